@@ -1,0 +1,43 @@
+# Two commands do all: `make fly` flies the spiral, `make test` runs every check. Both set up .venv from the lock.
+PYTHON ?= python3
+BIN := .venv/bin
+OUT ?= out/spiral
+
+.PHONY: setup fly test lint fuzz bench lock clean
+
+setup: .venv/.ready
+
+.venv/.ready: requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "colibri needs Python 3.11 or later: make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; exit 2; }
+	@echo "setting up .venv from requirements.lock (once, about a minute)"
+	@$(PYTHON) -m venv --clear .venv
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+fly: setup
+	$(BIN)/colibri fly spiral --out $(OUT)
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: lint
+	$(BIN)/python -m pytest -n 2
+
+fuzz: setup
+	$(BIN)/python -m tests.fuzz
+
+bench: setup
+	$(BIN)/colibri bench
+
+# The lock names versions and hashes, no registry. Needs uv.
+lock:
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
+	  --extra dev pyproject.toml -o requirements.lock
+
+clean:
+	rm -rf .venv out dist

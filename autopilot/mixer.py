@@ -1,0 +1,32 @@
+"""Thrust and moments -> rotor speeds within their limits: the inverse of THESIS [2.2]."""
+
+import numpy as np
+
+from autopilot.lpv import Array
+from plant.vehicle import Vehicle
+
+
+class Mixer:
+    """The inverse allocation of one vehicle."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        """Invert the allocation of `vehicle`."""
+        self._allocation = vehicle.allocation()
+        self._inverse = np.linalg.inv(self._allocation)
+        self._momentum = vehicle.rotor_momentum()
+        self._squared_max = vehicle.rotors.max_speed**2
+
+    def rotor_speeds(self, wrench: Array) -> Array:
+        """Return the rotor speeds (4,), in the vehicle's unit, that make U1 (N), U2, U3, U4 (N m), or come closest.
+
+        What one rotor cannot do is cut at that rotor's limit.
+        """
+        return np.sqrt(np.clip(self._inverse @ wrench, 0.0, self._squared_max))
+
+    def wrench(self, speeds: Array) -> Array:
+        """Return U1..U4 (4,) of rotor speeds (4,)."""
+        return self._allocation @ (speeds * speeds)
+
+    def momentum(self, speeds: Array) -> float:
+        """Return the rotors' angular momentum h along body z, N m s."""
+        return float(self._momentum @ speeds)

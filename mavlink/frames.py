@@ -1,0 +1,125 @@
+"""Rotations, and the only conversions between ENU/FLU (inside) and NED/FRD (the wire).
+
+Vectors and quaternions are tuples of floats: at these sizes they are several times faster than arrays, and they
+cannot be changed by whoever reads them. Quaternions are wxyz, Hamilton, and rotate body vectors into the earth frame.
+Euler angles are Z-Y'-X'': yaw psi, pitch theta, roll phi.
+"""
+
+from math import asin, atan2, cos, floor, pi, sin, sqrt
+from typing import TypeAlias
+
+Vector: TypeAlias = tuple[float, float, float]
+Quaternion: TypeAlias = tuple[float, float, float, float]
+Matrix: TypeAlias = tuple[Vector, Vector, Vector]
+
+_HALF_SQRT2 = sqrt(0.5)
+
+
+def ned_from_enu(vector: Vector) -> Vector:
+    """Convert an earth vector from ENU to NED, or from NED to ENU: the map is its own inverse."""
+    x, y, z = vector
+    return (y, x, -z)
+
+
+def frd_from_flu(vector: Vector) -> Vector:
+    """Convert a body vector from FLU to FRD, or from FRD to FLU: the map is its own inverse."""
+    x, y, z = vector
+    return (x, -y, -z)
+
+
+def ned_frd_from_enu_flu(q: Quaternion) -> Quaternion:
+    """Convert an attitude from ENU/FLU to NED/FRD, or back: the map is its own inverse.
+
+    In Euler angles: roll stays, pitch changes its sign, yaw becomes pi/2 - yaw.
+    """
+    w, x, y, z = q
+    return (_HALF_SQRT2 * (w + z), _HALF_SQRT2 * (x + y), _HALF_SQRT2 * (x - y), _HALF_SQRT2 * (w - z))
+
+
+def normalized(q: Quaternion) -> Quaternion:
+    """Scale a quaternion to unit length.
+
+    Raises:
+        ValueError: The quaternion is zero.
+    """
+    w, x, y, z = q
+    norm = sqrt(w * w + x * x + y * y + z * z)
+    if norm == 0.0:
+        raise ValueError("a zero quaternion is no rotation")
+    return (w / norm, x / norm, y / norm, z / norm)
+
+
+def product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Compose two rotations: the result turns a vector by `b` first, then by `a`."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
+
+
+def rotation_matrix(q: Quaternion) -> Matrix:
+    """Return R of THESIS [2.6], rows first: earth vector = R · body vector."""
+    w, x, y, z = q
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
+
+
+def earth_from_body(q: Quaternion, vector: Vector) -> Vector:
+    """Rotate a body vector into the earth frame."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation_matrix(q)
+    x, y, z = vector
+    return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
+
+
+def body_from_earth(q: Quaternion, vector: Vector) -> Vector:
+    """Rotate an earth vector into the body frame."""
+    w, x, y, z = q
+    return earth_from_body((w, -x, -y, -z), vector)
+
+
+def quaternion_from_euler(phi: float, theta: float, psi: float) -> Quaternion:
+    """Build the quaternion of roll `phi`, pitch `theta`, yaw `psi` (rad, Z-Y'-X'')."""
+    cr, sr = cos(0.5 * phi), sin(0.5 * phi)
+    cp, sp = cos(0.5 * theta), sin(0.5 * theta)
+    cy, sy = cos(0.5 * psi), sin(0.5 * psi)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def euler_from_quaternion(q: Quaternion) -> Vector:
+    """Return (phi, theta, psi) in rad of a unit quaternion: theta in [-pi/2, pi/2], phi and psi in (-pi, pi]."""
+    w, x, y, z = q
+    phi = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    theta = asin(min(1.0, max(-1.0, 2.0 * (w * y - x * z))))
+    psi = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return (phi, theta, psi)
+
+
+def euler_rates(phi: float, theta: float, rate: Vector) -> Vector:
+    """Return (phi', theta', psi') = T(phi, theta) · [p q r], THESIS [2.7]; singular at theta = ±pi/2.
+
+    Args:
+        phi: Roll, rad.
+        theta: Pitch, rad.
+        rate: Body rates p, q, r in FLU, rad/s.
+    """
+    p, q, r = rate
+    s, c = sin(phi), cos(phi)
+    swing = s * q + c * r
+    return (p + sin(theta) / cos(theta) * swing, c * q - s * r, swing / cos(theta))
+
+
+def nearest_turn(angle: float, reference: float) -> float:
+    """Add full turns to `angle` (rad) so that it lies within half a turn of `reference` (rad)."""
+    return angle - 2.0 * pi * floor((angle - reference) / (2.0 * pi) + 0.5)

@@ -1,0 +1,270 @@
+"""The lockstep conversation between plant and autopilot, its two ends as state machines without input or output.
+
+Datagrams and the wall-clock time go in, datagrams come out. The plant sends the frame of time t and advances only
+with the command that names t, so nothing that a link does to datagrams can change a flight:
+
+- a frame unanswered for `RESEND_AFTER_S` is sent again;
+- a repeated frame gets the remembered answer, so each frame is computed once;
+- what names another time than the one awaited is dropped.
+
+The autopilot calls the plant with one datagram: SET_MESSAGE_INTERVAL (how often it wants frames) and a HEARTBEAT. The
+plant begins with the first such call, and answers an autopilot that was started again where the flight stands.
+"""
+
+from collections import Counter
+from typing import NamedTuple, TypeAlias
+
+from mavlink import dialect
+from mavlink.dialect import Codec, Message
+from mavlink.hil import ActuatorCommand, StateFrame, decode_actuators, decode_state, encode_actuators, encode_state
+
+Address: TypeAlias = tuple[str, int]
+
+RESEND_AFTER_S = 0.02
+"""Wall-clock silence after which the plant sends its frame again."""
+PEER_LOST_AFTER_S = 0.5
+"""Wall-clock silence after which another autopilot may take over the plant."""
+CALL_AFTER_S = 1.0
+"""Wall-clock silence after which the autopilot calls the plant again, and would begin a new flight."""
+CALL_EVERY_S = 0.05
+HEARTBEAT_EVERY_US = 1_000_000
+MIN_FRAME_INTERVAL_US = 1_000
+MAX_FRAME_INTERVAL_US = 1_000_000
+
+
+class Outgoing(NamedTuple):
+    """A datagram to send, the address it goes to, and the frames that it is made of."""
+
+    frames: tuple[bytes, ...]
+    address: Address
+
+    @property
+    def datagram(self) -> bytes:
+        """The bytes to send."""
+        return b"".join(self.frames)
+
+
+class PlantEnd:
+    """The plant's end: offers a frame, waits for its answer.
+
+    Attributes:
+        peer: Where the autopilot is, None until one has called.
+        frame_interval_us: Time between frames; fixed once the first frame was offered.
+        resent: How many times a frame was sent again.
+        dropped: What was received and not used, by reason.
+        received: Frames of the autopilot that were understood, in order; the owner may log and clear it.
+    """
+
+    def __init__(self, *, system_id: int, frame_interval_us: int) -> None:
+        """Wait for the autopilot of `system_id`; `frame_interval_us` holds unless it asks for another."""
+        self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
+        self._autopilot = (system_id, dialect.AUTOPILOT_COMPONENT)
+        self.peer: Address | None = None
+        self.frame_interval_us = frame_interval_us
+        self.resent = 0
+        self.dropped: Counter[str] = self._codec.dropped
+        self.received: list[bytes] = []
+        self._peer_heard_s = 0.0
+        self._frames: tuple[bytes, ...] = ()
+        self._awaited_us: int | None = None
+        self._resend_at_s = 0.0
+        self._outbox: list[Outgoing] = []
+
+    def offer(self, frame: StateFrame, now_s: float) -> None:
+        """Send `frame` and await the command that answers it."""
+        frames = encode_state(self._codec, frame)
+        if frame.time_us % HEARTBEAT_EVERY_US == 0:
+            frames.append(_heartbeat(self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False))
+        self._frames = tuple(frames)
+        self._awaited_us = frame.time_us
+        self._send_frame(now_s)
+
+    def receive(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
+        """Take one datagram in; return the command that answers the frame awaited, if it holds that."""
+        command = None
+        for message in self._codec.decode(datagram):
+            if message.source != self._autopilot:
+                self.dropped["foreign"] += 1
+                continue
+            if message.name == "HEARTBEAT":
+                self._hear_heartbeat(sender, now_s)
+            elif message.name == "COMMAND_LONG":
+                self._obey(message, sender)
+            elif message.name == "HIL_ACTUATOR_CONTROLS" and sender == self.peer:
+                command = self._accept(message) or command
+            else:
+                self.dropped["unexpected"] += 1
+                continue
+            if sender == self.peer:
+                self._peer_heard_s = now_s
+                self.received.append(message.frame)
+        return command
+
+    def poll(self, now_s: float) -> float:
+        """Do what is due at `now_s`; return the time at which something will be due again."""
+        if self._awaited_us is None:
+            return now_s + RESEND_AFTER_S
+        if now_s >= self._resend_at_s:
+            self.resent += 1
+            self._send_frame(now_s)
+        return self._resend_at_s
+
+    def take_outbox(self) -> list[Outgoing]:
+        """Return the datagrams to send now, and forget them."""
+        outbox, self._outbox = self._outbox, []
+        return outbox
+
+    def _send_frame(self, now_s: float) -> None:
+        self._resend_at_s = now_s + RESEND_AFTER_S
+        if self.peer is not None:
+            self._outbox.append(Outgoing(self._frames, self.peer))
+
+    def _hear_heartbeat(self, sender: Address, now_s: float) -> None:
+        if sender == self.peer:
+            return
+        if self.peer is not None and now_s - self._peer_heard_s < PEER_LOST_AFTER_S:
+            self.dropped["second autopilot"] += 1
+            return
+        self.peer = sender
+        if self._awaited_us is not None:
+            self._send_frame(now_s)
+
+    def _obey(self, message: Message, sender: Address) -> None:
+        fields = message.fields
+        if (fields.target_system, fields.target_component) != self._codec.source:
+            self.dropped["foreign"] += 1
+            return
+        result = dialect.RESULT_UNSUPPORTED
+        if fields.command == dialect.CMD_SET_MESSAGE_INTERVAL and fields.param1 == dialect.MSG_ATTITUDE_QUATERNION:
+            result = self._set_frame_interval(fields.param2)
+        ack = self._codec.encode("COMMAND_ACK", fields.command, result, 0, 0, *message.source)
+        self._outbox.append(Outgoing((ack,), sender))
+
+    def _set_frame_interval(self, interval_us: float) -> int:
+        whole_ms = MIN_FRAME_INTERVAL_US <= interval_us <= MAX_FRAME_INTERVAL_US and interval_us % 1000 == 0
+        if not whole_ms:
+            return dialect.RESULT_DENIED
+        if self._awaited_us is not None and interval_us != self.frame_interval_us:
+            return dialect.RESULT_TEMPORARILY_REJECTED
+        self.frame_interval_us = int(interval_us)
+        return dialect.RESULT_ACCEPTED
+
+    def _accept(self, message: Message) -> ActuatorCommand | None:
+        command = decode_actuators(message)
+        if command is None:
+            self.dropped["invalid"] += 1
+        elif command.time_us != self._awaited_us:
+            self.dropped["repeated"] += 1
+            command = None
+        return command
+
+
+class AutopilotEnd:
+    """The autopilot's end: calls the plant, hands each new frame out once, remembers the last answer.
+
+    Attributes:
+        refused: The plant's refusal of the frame interval asked for (a MAV_RESULT), None if there was none.
+        repeated: How many frames came again and got the remembered answer.
+        dropped: What was received and not used, by reason.
+    """
+
+    def __init__(self, *, system_id: int, frame_interval_us: int, now_s: float) -> None:
+        """Speak as the autopilot of `system_id` and ask the plant for a frame every `frame_interval_us`."""
+        self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
+        self._plant = (system_id, dialect.PLANT_COMPONENT)
+        self._frame_interval_us = frame_interval_us
+        self.refused: int | None = None
+        self.repeated = 0
+        self.dropped: Counter[str] = self._codec.dropped
+        self._time_us: int | None = None
+        self._answer: bytes | None = None
+        self._heard_s = now_s - CALL_AFTER_S
+        self._call_at_s = now_s
+        self._outbox: list[bytes] = []
+
+    def silence_s(self, now_s: float) -> float:
+        """How long the plant has been silent."""
+        return now_s - self._heard_s
+
+    def receive(self, datagram: bytes, now_s: float) -> StateFrame | None:
+        """Take one datagram in; return its frame if that is the next one to compute."""
+        halves: dict[str, Message] = {}
+        for message in self._codec.decode(datagram):
+            if message.source != self._plant:
+                self.dropped["foreign"] += 1
+            elif message.name in ("ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"):
+                halves[message.name] = message
+            elif message.name == "COMMAND_ACK":
+                self._hear_ack(message)
+            elif message.name != "HEARTBEAT":
+                self.dropped["unexpected"] += 1
+        if not halves:
+            return None
+        frame = decode_state(halves["ATTITUDE_QUATERNION"], halves["LOCAL_POSITION_NED"]) if len(halves) == 2 else None
+        if frame is None:
+            self.dropped["invalid"] += 1
+            return None
+        return self._next(frame, now_s)
+
+    def answer(self, command: ActuatorCommand) -> None:
+        """Send the command that answers the frame handed out last, and remember it."""
+        answer = encode_actuators(self._codec, command)
+        if command.time_us % HEARTBEAT_EVERY_US == 0:
+            answer += self._heartbeat(command.armed)
+        self._answer = answer
+        self._outbox.append(answer)
+
+    def poll(self, now_s: float) -> float:
+        """Do what is due at `now_s`; return the time at which something will be due again."""
+        if self.silence_s(now_s) < CALL_AFTER_S:
+            return self._heard_s + CALL_AFTER_S
+        if now_s >= self._call_at_s:
+            self._call_at_s = now_s + CALL_EVERY_S
+            self._outbox.append(self._call())
+        return self._call_at_s
+
+    def take_outbox(self) -> list[bytes]:
+        """Return the datagrams to send to the plant now, and forget them."""
+        outbox, self._outbox = self._outbox, []
+        return outbox
+
+    def _next(self, frame: StateFrame, now_s: float) -> StateFrame | None:
+        lost = self.silence_s(now_s) >= CALL_AFTER_S
+        if frame.time_us == self._time_us:
+            self._heard_s = now_s
+            self.repeated += 1
+            if self._answer is not None:
+                self._outbox.append(self._answer)
+            return None
+        if self._time_us is not None and not lost and frame.time_us != self._time_us + self._frame_interval_us:
+            self.dropped["out of step"] += 1
+            return None
+        self._heard_s = now_s
+        self._time_us = frame.time_us
+        self._answer = None
+        return frame
+
+    def _hear_ack(self, message: Message) -> None:
+        fields = message.fields
+        refused = fields.command == dialect.CMD_SET_MESSAGE_INTERVAL and fields.result != dialect.RESULT_ACCEPTED
+        self.refused = fields.result if refused else None
+
+    def _call(self) -> bytes:
+        request = self._codec.encode(
+            "COMMAND_LONG",
+            *self._plant,
+            dialect.CMD_SET_MESSAGE_INTERVAL,
+            0,
+            dialect.MSG_ATTITUDE_QUATERNION,
+            self._frame_interval_us,
+            *[0.0] * 5,
+        )
+        return request + self._heartbeat(armed=False)
+
+    def _heartbeat(self, armed: bool) -> bytes:
+        return _heartbeat(self._codec, dialect.TYPE_QUADROTOR, dialect.AUTOPILOT_GENERIC, armed)
+
+
+def _heartbeat(codec: Codec, kind: int, autopilot: int, armed: bool) -> bytes:
+    mode = dialect.MODE_ARMED if armed else 0
+    return codec.encode("HEARTBEAT", kind, autopilot, mode, 0, dialect.STATE_ACTIVE, 3)

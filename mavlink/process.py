@@ -1,0 +1,116 @@
+"""What both processes share with the world: one-line errors, a clean end on a signal, status lines, log files."""
+
+import argparse
+import json
+import os
+import signal
+import struct
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Any, NoReturn, TextIO
+
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+
+STATUS_EVERY_S = 0.1
+"""Wall-clock time between progress events."""
+
+
+class ArgumentParser(argparse.ArgumentParser):
+    """A parser whose errors are one line and exit code 2."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and where to read on."""
+        fail(f"{message} (see {self.prog} --help)")
+
+
+def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
+    """End the process with one line on standard error."""
+    sys.stderr.write(f"colibri: error: {message}\n")
+    sys.stderr.flush()
+    raise SystemExit(code)
+
+
+class Stop:
+    """Becomes true when the process shall end: SIGINT, SIGTERM, or (if asked for) the death of its parent."""
+
+    def __init__(self, *, with_parent: bool = False) -> None:
+        """Take over SIGINT and SIGTERM."""
+        self._signalled = False
+        self._parent = os.getppid() if with_parent else None
+        signal.signal(signal.SIGINT, self._handle)
+        signal.signal(signal.SIGTERM, self._handle)
+
+    def __bool__(self) -> bool:
+        """Whether to end now."""
+        return self._signalled or (self._parent is not None and os.getppid() != self._parent)
+
+    def _handle(self, _signal: int, _frame: FrameType | None) -> None:
+        self._signalled = True
+
+
+class Status:
+    """Tells what the process is doing: lines for a person on standard error, or JSON lines on standard output."""
+
+    def __init__(self, name: str, *, as_json: bool) -> None:
+        """Speak as `name`."""
+        self._name = name
+        self._as_json = as_json
+
+    def say(self, event: str, text: str, **facts: Any) -> None:
+        """Report `event`: `text` for a person, `facts` for a program."""
+        if self._as_json:
+            sys.stdout.write(json.dumps({"event": event, "text": text, **facts}) + "\n")
+            sys.stdout.flush()
+        else:
+            sys.stderr.write(f"{self._name}: {text}\n")
+            sys.stderr.flush()
+
+
+class CsvLog:
+    """A CSV file written row by row; numbers keep every bit."""
+
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        """Create the file and its header."""
+        self._file: TextIO = open_for_writing(path)
+        self._file.write(",".join(columns) + "\n")
+
+    def write(self, row: Iterable[float | str]) -> None:
+        """Append a row."""
+        self._file.write(",".join([str(value) for value in row]) + "\n")
+
+    def close(self) -> None:
+        """Write out what is buffered and close."""
+        self._file.close()
+
+
+class TlogWriter:
+    """A telemetry log as ground stations write it: each frame behind its time, µs, as a big-endian integer."""
+
+    def __init__(self, path: Path) -> None:
+        """Create the file."""
+        try:
+            self._file = path.open("wb")
+        except OSError as error:
+            fail(f"cannot write {path}: {error.strerror}")
+
+    def write(self, time_us: int, frames: Iterable[bytes]) -> None:
+        """Append frames, all of simulated time `time_us`."""
+        stamp = struct.pack(">Q", time_us)
+        for frame in frames:
+            self._file.write(stamp + frame)
+
+    def close(self) -> None:
+        """Write out what is buffered and close."""
+        self._file.close()
+
+
+def open_for_writing(path: Path) -> TextIO:
+    """Open a text file for writing, its folder made where it is missing, or end with one line."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path.open("w", encoding="utf-8", newline="")
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror}")

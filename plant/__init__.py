@@ -1,0 +1,1 @@
+"""The vehicle that flies: its description, its nonlinear dynamics, and the process that integrates them."""

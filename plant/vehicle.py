@@ -1,0 +1,149 @@
+"""The airframe: numbers with units and source, read strictly from a TOML file."""
+
+from importlib.resources import files
+from math import isfinite, pi, sqrt
+from pathlib import Path
+from typing import Annotated, Literal, TypeAlias, TypeVar
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
+Array: TypeAlias = NDArray[np.float64]
+T = TypeVar("T")
+
+_RAD_S_PER_UNIT = {"rad/s": 1.0, "rpm": 2.0 * pi / 60.0}
+
+
+class VehicleError(Exception):
+    """A vehicle file that cannot be flown; the message names file and key."""
+
+
+class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The rigid body."""
+
+    mass_kg: Positive
+    inertia_kg_m2: tuple[Positive, Positive, Positive]
+    """Ix, Iy, Iz about the FLU axes."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        _check_finite(self.mass_kg, *self.inertia_kg_m2)
+        ix, iy, iz = sorted(self.inertia_kg_m2)
+        if ix + iy < iz:
+            raise ValueError("inertia_kg_m2: no body has one moment of inertia above the sum of the other two")
+
+
+class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The four rotors, all alike. Speeds and coefficients are in the file's own `speed_unit`."""
+
+    speed_unit: Literal["rad/s", "rpm"]
+    thrust_coefficient: Positive
+    """cT: thrust in N per speed unit squared."""
+    torque_coefficient: Positive
+    """cQ: drag torque in N m per speed unit squared."""
+    inertia_kg_m2: Positive
+    """J: moment of inertia of one rotor with its motor about its axis."""
+    max_speed: Positive
+    position_m: tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]
+    """x forward, y left of each rotor."""
+    direction: tuple[Literal["ccw", "cw"], Literal["ccw", "cw"], Literal["ccw", "cw"], Literal["ccw", "cw"]]
+    """Seen from above."""
+    gyroscopic_term: Literal["conserving", "as-printed"]
+    """`conserving` keeps angular momentum; `as-printed` has the thesis's sign, and takes the speed in its own unit."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        numbers = (self.thrust_coefficient, self.torque_coefficient, self.inertia_kg_m2, self.max_speed)
+        _check_finite(*numbers, *(metre for position in self.position_m for metre in position))
+        if np.linalg.matrix_rank(_allocation(self)) < len(self.position_m):
+            raise ValueError("position_m, direction: these rotors cannot turn the vehicle about every axis")
+
+
+class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A quadrotor, described in SI but for its rotor speeds (`rotors.speed_unit`)."""
+
+    name: str
+    gravity_m_s2: Positive
+    body: Body
+    rotors: Rotors
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        _check_finite(self.gravity_m_s2)
+        if self.hover_speed >= self.rotors.max_speed:
+            raise ValueError(f"rotors.max_speed: hover needs {self.hover_speed:.0f} {self.rotors.speed_unit}")
+
+    @property
+    def hover_speed(self) -> float:
+        """Rotor speed at which four rotors carry the weight."""
+        weight_n = self.body.mass_kg * self.gravity_m_s2
+        return sqrt(weight_n / (len(self.rotors.position_m) * self.rotors.thrust_coefficient))
+
+    def allocation(self) -> Array:
+        """Return the 4 x 4 matrix that maps squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2]."""
+        return _allocation(self.rotors)
+
+    def rotor_momentum(self) -> Array:
+        """Return the row (4,) that maps rotor speeds to their angular momentum along body z, N m s.
+
+        `conserving`: h = J (Ω1 - Ω2 + Ω3 - Ω4) with Ω in rad/s. `as-printed`: the thesis's +J Ω [2.8], opposite in
+        sign, and Ω in the file's unit.
+        """
+        spin = _spin(self.rotors) * self.rotors.inertia_kg_m2
+        if self.rotors.gyroscopic_term == "as-printed":
+            return -spin
+        return spin * _RAD_S_PER_UNIT[self.rotors.speed_unit]
+
+
+def vehicle_names() -> list[str]:
+    """Return the names of the vehicles that come with Colibri."""
+    return sorted(entry.name.removesuffix(".toml") for entry in files("plant").joinpath("vehicles").iterdir())
+
+
+def load_vehicle(name_or_path: str) -> Vehicle:
+    """Read a vehicle by its name, or from a file if the argument ends in `.toml`.
+
+    Raises:
+        VehicleError: There is no such vehicle, or the file has a missing, unknown or impossible key.
+    """
+    if name_or_path.endswith(".toml"):
+        return read_toml(Path(name_or_path), Vehicle, VehicleError)
+    if name_or_path not in vehicle_names():
+        raise VehicleError(f"unknown vehicle {name_or_path}: choose {', '.join(vehicle_names())} or a .toml file")
+    return read_toml(Path(str(files("plant").joinpath("vehicles", f"{name_or_path}.toml"))), Vehicle, VehicleError)
+
+
+def read_toml(path: Path, kind: type[T], error: type[Exception]) -> T:
+    """Read a TOML file into a strict structure.
+
+    Raises:
+        error: The file cannot be read, or has a missing, unknown or impossible key; names file and key.
+    """
+    try:
+        return msgspec.toml.decode(path.read_bytes(), type=kind)
+    except OSError as reason:
+        raise error(f"{path}: {reason.strerror}") from reason
+    except msgspec.ValidationError as reason:
+        what, _, where = str(reason).partition(" - at `$.")
+        key = where.rstrip("`")
+        raise error(f"{path}: {key}: {what}" if key else f"{path}: {what}") from reason
+    except (msgspec.DecodeError, UnicodeDecodeError, ValueError) as reason:
+        raise error(f"{path}: {reason}") from reason
+
+
+def _allocation(rotors: Rotors) -> Array:
+    x, y = np.array(rotors.position_m).T
+    thrust = np.full(len(x), rotors.thrust_coefficient)
+    return np.array([thrust, thrust * y, -thrust * x, -_spin(rotors) * rotors.torque_coefficient])
+
+
+def _spin(rotors: Rotors) -> Array:
+    """Return +1 for a rotor that turns counter-clockwise seen from above, -1 for the others."""
+    return np.array([1.0 if direction == "ccw" else -1.0 for direction in rotors.direction])
+
+
+def _check_finite(*numbers: float) -> None:
+    if not all(map(isfinite, numbers)):
+        raise ValueError("every number must be finite")

@@ -1,0 +1,1 @@
+"""The command line: fly both processes and report, draw, measure."""
