@@ -74,10 +74,10 @@ class AttitudeMpc:
         phi, theta, psi = euler
         phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, rate)
         A, B = attitude_model(phi_rate, theta_rate, rotor_momentum_n_m_s, inertia_kg_m2=self._inertia)
-        Ad, Bd = discretise(A, B, self._interval_s, self._settings.discretisation)
+        model = augment(discretise(A, B, self._interval_s, self._settings.discretisation), OUTPUT)
         x = np.array([phi, phi_rate, theta, theta_rate, psi, psi_rate, *moment_n_m])
         references = np.broadcast_to(np.array(reference), (horizon, 3))
-        qp = condense(*augment(Ad, Bd, OUTPUT), horizon, x, references, self._weights)
+        qp = condense(model, horizon, x, references, self._weights)
         bound = np.tile(self._largest_increment, horizon)
         started_s = self._clock()
         result = self._solver.solve(qp.H, qp.f, -bound, bound)
@@ -89,4 +89,5 @@ class AttitudeMpc:
 def _largest_moments(vehicle: Vehicle) -> Array:
     """Return the largest moment that the rotors can make about each axis, N m, (3,)."""
     squared_max = vehicle.rotors.max_speed**2
-    return np.clip(vehicle.allocation()[1:] * squared_max, 0.0, None).sum(axis=1)
+    largest: Array = np.clip(vehicle.allocation()[1:] * squared_max, 0.0, None).sum(axis=1)
+    return largest

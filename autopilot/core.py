@@ -30,11 +30,12 @@ class Autopilot:
             SolverError: The profile's solver cannot be used.
         """
         self._interval_us = profile.control_interval_us
-        self._start_speed = profile.simulation.rotor_speed
+        self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._vehicle = vehicle
         self._clock = clock
-        self._planner = SampledPlanner(track, profile.control_interval_s * profile.position.samples)
         self._controller = Cascade(profile, vehicle, clock)
+        outer_interval_s = profile.control_interval_s * profile.position.samples
+        self._planner = SampledPlanner(track, outer_interval_s, self._controller.preview)
         self._memory: Memory | None = None
         self._time_us = 0
         self._yaw_rad = 0.0
@@ -46,7 +47,7 @@ class Autopilot:
         rotor speed at time 0, and with hover in mid-flight, where nothing is known of the rotors.
         """
         started_s = self._clock()
-        references = self._planner.horizon(frame.time_us, self._controller.preview)
+        references = self._planner.horizon(frame.time_us)
         if self._memory is None or frame.time_us != self._time_us + self._interval_us:
             speed = self._start_speed if frame.time_us == 0 else self._vehicle.hover_speed
             self._memory = self._controller.initial(speed)

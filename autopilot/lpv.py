@@ -39,16 +39,13 @@ def attitude_model(
     return A, B
 
 
-def discretise(A: Array, B: Array, interval_s: float, method: Discretisation) -> tuple[Array, Array]:
-    """Return (Ad, Bd) of x[k+1] = Ad x[k] + Bd u[k].
+def discretise(A: Array, B: Array, interval_s: float, method: Discretisation) -> Array:
+    """Return [[Ad, Bd], [0, I]] of x[k+1] = Ad x[k] + Bd u[k], (n + m, n + m).
 
-    Zero-order hold is exact for an input held over `interval_s` (Van Loan, 1978: one matrix exponential of
-    [[A, B], [0, 0]]); forward Euler is its first-order term.
+    Zero-order hold is exact for an input held over `interval_s`: the exponential of [[A, B], [0, 0]] (Van Loan, 1978);
+    forward Euler is its first-order term. The block is at once the Ã of a model in input increments.
     """
     n, m = B.shape
-    if method == "forward-euler":
-        return np.eye(n) + interval_s * A, interval_s * B
     block = np.zeros((n + m, n + m))
-    block[:n, :n], block[:n, n:] = A, B
-    exponential = expm(interval_s * block)
-    return exponential[:n, :n], exponential[:n, n:]
+    block[:n, :n], block[:n, n:] = interval_s * A, interval_s * B
+    return expm(block) if method == "zero-order-hold" else np.eye(n + m) + block

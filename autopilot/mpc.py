@@ -23,42 +23,55 @@ class CondensedQp(NamedTuple):
     f: Array
 
 
-def augment(A: Array, B: Array, C: Array) -> tuple[Array, Array, Array]:
-    """Append the last input to the state, so that the decision is its increment.
+class IncrementModel(NamedTuple):
+    """A model whose state x̃ = [x; u₋₁] holds the last input, so that the decision is its increment.
 
-    x̃ = [x; u₋₁], Ã = [[A, B], [0, I]], B̃ = [B; I], C̃ = [C, 0].
+    Ã = [[A, B], [0, I]], B̃ = [B; I], C̃ = [C, 0].
     """
-    n, m = B.shape
-    A_augmented = np.block([[A, B], [np.zeros((m, n)), np.eye(m)]])
-    return A_augmented, np.vstack([B, np.eye(m)]), np.hstack([C, np.zeros((C.shape[0], m))])
+
+    A: Array
+    B: Array
+    C: Array
 
 
-def condense(A: Array, B: Array, C: Array, horizon: int, x: Array, reference: Array, weights: Weights) -> CondensedQp:
+def augment(transition: Array, C: Array) -> IncrementModel:
+    """Return the increment model of a discretised model [[Ad, Bd], [0, I]], (n + m, n + m), and its output C, (p, n).
+
+    The transition is Ã as it stands, and its last m columns are B̃.
+    """
+    outputs, n = C.shape
+    inputs = len(transition) - n
+    return IncrementModel(transition, transition[:, n:], np.hstack([C, np.zeros((outputs, inputs))]))
+
+
+def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, weights: Weights) -> CondensedQp:
     """Eliminate the states: outputs over the horizon are an affine function of the increments.
 
     With Y = Phi x + Gamma Δu: H = Gammaᵀ Q̄ Gamma + R̄ and f = Gammaᵀ Q̄ (Phi x - r), THESIS [3.20] with C folded in.
 
     Args:
-        A: Augmented Ã, (n, n).
-        B: Augmented B̃, (n, m).
-        C: Augmented C̃, (p, n).
+        model: The increment model; n states, m inputs, p outputs.
         horizon: N, number of steps.
         x: Present augmented state, (n,).
         reference: r, the output wanted at each step, (N, p).
         weights: Diagonals of Q, S (p,) and R (m,).
     """
-    p, m = C.shape[0], B.shape[1]
-    rows = np.empty((horizon + 1, p, A.shape[0]))
-    rows[0] = C
+    p, m = model.C.shape[0], model.B.shape[1]
+    responses = np.empty((horizon + 1, *model.C.shape))
+    responses[0] = model.C
     for step in range(horizon):
-        rows[step + 1] = rows[step] @ A
-    markov = rows[:horizon] @ B
+        np.matmul(responses[step], model.A, out=responses[step + 1])
+    Phi = responses[1:].reshape(horizon * p, -1)
+    markov = (responses[:horizon] @ model.B).reshape(horizon * p, m)
     Gamma = np.zeros((horizon * p, horizon * m))
     for column in range(horizon):
-        Gamma[column * p :, column * m : (column + 1) * m] = markov[: horizon - column].reshape(-1, m)
-    Phi = rows[1:].reshape(horizon * p, -1)
-    Q = np.concatenate([*[weights.output] * (horizon - 1), weights.terminal])
-    weighted = Gamma.T * Q
+        Gamma[column * p :, column * m : (column + 1) * m] = markov[: (horizon - column) * p]
+    weighted = Gamma.T * _along(horizon, weights)
     H = weighted @ Gamma
-    H[np.diag_indices_from(H)] += np.tile(weights.increment, horizon)
+    H.flat[:: horizon * m + 1] += np.concatenate([weights.increment] * horizon)
     return CondensedQp(0.5 * (H + H.T), weighted @ (Phi @ x - reference.ravel()))
+
+
+def _along(horizon: int, weights: Weights) -> Array:
+    """Return the diagonal of Q̄: Q at every step, S at the last."""
+    return np.concatenate([weights.output] * (horizon - 1) + [weights.terminal])

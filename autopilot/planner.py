@@ -33,26 +33,27 @@ class SampledPlanner:
     for the first sample's, which is the tangent of a circle about the origin. After the end it holds the last point.
     """
 
-    def __init__(self, track: Track, interval_s: float) -> None:
-        """Sample `track` every `interval_s` over its duration."""
-        times = interval_s * np.arange(round(DURATION_S / interval_s) + 1)
+    def __init__(self, track: Track, interval_s: float, preview: int) -> None:
+        """Sample `track` every `interval_s` over its duration; horizons hold `preview` references."""
+        times: Array = interval_s * np.arange(round(DURATION_S / interval_s) + 1, dtype=np.float64)
+        position = track(times)
         self._interval_s = interval_s
-        self._position = track(times)
-        self._velocity = _differences(self._position, interval_s)
-        self._yaw = _yaw(self._position)
+        self._interval_us = round(interval_s * 1e6)
+        self._preview = preview
+        self._last = len(times)
+        self._position = np.pad(position, ((0, preview), (0, 0)), mode="edge")
+        self._velocity = np.pad(_differences(position, interval_s), ((0, preview), (0, 0)))
+        self._yaw = np.pad(_yaw(position), (0, preview), mode="edge")
 
-    def horizon(self, time_us: int, count: int) -> Horizon:
-        """Return the reference of the sample that `time_us` lies in, and the `count` - 1 that follow it."""
-        first = int(time_us // round(self._interval_s * 1e6))
-        last = len(self._yaw) - 1
-        wanted = np.arange(first, first + count)
-        index = np.minimum(wanted, last)
-        velocity = np.where((wanted > last)[:, None], 0.0, self._velocity[index])
-        return Horizon(self._interval_s, self._position[index], velocity, self._yaw[index])
+    def horizon(self, time_us: int) -> Horizon:
+        """Return the reference of the sample that `time_us` lies in, and those that follow it."""
+        first = min(time_us // self._interval_us, self._last)
+        ahead = slice(first, first + self._preview)
+        return Horizon(self._interval_s, self._position[ahead], self._velocity[ahead], self._yaw[ahead])
 
 
 def _differences(position: Array, interval_s: float) -> Array:
-    backward = np.diff(position, axis=0) / interval_s
+    backward: Array = np.diff(position, axis=0) / interval_s
     velocity = np.concatenate([backward[:1], backward])
     velocity[:, 2] = np.round(velocity[:, 2], _VERTICAL_SPEED_DECIMALS)
     return velocity

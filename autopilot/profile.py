@@ -63,8 +63,8 @@ class SimulationSettings(_Table, frozen=True, forbid_unknown_fields=True, kw_onl
     vehicle: str
     integrator: Literal["rk4", "adaptive"]
     position_enu_m: tuple[float, float, float]
-    rotor_speed: Annotated[float, msgspec.Meta(ge=0.0)]
-    """Of every rotor, in the vehicle's unit."""
+    rotor_speed_rpm: Annotated[float, msgspec.Meta(ge=0.0)]
+    """Of every rotor, in turns per minute."""
 
 
 class Profile(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):

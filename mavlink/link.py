@@ -6,7 +6,7 @@ from time import perf_counter
 
 Address = tuple[str, int]
 
-SPIN_S = 100e-6
+SPIN_S = 500e-6
 """How long to look for a datagram before going to sleep: on loopback a wake-up costs more than the exchange."""
 _LARGEST_DATAGRAM = 4096
 

@@ -134,7 +134,7 @@ class PlantEnd:
         if (fields.target_system, fields.target_component) != self._codec.source:
             self.dropped["foreign"] += 1
             return
-        result = dialect.RESULT_UNSUPPORTED
+        result: int = dialect.RESULT_UNSUPPORTED
         if fields.command == dialect.CMD_SET_MESSAGE_INTERVAL and fields.param1 == dialect.MSG_ATTITUDE_QUATERNION:
             result = self._set_frame_interval(fields.param2)
         ack = self._codec.encode("COMMAND_ACK", fields.command, result, 0, 0, *message.source)

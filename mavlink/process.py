@@ -6,16 +6,16 @@ import os
 import signal
 import struct
 import sys
+from argparse import ArgumentTypeError
 from collections.abc import Iterable, Sequence
+from math import inf, isfinite
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn, TextIO
 
+EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
-
-STATUS_EVERY_S = 0.1
-"""Wall-clock time between progress events."""
 
 
 class ArgumentParser(argparse.ArgumentParser):
@@ -24,6 +24,36 @@ class ArgumentParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and where to read on."""
         fail(f"{message} (see {self.prog} --help)")
+
+
+def use_one_thread() -> None:
+    """Keep linear algebra to one thread: at a dozen states the others only spin, on the cores that the flight needs.
+
+    To be called before numpy is loaded.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
+def number(text: str) -> float:
+    """Read a finite number of the command line."""
+    value = float(text)
+    if not isfinite(value):
+        raise ValueError
+    return value
+
+
+def positive(text: str) -> float:
+    """Read a number above zero of the command line."""
+    value = number(text)
+    if value <= 0.0:
+        raise ArgumentTypeError(f"must be above zero, not {text}")
+    return value
+
+
+def speed(text: str) -> float:
+    """Read how many times real time to fly: a number above zero, or `max`."""
+    return inf if text == "max" else positive(text)
 
 
 def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
@@ -57,16 +87,34 @@ class Status:
     def __init__(self, name: str, *, as_json: bool) -> None:
         """Speak as `name`."""
         self._name = name
-        self._as_json = as_json
+        self.as_json = as_json
 
     def say(self, event: str, text: str, **facts: Any) -> None:
         """Report `event`: `text` for a person, `facts` for a program."""
-        if self._as_json:
+        if self.as_json:
             sys.stdout.write(json.dumps({"event": event, "text": text, **facts}) + "\n")
             sys.stdout.flush()
         else:
             sys.stderr.write(f"{self._name}: {text}\n")
             sys.stderr.flush()
+
+
+class Progress:
+    """Reports how far a flight is, often to a program and seldom to a person."""
+
+    def __init__(self, status: Status) -> None:
+        """Report through `status`."""
+        self._status = status
+        self._every_s = 0.1 if status.as_json else 2.0
+        self._due_s = self._every_s
+
+    def report(self, sim_time_s: float, wall_time_s: float) -> None:
+        """Report, if it is time to."""
+        if wall_time_s < self._due_s:
+            return
+        self._due_s = wall_time_s + self._every_s
+        text = f"t = {sim_time_s:.1f} s, {sim_time_s / wall_time_s:.0f} times real time"
+        self._status.say("progress", text, sim_time_s=sim_time_s, wall_time_s=wall_time_s)
 
 
 class CsvLog:

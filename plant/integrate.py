@@ -1,18 +1,23 @@
 """Two ways to integrate x' = f(x) over a frame: fixed-step Runge-Kutta 4, and adaptive Dormand-Prince 4(5)."""
 
 from collections.abc import Callable, Sequence
+from math import isfinite
 from typing import Literal, TypeAlias
+from warnings import catch_warnings, simplefilter
 
 Derivative: TypeAlias = Callable[[Sequence[float]], list[float]]
+Solver: TypeAlias = Callable[[Derivative, Sequence[float], float], list[float]]
+"""(f, state, duration in s) -> state after it."""
 Integrator: TypeAlias = Literal["rk4", "adaptive"]
 
 RK4_STEP_S = 0.001
-RELATIVE_TOLERANCE = 1e-10
+RELATIVE_TOLERANCE = 1e-9
 ABSOLUTE_TOLERANCE = 1e-12
+_MOST_STEPS = 10_000
 
 
 class IntegrationError(Exception):
-    """The adaptive integrator found no step small enough: the state has left what the model describes."""
+    """The state cannot be integrated any further."""
 
 
 def runge_kutta_4(f: Derivative, state: Sequence[float], duration_s: float) -> list[float]:
@@ -29,24 +34,27 @@ def runge_kutta_4(f: Derivative, state: Sequence[float], duration_s: float) -> l
     return x
 
 
-def dormand_prince(f: Derivative, state: Sequence[float], duration_s: float) -> list[float]:
-    """Integrate with the embedded 4(5) pair of Dormand and Prince (Hairer's dopri5) to a tight tolerance.
+def dormand_prince() -> Solver:
+    """Return the embedded 4(5) pair of Dormand and Prince (Hairer's dopri5), held to a tight tolerance.
 
-    Raises:
-        IntegrationError: No step was small enough.
+    The solver raises IntegrationError where no step is small enough.
     """
-    from scipy.integrate import ode
+    from scipy.integrate import ode  # slow to load, and Runge-Kutta does without
 
-    solver = ode(lambda _t, x: f(x.tolist()))
-    solver.set_integrator("dopri5", rtol=RELATIVE_TOLERANCE, atol=ABSOLUTE_TOLERANCE, nsteps=100_000)
-    solver.set_initial_value(list(state), 0.0)
-    end: list[float] = solver.integrate(duration_s).tolist()
-    if not solver.successful():
-        raise IntegrationError(f"Dormand-Prince stopped after {solver.t:.6f} of {duration_s:.6f} s")
-    return end
+    def integrate(f: Derivative, state: Sequence[float], duration_s: float) -> list[float]:
+        problem = ode(lambda _t, x: f(x.tolist()))
+        problem.set_integrator("dopri5", rtol=RELATIVE_TOLERANCE, atol=ABSOLUTE_TOLERANCE, nsteps=_MOST_STEPS)
+        problem.set_initial_value(list(state), 0.0)
+        with catch_warnings():
+            simplefilter("ignore")
+            end: list[float] = problem.integrate(duration_s).tolist()
+        if not problem.successful() or not all(map(isfinite, end)):
+            raise IntegrationError("the state has left what the model describes: no step is small enough")
+        return end
+
+    return integrate
 
 
-INTEGRATORS: dict[Integrator, Callable[[Derivative, Sequence[float], float], list[float]]] = {
-    "rk4": runge_kutta_4,
-    "adaptive": dormand_prince,
-}
+def solver(name: Integrator) -> Solver:
+    """Return the solver of that name."""
+    return dormand_prince() if name == "adaptive" else runge_kutta_4

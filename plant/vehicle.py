@@ -81,6 +81,10 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         weight_n = self.body.mass_kg * self.gravity_m_s2
         return sqrt(weight_n / (len(self.rotors.position_m) * self.rotors.thrust_coefficient))
 
+    def speed_from_rpm(self, rpm: float) -> float:
+        """Convert a rotor speed from turns per minute to the vehicle's unit."""
+        return rpm * _RAD_S_PER_UNIT["rpm"] / _RAD_S_PER_UNIT[self.rotors.speed_unit]
+
     def allocation(self) -> Array:
         """Return the 4 x 4 matrix that maps squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2]."""
         return _allocation(self.rotors)

@@ -1,12 +1,11 @@
 """The world: vehicle, rotors and time, advanced one frame at a time. A pure composition: (world, command) -> world."""
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 from mavlink.frames import Quaternion, Vector, earth_from_body, normalized, quaternion_from_euler
 from mavlink.hil import ActuatorCommand, StateFrame
-from plant.dynamics import attitude_of, derivative
-from plant.integrate import INTEGRATORS, Integrator
+from plant.dynamics import attitude_of, rigid_body
+from plant.integrate import Integrator, solver
 from plant.rotors import Rotors, RotorSpeeds
 from plant.vehicle import Vehicle
 
@@ -41,19 +40,20 @@ class Physics:
     def __init__(self, vehicle: Vehicle, integrator: Integrator) -> None:
         """Fly `vehicle`, integrated by `integrator`."""
         self._rotors = Rotors(vehicle)
-        self._integrate = INTEGRATORS[integrator]
-        self._derivative = partial(
-            derivative,
-            mass_kg=vehicle.body.mass_kg,
-            gravity_m_s2=vehicle.gravity_m_s2,
-            inertia_kg_m2=vehicle.body.inertia_kg_m2,
-        )
+        self._integrate = solver(integrator)
+        self._gravity_m_s2 = vehicle.gravity_m_s2
+        self._body = vehicle.body
 
     def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
         """Advance by `duration_us` with the rotors at `command`, at rest where it is not armed."""
         speeds = self._rotors.speeds(command.controls) if command.armed else (0.0, 0.0, 0.0, 0.0)
-        wrench = self._rotors.wrench(speeds)
-        end = self._integrate(lambda x: self._derivative(x, wrench), world.state, duration_us * 1e-6)
+        f = rigid_body(
+            self._rotors.wrench(speeds),
+            mass_kg=self._body.mass_kg,
+            gravity_m_s2=self._gravity_m_s2,
+            inertia_kg_m2=self._body.inertia_kg_m2,
+        )
+        end = self._integrate(f, world.state, duration_us * 1e-6)
         state = (*end[:9], *normalized(attitude_of(end)))
         return replace(world, time_us=world.time_us + duration_us, state=state, rotor_speeds=speeds)
 

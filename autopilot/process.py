@@ -1,0 +1,121 @@
+"""The autopilot as a process: calls a plant over a link, answers its frames, logs what it decided."""
+
+import argparse
+from pathlib import Path
+from time import perf_counter
+
+import msgspec
+
+from autopilot.core import Autopilot, Step
+from autopilot.profile import Profile, ProfileError, load_profile
+from autopilot.qp import QpStatus, SolverError
+from autopilot.tracks import TrackError, track
+from mavlink.link import LinkError, UdpLink
+from mavlink.lockstep import AutopilotEnd
+from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Status, Stop, fail
+from plant.vehicle import Vehicle, VehicleError, load_vehicle
+
+DECISION_COLUMNS = ("t", "phi_ref", "theta_ref", "psi_ref", "qp_solved", "solve_time_us", "control_step_us")
+
+_SILENCE_SAID_AFTER_S = 2.0
+_WAIT_AT_MOST_S = 0.1
+
+
+class AutopilotLog:
+    """What the autopilot writes: one row a control sample."""
+
+    def __init__(self, folder: Path) -> None:
+        """Create `autopilot.csv` in `folder`."""
+        self._decisions = CsvLog(folder / "autopilot.csv", DECISION_COLUMNS)
+
+    def write(self, step: Step) -> None:
+        """Append a control sample."""
+        decision = step.decision
+        solved = int(decision.qp_status is QpStatus.SOLVED)
+        times_us = (decision.solve_time_s * 1e6, step.duration_s * 1e6)
+        self._decisions.write((step.command.time_us / 1e6, *decision.reference, solved, *times_us))
+
+    def close(self) -> None:
+        """Close the file."""
+        self._decisions.close()
+
+
+def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
+    """Fly the plant at the other end of `link` as the command line says; return the exit code."""
+    try:
+        profile, vehicle = configuration(args.profile, args.vehicle, args.solver)
+        autopilot = Autopilot(profile, vehicle, track(args.track), perf_counter)
+    except (ProfileError, VehicleError, TrackError, SolverError) as error:
+        fail(str(error))
+    log = AutopilotLog(args.out) if args.out else None
+    end = AutopilotEnd(system_id=args.system_id, frame_interval_us=profile.control_interval_us, now_s=perf_counter())
+    try:
+        Client(link, end, status, stop, log).fly(autopilot)
+    except LinkError as error:
+        fail(str(error), EXIT_FAILED)
+    finally:
+        link.close()
+        if log:
+            log.close()
+    return EXIT_INTERRUPTED
+
+
+def configuration(profile_name: str, vehicle_name: str | None, solver: str | None) -> tuple[Profile, Vehicle]:
+    """Read the profile, with another solver if one is named, and the vehicle to control, by default the profile's.
+
+    Raises:
+        ProfileError: The profile cannot be read.
+        VehicleError: The vehicle cannot be read.
+    """
+    profile = load_profile(profile_name)
+    if solver:
+        profile = msgspec.structs.replace(profile, qp=msgspec.structs.replace(profile.qp, solver=solver))
+    return profile, load_vehicle(vehicle_name or profile.simulation.vehicle)
+
+
+class Client:
+    """Drives the autopilot's end of the conversation over a link."""
+
+    def __init__(self, link: UdpLink, end: AutopilotEnd, status: Status, stop: Stop, log: AutopilotLog | None) -> None:
+        """Serve `end` on `link` until `stop`."""
+        self._link = link
+        self._end = end
+        self._status = status
+        self._stop = stop
+        self._log = log
+        self._heard = False
+        self._refusal_said = False
+
+    def fly(self, autopilot: Autopilot) -> None:
+        """Answer every frame until told to stop."""
+        self._status.say("calling", "waiting for the plant at " + self._link.url.removeprefix("udpout:"))
+        due_s = 0.0
+        while not self._stop:
+            received = self._link.receive(min(max(0.0, due_s - perf_counter()), _WAIT_AT_MOST_S))
+            step = self._answer(autopilot, received[0]) if received else None
+            due_s = self._end.poll(perf_counter())
+            for datagram in self._end.take_outbox():
+                self._link.send(datagram)
+            if step and self._log:
+                self._log.write(step)  # while the plant integrates
+            self._say_what_changed()
+
+    def _answer(self, autopilot: Autopilot, datagram: bytes) -> Step | None:
+        frame = self._end.receive(datagram, perf_counter())
+        if frame is None:
+            return None
+        step = autopilot.step(frame)
+        self._end.answer(step.command)
+        return step
+
+    def _say_what_changed(self) -> None:
+        silent = self._end.silence_s(perf_counter()) > _SILENCE_SAID_AFTER_S
+        if not self._heard and not silent:
+            self._heard = True
+            self._status.say("flying", "the plant sends frames")
+        elif self._heard and silent:
+            self._heard = False
+            self._status.say("silence", f"no frame for {_SILENCE_SAID_AFTER_S:.0f} s, waiting for a plant")
+        if self._end.refused is not None and not self._refusal_said:
+            self._refusal_said = True
+            self._status.say("refused", "the plant flies at another frame rate, and will not change it in mid-flight")

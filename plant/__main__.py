@@ -1,0 +1,60 @@
+"""`python -m plant`: the command line of the plant. It listens before it loads what takes time to load."""
+
+import sys
+from math import inf
+from pathlib import Path
+
+from mavlink.link import LinkError, open_link
+from mavlink.process import ArgumentParser, Status, Stop, fail, number, positive, speed, use_one_thread
+
+DEFAULT_LINK = "udpin:127.0.0.1:14560"
+
+
+def _parser() -> ArgumentParser:
+    parser = ArgumentParser(
+        prog="python -m plant",
+        description="The quadrotor and its world: integrates the nonlinear vehicle, sends its state and takes rotor "
+        "commands over MAVLink/UDP. In lockstep: it waits for each answer, however long that takes. "
+        "Start `python -m autopilot` in another terminal, before or after.",
+        epilog="Example: python -m plant --duration 100 --out out/flight",
+    )
+    add = parser.add_argument
+    add("--link", default=DEFAULT_LINK, metavar="URL", help="where to wait for the autopilot (default %(default)s)")
+    add("--vehicle", default="hummingbird-thesis", metavar="NAME", help="vehicle name or .toml (default %(default)s)")
+    add(
+        "--integrator",
+        default="adaptive",
+        choices=("rk4", "adaptive"),
+        help="rk4: fixed steps of 1 ms; adaptive: Dormand-Prince to 1e-9 (default)",
+    )
+    add("--position", type=number, nargs=3, default=(0.0, -1.0, 0.0), metavar=("X", "Y", "Z"), help="start, m, ENU")
+    add("--yaw", type=number, default=1.5707963267948966, metavar="RAD", help="start yaw from east (default pi/2)")
+    add("--rotor-rpm", type=number, default=3000.0, metavar="RPM", help="start speed of every rotor (default 3000)")
+    add("--rate", type=positive, default=250.0, metavar="HZ", help="frames, if the autopilot asks for no other rate")
+    add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
+    add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")
+    add("--system-id", type=int, default=1, choices=range(1, 256), metavar="ID", help="MAVLink system (default 1)")
+    add("--out", type=Path, metavar="DIR", help="write plant.csv (truth at every frame) and flight.tlog there")
+    add("--json", action="store_true", help="status as JSON lines on standard output")
+    add("--with-parent", action="store_true", help="end when the process that started this one ends")
+    return parser
+
+
+def main() -> int:
+    """Run the plant; return the exit code."""
+    args = _parser().parse_args()
+    use_one_thread()
+    stop = Stop(with_parent=args.with_parent)
+    status = Status("plant", as_json=args.json)
+    try:
+        link = open_link(args.link)
+    except LinkError as error:
+        fail(str(error))
+    status.say("listening", f"waiting for an autopilot on {link.url}", url=link.url)
+    from plant.process import run
+
+    return run(args, link, status, stop)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,163 @@
+"""The plant as a process: a lockstep server on a link, driven by the wall clock, with its logs."""
+
+import argparse
+from math import isfinite
+from pathlib import Path
+from time import perf_counter, sleep
+
+from mavlink.hil import ActuatorCommand
+from mavlink.link import LinkError, UdpLink
+from mavlink.lockstep import Outgoing, PlantEnd
+from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Progress, Status, Stop, TlogWriter, fail
+from plant.dynamics import STATE
+from plant.integrate import IntegrationError
+from plant.vehicle import Vehicle, VehicleError, load_vehicle
+from plant.world import Physics, World, state_frame, world_at_rest
+
+TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4")
+
+_SILENCE_SAID_AFTER_S = 2.0
+_WAIT_AT_MOST_S = 0.1
+
+
+def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
+    """Serve one flight on `link` as the command line says; return the exit code."""
+    try:
+        vehicle = load_vehicle(args.vehicle)
+        world = world_at_rest(tuple(args.position), args.yaw, start_speed(vehicle, args.rotor_rpm))
+    except VehicleError as error:
+        fail(str(error))
+    physics = Physics(vehicle, args.integrator)
+    logs = PlantLogs(args.out) if args.out else None
+    end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000)
+    server = Server(link, end, status, stop, logs)
+    try:
+        server.fly(world, physics, duration_s=args.duration, speed=args.speed)
+    except (IntegrationError, LinkError) as error:
+        fail(str(error), EXIT_FAILED)
+    finally:
+        link.close()
+        if logs:
+            logs.close()
+    return EXIT_INTERRUPTED if stop else 0
+
+
+def start_speed(vehicle: Vehicle, rpm: float) -> float:
+    """Return `rpm` in the vehicle's unit.
+
+    Raises:
+        VehicleError: Its rotors never turn at that speed.
+    """
+    speed = vehicle.speed_from_rpm(rpm)
+    if not 0.0 <= speed <= vehicle.rotors.max_speed:
+        raise VehicleError(f"the rotors of {vehicle.name} cannot start at {rpm:g} rpm")
+    return speed
+
+
+class PlantLogs:
+    """What the plant writes: the truth at every frame, and every MAVLink frame."""
+
+    def __init__(self, folder: Path) -> None:
+        """Create `plant.csv` and `flight.tlog` in `folder`."""
+        self._truth = CsvLog(folder / "plant.csv", TRUTH_COLUMNS)
+        self._tlog = TlogWriter(folder / "flight.tlog")
+
+    def write_world(self, world: World) -> None:
+        """Append the state, and the rotor speeds that led to it."""
+        self._truth.write((world.time_us / 1e6, *world.state, *world.rotor_speeds))
+
+    def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
+        """Append what was received and sent at simulated time `time_us`."""
+        self._tlog.write(time_us, received)
+        for outgoing in sent:
+            self._tlog.write(time_us, outgoing.frames)
+
+    def close(self) -> None:
+        """Close both."""
+        self._truth.close()
+        self._tlog.close()
+
+
+class Server:
+    """Drives the plant's end of the conversation over a link."""
+
+    def __init__(self, link: UdpLink, end: PlantEnd, status: Status, stop: Stop, logs: PlantLogs | None) -> None:
+        """Serve `end` on `link` until `stop`."""
+        self._link = link
+        self._end = end
+        self._status = status
+        self._stop = stop
+        self._logs = logs
+        self._time_us = 0
+
+    def fly(self, world: World, physics: Physics, *, duration_s: float, speed: float) -> None:
+        """Wait for an autopilot, then fly for `duration_s` at `speed` times real time, or until told to stop."""
+        while not self._stop and self._end.peer is None:
+            self._receive(_WAIT_AT_MOST_S)
+        began_s = perf_counter()
+        progress = Progress(self._status)
+        interval_us = self._end.frame_interval_us
+        frames = 0
+        while not self._stop and world.time_us + interval_us <= duration_s * 1e6:
+            self._pace(began_s + world.time_us / 1e6 / speed if isfinite(speed) else 0.0)
+            command = self._exchange(world)
+            if command is None:
+                break
+            world = physics.step(world, command, interval_us)
+            frames += 1
+            progress.report(world.time_us / 1e6, perf_counter() - began_s)
+        if self._logs:
+            self._logs.write_world(world)
+        self._status.say(
+            "ended",
+            f"ended at t = {world.time_us / 1e6:.3f} s after {frames} frames",
+            sim_time_s=world.time_us / 1e6,
+            wall_time_s=perf_counter() - began_s,
+            frames=frames,
+            resent=self._end.resent,
+            dropped=dict(self._end.dropped),
+        )
+
+    def _exchange(self, world: World) -> ActuatorCommand | None:
+        """Send a frame until its answer comes; None if the process is told to stop first."""
+        self._time_us = world.time_us
+        offered_s = perf_counter()
+        self._end.offer(state_frame(world), offered_s)
+        self._send()
+        if self._logs:
+            self._logs.write_world(world)  # while the autopilot computes
+        silence_said = False
+        due_s = offered_s
+        while not self._stop:
+            command = self._receive(min(max(0.0, due_s - perf_counter()), _WAIT_AT_MOST_S))
+            if command is not None:
+                if silence_said:
+                    self._status.say("answered", "the autopilot answers again")
+                return command
+            now_s = perf_counter()
+            due_s = self._end.poll(now_s)
+            self._send()
+            if not silence_said and now_s - offered_s > _SILENCE_SAID_AFTER_S:
+                silence_said = True
+                self._status.say("silence", f"no answer at t = {world.time_us / 1e6:.3f} s, waiting for the autopilot")
+        return None
+
+    def _receive(self, timeout_s: float) -> ActuatorCommand | None:
+        received = self._link.receive(timeout_s)
+        if received is None:
+            return None
+        command = self._end.receive(*received, perf_counter())
+        self._send()
+        return command
+
+    def _send(self) -> None:
+        sent = self._end.take_outbox()
+        for outgoing in sent:
+            self._link.send(outgoing.datagram, outgoing.address)
+        if self._logs:
+            self._logs.write_traffic(self._time_us, self._end.received, sent)
+        self._end.received.clear()
+
+    def _pace(self, due_s: float) -> None:
+        while not self._stop and (early_s := due_s - perf_counter()) > 0.0:
+            sleep(min(early_s, _WAIT_AT_MOST_S))

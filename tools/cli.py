@@ -1,0 +1,62 @@
+"""`colibri`: the one command. Loads only what the subcommand needs."""
+
+from math import inf
+from pathlib import Path
+
+from mavlink.process import EXIT_INTERRUPTED, ArgumentParser, fail, positive, speed, use_one_thread
+
+TRACK_HELP = "spiral, expanding-spiral, line, wave or crown"
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run a subcommand; return the exit code."""
+    args = _parser().parse_args(argv)
+    use_one_thread()
+    try:
+        if args.command == "fly":
+            from tools.fly import fly
+
+            return fly(args)
+        from tools.bench import bench
+
+        return bench(args)
+    except KeyboardInterrupt:
+        fail("interrupted", EXIT_INTERRUPTED)
+
+
+def _parser() -> ArgumentParser:
+    parser = ArgumentParser(prog="colibri", description="A quadrotor autopilot in pure Python, flown over MAVLink.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _add_fly(commands.add_parser("fly", help="fly a track and report how well it went"))
+    _add_bench(commands.add_parser("bench", help="measure how fast it flies"))
+    return parser
+
+
+def _add_fly(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add("track", metavar="TRACK", help=TRACK_HELP)
+    add("--profile", default="thesis", metavar="NAME", help="control profile name or .toml (default %(default)s)")
+    add(
+        "--link",
+        default="udp",
+        choices=("udp", "memory", "direct"),
+        help="udp: two processes (default); memory: one process, same codec, same flight; direct: without the codec",
+    )
+    add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")
+    add("--seed", type=int, default=0, metavar="N", help="seed of everything random (default %(default)s)")
+    add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
+    add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
+    add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
+    add("--integrator", choices=("rk4", "adaptive"), help="of the plant (default: the profile's)")
+    add("--duration", type=positive, default=100.0, metavar="S", help="simulated time (default %(default)s)")
+    add(
+        "--out", type=Path, default=Path("out"), metavar="DIR", help="folder for logs and figures (default %(default)s)"
+    )
+    add("--quiet", action="store_true", help="say nothing but errors")
+    add("--no-figures", action="store_true", help="draw no PNG figures")
+
+
+def _add_bench(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--runs", type=int, default=5, choices=range(1, 101), metavar="N", help="flights of each kind (default 5)")
+    add("--out", type=Path, metavar="FILE", help="write the figures as JSON there")

@@ -1,0 +1,109 @@
+"""`colibri fly`: fly one track, show how far it is, report how well it went."""
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from autopilot.profile import ProfileError
+from autopilot.qp import SolverError
+from autopilot.tracks import TrackError
+from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, fail
+from plant.integrate import IntegrationError
+from plant.vehicle import VehicleError
+from tools.local import fly_locally
+from tools.plan import FlightPlan
+from tools.processes import FlightError, fly_processes
+from tools.recording import Recording, RecordingError, Summary, read_recording, write_recording
+from tools.report import print_report, report, write_report
+
+LEFT_BY_A_FLIGHT = ("flight.csv", "flight.tlog", "plant.csv", "autopilot.csv", "report.json")
+
+
+def fly(args: argparse.Namespace) -> int:
+    """Fly as the command line says; return the exit code."""
+    try:
+        plan = FlightPlan.from_arguments(args)
+    except (ProfileError, VehicleError, TrackError) as error:
+        fail(str(error))
+    _prepare(plan.out)
+    try:
+        with _progress(plan, quiet=args.quiet) as progress:
+            summary = _flight(plan, progress)
+    except (SolverError, ValueError) as error:
+        fail(str(error))
+    except IntegrationError as error:
+        _keep(plan)
+        fail(f"{error}; what was logged is in {plan.out}", EXIT_FAILED)
+    except FlightError as error:
+        _keep(plan)
+        if error.said:
+            return error.code
+        fail(f"{error}; what was logged is in {plan.out}", error.code)
+    except KeyboardInterrupt:
+        _keep(plan)
+        fail(f"interrupted; what was logged is in {plan.out}", EXIT_INTERRUPTED)
+    recording = read_recording(plan)
+    figures = report(plan, summary, recording)
+    write_recording(recording, plan.out / "flight.csv")
+    write_report(figures, plan.out / "report.json")
+    if not args.no_figures:
+        from tools.figures import draw_flight
+
+        draw_flight(recording, plan)
+    if not args.quiet:
+        print_report(figures, plan.out)
+    return 0
+
+
+def _flight(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
+    return fly_processes(plan, progress) if plan.link == "udp" else fly_locally(plan, progress)
+
+
+def _prepare(out: Path) -> None:
+    """Make the folder, and leave nothing of an earlier flight in it."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name in LEFT_BY_A_FLIGHT:
+            (out / name).unlink(missing_ok=True)
+        (out / LEFT_BY_A_FLIGHT[0]).touch()
+    except OSError as error:
+        fail(f"cannot write to --out {out}: {error.strerror}")
+
+
+def _keep(plan: FlightPlan) -> Recording | None:
+    """Write what there is of a flight that did not end well."""
+    try:
+        recording = read_recording(plan)
+    except (RecordingError, OSError):
+        return None
+    write_recording(recording, plan.out / "flight.csv")
+    return recording
+
+
+@contextmanager
+def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Callable[[float], None]]:
+    """Show a bar with simulated time and speed on standard error."""
+    if quiet:
+        yield lambda _sim_time_s: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:6.1f} / {task.total:.1f} s"),
+        TextColumn("{task.fields[speed]}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(plan.track_name, total=plan.duration_s, speed="starting")
+
+        def show(sim_time_s: float) -> None:
+            elapsed_s = bar.tasks[task].elapsed or 0.0
+            speed = f"{sim_time_s / elapsed_s:.0f} × real time" if elapsed_s else ""
+            bar.update(task, completed=sim_time_s, speed=speed)
+
+        yield show
+        bar.update(task, completed=plan.duration_s)

@@ -1,0 +1,117 @@
+"""A flight within this process: through the codec but without sockets (`memory`), or without either (`direct`)."""
+
+from collections.abc import Callable
+from math import isfinite
+from time import perf_counter, sleep
+from typing import Protocol
+
+from autopilot.core import Autopilot, Step
+from autopilot.process import AutopilotLog
+from mavlink.hil import ActuatorCommand
+from mavlink.lockstep import Address, AutopilotEnd, PlantEnd
+from plant.integrate import Integrator
+from plant.process import PlantLogs, start_speed
+from plant.world import Physics, World, state_frame, world_at_rest
+from tools.plan import FlightPlan
+from tools.recording import Summary
+
+SYSTEM_ID = 1
+_ADDRESS: Address = ("memory", 0)
+_NEVER_LATE_S = 0.0
+
+
+class Exchange(Protocol):
+    """How a world's state gets to the autopilot, and its command back."""
+
+    def __call__(self, world: World) -> tuple[Step, ActuatorCommand]:
+        """Return the autopilot's step and the command that reached the plant."""
+
+
+def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
+    """Fly `plan` in this process; `progress` is told the simulated time in s.
+
+    Raises:
+        SolverError: The solver cannot be used.
+        IntegrationError: The state cannot be integrated any further.
+    """
+    autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, perf_counter)
+    integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
+    physics = Physics(plan.plant_vehicle, integrator)
+    simulation = plan.profile.simulation
+    speed = start_speed(plan.plant_vehicle, simulation.rotor_speed_rpm)
+    world = world_at_rest(simulation.position_enu_m, plan.start_yaw_rad, speed)
+    interval_us = plan.profile.control_interval_us
+    plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out)
+    exchange: Exchange = InMemory(autopilot, interval_us, plant_logs) if plan.link == "memory" else Direct(autopilot)
+    began_s = perf_counter()
+    frames = 0
+    try:
+        plant_logs.write_world(world)
+        while world.time_us + interval_us <= plan.duration_s * 1e6:
+            if isfinite(plan.speed):
+                sleep(max(0.0, began_s + world.time_us / 1e6 / plan.speed - perf_counter()))
+            step, command = exchange(world)
+            world = physics.step(world, command, interval_us)
+            frames += 1
+            log.write(step)
+            plant_logs.write_world(world)
+            progress(world.time_us / 1e6)
+    finally:
+        plant_logs.close()
+        log.close()
+    return Summary(wall_time_s=perf_counter() - began_s, frames=frames, resent=0)
+
+
+class Direct:
+    """Hands frame and command over in double precision, without the codec."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        """Ask `autopilot`."""
+        self._autopilot = autopilot
+
+    def __call__(self, world: World) -> tuple[Step, ActuatorCommand]:
+        """Return the autopilot's step and its command as it is."""
+        step = self._autopilot.step(state_frame(world))
+        return step, step.command
+
+
+class InMemory:
+    """Carries the datagrams that the two processes would send, in the same conversation."""
+
+    def __init__(self, autopilot: Autopilot, frame_interval_us: int, logs: PlantLogs) -> None:
+        """Let `autopilot` call the plant."""
+        self._autopilot = autopilot
+        self._logs = logs
+        self._plant_end = PlantEnd(system_id=SYSTEM_ID, frame_interval_us=frame_interval_us)
+        self._autopilot_end = AutopilotEnd(
+            system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, now_s=_NEVER_LATE_S
+        )
+        self._autopilot_end.poll(_NEVER_LATE_S)
+        self._to_plant()
+
+    def __call__(self, world: World) -> tuple[Step, ActuatorCommand]:
+        """Return the autopilot's step and the command as the plant decoded it."""
+        self._plant_end.offer(state_frame(world), _NEVER_LATE_S)
+        step = self._to_autopilot(world)
+        command = self._to_plant()
+        assert step is not None, "the autopilot answers every new frame"
+        assert command is not None, "the answer names the frame awaited"
+        return step, command
+
+    def _to_autopilot(self, world: World) -> Step | None:
+        step = None
+        sent = self._plant_end.take_outbox()
+        self._logs.write_traffic(world.time_us, self._plant_end.received, sent)
+        self._plant_end.received.clear()
+        for outgoing in sent:
+            frame = self._autopilot_end.receive(outgoing.datagram, _NEVER_LATE_S)
+            if frame is not None:
+                step = self._autopilot.step(frame)
+                self._autopilot_end.answer(step.command)
+        return step
+
+    def _to_plant(self) -> ActuatorCommand | None:
+        command = None
+        for datagram in self._autopilot_end.take_outbox():
+            command = self._plant_end.receive(datagram, _ADDRESS, _NEVER_LATE_S) or command
+        return command

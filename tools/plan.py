@@ -1,0 +1,92 @@
+"""What to fly: the command line of `colibri fly`, resolved and checked before anything starts."""
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from autopilot.planner import SampledPlanner
+from autopilot.profile import Profile, load_profile
+from autopilot.tracks import Track, track
+from plant.process import start_speed
+from plant.vehicle import Vehicle, load_vehicle
+
+
+@dataclass(frozen=True, slots=True)
+class FlightPlan:
+    """A flight as it was asked for.
+
+    Attributes:
+        track_name: One of the tracks.
+        profile_name: Profile name or file.
+        vehicle_name: Vehicle that the autopilot controls, name or file.
+        plant_vehicle_name: Vehicle that the plant flies, name or file.
+        integrator: `rk4` or `adaptive`.
+        link: `udp`, `memory` or `direct`.
+        speed: Times real time; infinite for flat out.
+        seed: Seed of everything random.
+        duration_s: Simulated time to fly.
+        out: Folder for all that the flight leaves.
+        profile: The profile, with the solver asked for.
+        vehicle: The vehicle that the autopilot controls.
+        plant_vehicle: The vehicle that the plant flies.
+    """
+
+    track_name: str
+    profile_name: str
+    vehicle_name: str
+    plant_vehicle_name: str
+    integrator: str
+    link: str
+    speed: float
+    seed: int
+    duration_s: float
+    out: Path
+    profile: Profile
+    vehicle: Vehicle
+    plant_vehicle: Vehicle
+
+    @classmethod
+    def from_arguments(cls, args: argparse.Namespace) -> "FlightPlan":
+        """Resolve the command line.
+
+        Raises:
+            ProfileError: The profile cannot be read.
+            VehicleError: A vehicle cannot be read, or cannot start as the profile says.
+            TrackError: There is no such track.
+        """
+        track(args.track)
+        profile = load_profile(args.profile)
+        if args.solver:
+            profile = msgspec.structs.replace(profile, qp=msgspec.structs.replace(profile.qp, solver=args.solver))
+        vehicle_name = args.vehicle or profile.simulation.vehicle
+        plant_vehicle_name = args.plant_vehicle or vehicle_name
+        plant_vehicle = load_vehicle(plant_vehicle_name)
+        start_speed(plant_vehicle, profile.simulation.rotor_speed_rpm)
+        return cls(
+            track_name=args.track,
+            profile_name=args.profile,
+            vehicle_name=vehicle_name,
+            plant_vehicle_name=plant_vehicle_name,
+            integrator=args.integrator or profile.simulation.integrator,
+            link=args.link,
+            speed=args.speed,
+            seed=args.seed,
+            duration_s=args.duration,
+            out=args.out,
+            profile=profile,
+            vehicle=load_vehicle(vehicle_name),
+            plant_vehicle=plant_vehicle,
+        )
+
+    @property
+    def track(self) -> Track:
+        """The track to fly."""
+        return track(self.track_name)
+
+    @property
+    def start_yaw_rad(self) -> float:
+        """The first yaw reference, with which the vehicle starts."""
+        outer_interval_s = self.profile.control_interval_s * self.profile.position.samples
+        return float(SampledPlanner(self.track, outer_interval_s, preview=1).horizon(0).yaw_rad[0])

@@ -1,0 +1,137 @@
+"""What a flight left behind: the logs of plant and autopilot, joined into one row a control sample."""
+
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mavlink.frames import euler_from_quaternion, nearest_turn
+from tools.plan import FlightPlan
+
+Array: TypeAlias = NDArray[np.float64]
+
+STATE = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
+INPUT = ("U1", "U2", "U3", "U4")
+ATTITUDE_REFERENCE = ("phi_ref", "theta_ref", "psi_ref")
+ROTORS = ("omega1", "omega2", "omega3", "omega4")
+POSITION_REFERENCE = ("x_ref", "y_ref", "z_ref")
+COLUMNS = ("t", *STATE, *INPUT, *ATTITUDE_REFERENCE, *ROTORS, *POSITION_REFERENCE)
+
+_PLANT_STATE = slice(1, 14)
+_PLANT_ATTITUDE = slice(10, 14)
+_PLANT_ROTORS = slice(14, 18)
+
+
+class Summary(NamedTuple):
+    """What only the run itself knows: wall-clock time of the flight, frames exchanged and sent again."""
+
+    wall_time_s: float
+    frames: int
+    resent: int
+
+
+class RecordingError(Exception):
+    """The logs hold no flight."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A flight, one row a control sample.
+
+    Attributes:
+        table: Columns as in `COLUMNS`, (n, 27). Row k holds the state at its time and the inputs that led to it, with
+            the references they were computed for; row 0 the start.
+        solved: Whether each QP was solved, (m,).
+        solve_time_us: Time of each QP, (m,).
+        control_step_us: Time of each control step, (m,).
+        trajectory_sha256: Hash of the plant's states at every frame, as float64.
+    """
+
+    table: Array
+    solved: NDArray[np.bool_]
+    solve_time_us: Array
+    control_step_us: Array
+    trajectory_sha256: str
+
+    def __getitem__(self, column: str) -> Array:
+        """Return one column, (n,)."""
+        return self.table[:, COLUMNS.index(column)]
+
+    def columns(self, names: tuple[str, ...]) -> Array:
+        """Return some columns, (n, len(names))."""
+        return np.stack([self[name] for name in names], axis=1)
+
+    @property
+    def position_error_m(self) -> Array:
+        """Distance to the reference of the same instant, (n,)."""
+        error: Array = np.linalg.norm(self.columns(("x", "y", "z")) - self.columns(POSITION_REFERENCE), axis=1)
+        return error
+
+
+def read_recording(plan: FlightPlan) -> Recording:
+    """Join the logs in the plan's folder.
+
+    Raises:
+        RecordingError: There is no complete control sample in them.
+    """
+    plant = _read_csv(plan.out / "plant.csv")
+    autopilot = _read_csv(plan.out / "autopilot.csv")
+    samples = plant[np.isin(np.round(plant[:, 0] * 1e6), _sample_times_us(plan, plant))]
+    decisions = autopilot[: len(samples) - 1]
+    samples = samples[: len(decisions) + 1]
+    if len(samples) < 2:
+        raise RecordingError("the flight ended before its first control sample")
+    return Recording(
+        table=_join(plan, samples, decisions),
+        solved=decisions[:, 4] == 1.0,
+        solve_time_us=decisions[:, 5],
+        control_step_us=decisions[:, 6],
+        trajectory_sha256=sha256(np.ascontiguousarray(plant[:, _PLANT_STATE]).tobytes()).hexdigest(),
+    )
+
+
+def write_recording(recording: Recording, path: Path) -> None:
+    """Write the table as CSV; numbers keep every bit."""
+    rows = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in recording.table.tolist())]
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+
+
+def _sample_times_us(plan: FlightPlan, plant: Array) -> Array:
+    interval_us = plan.profile.control_interval_us
+    return np.arange(0.0, plant[-1, 0] * 1e6 + 0.5 * interval_us, interval_us)
+
+
+def _join(plan: FlightPlan, samples: Array, decisions: Array) -> Array:
+    squared = samples[:, _PLANT_ROTORS] ** 2
+    start_reference = [0.0, 0.0, plan.start_yaw_rad]
+    return np.hstack(
+        [
+            samples[:, :10],
+            _euler(samples[:, _PLANT_ATTITUDE], plan.start_yaw_rad),
+            squared @ plan.plant_vehicle.allocation().T,
+            np.vstack([start_reference, decisions[:, 1:4]]),
+            samples[:, _PLANT_ROTORS],
+            plan.track(samples[:, 0]),
+        ]
+    )
+
+
+def _euler(quaternions: Array, start_yaw_rad: float) -> Array:
+    """Return phi, theta and psi, (n, 3), psi by continuity from the start."""
+    angles = []
+    yaw = start_yaw_rad
+    for qw, qx, qy, qz in quaternions.tolist():
+        phi, theta, psi = euler_from_quaternion((qw, qx, qy, qz))
+        yaw = nearest_turn(psi, yaw)
+        angles.append((phi, theta, yaw))
+    return np.array(angles)
+
+
+def _read_csv(path: Path) -> Array:
+    """Return the complete rows of a log; a process that was killed may leave half of one."""
+    header, *lines = path.read_text(encoding="utf-8").split("\n")
+    complete = [line for line in lines[:-1] if line.count(",") == header.count(",")]
+    return np.array([[float(value) for value in line.split(",")] for line in complete], ndmin=2)

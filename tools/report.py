@@ -1,0 +1,87 @@
+"""How well a flight went: `report.json`, and the table that a person reads."""
+
+import json
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tools.plan import FlightPlan
+from tools.recording import Recording, Summary
+
+Array: TypeAlias = NDArray[np.float64]
+Report: TypeAlias = dict[str, Any]
+
+SETTLED_AFTER_S = 20.0
+
+
+def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
+    """Return the figures of a flight; errors are distances to the reference of the same instant."""
+    error, t = recording.position_error_m, recording["t"]
+    sim_time_s = float(t[-1])
+    settled = error[t >= SETTLED_AFTER_S]
+    return {
+        "track": plan.track_name,
+        "profile": plan.profile.name,
+        "link": plan.link,
+        "seed": plan.seed,
+        "solver": plan.profile.qp.solver,
+        "vehicle": plan.vehicle_name,
+        "plant_vehicle": plan.plant_vehicle_name,
+        "integrator": plan.integrator,
+        "sim_time_s": sim_time_s,
+        "wall_time_s": summary.wall_time_s,
+        "real_time_factor": sim_time_s / summary.wall_time_s,
+        "rmse_m": _rms(error),
+        "max_error_m": float(error.max()),
+        "rmse_after_20s_m": _rms(settled) if len(settled) else None,
+        "solve_time_us": _quantiles(recording.solve_time_us),
+        "control_step_us": _quantiles(recording.control_step_us),
+        "frames": summary.frames,
+        "resent": summary.resent,
+        "qp_failures": int(np.count_nonzero(~recording.solved)),
+        "trajectory_sha256": recording.trajectory_sha256,
+    }
+
+
+def write_report(figures: Report, path: Path) -> None:
+    """Write the report as JSON."""
+    path.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+
+
+def print_report(figures: Report, out: Path) -> None:
+    """Show the report as a table on standard output."""
+    from rich.console import Console
+    from rich.table import Table
+
+    def times(name: str) -> str:
+        return f"{figures[name]['p50']:.0f} / {figures[name]['p99']:.0f} µs"
+
+    settled = figures["rmse_after_20s_m"]
+    table = Table(title=f"{figures['track']}, profile {figures['profile']}", show_header=False, title_justify="left")
+    rows = {
+        "position error, RMS": f"{figures['rmse_m']:.4f} m",
+        f"position error, RMS after {SETTLED_AFTER_S:.0f} s": "-" if settled is None else f"{settled:.4f} m",
+        "position error, maximum": f"{figures['max_error_m']:.4f} m",
+        "QP solve time, p50 / p99": times("solve_time_us"),
+        "control step, p50 / p99": times("control_step_us"),
+        "flown": f"{figures['sim_time_s']:.1f} s in {figures['wall_time_s']:.2f} s",
+        "real-time factor": f"{figures['real_time_factor']:.0f}",
+        "frames, sent again": f"{figures['frames']}, {figures['resent']}",
+        "QPs not solved": f"{figures['qp_failures']}",
+        "trajectory": figures["trajectory_sha256"][:16],
+        "written to": str(out),
+    }
+    for name, value in rows.items():
+        table.add_row(name, value)
+    Console().print(table)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _quantiles(values: Array) -> dict[str, float]:
+    p50, p99 = np.quantile(values, [0.5, 0.99])
+    return {"p50": float(p50), "p99": float(p99), "max": float(values.max())}
