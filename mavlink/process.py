@@ -118,7 +118,7 @@ class Progress:
 
 
 class CsvLog:
-    """A CSV file written row by row; numbers keep every bit."""
+    """A CSV file written row by row, so that no end of the process loses one; numbers keep every bit."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         """Create the file and its header."""
@@ -140,15 +140,14 @@ class TlogWriter:
     def __init__(self, path: Path) -> None:
         """Create the file."""
         try:
-            self._file = path.open("wb")
+            self._file = path.open("wb", buffering=0)
         except OSError as error:
             fail(f"cannot write {path}: {error.strerror}")
 
     def write(self, time_us: int, frames: Iterable[bytes]) -> None:
         """Append frames, all of simulated time `time_us`."""
         stamp = struct.pack(">Q", time_us)
-        for frame in frames:
-            self._file.write(stamp + frame)
+        self._file.write(b"".join([stamp + frame for frame in frames]))
 
     def close(self) -> None:
         """Write out what is buffered and close."""
@@ -156,9 +155,9 @@ class TlogWriter:
 
 
 def open_for_writing(path: Path) -> TextIO:
-    """Open a text file for writing, its folder made where it is missing, or end with one line."""
+    """Open a text file for writing line by line, its folder made where it is missing, or end with one line."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        return path.open("w", encoding="utf-8", newline="")
+        return path.open("w", buffering=1, encoding="utf-8", newline="")
     except OSError as error:
         fail(f"cannot write {path}: {error.strerror}")

@@ -68,9 +68,9 @@ class PlantLogs:
 
     def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
         """Append what was received and sent at simulated time `time_us`."""
-        self._tlog.write(time_us, received)
-        for outgoing in sent:
-            self._tlog.write(time_us, outgoing.frames)
+        frames = [*received, *(frame for outgoing in sent for frame in outgoing.frames)]
+        if frames:
+            self._tlog.write(time_us, frames)
 
     def close(self) -> None:
         """Close both."""
@@ -89,6 +89,7 @@ class Server:
         self._stop = stop
         self._logs = logs
         self._time_us = 0
+        self._logged: World | None = None
 
     def fly(self, world: World, physics: Physics, *, duration_s: float, speed: float) -> None:
         """Wait for an autopilot, then fly for `duration_s` at `speed` times real time, or until told to stop."""
@@ -106,8 +107,7 @@ class Server:
             world = physics.step(world, command, interval_us)
             frames += 1
             progress.report(world.time_us / 1e6, perf_counter() - began_s)
-        if self._logs:
-            self._logs.write_world(world)
+        self._log(world)
         self._status.say(
             "ended",
             f"ended at t = {world.time_us / 1e6:.3f} s after {frames} frames",
@@ -124,8 +124,7 @@ class Server:
         offered_s = perf_counter()
         self._end.offer(state_frame(world), offered_s)
         self._send()
-        if self._logs:
-            self._logs.write_world(world)  # while the autopilot computes
+        self._log(world)  # while the autopilot computes
         silence_said = False
         due_s = offered_s
         while not self._stop:
@@ -141,6 +140,11 @@ class Server:
                 silence_said = True
                 self._status.say("silence", f"no answer at t = {world.time_us / 1e6:.3f} s, waiting for the autopilot")
         return None
+
+    def _log(self, world: World) -> None:
+        if self._logs and world is not self._logged:
+            self._logs.write_world(world)
+        self._logged = world
 
     def _receive(self, timeout_s: float) -> ActuatorCommand | None:
         received = self._link.receive(timeout_s)

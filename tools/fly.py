@@ -97,13 +97,18 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Callable[[float], No
         TextColumn("{task.fields[speed]}"),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(plan.track_name, total=plan.duration_s, speed="starting")
+    console = Console(stderr=True)
+    bar = Progress(*columns, console=console, disable=not console.is_terminal)
+    task = bar.add_task(plan.track_name, total=plan.duration_s, speed="")
 
-        def show(sim_time_s: float) -> None:
-            elapsed_s = bar.tasks[task].elapsed or 0.0
-            speed = f"{sim_time_s / elapsed_s:.0f} × real time" if elapsed_s else ""
-            bar.update(task, completed=sim_time_s, speed=speed)
+    def show(sim_time_s: float) -> None:
+        bar.start()  # not before something flies: an error of the start stands alone
+        elapsed_s = bar.tasks[task].elapsed or 0.0
+        speed = f"{sim_time_s / elapsed_s:.0f} × real time" if elapsed_s else ""
+        bar.update(task, completed=sim_time_s, speed=speed)
 
+    try:
         yield show
-        bar.update(task, completed=plan.duration_s)
+        show(plan.duration_s)
+    finally:
+        bar.stop()

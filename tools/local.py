@@ -87,13 +87,13 @@ class InMemory:
             system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, now_s=_NEVER_LATE_S
         )
         self._autopilot_end.poll(_NEVER_LATE_S)
-        self._to_plant()
+        self._to_plant(time_us=0)
 
     def __call__(self, world: World) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and the command as the plant decoded it."""
         self._plant_end.offer(state_frame(world), _NEVER_LATE_S)
         step = self._to_autopilot(world)
-        command = self._to_plant()
+        command = self._to_plant(world.time_us)
         assert step is not None, "the autopilot answers every new frame"
         assert command is not None, "the answer names the frame awaited"
         return step, command
@@ -101,8 +101,7 @@ class InMemory:
     def _to_autopilot(self, world: World) -> Step | None:
         step = None
         sent = self._plant_end.take_outbox()
-        self._logs.write_traffic(world.time_us, self._plant_end.received, sent)
-        self._plant_end.received.clear()
+        self._logs.write_traffic(world.time_us, [], sent)
         for outgoing in sent:
             frame = self._autopilot_end.receive(outgoing.datagram, _NEVER_LATE_S)
             if frame is not None:
@@ -110,8 +109,10 @@ class InMemory:
                 self._autopilot_end.answer(step.command)
         return step
 
-    def _to_plant(self) -> ActuatorCommand | None:
+    def _to_plant(self, time_us: int) -> ActuatorCommand | None:
         command = None
         for datagram in self._autopilot_end.take_outbox():
             command = self._plant_end.receive(datagram, _ADDRESS, _NEVER_LATE_S) or command
+        self._logs.write_traffic(time_us, self._plant_end.received, [])
+        self._plant_end.received.clear()
         return command

@@ -79,10 +79,12 @@ def read_recording(plan: FlightPlan) -> Recording:
     """
     plant = _read_csv(plan.out / "plant.csv")
     autopilot = _read_csv(plan.out / "autopilot.csv")
+    if not len(plant):
+        raise RecordingError("the flight ended before it began")
     samples = plant[np.isin(np.round(plant[:, 0] * 1e6), _sample_times_us(plan, plant))]
     decisions = autopilot[: len(samples) - 1]
     samples = samples[: len(decisions) + 1]
-    if len(samples) < 2:
+    if not len(decisions):
         raise RecordingError("the flight ended before its first control sample")
     return Recording(
         table=_join(plan, samples, decisions),
@@ -134,4 +136,5 @@ def _read_csv(path: Path) -> Array:
     """Return the complete rows of a log; a process that was killed may leave half of one."""
     header, *lines = path.read_text(encoding="utf-8").split("\n")
     complete = [line for line in lines[:-1] if line.count(",") == header.count(",")]
-    return np.array([[float(value) for value in line.split(",")] for line in complete], ndmin=2)
+    values = [[float(value) for value in line.split(",")] for line in complete]
+    return np.array(values).reshape(len(values), header.count(",") + 1)

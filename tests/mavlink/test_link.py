@@ -1,0 +1,72 @@
+"""UDP endpoints by URL."""
+
+from collections.abc import Iterator
+from contextlib import closing
+
+import pytest
+
+from mavlink.link import LinkError, UdpLink, open_link
+
+TIMEOUT_S = 2.0
+
+
+@pytest.fixture
+def server() -> Iterator[UdpLink]:
+    with closing(open_link("udpin:127.0.0.1:0")) as link:
+        yield link
+
+
+def client_of(server: UdpLink) -> UdpLink:
+    return open_link(server.url.replace("udpin", "udpout"))
+
+
+def test_a_datagram_there_and_back(server: UdpLink) -> None:
+    with closing(client_of(server)) as client:
+        client.send(b"there")
+        received = server.receive(TIMEOUT_S)
+        assert received is not None
+        datagram, address = received
+        server.send(datagram + b" and back", address)
+        answer = client.receive(TIMEOUT_S)
+        assert answer is not None
+        assert answer[0] == b"there and back"
+
+
+def test_an_outgoing_endpoint_hears_nobody_but_its_target(server: UdpLink) -> None:
+    with closing(client_of(server)) as client, closing(open_link("udpin:127.0.0.1:0")) as stranger:
+        client.send(b"hello")
+        received = server.receive(TIMEOUT_S)
+        assert received is not None
+        stranger.send(b"from a stranger", received[1])
+        server.send(b"from the target", received[1])
+        answers = [client.receive(TIMEOUT_S), client.receive(0.0)]
+        assert [answer[0] for answer in answers if answer] == [b"from the target"]
+
+
+def test_silence_is_none(server: UdpLink) -> None:
+    assert server.receive(0.0) is None
+    assert server.receive(0.01) is None
+
+
+def test_a_target_that_does_not_listen_is_no_error(server: UdpLink) -> None:
+    client = client_of(server)
+    server.close()
+    with closing(client):
+        for _ in range(3):
+            client.send(b"anybody?")
+            assert client.receive(0.001) is None
+
+
+def test_a_taken_port_is_named(server: UdpLink) -> None:
+    with pytest.raises(LinkError, match=server.url):
+        open_link(server.url)
+
+
+@pytest.mark.parametrize(
+    "url",
+    ["", "udpin", "udpin:127.0.0.1", "udpin::14560", "tcp:127.0.0.1:5760", "udpin:127.0.0.1:70000", "udpin:a:b",
+     "udpout:127.0.0.1:0", "udpout:127.0.0.1:-1"],
+)  # fmt: skip
+def test_a_malformed_url_is_refused(url: str) -> None:
+    with pytest.raises(LinkError, match=r"port 0|expected udpin"):
+        open_link(url)

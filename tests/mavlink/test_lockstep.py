@@ -1,0 +1,247 @@
+"""The lockstep conversation: what each end does with silence, repetition, strangers and restarts."""
+
+import random
+
+import pytest
+
+from mavlink import dialect, lockstep
+from mavlink.dialect import Codec
+from mavlink.hil import ActuatorCommand, StateFrame, encode_actuators
+from mavlink.lockstep import AutopilotEnd, PlantEnd
+
+ADDRESS = ("autopilot", 1)
+STRANGER = ("stranger", 2)
+INTERVAL_US = 100_000
+
+
+def frame_at(time_us: int) -> StateFrame:
+    return StateFrame(time_us, (0.0, 0.0, float(time_us)), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def command_at(time_us: int) -> ActuatorCommand:
+    return ActuatorCommand(time_us, (0.25, 0.5, 0.75, 1.0), armed=True)
+
+
+@pytest.fixture
+def plant() -> PlantEnd:
+    return PlantEnd(system_id=1, frame_interval_us=4_000)
+
+
+@pytest.fixture
+def autopilot() -> AutopilotEnd:
+    return AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0)
+
+
+def call(autopilot: AutopilotEnd, plant: PlantEnd) -> None:
+    autopilot.poll(0.0)
+    for datagram in autopilot.take_outbox():
+        plant.receive(datagram, ADDRESS, 0.0)
+    for outgoing in plant.take_outbox():
+        autopilot.receive(outgoing.datagram, 0.0)
+
+
+def answer_to(plant: PlantEnd, autopilot: AutopilotEnd, time_us: int) -> bytes:
+    plant.offer(frame_at(time_us), 0.0)
+    (outgoing,) = plant.take_outbox()
+    frame = autopilot.receive(outgoing.datagram, 0.0)
+    assert frame is not None
+    assert frame.time_us == time_us
+    autopilot.answer(command_at(time_us))
+    (answer,) = autopilot.take_outbox()
+    return answer
+
+
+def test_the_call_sets_peer_and_frame_interval(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    assert plant.peer == ADDRESS
+    assert plant.frame_interval_us == INTERVAL_US
+    assert autopilot.refused is None
+
+
+def test_a_frame_is_answered_once(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    answer = answer_to(plant, autopilot, 0)
+    assert plant.receive(answer, ADDRESS, 0.0) == command_at(0)
+    plant.offer(frame_at(INTERVAL_US), 0.0)
+    assert plant.receive(answer, ADDRESS, 0.0) is None
+    assert plant.dropped["repeated"] == 1
+
+
+def test_a_repeated_frame_gets_the_remembered_answer(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    answer = answer_to(plant, autopilot, 0)
+    plant.poll(lockstep.RESEND_AFTER_S)
+    (again,) = plant.take_outbox()
+    assert autopilot.receive(again.datagram, 0.03) is None
+    assert autopilot.take_outbox() == [answer]
+    assert (plant.resent, autopilot.repeated) == (1, 1)
+
+
+def test_a_frame_is_sent_again_only_after_silence(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    plant.offer(frame_at(0), 10.0)
+    plant.take_outbox()
+    assert plant.poll(10.0 + 0.9 * lockstep.RESEND_AFTER_S) == pytest.approx(10.0 + lockstep.RESEND_AFTER_S)
+    assert plant.take_outbox() == []
+
+
+@pytest.mark.parametrize("time_us", [2 * INTERVAL_US, INTERVAL_US + 1000, 77 * INTERVAL_US])
+def test_a_frame_out_of_step_is_dropped(plant: PlantEnd, autopilot: AutopilotEnd, time_us: int) -> None:
+    call(autopilot, plant)
+    answer_to(plant, autopilot, 0)
+    plant.offer(frame_at(time_us), 0.0)
+    (outgoing,) = plant.take_outbox()
+    assert autopilot.receive(outgoing.datagram, 0.5) is None
+    assert autopilot.dropped["out of step"] == 1
+
+
+def test_an_earlier_frame_begins_a_new_flight_only_after_silence(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    for time_us in (0, INTERVAL_US, 2 * INTERVAL_US):
+        answer_to(plant, autopilot, time_us)
+    plant.offer(frame_at(0), 0.0)
+    (outgoing,) = plant.take_outbox()
+    assert autopilot.receive(outgoing.datagram, 0.5) is None
+    assert autopilot.receive(outgoing.datagram, lockstep.CALL_AFTER_S) == frame_at(0)
+
+
+def test_the_autopilot_calls_again_after_silence(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    answer_to(plant, autopilot, 0)
+    assert autopilot.poll(0.5) == lockstep.CALL_AFTER_S
+    assert autopilot.take_outbox() == []
+    autopilot.poll(lockstep.CALL_AFTER_S)
+    assert len(autopilot.take_outbox()) == 1
+
+
+def test_a_second_autopilot_is_refused_while_the_first_answers(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    second = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0)
+    second.poll(0.0)
+    (hello,) = second.take_outbox()
+    plant.receive(hello, STRANGER, 0.9 * lockstep.PEER_LOST_AFTER_S)
+    assert plant.peer == ADDRESS
+    plant.receive(hello, STRANGER, 1.1 * lockstep.PEER_LOST_AFTER_S)
+    assert plant.peer == STRANGER
+
+
+def test_a_restarted_autopilot_gets_the_frame_awaited_at_once(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    plant.offer(frame_at(INTERVAL_US), 0.0)
+    plant.take_outbox()
+    restarted = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=5.0)
+    restarted.poll(5.0)
+    (hello,) = restarted.take_outbox()
+    plant.receive(hello, STRANGER, 5.0)
+    frames = [restarted.receive(outgoing.datagram, 5.0) for outgoing in plant.take_outbox()]
+    assert frame_at(INTERVAL_US) in frames
+
+
+@pytest.mark.parametrize(
+    ("interval_us", "flying", "result"),
+    [
+        (2_000.0, False, dialect.RESULT_ACCEPTED),
+        (2_500.0, False, dialect.RESULT_DENIED),
+        (0.0, False, dialect.RESULT_DENIED),
+        (-1.0, False, dialect.RESULT_DENIED),
+        (float("nan"), False, dialect.RESULT_DENIED),
+        (float("inf"), False, dialect.RESULT_DENIED),
+        (2_000_000.0, False, dialect.RESULT_DENIED),
+        (2_000.0, True, dialect.RESULT_TEMPORARILY_REJECTED),
+        (4_000.0, True, dialect.RESULT_ACCEPTED),
+    ],
+)
+def test_frame_interval_requests(plant: PlantEnd, interval_us: float, flying: bool, result: int) -> None:
+    codec = Codec(1, dialect.AUTOPILOT_COMPONENT)
+    if flying:
+        plant.offer(frame_at(0), 0.0)
+    target = (1, dialect.PLANT_COMPONENT)
+    message_id = dialect.MSG_ATTITUDE_QUATERNION
+    fields = (*target, dialect.CMD_SET_MESSAGE_INTERVAL, 0, message_id, interval_us, 0, 0, 0, 0, 0)
+    plant.receive(codec.encode("COMMAND_LONG", *fields), ADDRESS, 0.0)
+    (outgoing,) = plant.take_outbox()
+    (ack,) = codec.decode(outgoing.datagram)
+    assert (ack.fields.command, ack.fields.result) == (dialect.CMD_SET_MESSAGE_INTERVAL, result)
+
+
+def test_another_command_is_unsupported(plant: PlantEnd) -> None:
+    codec = Codec(1, dialect.AUTOPILOT_COMPONENT)
+    plant.receive(codec.encode("COMMAND_LONG", 1, dialect.PLANT_COMPONENT, 400, 0, *[0.0] * 7), ADDRESS, 0.0)
+    (outgoing,) = plant.take_outbox()
+    (ack,) = codec.decode(outgoing.datagram)
+    assert ack.fields.result == dialect.RESULT_UNSUPPORTED
+
+
+def test_an_autopilot_at_another_rate_learns_that_it_is_refused(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    plant.offer(frame_at(0), 0.0)
+    call(autopilot, plant)
+    assert autopilot.refused == dialect.RESULT_TEMPORARILY_REJECTED
+
+
+@pytest.mark.parametrize("source", [(2, dialect.AUTOPILOT_COMPONENT), (1, 42)])
+def test_a_foreign_command_is_not_obeyed(plant: PlantEnd, autopilot: AutopilotEnd, source: tuple[int, int]) -> None:
+    call(autopilot, plant)
+    plant.offer(frame_at(0), 0.0)
+    assert plant.receive(encode_actuators(Codec(*source), command_at(0)), ADDRESS, 0.0) is None
+    assert plant.dropped["foreign"] == 1
+
+
+def test_a_command_from_another_address_is_not_obeyed(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    answer = answer_to(plant, autopilot, 0)
+    assert plant.receive(answer, STRANGER, 0.0) is None
+    assert plant.receive(answer, ADDRESS, 0.0) == command_at(0)
+
+
+def test_heartbeats_count_in_simulated_time(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    codec = Codec(99, 99)
+    beats = {"plant": 0, "autopilot": 0}
+    for sample in range(31):
+        time_us = sample * INTERVAL_US
+        plant.offer(frame_at(time_us), 0.0)
+        (outgoing,) = plant.take_outbox()
+        beats["plant"] += [message.name for message in codec.decode(outgoing.datagram)].count("HEARTBEAT")
+        assert autopilot.receive(outgoing.datagram, 0.0) is not None
+        autopilot.answer(command_at(time_us))
+        (answer,) = autopilot.take_outbox()
+        beats["autopilot"] += [message.name for message in codec.decode(answer)].count("HEARTBEAT")
+    assert beats == {"plant": 4, "autopilot": 4}
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_loss_duplication_and_reordering_change_nothing(plant: PlantEnd, autopilot: AutopilotEnd, seed: int) -> None:
+    """Whatever the link does, the plant obeys each command once, in order."""
+    chance = random.Random(seed)
+    call(autopilot, plant)
+    obeyed: list[int] = []
+    computed: list[int] = []
+    in_flight: list[tuple[str, bytes]] = []
+
+    def post(to: str, datagram: bytes) -> None:
+        for _ in range(chance.choices((0, 1, 2), (0.2, 0.7, 0.1))[0]):
+            in_flight.insert(chance.randint(0, len(in_flight)), (to, datagram))
+
+    now_s = 0.0
+    plant.offer(frame_at(0), now_s)
+    while len(obeyed) < 50:
+        now_s += 0.001
+        plant.poll(now_s)
+        for outgoing in plant.take_outbox():
+            post("autopilot", outgoing.datagram)
+        if in_flight:
+            to, datagram = in_flight.pop()
+            if to == "plant":
+                command = plant.receive(datagram, ADDRESS, now_s)
+                if command:
+                    obeyed.append(command.time_us)
+                    plant.offer(frame_at(command.time_us + INTERVAL_US), now_s)
+            else:
+                frame = autopilot.receive(datagram, now_s)
+                if frame:
+                    computed.append(frame.time_us)
+                    autopilot.answer(command_at(frame.time_us))
+        for datagram in autopilot.take_outbox():
+            post("plant", datagram)
+    assert obeyed == [sample * INTERVAL_US for sample in range(50)]
+    assert computed[:50] == obeyed

@@ -1,0 +1,27 @@
+"""Hypothesis strategies and tolerances that several tests share."""
+
+from math import pi
+
+from hypothesis import strategies as st
+
+from mavlink.frames import Quaternion, Vector, normalized
+
+
+def reals(limit: float) -> st.SearchStrategy[float]:
+    """Finite numbers up to `limit` in size."""
+    return st.floats(-limit, limit, allow_nan=False)
+
+
+def vectors(limit: float = 1e3) -> st.SearchStrategy[Vector]:
+    """Vectors with components up to `limit`."""
+    return st.tuples(reals(limit), reals(limit), reals(limit))
+
+
+def quaternions() -> st.SearchStrategy[Quaternion]:
+    """Unit quaternions."""
+    components = st.tuples(reals(1.0), reals(1.0), reals(1.0), reals(1.0))
+    return components.filter(lambda q: sum(c * c for c in q) > 1e-3).map(normalized)
+
+
+ANGLES = reals(pi)
+TILTS = reals(0.49 * pi)

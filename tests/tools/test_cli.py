@@ -1,0 +1,181 @@
+"""The command line: what bad input gets, and how a flight is interrupted."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+import pytest
+
+from mavlink.link import open_link
+from tests.flights.runs import wait_for
+from tools.cli import main
+
+VEHICLE = Path(__file__).parents[2] / "plant" / "vehicles" / "hummingbird.toml"
+PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "thesis.toml"
+
+
+def edited(source: Path, old: str, new: str) -> Callable[[Path], str]:
+    def write(folder: Path) -> str:
+        text = source.read_text(encoding="utf-8")
+        assert text.count(old) == 1
+        path = folder / source.name
+        path.write_text(text.replace(old, new), encoding="utf-8")
+        return str(path)
+
+    return write
+
+
+def plain(text: str) -> Callable[[Path], str]:
+    return lambda _folder: text
+
+
+BAD_INPUT = {
+    "track": ((plain("loop"),), "unknown track loop: choose spiral, expanding-spiral, line, wave, crown"),
+    "profile": ((plain("spiral"), plain("--profile"), plain("fast")), "unknown profile fast: choose thesis"),
+    "vehicle": ((plain("spiral"), plain("--vehicle"), plain("dragonfly")), "unknown vehicle dragonfly: choose"),
+    "solver": ((plain("spiral"), plain("--solver"), plain("simplex")), "unknown solver simplex: installed are"),
+    "extra": ((plain("spiral"), plain("--solver"), plain("gurobi")), "gurobi is not installed: pip install"),
+    "missing key": (
+        (plain("spiral"), plain("--vehicle"), edited(VEHICLE, "mass_kg = 0.698", "")),
+        "hummingbird.toml: body: Object missing required field `mass_kg`",
+    ),
+    "unknown key": (
+        (plain("spiral"), plain("--plant-vehicle"), edited(VEHICLE, "[body]", "[body]\ncolour = 1")),
+        "hummingbird.toml: body: Object contains unknown field `colour`",
+    ),
+    "impossible value": (
+        (plain("spiral"), plain("--vehicle"), edited(VEHICLE, "mass_kg = 0.698", "mass_kg = -1.0")),
+        "hummingbird.toml: body.mass_kg: Expected `float` > 0.0",
+    ),
+    "profile key": (
+        (plain("spiral"), plain("--profile"), edited(PROFILE, "horizon = 4 ", "horizon = 0 ")),
+        "thesis.toml: attitude.horizon: Expected `int` >= 1",
+    ),
+    "speed": ((plain("spiral"), plain("--speed"), plain("0")), "argument --speed: must be above zero, not 0"),
+    "link": ((plain("spiral"), plain("--link"), plain("carrier-pigeon")), "argument --link: invalid choice"),
+    "command": ((), "the following arguments are required: TRACK"),
+}
+
+
+@pytest.mark.parametrize("link", ["udp", "direct"])
+@pytest.mark.parametrize(("arguments", "line"), BAD_INPUT.values(), ids=BAD_INPUT)
+def test_bad_input_gets_one_line_and_exit_code_2(
+    tmp_path: Path, link: str, arguments: tuple[Callable[[Path], str], ...], line: str
+) -> None:
+    command = [sys.executable, "-m", "tools", "fly", "--link", link, "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        [*command, *(make(tmp_path) for make in arguments)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert line in done.stderr
+    assert done.stderr.startswith("colibri: error: ")
+    assert done.stderr.count("\n") == 1
+    assert done.stdout == ""
+
+
+def test_out_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    occupied = tmp_path / "file"
+    occupied.touch()
+    with pytest.raises(SystemExit) as ended:
+        main(["fly", "spiral", "--quiet", "--out", str(occupied / "out")])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == f"colibri: error: cannot write to --out {occupied / 'out'}: Not a directory\n"
+
+
+@pytest.mark.parametrize("package", ["plant", "autopilot"])
+def test_help_says_what_a_stranger_needs(package: str) -> None:
+    done = subprocess.run([sys.executable, "-m", package, "--help"], capture_output=True, text=True, check=True)
+    assert "Example: python -m" in done.stdout
+    assert "14560" in done.stdout
+
+
+def test_a_taken_port() -> None:
+    taken = open_link("udpin:127.0.0.1:0")
+    command = [sys.executable, "-m", "plant", "--link", taken.url]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    taken.close()
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"colibri: error: {taken.url}: Address already in use; ")
+    assert done.stderr.count("\n") == 1
+
+
+def fly_slowly(out: Path) -> "subprocess.Popen[str]":
+    command = [sys.executable, "-m", "tools", "fly", "spiral", "--speed", "10", "--no-figures", "--out", str(out)]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True)
+
+
+def has_flown(out: Path) -> bool:
+    log = out / "plant.csv"
+    return log.exists() and log.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("whom", ["group", "parent"])
+def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path, whom: str) -> None:
+    """A terminal interrupts the whole group; `kill` only the command itself."""
+    flight = fly_slowly(tmp_path)
+    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
+    children = psutil.Process(flight.pid).children(recursive=True)
+    assert len(children) == 2
+    if whom == "group":
+        os.killpg(flight.pid, signal.SIGINT)
+    else:
+        flight.send_signal(signal.SIGINT)
+    _, said = flight.communicate(timeout=60.0)
+    assert flight.returncode == 130
+    assert said.splitlines()[-1] == f"colibri: error: interrupted; what was logged is in {tmp_path}"
+    assert "Traceback" not in said
+    assert not any(child.is_running() for child in children)
+    flown = (tmp_path / "flight.csv").read_text(encoding="utf-8").splitlines()
+    assert len(flown) > 10
+    assert flown[0].startswith("t,u,v,w,p,q,r,x,y,z,phi,theta,psi,U1")
+
+
+@pytest.mark.parametrize("name", ["plant", "autopilot"])
+def test_a_process_that_dies_ends_the_flight_in_words(tmp_path: Path, name: str) -> None:
+    flight = fly_slowly(tmp_path)
+    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
+    children = psutil.Process(flight.pid).children(recursive=True)
+    (victim,) = (child for child in children if name in child.cmdline()[2])
+    victim.send_signal(signal.SIGKILL)
+    _, said = flight.communicate(timeout=60.0)
+    assert flight.returncode == 1
+    expected = f"colibri: error: the {name} was killed by SIGKILL; what was logged is in {tmp_path}"
+    assert said.splitlines()[-1] == expected
+    assert not any(child.is_running() for child in children)
+
+
+def test_no_process_outlives_a_parent_that_was_killed(tmp_path: Path) -> None:
+    flight = fly_slowly(tmp_path)
+    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
+    children = psutil.Process(flight.pid).children(recursive=True)
+    flight.kill()
+    flight.communicate()
+    wait_for(lambda: not any(alive(child) for child in children), "both processes to end")
+
+
+def alive(process: psutil.Process) -> bool:
+    return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+
+
+def test_a_flight_leaves_what_the_readme_names(tmp_path: Path) -> None:
+    assert main(["fly", "crown", "--duration", "25", "--seed", "7", "--quiet", "--out", str(tmp_path)]) == 0
+    report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert {
+        "track": "crown",
+        "profile": "thesis",
+        "link": "udp",
+        "seed": 7,
+        "solver": "clarabel",
+    }.items() <= report.items()
+    assert set(report["solve_time_us"]) == set(report["control_step_us"]) == {"p50", "p99", "max"}
+    assert report["sim_time_s"] == 25.0
+    assert report["real_time_factor"] == pytest.approx(25.0 / report["wall_time_s"])
+    assert 0.0 < report["rmse_after_20s_m"] <= report["rmse_m"] <= report["max_error_m"]
+    assert len(report["trajectory_sha256"]) == 64
+    assert {"flight.csv", "flight.tlog"} <= {path.name for path in tmp_path.iterdir()}
+    assert len(list(tmp_path.glob("*.png"))) == 6
