@@ -17,7 +17,8 @@ from tools.processes import FlightError, fly_processes
 from tools.recording import Recording, RecordingError, Summary, read_recording, write_recording
 from tools.report import print_report, report, write_report
 
-LEFT_BY_A_FLIGHT = ("flight.csv", "flight.tlog", "plant.csv", "autopilot.csv", "report.json")
+LOGS = ("flight.csv", "flight.tlog", "plant.csv", "autopilot.csv", "report.json")
+FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "rotors.png", "error.png")
 
 
 def fly(args: argparse.Namespace) -> int:
@@ -64,9 +65,9 @@ def _prepare(out: Path) -> None:
     """Make the folder, and leave nothing of an earlier flight in it."""
     try:
         out.mkdir(parents=True, exist_ok=True)
-        for name in LEFT_BY_A_FLIGHT:
+        for name in (*LOGS, *FIGURES):
             (out / name).unlink(missing_ok=True)
-        (out / LEFT_BY_A_FLIGHT[0]).touch()
+        (out / LOGS[0]).touch()
     except OSError as error:
         fail(f"cannot write to --out {out}: {error.strerror}")
 
