@@ -99,6 +99,7 @@ class Client:
             if step and self._log:
                 self._log.write(step)  # while the plant integrates
             self._say_what_changed()
+        self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
     def _answer(self, autopilot: Autopilot, datagram: bytes) -> Step | None:
         frame = self._end.receive(datagram, perf_counter())

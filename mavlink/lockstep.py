@@ -66,6 +66,7 @@ class PlantEnd:
         self.received: list[bytes] = []
         self._peer_heard_s = 0.0
         self._frames: tuple[bytes, ...] = ()
+        self._begun = False
         self._awaited_us: int | None = None
         self._resend_at_s = 0.0
         self._outbox: list[Outgoing] = []
@@ -76,6 +77,7 @@ class PlantEnd:
         if frame.time_us % HEARTBEAT_EVERY_US == 0:
             frames.append(_heartbeat(self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False))
         self._frames = tuple(frames)
+        self._begun = True
         self._awaited_us = frame.time_us
         self._send_frame(now_s)
 
@@ -144,7 +146,7 @@ class PlantEnd:
         whole_ms = MIN_FRAME_INTERVAL_US <= interval_us <= MAX_FRAME_INTERVAL_US and interval_us % 1000 == 0
         if not whole_ms:
             return dialect.RESULT_DENIED
-        if self._awaited_us is not None and interval_us != self.frame_interval_us:
+        if self._begun and interval_us != self.frame_interval_us:
             return dialect.RESULT_TEMPORARILY_REJECTED
         self.frame_interval_us = int(interval_us)
         return dialect.RESULT_ACCEPTED
@@ -156,6 +158,8 @@ class PlantEnd:
         elif command.time_us != self._awaited_us:
             self.dropped["repeated"] += 1
             command = None
+        else:
+            self._awaited_us = None
         return command
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.flights.relay import Relay
-from tests.flights.runs import Process, fly, reference, running, start_plant, states, wait_for
+from tests.runs import Process, fly, reference, running, start_plant, states, wait_for
 
 START = ("--duration", "100")
 

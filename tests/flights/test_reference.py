@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.flights.runs import fly, largest_difference, reference, rows
+from tests.runs import fly, largest_difference, reference, rows
 from tools.recording import ATTITUDE_REFERENCE, COLUMNS, INPUT, STATE
 
 TRACKS = ("spiral", "line")

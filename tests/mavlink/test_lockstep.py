@@ -62,9 +62,10 @@ def test_a_frame_is_answered_once(plant: PlantEnd, autopilot: AutopilotEnd) -> N
     call(autopilot, plant)
     answer = answer_to(plant, autopilot, 0)
     assert plant.receive(answer, ADDRESS, 0.0) == command_at(0)
+    assert plant.receive(answer, ADDRESS, 0.0) is None
     plant.offer(frame_at(INTERVAL_US), 0.0)
     assert plant.receive(answer, ADDRESS, 0.0) is None
-    assert plant.dropped["repeated"] == 1
+    assert plant.dropped["repeated"] == 2
 
 
 def test_a_repeated_frame_gets_the_remembered_answer(plant: PlantEnd, autopilot: AutopilotEnd) -> None:

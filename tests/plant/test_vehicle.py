@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import plant
-
 from plant.vehicle import VehicleError, load_vehicle, vehicle_names
 
 FILE = Path(plant.__file__).parent / "vehicles" / "hummingbird.toml"

@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 from mavlink.link import open_link
-from tests.flights.runs import wait_for
+from tests.runs import wait_for
 from tools.cli import main
 
 VEHICLE = Path(__file__).parents[2] / "plant" / "vehicles" / "hummingbird.toml"
