@@ -41,9 +41,15 @@ def dormand_prince() -> Solver:
     """
     from scipy.integrate import ode  # slow to load, and Runge-Kutta does without
 
+    now: Derivative = list
+
+    # One solver for every frame: each that is made leaks 1.7 kB in scipy 1.17 and 1.18.
+    problem = ode(lambda _t, x: now(x.tolist()))
+    problem.set_integrator("dopri5", rtol=RELATIVE_TOLERANCE, atol=ABSOLUTE_TOLERANCE, nsteps=_MOST_STEPS)
+
     def integrate(f: Derivative, state: Sequence[float], duration_s: float) -> list[float]:
-        problem = ode(lambda _t, x: f(x.tolist()))
-        problem.set_integrator("dopri5", rtol=RELATIVE_TOLERANCE, atol=ABSOLUTE_TOLERANCE, nsteps=_MOST_STEPS)
+        nonlocal now
+        now = f
         problem.set_initial_value(list(state), 0.0)
         with catch_warnings():
             simplefilter("ignore")

@@ -8,7 +8,7 @@ from time import perf_counter
 
 from tests.fuzz.campaign import campaign
 
-BURST = 100
+BURST = 40
 
 
 def main() -> int:
