@@ -1,48 +1,37 @@
 """The inner loop: LPV model at the present state, MPC over the horizon, one increment of the moments."""
 
-from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
-
 import numpy as np
-from numpy.typing import NDArray
 
-from autopilot.lpv import OUTPUT, attitude_model, discretise
-from autopilot.mpc import Weights, augment, condense
-from autopilot.profile import AttitudeSettings
-from autopilot.qp import QpSolver, QpStatus
+from autopilot.controller import Array, Clock
+from autopilot.lpv import ATTITUDE_OUTPUT, Discretisation, attitude_model, discretise
+from autopilot.mpc import Solution, Weights, augment, condense, solve
+from autopilot.qp import QpSolver
+from autopilot.settings import Count, Table
 from mavlink.frames import Vector, euler_rates
-from plant.vehicle import Vehicle
+from plant.vehicle import Positive, Vehicle
 
-Array: TypeAlias = NDArray[np.float64]
+PerAxis = tuple[Positive, Positive, Positive]
 
 
-class AttitudeStep(NamedTuple):
-    """What one step of the attitude MPC decided.
+class AttitudeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The inner loop."""
 
-    Attributes:
-        moment_n_m: U2, U3, U4, N m.
-        status: How the QP ended; if it was not solved, the moments are the last ones.
-        solve_time_s: Time that the QP took.
-    """
-
-    moment_n_m: Array
-    status: QpStatus
-    solve_time_s: float
+    horizon: Count
+    shrinking_horizon: bool
+    discretisation: Discretisation
+    output_weight: PerAxis
+    terminal_weight: PerAxis
+    increment_weight: PerAxis
 
 
 class AttitudeMpc:
     """LPV-MPC of roll, pitch and yaw."""
 
     def __init__(
-        self,
-        settings: AttitudeSettings,
-        vehicle: Vehicle,
-        solver: QpSolver,
-        interval_s: float,
-        clock: Callable[[], float],
+        self, settings: AttitudeSettings, vehicle: Vehicle, solver: QpSolver, interval_s: float, clock: Clock
     ) -> None:
         """Control `vehicle` every `interval_s`; `clock` only measures, it decides nothing."""
-        self._settings = settings
+        self._discretisation = settings.discretisation
         self._inertia = vehicle.body.inertia_kg_m2
         self._solver = solver
         self._interval_s = interval_s
@@ -50,7 +39,7 @@ class AttitudeMpc:
         self._weights = Weights(
             np.array(settings.output_weight), np.array(settings.terminal_weight), np.array(settings.increment_weight)
         )
-        self._largest_increment = 2.0 * _largest_moments(vehicle)
+        self._largest_increment = 2.0 * vehicle.largest_wrench()[1:]
 
     def step(
         self,
@@ -60,8 +49,10 @@ class AttitudeMpc:
         rotor_momentum_n_m_s: float,
         reference: Vector,
         horizon: int,
-    ) -> AttitudeStep:
-        """Decide the moments to hold until the next step.
+    ) -> Solution:
+        """Decide the increments of U2, U3, U4 (N m) to apply until the next step.
+
+        The increments are bounded by what the rotors could do at all: from full moment to full moment.
 
         Args:
             euler: phi, theta, psi, rad.
@@ -74,20 +65,9 @@ class AttitudeMpc:
         phi, theta, psi = euler
         phi_rate, theta_rate, psi_rate = euler_rates(phi, theta, rate)
         A, B = attitude_model(phi_rate, theta_rate, rotor_momentum_n_m_s, inertia_kg_m2=self._inertia)
-        model = augment(discretise(A, B, self._interval_s, self._settings.discretisation), OUTPUT)
+        model = augment(discretise(A, B, self._interval_s, self._discretisation), ATTITUDE_OUTPUT)
         x = np.array([phi, phi_rate, theta, theta_rate, psi, psi_rate, *moment_n_m])
-        references = np.broadcast_to(np.array(reference), (horizon, 3))
-        qp = condense(model, horizon, x, references, self._weights)
-        bound = np.tile(self._largest_increment, horizon)
-        started_s = self._clock()
-        result = self._solver.solve(qp.H, qp.f, -bound, bound)
-        solve_time_s = self._clock() - started_s
-        increment = np.zeros(3) if result.x is None else result.x[:3]
-        return AttitudeStep(moment_n_m + increment, result.status, solve_time_s)
-
-
-def _largest_moments(vehicle: Vehicle) -> Array:
-    """Return the largest moment that the rotors can make about each axis, N m, (3,)."""
-    squared_max = vehicle.rotors.max_speed**2
-    largest: Array = np.clip(vehicle.allocation()[1:] * squared_max, 0.0, None).sum(axis=1)
-    return largest
+        references = np.array([reference] * horizon)
+        return solve(
+            condense(model, horizon, x, references, self._weights), self._largest_increment, self._solver, self._clock
+        )

@@ -1,38 +1,29 @@
 """The thesis's second strategy: position by feedback linearisation, attitude by LPV-MPC, one after the other."""
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from autopilot.attitude import AttitudeMpc
-from autopilot.lpv import Array
+from autopilot.attitude import AttitudeMpc, AttitudeSettings
+from autopilot.controller import Array, Clock, Decision, Horizon, Preview, VehicleState
 from autopilot.mixer import Mixer
-from autopilot.planner import Horizon
-from autopilot.position import AttitudeAndThrust, PositionController
-from autopilot.profile import Profile
-from autopilot.qp import QpSolver, QpStatus
-from mavlink.frames import Vector
+from autopilot.position import AttitudeAndThrust, PositionController, PositionSettings
+from autopilot.qp import QpSolver
+from autopilot.settings import ControlInterval, QpSettings, SettingsError, Table, interval_us, read_settings
 from plant.vehicle import Vehicle
 
 
-class VehicleState(NamedTuple):
-    """What a control law knows of the vehicle.
+class CascadeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The cascade."""
 
-    Attributes:
-        position_enu_m: Position, m, ENU.
-        velocity_enu_m_s: Velocity, m/s, ENU.
-        euler: phi, theta, psi in rad, psi unwrapped.
-        rate_flu_rad_s: Body rates p, q, r, rad/s, FLU.
-    """
-
-    position_enu_m: Vector
-    velocity_enu_m_s: Vector
-    euler: Vector
-    rate_flu_rad_s: Vector
+    control_interval_s: ControlInterval
+    position: PositionSettings
+    attitude: AttitudeSettings
+    qp: QpSettings
 
 
-class Memory(NamedTuple):
+class CascadeMemory(NamedTuple):
     """What the cascade carries from one control sample to the next.
 
     Attributes:
@@ -44,63 +35,59 @@ class Memory(NamedTuple):
     demand: AttitudeAndThrust | None
 
 
-class Decision(NamedTuple):
-    """What a control law decided, and how.
-
-    Attributes:
-        rotor_speeds: In the vehicle's unit, within its limits, (4,).
-        reference: phi, theta, psi that the attitude was steered to, rad.
-        qp_status: How the QP ended.
-        solve_time_s: Time that the QP took.
-    """
-
-    rotor_speeds: Array
-    reference: Vector
-    qp_status: QpStatus
-    solve_time_s: float
-
-
 class Cascade:
-    """The control law: one call a control sample.
+    """The control law. Its predicted outputs are phi, theta, psi in rad.
 
     Attributes:
-        preview: How many references it needs, from the present outer sample on.
+        control_interval_us: The inner sample.
+        preview: This outer sample and the next.
     """
 
-    preview = 2
+    def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
+        """Control `vehicle` as the profile's `table` says; `clock` only measures.
 
-    def __init__(self, profile: Profile, vehicle: Vehicle, clock: Callable[[], float]) -> None:
-        """Control `vehicle` as `profile` says; `clock` only measures, it decides nothing."""
-        self._samples = profile.position.samples
-        self._interval_us = profile.control_interval_us
-        self._horizon = profile.attitude.horizon
-        self._shrinking = profile.attitude.shrinking_horizon
-        self._position = PositionController(profile.position, vehicle)
-        solver = QpSolver(profile.qp.solver, profile.qp.tolerance)
-        self._attitude = AttitudeMpc(profile.attitude, vehicle, solver, profile.control_interval_s, clock)
+        Raises:
+            SettingsError: The table is wrong.
+            SolverError: The solver cannot be used.
+        """
+        settings = read_settings(table, CascadeSettings)
+        self._samples = settings.position.samples
+        self._horizon = settings.attitude.horizon
+        self._shrinking = settings.attitude.shrinking_horizon
+        if self._shrinking and self._horizon < self._samples:
+            raise SettingsError("attitude.horizon: a shrinking horizon must not end before the outer sample does")
+        self.control_interval_us = interval_us(settings.control_interval_s)
+        self.preview = Preview(self.control_interval_us * self._samples, 2)
+        self._position = PositionController(settings.position, vehicle)
+        solver = QpSolver(settings.qp.solver, settings.qp.tolerance)
+        self._attitude = AttitudeMpc(settings.attitude, vehicle, solver, settings.control_interval_s, clock)
         self._mixer = Mixer(vehicle)
 
-    def initial(self, rotor_speed: float) -> Memory:
-        """Return the memory of a controller whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
-        return Memory(np.full(4, rotor_speed), None)
+    def initial(self, rotor_speed: float) -> CascadeMemory:
+        """Return the memory of a cascade whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
+        return CascadeMemory(np.full(4, rotor_speed), None)
 
-    def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
+    def step(
+        self, memory: CascadeMemory, time_us: int, state: VehicleState, references: Horizon
+    ) -> tuple[CascadeMemory, Decision]:
         """Decide the rotor speeds to hold until the next control sample."""
-        sample = (time_us // self._interval_us) % self._samples
+        sample = (time_us // self.control_interval_us) % self._samples
         demand = memory.demand
         if demand is None or sample == 0:
             demand = self._demand(state, references)
         reference = (demand.phi, demand.theta, float(references.yaw_rad[1]))
+        moment_n_m = self._mixer.wrench(memory.rotor_speeds)[1:]
         attitude = self._attitude.step(
             state.euler,
             state.rate_flu_rad_s,
-            self._mixer.wrench(memory.rotor_speeds)[1:],
+            moment_n_m,
             self._mixer.momentum(memory.rotor_speeds),
             reference,
             self._horizon - sample if self._shrinking else self._horizon,
         )
-        speeds = self._mixer.rotor_speeds(np.array([demand.thrust_n, *attitude.moment_n_m]))
-        return Memory(speeds, demand), Decision(speeds, reference, attitude.status, attitude.solve_time_s)
+        wrench = np.array([demand.thrust_n, *(moment_n_m + attitude.increment)])
+        speeds = self._mixer.rotor_speeds(wrench)
+        return CascadeMemory(speeds, demand), Decision(speeds, reference, attitude.diagnostics)
 
     def _demand(self, state: VehicleState, references: Horizon) -> AttitudeAndThrust:
         """Steer to the reference of the next outer sample."""

@@ -1,16 +1,16 @@
-"""The LPV model of the attitude, THESIS [3.3], and its discretisation."""
+"""The LPV models of attitude and position, THESIS [3.1-3.4], and their discretisation."""
 
-from typing import TypeAlias
+from math import cos, sin
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from autopilot.profile import Discretisation
-
 Array: TypeAlias = NDArray[np.float64]
+Discretisation: TypeAlias = Literal["zero-order-hold", "forward-euler"]
 
-OUTPUT = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0], [0, 0, 0, 0, 1.0, 0]])
+ATTITUDE_OUTPUT = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0], [0, 0, 0, 0, 1.0, 0]])
 """C: the outputs phi, theta, psi of the state [phi phi' theta theta' psi psi']."""
 
 
@@ -36,6 +36,36 @@ def attitude_model(
     A[5, 1], A[5, 3] = 0.5 * theta_rate * (ix - iy) / iz, 0.5 * phi_rate * (ix - iy) / iz
     B = np.zeros((6, 3))
     B[1, 0], B[3, 1], B[5, 2] = 1.0 / ix, 1.0 / iy, 1.0 / iz
+    return A, B
+
+
+GLOBAL_OUTPUT = np.zeros((4, 12))
+"""C: the outputs x, y, z, psi of the state [x x' y y' z z' phi phi' theta theta' psi psi']."""
+GLOBAL_OUTPUT[[0, 1, 2, 3], [0, 2, 4, 10]] = 1.0
+
+
+def global_model(
+    attitude: tuple[Array, Array], euler: tuple[float, float, float], thrust_n: float, *, mass_kg: float, gravity_m_s2: float
+) -> tuple[Array, Array]:
+    """Return A (12, 12) and B (12, 4) of position and attitude together, THESIS [3.1, 3.4].
+
+    State [x x' y y' z z' phi phi' theta theta' psi psi'] in m, m/s, rad, rad/s (ENU), inputs U1 in N, U2, U3, U4 in N m.
+    Thrust enters the position through B alone, at the present tilt; gravity is divided by the last thrust to fit in.
+
+    Args:
+        attitude: A and B of `attitude_model`.
+        euler: phi, theta, psi, rad.
+        thrust_n: The last U1, above zero, N.
+        mass_kg: Mass.
+        gravity_m_s2: Gravitational acceleration.
+    """
+    phi, theta, psi = euler
+    A, B = np.zeros((12, 12)), np.zeros((12, 4))
+    A[0, 1] = A[2, 3] = A[4, 5] = 1.0
+    A[6:, 6:], B[6:, 1:] = attitude
+    B[1, 0] = (cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi)) / mass_kg
+    B[3, 0] = (cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi)) / mass_kg
+    B[5, 0] = -gravity_m_s2 / thrust_n + cos(phi) * cos(theta) / mass_kg
     return A, B
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from autopilot.lpv import Array
+from autopilot.controller import Array
 from plant.vehicle import Vehicle
 
 
@@ -12,7 +12,7 @@ class Mixer:
     def __init__(self, vehicle: Vehicle) -> None:
         """Invert the allocation of `vehicle`."""
         self._allocation = vehicle.allocation()
-        self._inverse = np.linalg.inv(self._allocation)
+        self._inverse = exact_inverse(self._allocation)
         self._momentum = vehicle.rotor_momentum()
         self._squared_max = vehicle.rotors.max_speed**2
 
@@ -30,3 +30,15 @@ class Mixer:
     def momentum(self, speeds: Array) -> float:
         """Return the rotors' angular momentum h along body z, N m s."""
         return float(self._momentum @ speeds)
+
+
+def exact_inverse(allocation: Array) -> Array:
+    """Invert an allocation (4, 4) so that a symmetrical airframe stays symmetrical to the last bit.
+
+    The rows of a symmetrical allocation are orthogonal, and A⁻¹ = Aᵀ (A Aᵀ)⁻¹ then only divides; elimination would
+    leave a moment of 1e-17 N m where none was asked for, enough to drift in open loop.
+    """
+    scale = np.linalg.norm(allocation, axis=1)
+    unit = allocation / scale[:, None]
+    inverse: Array = unit.T @ np.linalg.inv(unit @ unit.T) / scale
+    return inverse

@@ -5,7 +5,13 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.controller import Clock, Diagnostics
+from autopilot.qp import QpSolver
+
 Array: TypeAlias = NDArray[np.float64]
+
+_BINDING = 1e-6
+"""A bound counts as active where this part of it or less is left."""
 
 
 class Weights(NamedTuple):
@@ -17,10 +23,19 @@ class Weights(NamedTuple):
 
 
 class CondensedQp(NamedTuple):
-    """min ½ Δuᵀ H Δu + fᵀ Δu over the increments of the whole horizon, (horizon · m,)."""
+    """min ½ Δuᵀ H Δu + fᵀ Δu over the increments of the whole horizon, (N · m,).
+
+    Attributes:
+        H: (N · m, N · m).
+        f: (N · m,).
+        free: Outputs predicted without any increment, (N · p,).
+        Gamma: What the increments add to them, (N · p, N · m).
+    """
 
     H: Array
     f: Array
+    free: Array
+    Gamma: Array
 
 
 class IncrementModel(NamedTuple):
@@ -69,9 +84,42 @@ def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, we
     weighted = Gamma.T * _along(horizon, weights)
     H = weighted @ Gamma
     H.flat[:: horizon * m + 1] += np.concatenate([weights.increment] * horizon)
-    return CondensedQp(0.5 * (H + H.T), weighted @ (Phi @ x - reference.ravel()))
+    free = Phi @ x
+    return CondensedQp(0.5 * (H + H.T), weighted @ (free - reference.ravel()), free, Gamma)
 
 
 def _along(horizon: int, weights: Weights) -> Array:
     """Return the diagonal of Q̄: Q at every step, S at the last."""
     return np.concatenate([weights.output] * (horizon - 1) + [weights.terminal])
+
+
+class Solution(NamedTuple):
+    """What the MPC decided.
+
+    Attributes:
+        increment: The first increment, to be applied now, (m,); zero if the QP was not solved.
+        diagnostics: How it came about; `predicted` holds the outputs over the horizon, (N, p).
+    """
+
+    increment: Array
+    diagnostics: Diagnostics
+
+
+def solve(qp: CondensedQp, bound: Array, solver: QpSolver, clock: Clock) -> Solution:
+    """Solve a condensed QP with every increment within ±`bound`, (m,)."""
+    m = len(bound)
+    horizon = len(qp.f) // m
+    box = np.concatenate([bound] * horizon)
+    started_s = clock()
+    status, increments = solver.solve(qp.H, qp.f, -box, box)
+    solve_time_s = clock() - started_s
+    if increments is None:
+        return Solution(np.zeros(m), Diagnostics(status, solve_time_s))
+    diagnostics = Diagnostics(
+        status,
+        solve_time_s,
+        cost=float(increments @ (0.5 * qp.H @ increments + qp.f)),
+        active_constraints=int(np.count_nonzero(np.abs(increments) > (1.0 - _BINDING) * box)),
+        predicted=(qp.free + qp.Gamma @ increments).reshape(horizon, -1),
+    )
+    return Solution(increments[:m], diagnostics)

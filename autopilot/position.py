@@ -3,12 +3,21 @@
 from math import atan, cos, sin
 from typing import NamedTuple
 
-from autopilot.profile import PositionSettings
+from autopilot.settings import Count, Negative, Table
 from mavlink.frames import Vector
 from plant.vehicle import Vehicle
 
 _LEAST_LIFT = 0.05
 """The demanded lift never falls below this part of gravity: the law has no answer for a vehicle that must push down."""
+
+
+class PositionSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The outer loop."""
+
+    samples: Count
+    """Control samples in one outer sample."""
+    poles: tuple[Negative, Negative]
+    """Closed-loop poles of each axis, rad/s."""
 
 
 class AttitudeAndThrust(NamedTuple):

@@ -1,63 +1,22 @@
-"""A control profile: rates, weights, horizon, solver, poles, read strictly from a TOML file."""
+"""A profile: which control law flies, with which numbers, and how its flights begin; read strictly from TOML."""
 
 from importlib.resources import files
-from math import isfinite
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
-from plant.vehicle import Positive, read_toml
+from autopilot.settings import Table
+from plant.vehicle import read_toml
 
-Negative: TypeAlias = Annotated[float, msgspec.Meta(lt=0.0)]
-Count: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1000)]
-PerAxis: TypeAlias = tuple[Positive, Positive, Positive]
-Discretisation: TypeAlias = Literal["zero-order-hold", "forward-euler"]
+References: TypeAlias = Literal["by-formula", "by-differences"]
 
 
 class ProfileError(Exception):
     """A profile that cannot be flown; the message names file and key."""
 
 
-class _Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A table of a profile: every number in it is finite."""
-
-    def __post_init__(self) -> None:
-        for key in self.__struct_fields__:
-            value = getattr(self, key)
-            numbers = value if isinstance(value, tuple) else (value,)
-            if any(isinstance(number, float) and not isfinite(number) for number in numbers):
-                raise ValueError(f"{key}: must be finite")
-
-
-class PositionSettings(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The outer loop."""
-
-    samples: Count
-    """Control samples in one outer sample."""
-    poles: tuple[Negative, Negative]
-    """Closed-loop poles of each axis, rad/s."""
-
-
-class AttitudeSettings(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The inner loop: the LPV-MPC."""
-
-    horizon: Count
-    shrinking_horizon: bool
-    discretisation: Discretisation
-    output_weight: PerAxis
-    terminal_weight: PerAxis
-    increment_weight: PerAxis
-
-
-class QpSettings(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The QP solver, by its name in qpsolvers."""
-
-    solver: str
-    tolerance: Positive
-
-
-class SimulationSettings(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SimulationSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How a flight with this profile begins."""
 
     vehicle: str
@@ -67,27 +26,36 @@ class SimulationSettings(_Table, frozen=True, forbid_unknown_fields=True, kw_onl
     """Of every rotor, in turns per minute."""
 
 
-class Profile(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A control profile."""
+class Profile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A profile."""
 
     name: str
-    control_interval_s: Annotated[float, msgspec.Meta(ge=0.001, le=1.0)]
-    position: PositionSettings
-    attitude: AttitudeSettings
-    qp: QpSettings
+    controller: str
+    """The control law that flies, by the name it is registered under."""
+    references: References
+    """Velocity and yaw from the track's formula, or by backward differences as in the thesis."""
+    controllers: dict[str, dict[str, Any]]
+    """The numbers of each control law that the profile knows; each law reads its own table strictly."""
     simulation: SimulationSettings
 
-    def __post_init__(self) -> None:
-        """Check what a range cannot say."""
-        if not (self.control_interval_s * 1000.0).is_integer():
-            raise ValueError("control_interval_s: must be whole milliseconds, as MAVLink counts them")
-        if self.attitude.shrinking_horizon and self.attitude.horizon < self.position.samples:
-            raise ValueError("attitude.horizon: a shrinking horizon must not end before the outer sample does")
+    def table(self, controller: str) -> dict[str, Any]:
+        """Return the numbers of a control law; none for one that the profile does not know."""
+        return self.controllers.get(controller, {})
 
-    @property
-    def control_interval_us(self) -> int:
-        """The control interval in whole microseconds."""
-        return round(self.control_interval_s * 1e6)
+    def with_choices(self, controller: str | None, solver: str | None) -> "Profile":
+        """Return the profile with another control law, and another QP solver in the table of the one that flies.
+
+        Raises:
+            ProfileError: The control law has no QP to solve.
+        """
+        chosen = msgspec.structs.replace(self, controller=controller or self.controller)
+        if solver is None:
+            return chosen
+        table = chosen.table(chosen.controller)
+        if "qp" not in table:
+            raise ProfileError(f"controller {chosen.controller} solves no QP: leave --solver out")
+        with_solver = {**table, "qp": {**table["qp"], "solver": solver}}
+        return msgspec.structs.replace(chosen, controllers={**chosen.controllers, chosen.controller: with_solver})
 
 
 def profile_names() -> list[str]:

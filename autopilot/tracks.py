@@ -1,4 +1,4 @@
-"""The thesis's five tracks: position as a function of time."""
+"""The tracks: position as a formula of time, from which every derivative follows."""
 
 from collections.abc import Callable
 from typing import TypeAlias
@@ -6,9 +6,11 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.jet import Jet, cos, sin
+
 Array: TypeAlias = NDArray[np.float64]
-Track: TypeAlias = Callable[[Array], Array]
-"""Times (n,) in s -> positions (n, 3) in m, ENU."""
+Track: TypeAlias = Callable[[Jet], tuple[Jet, Jet, Jet]]
+"""Time in s -> x, y, z in m, ENU."""
 
 DURATION_S = 100.0
 
@@ -22,33 +24,32 @@ class TrackError(Exception):
     """There is no such track."""
 
 
-def spiral(t: Array) -> Array:
+def spiral(t: Jet) -> tuple[Jet, Jet, Jet]:
     """Climb on a circle."""
     alpha = _alpha(t)
-    return np.stack([_RADIUS_M * np.cos(alpha), _RADIUS_M * np.sin(alpha), _climb(t)], axis=-1)
+    return _RADIUS_M * cos(alpha), _RADIUS_M * sin(alpha), _climb(t)
 
 
-def expanding_spiral(t: Array) -> Array:
+def expanding_spiral(t: Jet) -> tuple[Jet, Jet, Jet]:
     """Climb on a circle that widens by 0.2 m/s."""
-    alpha, radius = _alpha(t), _RADIUS_M * t / 10.0 + _RADIUS_M
-    return np.stack([radius * np.cos(alpha), radius * np.sin(alpha), _climb(t)], axis=-1)
+    alpha, radius = _alpha(t), _RADIUS_M * 0.1 * t + _RADIUS_M
+    return radius * cos(alpha), radius * sin(alpha), _climb(t)
 
 
-def line(t: Array) -> Array:
+def line(t: Jet) -> tuple[Jet, Jet, Jet]:
     """Climb along a straight line."""
-    return np.stack([t / 10.0 + 1.0, t / 10.0 - 2.0, _climb(t)], axis=-1)
+    return 0.1 * t + 1.0, 0.1 * t - 2.0, _climb(t)
 
 
-def wave(t: Array) -> Array:
+def wave(t: Jet) -> tuple[Jet, Jet, Jet]:
     """Swing in x while flying along y at 2 m/s."""
-    return np.stack([_RADIUS_M * np.cos(_alpha(t)), 2.0 * t, _climb(t)], axis=-1)
+    return _RADIUS_M * cos(_alpha(t)), 2.0 * t, _climb(t)
 
 
-def crown(t: Array) -> Array:
+def crown(t: Jet) -> tuple[Jet, Jet, Jet]:
     """Circle while the height swings by 1.5 m."""
     alpha = _alpha(t)
-    height = _START_HEIGHT_M + 1.5 * np.sin(t)
-    return np.stack([_RADIUS_M * np.cos(alpha), _RADIUS_M * np.sin(alpha), height], axis=-1)
+    return _RADIUS_M * cos(alpha), _RADIUS_M * sin(alpha), 1.5 * sin(t) + _START_HEIGHT_M
 
 
 TRACKS: dict[str, Track] = {
@@ -71,9 +72,21 @@ def track(name: str) -> Track:
     return TRACKS[name]
 
 
-def _alpha(t: Array) -> Array:
+def position(track: Track, t: Array, derivative: int = 0) -> Array:
+    """Return a derivative of the position on a track, (n, 3), in m / s^derivative, ENU.
+
+    Args:
+        track: The track.
+        t: Times, s, (n,).
+        derivative: 0 for the position itself.
+    """
+    time = Jet.time(np.asarray(t, dtype=np.float64), derivative)
+    return np.stack([axis.derivative(derivative) for axis in track(time)], axis=-1)
+
+
+def _alpha(t: Jet) -> Jet:
     return 2.0 * np.pi * _TURNS_PER_S * t
 
 
-def _climb(t: Array) -> Array:
-    return _START_HEIGHT_M + _CLIMB_M_S * t
+def _climb(t: Jet) -> Jet:
+    return _CLIMB_M_S * t + _START_HEIGHT_M

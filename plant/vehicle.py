@@ -89,6 +89,11 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         """Return the 4 x 4 matrix that maps squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2]."""
         return _allocation(self.rotors)
 
+    def largest_wrench(self) -> Array:
+        """Return the largest U1 (N), U2, U3, U4 (N m) that the rotors can make, each on its own, (4,)."""
+        largest: Array = np.clip(self.allocation(), 0.0, None).sum(axis=1) * self.rotors.max_speed**2
+        return largest
+
     def rotor_momentum(self) -> Array:
         """Return the row (4,) that maps rotor speeds to their angular momentum along body z, N m s.
 

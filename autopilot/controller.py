@@ -1,0 +1,189 @@
+"""The interface of a control law, and where control laws are found.
+
+A control law is a class that a package registers under the entry point group `colibri.controllers`. Its instances are
+given the vehicle's state and the references ahead once a control sample, and return the rotor speeds to hold until the
+next. What they remember they return too: a controller has no state of its own, so the same inputs give the same flight.
+"""
+
+from collections.abc import Callable, Mapping
+from importlib.metadata import entry_points
+from typing import Any, NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.qp import QpStatus
+from mavlink.frames import Quaternion, Vector
+from plant.vehicle import Vehicle
+
+Array: TypeAlias = NDArray[np.float64]
+Clock: TypeAlias = Callable[[], float]
+"""Returns seconds. A control law may measure itself with it; it must decide nothing by it."""
+Memory = TypeVar("Memory")
+
+GROUP = "colibri.controllers"
+DEFAULT = "cascade"
+
+
+class ControllerError(Exception):
+    """A control law that cannot be used, or that gave something no rotor can follow."""
+
+
+class Preview(NamedTuple):
+    """Which references a control law wants at each control sample.
+
+    Attributes:
+        interval_us: Time between two references, µs. The first is that of the interval that now lies in.
+        count: How many.
+    """
+
+    interval_us: int
+    count: int
+
+
+class Horizon(NamedTuple):
+    """References from now on, as far apart as the preview asks.
+
+    Attributes:
+        position_enu_m: (n, 3), m, ENU.
+        velocity_enu_m_s: (n, 3), m/s, ENU.
+        acceleration_enu_m_s2: (n, 3), m/s², ENU; zero where planned by differences.
+        jerk_enu_m_s3: (n, 3), m/s³, ENU; zero where planned by differences.
+        yaw_rad: (n,), rad, counter-clockwise from east, unwrapped.
+        yaw_rate_rad_s: (n,), rad/s; zero where planned by differences.
+    """
+
+    position_enu_m: Array
+    velocity_enu_m_s: Array
+    acceleration_enu_m_s2: Array
+    jerk_enu_m_s3: Array
+    yaw_rad: Array
+    yaw_rate_rad_s: Array
+
+
+class VehicleState(NamedTuple):
+    """What a control law knows of the vehicle.
+
+    Attributes:
+        position_enu_m: Position, m, ENU.
+        velocity_enu_m_s: Velocity, m/s, ENU.
+        attitude: Unit quaternion wxyz, FLU body to ENU earth.
+        euler: phi, theta, psi in rad, psi unwrapped.
+        rate_flu_rad_s: Body rates p, q, r, rad/s, FLU.
+    """
+
+    position_enu_m: Vector
+    velocity_enu_m_s: Vector
+    attitude: Quaternion
+    euler: Vector
+    rate_flu_rad_s: Vector
+
+
+class Diagnostics(NamedTuple):
+    """How a decision came about; a control law without a QP leaves the defaults.
+
+    Attributes:
+        qp_status: How the QP ended; None if there was none.
+        solve_time_s: Time that the QP took, s.
+        cost: The QP's objective at its solution.
+        active_constraints: How many constraints bind at the solution.
+        predicted: Outputs predicted over the horizon, (N, p), in the order and units that the control law documents.
+    """
+
+    qp_status: QpStatus | None = None
+    solve_time_s: float = 0.0
+    cost: float = 0.0
+    active_constraints: int = 0
+    predicted: Array | None = None
+
+
+class Decision(NamedTuple):
+    """What a control law decided.
+
+    Attributes:
+        rotor_speeds: In the vehicle's unit and rotor order, within its limits, (4,).
+        attitude_reference: phi, theta, psi that the attitude is steered to, rad.
+        diagnostics: How it came about.
+    """
+
+    rotor_speeds: Array
+    attitude_reference: Vector
+    diagnostics: Diagnostics = Diagnostics()
+
+
+@runtime_checkable
+class Controller(Protocol[Memory]):
+    """A control law.
+
+    Attributes:
+        control_interval_us: Time between two control samples: whole milliseconds.
+        preview: The references it wants.
+    """
+
+    control_interval_us: int
+    preview: Preview
+
+    def initial(self, rotor_speed: float) -> Memory:
+        """Return what the law remembers before its first sample, every rotor at `rotor_speed` (vehicle's unit)."""
+        ...
+
+    def step(
+        self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
+    ) -> tuple[Memory, Decision]:
+        """Decide the rotor speeds to hold until the next control sample.
+
+        Args:
+            memory: What the step before returned.
+            time_us: Simulated time, µs, a multiple of the control interval.
+            state: The vehicle now.
+            references: The references that `preview` asks for.
+        """
+        ...
+
+
+Factory: TypeAlias = Callable[[Mapping[str, Any], Vehicle, Clock], Controller[Any]]
+"""(the profile's table for this controller, the vehicle to control, clock) -> control law."""
+
+
+def controller_names() -> list[str]:
+    """Return the names of the control laws that are installed."""
+    return sorted({entry.name for entry in entry_points(group=GROUP)})
+
+
+def load_controller(name: str) -> Factory:
+    """Return the factory registered as `name`.
+
+    Raises:
+        ControllerError: There is none, or its package cannot be loaded.
+    """
+    for entry in entry_points(group=GROUP, name=name):
+        try:
+            factory: Factory = entry.load()
+        except (ImportError, AttributeError) as error:
+            raise ControllerError(f"controller {name} ({entry.value}) cannot be loaded: {error}") from error
+        return factory
+    raise ControllerError(f"unknown controller {name}: installed are {', '.join(controller_names())}")
+
+
+def check_controller(name: str, controller: object) -> None:
+    """Check what a control law promises before anything flies.
+
+    Raises:
+        ControllerError: It is not a control law.
+    """
+    if not isinstance(controller, Controller):
+        raise ControllerError(f"controller {name} needs control_interval_us, preview, initial() and step()")
+    interval_us = controller.control_interval_us
+    if not 1_000 <= interval_us <= 1_000_000 or interval_us % 1_000:
+        raise ControllerError(f"controller {name}: control_interval_us must be whole milliseconds up to a second")
+
+
+def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float) -> None:
+    """Check that rotors can follow a decision.
+
+    Raises:
+        ControllerError: They cannot.
+    """
+    speeds = np.asarray(rotor_speeds)
+    if speeds.shape != (4,) or not ((speeds >= 0.0) & (speeds <= max_speed)).all():
+        raise ControllerError(f"controller {name} gave rotor speeds {rotor_speeds}: expected four from 0 to {max_speed:g}")

@@ -1,0 +1,104 @@
+"""The thesis's first strategy, kept to see it fail: one LPV-MPC for position and yaw, THESIS [3.1, 3.4].
+
+It never tilts. With phi = theta = 0 the rows of B that push x and y sideways are zero, so the frozen model knows no
+input that moves them; and phi and theta are no outputs, so nothing asks for tilt either. Height fails too: at hover
+B[z', U1] = -g/U1 + 1/m is zero, and below hover thrust it has the wrong sign. Only yaw is left to be followed.
+"""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from autopilot.controller import Array, Clock, Decision, Horizon, Preview, VehicleState
+from autopilot.lpv import GLOBAL_OUTPUT, Discretisation, attitude_model, discretise, global_model
+from autopilot.mixer import Mixer
+from autopilot.mpc import Weights, augment, condense, solve
+from autopilot.qp import QpSolver
+from autopilot.settings import ControlInterval, Count, QpSettings, Table, interval_us, read_settings
+from mavlink.frames import euler_rates
+from plant.vehicle import Positive, Vehicle
+
+PerOutput = tuple[Positive, Positive, Positive, Positive]
+
+_LEAST_THRUST = 0.01
+"""The model divides by the last thrust: it never takes it for less than this part of the weight."""
+
+
+class GlobalSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The global MPC."""
+
+    control_interval_s: ControlInterval
+    horizon: Count
+    discretisation: Discretisation
+    output_weight: PerOutput
+    terminal_weight: PerOutput
+    increment_weight: PerOutput
+    qp: QpSettings
+
+
+class GlobalMemory(NamedTuple):
+    """The rotor speeds last commanded, in the vehicle's unit, (4,)."""
+
+    rotor_speeds: Array
+
+
+class GlobalMpc:
+    """The control law. Its predicted outputs are x, y, z in m and psi in rad.
+
+    Attributes:
+        control_interval_us: The control sample.
+        preview: Now, and the horizon.
+    """
+
+    def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
+        """Control `vehicle` as the profile's `table` says; `clock` only measures.
+
+        Raises:
+            SettingsError: The table is wrong.
+            SolverError: The solver cannot be used.
+        """
+        self._settings = read_settings(table, GlobalSettings)
+        self.control_interval_us = interval_us(self._settings.control_interval_s)
+        self.preview = Preview(self.control_interval_us, self._settings.horizon + 1)
+        self._vehicle = vehicle
+        self._clock = clock
+        self._solver = QpSolver(self._settings.qp.solver, self._settings.qp.tolerance)
+        self._mixer = Mixer(vehicle)
+        self._largest_increment = 2.0 * vehicle.largest_wrench()
+        self._weights = Weights(
+            np.array(self._settings.output_weight),
+            np.array(self._settings.terminal_weight),
+            np.array(self._settings.increment_weight),
+        )
+
+    def initial(self, rotor_speed: float) -> GlobalMemory:
+        """Return the memory of a controller whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
+        return GlobalMemory(np.full(4, rotor_speed))
+
+    def step(
+        self, memory: GlobalMemory, time_us: int, state: VehicleState, references: Horizon
+    ) -> tuple[GlobalMemory, Decision]:
+        """Decide the rotor speeds to hold until the next control sample."""
+        del time_us
+        wrench = self._mixer.wrench(memory.rotor_speeds)
+        phi, theta, psi = state.euler
+        rates = euler_rates(phi, theta, state.rate_flu_rad_s)
+        motion = zip((*state.position_enu_m, phi, theta, psi), (*state.velocity_enu_m_s, *rates), strict=True)
+        x = np.array([*(value for pair in motion for value in pair), *wrench])
+        A, B = self._model(state, rates, wrench, self._mixer.momentum(memory.rotor_speeds))
+        model = augment(discretise(A, B, self._settings.control_interval_s, self._settings.discretisation), GLOBAL_OUTPUT)
+        wanted = np.column_stack([references.position_enu_m[1:], references.yaw_rad[1:]])
+        qp = condense(model, self._settings.horizon, x, wanted, self._weights)
+        increment, diagnostics = solve(qp, self._largest_increment, self._solver, self._clock)
+        speeds = self._mixer.rotor_speeds(wrench + increment)
+        return GlobalMemory(speeds), Decision(speeds, (0.0, 0.0, float(references.yaw_rad[1])), diagnostics)
+
+    def _model(
+        self, state: VehicleState, rates: tuple[float, float, float], wrench: Array, rotor_momentum_n_m_s: float
+    ) -> tuple[Array, Array]:
+        """Return the LPV model at the present state and the last input."""
+        body, gravity_m_s2 = self._vehicle.body, self._vehicle.gravity_m_s2
+        thrust_n = max(float(wrench[0]), _LEAST_THRUST * body.mass_kg * gravity_m_s2)
+        attitude = attitude_model(rates[0], rates[1], rotor_momentum_n_m_s, inertia_kg_m2=body.inertia_kg_m2)
+        return global_model(attitude, state.euler, thrust_n, mass_kg=body.mass_kg, gravity_m_s2=gravity_m_s2)
