@@ -20,6 +20,7 @@ def _parser() -> ArgumentParser:
     add("--plant", default=DEFAULT_PLANT, metavar="URL", help="the plant to call (default %(default)s)")
     add("--track", default="spiral", metavar="NAME", help="what to fly (default %(default)s)")
     add("--profile", default="thesis", metavar="NAME", help="control profile name or .toml (default %(default)s)")
+    add("--controller", metavar="NAME", help="control law (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml to control (default: the profile's)")
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--system-id", type=int, default=1, choices=range(1, 256), metavar="ID", help="MAVLink system (default 1)")

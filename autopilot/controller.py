@@ -34,11 +34,11 @@ class Preview(NamedTuple):
 
     Attributes:
         interval_us: Time between two references, µs. The first is that of the interval that now lies in.
-        count: How many.
+        samples: How many.
     """
 
     interval_us: int
-    count: int
+    samples: int
 
 
 class Horizon(NamedTuple):
@@ -127,9 +127,7 @@ class Controller(Protocol[Memory]):
         """Return what the law remembers before its first sample, every rotor at `rotor_speed` (vehicle's unit)."""
         ...
 
-    def step(
-        self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
-    ) -> tuple[Memory, Decision]:
+    def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample.
 
         Args:
@@ -186,4 +184,6 @@ def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float) -> None
     """
     speeds = np.asarray(rotor_speeds)
     if speeds.shape != (4,) or not ((speeds >= 0.0) & (speeds <= max_speed)).all():
-        raise ControllerError(f"controller {name} gave rotor speeds {rotor_speeds}: expected four from 0 to {max_speed:g}")
+        raise ControllerError(
+            f"controller {name} gave rotor speeds {rotor_speeds}: expected four from 0 to {max_speed:g}"
+        )

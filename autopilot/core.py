@@ -1,11 +1,19 @@
 """The autopilot as a pure composition: a frame of the vehicle's state in, the rotor command that answers it out."""
 
-from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from autopilot.cascade import Cascade, Decision, Memory, VehicleState
-from autopilot.planner import SampledPlanner
-from autopilot.profile import Profile
+from autopilot.controller import (
+    Clock,
+    Controller,
+    Decision,
+    VehicleState,
+    check_controller,
+    check_rotor_speeds,
+    load_controller,
+)
+from autopilot.planner import plan
+from autopilot.profile import Profile, ProfileError
+from autopilot.settings import SettingsError
 from autopilot.tracks import Track
 from mavlink.frames import euler_from_quaternion, nearest_turn
 from mavlink.hil import ActuatorCommand, StateFrame
@@ -21,39 +29,49 @@ class Step(NamedTuple):
 
 
 class Autopilot:
-    """Flies one track with one profile."""
+    """Flies one track with one control law.
 
-    def __init__(self, profile: Profile, vehicle: Vehicle, track: Track, clock: Callable[[], float]) -> None:
+    Attributes:
+        frame_interval_us: How often it wants a frame: at every control sample.
+    """
+
+    def __init__(self, profile: Profile, vehicle: Vehicle, track: Track, clock: Clock) -> None:
         """Fly `vehicle` along `track`; `clock` only measures, it decides nothing.
 
         Raises:
-            SolverError: The profile's solver cannot be used.
+            ControllerError: The profile's control law cannot be used.
+            ProfileError: Its table is wrong.
+            SolverError: Its solver cannot be used.
         """
-        self._interval_us = profile.control_interval_us
+        self._name = profile.controller
+        self._controller = _build(profile, vehicle, clock)
+        self._planner = plan(track, profile.references, self._controller.preview)
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._vehicle = vehicle
         self._clock = clock
-        self._controller = Cascade(profile, vehicle, clock)
-        outer_interval_s = profile.control_interval_s * profile.position.samples
-        self._planner = SampledPlanner(track, outer_interval_s, self._controller.preview)
-        self._memory: Memory | None = None
-        self._time_us = 0
+        self._memory: Any = None
+        self._time_us: int | None = None
         self._yaw_rad = 0.0
+        self.frame_interval_us = self._controller.control_interval_us
 
     def step(self, frame: StateFrame) -> Step:
         """Answer a frame.
 
         Frames follow one another at the control interval. One that does not begins a new flight: with the profile's
         rotor speed at time 0, and with hover in mid-flight, where nothing is known of the rotors.
+
+        Raises:
+            ControllerError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
         references = self._planner.horizon(frame.time_us)
-        if self._memory is None or frame.time_us != self._time_us + self._interval_us:
+        if self._time_us is None or frame.time_us != self._time_us + self.frame_interval_us:
             speed = self._start_speed if frame.time_us == 0 else self._vehicle.hover_speed
             self._memory = self._controller.initial(speed)
             self._yaw_rad = float(references.yaw_rad[0])
         self._time_us = frame.time_us
         self._memory, decision = self._controller.step(self._memory, frame.time_us, self._state(frame), references)
+        check_rotor_speeds(self._name, decision.rotor_speeds, self._vehicle.rotors.max_speed)
         c1, c2, c3, c4 = (decision.rotor_speeds / self._vehicle.rotors.max_speed).tolist()
         command = ActuatorCommand(frame.time_us, (c1, c2, c3, c4), armed=True)
         return Step(command, decision, self._clock() - started_s)
@@ -63,4 +81,14 @@ class Autopilot:
         phi, theta, psi = euler_from_quaternion(frame.attitude)
         self._yaw_rad = nearest_turn(psi, self._yaw_rad)
         euler = (phi, theta, self._yaw_rad)
-        return VehicleState(frame.position_enu_m, frame.velocity_enu_m_s, euler, frame.rate_flu_rad_s)
+        return VehicleState(frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
+
+
+def _build(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:
+    factory = load_controller(profile.controller)
+    try:
+        controller = factory(profile.table(profile.controller), vehicle, clock)
+    except SettingsError as error:
+        raise ProfileError(f"profile {profile.name}: controllers.{profile.controller}: {error}") from error
+    check_controller(profile.controller, controller)
+    return controller

@@ -45,11 +45,16 @@ GLOBAL_OUTPUT[[0, 1, 2, 3], [0, 2, 4, 10]] = 1.0
 
 
 def global_model(
-    attitude: tuple[Array, Array], euler: tuple[float, float, float], thrust_n: float, *, mass_kg: float, gravity_m_s2: float
+    attitude: tuple[Array, Array],
+    euler: tuple[float, float, float],
+    thrust_n: float,
+    *,
+    mass_kg: float,
+    gravity_m_s2: float,
 ) -> tuple[Array, Array]:
     """Return A (12, 12) and B (12, 4) of position and attitude together, THESIS [3.1, 3.4].
 
-    State [x x' y y' z z' phi phi' theta theta' psi psi'] in m, m/s, rad, rad/s (ENU), inputs U1 in N, U2, U3, U4 in N m.
+    State [x x' y y' z z' phi phi' theta theta' psi psi'] in m, m/s, rad, rad/s (ENU), inputs U1 in N, U2..U4 in N m.
     Thrust enters the position through B alone, at the present tilt; gravity is divided by the last thrust to fit in.
 
     Args:

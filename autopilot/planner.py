@@ -28,20 +28,21 @@ class Planner:
     def horizon(self, time_us: int) -> Horizon:
         """Return the reference of the sample that `time_us` lies in, and those that follow it."""
         first = min(time_us // self.preview.interval_us, self.samples)
-        ahead = slice(first, first + self.preview.count)
+        ahead = slice(first, first + self.preview.samples)
         return Horizon(*(column[ahead] for column in self.table))
 
 
 def plan(track: Track, references: References, preview: Preview) -> Planner:
     """Tabulate a track as often as `preview` asks, by its formula or by differences."""
-    t = preview.interval_us * 1e-6 * np.arange(round(DURATION_S * 1e6) // preview.interval_us + 1)
+    last = round(DURATION_S * 1e6) // preview.interval_us
+    t: Array = preview.interval_us * 1e-6 * np.arange(last + 1, dtype=np.float64)
     table = _by_differences(track, t) if references == "by-differences" else _by_formula(track, t)
-    return Planner(preview, len(t), _held(table, preview.count))
+    return Planner(preview, len(t), _held(table, preview.samples))
 
 
 def start_yaw(track: Track, references: References) -> float:
     """Return the first yaw reference, rad: with it a flight starts."""
-    return float(plan(track, references, Preview(interval_us=100_000, count=1)).table.yaw_rad[0])
+    return float(plan(track, references, Preview(interval_us=100_000, samples=1)).table.yaw_rad[0])
 
 
 def _by_formula(track: Track, t: Array) -> Horizon:

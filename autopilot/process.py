@@ -4,18 +4,20 @@ import argparse
 from pathlib import Path
 from time import perf_counter
 
-import msgspec
-
+from autopilot.controller import ControllerError
 from autopilot.core import Autopilot, Step
-from autopilot.profile import Profile, ProfileError, load_profile
+from autopilot.profile import ProfileError, load_profile
 from autopilot.qp import QpStatus, SolverError
 from autopilot.tracks import TrackError, track
 from mavlink.link import LinkError, UdpLink
 from mavlink.lockstep import AutopilotEnd
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Status, Stop, fail
-from plant.vehicle import Vehicle, VehicleError, load_vehicle
+from plant.vehicle import VehicleError, load_vehicle
 
-DECISION_COLUMNS = ("t", "phi_ref", "theta_ref", "psi_ref", "qp_solved", "solve_time_us", "control_step_us")
+DECISION_COLUMNS = (
+    *("t", "phi_ref", "theta_ref", "psi_ref"),
+    *("qp_solved", "solve_time_us", "control_step_us", "cost", "active_constraints"),
+)
 
 _SILENCE_SAID_AFTER_S = 2.0
 _WAIT_AT_MOST_S = 0.1
@@ -30,10 +32,13 @@ class AutopilotLog:
 
     def write(self, step: Step) -> None:
         """Append a control sample."""
-        decision = step.decision
-        solved = int(decision.qp_status is QpStatus.SOLVED)
-        times_us = (decision.solve_time_s * 1e6, step.duration_s * 1e6)
-        self._decisions.write((step.command.time_us / 1e6, *decision.reference, solved, *times_us))
+        decision, how = step.decision, step.decision.diagnostics
+        solved = int(how.qp_status in (None, QpStatus.SOLVED))
+        times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
+        time_s = step.command.time_us / 1e6
+        self._decisions.write(
+            (time_s, *decision.attitude_reference, solved, *times_us, how.cost, how.active_constraints)
+        )
 
     def close(self) -> None:
         """Close the file."""
@@ -43,34 +48,22 @@ class AutopilotLog:
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
     """Fly the plant at the other end of `link` as the command line says; return the exit code."""
     try:
-        profile, vehicle = configuration(args.profile, args.vehicle, args.solver)
+        profile = load_profile(args.profile).with_choices(args.controller, args.solver)
+        vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
         autopilot = Autopilot(profile, vehicle, track(args.track), perf_counter)
-    except (ProfileError, VehicleError, TrackError, SolverError) as error:
+    except (ProfileError, VehicleError, TrackError, ControllerError, SolverError) as error:
         fail(str(error))
     log = AutopilotLog(args.out) if args.out else None
-    end = AutopilotEnd(system_id=args.system_id, frame_interval_us=profile.control_interval_us, now_s=perf_counter())
+    end = AutopilotEnd(system_id=args.system_id, frame_interval_us=autopilot.frame_interval_us, now_s=perf_counter())
     try:
         Client(link, end, status, stop, log).fly(autopilot)
-    except LinkError as error:
+    except (LinkError, ControllerError) as error:
         fail(str(error), EXIT_FAILED)
     finally:
         link.close()
         if log:
             log.close()
     return EXIT_INTERRUPTED
-
-
-def configuration(profile_name: str, vehicle_name: str | None, solver: str | None) -> tuple[Profile, Vehicle]:
-    """Read the profile, with another solver if one is named, and the vehicle to control, by default the profile's.
-
-    Raises:
-        ProfileError: The profile cannot be read.
-        VehicleError: The vehicle cannot be read.
-    """
-    profile = load_profile(profile_name)
-    if solver:
-        profile = msgspec.structs.replace(profile, qp=msgspec.structs.replace(profile.qp, solver=solver))
-    return profile, load_vehicle(vehicle_name or profile.simulation.vehicle)
 
 
 class Client:

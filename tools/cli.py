@@ -36,6 +36,7 @@ def _add_fly(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("track", metavar="TRACK", help=TRACK_HELP)
     add("--profile", default="thesis", metavar="NAME", help="control profile name or .toml (default %(default)s)")
+    add("--controller", metavar="NAME", help="control law, also of another package (default: the profile's)")
     add(
         "--link",
         default="udp",

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from autopilot.controller import ControllerError
 from autopilot.profile import ProfileError
 from autopilot.qp import SolverError
 from autopilot.tracks import TrackError
@@ -31,7 +32,7 @@ def fly(args: argparse.Namespace) -> int:
     try:
         with _progress(plan, quiet=args.quiet) as progress:
             summary = _flight(plan, progress)
-    except (SolverError, ValueError) as error:
+    except (ControllerError, ProfileError, SolverError) as error:
         fail(str(error))
     except IntegrationError as error:
         _keep(plan)

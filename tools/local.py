@@ -31,6 +31,8 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     """Fly `plan` in this process; `progress` is told the simulated time in s.
 
     Raises:
+        ControllerError: The control law cannot be used, or gave what no rotor can follow.
+        ProfileError: The control law's table in the profile is wrong.
         SolverError: The solver cannot be used.
         IntegrationError: The state cannot be integrated any further.
     """
@@ -40,7 +42,7 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     simulation = plan.profile.simulation
     speed = start_speed(plan.plant_vehicle, simulation.rotor_speed_rpm)
     world = world_at_rest(simulation.position_enu_m, plan.start_yaw_rad, speed)
-    interval_us = plan.profile.control_interval_us
+    interval_us = autopilot.frame_interval_us
     plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out)
     exchange: Exchange = InMemory(autopilot, interval_us, plant_logs) if plan.link == "memory" else Direct(autopilot)
     began_s = perf_counter()

@@ -4,9 +4,7 @@ import argparse
 from dataclasses import dataclass
 from pathlib import Path
 
-import msgspec
-
-from autopilot.planner import SampledPlanner
+from autopilot.planner import start_yaw
 from autopilot.profile import Profile, load_profile
 from autopilot.tracks import Track, track
 from plant.process import start_speed
@@ -28,7 +26,8 @@ class FlightPlan:
         seed: Seed of everything random.
         duration_s: Simulated time to fly.
         out: Folder for all that the flight leaves.
-        profile: The profile, with the solver asked for.
+        solver: QP solver asked for; None for the profile's.
+        profile: The profile, with controller and solver as asked for.
         vehicle: The vehicle that the autopilot controls.
         plant_vehicle: The vehicle that the plant flies.
     """
@@ -43,6 +42,7 @@ class FlightPlan:
     seed: int
     duration_s: float
     out: Path
+    solver: str | None
     profile: Profile
     vehicle: Vehicle
     plant_vehicle: Vehicle
@@ -57,9 +57,7 @@ class FlightPlan:
             TrackError: There is no such track.
         """
         track(args.track)
-        profile = load_profile(args.profile)
-        if args.solver:
-            profile = msgspec.structs.replace(profile, qp=msgspec.structs.replace(profile.qp, solver=args.solver))
+        profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle_name = args.vehicle or profile.simulation.vehicle
         plant_vehicle_name = args.plant_vehicle or vehicle_name
         plant_vehicle = load_vehicle(plant_vehicle_name)
@@ -75,6 +73,7 @@ class FlightPlan:
             seed=args.seed,
             duration_s=args.duration,
             out=args.out,
+            solver=args.solver,
             profile=profile,
             vehicle=load_vehicle(vehicle_name),
             plant_vehicle=plant_vehicle,
@@ -88,5 +87,4 @@ class FlightPlan:
     @property
     def start_yaw_rad(self) -> float:
         """The first yaw reference, with which the vehicle starts."""
-        outer_interval_s = self.profile.control_interval_s * self.profile.position.samples
-        return float(SampledPlanner(self.track, outer_interval_s, preview=1).horizon(0).yaw_rad[0])
+        return start_yaw(self.track, self.profile.references)

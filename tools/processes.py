@@ -84,7 +84,8 @@ def _autopilot_options(plan: FlightPlan) -> list[str]:
         *("--track", plan.track_name),
         *("--profile", plan.profile_name),
         *("--vehicle", plan.vehicle_name),
-        *("--solver", plan.profile.qp.solver),
+        *("--controller", plan.profile.controller),
+        *(("--solver", plan.solver) if plan.solver else ()),
         *("--out", str(plan.out)),
     ]
 

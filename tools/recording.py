@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.tracks import position
 from mavlink.frames import euler_from_quaternion, nearest_turn
 from tools.plan import FlightPlan
 
@@ -81,9 +82,9 @@ def read_recording(plan: FlightPlan) -> Recording:
     autopilot = _read_csv(plan.out / "autopilot.csv")
     if not len(plant):
         raise RecordingError("the flight ended before it began")
-    samples = plant[np.isin(np.round(plant[:, 0] * 1e6), _sample_times_us(plan, plant))]
-    decisions = autopilot[: len(samples) - 1]
-    samples = samples[: len(decisions) + 1]
+    decisions = autopilot[: np.searchsorted(autopilot[:, 0], plant[-1, 0])]
+    samples = _at_samples(plant, decisions[:, 0])
+    decisions = decisions[: max(len(samples) - 1, 0)]
     if not len(decisions):
         raise RecordingError("the flight ended before its first control sample")
     return Recording(
@@ -101,9 +102,11 @@ def write_recording(recording: Recording, path: Path) -> None:
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
 
 
-def _sample_times_us(plan: FlightPlan, plant: Array) -> Array:
-    interval_us = plan.profile.control_interval_us
-    return np.arange(0.0, plant[-1, 0] * 1e6 + 0.5 * interval_us, interval_us)
+def _at_samples(plant: Array, decided_s: Array) -> Array:
+    """Return the plant's rows at the times of the decisions, and one where the last of them has been held."""
+    held_s = decided_s[-1:] + (decided_s[1] - decided_s[0] if len(decided_s) > 1 else plant[-1, 0])
+    times_us = np.round(np.concatenate([decided_s, held_s]) * 1e6)
+    return plant[np.isin(np.round(plant[:, 0] * 1e6), times_us)]
 
 
 def _join(plan: FlightPlan, samples: Array, decisions: Array) -> Array:
@@ -116,7 +119,7 @@ def _join(plan: FlightPlan, samples: Array, decisions: Array) -> Array:
             squared @ plan.plant_vehicle.allocation().T,
             np.vstack([start_reference, decisions[:, 1:4]]),
             samples[:, _PLANT_ROTORS],
-            plan.track(samples[:, 0]),
+            position(plan.track, samples[:, 0]),
         ]
     )
 

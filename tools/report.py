@@ -24,9 +24,10 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
     return {
         "track": plan.track_name,
         "profile": plan.profile.name,
+        "controller": plan.profile.controller,
         "link": plan.link,
         "seed": plan.seed,
-        "solver": plan.profile.qp.solver,
+        "solver": plan.profile.table(plan.profile.controller).get("qp", {}).get("solver"),
         "vehicle": plan.vehicle_name,
         "plant_vehicle": plan.plant_vehicle_name,
         "integrator": plan.integrator,

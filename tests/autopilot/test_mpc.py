@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.lpv import OUTPUT, Array, attitude_model, discretise
+from autopilot.lpv import ATTITUDE_OUTPUT, Array, attitude_model, discretise
 from autopilot.mpc import IncrementModel, Weights, augment, condense
 
 INERTIA = (0.0034, 0.0041, 0.006)
@@ -14,7 +14,7 @@ WEIGHTS = Weights(np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0]), np.array
 
 def model() -> IncrementModel:
     A, B = attitude_model(0.4, -0.7, 0.004, inertia_kg_m2=INERTIA)
-    return augment(discretise(A, B, 0.1, "zero-order-hold"), OUTPUT)
+    return augment(discretise(A, B, 0.1, "zero-order-hold"), ATTITUDE_OUTPUT)
 
 
 def cost(horizon: int, x: Array, reference: Array, increments: Array) -> float:

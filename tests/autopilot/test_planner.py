@@ -3,15 +3,18 @@
 import numpy as np
 import pytest
 
-from autopilot.planner import Horizon, SampledPlanner
-from autopilot.tracks import DURATION_S, TRACKS, TrackError, track
+from autopilot.controller import Horizon, Preview
+from autopilot.planner import plan, start_yaw
+from autopilot.profile import References
+from autopilot.tracks import DURATION_S, TRACKS, TrackError, position, track
 
 INTERVAL_S = 0.4
 SAMPLES = 250
+KINDS: tuple[References, ...] = ("by-differences", "by-formula")
 
 
-def horizon_from(name: str, time_us: int, preview: int) -> Horizon:
-    return SampledPlanner(track(name), INTERVAL_S, preview).horizon(time_us)
+def horizon_from(name: str, time_us: int, samples: int, kind: References = "by-differences") -> Horizon:
+    return plan(track(name), kind, Preview(round(INTERVAL_S * 1e6), samples)).horizon(time_us)
 
 
 def test_the_five_tracks() -> None:
@@ -31,7 +34,7 @@ def test_the_five_tracks() -> None:
     ],
 )
 def test_where_a_track_begins_and_ends(name: str, start: tuple[float, ...], end: tuple[float, ...]) -> None:
-    ends = track(name)(np.array([0.0, DURATION_S]))
+    ends = position(track(name), np.array([0.0, DURATION_S]))
     assert ends == pytest.approx(np.array([start, end]), abs=1e-12)
 
 
@@ -41,6 +44,31 @@ def test_velocity_is_the_backward_difference(name: str) -> None:
     steps = np.diff(horizon.position_enu_m, axis=0)
     assert horizon.velocity_enu_m_s[1:] * INTERVAL_S == pytest.approx(steps, abs=1e-8)
     assert horizon.velocity_enu_m_s[0] == pytest.approx(horizon.velocity_enu_m_s[1])
+
+
+@pytest.mark.parametrize("name", TRACKS)
+def test_by_formula_each_quantity_is_the_derivative_of_the_one_before(name: str) -> None:
+    """Central differences, whose error is of second order in the interval."""
+    interval_s = 1e-3
+    horizon = plan(track(name), "by-formula", Preview(round(interval_s * 1e6), 2000)).horizon(20_000_000)
+    quantities = [*horizon[:4], horizon.yaw_rad, horizon.yaw_rate_rad_s]
+    for lower, higher in ((0, 1), (1, 2), (2, 3), (4, 5)):
+        differences = (quantities[lower][2:] - quantities[lower][:-2]) / (2.0 * interval_s)
+        assert differences == pytest.approx(quantities[higher][1:-1], abs=1e-5)
+
+
+@pytest.mark.parametrize("name", TRACKS)
+def test_by_formula_is_what_differences_come_near(name: str) -> None:
+    differences, formula = (horizon_from(name, 0, SAMPLES + 1, kind) for kind in KINDS)
+    assert formula.position_enu_m == pytest.approx(differences.position_enu_m, abs=1e-12)
+    midway = 0.5 * (formula.velocity_enu_m_s[1:] + formula.velocity_enu_m_s[:-1])
+    assert differences.velocity_enu_m_s[1:] == pytest.approx(midway, abs=0.03)
+    assert np.abs(formula.yaw_rad - differences.yaw_rad).max() < 0.4
+
+
+def test_a_flight_starts_with_the_first_yaw() -> None:
+    assert start_yaw(track("line"), "by-differences") == pytest.approx(np.arctan2(-2.0, 1.0) + np.pi / 2)
+    assert start_yaw(track("line"), "by-formula") == pytest.approx(np.pi / 4)
 
 
 @pytest.mark.parametrize("name", TRACKS)
@@ -62,8 +90,9 @@ def test_a_horizon_begins_with_the_sample_it_lies_in() -> None:
         assert horizon.position_enu_m == pytest.approx(everything.position_enu_m[sample : sample + 2])
 
 
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("time_us", [100_000_000, 100_400_000, 3_600_000_000])
-def test_after_its_end_a_track_holds_its_last_point(time_us: int) -> None:
-    horizon = horizon_from("wave", time_us, 2)
+def test_after_its_end_a_track_holds_its_last_point(time_us: int, kind: References) -> None:
+    horizon = horizon_from("wave", time_us, 2, kind)
     assert horizon.position_enu_m[1] == pytest.approx([-2.0, 200.0, 5.0])
     assert horizon.velocity_enu_m_s[1] == pytest.approx([0.0, 0.0, 0.0])

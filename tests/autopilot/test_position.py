@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.mixer import Mixer
-from autopilot.position import PositionController
-from autopilot.profile import PositionSettings
+from autopilot.position import PositionController, PositionSettings
 from mavlink.frames import Vector, earth_from_body, quaternion_from_euler
 from plant.rotors import Rotors
 from plant.vehicle import load_vehicle

@@ -36,7 +36,7 @@ def plain(text: str) -> Callable[[Path], str]:
 
 BAD_INPUT = {
     "track": ((plain("loop"),), "unknown track loop: choose spiral, expanding-spiral, line, wave, crown"),
-    "profile": ((plain("spiral"), plain("--profile"), plain("fast")), "unknown profile fast: choose thesis"),
+    "profile": ((plain("spiral"), plain("--profile"), plain("fast")), "unknown profile fast: choose se3, thesis"),
     "vehicle": ((plain("spiral"), plain("--vehicle"), plain("dragonfly")), "unknown vehicle dragonfly: choose"),
     "solver": ((plain("spiral"), plain("--solver"), plain("simplex")), "unknown solver simplex: installed are"),
     "extra": ((plain("spiral"), plain("--solver"), plain("gurobi")), "gurobi is not installed: pip install"),
@@ -53,8 +53,20 @@ BAD_INPUT = {
         "hummingbird.toml: body.mass_kg: Expected `float` > 0.0",
     ),
     "profile key": (
-        (plain("spiral"), plain("--profile"), edited(PROFILE, "horizon = 4 ", "horizon = 0 ")),
-        "thesis.toml: attitude.horizon: Expected `int` >= 1",
+        (plain("spiral"), plain("--profile"), edited(PROFILE, "horizon = 4   ", "horizon = 0   ")),
+        "profile thesis: controllers.cascade: attitude.horizon: Expected `int` >= 1",
+    ),
+    "profile file": (
+        (plain("spiral"), plain("--profile"), edited(PROFILE, "rotor_speed_rpm = 3000.0", "rotor_speed_rpm = -1.0")),
+        "thesis.toml: simulation.rotor_speed_rpm: Expected `float` >= 0.0",
+    ),
+    "controller": (
+        (plain("spiral"), plain("--controller"), plain("pid")),
+        "unknown controller pid: installed are cascade, geometric-se3, global-lpv-mpc",
+    ),
+    "no QP": (
+        (plain("spiral"), plain("--profile"), plain("se3"), plain("--solver"), plain("daqp")),
+        "controller geometric-se3 solves no QP: leave --solver out",
     ),
     "speed": ((plain("spiral"), plain("--speed"), plain("0")), "argument --speed: must be above zero, not 0"),
     "link": ((plain("spiral"), plain("--link"), plain("carrier-pigeon")), "argument --link: invalid choice"),

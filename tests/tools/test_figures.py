@@ -42,7 +42,7 @@ class Flight(NamedTuple):
 
 def fly(out: Path, duration_s: float) -> Flight:
     arguments = {"profile": "thesis", "link": "direct", "speed": np.inf, "seed": 0, "duration": duration_s, "out": out}
-    files = {"solver": None, "vehicle": None, "plant_vehicle": None, "integrator": "rk4"}
+    files = {"controller": None, "solver": None, "vehicle": None, "plant_vehicle": None, "integrator": "rk4"}
     plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files))
     fly_locally(plan, lambda _sim_time_s: None)
     recording = read_recording(plan)
