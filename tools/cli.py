@@ -17,6 +17,14 @@ def main(argv: list[str] | None = None) -> int:
             from tools.fly import fly
 
             return fly(args)
+        if args.command == "figures":
+            from tools.thesis_figures import figures
+
+            return figures(args)
+        if args.command == "compare":
+            from tools.compare import compare
+
+            return compare(args)
         from tools.bench import bench
 
         return bench(args)
@@ -28,6 +36,8 @@ def _parser() -> ArgumentParser:
     parser = ArgumentParser(prog="colibri", description="A quadrotor autopilot in pure Python, flown over MAVLink.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_fly(commands.add_parser("fly", help="fly a track and report how well it went"))
+    _add_figures(commands.add_parser("figures", help="fly all that the thesis shows and draw its figures"))
+    _add_compare(commands.add_parser("compare", help="fly several controllers on several tracks, side by side"))
     _add_bench(commands.add_parser("bench", help="measure how fast it flies"))
     return parser
 
@@ -55,6 +65,42 @@ def _add_fly(parser: ArgumentParser) -> None:
     )
     add("--quiet", action="store_true", help="say nothing but errors")
     add("--no-figures", action="store_true", help="draw no PNG figures")
+
+
+def _add_figures(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add(
+        "--out",
+        type=Path,
+        default=Path("out/thesis"),
+        metavar="DIR",
+        help="folder for PNG and SVG (default %(default)s)",
+    )
+    add("--only", action="append", metavar="NUMBER", help="only this figure, 4.9 say; may be repeated")
+    add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def _add_compare(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add(
+        "--profile",
+        action="append",
+        metavar="NAME[:CONTROLLER]",
+        help="a profile, or another controller with it; may be repeated (default: thesis, thesis-euler, "
+        "thesis:global-lpv-mpc, se3)",
+    )
+    add("--track", action="append", metavar="NAME", help="a track; may be repeated (default: all)")
+    add(
+        "--link", default="memory", choices=("memory", "direct"), help="with or without the codec (default %(default)s)"
+    )
+    add(
+        "--out",
+        type=Path,
+        default=Path("out/compare"),
+        metavar="DIR",
+        help="folder for the tables (default %(default)s)",
+    )
+    add("--quiet", action="store_true", help="say nothing but errors")
 
 
 def _add_bench(parser: ArgumentParser) -> None:

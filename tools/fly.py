@@ -16,7 +16,7 @@ from tools.local import fly_locally
 from tools.plan import FlightPlan
 from tools.processes import FlightError, fly_processes
 from tools.recording import Recording, RecordingError, Summary, read_recording, write_recording
-from tools.report import print_report, report, write_report
+from tools.report import Report, print_report, report, write_report
 
 LOGS = ("flight.csv", "flight.tlog", "plant.csv", "autopilot.csv", "report.json")
 FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "rotors.png", "error.png")
@@ -28,7 +28,7 @@ def fly(args: argparse.Namespace) -> int:
         plan = FlightPlan.from_arguments(args)
     except (ProfileError, VehicleError, TrackError) as error:
         fail(str(error))
-    _prepare(plan.out)
+    prepare(plan.out)
     try:
         with _progress(plan, quiet=args.quiet) as progress:
             summary = _flight(plan, progress)
@@ -45,10 +45,7 @@ def fly(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         _keep(plan)
         fail(f"interrupted; what was logged is in {plan.out}", EXIT_INTERRUPTED)
-    recording = read_recording(plan)
-    figures = report(plan, summary, recording)
-    write_recording(recording, plan.out / "flight.csv")
-    write_report(figures, plan.out / "report.json")
+    recording, figures = keep_flight(plan, summary)
     if not args.no_figures:
         from tools.figures import draw_flight
 
@@ -58,11 +55,20 @@ def fly(args: argparse.Namespace) -> int:
     return 0
 
 
+def keep_flight(plan: FlightPlan, summary: Summary) -> tuple[Recording, Report]:
+    """Write `flight.csv` and `report.json` of a flight that ended well; return both."""
+    recording = read_recording(plan)
+    figures = report(plan, summary, recording)
+    write_recording(recording, plan.out / "flight.csv")
+    write_report(figures, plan.out / "report.json")
+    return recording, figures
+
+
 def _flight(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     return fly_processes(plan, progress) if plan.link == "udp" else fly_locally(plan, progress)
 
 
-def _prepare(out: Path) -> None:
+def prepare(out: Path) -> None:
     """Make the folder, and leave nothing of an earlier flight in it."""
     try:
         out.mkdir(parents=True, exist_ok=True)

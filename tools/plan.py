@@ -2,11 +2,12 @@
 
 import argparse
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 
 from autopilot.planner import start_yaw
 from autopilot.profile import Profile, load_profile
-from autopilot.tracks import Track, track
+from autopilot.tracks import DURATION_S, Track, track
 from plant.process import start_speed
 from plant.vehicle import Vehicle, load_vehicle
 
@@ -78,6 +79,21 @@ class FlightPlan:
             vehicle=load_vehicle(vehicle_name),
             plant_vehicle=plant_vehicle,
         )
+
+    @classmethod
+    def of_track(
+        cls, track_name: str, out: Path, *, profile: str, controller: str | None = None, link: str = "direct"
+    ) -> "FlightPlan":
+        """Return the plan of a whole track flown flat out, everything else as the profile has it.
+
+        Raises:
+            ProfileError: The profile cannot be read.
+            VehicleError: Its vehicle cannot be read.
+            TrackError: There is no such track.
+        """
+        unset = dict.fromkeys(("solver", "vehicle", "plant_vehicle", "integrator"))
+        chosen = {"track": track_name, "profile": profile, "controller": controller, "link": link, "out": out}
+        return cls.from_arguments(argparse.Namespace(**chosen, **unset, speed=inf, seed=0, duration=DURATION_S))
 
     @property
     def track(self) -> Track:

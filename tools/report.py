@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tools.plan import FlightPlan
-from tools.recording import Recording, Summary
+from tools.recording import INPUT, Recording, Summary
 
 Array: TypeAlias = NDArray[np.float64]
 Report: TypeAlias = dict[str, Any]
@@ -17,7 +17,10 @@ SETTLED_AFTER_S = 20.0
 
 
 def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
-    """Return the figures of a flight; errors are distances to the reference of the same instant."""
+    """Return the figures of a flight.
+
+    Errors are distances to the reference of the same instant; effort is the RMS of the moment U2..U4, N m.
+    """
     error, t = recording.position_error_m, recording["t"]
     sim_time_s = float(t[-1])
     settled = error[t >= SETTLED_AFTER_S]
@@ -37,6 +40,7 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
         "rmse_m": _rms(error),
         "max_error_m": float(error.max()),
         "rmse_after_20s_m": _rms(settled) if len(settled) else None,
+        "effort_n_m": _rms(np.linalg.norm(recording.columns(INPUT[1:]), axis=1)),
         "solve_time_us": _quantiles(recording.solve_time_us),
         "control_step_us": _quantiles(recording.control_step_us),
         "frames": summary.frames,

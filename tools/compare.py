@@ -1,0 +1,94 @@
+"""`colibri compare`: controllers × tracks in one table, on the terminal, as Markdown and as CSV."""
+
+import argparse
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from autopilot.controller import ControllerError, load_controller
+from autopilot.profile import ProfileError
+from autopilot.tracks import TRACKS, TrackError
+from mavlink.process import fail
+from plant.vehicle import VehicleError
+from tools.fly import keep_flight, prepare
+from tools.local import fly_locally
+from tools.plan import FlightPlan
+from tools.report import SETTLED_AFTER_S
+from tools.side_by_side import side_by_side
+
+DEFAULT_PROFILES = ("thesis", "thesis-euler", "thesis:global-lpv-mpc", "se3")
+COLUMNS = ("controller", "track", "RMS (m)", "maximum (m)", "effort (N m)", "solve p50 (µs)", "solve p99 (µs)")
+
+
+class Job(NamedTuple):
+    """One flight of the comparison."""
+
+    contender: str
+    track: str
+    link: str
+    out: Path
+
+    def plan(self) -> FlightPlan:
+        """Return the flight as a plan."""
+        profile, _, controller = self.contender.partition(":")
+        folder = self.out / "flights" / f"{self.contender.replace(':', '-')}-{self.track}"
+        return FlightPlan.of_track(self.track, folder, profile=profile, controller=controller or None, link=self.link)
+
+
+def compare(args: argparse.Namespace) -> int:
+    """Compare as the command line says; return the exit code."""
+    contenders, tracks = args.profile or DEFAULT_PROFILES, args.track or list(TRACKS)
+    jobs = [Job(contender, track, args.link, args.out) for contender in contenders for track in tracks]
+    try:
+        for job in jobs:
+            load_controller(job.plan().profile.controller)
+    except (ProfileError, VehicleError, TrackError, ControllerError) as error:
+        fail(str(error))
+    prepare(args.out)
+    rows = side_by_side(row_of, jobs, "flights", quiet=args.quiet, worth=lambda _job: 1)
+    (args.out / "compare.md").write_text(markdown(rows), encoding="utf-8")
+    (args.out / "compare.csv").write_text(csv(rows), encoding="utf-8")
+    if not args.quiet:
+        _print(rows, args.out)
+    return 0
+
+
+def row_of(job: Job) -> tuple[str, ...]:
+    """Fly once; return the row of the table.
+
+    RMS is that after the first 20 s, maximum that over the whole flight, its start beside the track included.
+    """
+    plan = job.plan()
+    prepare(plan.out)
+    _, figures = keep_flight(plan, fly_locally(plan, lambda _sim_time_s: None))
+    return (job.contender, job.track, *_cells(figures))
+
+
+def markdown(rows: list[tuple[str, ...]]) -> str:
+    """Return the rows as a Markdown table."""
+    lines = [COLUMNS, ("---", "---", *["---:"] * (len(COLUMNS) - 2)), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def csv(rows: list[tuple[str, ...]]) -> str:
+    """Return the rows as CSV."""
+    return "".join(",".join(line) + "\n" for line in [COLUMNS, *rows])
+
+
+def _cells(figures: dict[str, Any]) -> tuple[str, ...]:
+    solve = figures["solve_time_us"]
+    times = ("-", "-") if figures["solver"] is None else (f"{solve['p50']:.0f}", f"{solve['p99']:.0f}")
+    rms, largest = figures["rmse_after_20s_m"], figures["max_error_m"]
+    return (f"{rms:.4g}", f"{largest:.4g}", f"{figures['effort_n_m']:.4g}", *times)
+
+
+def _print(rows: list[tuple[str, ...]], out: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=f"RMS after {SETTLED_AFTER_S:.0f} s; written to {out}", title_justify="left")
+    for number, column in enumerate(COLUMNS):
+        table.add_column(column, justify="left" if number < 2 else "right")
+    for number, row in enumerate(rows):
+        last = number + 1 == len(rows) or rows[number + 1][0] != row[0]
+        table.add_row(*row, end_section=last)
+    Console().print(table)
