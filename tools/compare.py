@@ -16,7 +16,10 @@ from tools.report import SETTLED_AFTER_S
 from tools.side_by_side import side_by_side
 
 DEFAULT_PROFILES = ("thesis", "thesis-euler", "thesis:global-lpv-mpc", "se3")
-COLUMNS = ("controller", "track", "RMS (m)", "maximum (m)", "effort (N m)", "solve p50 (µs)", "solve p99 (µs)")
+COLUMNS = ("controller", "track", "RMS (m)", "maximum (m)", "effort (N m)", "QP p50 (µs)", "QP p99 (µs)")
+
+_TABLE_WIDTH = 110
+"""What the table needs; a narrower terminal wraps its lines rather than cut its numbers."""
 
 
 class Job(NamedTuple):
@@ -87,8 +90,9 @@ def _print(rows: list[tuple[str, ...]], out: Path) -> None:
 
     table = Table(title=f"RMS after {SETTLED_AFTER_S:.0f} s; written to {out}", title_justify="left")
     for number, column in enumerate(COLUMNS):
-        table.add_column(column, justify="left" if number < 2 else "right")
+        table.add_column(column, justify="left" if number < 2 else "right", no_wrap=True)
     for number, row in enumerate(rows):
         last = number + 1 == len(rows) or rows[number + 1][0] != row[0]
         table.add_row(*row, end_section=last)
-    Console().print(table)
+    console = Console()
+    console.print(table, width=max(console.width, _TABLE_WIDTH))

@@ -30,6 +30,8 @@ _ROW_IN, _ROW_GAP_IN, _COLUMN_GAP_IN = 1.4, 0.2, 0.95
 _TITLE_IN, _LABEL_IN = 0.45, 0.6
 _TIME_MARGIN = 0.015
 _FLATTEST = 0.4
+_NOTHING = 1e-12
+_ROOM_FOR_TALL = 0.8
 
 
 class Style(NamedTuple):
@@ -230,6 +232,8 @@ def _draw_panel(axes: Axes, series: Series, panel: Panel) -> None:
     axes.yaxis.set_label_coords(-_LABEL_IN / _width_in(axes), 0.5)
     axes.grid(color="#DDDDDD", linewidth=0.6)
     axes.yaxis.set_major_locator(_ticks(6))
+    if np.ptp(axes.dataLim.intervaly) < _NOTHING:
+        axes.set_ylim(-1.0, 1.0)  # otherwise rounding errors fill the panel
     if panel.from_zero:
         axes.set_ylim(0.0, 1.1 * axes.dataLim.y1)
 
@@ -271,9 +275,11 @@ def _scale(axes: Any) -> bool:
     ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
     ranges /= ranges.max()
     lengths = np.maximum(ranges, _FLATTEST)
-    axes.set_box_aspect(lengths)
+    tall = lengths[2] > max(lengths[:2])
+    axes.set_box_aspect(lengths, zoom=_ROOM_FOR_TALL if tall else 1.0)
+    axes.zaxis.set_tick_params(pad=18 if tall else 8)
     for name, axis, length in zip(POSITION, (axes.xaxis, axes.yaxis, axes.zaxis), lengths, strict=True):
         axis.set_label_text(f"{name} (m)")
         axis.set_major_locator(_ticks(3 if length < 0.7 else 6))
-        axis.labelpad = 14.0
+        axis.labelpad = 32.0 if tall and name == "z" else 18.0
     return bool(ranges.min() >= _FLATTEST)
