@@ -26,7 +26,11 @@ DEFAULT = "cascade"
 
 
 class ControllerError(Exception):
-    """A control law that cannot be used, or that gave something no rotor can follow."""
+    """A control law that cannot be used."""
+
+
+class DecisionError(Exception):
+    """A control law decided in flight what no rotor can follow."""
 
 
 class Preview(NamedTuple):
@@ -180,10 +184,10 @@ def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float) -> None
     """Check that rotors can follow a decision.
 
     Raises:
-        ControllerError: They cannot.
+        DecisionError: They cannot.
     """
     speeds = np.asarray(rotor_speeds)
     if speeds.shape != (4,) or not ((speeds >= 0.0) & (speeds <= max_speed)).all():
-        raise ControllerError(
+        raise DecisionError(
             f"controller {name} gave rotor speeds {rotor_speeds}: expected four from 0 to {max_speed:g}"
         )

@@ -61,7 +61,7 @@ class Autopilot:
         rotor speed at time 0, and with hover in mid-flight, where nothing is known of the rotors.
 
         Raises:
-            ControllerError: The control law gave what no rotor can follow.
+            DecisionError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
         references = self._planner.horizon(frame.time_us)

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from time import perf_counter
 
-from autopilot.controller import ControllerError
+from autopilot.controller import ControllerError, DecisionError
 from autopilot.core import Autopilot, Step
 from autopilot.profile import ProfileError, load_profile
 from autopilot.qp import QpStatus, SolverError
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     end = AutopilotEnd(system_id=args.system_id, frame_interval_us=autopilot.frame_interval_us, now_s=perf_counter())
     try:
         Client(link, end, status, stop, log).fly(autopilot)
-    except (LinkError, ControllerError) as error:
+    except (LinkError, DecisionError) as error:
         fail(str(error), EXIT_FAILED)
     finally:
         link.close()

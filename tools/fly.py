@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from autopilot.controller import ControllerError
+from autopilot.controller import ControllerError, DecisionError
 from autopilot.profile import ProfileError
 from autopilot.qp import SolverError
 from autopilot.tracks import TrackError
@@ -34,7 +34,7 @@ def fly(args: argparse.Namespace) -> int:
             summary = _flight(plan, progress)
     except (ControllerError, ProfileError, SolverError) as error:
         fail(str(error))
-    except IntegrationError as error:
+    except (IntegrationError, DecisionError) as error:
         _keep(plan)
         fail(f"{error}; what was logged is in {plan.out}", EXIT_FAILED)
     except FlightError as error:

@@ -31,7 +31,8 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     """Fly `plan` in this process; `progress` is told the simulated time in s.
 
     Raises:
-        ControllerError: The control law cannot be used, or gave what no rotor can follow.
+        ControllerError: The control law cannot be used.
+        DecisionError: The control law decided what no rotor can follow.
         ProfileError: The control law's table in the profile is wrong.
         SolverError: The solver cannot be used.
         IntegrationError: The state cannot be integrated any further.

@@ -15,6 +15,7 @@ import pytest
 from autopilot.controller import (
     Controller,
     ControllerError,
+    DecisionError,
     Horizon,
     Preview,
     VehicleState,
@@ -115,14 +116,14 @@ def test_what_is_no_controller_is_refused() -> None:
 
 @pytest.mark.parametrize("speeds", [[0.0, 0.0, 0.0, np.nan], [0.0] * 3, [0.0, 0.0, 0.0, 9000.0], [0.0, 0.0, 0.0, -1.0]])
 def test_what_no_rotor_can_follow_is_refused(speeds: list[float]) -> None:
-    with pytest.raises(ControllerError, match="expected four from 0 to 8002"):
+    with pytest.raises(DecisionError, match="expected four from 0 to 8002"):
         check_rotor_speeds("wild", np.array(speeds), 8002.0)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_target_attitude_turns_as_it_says(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    force, force_rate = rng.normal(size=3) + [0.0, 0.0, 9.81], rng.normal(size=3)
+    force, force_rate = rng.normal(size=3) + np.array([0.0, 0.0, 9.81]), rng.normal(size=3)
     yaw, yaw_rate, step = float(rng.normal()), float(rng.normal()), 1e-6
     target = track_direction(force, force_rate, yaw, yaw_rate)
     later = track_direction(force + step * force_rate, force_rate, yaw + step * yaw_rate, yaw_rate)
