@@ -9,7 +9,7 @@ from autopilot.profile import ProfileError
 from autopilot.tracks import TRACKS, TrackError
 from mavlink.process import fail
 from plant.vehicle import VehicleError
-from tools.fly import keep_flight, prepare
+from tools.fly import keep_flight, make_folder, prepare
 from tools.local import fly_locally
 from tools.plan import FlightPlan
 from tools.report import SETTLED_AFTER_S
@@ -46,7 +46,7 @@ def compare(args: argparse.Namespace) -> int:
             load_controller(job.plan().profile.controller)
     except (ProfileError, VehicleError, TrackError, ControllerError) as error:
         fail(str(error))
-    prepare(args.out)
+    make_folder(args.out)
     rows = side_by_side(row_of, jobs, "flights", quiet=args.quiet, worth=lambda _job: 1)
     (args.out / "compare.md").write_text(markdown(rows), encoding="utf-8")
     (args.out / "compare.csv").write_text(csv(rows), encoding="utf-8")
@@ -94,5 +94,5 @@ def _print(rows: list[tuple[str, ...]], out: Path) -> None:
     for number, row in enumerate(rows):
         last = number + 1 == len(rows) or rows[number + 1][0] != row[0]
         table.add_row(*row, end_section=last)
-    console = Console()
-    console.print(table, width=max(console.width, _TABLE_WIDTH))
+    width = Console().width
+    Console(width=max(width, _TABLE_WIDTH)).print(table)

@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from autopilot.controller import ControllerError, DecisionError
 from autopilot.profile import ProfileError
@@ -69,12 +70,21 @@ def _flight(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
 
 
 def prepare(out: Path) -> None:
-    """Make the folder, and leave nothing of an earlier flight in it."""
+    """Make the folder of a flight, and leave nothing of an earlier one in it."""
+    make_folder(out)
     try:
-        out.mkdir(parents=True, exist_ok=True)
         for name in (*LOGS, *FIGURES):
             (out / name).unlink(missing_ok=True)
-        (out / LOGS[0]).touch()
+    except OSError as error:
+        fail(f"cannot write to --out {out}: {error.strerror}")
+
+
+def make_folder(out: Path) -> None:
+    """Make a folder that can be written to, or end with one line."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=out):
+            pass
     except OSError as error:
         fail(f"cannot write to --out {out}: {error.strerror}")
 

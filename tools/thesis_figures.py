@@ -21,7 +21,7 @@ from tools.figures import (
     followed,
     write_figure,
 )
-from tools.fly import keep_flight, prepare
+from tools.fly import keep_flight, make_folder, prepare
 from tools.local import fly_locally
 from tools.plan import FlightPlan
 from tools.recording import INPUT
@@ -79,7 +79,7 @@ def figures(args: argparse.Namespace) -> int:
     """Draw as the command line says; return the exit code."""
     wanted = _wanted(args.only)
     flights = [flight for flight in FLIGHTS if any(figure.flight == flight.name for figure in wanted)]
-    prepare(args.out)
+    make_folder(args.out)
     jobs = [
         Job(flight, tuple(figure for figure in wanted if figure.flight == flight.name), args.out) for flight in flights
     ]
