@@ -66,7 +66,7 @@ def test_the_outer_loop_decides_as_the_thesis_says(tmp_path: Path, name: str) ->
 
 @pytest.mark.parametrize("name", ["spiral", "expanding-spiral", "line", "wave"])
 def test_the_vehicle_is_one_outer_sample_ahead(tmp_path: Path, name: str) -> None:
-    """Of all shifts in time, 0.4 s fits best. On the crown another error is larger: nothing feeds acceleration forward."""
+    """Of all shifts in time, 0.4 s fits best; not on the crown, where more is lost for want of feed-forward."""
     fly(tmp_path, name, "--link", "direct")
     flown = rows(tmp_path / "flight.csv")
     settled = flown["t"] >= 20.0
