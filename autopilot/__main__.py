@@ -1,10 +1,8 @@
 """`python -m autopilot`: the command line of the autopilot."""
 
 import sys
-from pathlib import Path
 
-from mavlink.link import LinkError, open_link
-from mavlink.process import ArgumentParser, Status, Stop, fail, use_one_thread
+from mavlink.process import ArgumentParser, add_common_arguments, begin
 
 DEFAULT_PLANT = "udpout:127.0.0.1:14560"
 
@@ -23,23 +21,14 @@ def _parser() -> ArgumentParser:
     add("--controller", metavar="NAME", help="control law (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml to control (default: the profile's)")
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
-    add("--system-id", type=int, default=1, choices=range(1, 256), metavar="ID", help="MAVLink system (default 1)")
-    add("--out", type=Path, metavar="DIR", help="write autopilot.csv (references, solver, times) there")
-    add("--json", action="store_true", help="status as JSON lines on standard output")
-    add("--with-parent", action="store_true", help="end when the process that started this one ends")
+    add_common_arguments(parser, "autopilot.csv (references, solver, times)")
     return parser
 
 
 def main() -> int:
     """Run the autopilot; return the exit code."""
     args = _parser().parse_args()
-    use_one_thread()
-    stop = Stop(with_parent=args.with_parent)
-    status = Status("autopilot", as_json=args.json)
-    try:
-        link = open_link(args.plant)
-    except LinkError as error:
-        fail(str(error))
+    link, status, stop = begin("autopilot", args.plant, args)
     from autopilot.process import run
 
     return run(args, link, status, stop)

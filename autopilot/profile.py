@@ -1,13 +1,14 @@
 """A profile: which control law flies, with which numbers, and how its flights begin; read strictly from TOML."""
 
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
 from autopilot.settings import Table
-from plant.vehicle import read_toml
+from plant.vehicle import read_named
+
+_FOLDER = Path(__file__).parent / "profiles"
 
 References: TypeAlias = Literal["by-formula", "by-differences"]
 
@@ -58,19 +59,10 @@ class Profile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return msgspec.structs.replace(chosen, controllers={**chosen.controllers, chosen.controller: with_solver})
 
 
-def profile_names() -> list[str]:
-    """Return the names of the profiles that come with Colibri."""
-    return sorted(entry.name.removesuffix(".toml") for entry in files("autopilot").joinpath("profiles").iterdir())
-
-
 def load_profile(name_or_path: str) -> Profile:
     """Read a profile by its name, or from a file if the argument ends in `.toml`.
 
     Raises:
         ProfileError: There is no such profile, or the file has a missing, unknown or impossible key.
     """
-    if name_or_path.endswith(".toml"):
-        return read_toml(Path(name_or_path), Profile, ProfileError)
-    if name_or_path not in profile_names():
-        raise ProfileError(f"unknown profile {name_or_path}: choose {', '.join(profile_names())} or a .toml file")
-    return read_toml(Path(str(files("autopilot").joinpath("profiles", f"{name_or_path}.toml"))), Profile, ProfileError)
+    return read_named("profile", _FOLDER, name_or_path, Profile, ProfileError)

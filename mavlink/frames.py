@@ -49,18 +49,6 @@ def normalized(q: Quaternion) -> Quaternion:
     return (w / norm, x / norm, y / norm, z / norm)
 
 
-def product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Compose two rotations: the result turns a vector by `b` first, then by `a`."""
-    aw, ax, ay, az = a
-    bw, bx, by, bz = b
-    return (
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )
-
-
 def rotation_matrix(q: Quaternion) -> Matrix:
     """Return R of THESIS [2.6], rows first: earth vector = R · body vector."""
     w, x, y, z = q
@@ -76,12 +64,6 @@ def earth_from_body(q: Quaternion, vector: Vector) -> Vector:
     (a, b, c), (d, e, f), (g, h, i) = rotation_matrix(q)
     x, y, z = vector
     return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
-
-
-def body_from_earth(q: Quaternion, vector: Vector) -> Vector:
-    """Rotate an earth vector into the body frame."""
-    w, x, y, z = q
-    return earth_from_body((w, -x, -y, -z), vector)
 
 
 def quaternion_from_euler(phi: float, theta: float, psi: float) -> Quaternion:

@@ -13,6 +13,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn, TextIO
 
+from mavlink.link import LinkError, UdpLink, open_link
+
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -97,6 +99,26 @@ class Status:
         else:
             sys.stderr.write(f"{self._name}: {text}\n")
             sys.stderr.flush()
+
+
+def add_common_arguments(parser: ArgumentParser, log: str) -> None:
+    """Add the options that both processes have; `log` names what `--out` writes."""
+    add = parser.add_argument
+    add("--system-id", type=int, default=1, choices=range(1, 256), metavar="ID", help="MAVLink system (default 1)")
+    add("--out", type=Path, metavar="DIR", help=f"write {log} there")
+    add("--json", action="store_true", help="status as JSON lines on standard output")
+    add("--with-parent", action="store_true", help="end when the process that started this one ends")
+
+
+def begin(name: str, url: str, args: argparse.Namespace) -> tuple[UdpLink, Status, Stop]:
+    """Open the link at `url` and take over signals, or end with one line. To be called before numpy is loaded."""
+    use_one_thread()
+    stop = Stop(with_parent=args.with_parent)
+    try:
+        link = open_link(url)
+    except LinkError as error:
+        fail(str(error))
+    return link, Status(name, as_json=args.json), stop
 
 
 class Progress:

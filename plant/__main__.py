@@ -2,10 +2,8 @@
 
 import sys
 from math import inf
-from pathlib import Path
 
-from mavlink.link import LinkError, open_link
-from mavlink.process import ArgumentParser, Status, Stop, fail, number, positive, speed, use_one_thread
+from mavlink.process import ArgumentParser, add_common_arguments, begin, number, positive, speed
 
 DEFAULT_LINK = "udpin:127.0.0.1:14560"
 
@@ -33,23 +31,14 @@ def _parser() -> ArgumentParser:
     add("--rate", type=positive, default=250.0, metavar="HZ", help="frames, if the autopilot asks for no other rate")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")
-    add("--system-id", type=int, default=1, choices=range(1, 256), metavar="ID", help="MAVLink system (default 1)")
-    add("--out", type=Path, metavar="DIR", help="write plant.csv (truth at every frame) and flight.tlog there")
-    add("--json", action="store_true", help="status as JSON lines on standard output")
-    add("--with-parent", action="store_true", help="end when the process that started this one ends")
+    add_common_arguments(parser, "plant.csv (truth at every frame) and flight.tlog")
     return parser
 
 
 def main() -> int:
     """Run the plant; return the exit code."""
     args = _parser().parse_args()
-    use_one_thread()
-    stop = Stop(with_parent=args.with_parent)
-    status = Status("plant", as_json=args.json)
-    try:
-        link = open_link(args.link)
-    except LinkError as error:
-        fail(str(error))
+    link, status, stop = begin("plant", args.link, args)
     status.say("listening", f"waiting for an autopilot on {link.url}", url=link.url)
     from plant.process import run
 

@@ -1,6 +1,5 @@
 """The airframe: numbers with units and source, read strictly from a TOML file."""
 
-from importlib.resources import files
 from math import isfinite, pi, sqrt
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias, TypeVar
@@ -13,6 +12,7 @@ Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 Array: TypeAlias = NDArray[np.float64]
 T = TypeVar("T")
 
+_FOLDER = Path(__file__).parent / "vehicles"
 _RAD_S_PER_UNIT = {"rad/s": 1.0, "rpm": 2.0 * pi / 60.0}
 
 
@@ -108,7 +108,7 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 def vehicle_names() -> list[str]:
     """Return the names of the vehicles that come with Colibri."""
-    return sorted(entry.name.removesuffix(".toml") for entry in files("plant").joinpath("vehicles").iterdir())
+    return toml_names(_FOLDER)
 
 
 def load_vehicle(name_or_path: str) -> Vehicle:
@@ -117,11 +117,26 @@ def load_vehicle(name_or_path: str) -> Vehicle:
     Raises:
         VehicleError: There is no such vehicle, or the file has a missing, unknown or impossible key.
     """
+    return read_named("vehicle", _FOLDER, name_or_path, Vehicle, VehicleError)
+
+
+def toml_names(folder: Path) -> list[str]:
+    """Return the names of the TOML files in a folder, without suffix."""
+    return sorted(path.stem for path in folder.glob("*.toml"))
+
+
+def read_named(what: str, folder: Path, name_or_path: str, kind: type[T], error: type[Exception]) -> T:
+    """Read the TOML file of that name in `folder`, or any file if the argument ends in `.toml`.
+
+    Raises:
+        error: There is no such name, or the file has a missing, unknown or impossible key.
+    """
     if name_or_path.endswith(".toml"):
-        return read_toml(Path(name_or_path), Vehicle, VehicleError)
-    if name_or_path not in vehicle_names():
-        raise VehicleError(f"unknown vehicle {name_or_path}: choose {', '.join(vehicle_names())} or a .toml file")
-    return read_toml(Path(str(files("plant").joinpath("vehicles", f"{name_or_path}.toml"))), Vehicle, VehicleError)
+        return read_toml(Path(name_or_path), kind, error)
+    known = toml_names(folder)
+    if name_or_path not in known:
+        raise error(f"unknown {what} {name_or_path}: choose {', '.join(known)} or a .toml file")
+    return read_toml(folder / f"{name_or_path}.toml", kind, error)
 
 
 def read_toml(path: Path, kind: type[T], error: type[Exception]) -> T:

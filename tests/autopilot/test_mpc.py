@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.lpv import ATTITUDE_OUTPUT, Array, attitude_model, discretise
@@ -29,7 +29,6 @@ def cost(horizon: int, x: Array, reference: Array, increments: Array) -> float:
     return float(total)
 
 
-@settings(deadline=None)
 @given(st.integers(1, 12), st.integers(0, 2**32 - 1))
 def test_the_condensed_cost_is_the_simulated_one(horizon: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.flights.relay import Relay
+from tests.flights.relay import BadLink
 from tests.runs import Process, fly, reference, running, start_plant, states, wait_for
 
-START = ("--duration", "100")
+START = ("--duration", "100", "--speed", "50")
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def test_a_bad_link_does_not_change_the_flight(tmp_path: Path, logs: Path, seed:
     duration = ("--duration", "40")
     fly(tmp_path / "good", "spiral", "--link", "memory", *duration)
     plant, url = start_plant(logs, tmp_path / "bad", *duration)
-    with Relay(url, seed) as relay:
+    with BadLink(url, seed) as relay:
         autopilot = Process(logs, "autopilot", "--plant", relay.url)
         with running(plant, autopilot):
             ended = plant.wait_for("ended")

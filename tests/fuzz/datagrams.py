@@ -15,6 +15,7 @@ Ids = tuple[int, int]
 
 AUTOPILOT: Ids = (1, 1)
 PLANT: Ids = (1, common.MAV_COMP_ID_USER1)
+HEARTBEAT, ATTITUDE, POSITION, COMMAND, ACK, ACTUATORS = 0, 31, 32, 76, 77, 93
 
 _SIGNED = 0x01
 _BAD_FLOATS = (nan, inf, -inf, 3.4e38, -3.4e38, 1e-45)
@@ -90,14 +91,14 @@ class Fuzzer:
     def _any_message(self) -> bytes:
         """Any message of the dialect that is not part of the conversation, with random content."""
         message_id = self._chance.choice(_KNOWN)
-        if message_id in (0, 31, 32, 76, 77, 93):
-            message_id = 30
+        if message_id in (HEARTBEAT, ATTITUDE, POSITION, COMMAND, ACK, ACTUATORS):
+            message_id = common.MAVLINK_MSG_ID_ATTITUDE
         size = common.mavlink_map[message_id].unpacker.size
         return frame(message_id, self._chance.randbytes(size), self._peer, sequence=self._chance.randrange(256))
 
     def _wrong_length(self) -> bytes:
         """A message cut short, or longer than it is defined; never enough of it to be a valid one."""
-        message_id = self._chance.choice((31, 32, 93))
+        message_id = self._chance.choice((ATTITUDE, POSITION, ACTUATORS))
         length = self._chance.choice((0, 1, self._chance.randrange(2, 12), 255))
         return frame(message_id, b"\xff" * length, self._peer)
 
@@ -121,7 +122,7 @@ class Fuzzer:
         attitude = struct.pack("<I7f", time_us // 1000, *self._quaternion(), *values[:3])
         position = struct.pack("<I6f", time_us // 1000 + self._chance.choice((0, 1)), *values[3:9])
         broken = any(value != value or abs(value) == inf for value in values[:9])
-        halves = [frame(31, attitude, self._peer), frame(32, position, self._peer)]
+        halves = [frame(ATTITUDE, attitude, self._peer), frame(POSITION, position, self._peer)]
         return b"".join(halves if broken else halves[:1])
 
     def _actuators(self) -> bytes:
@@ -131,39 +132,39 @@ class Fuzzer:
         controls = [self._chance.random() for _ in range(16)]
         controls[self._chance.randrange(4)] = self._chance.choice((*_BAD_FLOATS[:5], -1.0, 1.5))
         time_us = _FRAME_US * self._chance.randrange(1000)
-        return frame(93, struct.pack("<QQ16fB", time_us, 1, *controls, 0xFF), self._peer)
+        return frame(ACTUATORS, struct.pack("<QQ16fB", time_us, 1, *controls, 0xFF), self._peer)
 
     def _heartbeat(self) -> bytes:
-        return frame(0, self._chance.randbytes(9), self._peer)
+        return frame(HEARTBEAT, self._chance.randbytes(9), self._peer)
 
     def _command(self) -> bytes:
         """A command: any, or another frame interval, which a flight that has begun must refuse."""
         command = self._chance.choice((511, 400, self._chance.randrange(65536)))
         parameters = [31.0, *(self._value() for _ in range(6))]
         target = self._chance.choice((self._receiver, (0, 0), (9, 9)))
-        return frame(76, struct.pack("<7fHBBB", *parameters, command, *target, 0), self._peer)
+        return frame(COMMAND, struct.pack("<7fHBBB", *parameters, command, *target, 0), self._peer)
 
     def _ack(self) -> bytes:
-        return frame(77, self._chance.randbytes(10), self._peer)
+        return frame(ACK, self._chance.randbytes(10), self._peer)
 
     def _signed(self) -> bytes:
         """A frame that says it is signed; what it holds is not worth obeying either."""
         content = bytearray(self._valid_actuators(1, self._peer))
         content[2] = _SIGNED
-        crc = _crc(bytes(content[1:-2]), common.mavlink_map[93].crc_extra)
+        crc = _crc(bytes(content[1:-2]), common.mavlink_map[ACTUATORS].crc_extra)
         return bytes(content[:-2]) + crc + self._chance.randbytes(13)
 
     def _version_1(self) -> bytes:
-        return frame_v1(0, self._chance.randbytes(9), self._peer)
+        return frame_v1(HEARTBEAT, self._chance.randbytes(9), self._peer)
 
     def _valid_state(self, time_us: int, source: Ids) -> bytes:
         attitude = struct.pack("<I7f", time_us // 1000, *self._quaternion(), 0.0, 0.0, 0.0)
         position = struct.pack("<I6f", time_us // 1000, *(self._chance.gauss(0.0, 10.0) for _ in range(6)))
-        return frame(31, attitude, source) + frame(32, position, source)
+        return frame(ATTITUDE, attitude, source) + frame(POSITION, position, source)
 
     def _valid_actuators(self, time_us: int, source: Ids) -> bytes:
         controls = [self._chance.random() for _ in range(16)]
-        return frame(93, struct.pack("<QQ16fB", time_us, 1, *controls, 0x80), source)
+        return frame(ACTUATORS, struct.pack("<QQ16fB", time_us, 1, *controls, 0x80), source)
 
     def _quaternion(self) -> tuple[float, float, float, float]:
         return self._chance.choice(((1.0, 0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5), (0.0, 0.6, 0.8, 0.0)))

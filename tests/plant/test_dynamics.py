@@ -41,7 +41,7 @@ def rate_of(state: list[float]) -> Vector:
     return (p, q, r)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(quaternions(), vectors(6.0), reals(0.02), SYMMETRIC_AND_NOT)
 def test_torque_free_motion_conserves_energy_and_momentum(
     attitude: Quaternion, rate: Vector, rotor_momentum: float, inertia: Vector
@@ -68,7 +68,7 @@ def test_the_gyroscopic_moment_does_no_work(rate: Vector, rotor_momentum: float,
     assert moment == pytest.approx(-np.cross(rate, (0.0, 0.0, rotor_momentum)), abs=1e-9)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(quaternions(), vectors(10.0), vectors(6.0))
 def test_free_fall_is_a_parabola_however_it_tumbles(attitude: Quaternion, velocity: Vector, rate: Vector) -> None:
     wrench = Wrench(0.0, NO_MOMENT, 0.0)

@@ -1,0 +1,67 @@
+"""A UDP relay between autopilot and plant, which does to the datagrams what a test wants done."""
+
+import socket
+from abc import ABC, abstractmethod
+from select import select
+from threading import Event, Thread
+from types import TracebackType
+from typing import Self
+
+
+class Relay(ABC):
+    """Stands between an autopilot, which calls `url`, and a plant.
+
+    Attributes:
+        url: What the autopilot is to call.
+    """
+
+    def __init__(self, plant_url: str) -> None:
+        """Relay to the plant at `plant_url`."""
+        _, host, port = plant_url.split(":")
+        self._plant = (host, int(port))
+        self._near, self._far = _bound_socket(), _bound_socket()
+        self._autopilot: tuple[str, int] | None = None
+        self._ended = Event()
+        self._thread = Thread(target=self._run, daemon=True)
+        self.url = f"udpout:127.0.0.1:{self._near.getsockname()[1]}"
+
+    @abstractmethod
+    def pass_on(self, to: str, datagram: bytes) -> None:
+        """Deal with a datagram for the `plant` or the `autopilot`, by `deliver`."""
+
+    def deliver(self, to: str, datagram: bytes) -> None:
+        """Send a datagram on."""
+        if to == "plant":
+            self._far.sendto(datagram, self._plant)
+        elif self._autopilot:
+            self._near.sendto(datagram, self._autopilot)
+
+    def __enter__(self) -> Self:
+        """Start relaying."""
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop relaying."""
+        self._ended.set()
+        self._thread.join()
+        self._near.close()
+        self._far.close()
+
+    def _run(self) -> None:
+        while not self._ended.is_set():
+            for sock in select([self._near, self._far], [], [], 0.05)[0]:
+                datagram, sender = sock.recvfrom(4096)
+                if sock is self._near:
+                    self._autopilot = sender
+                    self.pass_on("plant", datagram)
+                else:
+                    self.pass_on("autopilot", datagram)
+
+
+def _bound_socket() -> socket.socket:
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.bind(("127.0.0.1", 0))
+    return sock
