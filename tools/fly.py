@@ -117,16 +117,20 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Callable[[float], No
     )
     console = Console(stderr=True)
     bar = Progress(*columns, console=console, disable=not console.is_terminal)
-    task = bar.add_task(plan.track_name, total=plan.duration_s, speed="")
+    task = bar.add_task(plan.track_name, total=plan.duration_s, speed="", start=False)
+    first_s: list[float] = []
 
     def show(sim_time_s: float) -> None:
-        bar.start()  # not before something flies: an error of the start stands alone
+        if not first_s:
+            bar.start()  # not before something flies: an error of the start stands alone
+            bar.start_task(task)
+            first_s.append(sim_time_s)
         elapsed_s = bar.tasks[task].elapsed or 0.0
-        speed = f"{sim_time_s / elapsed_s:.0f} × real time" if elapsed_s else ""
+        speed = f"{(sim_time_s - first_s[0]) / elapsed_s:.0f} × real time" if elapsed_s else ""
         bar.update(task, completed=sim_time_s, speed=speed)
 
     try:
         yield show
-        show(plan.duration_s)
+        bar.update(task, completed=plan.duration_s)
     finally:
         bar.stop()
