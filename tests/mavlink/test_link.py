@@ -70,3 +70,7 @@ def test_a_taken_port_is_named(server: UdpLink) -> None:
 def test_a_malformed_url_is_refused(url: str) -> None:
     with pytest.raises(LinkError, match=r"port 0|expected udpin"):
         open_link(url)
+
+
+def test_a_sender_that_cannot_be_answered_is_no_error(server: UdpLink) -> None:
+    server.send(b"who lies about its port", ("127.0.0.1", 0))
