@@ -1,6 +1,11 @@
-"""Property tests that give the same verdict every time, on however slow a machine."""
+"""The same verdict every time, on however slow a machine and from whatever shell."""
+
+import signal
 
 from hypothesis import settings
 
 settings.register_profile("same-verdict", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("same-verdict")
+
+# A shell's background job ignores Ctrl-C, and so would every process that a test starts.
+signal.signal(signal.SIGINT, signal.default_int_handler)
