@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
+NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
+Part: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 Array: TypeAlias = NDArray[np.float64]
 T = TypeVar("T")
 
@@ -35,6 +37,19 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             raise ValueError("inertia_kg_m2: no body has one moment of inertia above the sum of the other two")
 
 
+class RotorLag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A rotor's speed follows its command as a first-order lag."""
+
+    time_constant_up_s: Positive
+    """While it speeds up."""
+    time_constant_down_s: Positive
+    """While it slows down."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        _check_finite(self.time_constant_up_s, self.time_constant_down_s)
+
+
 class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The four rotors, all alike. Speeds and coefficients are in the file's own `speed_unit`."""
 
@@ -52,22 +67,47 @@ class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Seen from above."""
     gyroscopic_term: Literal["conserving", "as-printed"]
     """`conserving` keeps angular momentum; `as-printed` has the thesis's sign, and takes the speed in its own unit."""
+    idle_speed: NotNegative = 0.0
+    """What an armed rotor never falls below."""
+    strength: tuple[Part, Part, Part, Part] = (1.0, 1.0, 1.0, 1.0)
+    """Part of its thrust and torque that each rotor has: 0.85 is a rotor 15 % weak."""
+    lag: RotorLag | None = None
+    """Without it, rotors follow their commands at once."""
 
     def __post_init__(self) -> None:
         """Check what a range cannot say."""
         numbers = (self.thrust_coefficient, self.torque_coefficient, self.inertia_kg_m2, self.max_speed)
         _check_finite(*numbers, *(metre for position in self.position_m for metre in position))
+        if self.idle_speed >= self.max_speed:
+            raise ValueError("idle_speed: must lie below max_speed")
         if np.linalg.matrix_rank(_allocation(self)) < len(self.position_m):
             raise ValueError("position_m, direction: these rotors cannot turn the vehicle about every axis")
 
 
+class Drag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Forces against the motion through the air."""
+
+    linear_n_s_m: tuple[NotNegative, NotNegative, NotNegative]
+    """Of the airframe, along the FLU axes: N for each m/s."""
+    rotor_coefficient: NotNegative
+    """Of one rotor, in its plane: N for each m/s and for each of its speed unit."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        _check_finite(*self.linear_n_s_m, self.rotor_coefficient)
+
+
 class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A quadrotor, described in SI but for its rotor speeds (`rotors.speed_unit`)."""
+    """A quadrotor, described in SI but for its rotor speeds (`rotors.speed_unit`).
+
+    What is None is not modelled.
+    """
 
     name: str
     gravity_m_s2: Positive
     body: Body
     rotors: Rotors
+    drag: Drag | None = None
 
     def __post_init__(self) -> None:
         """Check what a range cannot say."""
@@ -159,8 +199,9 @@ def read_toml(path: Path, kind: type[T], error: type[Exception]) -> T:
 
 def _allocation(rotors: Rotors) -> Array:
     x, y = np.array(rotors.position_m).T
-    thrust = np.full(len(x), rotors.thrust_coefficient)
-    return np.array([thrust, thrust * y, -thrust * x, -_spin(rotors) * rotors.torque_coefficient])
+    strength = np.array(rotors.strength)
+    thrust = rotors.thrust_coefficient * strength
+    return np.array([thrust, thrust * y, -thrust * x, -_spin(rotors) * rotors.torque_coefficient * strength])
 
 
 def _spin(rotors: Rotors) -> Array:
