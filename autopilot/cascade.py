@@ -59,7 +59,7 @@ class Cascade:
         self.control_interval_us = interval_us(settings.control_interval_s)
         self.preview = Preview(self.control_interval_us * self._samples, 2)
         self._position = PositionController(settings.position, vehicle)
-        solver = QpSolver(settings.qp.solver, settings.qp.tolerance)
+        solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
         self._attitude = AttitudeMpc(settings.attitude, vehicle, solver, settings.control_interval_s, clock)
         self._mixer = Mixer(vehicle)
 

@@ -6,6 +6,7 @@ next. What they remember they return too: a controller has no state of its own, 
 """
 
 from collections.abc import Callable, Mapping
+from enum import StrEnum
 from importlib.metadata import entry_points
 from typing import Any, NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
 
@@ -83,22 +84,46 @@ class VehicleState(NamedTuple):
     rate_flu_rad_s: Vector
 
 
+class Fallback(StrEnum):
+    """What decided in place of a solved QP."""
+
+    SHIFTED_PLAN = "shifted plan"
+    LQR = "LQR"
+    DESCENT = "level and descend"
+    RECOVERY = "recovery"
+
+
+class Active(NamedTuple):
+    """How many constraints of each kind bind at the solution."""
+
+    rotors: int = 0
+    increments: int = 0
+    angles: int = 0
+    rates: int = 0
+
+
 class Diagnostics(NamedTuple):
     """How a decision came about; a control law without a QP leaves the defaults.
 
     Attributes:
         qp_status: How the QP ended; None if there was none.
+        fallback: What decided in its place; None if it was solved, or there was none.
         solve_time_s: Time that the QP took, s.
         cost: The QP's objective at its solution.
-        active_constraints: How many constraints bind at the solution.
+        active: Constraints that bind at the solution.
+        slack: By how much soft limits are exceeded, in parts of each: the largest.
         predicted: Outputs predicted over the horizon, (N, p), in the order and units that the control law documents.
+        planned_squared: Squared rotor speeds that the plan commands at each step, in parts of the largest, (N, 4).
     """
 
     qp_status: QpStatus | None = None
+    fallback: Fallback | None = None
     solve_time_s: float = 0.0
     cost: float = 0.0
-    active_constraints: int = 0
+    active: Active = Active()
+    slack: float = 0.0
     predicted: Array | None = None
+    planned_squared: Array | None = None
 
 
 class Decision(NamedTuple):

@@ -2,7 +2,10 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from autopilot.controller import (
+    Array,
     Clock,
     Controller,
     Decision,
@@ -21,10 +24,13 @@ from plant.vehicle import Vehicle
 
 
 class Step(NamedTuple):
-    """One control sample: the command to send, the decision behind it, and how long it took."""
+    """The answer to a frame: the command to send, the decision behind it, and how long it took.
+
+    Between two control samples the last command is sent again, and there is no decision.
+    """
 
     command: ActuatorCommand
-    decision: Decision
+    decision: Decision | None
     duration_s: float
 
 
@@ -32,7 +38,7 @@ class Autopilot:
     """Flies one track with one control law.
 
     Attributes:
-        frame_interval_us: How often it wants a frame: at every control sample.
+        frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
     """
 
     def __init__(self, profile: Profile, vehicle: Vehicle, track: Track, clock: Clock) -> None:
@@ -52,29 +58,42 @@ class Autopilot:
         self._memory: Any = None
         self._time_us: int | None = None
         self._yaw_rad = 0.0
-        self.frame_interval_us = self._controller.control_interval_us
+        self._controls = (0.0, 0.0, 0.0, 0.0)
+        self.frame_interval_us = _frame_interval_us(profile, self._controller.control_interval_us)
 
     def step(self, frame: StateFrame) -> Step:
         """Answer a frame.
 
-        Frames follow one another at the control interval. One that does not begins a new flight: with the profile's
+        Frames follow one another at the frame interval. One that does not begins a new flight: with the profile's
         rotor speed at time 0, and with hover in mid-flight, where nothing is known of the rotors.
 
         Raises:
             DecisionError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
-        references = self._planner.horizon(frame.time_us)
         if self._time_us is None or frame.time_us != self._time_us + self.frame_interval_us:
-            speed = self._start_speed if frame.time_us == 0 else self._vehicle.hover_speed
-            self._memory = self._controller.initial(speed)
-            self._yaw_rad = float(references.yaw_rad[0])
+            self._begin(frame)
         self._time_us = frame.time_us
-        self._memory, decision = self._controller.step(self._memory, frame.time_us, self._state(frame), references)
-        check_rotor_speeds(self._name, decision.rotor_speeds, self._vehicle.rotors.max_speed)
-        c1, c2, c3, c4 = (decision.rotor_speeds / self._vehicle.rotors.max_speed).tolist()
-        command = ActuatorCommand(frame.time_us, (c1, c2, c3, c4), armed=True)
+        state = self._state(frame)
+        decision = None
+        if frame.time_us % self._controller.control_interval_us == 0:
+            references = self._planner.horizon(frame.time_us)
+            self._memory, decision = self._controller.step(self._memory, frame.time_us, state, references)
+            self._controls = self._controls_of(decision.rotor_speeds)
+        command = ActuatorCommand(frame.time_us, self._controls, armed=True)
         return Step(command, decision, self._clock() - started_s)
+
+    def _begin(self, frame: StateFrame) -> None:
+        speed = self._start_speed if frame.time_us == 0 else self._vehicle.hover_speed
+        self._memory = self._controller.initial(speed)
+        self._yaw_rad = float(self._planner.horizon(frame.time_us).yaw_rad[0])
+        self._controls = self._controls_of(np.full(4, speed))
+
+    def _controls_of(self, rotor_speeds: Array) -> tuple[float, float, float, float]:
+        """Return rotor speeds as parts of the largest."""
+        check_rotor_speeds(self._name, rotor_speeds, self._vehicle.rotors.max_speed)
+        c1, c2, c3, c4 = (rotor_speeds / self._vehicle.rotors.max_speed).tolist()
+        return (c1, c2, c3, c4)
 
     def _state(self, frame: StateFrame) -> VehicleState:
         """Unwrap yaw by continuity: a quaternion forgets full turns."""
@@ -82,6 +101,19 @@ class Autopilot:
         self._yaw_rad = nearest_turn(psi, self._yaw_rad)
         euler = (phi, theta, self._yaw_rad)
         return VehicleState(frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
+
+
+def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
+    wanted_s = profile.simulation.frame_interval_s
+    if wanted_s is None:
+        return control_interval_us
+    wanted_us = round(wanted_s * 1e6)
+    if wanted_us % 1000 or control_interval_us % wanted_us:
+        raise ProfileError(
+            f"profile {profile.name}: simulation.frame_interval_s: must be whole milliseconds and divide the control "
+            f"interval of {control_interval_us / 1e6:g} s"
+        )
+    return wanted_us
 
 
 def _build(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:

@@ -5,8 +5,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.controller import Clock, Diagnostics
-from autopilot.qp import QpSolver
+from autopilot.controller import Active, Clock, Diagnostics
+from autopilot.qp import Qp, QpSolver, box
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -109,17 +109,17 @@ def solve(qp: CondensedQp, bound: Array, solver: QpSolver, clock: Clock) -> Solu
     """Solve a condensed QP with every increment within ±`bound`, (m,)."""
     m = len(bound)
     horizon = len(qp.f) // m
-    box = np.concatenate([bound] * horizon)
+    largest = np.concatenate([bound] * horizon)
     started_s = clock()
-    status, increments = solver.solve(qp.H, qp.f, -box, box)
+    status, increments = solver.solve(Qp(qp.H, qp.f, box(len(qp.f)), np.concatenate([largest, largest])))
     solve_time_s = clock() - started_s
     if increments is None:
-        return Solution(np.zeros(m), Diagnostics(status, solve_time_s))
+        return Solution(np.zeros(m), Diagnostics(status, solve_time_s=solve_time_s))
     diagnostics = Diagnostics(
         status,
-        solve_time_s,
+        solve_time_s=solve_time_s,
         cost=float(increments @ (0.5 * qp.H @ increments + qp.f)),
-        active_constraints=int(np.count_nonzero(np.abs(increments) > (1.0 - _BINDING) * box)),
+        active=Active(increments=int(np.count_nonzero(np.abs(increments) > (1.0 - _BINDING) * largest))),
         predicted=(qp.free + qp.Gamma @ increments).reshape(horizon, -1),
     )
     return Solution(increments[:m], diagnostics)

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from time import perf_counter
 
-from autopilot.controller import ControllerError, DecisionError
+from autopilot.controller import Active, ControllerError, DecisionError, Fallback
 from autopilot.core import Autopilot, Step
 from autopilot.profile import ProfileError, load_profile
 from autopilot.qp import QpStatus, SolverError
@@ -16,8 +16,14 @@ from plant.vehicle import VehicleError, load_vehicle
 
 DECISION_COLUMNS = (
     *("t", "phi_ref", "theta_ref", "psi_ref"),
-    *("qp_solved", "solve_time_us", "control_step_us", "cost", "active_constraints"),
+    *("qp_status", "fallback", "solve_time_us", "control_step_us", "cost", "slack"),
+    *(f"active_{kind}" for kind in Active._fields),
 )
+
+STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, status in enumerate(QpStatus)}
+"""How `qp_status` is written: 0 is solved, -1 no QP."""
+FALLBACK_CODES: dict[Fallback | None, int] = {None: -1} | {fallback: code for code, fallback in enumerate(Fallback)}
+"""How `fallback` is written: -1 is none."""
 
 _SILENCE_SAID_AFTER_S = 2.0
 _WAIT_AT_MOST_S = 0.1
@@ -31,13 +37,15 @@ class AutopilotLog:
         self._decisions = CsvLog(folder / "autopilot.csv", DECISION_COLUMNS)
 
     def write(self, step: Step) -> None:
-        """Append a control sample."""
-        decision, how = step.decision, step.decision.diagnostics
-        solved = int(how.qp_status in (None, QpStatus.SOLVED))
+        """Append a control sample; a frame between two of them has nothing to tell."""
+        if step.decision is None:
+            return
+        how = step.decision.diagnostics
+        codes = (STATUS_CODES[how.qp_status], FALLBACK_CODES[how.fallback])
         times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
         time_s = step.command.time_us / 1e6
         self._decisions.write(
-            (time_s, *decision.attitude_reference, solved, *times_us, how.cost, how.active_constraints)
+            (time_s, *step.decision.attitude_reference, *codes, *times_us, how.cost, how.slack, *how.active)
         )
 
     def close(self) -> None:

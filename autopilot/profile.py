@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
-from autopilot.settings import Table
+from autopilot.settings import ControlInterval, Table
 from plant.vehicle import read_named
 
 _FOLDER = Path(__file__).parent / "profiles"
@@ -25,6 +25,8 @@ class SimulationSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only
     position_enu_m: tuple[float, float, float]
     rotor_speed_rpm: Annotated[float, msgspec.Meta(ge=0.0)]
     """Of every rotor, in turns per minute."""
+    frame_interval_s: ControlInterval | None = None
+    """Between two frames of the plant; the control interval where it is not given."""
 
 
 class Profile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -12,10 +12,13 @@ from scipy.sparse import csc_matrix
 
 Array: TypeAlias = NDArray[np.float64]
 
-IN_SOLVERS_EXTRA = ("daqp", "highs", "osqp", "piqp", "proxqp", "quadprog", "scs")
+IN_SOLVERS_EXTRA = ("highs", "osqp", "piqp", "proxqp", "quadprog", "scs")
 """What `pip install colibri-sitl[solvers]` brings, by the names that qpsolvers uses."""
 
-_MAX_ITERATIONS = 100_000
+LARGEST_RESIDUAL = 1e-6
+"""A solution that misses its optimality conditions by more is not accurate."""
+
+MOST_ITERATIONS = 100_000
 
 
 class SolverError(Exception):
@@ -26,8 +29,31 @@ class QpStatus(StrEnum):
     """How a QP ended."""
 
     SOLVED = "solved"
-    NOT_SOLVED = "not solved"
-    FAILED = "failed"
+    INFEASIBLE = "infeasible"
+    TIME_OUT = "time-out"
+    """The solver stopped at its most iterations: counted, not timed, so that a flight stays the same flight."""
+    NOT_ACCURATE = "not accurate"
+    """What the solver gave is no number, or does not satisfy the optimality conditions."""
+
+
+class Qp(NamedTuple):
+    """min ½ xᵀ H x + fᵀ x subject to G x <= h, lower <= x <= upper.
+
+    Attributes:
+        H: Symmetric, positive definite, (n, n).
+        f: (n,).
+        G: (m, n).
+        h: (m,).
+        lower: (n,); None for no bounds.
+        upper: (n,); None for no bounds.
+    """
+
+    H: Array
+    f: Array
+    G: Array
+    h: Array
+    lower: Array | None = None
+    upper: Array | None = None
 
 
 class QpResult(NamedTuple):
@@ -40,8 +66,8 @@ class QpResult(NamedTuple):
 class QpSolver:
     """One solver of qpsolvers, held to a tolerance."""
 
-    def __init__(self, name: str, tolerance: float) -> None:
-        """Use solver `name`; those that work to a tolerance stop at `tolerance`.
+    def __init__(self, name: str, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
+        """Use solver `name`; those that work to a tolerance stop at `tolerance`, all at `max_iterations`.
 
         Raises:
             SolverError: There is no such solver, or it is not installed.
@@ -49,32 +75,58 @@ class QpSolver:
         check_solver(name)
         self._name = name
         self._sparse = name in qpsolvers.sparse_solvers and name not in qpsolvers.dense_solvers
-        self._options = _options(name, tolerance)
+        self._options = _options(name, tolerance, max_iterations)
 
-    def solve(self, H: Array, f: Array, lower: Array, upper: Array) -> QpResult:
-        """Minimise ½ xᵀ H x + fᵀ x subject to lower <= x <= upper.
-
-        Args:
-            H: Symmetric, positive definite, (n, n).
-            f: (n,).
-            lower: (n,).
-            upper: (n,).
-        """
-        P, G = _sparse_box(len(f)) if self._sparse else (H, _box(len(f)))
-        if self._sparse:
-            np.asarray(P.data)[:] = H.ravel()
+    def solve(self, qp: Qp) -> QpResult:
+        """Solve a QP."""
+        P, G = (_filled("P", qp.H), _filled("G", qp.G)) if self._sparse else (qp.H, qp.G)
         try:
             with catch_warnings():
                 simplefilter("ignore")
-                problem = qpsolvers.Problem(P, f, G, np.concatenate([upper, -lower]))
+                problem = qpsolvers.Problem(P, qp.f, G, qp.h, lb=qp.lower, ub=qp.upper)
                 solution = qpsolvers.solve_problem(problem, self._name, **self._options)
         except (qpsolvers.QPError, ArithmeticError, ValueError):
-            return QpResult(QpStatus.FAILED, None)
+            return QpResult(QpStatus.NOT_ACCURATE, None)
         if not solution.found or solution.x is None:
-            return QpResult(QpStatus.NOT_SOLVED, None)
-        if not np.isfinite(solution.x).all():
-            return QpResult(QpStatus.FAILED, None)
-        return QpResult(QpStatus.SOLVED, np.asarray(solution.x, dtype=np.float64))
+            return QpResult(why_none(qp), None)
+        x = np.asarray(solution.x, dtype=np.float64)
+        if not np.isfinite(x).all() or not residual(qp, x, solution.z, solution.z_box) <= LARGEST_RESIDUAL:
+            return QpResult(QpStatus.NOT_ACCURATE, None)
+        return QpResult(QpStatus.SOLVED, x)
+
+
+def residual(qp: Qp, x: Array, z: Array | None, z_box: Array | None) -> float:
+    """Return by how much a solution misses the optimality conditions: by its worst constraint, or gradient over f.
+
+    Args:
+        qp: The problem.
+        x: The solution, (n,).
+        z: Multipliers of G x <= h, (m,); None where the solver gives none: then only feasibility counts.
+        z_box: Multipliers of the bounds, (n,), negative at a lower one; None or empty without.
+    """
+    missed = float((qp.G @ x - qp.h).max(initial=0.0))
+    if qp.lower is not None and qp.upper is not None:
+        missed = max(missed, float((qp.lower - x).max()), float((x - qp.upper).max()))
+    if z is None:
+        return missed
+    gradient = qp.H @ x + qp.f + z @ qp.G
+    if z_box is not None and len(z_box):
+        gradient += z_box
+    return max(missed, float(np.abs(gradient).max()) / (1.0 + float(np.abs(qp.f).max())))
+
+
+def why_none(qp: Qp) -> QpStatus:
+    """Tell why a QP has no solution: no point satisfies its constraints (a linear program's phase one), or no time."""
+    from scipy.optimize import linprog
+
+    if not all(np.isfinite(part).all() for part in (qp.H, qp.f, qp.G, qp.h)):
+        return QpStatus.NOT_ACCURATE
+    n = len(qp.f)
+    lower = np.full(n, -np.inf) if qp.lower is None else qp.lower
+    upper = np.full(n, np.inf) if qp.upper is None else qp.upper
+    bounds = list(zip(lower.tolist(), upper.tolist(), strict=True))
+    feasible = linprog(np.zeros(n), A_ub=qp.G, b_ub=qp.h, bounds=bounds).status == 0
+    return QpStatus.TIME_OUT if feasible else QpStatus.INFEASIBLE
 
 
 def installed_solvers() -> list[str]:
@@ -97,15 +149,22 @@ def check_solver(name: str) -> None:
 
 
 @cache
-def _box(n: int) -> Array:
+def box(n: int) -> Array:
     """Return G of the box G x <= [upper; -lower]."""
     return np.vstack([np.eye(n), -np.eye(n)])
 
 
+def _filled(role: str, matrix: Array) -> csc_matrix:
+    """Return a matrix as CSC: to build one anew costs five times what Clarabel takes, so the pattern is kept."""
+    sparse = _full(role, *matrix.shape)
+    np.asarray(sparse.data)[:] = matrix.ravel(order="F")
+    return sparse
+
+
 @cache
-def _sparse_box(n: int) -> tuple[csc_matrix, csc_matrix]:
-    """Return a full P to be filled and the G of the box: to build them anew costs five times what Clarabel takes."""
-    return csc_matrix(np.ones((n, n))), csc_matrix(_box(n))
+def _full(role: str, rows: int, columns: int) -> csc_matrix:
+    del role  # two matrices of one shape are two matrices
+    return csc_matrix(np.ones((rows, columns)))
 
 
 @cache
@@ -114,15 +173,22 @@ def _known_solvers() -> frozenset[str]:
     return frozenset(entry.removesuffix(suffix) for entry in dir(qpsolvers) if entry.endswith(suffix))
 
 
-def _options(name: str, tolerance: float) -> dict[str, Any]:
-    """Return what each solver calls its tolerances; an active-set solver works to machine precision anyway."""
+def _options(name: str, tolerance: float, max_iterations: int) -> dict[str, Any]:
+    """Return what each solver calls its tolerances and its most iterations; quadprog has neither."""
     absolute_and_relative = {"eps_abs": tolerance, "eps_rel": tolerance}
     options: dict[str, dict[str, Any]] = {
-        "clarabel": {"tol_gap_abs": tolerance, "tol_gap_rel": tolerance, "tol_feas": tolerance},
-        "osqp": {**absolute_and_relative, "max_iter": _MAX_ITERATIONS},
-        "piqp": absolute_and_relative,
-        "proxqp": absolute_and_relative,
-        "scs": {**absolute_and_relative, "max_iters": _MAX_ITERATIONS},
-        "highs": {"primal_feasibility_tolerance": tolerance, "dual_feasibility_tolerance": tolerance},
+        "clarabel": {
+            **{f"tol_{what}": tolerance for what in ("gap_abs", "gap_rel", "feas")},
+            "max_iter": max_iterations,
+        },
+        "daqp": {"iter_limit": max_iterations},
+        "osqp": {**absolute_and_relative, "max_iter": max_iterations},
+        "piqp": {**absolute_and_relative, "max_iter": max_iterations},
+        "proxqp": {**absolute_and_relative, "max_iter": max_iterations},
+        "scs": {**absolute_and_relative, "max_iters": max_iterations},
+        "highs": {
+            **{f"{what}_feasibility_tolerance": tolerance for what in ("primal", "dual")},
+            "qp_iteration_limit": max_iterations,
+        },
     }
     return options.get(name, {})

@@ -9,6 +9,7 @@ import msgspec
 from plant.vehicle import Positive
 
 Negative: TypeAlias = Annotated[float, msgspec.Meta(lt=0.0)]
+Degrees: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0, lt=90.0)]
 Count: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 ControlInterval: TypeAlias = Annotated[float, msgspec.Meta(ge=0.001, le=1.0)]
 T = TypeVar("T")
@@ -35,6 +36,8 @@ class QpSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     solver: str
     tolerance: Positive
+    max_iterations: Annotated[int, msgspec.Meta(ge=1, le=100_000)] = 100_000
+    """More count as a time-out."""
 
 
 def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:

@@ -45,16 +45,22 @@ class Recording:
     Attributes:
         table: Columns as in `COLUMNS`, (n, 27). Row k holds the state at its time and the inputs that led to it, with
             the references they were computed for; row 0 the start.
-        solved: Whether each QP was solved, (m,).
+        qp_status: How each QP ended, as in `autopilot.process.STATUS_CODES`, (m,).
+        fallback: What decided in its place, as in `autopilot.process.FALLBACK_CODES`, (m,).
         solve_time_us: Time of each QP, (m,).
         control_step_us: Time of each control step, (m,).
+        slack: By how much soft limits were planned to be exceeded, in parts of each, (m,).
+        active: How many constraints of each kind were active, columns as in `autopilot.controller.Active`, (m, 4).
         trajectory_sha256: Hash of the plant's states at every frame, as float64.
     """
 
     table: Array
-    solved: NDArray[np.bool_]
+    qp_status: NDArray[np.int64]
+    fallback: NDArray[np.int64]
     solve_time_us: Array
     control_step_us: Array
+    slack: Array
+    active: NDArray[np.int64]
     trajectory_sha256: str
 
     def __getitem__(self, column: str) -> Array:
@@ -89,9 +95,12 @@ def read_recording(plan: FlightPlan) -> Recording:
         raise RecordingError("the flight ended before its first control sample")
     return Recording(
         table=_join(plan, samples, decisions),
-        solved=decisions[:, 4] == 1.0,
-        solve_time_us=decisions[:, 5],
-        control_step_us=decisions[:, 6],
+        qp_status=decisions[:, 4].astype(np.int64),
+        fallback=decisions[:, 5].astype(np.int64),
+        solve_time_us=decisions[:, 6],
+        control_step_us=decisions[:, 7],
+        slack=decisions[:, 9],
+        active=decisions[:, 10:14].astype(np.int64),
         trajectory_sha256=sha256(np.ascontiguousarray(plant[:, _PLANT_STATE]).tobytes()).hexdigest(),
     )
 

@@ -7,6 +7,9 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.controller import Active, Fallback
+from autopilot.process import FALLBACK_CODES, STATUS_CODES
+from autopilot.qp import QpStatus
 from tools.plan import FlightPlan
 from tools.recording import INPUT, Recording, Summary
 
@@ -45,7 +48,13 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
         "control_step_us": _quantiles(recording.control_step_us),
         "frames": summary.frames,
         "resent": summary.resent,
-        "qp_failures": int(np.count_nonzero(~recording.solved)),
+        "qp_failures": int(np.count_nonzero(recording.qp_status > STATUS_CODES[QpStatus.SOLVED])),
+        "qp_status": _counts(recording.qp_status, {str(status): STATUS_CODES[status] for status in QpStatus}),
+        "fallbacks": _counts(recording.fallback, {str(fallback): FALLBACK_CODES[fallback] for fallback in Fallback}),
+        "constrained_samples": dict(
+            zip(Active._fields, np.count_nonzero(recording.active, axis=0).tolist(), strict=True)
+        ),
+        "max_slack": float(recording.slack.max()),
         "trajectory_sha256": recording.trajectory_sha256,
     }
 
@@ -64,6 +73,7 @@ def print_report(figures: Report, out: Path) -> None:
         return f"{figures[name]['p50']:.0f} / {figures[name]['p99']:.0f} µs"
 
     settled = figures["rmse_after_20s_m"]
+    fallbacks = [f"{count} {name}" for name, count in figures["fallbacks"].items() if count]
     table = Table(title=f"{figures['track']}, profile {figures['profile']}", show_header=False, title_justify="left")
     rows = {
         "position error, RMS": f"{figures['rmse_m']:.4f} m",
@@ -75,12 +85,17 @@ def print_report(figures: Report, out: Path) -> None:
         "real-time factor": f"{figures['real_time_factor']:.0f}",
         "frames, sent again": f"{figures['frames']}, {figures['resent']}",
         "QPs not solved": f"{figures['qp_failures']}",
+        "samples flown by a fallback": ", ".join(fallbacks) or "0",
         "trajectory": figures["trajectory_sha256"][:16],
         "written to": str(out),
     }
     for name, value in rows.items():
         table.add_row(name, value)
     Console().print(table)
+
+
+def _counts(codes: NDArray[np.int64], names: dict[str, int]) -> dict[str, int]:
+    return {name: int(np.count_nonzero(codes == code)) for name, code in names.items()}
 
 
 def _rms(values: Array) -> float:

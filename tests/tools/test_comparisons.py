@@ -64,8 +64,8 @@ def test_controllers_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[
 @pytest.mark.parametrize(
     ("options", "line"),
     [
-        (["--profile", "fast"], "unknown profile fast: choose se3, thesis, thesis-euler or a .toml file"),
-        (["--profile", "thesis:pid"], "unknown controller pid: installed are cascade, geometric-se3, global-lpv-mpc"),
+        (["--profile", "fast"], "unknown profile fast: choose flight, se3, thesis, thesis-euler or a .toml file"),
+        (["--profile", "thesis:pid"], "unknown controller pid: installed are cascade, geometric-se3, global-lpv-mpc, lpv-mpc"),
         (["--track", "loop"], "unknown track loop: choose spiral, expanding-spiral, line, wave, crown"),
     ],
 )

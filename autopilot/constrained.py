@@ -1,0 +1,251 @@
+"""The constrained MPC's QP, condensed to the increments and two slacks, as compiled kernels.
+
+    z = [Δu at each move, angle slack, rate slack]
+    min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
+
+The cost is the thesis's [3.13-3.20], its terminal weight a full matrix on state and input.
+"""
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.prediction import ANGLES, INPUTS, STATES, P, Q, R
+from mavlink.compiled import compiled
+
+Array: TypeAlias = NDArray[np.float64]
+Integers: TypeAlias = NDArray[np.int64]
+
+SLACKS = 2
+ANGLE_SLACK, RATE_SLACK = 0, 1
+ROTORS = 4
+LIMITED = 5
+"""Softly limited: phi and theta with one slack; p, q and r with the other."""
+_TWO_SIDES = 2
+
+
+@compiled
+def quadratic_cost(
+    responses: Array,
+    angles: Array,
+    terminal: Array,
+    u: Array,
+    output_weight: Array,
+    terminal_weight: Array,
+    increment_weight: Array,
+    H: Array,
+    f: Array,
+) -> None:
+    """Fill the part of H and f that belongs to the increments.
+
+    Args:
+        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
+        angles: phi, theta, psi wanted after each step, rad, (N, 3).
+        terminal: State and input wanted at the end, (12,).
+        u: Moments last commanded, N m, (3,).
+        output_weight: Diagonal of Q, (3,).
+        terminal_weight: S on state and input, (12, 12), symmetric.
+        increment_weight: Diagonal of R, (3,).
+        H: (n, n), n = 3 b + 2.
+        f: (n,).
+    """
+    steps = responses.shape[0] - 1
+    moved = responses.shape[2] - 1
+    H[:moved, :moved] = 0.0
+    f[:moved] = 0.0
+    for step in range(1, steps + 1):
+        for j in range(INPUTS):
+            row = responses[step, ANGLES[j]]
+            weight = output_weight[j]
+            error = weight * (row[0] - angles[step - 1, j])
+            for k in range(moved):
+                f[k] += error * row[1 + k]
+                weighted = weight * row[1 + k]
+                for i in range(k + 1):
+                    H[k, i] += weighted * row[1 + i]
+    _add_terminal(responses[steps], terminal, u, terminal_weight, H, f)
+    for k in range(moved):
+        H[k, k] += increment_weight[k % INPUTS]
+        for i in range(k):
+            H[i, k] = H[k, i]
+
+
+@compiled
+def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f: Array) -> None:
+    """Add ½ eᵀSe of the error of state and input at the end, to the lower triangle of H."""
+    moved = last.shape[1] - 1
+    E = np.zeros((STATES + INPUTS, moved + 1))
+    E[:STATES] = last
+    for i in range(INPUTS):
+        E[STATES + i, 0] = u[i]
+        for k in range(i, moved, INPUTS):
+            E[STATES + i, 1 + k] = 1.0
+    E[:, 0] -= terminal
+    weighted = np.dot(S, E)
+    for k in range(moved):
+        for row in range(STATES + INPUTS):
+            f[k] += E[row, 1 + k] * weighted[row, 0]
+        for i in range(k + 1):
+            for row in range(STATES + INPUTS):
+                H[k, i] += E[row, 1 + k] * weighted[row, 1 + i]
+
+
+@compiled
+def limit_rotors(
+    rotors_from_moments: Array,
+    rotors_from_thrust: Array,
+    thrust_n: Array,
+    u: Array,
+    starts: Integers,
+    squared_least: float,
+    squared_most: float,
+    G: Array,
+    h: Array,
+) -> int:
+    """Fill the rows that keep every rotor within its limits at every step of the horizon; return how many.
+
+    Linear in squared speed, and with the thrust known only the moments move it. Between two moves the moments stay, so
+    one row a side holds the tightest step of them. Rows are in parts of the largest squared speed.
+
+    Args:
+        rotors_from_moments: Squared speeds from U2, U3, U4, in parts of the largest, (4, 3).
+        rotors_from_thrust: The same from U1, (4,).
+        thrust_n: U1 commanded at each step, N, (N,).
+        u: Moments last commanded, N m, (3,).
+        starts: Step of each move, (b,).
+        squared_least: Least squared speed, in parts of the largest.
+        squared_most: Largest squared speed, in the same parts.
+        G: Is filled from row 0, (m, n), zeros where nothing is written.
+        h: (m,).
+    """
+    count = 0
+    for move in range(starts.shape[0]):
+        end = starts[move + 1] if move + 1 < starts.shape[0] else thrust_n.shape[0]
+        least, most = thrust_n[starts[move]], thrust_n[starts[move]]
+        for step in range(starts[move], end):
+            least, most = min(least, thrust_n[step]), max(most, thrust_n[step])
+        for rotor in range(ROTORS):
+            turned = 0.0
+            for i in range(INPUTS):
+                turned += rotors_from_moments[rotor, i] * u[i]
+                for j in range(move + 1):
+                    G[count, INPUTS * j + i] = rotors_from_moments[rotor, i]
+                    G[count + 1, INPUTS * j + i] = -rotors_from_moments[rotor, i]
+            h[count] = squared_most - rotors_from_thrust[rotor] * most - turned
+            h[count + 1] = turned + rotors_from_thrust[rotor] * least - squared_least
+            count += _TWO_SIDES
+    return count
+
+
+@compiled
+def limit_motion(responses: Array, checked: Integers, limits: Array, first: int, G: Array, h: Array) -> int:
+    """Fill the soft rows of angles and rates from row `first`; return the row after them.
+
+    Args:
+        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
+        checked: Steps at which the limits are held, (c,).
+        limits: Of |phi|, |theta|, |p|, |q|, |r|, rad and rad/s, (5,).
+        first: Row to begin at.
+        G: (m, n).
+        h: (m,).
+    """
+    states = (ANGLES[0], ANGLES[1], P, Q, R)
+    moved = responses.shape[2] - 1
+    count = first
+    for step in checked:
+        for i in range(LIMITED):
+            row = responses[step, states[i]]
+            slack = moved + (ANGLE_SLACK if i < 2 else RATE_SLACK)
+            for k in range(moved):
+                G[count, k] = row[1 + k] / limits[i]
+                G[count + 1, k] = -row[1 + k] / limits[i]
+            G[count, slack] = -1.0
+            G[count + 1, slack] = -1.0
+            h[count] = 1.0 - row[0] / limits[i]
+            h[count + 1] = 1.0 + row[0] / limits[i]
+            count += _TWO_SIDES
+    return count
+
+
+@compiled
+def read_plan(
+    responses: Array,
+    starts: Integers,
+    u: Array,
+    z: Array,
+    thrust_n: Array,
+    rotors_from_thrust: Array,
+    rotors_from_moments: Array,
+    states: Array,
+    moments: Array,
+    squared: Array,
+) -> None:
+    """Write what increments lead to.
+
+    Args:
+        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
+        starts: Step of each move, (b,).
+        u: Moments last commanded, N m, (3,).
+        z: The QP's solution, (n,).
+        thrust_n: U1 commanded at each step, N, (N,).
+        rotors_from_thrust: Squared speeds from U1, in parts of the largest, (4,).
+        rotors_from_moments: The same from U2, U3, U4, (4, 3).
+        states: Is filled: predicted, (N + 1, 9).
+        moments: Is filled: commanded at each step, N m, (N, 3).
+        squared: Is filled: squared rotor speeds commanded at each step, in parts of the largest, (N, 4).
+    """
+    moved = responses.shape[2] - 1
+    for step in range(responses.shape[0]):
+        for state in range(STATES):
+            total = responses[step, state, 0]
+            for k in range(moved):
+                total += responses[step, state, 1 + k] * z[k]
+            states[step, state] = total
+    held = u.copy()
+    move = 0
+    for step in range(moments.shape[0]):
+        if move < starts.shape[0] and starts[move] == step:
+            held += z[INPUTS * move : INPUTS * move + INPUTS]
+            move += 1
+        moments[step] = held
+        for rotor in range(ROTORS):
+            total = rotors_from_thrust[rotor] * thrust_n[step]
+            for i in range(INPUTS):
+                total += rotors_from_moments[rotor, i] * held[i]
+            squared[step, rotor] = total
+
+
+@compiled
+def count_active(
+    G: Array, h: Array, lower: Array, upper: Array, z: Array, rotor_rows: int, binding: float
+) -> tuple[int, int, int, int]:
+    """Return how many limits of rotors, increments, angles and rates bind at z.
+
+    Args:
+        G: Rows of `limit_rotors`, then of `limit_motion`, (m, n).
+        h: (m,).
+        lower: (n,).
+        upper: (n,).
+        z: (n,).
+        rotor_rows: How many rows are the rotors'.
+        binding: A limit binds where no more is left.
+    """
+    increments = 0
+    for k in range(z.shape[0] - SLACKS):
+        if z[k] - lower[k] < binding or upper[k] - z[k] < binding:
+            increments += 1
+    rotors, angles, rates = 0, 0, 0
+    angle_rows = 2 * _TWO_SIDES
+    for row in range(G.shape[0]):
+        left = h[row]
+        for k in range(z.shape[0]):
+            left -= G[row, k] * z[k]
+        if left < binding:
+            if row < rotor_rows:
+                rotors += 1
+            elif (row - rotor_rows) % (LIMITED * _TWO_SIDES) < angle_rows:
+                angles += 1
+            else:
+                rates += 1
+    return rotors, increments, angles, rates

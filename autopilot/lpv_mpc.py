@@ -1,0 +1,311 @@
+"""The flight profile's control law: position by feedback linearisation with preview, attitude by LPV-MPC."""
+
+from collections.abc import Mapping
+from math import cos, radians, tan
+from typing import Annotated, Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from autopilot import guidance, observer, prediction, recovery, rotor_lag
+from autopilot.attitude_plan import (
+    AttitudeMpc,
+    AttitudeSettings,
+    Plan,
+    Situation,
+    Target,
+    squared_speeds_from,
+)
+from autopilot.controller import Array, Clock, Decision, Diagnostics, Fallback, Horizon, Preview, VehicleState
+from autopilot.qp import QpSolver
+from autopilot.settings import (
+    ControlInterval,
+    Count,
+    Degrees,
+    Negative,
+    QpSettings,
+    Table,
+    interval_us,
+    read_settings,
+)
+from mavlink.frames import nearest_turn, rotation_matrix
+from plant.vehicle import Positive, Vehicle
+
+_RECOVER_BEYOND = cos(radians(75.0))
+"""A thrust axis further from where it must point, or a steeper pitch, is for the recovery law."""
+
+
+Part = Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
+
+
+class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The position loop."""
+
+    poles: tuple[Negative, Negative]
+    approach_speed_m_s: Positive
+    largest_tilt_deg: Degrees
+    thrust_margin: Annotated[float, msgspec.Meta(ge=0.0, lt=0.5)]
+
+
+class ObserverSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The disturbance observers."""
+
+    acceleration_rad_s: Positive
+    moment_rad_s: Positive
+    most_m_s2: Positive
+    most_n_m: Positive
+
+
+class FallbackSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What flies when no plan can be had."""
+
+    shifted_samples: Count
+    lqr_samples: Count
+    descent_thrust: Part
+    turn_1_s: Positive
+    rate_1_s: Positive
+    fastest_rad_s: Positive
+
+
+class LpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The control law."""
+
+    control_interval_s: ControlInterval
+    guidance: GuidanceSettings
+    observer: ObserverSettings
+    attitude: AttitudeSettings
+    fallback: FallbackSettings
+    qp: QpSettings
+
+
+class Memory(NamedTuple):
+    """What the law carries from one control sample to the next.
+
+    Attributes:
+        speeds: Rotor speeds now, as the lag has them, parts of the largest, (4,).
+        moments: U2..U4 last commanded, N m, (3,).
+        wrench: Mean U1..U4 over the interval that ends now, (4,).
+        measured: What the observer measured a sample ago, (9,); None before the first.
+        estimate: Of the observer a sample ago, (12,).
+        plan: The last plan, made `age` samples ago; None where there is none to build on.
+        age: Samples since that plan.
+    """
+
+    speeds: Array
+    moments: Array
+    wrench: Array
+    measured: Array | None
+    estimate: Array
+    plan: Plan | None
+    age: int
+
+
+class LpvMpc:
+    """The control law. Its predicted outputs are the states of `prediction`.
+
+    Attributes:
+        control_interval_us: The control sample.
+        preview: From now to one sample past the horizon.
+    """
+
+    def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
+        """Control `vehicle` as the profile's `table` says; `clock` only measures.
+
+        Raises:
+            SettingsError: The table is wrong.
+            SolverError: The solver cannot be used.
+        """
+        settings = read_settings(table, LpvMpcSettings)
+        self.control_interval_us = interval_us(settings.control_interval_s)
+        self._interval_s = settings.control_interval_s
+        self._vehicle = vehicle
+        self._lag = rotor_lag.rotor_lag(vehicle, self._interval_s)
+        solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
+        self._attitude = AttitudeMpc(settings.attitude, vehicle, self._lag, solver, self._interval_s, clock)
+        self._samples = self._attitude.horizon + 2
+        self.preview = Preview(self.control_interval_us, self._samples)
+        self._fallback = settings.fallback
+        self._from_thrust, self._from_moments = squared_speeds_from(vehicle)
+        self._allocation = vehicle.allocation() * vehicle.rotors.max_speed**2
+        self._momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
+        self._inertia = np.array(vehicle.body.inertia_kg_m2)
+        self._airframe = airframe_of(vehicle)
+        self._prepare_guidance(settings.guidance)
+        self._prepare_observer(settings.observer)
+        self._turn = recovery.TurnGains(
+            settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.fastest_rad_s
+        )
+
+    def _prepare_guidance(self, settings: GuidanceSettings) -> None:
+        first, second = settings.poles
+        self._gains = (first * second, -(first + second))
+        self._errors_ahead = guidance.error_transition(settings.poles, self._interval_s, self._samples)
+        span_n = float(self._allocation[0].sum())
+        least_n = span_n * self._lag.least**2
+        margin_n = settings.thrust_margin * (span_n - least_n)
+        self._limits = guidance.Limits(
+            tan(radians(settings.largest_tilt_deg)),
+            least_n + margin_n,
+            span_n - margin_n,
+            settings.approach_speed_m_s * self._gains[1] / self._gains[0],
+        )
+
+    def _prepare_observer(self, settings: ObserverSettings) -> None:
+        on_velocity, on_acceleration = observer.gains(settings.acceleration_rad_s, self._interval_s)
+        on_rate, on_turn = observer.gains(settings.moment_rad_s, self._interval_s)
+        self._observer = observer.Observer(
+            on_velocity, on_acceleration, on_rate, on_turn, settings.most_m_s2, settings.most_n_m
+        )
+
+    def initial(self, rotor_speed: float) -> Memory:
+        """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
+        speeds = np.full(4, rotor_speed / self._vehicle.rotors.max_speed)
+        wrench = self._allocation @ (speeds * speeds)
+        return Memory(speeds, wrench[1:].copy(), wrench, None, np.zeros(observer.ESTIMATES), None, 0)
+
+    def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
+        """Decide the rotor speeds to hold until the next control sample."""
+        del time_us
+        rotation = np.array(rotation_matrix(state.attitude))
+        measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2]])
+        estimate = self._estimate(memory, measured)
+        now = self._situation(memory, state, estimate)
+        forces = self._forces(state, references, estimate)
+        target = self._target(memory, now, references, forces, rotation)
+        choice = self._choose(memory, now, target, forces[0], rotation)
+        commands = rotor_lag.lead(memory.speeds, choice.squared, self._lag)
+        speeds = rotor_lag.follow(memory.speeds, commands, self._lag)
+        wrench = 0.5 * (self._allocation @ (memory.speeds**2 + speeds**2))
+        after = Memory(speeds, choice.moments, wrench, measured, estimate, choice.plan, choice.age)
+        phi, theta, psi = target.angles[0].tolist()
+        return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), choice.diagnostics)
+
+    def _choose(self, memory: Memory, now: Situation, target: Target, force: Array, rotation: Array) -> "Choice":
+        """Plan; where that cannot be had, fall back."""
+        if not self._upright(force, rotation):
+            return self._recover(now, force, rotation)
+        ahead = memory.plan.states[memory.age + 1 :] if memory.plan else None
+        plan, diagnostics = self._attitude.plan(now, target, ahead)
+        if plan is not None:
+            squared = self._from_thrust * target.thrust_n[0] + self._from_moments @ plan.moments[0]
+            return Choice(squared, plan.moments[0], plan, 1, diagnostics)
+        age = memory.age + 1
+        if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._attitude.horizon - 1):
+            moments = memory.plan.moments[memory.age]
+            how = diagnostics._replace(fallback=Fallback.SHIFTED_PLAN)
+            return Choice(self._mixed(float(target.thrust_n[0]), moments), moments, memory.plan, age, how)
+        if memory.age <= self._fallback.shifted_samples + self._fallback.lqr_samples:
+            moments = self._attitude.lqr(now, target)
+            how = diagnostics._replace(fallback=Fallback.LQR)
+            return Choice(self._mixed(float(target.thrust_n[0]), moments), moments, None, age, how)
+        return self._descend(now, age, diagnostics)
+
+    def _estimate(self, memory: Memory, measured: Array) -> Array:
+        if memory.measured is None:
+            return observer.first_estimate(measured)
+        return observer.observe(
+            memory.estimate,
+            memory.measured,
+            measured,
+            float(memory.wrench[0]),
+            memory.wrench[1:],
+            float(self._momentum @ memory.speeds),
+            self._airframe,
+            self._inertia,
+            self._observer,
+            self._interval_s,
+        )
+
+    def _situation(self, memory: Memory, state: VehicleState, estimate: Array) -> Situation:
+        phi, theta, psi = state.euler
+        p, q, r = state.rate_flu_rad_s
+        wrench = self._allocation @ (memory.speeds * memory.speeds)
+        x = np.array([phi, p, theta, q, psi, r, *wrench[1:]])
+        return Situation(x, memory.moments, estimate[9:], float(self._momentum @ memory.speeds))
+
+    def _forces(self, state: VehicleState, references: Horizon, estimate: Array) -> Array:
+        forces = np.empty((self._samples, 3))
+        guidance.wanted_forces(
+            np.array(state.position_enu_m),
+            np.array(state.velocity_enu_m_s),
+            (references.position_enu_m, references.velocity_enu_m_s, references.acceleration_enu_m_s2),
+            self._errors_ahead,
+            self._gains,
+            estimate[6:9],
+            self._airframe,
+            self._limits,
+            forces,
+        )
+        return forces
+
+    def _target(self, memory: Memory, now: Situation, references: Horizon, forces: Array, rotation: Array) -> Target:
+        yaw_now = float(now.x[prediction.PSI])
+        turns = nearest_turn(float(references.yaw_rad[0]), yaw_now) - float(references.yaw_rad[0])
+        wanted = references.yaw_rad + turns
+        angles = np.empty((self._samples, 3))
+        guidance.attitudes(forces, wanted, self._yaw_ahead(memory, yaw_now, wanted), angles)
+        thrust = np.empty(self._attitude.horizon)
+        thrust_now_n = float(self._allocation[0] @ (memory.speeds * memory.speeds))
+        guidance.thrust_commands(thrust_now_n, forces, rotation[:, 2].copy(), self._lag.planned, self._limits, thrust)
+        end = np.empty(prediction.STATES + prediction.INPUTS)
+        guidance.end_of_motion(angles, self._inertia, now.disturbance_n_m, self._interval_s, end)
+        return Target(angles[1:-1], end, thrust)
+
+    def _yaw_ahead(self, memory: Memory, yaw_now: float, wanted: Array) -> Array:
+        """Return the yaw expected at each sample: as planned, or keeping its distance to the yaw wanted."""
+        ahead: Array = wanted - wanted[0]
+        if memory.plan is not None:
+            planned = memory.plan.states[memory.age :, prediction.PSI]
+            ahead += planned[-1] - planned[0] - ahead[len(planned) - 1]
+            ahead[: len(planned)] = planned - planned[0]
+        ahead += yaw_now
+        return ahead
+
+    def _upright(self, force: Array, rotation: Array) -> bool:
+        """Tell whether Euler angles can describe the way to where the thrust must point."""
+        aligned = float(rotation[:, 2] @ force) / guidance.length(force)
+        return aligned > _RECOVER_BEYOND and float(rotation[2, 0]) ** 2 < 1.0 - _RECOVER_BEYOND**2
+
+    def _recover(self, now: Situation, force: Array, rotation: Array) -> "Choice":
+        """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
+        direction = rotation.T @ (force / guidance.length(force))
+        moments = recovery.turning_moment(direction, now.x[list(prediction.RATES)], self._inertia, self._turn)
+        thrust_n = max(float(force @ rotation[:, 2]), self._limits.least_thrust_n)
+        squared = self._mixed(thrust_n, moments)
+        return Choice(squared, self._allocation[1:] @ squared, None, 1, Diagnostics(fallback=Fallback.RECOVERY))
+
+    def _descend(self, now: Situation, age: int, diagnostics: Diagnostics) -> "Choice":
+        """Level and sink, the last resort."""
+        end = np.zeros(prediction.STATES + prediction.INPUTS)
+        end[prediction.PSI] = now.x[prediction.PSI]
+        end[9:] = end[6:9] = -now.disturbance_n_m
+        level = Target(end[None, [0, 2, 4]], end, np.zeros(1))
+        moments = self._attitude.lqr(now, level)
+        weight_n = self._airframe.mass_kg * self._airframe.gravity_m_s2
+        how = diagnostics._replace(fallback=Fallback.DESCENT)
+        return Choice(self._mixed(weight_n * self._fallback.descent_thrust, moments), moments, None, age, how)
+
+    def _mixed(self, thrust_n: float, moments: Array) -> Array:
+        least, most = self._lag.least**2, self._lag.most**2
+        return recovery.prioritised(thrust_n, moments, self._from_thrust, self._from_moments, least, most)
+
+
+class Choice(NamedTuple):
+    """What was chosen: squared rotor speeds (4,) in parts of the largest, their moments, and the plan to go on with."""
+
+    squared: Array
+    moments: Array
+    plan: Plan | None
+    age: int
+    diagnostics: Diagnostics
+
+
+def airframe_of(vehicle: Vehicle) -> guidance.Airframe:
+    """Return what the outer loop knows of `vehicle`."""
+    mass_kg, gravity = vehicle.body.mass_kg, vehicle.gravity_m_s2
+    if vehicle.drag is None:
+        return guidance.Airframe(mass_kg, gravity, 0.0, 0.0, 0.0)
+    x, y, z = vehicle.drag.linear_n_s_m
+    rotors = vehicle.drag.rotor_coefficient * len(vehicle.rotors.position_m)
+    speed_at_1_n = (len(vehicle.rotors.position_m) * vehicle.rotors.thrust_coefficient) ** -0.5
+    return guidance.Airframe(mass_kg, gravity, 0.5 * (x + y), z, rotors * speed_at_1_n)
