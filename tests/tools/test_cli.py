@@ -36,7 +36,7 @@ def plain(text: str) -> Callable[[Path], str]:
 
 BAD_INPUT = {
     "track": ((plain("loop"),), "unknown track loop: choose spiral, expanding-spiral, line, wave, crown"),
-    "profile": ((plain("spiral"), plain("--profile"), plain("fast")), "unknown profile fast: choose flight, se3, thesis"),
+    "profile": ((plain("spiral"), plain("--profile"), plain("fast")), "unknown profile fast: choose flight, se3, "),
     "vehicle": ((plain("spiral"), plain("--vehicle"), plain("dragonfly")), "unknown vehicle dragonfly: choose"),
     "solver": ((plain("spiral"), plain("--solver"), plain("simplex")), "unknown solver simplex: installed are"),
     "extra": ((plain("spiral"), plain("--solver"), plain("gurobi")), "gurobi is not installed: pip install"),

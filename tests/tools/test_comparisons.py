@@ -9,6 +9,8 @@ from tools.cli import main
 from tools.compare import COLUMNS
 from tools.thesis_figures import FIGURES
 
+INSTALLED = "cascade, geometric-se3, global-lpv-mpc, lpv-mpc"
+
 
 def test_every_figure_of_the_thesis_has_its_place() -> None:
     numbers = [figure.number for figure in FIGURES]
@@ -65,7 +67,7 @@ def test_controllers_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[
     ("options", "line"),
     [
         (["--profile", "fast"], "unknown profile fast: choose flight, se3, thesis, thesis-euler or a .toml file"),
-        (["--profile", "thesis:pid"], "unknown controller pid: installed are cascade, geometric-se3, global-lpv-mpc, lpv-mpc"),
+        (["--profile", "thesis:pid"], f"unknown controller pid: installed are {INSTALLED}"),
         (["--track", "loop"], "unknown track loop: choose spiral, expanding-spiral, line, wave, crown"),
     ],
 )
