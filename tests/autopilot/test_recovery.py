@@ -51,9 +51,7 @@ def test_too_much_tilting_moment_keeps_its_direction() -> None:
 
 
 @given(quaternions(), vectors(10.0))
-def test_the_thrust_axis_gets_where_it_must_point(
-    q: tuple[float, float, float, float], rate: tuple[float, ...]
-) -> None:
+def test_the_thrust_axis_gets_where_it_must_point(q: Quaternion, rate: Vector) -> None:
     """From any attitude and rotation, with moments as asked: upright, and turning no more, in three seconds."""
     omega, attitude, h = np.array(rate), q, 1e-3
     for _ in range(3000):
