@@ -54,16 +54,20 @@ class Horizon(NamedTuple):
         velocity_enu_m_s: (n, 3), m/s, ENU.
         acceleration_enu_m_s2: (n, 3), m/s², ENU; zero where planned by differences.
         jerk_enu_m_s3: (n, 3), m/s³, ENU; zero where planned by differences.
+        snap_enu_m_s4: (n, 3), m/s⁴, ENU; zero where planned by differences.
         yaw_rad: (n,), rad, counter-clockwise from east, unwrapped.
-        yaw_rate_rad_s: (n,), rad/s; zero where planned by differences.
+        yaw_rate_rad_s: (n,), rad/s; zero where planned by differences, or where yaw is held for want of a direction.
+        yaw_acceleration_rad_s2: (n,), rad/s²; zero where planned by differences, or where yaw is held.
     """
 
     position_enu_m: Array
     velocity_enu_m_s: Array
     acceleration_enu_m_s2: Array
     jerk_enu_m_s3: Array
+    snap_enu_m_s4: Array
     yaw_rad: Array
     yaw_rate_rad_s: Array
+    yaw_acceleration_rad_s2: Array
 
 
 class VehicleState(NamedTuple):

@@ -5,7 +5,11 @@ from pathlib import Path
 
 from mavlink.process import EXIT_INTERRUPTED, ArgumentParser, fail, positive, speed, use_one_thread
 
-TRACK_HELP = "spiral, expanding-spiral, line, wave or crown"
+TRACK_HELP = (
+    "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
+    "hover[:x=0,y=0,height=2,yaw=0], lemniscate[:size=4,height=3,lap=6,yaw=path|fixed], "
+    "circle[:radius=2,speed=2,height=2,yaw=path|fixed], waypoints:FILE[,speed=2]; m, s, degrees"
+)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -89,7 +93,7 @@ def _add_compare(parser: ArgumentParser) -> None:
         help="a profile, or another controller with it; may be repeated (default: thesis, thesis-euler, "
         "thesis:global-lpv-mpc, se3)",
     )
-    add("--track", action="append", metavar="NAME", help="a track; may be repeated (default: all)")
+    add("--track", action="append", metavar="TRACK", help="a track; may be repeated (default: the thesis's five)")
     add(
         "--link", default="memory", choices=("memory", "direct"), help="with or without the codec (default %(default)s)"
     )

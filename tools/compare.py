@@ -1,12 +1,15 @@
 """`colibri compare`: controllers × tracks in one table, on the terminal, as Markdown and as CSV."""
 
 import argparse
+import csv
+from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import quote
 
 from autopilot.controller import ControllerError, load_controller
 from autopilot.profile import ProfileError
-from autopilot.tracks import TRACKS, TrackError
+from autopilot.tracks import THESIS_TRACKS, TrackError
 from mavlink.process import fail
 from plant.vehicle import VehicleError
 from tools.fly import keep_flight, make_folder, prepare
@@ -33,13 +36,13 @@ class Job(NamedTuple):
     def plan(self) -> FlightPlan:
         """Return the flight as a plan."""
         profile, _, controller = self.contender.partition(":")
-        folder = self.out / "flights" / f"{self.contender.replace(':', '-')}-{self.track}"
+        folder = self.out / "flights" / f"{self.contender.replace(':', '-')}-{folder_name(self.track)}"
         return FlightPlan.of_track(self.track, folder, profile=profile, controller=controller or None, link=self.link)
 
 
 def compare(args: argparse.Namespace) -> int:
     """Compare as the command line says; return the exit code."""
-    contenders, tracks = args.profile or DEFAULT_PROFILES, args.track or list(TRACKS)
+    contenders, tracks = args.profile or DEFAULT_PROFILES, args.track or list(THESIS_TRACKS)
     jobs = [Job(contender, track, args.link, args.out) for contender in contenders for track in tracks]
     try:
         for job in jobs:
@@ -49,7 +52,7 @@ def compare(args: argparse.Namespace) -> int:
     make_folder(args.out)
     rows = side_by_side(row_of, jobs, "flights", quiet=args.quiet, worth=lambda _job: 1)
     (args.out / "compare.md").write_text(markdown(rows), encoding="utf-8")
-    (args.out / "compare.csv").write_text(csv(rows), encoding="utf-8")
+    (args.out / "compare.csv").write_text(comma_separated(rows), encoding="utf-8")
     if not args.quiet:
         _print(rows, args.out)
     return 0
@@ -72,9 +75,16 @@ def markdown(rows: list[tuple[str, ...]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def csv(rows: list[tuple[str, ...]]) -> str:
-    """Return the rows as CSV."""
-    return "".join(",".join(line) + "\n" for line in [COLUMNS, *rows])
+def comma_separated(rows: list[tuple[str, ...]]) -> str:
+    """Return the rows as CSV; a track with several options is quoted."""
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows([COLUMNS, *rows])
+    return text.getvalue()
+
+
+def folder_name(track: str) -> str:
+    """Return a track's name with its options as the name of a folder, one that no other track has."""
+    return quote(track.replace(":", "-", 1), safe="=,")
 
 
 def _cells(figures: dict[str, Any]) -> tuple[str, ...]:

@@ -31,6 +31,7 @@ _TITLE_IN, _LABEL_IN = 0.45, 0.6
 _TIME_MARGIN = 0.015
 _FLATTEST = 0.4
 _NOTHING = 1e-12
+_LONGEST_NAME = 36
 _ROOM_FOR_TALL = 0.8
 
 
@@ -85,7 +86,7 @@ class TimeFigure(NamedTuple):
 def draw_flight(recording: Recording, plan: FlightPlan) -> list[Path]:
     """Draw all figures of a flight as PNG into the plan's folder; return their paths."""
     series = flight_series(recording, plan)
-    flight = f"{plan.track_name}, profile {plan.profile.name}"
+    flight = f"{shortened(plan.track_name)}, profile {plan.profile.name}"
     paths = write_figure(draw_trajectory(series, f"{flight}: trajectory"), plan.out / "trajectory")
     for figure in flight_figures(series, plan):
         paths += write_figure(draw_times(series, figure, f"{flight}: {figure.subject}"), plan.out / figure.name)
@@ -170,6 +171,12 @@ def draw_trajectory(series: Series, title: str) -> Figure:
     to_scale = _scale(axes)
     _head(figure, title if to_scale else f"{title}, axes not to scale")
     return figure
+
+
+def shortened(name: str) -> str:
+    """Return a name that fits into a title: of one that is too long, its beginning and its end."""
+    half = _LONGEST_NAME // 2
+    return name if len(name) <= _LONGEST_NAME else f"{name[:half]}…{name[-half:]}"
 
 
 def write_figure(figure: Figure, path: Path, formats: Iterable[str] = ("png",)) -> list[Path]:
@@ -258,7 +265,9 @@ def _head(figure: Figure, title: str) -> None:
     pairs = (axes.get_legend_handles_labels() for axes in figure.axes)
     labelled = {label: handle for handles, labels in pairs for label, handle in zip(labels, handles, strict=True)}
     height_in = figure.get_figheight()
-    figure.text(0.2 / _WIDTH_IN, 1.0 - 0.1 / height_in, title, va="top", fontsize="large", fontweight="bold")
+    figure.text(
+        0.2 / _WIDTH_IN, 1.0 - 0.1 / height_in, title, va="top", fontsize="large", fontweight="bold", parse_math=False
+    )
     figure.legend(
         labelled.values(),
         labelled.keys(),

@@ -106,6 +106,7 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Callable[[float], No
         yield lambda _sim_time_s: None
         return
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (
@@ -117,7 +118,7 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Callable[[float], No
     )
     console = Console(stderr=True)
     bar = Progress(*columns, console=console, disable=not console.is_terminal)
-    task = bar.add_task(plan.track_name, total=plan.duration_s, speed="", start=False)
+    task = bar.add_task(escape(plan.track_name), total=plan.duration_s, speed="", start=False)
     first_s: list[float] = []
 
     def show(sim_time_s: float) -> None:

@@ -17,7 +17,7 @@ class FlightPlan:
     """A flight as it was asked for.
 
     Attributes:
-        track_name: One of the tracks.
+        track_name: The track, with its options.
         profile_name: Profile name or file.
         vehicle_name: Vehicle that the autopilot controls, name or file.
         plant_vehicle_name: Vehicle that the plant flies, name or file.
@@ -28,6 +28,7 @@ class FlightPlan:
         duration_s: Simulated time to fly.
         out: Folder for all that the flight leaves.
         solver: QP solver asked for; None for the profile's.
+        track: The track to fly.
         profile: The profile, with controller and solver as asked for.
         vehicle: The vehicle that the autopilot controls.
         plant_vehicle: The vehicle that the plant flies.
@@ -44,6 +45,7 @@ class FlightPlan:
     duration_s: float
     out: Path
     solver: str | None
+    track: Track
     profile: Profile
     vehicle: Vehicle
     plant_vehicle: Vehicle
@@ -55,9 +57,9 @@ class FlightPlan:
         Raises:
             ProfileError: The profile cannot be read.
             VehicleError: A vehicle cannot be read, or cannot start as the profile says.
-            TrackError: There is no such track.
+            TrackError: There is no such track, or its file cannot be flown.
         """
-        track(args.track)
+        to_fly = track(args.track)
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle_name = args.vehicle or profile.simulation.vehicle
         plant_vehicle_name = args.plant_vehicle or vehicle_name
@@ -75,6 +77,7 @@ class FlightPlan:
             duration_s=args.duration,
             out=args.out,
             solver=args.solver,
+            track=to_fly,
             profile=profile,
             vehicle=load_vehicle(vehicle_name),
             plant_vehicle=plant_vehicle,
@@ -84,21 +87,16 @@ class FlightPlan:
     def of_track(
         cls, track_name: str, out: Path, *, profile: str, controller: str | None = None, link: str = "direct"
     ) -> "FlightPlan":
-        """Return the plan of a whole track flown flat out, everything else as the profile has it.
+        """Return the plan of a track flown flat out for 100 s, everything else as the profile has it.
 
         Raises:
             ProfileError: The profile cannot be read.
             VehicleError: Its vehicle cannot be read.
-            TrackError: There is no such track.
+            TrackError: There is no such track, or its file cannot be flown.
         """
         unset = dict.fromkeys(("solver", "vehicle", "plant_vehicle", "integrator"))
         chosen = {"track": track_name, "profile": profile, "controller": controller, "link": link, "out": out}
         return cls.from_arguments(argparse.Namespace(**chosen, **unset, speed=inf, seed=0, duration=DURATION_S))
-
-    @property
-    def track(self) -> Track:
-        """The track to fly."""
-        return track(self.track_name)
 
     @property
     def start_yaw_rad(self) -> float:

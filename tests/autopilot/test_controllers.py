@@ -47,8 +47,8 @@ def hovering(position: tuple[float, float, float] = (0.0, 0.0, 0.0), psi: float 
 
 
 def staying(preview: Preview) -> Horizon:
-    none = np.zeros((preview.samples, 3))
-    return Horizon(none, none, none, none, np.zeros(preview.samples), np.zeros(preview.samples))
+    nowhere, east = np.zeros((preview.samples, 3)), np.zeros(preview.samples)
+    return Horizon(nowhere, nowhere, nowhere, nowhere, nowhere, east, east, east)
 
 
 def test_four_come_along() -> None:

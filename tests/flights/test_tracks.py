@@ -1,10 +1,11 @@
-"""The five tracks, the solvers and the discretisations of the thesis profile.
+"""The tracks, the solvers and the discretisations of the thesis profile.
 
-Spiral and line are held to the thesis's own data (test_reference.py). For the other three there is none here; they are
-held to what the loop must do whatever the track: what the outer loop decides in closed form, and the shift in time that
-it leaves.
+Of the thesis's five, spiral and line are held to the thesis's own data (test_reference.py). For the other three there
+is none here; they are held to what the loop must do whatever the track: what the outer loop decides in closed form,
+and the shift in time that it leaves.
 """
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,10 @@ import pytest
 from autopilot.controller import Preview
 from autopilot.planner import plan
 from autopilot.qp import IN_SOLVERS_EXTRA
-from autopilot.tracks import TRACKS, position, track
+from autopilot.tracks import THESIS_TRACKS, position, track
 from mavlink.frames import earth_from_body, quaternion_from_euler
 from tests.runs import Array, fly, largest_difference, rows
+from tools.cli import main
 from tools.recording import STATE
 
 OUTER_US = 400_000
@@ -27,7 +29,7 @@ def earth_velocity(flown: dict[str, Array]) -> Array:
     return np.array([earth_from_body(quaternion_from_euler(*row[:3]), tuple(row[3:])) for row in columns.tolist()])
 
 
-@pytest.mark.parametrize("name", TRACKS)
+@pytest.mark.parametrize("name", THESIS_TRACKS)
 def test_every_track_over_udp_is_the_one_flown_directly(tmp_path: Path, name: str) -> None:
     """But for float32 on the wire, which costs 2e-5 where a track stays near the origin, more at 200 m from it."""
     over_udp = fly(tmp_path / "udp", name, "--link", "udp")
@@ -39,7 +41,7 @@ def test_every_track_over_udp_is_the_one_flown_directly(tmp_path: Path, name: st
         assert figures["rmse_after_20s_m"] == pytest.approx(SETTLED_RMS_M[name], abs=1e-3)
 
 
-@pytest.mark.parametrize("name", TRACKS)
+@pytest.mark.parametrize("name", THESIS_TRACKS)
 def test_the_outer_loop_decides_as_the_thesis_says(tmp_path: Path, name: str) -> None:
     """At each outer sample, [3.24-3.33] by hand from the flown state: thrust, and the references held for 0.4 s."""
     fly(tmp_path, name, "--link", "direct")
@@ -96,3 +98,23 @@ def test_forward_euler_flies_a_little_worse(tmp_path: Path) -> None:
     euler = fly(tmp_path / "euler", "spiral", "--link", "direct", "--profile", "thesis-euler")
     assert 1.001 < euler["rmse_after_20s_m"] / exact["rmse_after_20s_m"] < 1.02
     assert euler["effort_n_m"] > 1.2 * exact["effort_n_m"]
+
+
+@pytest.mark.parametrize(
+    ("name", "rms_m"), [("hover", 1e-6), ("circle:radius=3,speed=4", 1e-3), ("lemniscate", 0.01), ("waypoints", 1e-6)]
+)
+def test_the_others_by_formula_over_udp(tmp_path: Path, name: str, rms_m: float) -> None:
+    """Beyond 100 s too: those without end go on, and the waypoints, reached after 7 s, are rested at."""
+    if name == "waypoints":
+        path = tmp_path / "points $x$ [red].csv"
+        path.write_text("x,y,z,t\n0,0,1,0\n3,0,2,2\n3,4,2,4\n0,0,1,7\n", encoding="utf-8")
+        name = f"waypoints:{path}"
+    out = tmp_path / "out"
+    options = ("--profile", "se3", "--duration", "110", "--quiet", "--out", str(out))
+    assert main(["fly", name, *options]) == 0
+    figures, flown = json.loads((out / "report.json").read_text(encoding="utf-8")), rows(out / "flight.csv")
+    assert figures["track"] == name
+    assert figures["rmse_after_20s_m"] < rms_m
+    wanted = position(track(name), flown["t"])
+    assert np.stack([flown["x_ref"], flown["y_ref"], flown["z_ref"]], axis=1) == pytest.approx(wanted)
+    assert flown["t"][-1] == pytest.approx(110.0)

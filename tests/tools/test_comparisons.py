@@ -1,12 +1,14 @@
 """`colibri figures` and `colibri compare`."""
 
+import csv
 import struct
 from pathlib import Path
 
 import pytest
 
+from autopilot.tracks import OPTIONS, THESIS_TRACKS
 from tools.cli import main
-from tools.compare import COLUMNS
+from tools.compare import COLUMNS, folder_name
 from tools.thesis_figures import FIGURES
 
 INSTALLED = "cascade, geometric-se3, global-lpv-mpc, lpv-mpc"
@@ -20,6 +22,25 @@ def test_every_figure_of_the_thesis_has_its_place() -> None:
     assert [flights[number] for number in firsts] == ["global", "spiral", "expanding-spiral", "line", "wave", "crown"]
     kinds = {figure.number: figure.kind for figure in FIGURES}
     assert (kinds["4.10"], kinds["4.11"], kinds["A.24"]) == ("first-seconds", "inputs", "inputs")
+
+
+def test_tracks_with_options_are_compared_too(tmp_path: Path) -> None:
+    tracks = ["hover:x=1,y=2", "hover:x=1"]
+    options = [option for name in tracks for option in ("--track", name)]
+    assert main(["compare", "--profile", "thesis", *options, "--out", str(tmp_path), "--quiet"]) == 0
+    with (tmp_path / "compare.csv").open(encoding="utf-8", newline="") as file:
+        lines = list(csv.reader(file))
+    assert [line[:2] for line in lines[1:]] == [["thesis", name] for name in tracks]
+    assert {len(line) for line in lines} == {len(COLUMNS)}
+    assert {path.name for path in (tmp_path / "flights").iterdir()} == {"thesis-hover-x=1,y=2", "thesis-hover-x=1"}
+
+
+@pytest.mark.parametrize(
+    ("name", "folder"),
+    [("spiral", "spiral"), ("waypoints:a/b.csv", "waypoints-a%2Fb.csv"), ("waypoints:../a:b", "waypoints-..%2Fa%3Ab")],
+)
+def test_a_track_names_a_folder(name: str, folder: str) -> None:
+    assert folder_name(name) == folder
 
 
 def test_only_what_is_asked_for_is_drawn(tmp_path: Path) -> None:
@@ -68,7 +89,7 @@ def test_controllers_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[
     [
         (["--profile", "fast"], "unknown profile fast: choose flight, se3, thesis, thesis-euler or a .toml file"),
         (["--profile", "thesis:pid"], f"unknown controller pid: installed are {INSTALLED}"),
-        (["--track", "loop"], "unknown track loop: choose spiral, expanding-spiral, line, wave, crown"),
+        (["--track", "loop"], f"unknown track loop: choose {', '.join([*THESIS_TRACKS, *OPTIONS])}"),
     ],
 )
 def test_bad_contenders_are_one_line(

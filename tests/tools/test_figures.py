@@ -21,6 +21,7 @@ from tools.figures import (
     draw_trajectory,
     flight_figures,
     flight_series,
+    shortened,
     write_figure,
 )
 from tools.local import fly_locally
@@ -198,3 +199,8 @@ def test_a_figure_of_ones_own_in_two_formats(short: Flight, tmp_path: Path) -> N
     assert png.read_bytes().startswith(PNG)
     assert svg.read_bytes().startswith(SVG)
     assert drawn(figure.axes[0].lines[0])[0][[0, -1]] == pytest.approx([1.0, 2.0])
+
+
+def test_a_long_name_is_shortened_in_the_middle() -> None:
+    assert shortened("circle:radius=3,speed=4") == "circle:radius=3,speed=4"
+    assert shortened(f"waypoints:{'x' * 100}points.csv") == "waypoints:xxxxxxxx…xxxxxxxxpoints.csv"
