@@ -3,7 +3,8 @@
 import sys
 from math import inf
 
-from mavlink.process import ArgumentParser, add_common_arguments, begin, number, positive, speed
+from mavlink.process import ArgumentParser, add_common_arguments, begin, positive, speed
+from plant.scenario import add_world_arguments
 
 DEFAULT_LINK = "udpin:127.0.0.1:14560"
 
@@ -25,9 +26,7 @@ def _parser() -> ArgumentParser:
         choices=("rk4", "adaptive"),
         help="rk4: fixed steps of 1 ms; adaptive: Dormand-Prince to 1e-9 (default)",
     )
-    add("--position", type=number, nargs=3, default=(0.0, -1.0, 0.0), metavar=("X", "Y", "Z"), help="start, m, ENU")
-    add("--yaw", type=number, default=1.5707963267948966, metavar="RAD", help="start yaw from east (default pi/2)")
-    add("--rotor-rpm", type=number, default=3000.0, metavar="RPM", help="start speed of every rotor (default 3000)")
+    add_world_arguments(parser, start="y=-1,psi=90,rotors=3000, all else 0")
     add("--rate", type=positive, default=250.0, metavar="HZ", help="frames, if the autopilot asks for no other rate")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")

@@ -11,10 +11,14 @@ from mavlink.lockstep import Outgoing, PlantEnd
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Progress, Status, Stop, TlogWriter, fail
 from plant.dynamics import STATE
 from plant.integrate import IntegrationError
-from plant.vehicle import Vehicle, VehicleError, load_vehicle
-from plant.world import Physics, World, state_frame, world_at_rest
+from plant.scenario import Start
+from plant.vehicle import VehicleError, load_vehicle
+from plant.world import Physics, World, starting_world, state_frame
 
-TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4")
+TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah")
+
+DEFAULT_START = Start(y=-1.0, psi=90.0, rotors=3000.0)
+"""The thesis's spiral."""
 
 _SILENCE_SAID_AFTER_S = 2.0
 _WAIT_AT_MOST_S = 0.1
@@ -23,11 +27,11 @@ _WAIT_AT_MOST_S = 0.1
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
     """Serve one flight on `link` as the command line says; return the exit code."""
     try:
-        vehicle = load_vehicle(args.vehicle)
-        world = world_at_rest(tuple(args.position), args.yaw, start_speed(vehicle, args.rotor_rpm))
+        vehicle = load_vehicle(args.vehicle).without(args.without)
+        world = starting_world(DEFAULT_START._replace(**args.start), vehicle)
     except VehicleError as error:
         fail(str(error))
-    physics = Physics(vehicle, args.integrator)
+    physics = Physics(vehicle, args.integrator, args.wind.velocity_enu_m_s)
     logs = PlantLogs(args.out) if args.out else None
     end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000)
     server = Server(link, end, status, stop, logs)
@@ -42,18 +46,6 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     return EXIT_INTERRUPTED if stop else 0
 
 
-def start_speed(vehicle: Vehicle, rpm: float) -> float:
-    """Return `rpm` in the vehicle's unit.
-
-    Raises:
-        VehicleError: Its rotors never turn at that speed.
-    """
-    speed = vehicle.speed_from_rpm(rpm)
-    if not 0.0 <= speed <= vehicle.rotors.max_speed:
-        raise VehicleError(f"the rotors of {vehicle.name} cannot start at {rpm:g} rpm")
-    return speed
-
-
 class PlantLogs:
     """What the plant writes: the truth at every frame, and every MAVLink frame."""
 
@@ -63,8 +55,9 @@ class PlantLogs:
         self._tlog = TlogWriter(folder / "flight.tlog")
 
     def write_world(self, world: World) -> None:
-        """Append the state, and the rotor speeds that led to it."""
-        self._truth.write((world.time_us / 1e6, *world.state, *world.rotor_speeds))
+        """Append the state, the rotor speeds and the battery; `nan` volts where there is none."""
+        battery = (world.voltage_v, world.charge_used_ah)
+        self._truth.write((world.time_us / 1e6, *world.state, *world.rotor_speeds, *battery))
 
     def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
         """Append what was received and sent at simulated time `time_us`."""

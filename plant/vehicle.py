@@ -1,8 +1,9 @@
 """The airframe: numbers with units and source, read strictly from a TOML file."""
 
-from math import isfinite, pi, sqrt
+from collections.abc import Callable, Iterable
+from math import inf, isfinite, pi, sqrt
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias, TypeVar
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 import msgspec
 import numpy as np
@@ -11,11 +12,17 @@ from numpy.typing import NDArray
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
 Part: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+Efficiency: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
+TimeConstant: TypeAlias = Annotated[float, msgspec.Meta(ge=0.001)]
+"""At least the plant's integration step."""
+PointInPlane: TypeAlias = tuple[float, float]
 Array: TypeAlias = NDArray[np.float64]
 T = TypeVar("T")
 
 _FOLDER = Path(__file__).parent / "vehicles"
 _RAD_S_PER_UNIT = {"rad/s": 1.0, "rpm": 2.0 * pi / 60.0}
+_FASTEST_CONTACT_RAD_S = 2500.0
+"""Runge-Kutta 4 in steps of 1 ms is stable up to 2785."""
 
 
 class VehicleError(Exception):
@@ -40,9 +47,9 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 class RotorLag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A rotor's speed follows its command as a first-order lag."""
 
-    time_constant_up_s: Positive
+    time_constant_up_s: TimeConstant
     """While it speeds up."""
-    time_constant_down_s: Positive
+    time_constant_down_s: TimeConstant
     """While it slows down."""
 
     def __post_init__(self) -> None:
@@ -61,7 +68,7 @@ class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     inertia_kg_m2: Positive
     """J: moment of inertia of one rotor with its motor about its axis."""
     max_speed: Positive
-    position_m: tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]
+    position_m: tuple[PointInPlane, PointInPlane, PointInPlane, PointInPlane]
     """x forward, y left of each rotor."""
     direction: tuple[Literal["ccw", "cw"], Literal["ccw", "cw"], Literal["ccw", "cw"], Literal["ccw", "cw"]]
     """Seen from above."""
@@ -97,6 +104,58 @@ class Drag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         _check_finite(*self.linear_n_s_m, self.rotor_coefficient)
 
 
+class Ground(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How the vehicle stands on the ground: on four feet, or on its four rotors when it has fallen on its back.
+
+    Height 0 is that of the centre of mass of the vehicle at rest on its feet.
+    """
+
+    foot_position_m: tuple[PointInPlane, PointInPlane, PointInPlane, PointInPlane]
+    """x forward, y left of each foot."""
+    foot_depth_m: Positive
+    """How far the feet are below the centre of mass."""
+    stiffness_n_m: Positive
+    """Of the ground at one foot."""
+    damping_n_s_m: NotNegative
+    """Of the ground at one foot, against sinking in and coming out."""
+    friction_coefficient: NotNegative
+    """Coulomb's."""
+    slip_damping_n_s_m: NotNegative
+    """Friction of one foot that creeps, before Coulomb's limit: N for each m/s."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        numbers = (self.foot_depth_m, self.stiffness_n_m, self.damping_n_s_m, self.friction_coefficient)
+        _check_finite(*numbers, self.slip_damping_n_s_m, *(metre for foot in self.foot_position_m for metre in foot))
+
+    def contacts_m(self, rotors: Rotors) -> Array:
+        """Return the points in FLU that can touch the ground, (8, 3): the feet, and the rotors in the plane z = 0."""
+        feet = [(x, y, -self.foot_depth_m) for x, y in self.foot_position_m]
+        return np.array([*feet, *((x, y, 0.0) for x, y in rotors.position_m)])
+
+
+class Battery(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A battery: a voltage that falls linearly with the charge taken, behind a resistance.
+
+    The rotors' top speed is proportional to its terminal voltage.
+    """
+
+    full_voltage_v: Positive
+    """Without load."""
+    empty_voltage_v: Positive
+    """Without load."""
+    resistance_ohm: NotNegative
+    capacity_ah: Positive
+    efficiency: Efficiency
+    """Mechanical power of the rotors over electrical power."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        _check_finite(self.full_voltage_v, self.empty_voltage_v, self.resistance_ohm, self.capacity_ah)
+        if self.empty_voltage_v > self.full_voltage_v:
+            raise ValueError("empty_voltage_v: must not lie above full_voltage_v")
+
+
 class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A quadrotor, described in SI but for its rotor speeds (`rotors.speed_unit`).
 
@@ -108,12 +167,27 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     body: Body
     rotors: Rotors
     drag: Drag | None = None
+    ground: Ground | None = None
+    battery: Battery | None = None
 
     def __post_init__(self) -> None:
         """Check what a range cannot say."""
         _check_finite(self.gravity_m_s2)
         if self.hover_speed >= self.rotors.max_speed:
             raise ValueError(f"rotors.max_speed: hover needs {self.hover_speed:.0f} {self.rotors.speed_unit}")
+        if self.ground is not None and _fastest_contact_rad_s(self, self.ground) > _FASTEST_CONTACT_RAD_S:
+            raise ValueError("ground: stiffness or damping too large for the plant's integration step of 1 ms")
+
+    def without(self, parts: Iterable[str]) -> "Vehicle":
+        """Return the vehicle with `parts` not modelled: of `rotor-lag`, `drag`, `ground`, `battery`.
+
+        Raises:
+            KeyError: There is no such part.
+        """
+        vehicle = self
+        for part in parts:
+            vehicle = msgspec.structs.replace(vehicle, **_WITHOUT[part](vehicle))
+        return vehicle
 
     @property
     def hover_speed(self) -> float:
@@ -121,9 +195,22 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         weight_n = self.body.mass_kg * self.gravity_m_s2
         return sqrt(weight_n / (len(self.rotors.position_m) * self.rotors.thrust_coefficient))
 
+    @property
+    def ground_height_m(self) -> float:
+        """Height of the ground, z of ENU: the vehicle at rest on its feet, a little sunk in, is at 0."""
+        if self.ground is None:
+            return -inf
+        load_n = self.body.mass_kg * self.gravity_m_s2 / len(self.ground.foot_position_m)
+        return load_n / self.ground.stiffness_n_m - self.ground.foot_depth_m
+
     def speed_from_rpm(self, rpm: float) -> float:
         """Convert a rotor speed from turns per minute to the vehicle's unit."""
-        return rpm * _RAD_S_PER_UNIT["rpm"] / _RAD_S_PER_UNIT[self.rotors.speed_unit]
+        return rpm * (_RAD_S_PER_UNIT["rpm"] / self.rad_s_per_speed_unit)
+
+    @property
+    def rad_s_per_speed_unit(self) -> float:
+        """How many rad/s one unit of the vehicle's rotor speeds is."""
+        return _RAD_S_PER_UNIT[self.rotors.speed_unit]
 
     def allocation(self) -> Array:
         """Return the 4 x 4 matrix that maps squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2]."""
@@ -143,7 +230,7 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         spin = _spin(self.rotors) * self.rotors.inertia_kg_m2
         if self.rotors.gyroscopic_term == "as-printed":
             return -spin
-        return spin * _RAD_S_PER_UNIT[self.rotors.speed_unit]
+        return spin * self.rad_s_per_speed_unit
 
 
 def vehicle_names() -> list[str]:
@@ -209,6 +296,37 @@ def _spin(rotors: Rotors) -> Array:
     return np.array([1.0 if direction == "ccw" else -1.0 for direction in rotors.direction])
 
 
+def _fastest_contact_rad_s(vehicle: Vehicle, ground: Ground) -> float:
+    """Return a bound on the poles of the level vehicle on its feet, and of the one that lies on its rotors, rad/s."""
+    inertia = np.diag([vehicle.body.mass_kg] * 3 + [*vehicle.body.inertia_kg_m2])
+    points_m = ground.contacts_m(vehicle.rotors)
+    slip = ground.slip_damping_n_s_m
+    fastest = 0.0
+    for contacts_m in (points_m[:4], points_m[4:]):
+        damping = np.linalg.solve(inertia, _contact_matrix(contacts_m, (slip, slip, ground.damping_n_s_m)))
+        stiffness = np.linalg.solve(inertia, _contact_matrix(contacts_m, (0.0, 0.0, ground.stiffness_n_m)))
+        rates = (np.abs(np.linalg.eigvals(damping)).max(), np.sqrt(np.abs(np.linalg.eigvals(stiffness)).max()))
+        fastest = max(fastest, *map(float, rates))
+    return fastest
+
+
+def _contact_matrix(contacts_m: Array, along_axes: tuple[float, float, float]) -> Array:
+    """Return the 6 x 6 matrix that maps a small motion (m, rad) of the body to force and moment against it."""
+    matrix = np.zeros((6, 6))
+    for x, y, z in contacts_m:
+        motion = np.array([[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]])
+        matrix += motion.T @ np.diag(along_axes) @ motion
+    return matrix
+
+
 def _check_finite(*numbers: float) -> None:
     if not all(map(isfinite, numbers)):
         raise ValueError("every number must be finite")
+
+
+_WITHOUT: dict[str, Callable[[Vehicle], dict[str, Any]]] = {
+    "rotor-lag": lambda vehicle: {"rotors": msgspec.structs.replace(vehicle.rotors, lag=None)},
+    "drag": lambda _vehicle: {"drag": None},
+    "ground": lambda _vehicle: {"ground": None},
+    "battery": lambda _vehicle: {"battery": None},
+}

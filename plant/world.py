@@ -1,15 +1,25 @@
-"""The world: vehicle, rotors and time, advanced one frame at a time. A pure composition: (world, command) -> world."""
+"""The world: vehicle, rotors, battery and time, advanced one frame at a time: (world, command) -> world."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from math import isfinite, nan
 
-from mavlink.frames import Quaternion, Vector, earth_from_body, normalized, quaternion_from_euler
+import numpy as np
+
+from mavlink.frames import Vector, earth_from_body, normalized, rotation_matrix
 from mavlink.hil import ActuatorCommand, StateFrame
-from plant.dynamics import attitude_of, rigid_body
-from plant.integrate import Integrator, solver
-from plant.rotors import Rotors, RotorSpeeds
-from plant.vehicle import Vehicle
+from plant.dynamics import CHARGE, ROTORS, FourOf, attitude_of, packed
+from plant.integrate import IntegrationError, Integrator, solver
+from plant.parameters import parameters_of
+from plant.scenario import Start
+from plant.vehicle import Vehicle, VehicleError
 
 State = tuple[float, ...]
+
+CALM: Vector = (0.0, 0.0, 0.0)
+_STANDING: FourOf = (0.0, 0.0, 0.0, 0.0)
+_LEVEL: State = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+_MOMENT_S = 1e-3
+_DEEPEST_START_M = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,43 +29,67 @@ class World:
     Attributes:
         time_us: Simulated time, µs.
         state: `plant.dynamics.STATE`, 13 values.
-        rotor_speeds: What the rotors turned at up to now, in the vehicle's unit.
+        rotor_speeds: What the rotors turn at, in the vehicle's unit; without lag, what they turned at up to now.
+        charge_used_ah: Charge taken from the battery, Ah.
+        voltage_v: The battery's terminal voltage, V; nan before the first step, and without a battery.
     """
 
     time_us: int
     state: State
-    rotor_speeds: RotorSpeeds
+    rotor_speeds: FourOf
+    charge_used_ah: float = 0.0
+    voltage_v: float = nan
 
 
-def world_at_rest(position_enu_m: Vector, yaw_rad: float, rotor_speed: float) -> World:
-    """Return a world at time 0: level, without motion, every rotor at `rotor_speed` (the vehicle's unit)."""
-    attitude: Quaternion = quaternion_from_euler(0.0, 0.0, yaw_rad)
-    state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, *position_enu_m, *attitude)
-    return World(0, state, (rotor_speed, rotor_speed, rotor_speed, rotor_speed))
+def starting_world(start: Start, vehicle: Vehicle) -> World:
+    """Return a world at time 0, with a full battery.
+
+    Raises:
+        VehicleError: The vehicle cannot start like that.
+    """
+    _check_height(start, vehicle)
+    speed = _start_speed(start, vehicle)
+    state = (*start.velocity_flu_m_s, start.p, start.q, start.r, start.x, start.y, start.z, *start.attitude)
+    return World(0, state, (speed, speed, speed, speed))
 
 
 class Physics:
-    """The laws of one vehicle: how its world goes on."""
+    """The laws of one vehicle in one wind: how its world goes on."""
 
-    def __init__(self, vehicle: Vehicle, integrator: Integrator) -> None:
-        """Fly `vehicle`, integrated by `integrator`."""
-        self._rotors = Rotors(vehicle)
+    def __init__(self, vehicle: Vehicle, integrator: Integrator, wind_enu_m_s: Vector = CALM) -> None:
+        """Fly `vehicle`, integrated by `integrator`, in air that moves at `wind_enu_m_s`.
+
+        What is compiled is loaded here, not in the first step.
+        """
+        self._parameters = packed(parameters_of(vehicle, wind_enu_m_s))
         self._integrate = solver(integrator)
-        self._gravity_m_s2 = vehicle.gravity_m_s2
-        self._body = vehicle.body
+        self._idle = vehicle.rotors.idle_speed
+        self._top = vehicle.rotors.max_speed
+        self._has_battery = vehicle.battery is not None
+        self._integrate(np.array((*_LEVEL, *_STANDING, 0.0)), _STANDING, self._parameters, _MOMENT_S)
 
     def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
-        """Advance by `duration_us` with the rotors at `command`, at rest where it is not armed."""
-        speeds = self._rotors.speeds(command.controls) if command.armed else (0.0, 0.0, 0.0, 0.0)
-        f = rigid_body(
-            self._rotors.wrench(speeds),
-            mass_kg=self._body.mass_kg,
-            gravity_m_s2=self._gravity_m_s2,
-            inertia_kg_m2=self._body.inertia_kg_m2,
-        )
-        end = self._integrate(f, world.state, duration_us * 1e-6)
+        """Advance by `duration_us` with the rotors commanded to `command`.
+
+        Raises:
+            IntegrationError: The state cannot be integrated any further.
+        """
+        x = np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
+        x, voltage_v = self._integrate(x, self._target(command), self._parameters, duration_us * 1e-6)
+        end = x.tolist()
+        if not all(map(isfinite, end)):
+            raise IntegrationError("the state has left what the model describes: it is no longer finite")
         state = (*end[:9], *normalized(attitude_of(end)))
-        return replace(world, time_us=world.time_us + duration_us, state=state, rotor_speeds=speeds)
+        voltage_v = voltage_v if self._has_battery else nan
+        return World(world.time_us + duration_us, state, tuple(end[ROTORS]), end[CHARGE], voltage_v)
+
+    def _target(self, command: ActuatorCommand) -> FourOf:
+        """Return the rotor speeds that a command asks for: at least idle while armed, none while not."""
+        if not command.armed:
+            return _STANDING
+        c1, c2, c3, c4 = command.controls
+        idle, top = self._idle, self._top
+        return (max(c1 * top, idle), max(c2 * top, idle), max(c3 * top, idle), max(c4 * top, idle))
 
 
 def state_frame(world: World) -> StateFrame:
@@ -63,3 +97,20 @@ def state_frame(world: World) -> StateFrame:
     u, v, w, p, q, r, x, y, z = world.state[:9]
     attitude = attitude_of(world.state)
     return StateFrame(world.time_us, (x, y, z), earth_from_body(attitude, (u, v, w)), attitude, (p, q, r))
+
+
+def _start_speed(start: Start, vehicle: Vehicle) -> float:
+    speed = vehicle.speed_from_rpm(start.rotors)
+    if not 0.0 <= speed <= vehicle.rotors.max_speed:
+        raise VehicleError(f"the rotors of {vehicle.name} cannot start at {start.rotors:g} rpm")
+    return speed
+
+
+def _check_height(start: Start, vehicle: Vehicle) -> None:
+    if vehicle.ground is None:
+        return
+    _, _, up = rotation_matrix(start.attitude)
+    lowest_m = start.z + float((vehicle.ground.contacts_m(vehicle.rotors) @ up).min())
+    depth_m = vehicle.ground_height_m - lowest_m
+    if depth_m > _DEEPEST_START_M:
+        raise VehicleError(f"{vehicle.name} would start {depth_m:.3g} m below the ground: start it higher")

@@ -4,6 +4,7 @@ from math import inf
 from pathlib import Path
 
 from mavlink.process import EXIT_INTERRUPTED, ArgumentParser, fail, positive, speed, use_one_thread
+from plant.scenario import add_world_arguments
 
 TRACK_HELP = (
     "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
@@ -63,6 +64,9 @@ def _add_fly(parser: ArgumentParser) -> None:
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
     add("--integrator", choices=("rk4", "adaptive"), help="of the plant (default: the profile's)")
+    add_world_arguments(
+        parser, start="the profile's, and the track's first yaw", of_whom=" of the plant; the autopilot keeps its own"
+    )
     add("--duration", type=positive, default=100.0, metavar="S", help="simulated time (default %(default)s)")
     add(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="folder for logs and figures (default %(default)s)"

@@ -10,8 +10,8 @@ from autopilot.process import AutopilotLog
 from mavlink.hil import ActuatorCommand
 from mavlink.lockstep import Address, AutopilotEnd, PlantEnd
 from plant.integrate import Integrator
-from plant.process import PlantLogs, start_speed
-from plant.world import Physics, World, state_frame, world_at_rest
+from plant.process import PlantLogs
+from plant.world import Physics, World, starting_world, state_frame
 from tools.plan import FlightPlan
 from tools.recording import Summary
 
@@ -39,10 +39,8 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     """
     autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, perf_counter)
     integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
-    physics = Physics(plan.plant_vehicle, integrator)
-    simulation = plan.profile.simulation
-    speed = start_speed(plan.plant_vehicle, simulation.rotor_speed_rpm)
-    world = world_at_rest(simulation.position_enu_m, plan.start_yaw_rad, speed)
+    physics = Physics(plan.plant_vehicle, integrator, plan.wind.velocity_enu_m_s)
+    world = starting_world(plan.start, plan.plant_vehicle)
     interval_us = autopilot.frame_interval_us
     plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out)
     exchange: Exchange = InMemory(autopilot, interval_us, plant_logs) if plan.link == "memory" else Direct(autopilot)

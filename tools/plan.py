@@ -2,14 +2,15 @@
 
 import argparse
 from dataclasses import dataclass
-from math import inf
+from math import degrees, inf
 from pathlib import Path
 
 from autopilot.planner import start_yaw
 from autopilot.profile import Profile, load_profile
 from autopilot.tracks import DURATION_S, Track, track
-from plant.process import start_speed
+from plant.scenario import NO_WIND, Start, Wind
 from plant.vehicle import Vehicle, load_vehicle
+from plant.world import starting_world
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +22,9 @@ class FlightPlan:
         profile_name: Profile name or file.
         vehicle_name: Vehicle that the autopilot controls, name or file.
         plant_vehicle_name: Vehicle that the plant flies, name or file.
+        without: Parts that the plant's vehicle is flown without.
+        wind: Wind in which the plant flies.
+        start: How the plant begins.
         integrator: `rk4` or `adaptive`.
         link: `udp`, `memory` or `direct`.
         speed: Times real time; infinite for flat out.
@@ -31,13 +35,16 @@ class FlightPlan:
         track: The track to fly.
         profile: The profile, with controller and solver as asked for.
         vehicle: The vehicle that the autopilot controls.
-        plant_vehicle: The vehicle that the plant flies.
+        plant_vehicle: The vehicle that the plant flies, its parts left out.
     """
 
     track_name: str
     profile_name: str
     vehicle_name: str
     plant_vehicle_name: str
+    without: tuple[str, ...]
+    wind: Wind
+    start: Start
     integrator: str
     link: str
     speed: float
@@ -63,13 +70,17 @@ class FlightPlan:
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle_name = args.vehicle or profile.simulation.vehicle
         plant_vehicle_name = args.plant_vehicle or vehicle_name
-        plant_vehicle = load_vehicle(plant_vehicle_name)
-        start_speed(plant_vehicle, profile.simulation.rotor_speed_rpm)
+        plant_vehicle = load_vehicle(plant_vehicle_name).without(args.without)
+        start = _start_of(profile, to_fly)._replace(**args.start)
+        starting_world(start, plant_vehicle)
         return cls(
             track_name=args.track,
             profile_name=args.profile,
             vehicle_name=vehicle_name,
             plant_vehicle_name=plant_vehicle_name,
+            without=tuple(args.without),
+            wind=args.wind,
+            start=start,
             integrator=args.integrator or profile.simulation.integrator,
             link=args.link,
             speed=args.speed,
@@ -96,9 +107,19 @@ class FlightPlan:
         """
         unset = dict.fromkeys(("solver", "vehicle", "plant_vehicle", "integrator"))
         chosen = {"track": track_name, "profile": profile, "controller": controller, "link": link, "out": out}
-        return cls.from_arguments(argparse.Namespace(**chosen, **unset, speed=inf, seed=0, duration=DURATION_S))
+        world = {"wind": NO_WIND, "without": (), "start": {}}
+        return cls.from_arguments(
+            argparse.Namespace(**chosen, **unset, **world, speed=inf, seed=0, duration=DURATION_S)
+        )
 
     @property
     def start_yaw_rad(self) -> float:
-        """The first yaw reference, with which the vehicle starts."""
+        """The first yaw reference, with which the vehicle starts unless told otherwise."""
         return start_yaw(self.track, self.profile.references)
+
+
+def _start_of(profile: Profile, flown: Track) -> Start:
+    """Return how the flights of a profile begin: at rest, with the first yaw of the track."""
+    x, y, z = profile.simulation.position_enu_m
+    yaw_deg = degrees(start_yaw(flown, profile.references))
+    return Start(x=x, y=y, z=z, psi=yaw_deg, rotors=profile.simulation.rotor_speed_rpm)

@@ -65,14 +65,13 @@ def _start(package: str, *options: str, stdout: int = subprocess.DEVNULL) -> sub
 
 
 def _plant_options(plan: FlightPlan) -> list[str]:
-    simulation = plan.profile.simulation
     return [
         *("--link", "udpin:127.0.0.1:0"),
         *("--vehicle", plan.plant_vehicle_name),
         *("--integrator", plan.integrator),
-        *("--position", *map(repr, simulation.position_enu_m)),
-        *("--yaw", repr(plan.start_yaw_rad)),
-        *("--rotor-rpm", repr(simulation.rotor_speed_rpm)),
+        *(f"--without={part}" for part in plan.without),
+        *("--wind", str(plan.wind)),
+        *("--start", str(plan.start)),
         *("--duration", repr(plan.duration_s)),
         *("--speed", repr(plan.speed) if isfinite(plan.speed) else "max"),
         *("--out", str(plan.out)),

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from autopilot.mixer import Mixer
 from autopilot.position import PositionController, PositionSettings
 from mavlink.frames import Vector, earth_from_body, quaternion_from_euler
-from plant.rotors import Rotors
+from plant.dynamics import packed, rotor_momentum, rotor_wrench
+from plant.parameters import parameters_of
 from plant.vehicle import load_vehicle
 from tests.strategies import reals, vectors
 
@@ -65,10 +66,10 @@ SPEED = st.floats(0.0, VEHICLE.rotors.max_speed)
 @given(st.tuples(*[st.floats(0.0, 1.0)] * 4))
 def test_the_mixer_undoes_the_rotors(name: str, controls: tuple[float, float, float, float]) -> None:
     vehicle = load_vehicle(name)
-    rotors = Rotors(vehicle)
-    speeds = rotors.speeds(controls)
-    wrench = rotors.wrench(speeds)
-    mixed = Mixer(vehicle).rotor_speeds(np.array([wrench.thrust_n, *wrench.moment_n_m]))
+    c1, c2, c3, c4 = (control * vehicle.rotors.max_speed for control in controls)
+    speeds = (c1, c2, c3, c4)
+    wrench = rotor_wrench(speeds, packed(parameters_of(vehicle, AT_REST))[0])
+    mixed = Mixer(vehicle).rotor_speeds(np.array([wrench.force_n[2], *wrench.moment_n_m]))
     assert mixed**2 == pytest.approx(np.array(speeds) ** 2, abs=1e-9 * vehicle.rotors.max_speed**2)
 
 
@@ -81,6 +82,7 @@ def test_the_mixer_stays_within_the_rotors_limits(wrench: tuple[float, ...]) -> 
 
 @given(st.tuples(SPEED, SPEED, SPEED, SPEED))
 def test_plant_and_autopilot_agree_on_the_rotors(speeds: tuple[float, float, float, float]) -> None:
-    mixer, wrench = Mixer(VEHICLE), Rotors(VEHICLE).wrench(speeds)
-    assert mixer.wrench(np.array(speeds)) == pytest.approx([wrench.thrust_n, *wrench.moment_n_m], rel=1e-12)
-    assert mixer.momentum(np.array(speeds)) == pytest.approx(wrench.rotor_momentum_n_m_s, abs=1e-12)
+    mixer, parameters = Mixer(VEHICLE), packed(parameters_of(VEHICLE, AT_REST))[0]
+    wrench = rotor_wrench(speeds, parameters)
+    assert mixer.wrench(np.array(speeds)) == pytest.approx([wrench.force_n[2], *wrench.moment_n_m], rel=1e-12)
+    assert mixer.momentum(np.array(speeds)) == pytest.approx(rotor_momentum(speeds, parameters), abs=1e-12)

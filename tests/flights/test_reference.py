@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from plant.scenario import PARTS
 from tests.runs import fly, largest_difference, reference, rows
 from tools.recording import ATTITUDE_REFERENCE, COLUMNS, INPUT, STATE
 
@@ -71,7 +72,8 @@ def test_the_tlog_opens_in_mavlogdump(tmp_path: Path) -> None:
 
 
 def test_the_si_vehicle_flies_the_spiral_too(tmp_path: Path) -> None:
-    figures = fly(tmp_path, "spiral", "--link", "memory", "--vehicle", "hummingbird", "--integrator", "rk4")
+    ideal = [f"--without={part}" for part in PARTS]
+    figures = fly(tmp_path, "spiral", "--link", "memory", "--vehicle", "hummingbird", "--integrator", "rk4", *ideal)
     assert figures["rmse_after_20s_m"] == pytest.approx(SETTLED_RMS_M["spiral"], abs=1e-3)
 
 

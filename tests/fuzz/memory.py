@@ -5,15 +5,14 @@ from autopilot.profile import load_profile
 from autopilot.tracks import track
 from mavlink.hil import ActuatorCommand
 from mavlink.lockstep import Address, AutopilotEnd, PlantEnd
-from plant.process import start_speed
+from plant.process import DEFAULT_START
 from plant.vehicle import load_vehicle
-from plant.world import Physics, State, World, state_frame, world_at_rest
+from plant.world import Physics, State, World, starting_world, state_frame
 from tests.fuzz.datagrams import FRAME_US, Fuzzer
 
 SYSTEM_ID = 1
 NOW_S = 0.0
 _ADDRESS: Address = ("memory", 0)
-_YAW_RAD = 1.57
 
 
 class Flight:
@@ -30,8 +29,7 @@ class Flight:
         vehicle = load_vehicle(profile.simulation.vehicle)
         self._autopilot = Autopilot(profile, vehicle, track("spiral"), lambda: NOW_S)
         self._physics = Physics(vehicle, "rk4")
-        speed = start_speed(vehicle, profile.simulation.rotor_speed_rpm)
-        self._world = world_at_rest(profile.simulation.position_enu_m, _YAW_RAD, speed)
+        self._world = starting_world(DEFAULT_START, vehicle)
         self.plant_end = PlantEnd(system_id=SYSTEM_ID, frame_interval_us=FRAME_US)
         self.autopilot_end = AutopilotEnd(system_id=SYSTEM_ID, frame_interval_us=FRAME_US, now_s=NOW_S)
         self.autopilot_end.poll(NOW_S)

@@ -1,35 +1,93 @@
-"""The integrators: order, accuracy, and what they do with a state that explodes."""
+"""The integrators: order, agreement, what they do with a state that explodes, and that nobody compiles twice."""
 
-from collections.abc import Sequence
-from math import cos, exp, sin
+import subprocess
+import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from plant.integrate import RK4_STEP_S, IntegrationError, dormand_prince, runge_kutta_4, solver
+from mavlink.hil import ActuatorCommand
+from plant.dynamics import Array, packed, runge_kutta_4
+from plant.integrate import IntegrationError, Integrator, dormand_prince, fixed_step, solver
+from plant.parameters import parameters_of
+from plant.scenario import Start
+from plant.vehicle import load_vehicle
+from plant.world import CALM, Physics, World
+from tests.plant.flights import command, flight, hummingbird, states
+
+UNEVEN = (480.0, 500.0, 510.0, 495.0)
+PARAMETERS = packed(parameters_of(hummingbird("drag", "rotor-lag"), (1.0, -2.0, 0.0)))
+CACHED = """
+from plant.dynamics import derivative, runge_kutta_4
+from plant.vehicle import load_vehicle
+from plant.world import Physics
+for name, kernel in (("rk4", runge_kutta_4), ("adaptive", derivative)):
+    Physics(load_vehicle("hummingbird"), name)
+    print(sum(kernel.stats.cache_hits.values()), sum(kernel.stats.cache_misses.values()))
+"""
 
 
-def oscillator(x: Sequence[float]) -> list[float]:
-    return [x[1], -25.0 * x[0]]
-
-
-@pytest.mark.parametrize("name", ["rk4", "adaptive"])
-def test_an_oscillator(name: str) -> None:
-    integrate = solver("rk4" if name == "rk4" else "adaptive")
-    assert integrate(oscillator, [1.0, 0.0], 0.5) == pytest.approx([cos(2.5), -5.0 * sin(2.5)], abs=1e-8)
+def tumbling() -> Array:
+    return np.array([3.0, -2.0, 1.0, 4.0, -5.0, 3.0, 0.0, 0.0, 50.0, 1.0, 0.0, 0.0, 0.0, *UNEVEN, 0.0])
 
 
 def test_runge_kutta_is_of_fourth_order() -> None:
-    def error(steps: int) -> float:
-        h = 0.4 / steps
-        rate = RK4_STEP_S / h  # time runs slower, so that one step of the rule is a step of h
-        end = runge_kutta_4(lambda x: [-10.0 * x[0] / rate], [1.0], 0.4 * rate)
-        return abs(end[0] - exp(-4.0))
+    exact, _ = dormand_prince()(tumbling(), UNEVEN, PARAMETERS, 0.4)
+    counts = (16, 32, 64)
+    errors = [
+        float(np.abs(runge_kutta_4(tumbling(), UNEVEN, PARAMETERS, 0.4, steps)[0] - exact)[:13].max())
+        for steps in counts
+    ]
+    assert np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(-4.0, abs=0.3)
 
-    slope = np.polyfit(np.log([16, 32, 64]), np.log([error(16), error(32), error(64)]), 1)[0]
-    assert slope == pytest.approx(-4.0, abs=0.2)
+
+@pytest.mark.parametrize("duration_s", [0.004, 0.1, 0.0014])
+def test_no_step_is_longer_than_a_millisecond(duration_s: float) -> None:
+    steps = {0.004: 4, 0.1: 100, 0.0014: 2}[duration_s]
+    end, _ = fixed_step(tumbling(), UNEVEN, PARAMETERS, duration_s)
+    assert (end == runge_kutta_4(tumbling(), UNEVEN, PARAMETERS, duration_s, steps)[0]).all()
 
 
-def test_a_state_that_explodes_is_an_error() -> None:
-    with pytest.raises(IntegrationError, match="no step is small enough"):
-        dormand_prince()(lambda x: [x[0] * x[0]], [1.0], 2.0)
+def test_both_agree_in_free_flight_with_lag_drag_and_battery() -> None:
+    vehicle = hummingbird("drag", "rotor-lag", "battery")
+    start = Start(z=50.0, phi=20.0, vx=3.0, p=4.0, q=-3.0, r=2.0, rotors=3000.0)
+    order = command(*UNEVEN, vehicle=vehicle)
+    ends = [flight(vehicle, start, order, 0.4, integrator=name, wind=(2.0, 1.0, 0.0))[-1] for name in BOTH]
+    assert ends[0].state == pytest.approx(ends[1].state, abs=1e-7)
+    assert ends[0].rotor_speeds == pytest.approx(ends[1].rotor_speeds, rel=1e-7)
+    assert ends[0].charge_used_ah == pytest.approx(ends[1].charge_used_ah, rel=1e-7)
+    assert ends[0].voltage_v == pytest.approx(ends[1].voltage_v, rel=1e-7)
+
+
+@pytest.mark.parametrize("name", ["rk4", "adaptive"])
+def test_a_state_that_explodes_is_an_error(name: Integrator) -> None:
+    vehicle = load_vehicle("hummingbird")
+    spinning = (*(0.0,) * 3, 1e200, 1e200, 1e200, *(0.0,) * 3, 1.0, *(0.0,) * 3)
+    with pytest.raises(IntegrationError, match="the state has left what the model describes"):
+        Physics(vehicle, name).step(World(0, spinning, (0.0,) * 4), ActuatorCommand(0, (0.0,) * 4, True), 100_000)
+
+
+def test_the_second_process_compiles_nothing() -> None:
+    runs = [subprocess.run([sys.executable, "-c", CACHED], capture_output=True, text=True, check=True) for _ in "12"]
+    assert runs[1].stdout.split("\n")[:2] == ["1 0", "1 0"]
+
+
+@pytest.mark.parametrize("name", ["rk4", "adaptive"])
+def test_frames_follow_each_other(name: Integrator) -> None:
+    vehicle = hummingbird("drag", "rotor-lag")
+    order = command(*UNEVEN, vehicle=vehicle)
+    short = flight(vehicle, Start(z=9.0, p=1.0), order, 0.1, integrator=name, frame_us=4000)
+    long = flight(vehicle, Start(z=9.0, p=1.0), order, 0.1, integrator=name, frame_us=100_000)
+    assert all(after.time_us - before.time_us == 4000 for before, after in pairwise(short))
+    assert states(short)[-1] == pytest.approx(states(long)[-1], abs=1e-8)
+
+
+def test_an_unknown_wind_is_calm() -> None:
+    vehicle = hummingbird("drag")
+    assert solver("rk4") is fixed_step
+    order = command(*UNEVEN, vehicle=vehicle)
+    assert flight(vehicle, Start(z=9.0), order, 0.1) == flight(vehicle, Start(z=9.0), order, 0.1, wind=CALM)
+
+
+BOTH: tuple[Integrator, Integrator] = ("rk4", "adaptive")

@@ -71,6 +71,31 @@ BAD_INPUT = {
         "controller geometric-se3 solves no QP: leave --solver out",
     ),
     "speed": ((plain("spiral"), plain("--speed"), plain("0")), "argument --speed: must be above zero, not 0"),
+    "wind": (
+        (plain("spiral"), plain("--wind"), plain("5m/s@west")),
+        "argument --wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not 5m/s@west",
+    ),
+    "wind direction": (
+        (plain("spiral"), plain("--wind"), plain("5@400")),
+        "argument --wind: the speed must not be negative, the direction 0 to 360 degrees, not 5@400",
+    ),
+    "part": ((plain("spiral"), plain("--without"), plain("gravity")), "argument --without: invalid choice: 'gravity'"),
+    "start key": (
+        (plain("spiral"), plain("--start"), plain("z=1,roll=3")),
+        "argument --start: unknown key roll: choose x, y, z, phi, theta, psi, vx, vy, vz, p, q, r, rotors",
+    ),
+    "start value": (
+        (plain("spiral"), plain("--start"), plain("z=high")),
+        "argument --start: z: must be a number, not high",
+    ),
+    "start speed": (
+        (plain("spiral"), plain("--start"), plain("rotors=9000")),
+        "the rotors of AscTec Hummingbird (thesis) cannot start at 9000 rpm",
+    ),
+    "start in the ground": (
+        (plain("spiral"), plain("--vehicle"), plain("hummingbird"), plain("--start"), plain("z=-1")),
+        "AscTec Hummingbird would start 1 m below the ground: start it higher",
+    ),
     "link": ((plain("spiral"), plain("--link"), plain("carrier-pigeon")), "argument --link: invalid choice"),
     "command": ((), "the following arguments are required: TRACK"),
 }
@@ -106,6 +131,23 @@ def test_help_says_what_a_stranger_needs(package: str) -> None:
     done = subprocess.run([sys.executable, "-m", package, "--help"], capture_output=True, text=True, check=True)
     assert "Example: python -m" in done.stdout
     assert "14560" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (["--wind=-1@90"], "argument --wind: the speed must not be negative"),
+        (["--start", "psi=nan"], "argument --start: psi: must be a number, not nan"),
+        (["--start", "psi"], "argument --start: psi: must be a number, not "),
+        (["--without", "air"], "argument --without: invalid choice: 'air'"),
+        (["--start", "rotors=-1"], "the rotors of AscTec Hummingbird (thesis) cannot start at -1 rpm"),
+    ],
+)
+def test_a_plant_that_cannot_start(options: list[str], line: str) -> None:
+    command = [sys.executable, "-m", "plant", "--link", "udpin:127.0.0.1:0", *options]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert f"colibri: error: {line}" in done.stderr.splitlines()[-1]
 
 
 def test_a_taken_port() -> None:

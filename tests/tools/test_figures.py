@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from plant.scenario import NO_WIND
 from tools.figures import (
     Curve,
     Panel,
@@ -44,7 +45,8 @@ class Flight(NamedTuple):
 def fly(out: Path, duration_s: float) -> Flight:
     arguments = {"profile": "thesis", "link": "direct", "speed": np.inf, "seed": 0, "duration": duration_s, "out": out}
     files = {"controller": None, "solver": None, "vehicle": None, "plant_vehicle": None, "integrator": "rk4"}
-    plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files))
+    world: dict[str, Any] = {"wind": NO_WIND, "without": (), "start": {}}
+    plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files, **world))
     fly_locally(plan, lambda _sim_time_s: None)
     recording = read_recording(plan)
     series = flight_series(recording, plan)

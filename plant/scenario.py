@@ -1,0 +1,147 @@
+"""The world that a flight begins in, as the command line says it: wind, parts left out of the model, start."""
+
+from argparse import ArgumentTypeError
+from math import cos, radians, sin
+from typing import NamedTuple
+
+from mavlink.frames import Quaternion, Vector, earth_from_body, quaternion_from_euler
+from mavlink.process import ArgumentParser, number
+
+PARTS = ("rotor-lag", "drag", "ground", "battery")
+"""What `Vehicle.without` can leave out."""
+
+_FULL_TURN_DEG = 360.0
+
+
+class Wind(NamedTuple):
+    """A constant wind, as meteorology says it.
+
+    Attributes:
+        speed_m_s: Speed.
+        from_deg: Where it blows from, degrees clockwise from north: 270 blows from west to east.
+    """
+
+    speed_m_s: float
+    from_deg: float
+
+    @property
+    def velocity_enu_m_s(self) -> Vector:
+        """Velocity of the air, ENU."""
+        direction = radians(self.from_deg)
+        return (-self.speed_m_s * sin(direction), -self.speed_m_s * cos(direction), 0.0)
+
+    def __str__(self) -> str:
+        """Return what `wind` reads back."""
+        return f"{self.speed_m_s!r}@{self.from_deg!r}"
+
+
+NO_WIND = Wind(0.0, 0.0)
+
+
+class Start(NamedTuple):
+    """How the vehicle begins. Angles are Z-Y'-X''.
+
+    Attributes:
+        x: Position, ENU, m.
+        y: Position, ENU, m.
+        z: Position, ENU, m.
+        phi: Roll, degrees.
+        theta: Pitch, degrees.
+        psi: Yaw, degrees.
+        vx: Velocity, ENU, m/s.
+        vy: Velocity, ENU, m/s.
+        vz: Velocity, ENU, m/s.
+        p: Body rate, FLU, rad/s.
+        q: Body rate, FLU, rad/s.
+        r: Body rate, FLU, rad/s.
+        rotors: Speed of every rotor, turns per minute.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    phi: float = 0.0
+    theta: float = 0.0
+    psi: float = 0.0
+    vx: float = 0.0
+    vy: float = 0.0
+    vz: float = 0.0
+    p: float = 0.0
+    q: float = 0.0
+    r: float = 0.0
+    rotors: float = 0.0
+
+    @property
+    def attitude(self) -> Quaternion:
+        """The unit quaternion that turns FLU into ENU."""
+        return quaternion_from_euler(radians(self.phi), radians(self.theta), radians(self.psi))
+
+    @property
+    def velocity_flu_m_s(self) -> Vector:
+        """The velocity in the body frame."""
+        w, x, y, z = self.attitude
+        return earth_from_body((w, -x, -y, -z), (self.vx, self.vy, self.vz))
+
+    def __str__(self) -> str:
+        """Return what `start_values` reads back."""
+        return ",".join(f"{key}={value!r}" for key, value in self._asdict().items())
+
+
+def wind(text: str) -> Wind:
+    """Read a wind of the command line, `SPEED@FROM`."""
+    speed, _, direction = text.partition("@")
+    try:
+        value = Wind(number(speed), number(direction))
+    except ValueError:
+        raise ArgumentTypeError(f"must be SPEED@FROM in m/s and degrees, 5@270 say, not {text}") from None
+    if value.speed_m_s < 0.0 or not 0.0 <= value.from_deg <= _FULL_TURN_DEG:
+        raise ArgumentTypeError(f"the speed must not be negative, the direction 0 to 360 degrees, not {text}")
+    return value
+
+
+def start_values(text: str) -> dict[str, float]:
+    """Read values of a start of the command line, `KEY=VALUE[,KEY=VALUE...]`."""
+    return dict(_start_value(pair) for pair in text.split(","))
+
+
+def _start_value(pair: str) -> tuple[str, float]:
+    key, _, value = pair.partition("=")
+    if key not in Start._fields:
+        raise ArgumentTypeError(f"unknown key {key}: choose {', '.join(Start._fields)}")
+    try:
+        return key, number(value)
+    except ValueError:
+        raise ArgumentTypeError(f"{key}: must be a number, not {value}") from None
+
+
+def add_world_arguments(parser: ArgumentParser, *, start: str, of_whom: str = "") -> None:
+    """Add `--wind`, `--without` and `--start`.
+
+    Args:
+        parser: To add them to.
+        start: What is overridden by `--start`, for its help.
+        of_whom: Whose model `--without` concerns, for its help.
+    """
+    add = parser.add_argument
+    add(
+        "--wind",
+        type=wind,
+        default=NO_WIND,
+        metavar="SPEED@FROM",
+        help="m/s, and degrees it blows from, clockwise from north: 5@270 blows from west to east (default: calm)",
+    )
+    add(
+        "--without",
+        action="append",
+        default=[],
+        choices=PARTS,
+        help=f"leave a part of the vehicle file out of the model{of_whom}; may be repeated",
+    )
+    add(
+        "--start",
+        type=start_values,
+        default={},
+        metavar="KEY=VALUE,...",
+        help="begin otherwise: x, y, z (m, ENU), phi, theta, psi (degrees), vx, vy, vz (m/s, ENU), p, q, r (rad/s, "
+        f"FLU), rotors (rpm) (default: {start})",
+    )
