@@ -2,12 +2,18 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from mavlink.frames import Quaternion, Vector, rotation_matrix
+from plant.dynamics import contact_wrench, packed
 from plant.integrate import Integrator
+from plant.parameters import parameters_of
 from plant.scenario import Start, wind
 from plant.vehicle import VehicleError, load_vehicle
-from plant.world import starting_world
+from plant.world import CALM, starting_world
 from tests.plant.flights import OFF, flight, hover, hummingbird, rpm, states
+from tests.strategies import quaternions, vectors
 
 VEHICLE = load_vehicle("hummingbird")
 TOUCHED_M = 1e-4
@@ -65,6 +71,28 @@ def test_a_fall_on_the_back_ends_on_the_rotors(integrator: Integrator) -> None:
     assert end[:6] == pytest.approx(0.0, abs=1e-3)
     assert height_m[-1] == pytest.approx(-0.05, abs=1e-3) or height_m[-1] == pytest.approx(0.0, abs=1e-3)
     assert height_m.max() <= 1.5
+
+
+@given(st.floats(-0.2, 0.1), vectors(2.0), vectors(5.0), quaternions())
+def test_the_wrench_is_the_sum_over_the_points_that_touch(
+    height_m: float, velocity: Vector, rate: Vector, attitude: Quaternion
+) -> None:
+    ground = VEHICLE.ground
+    assert ground is not None
+    R = np.array(rotation_matrix(attitude))
+    force, moment = np.zeros(3), np.zeros(3)
+    for point in ground.contacts_m(VEHICLE.rotors):
+        depth_m = VEHICLE.ground_height_m - height_m - (R @ point)[2]
+        slip = R @ (np.array(velocity) + np.cross(rate, point))
+        normal_n = max(0.0, ground.stiffness_n_m * depth_m - ground.damping_n_s_m * slip[2]) * (depth_m > 0.0)
+        creeping = ground.slip_damping_n_s_m * slip[:2] * (depth_m > 0.0)
+        limit = min(1.0, ground.friction_coefficient * normal_n / max(float(np.linalg.norm(creeping)), 1e-300))
+        push = R.T @ np.array([*(-limit * creeping), normal_n])
+        force, moment = force + push, moment + np.cross(point, push)
+    parameters = packed(parameters_of(VEHICLE, CALM))[0]
+    wrench = contact_wrench(height_m, velocity, rate, rotation_matrix(attitude), parameters)
+    assert wrench.force_n == pytest.approx(force, abs=1e-8)
+    assert wrench.moment_n_m == pytest.approx(moment, abs=1e-8)
 
 
 def test_energy_never_comes_out_of_the_ground() -> None:

@@ -9,10 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mavlink.hil import ActuatorCommand
+from plant.dynamics import close, packed
 from plant.integrate import Integrator
+from plant.parameters import parameters_of
 from plant.scenario import Start
 from plant.vehicle import load_vehicle
-from plant.world import Physics, starting_world
+from plant.world import CALM, Physics, starting_world
 from tests.plant.flights import OFF, command, flight, hummingbird, rpm, speeds
 
 LAGGING = hummingbird("rotor-lag")
@@ -67,3 +69,9 @@ def test_no_rotor_leaves_its_limits(
     assert (turned <= vehicle.rotors.max_speed).all()
     for (before, after), (_, armed) in zip(pairwise(turned), orders, strict=True):
         assert not armed or (after >= np.minimum(before, vehicle.rotors.idle_speed)).all()
+
+
+def test_rounding_cannot_carry_a_rotor_past_its_limits() -> None:
+    x = np.array([*(0.0,) * 9, 1.0, *(0.0,) * 3, -1e-9, 838.0 + 1e-9, 500.0, 838.0, 0.0])
+    close(x, packed(parameters_of(LAGGING, CALM)))
+    assert x[13:17].tolist() == [0.0, 838.0, 500.0, 838.0]
