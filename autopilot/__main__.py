@@ -17,7 +17,7 @@ def _parser() -> ArgumentParser:
     add = parser.add_argument
     add("--plant", default=DEFAULT_PLANT, metavar="URL", help="the plant to call (default %(default)s)")
     add("--track", default="spiral", metavar="TRACK", help="what to fly, as in `colibri fly` (default %(default)s)")
-    add("--profile", default="thesis", metavar="NAME", help="control profile name or .toml (default %(default)s)")
+    add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
     add("--controller", metavar="NAME", help="control law (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml to control (default: the profile's)")
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")

@@ -19,14 +19,14 @@ def _parser() -> ArgumentParser:
     )
     add = parser.add_argument
     add("--link", default=DEFAULT_LINK, metavar="URL", help="where to wait for the autopilot (default %(default)s)")
-    add("--vehicle", default="hummingbird-thesis", metavar="NAME", help="vehicle name or .toml (default %(default)s)")
+    add("--vehicle", default="hummingbird", metavar="NAME", help="vehicle name or .toml (default %(default)s)")
     add(
         "--integrator",
-        default="adaptive",
+        default="rk4",
         choices=("rk4", "adaptive"),
-        help="rk4: fixed steps of 1 ms; adaptive: Dormand-Prince to 1e-9 (default)",
+        help="rk4: fixed steps of 1 ms (default); adaptive: Dormand-Prince to 1e-9",
     )
-    add_world_arguments(parser, start="y=-1,psi=90,rotors=3000, all else 0")
+    add_world_arguments(parser, start="y=-1,z=2,psi=90,rotors=4740, all else 0")
     add("--rate", type=positive, default=250.0, metavar="HZ", help="frames, if the autopilot asks for no other rate")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")

@@ -17,7 +17,7 @@ from plant.world import Physics, World, starting_world, state_frame
 
 TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah")
 
-DEFAULT_START = Start(y=-1.0, psi=90.0, rotors=3000.0)
+DEFAULT_START = Start(y=-1.0, z=2.0, psi=90.0, rotors=4740.0)
 """The thesis's spiral."""
 
 _SILENCE_SAID_AFTER_S = 2.0

@@ -19,6 +19,12 @@ Array: TypeAlias = NDArray[np.float64]
 
 REFERENCE = Path(__file__).parent / "reference"
 GIVE_UP_AFTER_S = 60.0
+THESIS_PLANT = (
+    *("--vehicle", "hummingbird-thesis"),
+    *("--integrator", "adaptive"),
+    *("--start", "y=-1,z=0,psi=90,rotors=3000"),
+)
+"""What `python -m plant` needs to begin as profile `thesis` does."""
 
 
 def fly(out: Path, *options: str) -> dict[str, Any]:
@@ -26,6 +32,11 @@ def fly(out: Path, *options: str) -> dict[str, Any]:
     assert main(["fly", *options, "--quiet", "--no-figures", "--out", str(out)]) == 0
     figures: dict[str, Any] = json.loads((out / "report.json").read_text(encoding="utf-8"))
     return figures
+
+
+def fly_thesis(out: Path, *options: str) -> dict[str, Any]:
+    """Fly with profile `thesis`."""
+    return fly(out, *options, "--profile", "thesis")
 
 
 def rows(path: Path) -> dict[str, Array]:
@@ -103,10 +114,15 @@ def running(*processes: Process) -> Iterator[None]:
 
 
 def start_plant(folder: Path, out: Path, *options: str) -> tuple[Process, str]:
-    """Start a plant on a free port; return it and the URL to call it."""
-    plant = Process(folder, "plant", "--link", "udpin:127.0.0.1:0", "--out", str(out), *options)
+    """Start the thesis's plant on a free port; return it and the URL to call it."""
+    plant = Process(folder, "plant", "--link", "udpin:127.0.0.1:0", "--out", str(out), *THESIS_PLANT, *options)
     url: str = plant.wait_for("listening")["url"]
     return plant, url.replace("udpin", "udpout")
+
+
+def start_autopilot(folder: Path, url: str, *options: str) -> Process:
+    """Start an autopilot with profile `thesis` that calls the plant at `url`."""
+    return Process(folder, "autopilot", "--plant", url, "--profile", "thesis", *options)
 
 
 def states(out: Path) -> Array:

@@ -50,7 +50,7 @@ def _parser() -> ArgumentParser:
 def _add_fly(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("track", metavar="TRACK", help=TRACK_HELP)
-    add("--profile", default="thesis", metavar="NAME", help="control profile name or .toml (default %(default)s)")
+    add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
     add("--controller", metavar="NAME", help="control law, also of another package (default: the profile's)")
     add(
         "--link",

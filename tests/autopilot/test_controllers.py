@@ -30,7 +30,7 @@ from autopilot.profile import load_profile
 from autopilot.settings import SettingsError
 from mavlink.frames import quaternion_from_euler
 from plant.vehicle import load_vehicle
-from tests.runs import fly, rows
+from tests.runs import fly, fly_thesis, rows
 
 DOCS = Path(__file__).parents[2] / "docs"
 PROFILES = {"cascade": "thesis", "global-lpv-mpc": "thesis", "geometric-se3": "se3"}
@@ -143,7 +143,7 @@ def test_a_symmetrical_airframe_stays_symmetrical() -> None:
 
 @pytest.mark.parametrize("link", ["direct", "memory"])
 def test_the_first_strategy_fails_as_the_thesis_says(tmp_path: Path, link: str) -> None:
-    fly(tmp_path, "spiral", "--controller", "global-lpv-mpc", "--link", link)
+    fly_thesis(tmp_path, "spiral", "--controller", "global-lpv-mpc", "--link", link)
     flown = rows(tmp_path / "flight.csv")
     assert np.abs(flown["x"]).max() < 1e-9
     assert np.abs(flown["y"] + 1.0).max() < 1e-9

@@ -7,7 +7,17 @@ import numpy as np
 import pytest
 
 from tests.flights.relay import BadLink
-from tests.runs import Process, fly, reference, running, start_plant, states, wait_for
+from tests.runs import (
+    THESIS_PLANT,
+    Process,
+    fly_thesis,
+    reference,
+    running,
+    start_autopilot,
+    start_plant,
+    states,
+    wait_for,
+)
 
 START = ("--duration", "100", "--speed", "50")
 
@@ -23,10 +33,10 @@ def logs(tmp_path: Path) -> Path:
 def test_a_bad_link_does_not_change_the_flight(tmp_path: Path, logs: Path, seed: int) -> None:
     """20 % lost, 10 % duplicated, 10 % reordered, both ways."""
     duration = ("--duration", "40")
-    fly(tmp_path / "good", "spiral", "--link", "memory", *duration)
+    fly_thesis(tmp_path / "good", "spiral", "--link", "memory", *duration)
     plant, url = start_plant(logs, tmp_path / "bad", *duration)
     with BadLink(url, seed) as relay:
-        autopilot = Process(logs, "autopilot", "--plant", relay.url)
+        autopilot = start_autopilot(logs, relay.url)
         with running(plant, autopilot):
             ended = plant.wait_for("ended")
             assert plant.wait() == 0
@@ -40,10 +50,11 @@ def test_a_bad_link_does_not_change_the_flight(tmp_path: Path, logs: Path, seed:
 def test_the_autopilot_may_start_first(tmp_path: Path, logs: Path) -> None:
     free, url = start_plant(logs, tmp_path / "unused")
     free.stop()
-    autopilot = Process(logs, "autopilot", "--plant", url)
+    autopilot = start_autopilot(logs, url)
     with running(autopilot):
         autopilot.wait_for("calling")
-        plant = Process(logs, "plant", "--link", url.replace("udpout", "udpin"), "--duration", "5")
+        link = ("--link", url.replace("udpout", "udpin"))
+        plant = Process(logs, "plant", *link, *THESIS_PLANT, "--duration", "5")
         with running(plant):
             assert plant.wait_for("ended")["frames"] == 50
             assert plant.wait() == 0
@@ -52,12 +63,12 @@ def test_the_autopilot_may_start_first(tmp_path: Path, logs: Path) -> None:
 def test_a_killed_autopilot_is_replaced_in_mid_flight(tmp_path: Path, logs: Path) -> None:
     out = tmp_path / "flight"
     plant, url = start_plant(logs, out, *START)
-    first = Process(logs, "autopilot", "--plant", url)
+    first = start_autopilot(logs, url)
     with running(plant, first):
         wait_for(lambda: any(event["sim_time_s"] > 30 for event in plant.events("progress")), "30 s of flight")
         first.process.send_signal(signal.SIGKILL)
         first.wait()
-        second = Process(logs, "autopilot", "--plant", url)
+        second = start_autopilot(logs, url)
         with running(second):
             assert plant.wait_for("ended")["sim_time_s"] == 100.0
             assert plant.wait() == 0
@@ -70,7 +81,7 @@ def test_a_killed_autopilot_is_replaced_in_mid_flight(tmp_path: Path, logs: Path
 
 def test_a_killed_plant_is_missed_and_replaced(tmp_path: Path, logs: Path) -> None:
     first, url = start_plant(logs, tmp_path / "first")
-    autopilot = Process(logs, "autopilot", "--plant", url)
+    autopilot = start_autopilot(logs, url)
     with running(first, autopilot):
         first.wait_for("progress")
         first.process.send_signal(signal.SIGKILL)
@@ -85,10 +96,11 @@ def test_a_killed_plant_is_missed_and_replaced(tmp_path: Path, logs: Path) -> No
             "10",
             "--out",
             str(tmp_path / "second"),
+            *THESIS_PLANT,
         )
         with running(second):
             assert second.wait_for("ended")["frames"] == 100
-    fly(tmp_path / "alone", "spiral", "--link", "memory", "--duration", "10")
+    fly_thesis(tmp_path / "alone", "spiral", "--link", "memory", "--duration", "10")
     assert (states(tmp_path / "second") == states(tmp_path / "alone")).all()
 
 
@@ -97,11 +109,11 @@ def test_an_autopilot_at_another_rate_is_told(tmp_path: Path, logs: Path) -> Non
     text = (Path(__file__).parents[2] / "autopilot" / "profiles" / "thesis.toml").read_text(encoding="utf-8")
     profile.write_text(text.replace("control_interval_s = 0.1", "control_interval_s = 0.2"), encoding="utf-8")
     plant, url = start_plant(logs, tmp_path / "flight", "--speed", "1")
-    first = Process(logs, "autopilot", "--plant", url)
+    first = start_autopilot(logs, url)
     with running(plant, first):
         first.wait_for("flying")
         first.stop()
-        second = Process(logs, "autopilot", "--plant", url, "--profile", str(profile))
+        second = start_autopilot(logs, url, "--profile", str(profile))
         with running(second):
             assert "another frame rate" in second.wait_for("refused")["text"]
 
@@ -110,7 +122,7 @@ def test_an_autopilot_at_another_rate_is_told(tmp_path: Path, logs: Path) -> Non
 def test_a_signal_ends_both_and_keeps_what_was_logged(tmp_path: Path, logs: Path, number: signal.Signals) -> None:
     out = tmp_path / "flight"
     plant, url = start_plant(logs, out)
-    autopilot = Process(logs, "autopilot", "--plant", url, "--out", str(out))
+    autopilot = start_autopilot(logs, url, "--out", str(out))
     with running(plant, autopilot):
         plant.wait_for("progress")
         for process in (plant, autopilot):

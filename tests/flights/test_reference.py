@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from plant.scenario import PARTS
-from tests.runs import fly, largest_difference, reference, rows
+from tests.runs import fly_thesis, largest_difference, reference, rows
 from tools.recording import ATTITUDE_REFERENCE, COLUMNS, INPUT, STATE
 
 TRACKS = ("spiral", "line")
@@ -19,7 +19,7 @@ SETTLED_RMS_M = {"spiral": 0.1254, "line": 0.0578}
 @pytest.mark.parametrize("integrator", ["adaptive", "rk4"])
 @pytest.mark.parametrize("track", TRACKS)
 def test_direct_equals_the_reference(tmp_path: Path, track: str, integrator: str) -> None:
-    figures = fly(tmp_path, track, "--link", "direct", "--integrator", integrator)
+    figures = fly_thesis(tmp_path, track, "--link", "direct", "--integrator", integrator)
     flown, wanted = rows(tmp_path / "flight.csv"), reference(track)
     assert tuple(flown) == COLUMNS
     assert len(flown["t"]) == 1001
@@ -33,9 +33,9 @@ def test_direct_equals_the_reference(tmp_path: Path, track: str, integrator: str
 @pytest.mark.parametrize("track", TRACKS)
 def test_udp_equals_the_reference_and_memory_bit_for_bit(tmp_path: Path, track: str) -> None:
     flights = [
-        fly(tmp_path / "first", track, "--link", "udp"),
-        fly(tmp_path / "second", track, "--link", "udp"),
-        fly(tmp_path / "memory", track, "--link", "memory"),
+        fly_thesis(tmp_path / "first", track, "--link", "udp"),
+        fly_thesis(tmp_path / "second", track, "--link", "udp"),
+        fly_thesis(tmp_path / "memory", track, "--link", "memory"),
     ]
     assert len({figures["trajectory_sha256"] for figures in flights}) == 1
     flown = rows(tmp_path / "first" / "flight.csv")
@@ -45,7 +45,7 @@ def test_udp_equals_the_reference_and_memory_bit_for_bit(tmp_path: Path, track: 
 
 
 def test_the_reference_columns_are_of_the_same_instant(tmp_path: Path) -> None:
-    fly(tmp_path, "line", "--link", "direct")
+    fly_thesis(tmp_path, "line", "--link", "direct")
     flown = rows(tmp_path / "flight.csv")
     assert flown["x_ref"] == pytest.approx(flown["t"] / 10 + 1)
     assert flown["y_ref"] == pytest.approx(flown["t"] / 10 - 2)
@@ -53,7 +53,7 @@ def test_the_reference_columns_are_of_the_same_instant(tmp_path: Path) -> None:
 
 
 def test_the_tlog_opens_in_mavlogdump(tmp_path: Path) -> None:
-    fly(tmp_path, "spiral", "--link", "memory", "--duration", "2")
+    fly_thesis(tmp_path, "spiral", "--link", "memory", "--duration", "2")
     mavlogdump = shutil.which("mavlogdump.py", path=str(Path(sys.executable).parent))
     assert mavlogdump is not None
     command = [sys.executable, mavlogdump, str(tmp_path / "flight.tlog")]
@@ -72,14 +72,16 @@ def test_the_tlog_opens_in_mavlogdump(tmp_path: Path) -> None:
 
 
 def test_the_si_vehicle_flies_the_spiral_too(tmp_path: Path) -> None:
-    ideal = [f"--without={part}" for part in PARTS]
-    figures = fly(tmp_path, "spiral", "--link", "memory", "--vehicle", "hummingbird", "--integrator", "rk4", *ideal)
+    ideal = tuple(f"--without={part}" for part in PARTS)
+    figures = fly_thesis(
+        tmp_path, "spiral", "--link", "memory", "--vehicle", "hummingbird", "--integrator", "rk4", *ideal
+    )
     assert figures["rmse_after_20s_m"] == pytest.approx(SETTLED_RMS_M["spiral"], abs=1e-3)
 
 
 def test_the_box_of_the_qp_never_binds(tmp_path: Path) -> None:
     """The thesis solved it without constraints; ours are only what no rotor could do."""
-    fly(tmp_path, "spiral", "--link", "direct")
+    fly_thesis(tmp_path, "spiral", "--link", "direct")
     flown = rows(tmp_path / "flight.csv")
     assert max(np.abs(np.diff(flown[name])).max() for name in ("U2", "U3")) < 0.25 * 0.834
     assert max(flown[f"omega{rotor}"].max() for rotor in (1, 2, 3, 4)) < 8002.0

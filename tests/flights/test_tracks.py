@@ -16,7 +16,7 @@ from autopilot.planner import plan
 from autopilot.qp import IN_SOLVERS_EXTRA
 from autopilot.tracks import THESIS_TRACKS, position, track
 from mavlink.frames import earth_from_body, quaternion_from_euler
-from tests.runs import Array, fly, largest_difference, rows
+from tests.runs import Array, fly, fly_thesis, largest_difference, rows
 from tools.cli import main
 from tools.recording import STATE
 
@@ -32,8 +32,8 @@ def earth_velocity(flown: dict[str, Array]) -> Array:
 @pytest.mark.parametrize("name", THESIS_TRACKS)
 def test_every_track_over_udp_is_the_one_flown_directly(tmp_path: Path, name: str) -> None:
     """But for float32 on the wire, which costs 2e-5 where a track stays near the origin, more at 200 m from it."""
-    over_udp = fly(tmp_path / "udp", name, "--link", "udp")
-    direct = fly(tmp_path / "direct", name, "--link", "direct")
+    over_udp = fly_thesis(tmp_path / "udp", name, "--link", "udp")
+    direct = fly_thesis(tmp_path / "direct", name, "--link", "direct")
     flown, wanted = rows(tmp_path / "udp" / "flight.csv"), rows(tmp_path / "direct" / "flight.csv")
     assert largest_difference(flown, wanted, STATE) < (1e-3 if name == "wave" else 1e-4)
     for figures in (over_udp, direct):
@@ -44,7 +44,7 @@ def test_every_track_over_udp_is_the_one_flown_directly(tmp_path: Path, name: st
 @pytest.mark.parametrize("name", THESIS_TRACKS)
 def test_the_outer_loop_decides_as_the_thesis_says(tmp_path: Path, name: str) -> None:
     """At each outer sample, [3.24-3.33] by hand from the flown state: thrust, and the references held for 0.4 s."""
-    fly(tmp_path, name, "--link", "direct")
+    fly_thesis(tmp_path, name, "--link", "direct")
     flown = rows(tmp_path / "flight.csv")
     mass_kg, gravity_m_s2 = 0.698, 9.81
     table = plan(track(name), "by-differences", Preview(OUTER_US, 1)).table
@@ -69,7 +69,7 @@ def test_the_outer_loop_decides_as_the_thesis_says(tmp_path: Path, name: str) ->
 @pytest.mark.parametrize("name", ["spiral", "expanding-spiral", "line", "wave"])
 def test_the_vehicle_is_one_outer_sample_ahead(tmp_path: Path, name: str) -> None:
     """Of all shifts in time, 0.4 s fits best; not on the crown, where more is lost for want of feed-forward."""
-    fly(tmp_path, name, "--link", "direct")
+    fly_thesis(tmp_path, name, "--link", "direct")
     flown = rows(tmp_path / "flight.csv")
     settled = flown["t"] >= 20.0
     point = np.stack([flown["x"], flown["y"], flown["z"]], axis=1)[settled]
@@ -85,8 +85,8 @@ def test_the_vehicle_is_one_outer_sample_ahead(tmp_path: Path, name: str) -> Non
 @pytest.mark.parametrize("solver", IN_SOLVERS_EXTRA)
 def test_every_solver_flies_the_same_spiral(tmp_path: Path, solver: str) -> None:
     """All at the profile's tolerance of 1e-10; the worst of them, HiGHS, differs by 6e-9 m."""
-    fly(tmp_path / "clarabel", "spiral", "--link", "direct", "--duration", "30")
-    figures = fly(tmp_path / solver, "spiral", "--link", "direct", "--duration", "30", "--solver", solver)
+    fly_thesis(tmp_path / "clarabel", "spiral", "--link", "direct", "--duration", "30")
+    figures = fly_thesis(tmp_path / solver, "spiral", "--link", "direct", "--duration", "30", "--solver", solver)
     assert figures["solver"] == solver
     assert figures["qp_failures"] == 0
     flown, wanted = (rows(tmp_path / name / "flight.csv") for name in (solver, "clarabel"))
@@ -94,7 +94,7 @@ def test_every_solver_flies_the_same_spiral(tmp_path: Path, solver: str) -> None
 
 
 def test_forward_euler_flies_a_little_worse(tmp_path: Path) -> None:
-    exact = fly(tmp_path / "exact", "spiral", "--link", "direct")
+    exact = fly_thesis(tmp_path / "exact", "spiral", "--link", "direct")
     euler = fly(tmp_path / "euler", "spiral", "--link", "direct", "--profile", "thesis-euler")
     assert 1.001 < euler["rmse_after_20s_m"] / exact["rmse_after_20s_m"] < 1.02
     assert euler["effort_n_m"] > 1.2 * exact["effort_n_m"]

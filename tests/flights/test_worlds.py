@@ -9,9 +9,9 @@ import pytest
 from plant.process import TRUTH_COLUMNS
 from plant.scenario import PARTS
 from plant.vehicle import load_vehicle
-from tests.runs import fly, rows
+from tests.runs import fly, fly_thesis, rows
 
-REALISTIC = ("spiral", "--vehicle", "hummingbird", "--integrator", "rk4", "--duration")
+REALISTIC = ("spiral", "--profile", "thesis", "--vehicle", "hummingbird", "--integrator", "rk4", "--duration")
 TUMBLING = "x=1,y=2,z=20,phi=170,theta=-10,psi=123.4,vx=3,vy=-2,vz=1,p=10,q=-1,r=0.5,rotors=4000"
 
 
@@ -36,7 +36,7 @@ def test_a_flight_begins_as_it_is_told(tmp_path: Path) -> None:
 
 
 def test_the_start_is_the_profiles_where_it_is_not_told(tmp_path: Path) -> None:
-    fly(tmp_path, "line", "--link", "direct", "--duration", "1", "--start", "z=3")
+    fly_thesis(tmp_path, "line", "--link", "direct", "--duration", "1", "--start", "z=3")
     flown = rows(tmp_path / "flight.csv")
     assert (flown["x"][0], flown["y"][0], flown["z"][0], flown["omega4"][0]) == (0.0, -1.0, 3.0, 3000.0)
     assert flown["psi"][0] == pytest.approx(np.arctan2(-2.0, 1.0) + np.pi / 2.0, abs=1e-12)

@@ -12,7 +12,7 @@ import psutil
 
 from tests.fuzz.datagrams import FRAME_US
 from tests.fuzz.relay import FuzzingRelay, unreadable
-from tests.runs import Process, fly, running, start_plant, states
+from tests.runs import Process, fly_thesis, running, start_autopilot, start_plant, states
 
 MOST_GROWTH_MIB = 4.0
 _MARGIN = 1.05
@@ -54,7 +54,7 @@ def campaign(
     logs.mkdir()
     plant, url = start_plant(logs, folder / "flight", "--duration", str(duration_s))
     with FuzzingRelay(url, burst=burst, quota=quota, seed=seed) as relay:
-        autopilot = Process(logs, "autopilot", "--plant", relay.url)
+        autopilot = start_autopilot(logs, relay.url)
         processes = {"plant": plant, "autopilot": autopilot}
         with running(*processes.values()):
             failures = _fly_to(0.1 * duration_s, duration_s, processes, progress)
@@ -138,7 +138,7 @@ def _kernel_drops(processes: dict[str, Process]) -> int:
 
 
 def _undisturbed(folder: Path, duration_s: float) -> str:
-    fly(folder / "undisturbed", "spiral", "--link", "memory", "--duration", str(duration_s))
+    fly_thesis(folder / "undisturbed", "spiral", "--link", "memory", "--duration", str(duration_s))
     return _hash(folder / "undisturbed")
 
 

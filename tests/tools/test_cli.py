@@ -223,10 +223,10 @@ def test_a_flight_leaves_what_the_readme_names(tmp_path: Path) -> None:
     report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert {
         "track": "crown",
-        "profile": "thesis",
+        "profile": "flight",
         "link": "udp",
         "seed": 7,
-        "solver": "clarabel",
+        "solver": "daqp",
     }.items() <= report.items()
     assert set(report["solve_time_us"]) == set(report["control_step_us"]) == {"p50", "p99", "max"}
     assert report["sim_time_s"] == 25.0

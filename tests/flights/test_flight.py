@@ -1,0 +1,148 @@
+"""Profile `flight` on the vehicle with rotor lag, limits, drag and battery: how well it tracks, whatever is wrong."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import plant
+from autopilot.process import FALLBACK_CODES
+from tests.runs import fly, rows
+
+HUMMINGBIRD = Path(plant.__file__).parent / "vehicles" / "hummingbird.toml"
+IDLE, FASTEST = 83.8, 838.0
+
+
+def vehicle_file(folder: Path, **changes: str) -> str:
+    """Write the Hummingbird's file with other values; return its path."""
+    text = HUMMINGBIRD.read_text(encoding="utf-8")
+    for key, value in changes.items():
+        text, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", text, flags=re.MULTILINE)
+        if not count:
+            text = text.replace("[rotors]\n", f"[rotors]\n{key} = {value}\n")
+    path = folder / "vehicle.toml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("track", "duration_s", "reach_m"),
+    [
+        ("spiral", 40, 0.001),
+        ("expanding-spiral", 100, 0.005),
+        ("line", 40, 0.001),
+        ("wave", 40, 0.002),
+        ("crown", 40, 0.003),
+        ("lemniscate", 40, 0.005),
+        ("lemniscate:yaw=fixed", 40, 0.002),
+    ],
+)
+def test_every_track_is_tracked(tmp_path: Path, track: str, duration_s: int, reach_m: float) -> None:
+    figures = fly(tmp_path, track, "--link", "memory", "--duration", str(duration_s))
+    assert figures["profile"] == "flight"
+    assert figures["rmse_after_20s_m"] < reach_m
+    assert figures["qp_failures"] == 0
+    assert not any(figures["fallbacks"].values())
+    truth = rows(tmp_path / "plant.csv")
+    speeds = np.array([truth[f"omega{number}"] for number in range(1, 5)])
+    assert speeds.min() >= IDLE
+    assert speeds.max() <= FASTEST
+
+
+def test_two_processes_fly_the_same_flight(tmp_path: Path) -> None:
+    """Frames at 250 Hz, control at 125 Hz: over UDP and in memory the same, bit for bit."""
+    flights = [fly(tmp_path / link, "lemniscate", "--link", link, "--duration", "12") for link in ("udp", "memory")]
+    assert flights[0]["frames"] == flights[1]["frames"] == 3000
+    assert flights[0]["trajectory_sha256"] == flights[1]["trajectory_sha256"]
+    flown = [(tmp_path / link / "flight.csv").read_bytes() for link in ("udp", "memory")]
+    assert flown[0] == flown[1]
+    assert len(flown[0].splitlines()) == 1 + 1501
+
+
+WRONG = {
+    "20 % heavier": {"mass_kg": "0.8376"},
+    "20 % lighter": {"mass_kg": "0.5584"},
+    "30 % more inertia": {"inertia_kg_m2": "[0.00442, 0.00442, 0.0078]"},
+    "30 % less inertia": {"inertia_kg_m2": "[0.00238, 0.00238, 0.0042]"},
+    "one rotor 15 % weak": {"strength": "[1.0, 0.85, 1.0, 1.0]"},
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_wrong_model_costs_little(tmp_path: Path, what: str) -> None:
+    other = ("--plant-vehicle", vehicle_file(tmp_path, **WRONG[what]))
+    figures = fly(tmp_path / "out", "spiral", "--link", "memory", "--duration", "40", *other)
+    error = rows(tmp_path / "out" / "flight.csv")
+    assert figures["plant_vehicle"] == other[1]
+    assert largest_error_m(error, 20.0) < 0.001
+    assert figures["qp_failures"] == 0
+
+
+def test_constant_wind_leaves_no_offset(tmp_path: Path) -> None:
+    fly(tmp_path, "hover:height=3", "--link", "memory", "--duration", "15", "--wind", "5@270")
+    flown = rows(tmp_path / "flight.csv")
+    assert largest_error_m(flown, 10.0) < 0.001
+    assert abs(flown["theta"][-1]) > 0.05  # it leans into the wind
+
+
+def largest_error_m(flown: dict[str, np.ndarray], after_s: float) -> float:
+    """Return the largest distance to the reference of the same instant."""
+    settled = flown["t"] >= after_s
+    axes = [flown[axis][settled] - flown[f"{axis}_ref"][settled] for axis in "xyz"]
+    return float(np.linalg.norm(axes, axis=0).max())
+
+
+def test_with_tight_limits_constraints_bind_and_it_still_flies(tmp_path: Path) -> None:
+    """600 rad/s at most, hover at 497: take the spiral up from 2 m away, never ask for more."""
+    vehicle = ("--vehicle", vehicle_file(tmp_path, max_speed="600.0", idle_speed="60.0"))
+    figures = fly(tmp_path / "out", "spiral", "--link", "memory", "--duration", "40", *vehicle)
+    truth = rows(tmp_path / "out" / "plant.csv")
+    assert max(truth[f"omega{number}"].max() for number in range(1, 5)) <= 600.0
+    assert figures["constrained_samples"]["rotors"] > 10
+    assert figures["qp_failures"] == 0
+    assert figures["rmse_after_20s_m"] < 0.001
+
+
+@pytest.mark.parametrize(
+    "start",
+    ["phi=170", "phi=180", "theta=89", "p=10", "q=10", "r=10", "phi=170,p=6,q=-6,r=5", "phi=120,theta=40,q=10"],
+)
+def test_any_start_is_recovered_from(tmp_path: Path, start: str) -> None:
+    """20 m up: upright within a second, no lower than 3 m below, and back at its place."""
+    fly(tmp_path, "hover:height=20", "--link", "memory", "--duration", "10", "--start", f"x=0,y=0,z=20,{start}")
+    flown = rows(tmp_path / "flight.csv")
+    tilt_cosine = np.cos(flown["phi"]) * np.cos(flown["theta"])
+    assert tilt_cosine[flown["t"] > 1.0].min() > np.cos(np.radians(65.0))
+    assert flown["z"].min() > 17.0
+    assert largest_error_m(flown, 8.0) < 0.01
+    if "170" in start:
+        fallback = rows(tmp_path / "autopilot.csv")["fallback"]
+        recovering = fallback == max(FALLBACK_CODES.values())
+        assert recovering[0]
+        assert not recovering[flown["t"][1:] > 1.0].any()
+
+
+@pytest.mark.parametrize("lap_s", [4.0, 2.0, 1.0])
+def test_what_no_vehicle_can_follow_is_followed_upright_and_never_lost(tmp_path: Path, lap_s: float) -> None:
+    """Up to 36 m/s and 400 m/s²: it saturates, stays within the size of the figure, and does not fall."""
+    figures = fly(tmp_path, f"lemniscate:lap={lap_s}", "--link", "memory", "--duration", "60")
+    flown = rows(tmp_path / "flight.csv")
+    late = flown["t"] > 20.0
+    assert figures["constrained_samples"]["rotors"] + figures["constrained_samples"]["rates"] > 0
+    assert (np.cos(flown["phi"]) * np.cos(flown["theta"]))[late].min() > 0.2
+    assert largest_error_m(flown, 20.0) < 10.0
+    assert np.ptp(flown["z"][late]) < 2.0
+    growth = [
+        largest_error_m({key: value[flown["t"] < end] for key, value in flown.items()}, end - 20.0)
+        for end in (40.0, 60.0)
+    ]
+    assert growth[1] < 1.1 * growth[0]
+
+
+def test_it_stands_on_the_ground_until_it_is_time(tmp_path: Path) -> None:
+    """From rest on the ground straight up, and no sinking before."""
+    fly(tmp_path, "hover:height=1.5", "--link", "memory", "--duration", "8", "--start", "x=0,y=0,z=0,rotors=0")
+    flown = rows(tmp_path / "flight.csv")
+    assert flown["z"].min() > -0.003
+    assert largest_error_m(flown, 6.0) < 0.005
