@@ -5,7 +5,6 @@ is none here; they are held to what the loop must do whatever the track: what th
 and the shift in time that it leaves.
 """
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -103,18 +102,29 @@ def test_forward_euler_flies_a_little_worse(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "rms_m"), [("hover", 1e-6), ("circle:radius=3,speed=4", 1e-3), ("lemniscate", 0.01), ("waypoints", 1e-6)]
 )
-def test_the_others_by_formula_over_udp(tmp_path: Path, name: str, rms_m: float) -> None:
+def test_the_others_by_formula(tmp_path: Path, name: str, rms_m: float) -> None:
     """Beyond 100 s too: those without end go on, and the waypoints, reached after 7 s, are rested at."""
     if name == "waypoints":
-        path = tmp_path / "points $x$ [red].csv"
+        path = tmp_path / "points.csv"
         path.write_text("x,y,z,t\n0,0,1,0\n3,0,2,2\n3,4,2,4\n0,0,1,7\n", encoding="utf-8")
         name = f"waypoints:{path}"
     out = tmp_path / "out"
-    options = ("--profile", "se3", "--duration", "110", "--quiet", "--out", str(out))
-    assert main(["fly", name, *options]) == 0
-    figures, flown = json.loads((out / "report.json").read_text(encoding="utf-8")), rows(out / "flight.csv")
+    figures = fly(out, name, "--profile", "se3", "--duration", "110", "--link", "memory")
+    flown = rows(out / "flight.csv")
     assert figures["track"] == name
     assert figures["rmse_after_20s_m"] < rms_m
     wanted = position(track(name), flown["t"])
     assert np.stack([flown["x_ref"], flown["y_ref"], flown["z_ref"]], axis=1) == pytest.approx(wanted)
     assert flown["t"][-1] == pytest.approx(110.0)
+
+
+def test_options_and_a_file_reach_the_autopilot_over_udp(tmp_path: Path) -> None:
+    """With every figure drawn: a name may hold what matplotlib and rich would take for markup."""
+    path = tmp_path / "points $x$ [red].csv"
+    path.write_text("x,y,z\n0,0,1\n3,0,2\n3,4,2\n", encoding="utf-8")
+    name, options = f"waypoints:file={path},speed=3", ("--profile", "se3", "--duration", "2", "--quiet")
+    assert main(["fly", name, *options, "--out", str(tmp_path / "udp")]) == 0
+    fly(tmp_path / "memory", name, *options, "--link", "memory")
+    same = [(tmp_path / link / "flight.csv").read_bytes() for link in ("udp", "memory")]
+    assert same[0] == same[1]
+    assert (tmp_path / "udp" / "trajectory.png").exists()
