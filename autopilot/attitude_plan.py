@@ -47,12 +47,14 @@ class Situation(NamedTuple):
         u: Moments last commanded, N m, (3,).
         disturbance_n_m: Moment that the model does not explain, (3,).
         momentum: h of the rotors along body z, N m s.
+        fastest: Largest rotor speed that can be had, in parts of the vehicle's largest.
     """
 
     x: Array
     u: Array
     disturbance_n_m: Array
     momentum: float
+    fastest: float
 
 
 class Target(NamedTuple):
@@ -211,7 +213,7 @@ class AttitudeMpc:
             now.u,
             self._starts,
             self._lag.least**2,
-            self._lag.most**2,
+            now.fastest**2,
             self._G,
             self._h,
         )

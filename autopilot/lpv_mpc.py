@@ -16,6 +16,7 @@ from autopilot.attitude_plan import (
     Target,
     squared_speeds_from,
 )
+from autopilot.battery import BatteryModel
 from autopilot.controller import Array, Clock, Decision, Diagnostics, Fallback, Horizon, Preview, VehicleState
 from autopilot.qp import QpSolver
 from autopilot.settings import (
@@ -87,6 +88,7 @@ class Memory(NamedTuple):
         wrench: Mean U1..U4 over the interval that ends now, (4,).
         measured: What the observer measured a sample ago, (9,); None before the first.
         estimate: Of the observer a sample ago, (12,).
+        charge_ah: Charge taken from the battery.
         plan: The last plan, made `age` samples ago; None where there is none to build on.
         age: Samples since that plan.
     """
@@ -96,6 +98,7 @@ class Memory(NamedTuple):
     wrench: Array
     measured: Array | None
     estimate: Array
+    charge_ah: float
     plan: Plan | None
     age: int
 
@@ -120,6 +123,7 @@ class LpvMpc:
         self._interval_s = settings.control_interval_s
         self._vehicle = vehicle
         self._lag = rotor_lag.rotor_lag(vehicle, self._interval_s)
+        self._battery = BatteryModel(vehicle)
         solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
         self._attitude = AttitudeMpc(settings.attitude, vehicle, self._lag, solver, self._interval_s, clock)
         self._samples = self._attitude.horizon + 2
@@ -140,15 +144,9 @@ class LpvMpc:
         first, second = settings.poles
         self._gains = (first * second, -(first + second))
         self._errors_ahead = guidance.error_transition(settings.poles, self._interval_s, self._samples)
-        span_n = float(self._allocation[0].sum())
-        least_n = span_n * self._lag.least**2
-        margin_n = settings.thrust_margin * (span_n - least_n)
-        self._limits = guidance.Limits(
-            tan(radians(settings.largest_tilt_deg)),
-            least_n + margin_n,
-            span_n - margin_n,
-            settings.approach_speed_m_s * self._gains[1] / self._gains[0],
-        )
+        self._thrust_margin = settings.thrust_margin
+        self._tilt_tangent = tan(radians(settings.largest_tilt_deg))
+        self._position_error_m = settings.approach_speed_m_s * self._gains[1] / self._gains[0]
 
     def _prepare_observer(self, settings: ObserverSettings) -> None:
         on_velocity, on_acceleration = observer.gains(settings.acceleration_rad_s, self._interval_s)
@@ -161,7 +159,7 @@ class LpvMpc:
         """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
         speeds = np.full(4, rotor_speed / self._vehicle.rotors.max_speed)
         wrench = self._allocation @ (speeds * speeds)
-        return Memory(speeds, wrench[1:].copy(), wrench, None, np.zeros(observer.ESTIMATES), None, 0)
+        return Memory(speeds, wrench[1:].copy(), wrench, None, np.zeros(observer.ESTIMATES), 0.0, None, 0)
 
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample."""
@@ -170,13 +168,15 @@ class LpvMpc:
         measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2]])
         estimate = self._estimate(memory, measured)
         now = self._situation(memory, state, estimate)
-        forces = self._forces(state, references, estimate)
-        target = self._target(memory, now, references, forces, rotation)
+        limits = self._limits(now.fastest)
+        forces = self._forces(state, references, estimate, limits)
+        target = self._target(memory, now, references, forces, rotation, limits)
         choice = self._choose(memory, now, target, forces[0], rotation)
-        commands = rotor_lag.lead(memory.speeds, choice.squared, self._lag)
+        commands = rotor_lag.lead(memory.speeds, choice.squared, self._lag, now.fastest)
         speeds = rotor_lag.follow(memory.speeds, commands, self._lag)
         wrench = 0.5 * (self._allocation @ (memory.speeds**2 + speeds**2))
-        after = Memory(speeds, choice.moments, wrench, measured, estimate, choice.plan, choice.age)
+        charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
+        after = Memory(speeds, choice.moments, wrench, measured, estimate, charge_ah, choice.plan, choice.age)
         phi, theta, psi = target.angles[0].tolist()
         return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), choice.diagnostics)
 
@@ -193,16 +193,19 @@ class LpvMpc:
         if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._attitude.horizon - 1):
             moments = memory.plan.moments[memory.age]
             how = diagnostics._replace(fallback=Fallback.SHIFTED_PLAN)
-            return Choice(self._mixed(float(target.thrust_n[0]), moments), moments, memory.plan, age, how)
+            return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, memory.plan, age, how)
         if memory.age <= self._fallback.shifted_samples + self._fallback.lqr_samples:
             moments = self._attitude.lqr(now, target)
             how = diagnostics._replace(fallback=Fallback.LQR)
-            return Choice(self._mixed(float(target.thrust_n[0]), moments), moments, None, age, how)
+            return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, None, age, how)
         return self._descend(now, age, diagnostics)
 
     def _estimate(self, memory: Memory, measured: Array) -> Array:
         if memory.measured is None:
             return observer.first_estimate(measured)
+        middle = 0.5 * (memory.measured + measured)
+        drag = np.empty(3)
+        guidance.drag_force(self._airframe, middle[:3], middle[6:], float(memory.wrench[0]), drag)
         return observer.observe(
             memory.estimate,
             memory.measured,
@@ -210,6 +213,7 @@ class LpvMpc:
             float(memory.wrench[0]),
             memory.wrench[1:],
             float(self._momentum @ memory.speeds),
+            drag,
             self._airframe,
             self._inertia,
             self._observer,
@@ -221,9 +225,17 @@ class LpvMpc:
         p, q, r = state.rate_flu_rad_s
         wrench = self._allocation @ (memory.speeds * memory.speeds)
         x = np.array([phi, p, theta, q, psi, r, *wrench[1:]])
-        return Situation(x, memory.moments, estimate[9:], float(self._momentum @ memory.speeds))
+        momentum, fastest = float(self._momentum @ memory.speeds), self._battery.fastest(memory.charge_ah)
+        return Situation(x, memory.moments, estimate[9:], momentum, fastest)
 
-    def _forces(self, state: VehicleState, references: Horizon, estimate: Array) -> Array:
+    def _limits(self, fastest: float) -> guidance.Limits:
+        """Return what the outer loop may ask for while rotors turn at `fastest` (parts of the largest) at most."""
+        span_n = float(self._allocation[0].sum())
+        least_n, most_n = span_n * self._lag.least**2, span_n * fastest**2
+        margin_n = self._thrust_margin * (most_n - least_n)
+        return guidance.Limits(self._tilt_tangent, least_n + margin_n, most_n - margin_n, self._position_error_m)
+
+    def _forces(self, state: VehicleState, references: Horizon, estimate: Array, limits: guidance.Limits) -> Array:
         forces = np.empty((self._samples, 3))
         guidance.wanted_forces(
             np.array(state.position_enu_m),
@@ -233,12 +245,20 @@ class LpvMpc:
             self._gains,
             estimate[6:9],
             self._airframe,
-            self._limits,
+            limits,
             forces,
         )
         return forces
 
-    def _target(self, memory: Memory, now: Situation, references: Horizon, forces: Array, rotation: Array) -> Target:
+    def _target(
+        self,
+        memory: Memory,
+        now: Situation,
+        references: Horizon,
+        forces: Array,
+        rotation: Array,
+        limits: guidance.Limits,
+    ) -> Target:
         yaw_now = float(now.x[prediction.PSI])
         turns = nearest_turn(float(references.yaw_rad[0]), yaw_now) - float(references.yaw_rad[0])
         wanted = references.yaw_rad + turns
@@ -246,7 +266,7 @@ class LpvMpc:
         guidance.attitudes(forces, wanted, self._yaw_ahead(memory, yaw_now, wanted), angles)
         thrust = np.empty(self._attitude.horizon)
         thrust_now_n = float(self._allocation[0] @ (memory.speeds * memory.speeds))
-        guidance.thrust_commands(thrust_now_n, forces, rotation[:, 2].copy(), self._lag.planned, self._limits, thrust)
+        guidance.thrust_commands(thrust_now_n, forces, rotation[:, 2].copy(), self._lag.planned, limits, thrust)
         end = np.empty(prediction.STATES + prediction.INPUTS)
         guidance.end_of_motion(angles, self._inertia, now.disturbance_n_m, self._interval_s, end)
         return Target(angles[1:-1], end, thrust)
@@ -270,8 +290,7 @@ class LpvMpc:
         """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
         direction = rotation.T @ (force / guidance.length(force))
         moments = recovery.turning_moment(direction, now.x[list(prediction.RATES)], self._inertia, self._turn)
-        thrust_n = max(float(force @ rotation[:, 2]), self._limits.least_thrust_n)
-        squared = self._mixed(thrust_n, moments)
+        squared = self._mixed(max(float(force @ rotation[:, 2]), 0.0), moments, now)
         return Choice(squared, self._allocation[1:] @ squared, None, 1, Diagnostics(fallback=Fallback.RECOVERY))
 
     def _descend(self, now: Situation, age: int, diagnostics: Diagnostics) -> "Choice":
@@ -283,10 +302,11 @@ class LpvMpc:
         moments = self._attitude.lqr(now, level)
         weight_n = self._airframe.mass_kg * self._airframe.gravity_m_s2
         how = diagnostics._replace(fallback=Fallback.DESCENT)
-        return Choice(self._mixed(weight_n * self._fallback.descent_thrust, moments), moments, None, age, how)
+        squared = self._mixed(weight_n * self._fallback.descent_thrust, moments, now)
+        return Choice(squared, moments, None, age, how)
 
-    def _mixed(self, thrust_n: float, moments: Array) -> Array:
-        least, most = self._lag.least**2, self._lag.most**2
+    def _mixed(self, thrust_n: float, moments: Array, now: Situation) -> Array:
+        least, most = self._lag.least**2, now.fastest**2
         return recovery.prioritised(thrust_n, moments, self._from_thrust, self._from_moments, least, most)
 
 

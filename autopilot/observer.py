@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.guidance import Airframe, drag_force
+from autopilot.guidance import Airframe
 from mavlink.compiled import compiled
 
 Array: TypeAlias = NDArray[np.float64]
@@ -60,6 +60,7 @@ def observe(
     thrust_n: float,
     moment_n_m: Array,
     momentum: float,
+    drag_n: Array,
     airframe: Airframe,
     inertia: Array,
     observer: Observer,
@@ -74,15 +75,15 @@ def observe(
         thrust_n: Its mean over the interval, N.
         moment_n_m: Its mean over the interval, FLU, (3,).
         momentum: h of the rotors along body z, N m s.
+        drag_n: Its mean over the interval, ENU, (3,).
         airframe: The vehicle.
         inertia: Ix, Iy, Iz, kg m², (3,).
         observer: Gains and limits.
         interval_s: Between the two.
     """
     middle = 0.5 * (before + now)
-    velocity, rate, up = middle[:3], middle[3:6], middle[6:]
-    force, turn = np.empty(3), np.empty(3)
-    drag_force(airframe, velocity, up, thrust_n, force)
+    rate, up = middle[3:6], middle[6:]
+    turn = np.empty(3)
     ix, iy, iz = inertia
     p, q, r = rate
     turn[0] = (moment_n_m[0] + (iy - iz) * q * r - momentum * q) / ix
@@ -90,7 +91,7 @@ def observe(
     turn[2] = (moment_n_m[2] + (ix - iy) * p * q) / iz
     after = np.empty(ESTIMATES)
     for i in range(3):
-        explained = (force[i] + thrust_n * up[i]) / airframe.mass_kg - (airframe.gravity_m_s2 if i == 2 else 0.0)
+        explained = (drag_n[i] + thrust_n * up[i]) / airframe.mass_kg - (airframe.gravity_m_s2 if i == 2 else 0.0)
         expected = estimate[i] + interval_s * (explained + estimate[6 + i])
         missed = now[i] - expected
         after[i] = expected + observer.velocity * missed

@@ -25,14 +25,12 @@ class RotorLag(NamedTuple):
         down: Part of the way while it slows down.
         planned: Part of the way that the plan has force go.
         least: Least speed.
-        most: Largest speed.
     """
 
     up: float
     down: float
     planned: float
     least: float
-    most: float
 
 
 def rotor_lag(vehicle: Vehicle, interval_s: float) -> RotorLag:
@@ -40,7 +38,7 @@ def rotor_lag(vehicle: Vehicle, interval_s: float) -> RotorLag:
     lag = vehicle.rotors.lag
     up = 1.0 - exp(-interval_s / lag.time_constant_up_s) if lag else 1.0
     down = 1.0 - exp(-interval_s / lag.time_constant_down_s) if lag else 1.0
-    return RotorLag(up, down, min(up, down), vehicle.rotors.idle_speed / vehicle.rotors.max_speed, 1.0)
+    return RotorLag(up, down, min(up, down), vehicle.rotors.idle_speed / vehicle.rotors.max_speed)
 
 
 @compiled
@@ -54,13 +52,14 @@ def follow(speeds: Array, commands: Array, lag: RotorLag) -> Array:
 
 
 @compiled
-def lead(speeds: Array, squared_commands: Array, lag: RotorLag) -> Array:
+def lead(speeds: Array, squared_commands: Array, lag: RotorLag, fastest: float) -> Array:
     """Return the commands (4,) that bring squared speed where the plan has it after one control sample.
 
     Args:
         speeds: Now, (4,).
         squared_commands: Squared speeds that the plan commands, (4,).
         lag: Of the rotors.
+        fastest: Largest speed that can be had.
     """
     commands = np.empty_like(speeds)
     for i in range(speeds.shape[0]):
@@ -68,5 +67,5 @@ def lead(speeds: Array, squared_commands: Array, lag: RotorLag) -> Array:
         after = sqrt(max(squared + (squared_commands[i] - squared) * lag.planned, 0.0))
         way = after - speeds[i]
         command = speeds[i] + way / (lag.up if way > 0.0 else lag.down)
-        commands[i] = min(max(command, lag.least), lag.most)
+        commands[i] = min(max(command, lag.least), fastest)
     return commands

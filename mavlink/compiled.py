@@ -17,6 +17,8 @@ class _Decorator(Protocol):
 compiled = cast(_Decorator, njit(cache=True, error_model="numpy"))
 """Compile a function at its first call, and keep the machine code on disk for every later process.
 
+The disk's copy is renewed when the function's own file changes, and only then: so a kernel calls no other file's.
+
 Arithmetic stays IEEE 754's in the order written, so that a kernel gives the same bits on every run; division by zero
 gives an infinity, as in numpy.
 """

@@ -129,10 +129,9 @@ def test_commands_within_the_plans_limits_are_never_cut(monkeypatch: pytest.Monk
 
     lead = rotor_lag.lead
 
-    def watch(speeds: np.ndarray, squared: np.ndarray, lag: rotor_lag.RotorLag) -> np.ndarray:
-        wide = lead(speeds, squared, lag._replace(least=-10.0, most=10.0))
-        seen.append(wide)
-        return lead(speeds, squared, lag)
+    def watch(speeds: np.ndarray, squared: np.ndarray, lag: rotor_lag.RotorLag, fastest: float) -> np.ndarray:
+        seen.append(lead(speeds, squared, lag._replace(least=-10.0), 10.0))
+        return lead(speeds, squared, lag, fastest)
 
     monkeypatch.setattr(rotor_lag, "lead", watch)
     for state in (turned(40, 0), turned(-30, 30, (4, -4, 2))):

@@ -12,6 +12,7 @@ INERTIA = np.array([0.003, 0.004, 0.006])
 OBSERVER = Observer(*gains(9.0, INTERVAL_S), *gains(12.0, INTERVAL_S), 6.0, 0.3)
 HOVER_N = 0.7 * 9.81
 NO_MOMENT = np.zeros(3)
+NO_DRAG = np.zeros(3)
 
 
 def fly(acceleration: np.ndarray, moment: np.ndarray, seconds: float, observer: Observer = OBSERVER) -> np.ndarray:
@@ -23,7 +24,9 @@ def fly(acceleration: np.ndarray, moment: np.ndarray, seconds: float, observer: 
         now = measured.copy()
         now[:3] += INTERVAL_S * acceleration
         now[3:6] += INTERVAL_S * moment / INERTIA
-        estimate = observe(estimate, measured, now, HOVER_N, NO_MOMENT, 0.0, AIRFRAME, INERTIA, observer, INTERVAL_S)
+        estimate = observe(
+            estimate, measured, now, HOVER_N, NO_MOMENT, 0.0, NO_DRAG, AIRFRAME, INERTIA, observer, INTERVAL_S
+        )
         measured = now
     return estimate
 
@@ -55,20 +58,19 @@ def test_no_more_is_believed_than_the_limit() -> None:
 
 def test_the_models_coupling_and_drag_are_no_disturbance() -> None:
     """Euler's equation with the rotors' momentum, and a drag that slows: one small step, seen by none."""
-    airframe = Airframe(0.7, 9.81, 0.02, 0.05, 0.06)
     h = 1e-6
     before = np.array([3.0, -1.0, 0.5, 2.0, -1.0, 0.7, 0.0, 0.0, 1.0])
-    across = 0.02 + 0.06 * HOVER_N**0.5
+    drag = np.array([-0.5, 0.2, -0.025])
     p, q, r = before[3:6]
     ix, iy, iz = INERTIA
     momentum = 2e-3
     turn = [((iy - iz) * q * r - momentum * q) / ix, ((iz - ix) * p * r + momentum * p) / iy, (ix - iy) * p * q / iz]
     now = before.copy()
-    now[:3] += h * np.array([-across * 3.0, across * 1.0, -0.05 * 0.5]) / 0.7
+    now[:3] += h * drag / 0.7
     now[3:6] += h * np.array(turn)
     observer = Observer(*gains(9.0, h), *gains(12.0, h), 6.0, 0.3)
     estimate = observe(
-        first_estimate(before), before, now, HOVER_N, NO_MOMENT, momentum, airframe, INERTIA, observer, h
+        first_estimate(before), before, now, HOVER_N, NO_MOMENT, momentum, drag, AIRFRAME, INERTIA, observer, h
     )
     assert estimate[:6] == pytest.approx(now[:6], abs=1e-11)
     assert estimate[6:] == pytest.approx(np.zeros(6), abs=1e-9)

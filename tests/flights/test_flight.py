@@ -15,12 +15,14 @@ IDLE, FASTEST = 83.8, 838.0
 
 
 def vehicle_file(folder: Path, **changes: str) -> str:
-    """Write the Hummingbird's file with other values; return its path."""
+    """Write the Hummingbird's file with other values, keys as TABLE__KEY; return its path."""
     text = HUMMINGBIRD.read_text(encoding="utf-8")
-    for key, value in changes.items():
-        text, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", text, flags=re.MULTILINE)
-        if not count:
-            text = text.replace("[rotors]\n", f"[rotors]\n{key} = {value}\n")
+    for name, value in changes.items():
+        table, key = name.split("__")
+        head, body = text.split(f"[{table}]\n")
+        this, *others = re.split(r"(?=^\[)", body, flags=re.MULTILINE)
+        this = f"{key} = {value}\n" + re.sub(rf"^{key} = .*\n", "", this, flags=re.MULTILINE)
+        text = f"{head}[{table}]\n{this}{''.join(others)}"
     path = folder / "vehicle.toml"
     path.write_text(text, encoding="utf-8")
     return str(path)
@@ -61,11 +63,11 @@ def test_two_processes_fly_the_same_flight(tmp_path: Path) -> None:
 
 
 WRONG = {
-    "20 % heavier": {"mass_kg": "0.8376"},
-    "20 % lighter": {"mass_kg": "0.5584"},
-    "30 % more inertia": {"inertia_kg_m2": "[0.00442, 0.00442, 0.0078]"},
-    "30 % less inertia": {"inertia_kg_m2": "[0.00238, 0.00238, 0.0042]"},
-    "one rotor 15 % weak": {"strength": "[1.0, 0.85, 1.0, 1.0]"},
+    "20 % heavier": {"body__mass_kg": "0.8376"},
+    "20 % lighter": {"body__mass_kg": "0.5584"},
+    "30 % more inertia": {"body__inertia_kg_m2": "[0.00442, 0.00442, 0.0078]"},
+    "30 % less inertia": {"body__inertia_kg_m2": "[0.00238, 0.00238, 0.0042]"},
+    "one rotor 15 % weak": {"rotors__strength": "[1.0, 0.85, 1.0, 1.0]"},
 }
 
 
@@ -95,7 +97,7 @@ def largest_error_m(flown: dict[str, np.ndarray], after_s: float) -> float:
 
 def test_with_tight_limits_constraints_bind_and_it_still_flies(tmp_path: Path) -> None:
     """600 rad/s at most, hover at 497: take the spiral up from 2 m away, never ask for more."""
-    vehicle = ("--vehicle", vehicle_file(tmp_path, max_speed="600.0", idle_speed="60.0"))
+    vehicle = ("--vehicle", vehicle_file(tmp_path, rotors__max_speed="600.0", rotors__idle_speed="60.0"))
     figures = fly(tmp_path / "out", "spiral", "--link", "memory", "--duration", "40", *vehicle)
     truth = rows(tmp_path / "out" / "plant.csv")
     assert max(truth[f"omega{number}"].max() for number in range(1, 5)) <= 600.0

@@ -1,0 +1,59 @@
+"""The battery as the vehicle file has it: the charge that the rotors took, and how fast they can turn on the rest.
+
+Nothing in a frame tells the voltage, so it is followed as the rotors are: V = V0 - R I, V0 falling linearly with the
+charge taken, and the rotors' top speed in proportion to V.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from autopilot.controller import Array
+from plant.vehicle import Battery, Vehicle
+
+_SECONDS_PER_HOUR = 3600.0
+_TABLE = 101
+_BISECTIONS = 40
+
+
+class BatteryModel:
+    """The battery of one vehicle; one that has none never tires."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        """Follow the battery of `vehicle`."""
+        self._battery = vehicle.battery
+        drag_torque = vehicle.rotors.torque_coefficient * vehicle.rotors.max_speed**2
+        efficiency = vehicle.battery.efficiency if vehicle.battery else 1.0
+        self._full_power_w = drag_torque * vehicle.rad_s_per_speed_unit * vehicle.rotors.max_speed / efficiency
+        if self._battery:
+            self._charges_ah = np.linspace(0.0, self._battery.capacity_ah, _TABLE)
+            self._fastest = np.array([self._balance(self._battery, charge) for charge in self._charges_ah.tolist()])
+
+    def charge_after(self, charge_ah: float, speeds: Array, duration_s: float) -> float:
+        """Return the charge taken, Ah, after `duration_s` at rotor speeds (4,), parts of the largest."""
+        if self._battery is None:
+            return charge_ah
+        power_w = self._full_power_w * float((speeds * speeds) @ speeds)
+        current_a = power_w / _voltage_v(self._battery, charge_ah, power_w)
+        return charge_ah + current_a * duration_s / _SECONDS_PER_HOUR
+
+    def fastest(self, charge_ah: float) -> float:
+        """Return the speed that all rotors can keep up together once `charge_ah` is taken, in parts of the largest."""
+        return 1.0 if self._battery is None else float(np.interp(charge_ah, self._charges_ah, self._fastest))
+
+    def _balance(self, battery: Battery, charge_ah: float) -> float:
+        """Find the speed, in parts of the largest, at which the voltage left is just in that proportion."""
+        low, high = 0.0, 1.0
+        for _ in range(_BISECTIONS):
+            speed = 0.5 * (low + high)
+            power_w = 4.0 * self._full_power_w * speed**3
+            enough = _voltage_v(battery, charge_ah, power_w) >= speed * battery.full_voltage_v
+            low, high = (speed, high) if enough else (low, speed)
+        return low
+
+
+def _voltage_v(battery: Battery, charge_ah: float, power_w: float) -> float:
+    """Return the terminal voltage at which `power_w` is drawn: V² - V0 V + R P = 0, but at least half of V0."""
+    used = min(charge_ah / battery.capacity_ah, 1.0)
+    open_v = battery.full_voltage_v + (battery.empty_voltage_v - battery.full_voltage_v) * used
+    return 0.5 * (open_v + sqrt(max(0.0, open_v * open_v - 4.0 * battery.resistance_ohm * power_w)))
