@@ -1,7 +1,7 @@
 """The outer loop over a horizon: references, feedback and limits to attitudes and thrusts, as compiled kernels.
 
 Thrust must make F = m (a_ref + k1 e + k2 e' + g - d) plus the drag; its direction gives roll and pitch about the yaw
-that is predicted, so that thrust points right whatever yaw does.
+that is predicted, so that thrust points right whatever yaw does. The errors ahead are those of the closed loop.
 Source of the flat output to thrust direction: Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018.
 """
 
@@ -56,6 +56,23 @@ class Airframe(NamedTuple):
     rotor_drag: float
 
 
+def error_transition(poles: tuple[float, float], interval_s: float, samples: int) -> Array:
+    """Return how an error and its rate (2,) go on at each sample from now, (samples, 2, 2), the poles being placed."""
+    first, second = poles
+    t = interval_s * np.arange(samples)
+    if first == second:
+        decay = np.exp(first * t)
+        rows = [[(1.0 - first * t) * decay, t * decay], [-first * first * t * decay, (1.0 + first * t) * decay]]
+    else:
+        a, b = np.exp(first * t), np.exp(second * t)
+        apart = first - second
+        rows = [
+            [(first * b - second * a) / apart, (a - b) / apart],
+            [first * second * (b - a) / apart, (first * a - second * b) / apart],
+        ]
+    return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
+
+
 @compiled
 def drag_force(airframe: Airframe, velocity: Array, up: Array, thrust_n: float, out: Array) -> None:
     """Write the drag, N, ENU, on a vehicle whose z axis is `up` while it makes `thrust_n`.
@@ -90,54 +107,51 @@ def wanted_forces(
     position: Array,
     velocity: Array,
     references: tuple[Array, Array, Array],
+    errors_ahead: Array,
     gains: tuple[float, float],
     disturbance_m_s2: Array,
     airframe: Airframe,
     limits: Limits,
-    interval_s: float,
     forces: Array,
 ) -> None:
     """Fill `forces` with what the thrust must do at each sample of the horizon, N, ENU, (n, 3).
-
-    The errors ahead are those that the limited forces leave.
 
     Args:
         position: Now, m, ENU, (3,).
         velocity: Now, m/s, ENU, (3,).
         references: Position, velocity and acceleration at each sample, (n, 3) each.
+        errors_ahead: Of `error_transition`, (n, 2, 2).
         gains: k1, 1/s², and k2, 1/s.
         disturbance_m_s2: Acceleration that the model does not explain, ENU, (3,).
         airframe: The vehicle.
         limits: Of the forces.
-        interval_s: Between two samples.
         forces: Is filled.
     """
-    e, e_rate = references[0][0] - position, references[1][0] - velocity
-    moving, free, drag, up = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    e = references[0][0] - position
+    near = min(1.0, limits.position_error_m / max(length(e), limits.position_error_m))
+    e *= near
+    e_rate = near * references[1][0] - velocity
+    k1, k2 = gains
+    free, drag, moving, up = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for n in range(forces.shape[0]):
-        near = min(1.0, limits.position_error_m / max(length(e), limits.position_error_m))
+        E = errors_ahead[n]
         for i in range(3):
-            moving[i] = references[1][n, i] - e_rate[i]
-            slower = near * references[1][n, i] - moving[i]
-            demanded = near * (references[2][n, i] + gains[0] * e[i]) + gains[1] * slower
-            free[i] = airframe.mass_kg * (demanded - disturbance_m_s2[i])
+            ahead = E[0, 0] * e[i] + E[0, 1] * e_rate[i]
+            ahead_rate = E[1, 0] * e[i] + E[1, 1] * e_rate[i]
+            moving[i] = near * references[1][n, i] - ahead_rate
+            demanded = near * references[2][n, i] + k1 * ahead + k2 * ahead_rate - disturbance_m_s2[i]
+            free[i] = airframe.mass_kg * demanded
         free[2] += airframe.mass_kg * airframe.gravity_m_s2
-        force = forces[n]
-        force[:] = free
-        limited_force(force, limits)
+        forces[n] = free
+        limited_force(forces[n], limits)
         for _ in range(_DRAG_PASSES):
-            thrust = length(force)
+            thrust = length(forces[n])
             for i in range(3):
-                up[i] = force[i] / thrust
+                up[i] = forces[n, i] / thrust
             drag_force(airframe, moving, up, thrust, drag)
             for i in range(3):
-                force[i] = free[i] - drag[i]
-            limited_force(force, limits)
-        for i in range(3):
-            gained = (force[i] + drag[i]) / airframe.mass_kg + disturbance_m_s2[i]
-            left = references[2][n, i] - gained + (airframe.gravity_m_s2 if i == 2 else 0.0)
-            e[i] += interval_s * (e_rate[i] + 0.5 * interval_s * left)
-            e_rate[i] += interval_s * left
+                forces[n, i] = free[i] - drag[i]
+            limited_force(forces[n], limits)
 
 
 @compiled

@@ -143,6 +143,7 @@ class LpvMpc:
     def _prepare_guidance(self, settings: GuidanceSettings) -> None:
         first, second = settings.poles
         self._gains = (first * second, -(first + second))
+        self._errors_ahead = guidance.error_transition(settings.poles, self._interval_s, self._samples)
         self._thrust_margin = settings.thrust_margin
         self._tilt_tangent = tan(radians(settings.largest_tilt_deg))
         self._position_error_m = settings.approach_speed_m_s * self._gains[1] / self._gains[0]
@@ -240,11 +241,11 @@ class LpvMpc:
             np.array(state.position_enu_m),
             np.array(state.velocity_enu_m_s),
             (references.position_enu_m, references.velocity_enu_m_s, references.acceleration_enu_m_s2),
+            self._errors_ahead,
             self._gains,
             estimate[6:9],
             self._airframe,
             limits,
-            self._interval_s,
             forces,
         )
         return forces

@@ -19,6 +19,14 @@ GAINS = (20.0, 9.0)
 NOTHING = np.zeros(3)
 
 
+@pytest.mark.parametrize("poles", [(-4.0, -5.0), (-3.0, -3.0)])
+def test_errors_go_on_as_the_poles_say(poles: tuple[float, float]) -> None:
+    first, second = poles
+    A = np.array([[0.0, 1.0], [-first * second, first + second]])
+    for sample, transition in enumerate(guidance.error_transition(poles, 0.05, 12)):
+        assert transition == pytest.approx(expm(A * 0.05 * sample), abs=1e-12)
+
+
 def forces_for(
     position: np.ndarray,
     velocity: np.ndarray,
@@ -28,7 +36,8 @@ def forces_for(
 ) -> np.ndarray:
     forces = np.empty((2, 3))
     r, v, a = (np.tile(part, (2, 1)) for part in reference)
-    guidance.wanted_forces(position, velocity, (r, v, a), GAINS, disturbance, airframe, LIMITS, 0.01, forces)
+    ahead = np.tile(np.eye(2), (2, 1, 1))
+    guidance.wanted_forces(position, velocity, (r, v, a), ahead, GAINS, disturbance, airframe, LIMITS, forces)
     first: np.ndarray = forces[0]
     return first
 
@@ -37,25 +46,6 @@ def test_the_force_is_newtons_for_the_demanded_acceleration() -> None:
     e, e_rate, a, d = (np.array(v) for v in ((0.1, -0.05, 0.08), (0.2, 0.1, -0.1), (0.5, 1.0, -0.3), (0.2, -0.4, 0.6)))
     wanted = 0.698 * (a + 20.0 * e + 9.0 * e_rate - d + np.array([0.0, 0.0, 9.81]))
     assert forces_for(-e, -e_rate, (NOTHING, NOTHING, a), disturbance=d) == pytest.approx(wanted)
-
-
-def test_errors_ahead_are_those_of_the_placed_poles() -> None:
-    """At rest 10 cm off a point: the force along the horizon follows the closed loop's exponential."""
-    e, h, steps = np.array([0.1, 0.0, 0.0]), 0.001, 200
-    nothing = np.zeros((steps, 3))
-    forces = np.empty((steps, 3))
-    guidance.wanted_forces(-e, NOTHING, (nothing, nothing, nothing), GAINS, NOTHING, NO_DRAG, LIMITS, h, forces)
-    A = np.array([[0.0, 1.0], [-GAINS[0], -GAINS[1]]])
-    ahead = np.array([expm(A * h * n) @ [0.1, 0.0] for n in range(steps)])
-    assert forces[:, 0] == pytest.approx(0.698 * (ahead @ GAINS), abs=0.01)
-
-
-def test_errors_ahead_are_those_that_the_limits_leave() -> None:
-    """Far off, the force stays at its limit along the whole horizon: nothing imagined brings the vehicle there."""
-    far, nothing = np.tile([50.0, 0.0, 0.0], (12, 1)), np.zeros((12, 3))
-    forces = np.empty((12, 3))
-    guidance.wanted_forces(NOTHING, NOTHING, (far, nothing, nothing), GAINS, NOTHING, NO_DRAG, LIMITS, 0.008, forces)
-    assert forces[:, 0] == pytest.approx(np.full(12, forces[0, 2] * LIMITS.tilt_tangent))
 
 
 @given(vectors(5.0))
