@@ -22,6 +22,8 @@ from mavlink.frames import euler_from_quaternion, nearest_turn
 from mavlink.hil import ActuatorCommand, StateFrame
 from plant.vehicle import Vehicle
 
+_ROUNDING = 1e-6
+
 
 class Step(NamedTuple):
     """The answer to a frame: the command to send, the decision behind it, and how long it took.
@@ -104,16 +106,14 @@ class Autopilot:
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
+    """Return the longest interval of whole milliseconds that divides the control interval, as short as asked for."""
     wanted_s = profile.simulation.frame_interval_s
     if wanted_s is None:
         return control_interval_us
-    wanted_us = round(wanted_s * 1e6)
-    if wanted_us % 1000 or control_interval_us % wanted_us:
-        raise ProfileError(
-            f"profile {profile.name}: simulation.frame_interval_s: must be whole milliseconds and divide the control "
-            f"interval of {control_interval_us / 1e6:g} s"
-        )
-    return wanted_us
+    control_ms = control_interval_us // 1000
+    return 1000 * max(
+        ms for ms in range(1, control_ms + 1) if control_ms % ms == 0 and ms <= wanted_s * 1e3 + _ROUNDING
+    )
 
 
 def _build(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:
