@@ -22,8 +22,6 @@ from mavlink.frames import euler_from_quaternion, nearest_turn
 from mavlink.hil import ActuatorCommand, StateFrame
 from plant.vehicle import Vehicle
 
-_ROUNDING = 1e-6
-
 
 class Step(NamedTuple):
     """The answer to a frame: the command to send, the decision behind it, and how long it took.
