@@ -108,10 +108,8 @@ def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
     wanted_s = profile.simulation.frame_interval_s
     if wanted_s is None:
         return control_interval_us
-    control_ms = control_interval_us // 1000
-    return 1000 * max(
-        ms for ms in range(1, control_ms + 1) if control_ms % ms == 0 and ms <= wanted_s * 1e3 + _ROUNDING
-    )
+    control_ms, wanted_ms = control_interval_us // 1000, round(wanted_s * 1e6) // 1000
+    return 1000 * max(ms for ms in range(1, control_ms + 1) if control_ms % ms == 0 and ms <= wanted_ms)
 
 
 def _build(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:
