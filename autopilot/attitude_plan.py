@@ -10,7 +10,7 @@ from autopilot import constrained, prediction
 from autopilot.controller import Active, Array, Clock, Diagnostics
 from autopilot.mixer import exact_inverse
 from autopilot.prediction import INPUTS, STATES
-from autopilot.qp import Qp, QpSolver
+from autopilot.qp import Qp, QpSolver, QpStatus
 from autopilot.rotor_lag import RotorLag
 from autopilot.settings import Count, Degrees, Table
 from plant.vehicle import Positive, Vehicle
@@ -149,31 +149,7 @@ class AttitudeMpc:
         solve_time_s = self._clock() - started_s
         if z is None:
             return None, Diagnostics(status, solve_time_s=solve_time_s)
-        states, moments = np.empty((self.horizon + 1, STATES)), np.empty((self.horizon, INPUTS))
-        squared = np.empty((self.horizon, constrained.ROTORS))
-        constrained.read_plan(
-            self._responses,
-            self._starts,
-            now.u,
-            z,
-            target.thrust_n,
-            self._from_thrust,
-            self._from_moments,
-            states,
-            moments,
-            squared,
-        )
-        active = constrained.count_active(qp.G, qp.h, self._lower, self._upper, z, self._rotor_rows, _BINDING)
-        diagnostics = Diagnostics(
-            status,
-            solve_time_s=solve_time_s,
-            cost=float(z @ (0.5 * (qp.H @ z) + qp.f)),
-            active=Active(*active),
-            slack=float(max(z[-constrained.SLACKS :])),
-            predicted=states,
-            planned_squared=squared,
-        )
-        return Plan(moments, states), diagnostics
+        return self.read(now, target, qp, z, solve_time_s)
 
     def predict(self, now: Situation, ahead: Array | None) -> None:
         """Predict the responses, scheduled along the last plan if there is one."""
@@ -219,6 +195,34 @@ class AttitudeMpc:
         )
         constrained.limit_motion(self._responses, self._checked, self._limits, row, self._G, self._h)
         return Qp(self._H, self._f, self._G, self._h, self._lower, self._upper)
+
+    def read(self, now: Situation, target: Target, qp: Qp, z: Array, solve_time_s: float) -> tuple[Plan, Diagnostics]:
+        """Return the plan that the QP's solution `z` (n,) stands for, and what there is to say of it."""
+        states, moments = np.empty((self.horizon + 1, STATES)), np.empty((self.horizon, INPUTS))
+        squared = np.empty((self.horizon, constrained.ROTORS))
+        constrained.read_plan(
+            self._responses,
+            self._starts,
+            now.u,
+            z,
+            target.thrust_n,
+            self._from_thrust,
+            self._from_moments,
+            states,
+            moments,
+            squared,
+        )
+        active = constrained.count_active(qp.G, qp.h, self._lower, self._upper, z, self._rotor_rows, _BINDING)
+        diagnostics = Diagnostics(
+            QpStatus.SOLVED,
+            solve_time_s=solve_time_s,
+            cost=float(z @ (0.5 * (qp.H @ z) + qp.f)),
+            active=Active(*active),
+            slack=float(max(z[-constrained.SLACKS :])),
+            predicted=states,
+            planned_squared=squared,
+        )
+        return Plan(moments, states), diagnostics
 
     def lqr(self, now: Situation, target: Target) -> Array:
         """Return the moments, N m, (3,), of the unconstrained law at hover that the terminal weight belongs to."""

@@ -166,19 +166,62 @@ class LpvMpc:
         del time_us
         rotation = np.array(rotation_matrix(state.attitude))
         measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2]])
-        estimate = self._estimate(memory, measured)
+        estimate = self.estimate(memory, measured)
         now = self._situation(memory, state, estimate)
-        limits = self._limits(now.fastest)
-        forces = self._forces(state, references, estimate, limits)
-        target = self._target(memory, now, references, forces, rotation, limits)
-        choice = self._choose(memory, now, target, forces[0], rotation)
-        commands = rotor_lag.lead(memory.speeds, choice.squared, self._lag, now.fastest)
-        speeds = rotor_lag.follow(memory.speeds, commands, self._lag)
-        wrench = 0.5 * (self._allocation @ (memory.speeds**2 + speeds**2))
+        force, target = self.position(memory, now, state, references, estimate, rotation)
+        choice = self._choose(memory, now, target, force, rotation)
+        commands, speeds, wrench = self.mix(memory, choice.squared, now.fastest)
         charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
         after = Memory(speeds, choice.moments, wrench, measured, estimate, charge_ah, choice.plan, choice.age)
         phi, theta, psi = target.angles[0].tolist()
         return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), choice.diagnostics)
+
+    def estimate(self, memory: Memory, measured: Array) -> Array:
+        """Return the observer's estimate, (12,), now that `measured`, (9,), is."""
+        if memory.measured is None:
+            return observer.first_estimate(measured)
+        middle = 0.5 * (memory.measured + measured)
+        drag = np.empty(3)
+        guidance.drag_force(self._airframe, middle[:3], middle[6:], float(memory.wrench[0]), drag)
+        return observer.observe(
+            memory.estimate,
+            memory.measured,
+            measured,
+            float(memory.wrench[0]),
+            memory.wrench[1:],
+            float(self._momentum @ memory.speeds),
+            drag,
+            self._airframe,
+            self._inertia,
+            self._observer,
+            self._interval_s,
+        )
+
+    def position(
+        self,
+        memory: Memory,
+        now: Situation,
+        state: VehicleState,
+        references: Horizon,
+        estimate: Array,
+        rotation: Array,
+    ) -> tuple[Array, Target]:
+        """Return the force wanted now, N, ENU, (3,), and what the attitude is to reach for it and those that follow."""
+        limits = self._limits(now.fastest)
+        forces = self._forces(state, references, estimate, limits)
+        return forces[0], self._target(memory, now, references, forces, rotation, limits)
+
+    def mix(self, memory: Memory, squared: Array, fastest: float) -> tuple[Array, Array, Array]:
+        """Return the rotors' commands (4,), their speeds a sample later (4,), and the mean wrench until then (4,).
+
+        Args:
+            memory: Of the sample before.
+            squared: Squared speeds that the plan commands, in parts of the largest, (4,).
+            fastest: Largest speed that can be had, in parts of the largest.
+        """
+        commands = rotor_lag.lead(memory.speeds, squared, self._lag, fastest)
+        speeds = rotor_lag.follow(memory.speeds, commands, self._lag)
+        return commands, speeds, 0.5 * (self._allocation @ (memory.speeds**2 + speeds**2))
 
     def _choose(self, memory: Memory, now: Situation, target: Target, force: Array, rotation: Array) -> "Choice":
         """Plan; where that cannot be had, fall back."""
@@ -199,26 +242,6 @@ class LpvMpc:
             how = diagnostics._replace(fallback=Fallback.LQR)
             return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, None, age, how)
         return self._descend(now, age, diagnostics)
-
-    def _estimate(self, memory: Memory, measured: Array) -> Array:
-        if memory.measured is None:
-            return observer.first_estimate(measured)
-        middle = 0.5 * (memory.measured + measured)
-        drag = np.empty(3)
-        guidance.drag_force(self._airframe, middle[:3], middle[6:], float(memory.wrench[0]), drag)
-        return observer.observe(
-            memory.estimate,
-            memory.measured,
-            measured,
-            float(memory.wrench[0]),
-            memory.wrench[1:],
-            float(self._momentum @ memory.speeds),
-            drag,
-            self._airframe,
-            self._inertia,
-            self._observer,
-            self._interval_s,
-        )
 
     def _situation(self, memory: Memory, state: VehicleState, estimate: Array) -> Situation:
         phi, theta, psi = state.euler

@@ -1,76 +1,156 @@
-"""`colibri bench`: how fast the thesis's spiral flies, and how long the whole command takes."""
+"""`colibri bench`: how long each stage takes, and how much faster than real time it flies, beside a peer."""
 
 import argparse
 import json
-import subprocess
+import os
+import platform
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from statistics import median
 from tempfile import TemporaryDirectory
-from time import perf_counter
-from typing import TypeAlias
+from typing import Any
 
-from mavlink.process import EXIT_FAILED, fail
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
 
-Samples: TypeAlias = dict[str, list[float]]
+from autopilot.profile import load_profile
+from autopilot.qp import installed_solvers
+from mavlink.process import fail
+from tools import peer
+from tools.speed import CONTROL_S, LINKS, THESIS_LINKS, Tell, rate_figures, thesis_figures
+from tools.stages import MOVES, STAGES, stage_figures
 
-LINKS = ("udp", "memory")
+PROFILE = "flight"
 
 
 def bench(args: argparse.Namespace) -> int:
-    """Fly as often as the command line says, print minimum, median and maximum; return the exit code."""
-    samples: Samples = {}
-    for link in LINKS:
-        for _ in range(args.runs):
-            for name, value in _fly_once(link).items():
-                samples.setdefault(name, []).append(value)
-    figures = {name: summarised(values) for name, values in samples.items()}
-    _print(figures, args.runs)
+    """Measure what the command line says, print tables, write JSON; return the exit code."""
+    wanted = args.only or ["stages", "flights", "thesis"]
+    if args.out:
+        _check_writable(args.out)
+    beside = "flights" in wanted and peer.installed()
+    if "flights" in wanted and not beside:
+        _note(peer.MISSING)
+    figures: dict[str, Any] = {"settings": _settings(args)}
+    with _progress(_parts(wanted, args.runs, beside=beside)) as tell, TemporaryDirectory() as folder:
+        profile = load_profile(PROFILE)
+        if "stages" in wanted:
+            figures["stages"] = stage_figures(profile, Path(folder), args.duration, tell)
+        if "flights" in wanted:
+            figures["flights"] = rate_figures(profile, Path(folder), args.duration, args.runs, tell, beside=beside)
+        if "thesis" in wanted:
+            figures["thesis"] = thesis_figures(args.runs, tell)
+    _print(figures)
     if args.out:
         _write(figures, args.out)
     return 0
 
 
-def summarised(values: Iterable[float]) -> dict[str, float]:
-    """Return minimum, median and maximum."""
-    ordered = sorted(values)
-    return {"min": ordered[0], "median": median(ordered), "max": ordered[-1]}
+def _settings(args: argparse.Namespace) -> dict[str, Any]:
+    machine = {"python": platform.python_version(), "machine": platform.machine(), "cpus": os.cpu_count()}
+    return {"profile": PROFILE, "runs": args.runs, "duration_s": args.duration, **machine}
 
 
-def _fly_once(link: str) -> dict[str, float]:
-    """Run the command as a user would, in a process of its own."""
-    with TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "tools", "fly", "spiral", "--profile", "thesis", "--link", link]
-        started_s = perf_counter()
-        done = subprocess.run([*command, "--quiet", "--no-figures", "--out", folder], check=False)
-        command_s = perf_counter() - started_s
-        if done.returncode:
-            fail(f"a flight ended with exit code {done.returncode}", EXIT_FAILED)
-        report = json.loads((Path(folder) / "report.json").read_text(encoding="utf-8"))
-    return {
-        f"{link}: real-time factor": report["real_time_factor"],
-        f"{link}: whole command, s": command_s,
-        f"{link}: QP solve time p50, µs": report["solve_time_us"]["p50"],
-        f"{link}: control step p50, µs": report["control_step_us"]["p50"],
-        f"{link}: control step p99, µs": report["control_step_us"]["p99"],
+def _parts(wanted: list[str], runs: int, *, beside: bool) -> int:
+    """Return how often `tell` will be called."""
+    stages = 1 + len(MOVES) * (1 + len(installed_solvers()))
+    flights = 1 + runs * len(CONTROL_S) * (len(LINKS) + beside)
+    parts = {"stages": stages, "flights": flights, "thesis": runs * len(THESIS_LINKS)}
+    return sum(parts[section] for section in set(wanted))
+
+
+@contextmanager
+def _progress(parts: int) -> Iterator[Tell]:
+    """Show on standard error what is being measured."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=parts)
+
+        def tell(what: str) -> None:
+            bar.update(task, description=what, advance=1)
+
+        yield tell
+
+
+def _print(figures: Mapping[str, Any]) -> None:
+    console = Console()
+    settings = figures["settings"]
+    if "stages" in figures:
+        for table in _stage_tables(figures["stages"]):
+            console.print(table)
+    if "flights" in figures:
+        title = f"{figures['flights']['track']}, profile {PROFILE}, times real time (min, median, max)"
+        rows = {
+            f"{frames_hz} Hz: {name}": figure
+            for frames_hz, rate in figures["flights"]["rates_hz"].items()
+            for name, figure in rate.items()
+        }
+        console.print(_spread(f"{title}, {settings['runs']} runs", rows))
+    if "thesis" in figures:
+        console.print(_spread(f"spiral, profile thesis, {settings['runs']} flights a link", figures["thesis"]))
+
+
+def _stage_tables(stages: Mapping[str, Any]) -> Iterator[Table]:
+    horizons = stages["horizons"]
+    of = {
+        horizon: {stage.name: measured["us"][stage.name] for stage in STAGES} for horizon, measured in horizons.items()
     }
+    yield _by_horizon(f"{stages['track']}, profile {PROFILE}: stages of a control step, p50 / p99 µs", of)
+    yield _by_horizon("QP by solver, p50 / p99 µs, part solved", stages["solvers"])
+    link = _table("link, µs", ("p50", "p99"))
+    for name, figure in stages["link"].items():
+        link.add_row(name, _number(figure["p50"]), _number(figure["p99"]))
+    yield link
 
 
-def _print(figures: dict[str, dict[str, float]], runs: int) -> None:
-    from rich.console import Console
-    from rich.table import Table
+def _by_horizon(title: str, figures: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
+    table = _table(title, [f"N = {horizon}" for horizon in figures])
+    for name in next(iter(figures.values())):
+        table.add_row(name, *(_of_stage(measured[name]) for measured in figures.values()))
+    return table
 
-    table = Table(title=f"spiral, profile thesis, {runs} flights a link", title_justify="left")
+
+def _of_stage(figure: Mapping[str, float]) -> str:
+    times = f"{_number(figure['p50'])} / {_number(figure['p99'])}"
+    return times if figure.get("solved", 1.0) == 1.0 else f"{times}, {100.0 * figure['solved']:.0f} %"
+
+
+def _spread(title: str, rows: Mapping[str, Mapping[str, float]]) -> Table:
+    table = _table(title, ("min", "median", "max"))
+    for name, figure in rows.items():
+        table.add_row(name, *map(_number, figure.values()))
+    return table
+
+
+def _table(title: str, columns: list[str] | tuple[str, ...]) -> Table:
+    table = Table(title=title, title_justify="left")
     table.add_column("")
-    for column in ("min", "median", "max"):
+    for column in columns:
         table.add_column(column, justify="right")
-    for name, figure in figures.items():
-        table.add_row(name, *(f"{value:.3g}" if value < 100 else f"{value:.0f}" for value in figure.values()))
-    Console().print(table)
+    return table
 
 
-def _write(figures: dict[str, dict[str, float]], path: Path) -> None:
+def _number(value: float) -> str:
+    return f"{value:.3g}" if value < 100 else f"{value:.0f}"
+
+
+def _note(text: str) -> None:
+    sys.stderr.write(f"colibri: {text}\n")
+
+
+def _check_writable(path: Path) -> None:
+    """End now rather than after minutes where the figures could not be written."""
+    try:
+        with path.open("a", encoding="utf-8"):
+            pass
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror}")
+
+
+def _write(figures: Mapping[str, Any], path: Path) -> None:
     try:
         path.write_text(json.dumps(figures, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     except OSError as error:

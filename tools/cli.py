@@ -113,5 +113,19 @@ def _add_compare(parser: ArgumentParser) -> None:
 
 def _add_bench(parser: ArgumentParser) -> None:
     add = parser.add_argument
-    add("--runs", type=int, default=5, choices=range(1, 101), metavar="N", help="flights of each kind (default 5)")
+    add(
+        "--only",
+        action="append",
+        choices=("stages", "flights", "thesis"),
+        help="stages: each stage of a control step; flights: times real time at several rates, beside RotorPy if it is "
+        "installed; thesis: its spiral through the whole command; may be repeated (default: all)",
+    )
+    add("--runs", type=int, default=3, choices=range(1, 101), metavar="N", help="flights of each kind (default 3)")
+    add(
+        "--duration",
+        type=positive,
+        default=10.0,
+        metavar="S",
+        help="simulated time of a flight, but of the spiral's (default %(default)s)",
+    )
     add("--out", type=Path, metavar="FILE", help="write the figures as JSON there")

@@ -1,8 +1,11 @@
 """Bytes ⇄ messages: nothing malformed raises, nothing good is lost beside it."""
 
+from typing import Any
+
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import common
 
 from mavlink import dialect
 from mavlink.dialect import Codec
@@ -62,3 +65,69 @@ def test_an_unknown_message_is_counted() -> None:
     unknown_id[7:10] = b"\xff\xff\xff"
     assert codec.decode(bytes(unknown_id)) == []
     assert codec.dropped == {"unknown": 1}
+
+
+def pymavlink_frame(name: str, payload: bytes) -> tuple[Any, bytes]:
+    """Return what pymavlink reads from a payload, and the frame that it writes of that."""
+    mav = common.MAVLink(None, srcSystem=7, srcComponent=9)
+    definition = getattr(common, f"MAVLink_{name.lower()}_message")
+    numbers = dict(zip(definition.ordered_fieldnames, unflattened(definition, payload), strict=True))
+    fields = [numbers[field] for field in definition.fieldnames]
+    frame = bytes(definition(*fields).pack(mav))
+    (message,) = mav.parse_buffer(frame)
+    return message, frame
+
+
+def unflattened(definition: Any, payload: bytes) -> list[Any]:
+    flat = iter(definition.unpacker.unpack(payload))
+    return [[next(flat) for _ in range(length)] if length else next(flat) for length in definition.array_lengths]
+
+
+NUMERIC = sorted(
+    definition.msgname for definition in common.mavlink_map.values() if "char" not in definition.fieldtypes
+)
+
+
+@settings(max_examples=500)
+@given(st.data(), st.sampled_from(NUMERIC))
+def test_reads_and_writes_numbers_as_pymavlink_does(data: st.DataObject, name: str) -> None:
+    size = getattr(common, f"MAVLink_{name.lower()}_message").unpacker.size
+    expected, frame = pymavlink_frame(name, data.draw(st.binary(min_size=size, max_size=size)))
+    codec = Codec(7, 9)
+    (message,) = codec.decode(frame)
+    fields = [getattr(message.fields, field) for field in expected.get_fieldnames()]
+    listed = [list(field) if isinstance(field, tuple) else field for field in fields]
+    assert repr(listed) == repr([getattr(expected, field) for field in expected.get_fieldnames()])
+    assert (message.name, message.source, message.frame) == (name, (7, 9), frame)
+    assert codec.encode(name, *fields) == frame
+
+
+def test_fields_of_an_extension_may_be_left_out() -> None:
+    q = (1.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3)
+    mav = common.MAVLink(None, srcSystem=1, srcComponent=1)
+    assert Codec(1, 1).encode("ATTITUDE_QUATERNION", 4, *q) == bytes(
+        common.MAVLink_attitude_quaternion_message(4, *q).pack(mav)
+    )
+
+
+def test_text_and_mavlink_1_are_messages_too() -> None:
+    codec = Codec(7, 9)
+    text = codec.encode("STATUSTEXT", 6, b"hello")
+    mav = common.MAVLink(None, srcSystem=7, srcComponent=9)
+    old = bytes(common.MAVLink_heartbeat_message(*HEARTBEAT).pack(mav, force_mavlink1=True))
+    assert [message.name for message in codec.decode(text + heartbeat() + old)] == [
+        "STATUSTEXT",
+        "HEARTBEAT",
+        "HEARTBEAT",
+    ]
+    assert not codec.dropped
+
+
+@given(st.lists(st.sampled_from(range(6)), max_size=5), st.binary(max_size=12))
+def test_a_good_frame_among_noise_is_found_and_the_noise_is_counted(order: list[int], noise: bytes) -> None:
+    parts = [heartbeat(), noise, heartbeat()[:-1], b"\xfd", b"\xfd\x00\xff", heartbeat()[:-1] + b"\0"]
+    datagram = b"".join(parts[i] for i in order)
+    fast, slow = Codec(1, 1), Codec(1, 1)
+    decoded = [message.frame for message in fast.decode(datagram)]
+    assert decoded == [message.frame for message in slow._parsed(datagram)]  # noqa: SLF001
+    assert fast.dropped == slow.dropped
