@@ -71,26 +71,27 @@ def tracks(results: Sequence[Result]) -> dict[str, Figure]:
 
 def speed(results: Sequence[Result]) -> dict[str, Figure]:
     """Draw error and tilt against the top speed of the lemniscate."""
-    figure, grid = axes_grid(3, 1, TOP_IN, row_in=1.7)
+    figure, grid = axes_grid(3, 1, TOP_IN + _LEGEND_ROW_IN, row_in=1.7)
     quantities: tuple[tuple[str, Callable[[Flown], float]], ...] = (
         ("RMS (m)", lambda flown: flown.rms_m),
         ("maximum (m)", lambda flown: flown.largest_m),
         ("largest tilt (°)", lambda flown: float(flown.tilt_deg[flown.settled].max(initial=0.0))),
     )
     for (axes,), (quantity, of) in zip(grid, quantities, strict=True):
-        for group in dict.fromkeys(result.group for result in results):
-            shown = [result for result in results if result.group == group]
-            for crashed, marker in ((False, "o-"), (True, "x")):
+        for group, battery in dict.fromkeys((result.group, result.row[2]) for result in results):
+            shown = [result for result in results if (result.group, result.row[2]) == (group, battery)]
+            label = group if battery == "with" else f"{group}, no battery"
+            for crashed, marker in ((False, "o-" if battery == "with" else "o:"), (True, "x")):
                 points = [(float(one.row[1]), of(one.flown)) for one in shown if one.flown.crashed == crashed]
-                label = f"{group}, crashed" if crashed else group
                 if points:
+                    label = f"{group}, crashed" if crashed else label
                     axes.plot(*zip(*points, strict=True), marker, label=label, color=_CONTENDERS[group], markersize=6)
         _dress(axes, quantity)
     for (axes,) in grid[:2]:
         axes.set_yscale("log")
     grid[2][0].set_ylim(0.0, 190.0)
     grid[-1][0].set_xlabel("top speed of the reference (m/s)")
-    put_head(figure, f"Lemniscates ever faster, after {SETTLED_AFTER_S:.0f} s")
+    put_head(figure, f"Lemniscates ever faster, after {SETTLED_AFTER_S:.0f} s", columns=3)
     return {"speed": figure}
 
 
@@ -139,7 +140,7 @@ def recovery(results: Sequence[Result]) -> dict[str, Figure]:
 
 def limits(results: Sequence[Result]) -> dict[str, Figure]:
     """Draw rotor speeds, active constraints and error of every flight."""
-    return {f"limits-{_file_name(result.row[0])}-{result.row[1]}": _limits(result) for result in results}
+    return {"-".join(("limits", *map(_file_name, result.row))): _limits(result) for result in results}
 
 
 def running_rms(flown: Flown) -> tuple[Array, Array]:
@@ -161,7 +162,7 @@ def _recoveries(results: Sequence[Result]) -> Figure:
     for (axes,), (quantity, of) in zip(grid, quantities, strict=True):
         for number, result in enumerate(results):
             shown = result.flown.t <= RECOVERY_SHOWN_S
-            style = Style((*COLORS[:4], *COLORS[5:])[number % 7], 1.6)
+            style = Style((*COLORS[:4], *COLORS[5:])[number % 7], 3.8 - 0.5 * number)
             axes.plot(
                 result.flown.t[shown],
                 of(result.flown)[shown],
@@ -175,7 +176,7 @@ def _recoveries(results: Sequence[Result]) -> Figure:
 
 
 def _recovery(result: Result) -> Figure:
-    figure, grid = axes_grid(4, 1, TOP_IN)
+    figure, grid = axes_grid(4, 1, TOP_IN + _LEGEND_ROW_IN)
     flown = result.flown
     shown = flown.t <= RECOVERY_SHOWN_S
     t = flown.t[shown]
@@ -189,7 +190,7 @@ def _recovery(result: Result) -> Figure:
             axes.axvspan(begin_s, min(end_s, RECOVERY_SHOWN_S), color=_SHADE, linewidth=0.0, label="recovery law flies")
         _dress(axes, quantity)
     rotors.set_xlabel("t (s)")
-    put_head(figure, f"Recovery at 20 m: {result.row[0].replace('-', ', ')} ({result.row[1]})")
+    put_head(figure, f"Recovery at 20 m: {result.row[0].replace('-', ', ')} ({result.row[1]})", columns=5)
     return figure
 
 
@@ -220,14 +221,15 @@ def _limits(result: Result) -> Figure:
     error.set_xlim(begin_s, end_s)
     error.set_xlabel("t (s)")
     put_head(
-        figure, f"{result.row[0]}, rotors up to {result.row[1]} rad/s: limits, which bind, position error", columns=5
+        figure, f"{result.row[0]}, rotors up to {result.row[1]} rad/s, {result.row[2]} battery: what binds", columns=5
     )
     return figure
 
 
 def _rotors(axes: Axes, flown: Flown, shown: Any) -> None:
-    for number, limit in enumerate(flown.rotor_limits):
-        axes.axhline(limit, label="limits" if number == 0 else None, **line_style(LIMIT))
+    least, most = flown.rotor_limits
+    axes.axhline(least, label="limits", **line_style(LIMIT))
+    axes.plot(flown.t[shown], most[shown], **line_style(LIMIT))
     for number, name in enumerate(ROTORS):
         style = Style(_FOUR[number], 1.2)
         axes.plot(flown.t[shown], flown.recording[name][shown], label=f"Ω{number + 1}", **line_style(style))
@@ -263,5 +265,5 @@ def _spans(t: Array, holds: Any) -> list[tuple[float, float]]:
     return [(float(t[begin]), float(ends[end])) for begin, end in edges.reshape(-1, 2)]
 
 
-def _file_name(track: str) -> str:
-    return track.replace(":", "-").replace("=", "-")
+def _file_name(text: str) -> str:
+    return text.replace(":", "-").replace("=", "-")

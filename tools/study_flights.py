@@ -16,6 +16,7 @@ from autopilot.profile import Profile
 from autopilot.qp import QpStatus
 from autopilot.tracks import DURATION_S
 from plant.integrate import IntegrationError
+from plant.process import TRUTH_COLUMNS
 from plant.scenario import NO_WIND, Wind
 from plant.vehicle import Vehicle
 from tools.local import fly_locally
@@ -109,13 +110,14 @@ class Flown:
     Attributes:
         flight: The flight.
         recording: What it left behind.
-        rotor_limits: Least and largest rotor speed, in the vehicle's unit.
+        rotor_limits: Least rotor speed, and the largest that the battery allows at each sample, (n,), both in the
+            vehicle's unit.
         failure: Why it ended early; None if it did not.
     """
 
     flight: Flight
     recording: Recording
-    rotor_limits: tuple[float, float]
+    rotor_limits: tuple[float, Array]
     failure: str | None
 
     @property
@@ -206,8 +208,21 @@ def fly(flight: Flight) -> Flown:
             fly_locally(plan, lambda _sim_time_s: None)
         except (IntegrationError, DecisionError) as error:
             failure = str(error)
-        rotors = plan.vehicle.rotors
-        return Flown(flight, read_recording(plan), (rotors.idle_speed, rotors.max_speed), failure)
+        recording = read_recording(plan)
+        limits = (plan.vehicle.rotors.idle_speed, _top_speed(plan, recording["t"]))
+        return Flown(flight, recording, limits, failure)
+
+
+def _top_speed(plan: FlightPlan, t: Array) -> Array:
+    """Return the largest rotor speed, which is proportional to the battery's voltage, at times `t` (n,)."""
+    vehicle = plan.plant_vehicle
+    if vehicle.battery is None:
+        return np.full_like(t, vehicle.rotors.max_speed)
+    columns = (TRUTH_COLUMNS.index("t"), TRUTH_COLUMNS.index("voltage_v"))
+    time_s, voltage_v = np.loadtxt(plan.out / "plant.csv", delimiter=",", skiprows=1, usecols=columns, unpack=True)
+    voltage_v[0] = vehicle.battery.full_voltage_v  # not known before the first step
+    speed: Array = vehicle.rotors.max_speed * np.interp(t, time_s, voltage_v) / vehicle.battery.full_voltage_v
+    return speed
 
 
 def _limited(vehicle: Vehicle, max_speed: float | None) -> Vehicle:
