@@ -1,5 +1,6 @@
 """UDP endpoints by URL: `udpin:HOST:PORT` waits for whoever sends, `udpout:HOST:PORT` speaks with that address only."""
 
+import os
 import socket
 from select import select
 from time import perf_counter
@@ -10,7 +11,9 @@ SPIN_S = 1e-3
 """How long to look for a datagram before going to sleep: on loopback a wake-up costs more than the exchange.
 
 Only where the wait before was no longer than this: a flight that is paced to the wall clock sleeps between its frames.
+Each look gives the core away if somebody else could use it: that may be the very process that is waited for.
 """
+_give_way = getattr(os, "sched_yield", lambda: None)
 _LARGEST_DATAGRAM = 4096
 
 
@@ -61,6 +64,8 @@ class UdpLink:
                 break
             if now_s >= spin_until_s:
                 select([self._socket], [], [], give_up_s - now_s)
+            else:
+                _give_way()
         self._waited_s = perf_counter() - began_s
         return received
 

@@ -8,16 +8,22 @@ import struct
 import sys
 from argparse import ArgumentTypeError
 from collections.abc import Iterable, Sequence
+from io import FileIO
 from math import inf, isfinite
 from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn, TextIO
+from typing import Any, NoReturn
+
+import msgspec
 
 from mavlink.link import LinkError, UdpLink, open_link
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
+
+_NUMBERS = msgspec.json.Encoder(enc_hook=float)
+"""The shortest digits that keep every bit, as `str` has them, in a tenth of its time; but no word for nan and inf."""
 
 
 class ArgumentParser(argparse.ArgumentParser):
@@ -144,15 +150,18 @@ class CsvLog:
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         """Create the file and its header."""
-        self._file: TextIO = open_for_writing(path)
-        self._file.write(",".join(columns) + "\n")
+        self._file = _open_for_writing(path)
+        self._file.write((",".join(columns) + "\n").encode())
 
-    def write(self, row: Iterable[float | str]) -> None:
+    def write(self, row: Sequence[float]) -> None:
         """Append a row."""
-        self._file.write(",".join([str(value) for value in row]) + "\n")
+        line = _NUMBERS.encode(row)[1:-1]
+        if b"null" in line:
+            line = ",".join(map(str, row)).encode()
+        self._file.write(line + b"\n")
 
     def close(self) -> None:
-        """Write out what is buffered and close."""
+        """Close."""
         self._file.close()
 
 
@@ -161,10 +170,7 @@ class TlogWriter:
 
     def __init__(self, path: Path) -> None:
         """Create the file."""
-        try:
-            self._file = path.open("wb", buffering=0)
-        except OSError as error:
-            fail(f"cannot write {path}: {error.strerror}")
+        self._file = _open_for_writing(path)
 
     def write(self, time_us: int, frames: Iterable[bytes]) -> None:
         """Append frames, all of simulated time `time_us`."""
@@ -172,14 +178,14 @@ class TlogWriter:
         self._file.write(b"".join([stamp + frame for frame in frames]))
 
     def close(self) -> None:
-        """Write out what is buffered and close."""
+        """Close."""
         self._file.close()
 
 
-def open_for_writing(path: Path) -> TextIO:
-    """Open a text file for writing line by line, its folder made where it is missing, or end with one line."""
+def _open_for_writing(path: Path) -> FileIO:
+    """Open a file whose every write reaches the system, its folder made where it is missing, or end with one line."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        return path.open("w", buffering=1, encoding="utf-8", newline="")
+        return path.open("wb", buffering=0)
     except OSError as error:
         fail(f"cannot write {path}: {error.strerror}")

@@ -23,18 +23,21 @@ from tools.speed import CONTROL_S, LINKS, THESIS_LINKS, Tell, rate_figures, thes
 from tools.stages import MOVES, STAGES, stage_figures
 
 PROFILE = "flight"
+LONGEST_S = 1000.0
 
 
 def bench(args: argparse.Namespace) -> int:
     """Measure what the command line says, print tables, write JSON; return the exit code."""
     wanted = args.only or ["stages", "flights", "thesis"]
+    if args.duration > LONGEST_S:
+        fail(f"--duration: at most {LONGEST_S:g} s, not {args.duration:g}")
     if args.out:
         _check_writable(args.out)
     beside = "flights" in wanted and peer.installed()
     if "flights" in wanted and not beside:
         _note(peer.MISSING)
     figures: dict[str, Any] = {"settings": _settings(args)}
-    with _progress(_parts(wanted, args.runs, beside=beside)) as tell, TemporaryDirectory() as folder:
+    with _progress(parts(wanted, args.runs, beside=beside)) as tell, TemporaryDirectory() as folder:
         profile = load_profile(PROFILE)
         if "stages" in wanted:
             figures["stages"] = stage_figures(profile, Path(folder), args.duration, tell)
@@ -53,7 +56,7 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
     return {"profile": PROFILE, "runs": args.runs, "duration_s": args.duration, **machine}
 
 
-def _parts(wanted: list[str], runs: int, *, beside: bool) -> int:
+def parts(wanted: list[str], runs: int, *, beside: bool) -> int:
     """Return how often `tell` will be called."""
     stages = 1 + len(MOVES) * (1 + len(installed_solvers()))
     flights = 1 + runs * len(CONTROL_S) * (len(LINKS) + beside)

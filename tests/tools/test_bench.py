@@ -1,0 +1,138 @@
+"""`colibri bench`: what it says and writes; no test asserts how fast anything is."""
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from autopilot.profile import load_profile
+from autopilot.qp import installed_solvers
+from tools import bench, peer, speed, stages
+from tools.cli import main
+from tools.variants import plan_of, toml_lines, with_intervals, with_moves
+
+SHORT_S = "0.2"
+
+
+def figures_of(out: Path, *options: str) -> dict[str, Any]:
+    assert main(["bench", "--runs", "1", "--duration", SHORT_S, "--out", str(out), *options]) == 0
+    figures: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
+    return figures
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    return figures_of(tmp_path_factory.mktemp("bench") / "stages.json", "--only", "stages")
+
+
+def test_every_stage_takes_time_at_every_horizon(measured: dict[str, Any]) -> None:
+    assert set(measured) == {"settings", "stages"}
+    horizons = measured["stages"]["horizons"]
+    assert {int(horizon) for horizon in horizons} == set(stages.MOVES)
+    for horizon, figures in horizons.items():
+        assert sum(figures["moves"]) == int(horizon)
+        assert set(figures["us"]) == {stage.name for stage in stages.STAGES}
+        assert all(0.0 < figure["p50"] <= figure["p99"] for figure in figures["us"].values())
+
+
+def test_a_stage_is_measured_once_a_control_step(measured: dict[str, Any]) -> None:
+    for figures in measured["stages"]["horizons"].values():
+        assert {figure["samples"] for figure in figures["us"].values()} == {25}
+
+
+def test_every_installed_solver_solves_the_qps_of_the_flight(measured: dict[str, Any]) -> None:
+    for solvers in measured["stages"]["solvers"].values():
+        assert set(solvers) == set(installed_solvers())
+        assert all(figure["p50"] > 0.0 for figure in solvers.values())
+        assert solvers["daqp"]["solved"] == 1.0
+
+
+def test_the_link_is_measured_with_the_datagrams_of_the_flight(measured: dict[str, Any]) -> None:
+    link = measured["stages"]["link"]
+    assert set(link) == {*(stage.name for stage in stages.LINK_STAGES), stages.EXCHANGE}
+    assert all(figure["p50"] > 0.0 for figure in link.values())
+
+
+def test_what_was_timed_is_as_it_was_before(measured: dict[str, Any]) -> None:
+    del measured
+    assert not [stage for stage in stages.STAGES if getattr(stage.owner, stage.method).__name__ == "timed"]
+
+
+def test_flies_beside_the_peer_in_every_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(peer, "installed", lambda: True)
+    monkeypatch.setattr(peer, "real_time_factor", lambda _frames_hz, _duration_s: 2.0)
+    flights = figures_of(tmp_path / "flights.json", "--only", "flights")["flights"]
+    assert {int(frames_hz) for frames_hz in flights["rates_hz"]} == set(speed.CONTROL_S)
+    for rate in flights["rates_hz"].values():
+        assert set(rate) == {"memory", "udp", "rotorpy", "memory / rotorpy", "udp / rotorpy"}
+        assert rate["udp / rotorpy"]["median"] == pytest.approx(rate["udp"]["median"] / 2.0)
+    assert "memory / rotorpy" in capsys.readouterr().out
+
+
+def test_a_missing_peer_is_said_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(peer, "installed", lambda: False)
+    flights = figures_of(tmp_path / "flights.json", "--only", "flights")["flights"]
+    assert all(set(rate) == {"memory", "udp"} for rate in flights["rates_hz"].values())
+    assert capsys.readouterr().err == f"colibri: {peer.MISSING}\n"
+    assert "colibri-sitl[bench]" in peer.MISSING
+
+
+@pytest.mark.skipif(not peer.installed(), reason="needs RotorPy, which the lock leaves out")
+def test_the_peer_flies() -> None:
+    assert peer.real_time_factor(100, 0.2) > 0.0
+
+
+def test_the_spiral_flies_through_the_whole_command(tmp_path: Path) -> None:
+    thesis = figures_of(tmp_path / "thesis.json", "--only", "thesis")["thesis"]
+    assert {name.partition(":")[0] for name in thesis} == set(speed.THESIS_LINKS)
+    assert all(0.0 < figure["min"] <= figure["median"] <= figure["max"] for figure in thesis.values())
+
+
+def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 1.0)
+    profile = load_profile(bench.PROFILE)
+    monkeypatch.setattr(peer, "real_time_factor", lambda *_: 1.0)
+    speed.rate_figures(profile, tmp_path, 0.1, 2, told.append, beside=True)
+    assert len(told) == bench.parts(["flights"], 2, beside=True)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--only", "nothing"),
+        ("--runs", "0"),
+        ("--duration", "0"),
+        ("--duration", "1000000"),
+        ("--out", "/nowhere/figures.json"),
+    ],
+)
+def test_bad_input_is_one_line(options: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["bench", *options])
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert said.startswith("colibri: error: ")
+    assert said.count("\n") == 1
+
+
+def test_a_profile_written_is_the_profile_read(tmp_path: Path) -> None:
+    profile = with_intervals(with_moves(load_profile("flight"), (1, 2)), frame_s=0.002, control_s=0.008)
+    assert plan_of(profile, tmp_path, 1.0, "memory").profile == profile
+
+
+def test_toml_leaves_out_what_is_not_given() -> None:
+    table = {"a": 1, "b": None, "c": {"d": [1.5, 1e-8], "e": {"f": 'g "h"'}}}
+    assert tomllib.loads("\n".join(toml_lines(table))) == {"a": 1, "c": {"d": [1.5, 1e-8], "e": {"f": 'g "h"'}}}
+
+
+def test_the_flight_profile_is_measured_at_its_own_horizon() -> None:
+    moves = load_profile(bench.PROFILE).table("lpv-mpc")["attitude"]["moves"]
+    assert tuple(msgspec.convert(moves, list[int])) == stages.MOVES[stages.PROFILE_HORIZON]
