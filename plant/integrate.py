@@ -6,6 +6,7 @@ from typing import Literal, TypeAlias
 from warnings import catch_warnings, simplefilter
 
 from plant.dynamics import Array, FourOf, Packed, close, derivative, held, runge_kutta_4
+from plant.scenario import IntegrationError
 
 Solver: TypeAlias = Callable[[Array, FourOf, Packed, float], tuple[Array, float]]
 """(x, commanded rotor speeds, parameters, duration in s) -> x after it, the battery's voltage; see `plant.dynamics`."""
@@ -16,10 +17,6 @@ RELATIVE_TOLERANCE = 1e-9
 ABSOLUTE_TOLERANCE = 1e-12
 _MOST_STEPS = 10_000
 _ROUNDING = 1e-6
-
-
-class IntegrationError(Exception):
-    """The state cannot be integrated any further."""
 
 
 def fixed_step(x: Array, target: FourOf, parameters: Packed, duration_s: float) -> tuple[Array, float]:

@@ -10,8 +10,7 @@ from mavlink.link import LinkError, UdpLink
 from mavlink.lockstep import Outgoing, PlantEnd
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Progress, Status, Stop, TlogWriter, fail
 from plant.dynamics import STATE
-from plant.integrate import IntegrationError
-from plant.scenario import Start
+from plant.scenario import IntegrationError, Start
 from plant.vehicle import VehicleError, load_vehicle
 from plant.world import Physics, World, starting_world, state_frame
 

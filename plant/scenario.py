@@ -1,16 +1,25 @@
-"""The world that a flight begins in, as the command line says it: wind, parts left out of the model, start."""
+"""The world that a flight begins in, as the command line says it: wind, parts left out of the model, start.
+
+Nothing here needs what is compiled: who only plans a flight, or starts the plant, does not wait for it.
+"""
 
 from argparse import ArgumentTypeError
 from math import cos, radians, sin
 from typing import NamedTuple
 
-from mavlink.frames import Quaternion, Vector, earth_from_body, quaternion_from_euler
+from mavlink.frames import Quaternion, Vector, earth_from_body, quaternion_from_euler, rotation_matrix
 from mavlink.process import ArgumentParser, number
+from plant.vehicle import Vehicle, VehicleError
 
 PARTS = ("rotor-lag", "drag", "ground", "battery")
 """What `Vehicle.without` can leave out."""
 
 _FULL_TURN_DEG = 360.0
+_DEEPEST_START_M = 0.01
+
+
+class IntegrationError(Exception):
+    """The state cannot be integrated any further."""
 
 
 class Wind(NamedTuple):
@@ -85,6 +94,23 @@ class Start(NamedTuple):
     def __str__(self) -> str:
         """Return what `start_values` reads back."""
         return ",".join(f"{key}={value!r}" for key, value in self._asdict().items())
+
+
+def check_start(start: Start, vehicle: Vehicle) -> None:
+    """Check that a vehicle can start like that.
+
+    Raises:
+        VehicleError: Its rotors do not turn so fast, or it would start in the ground.
+    """
+    if not 0.0 <= vehicle.speed_from_rpm(start.rotors) <= vehicle.rotors.max_speed:
+        raise VehicleError(f"the rotors of {vehicle.name} cannot start at {start.rotors:g} rpm")
+    if vehicle.ground is None:
+        return
+    _, _, up = rotation_matrix(start.attitude)
+    lowest_m = start.z + float((vehicle.ground.contacts_m(vehicle.rotors) @ up).min())
+    depth_m = vehicle.ground_height_m - lowest_m
+    if depth_m > _DEEPEST_START_M:
+        raise VehicleError(f"{vehicle.name} would start {depth_m:.3g} m below the ground: start it higher")
 
 
 def wind(text: str) -> Wind:

@@ -5,13 +5,13 @@ from math import isfinite, nan
 
 import numpy as np
 
-from mavlink.frames import Vector, earth_from_body, normalized, rotation_matrix
+from mavlink.frames import Vector, earth_from_body, normalized
 from mavlink.hil import ActuatorCommand, StateFrame
 from plant.dynamics import CHARGE, ROTORS, FourOf, attitude_of, packed
-from plant.integrate import IntegrationError, Integrator, solver
+from plant.integrate import Integrator, solver
 from plant.parameters import parameters_of
-from plant.scenario import Start
-from plant.vehicle import Vehicle, VehicleError
+from plant.scenario import IntegrationError, Start, check_start
+from plant.vehicle import Vehicle
 
 State = tuple[float, ...]
 
@@ -19,7 +19,6 @@ CALM: Vector = (0.0, 0.0, 0.0)
 _STANDING: FourOf = (0.0, 0.0, 0.0, 0.0)
 _LEVEL: State = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _MOMENT_S = 1e-3
-_DEEPEST_START_M = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +46,8 @@ def starting_world(start: Start, vehicle: Vehicle) -> World:
     Raises:
         VehicleError: The vehicle cannot start like that.
     """
-    _check_height(start, vehicle)
-    speed = _start_speed(start, vehicle)
+    check_start(start, vehicle)
+    speed = vehicle.speed_from_rpm(start.rotors)
     state = (*start.velocity_flu_m_s, start.p, start.q, start.r, start.x, start.y, start.z, *start.attitude)
     return World(0, state, (speed, speed, speed, speed))
 
@@ -97,20 +96,3 @@ def state_frame(world: World) -> StateFrame:
     u, v, w, p, q, r, x, y, z = world.state[:9]
     attitude = attitude_of(world.state)
     return StateFrame(world.time_us, (x, y, z), earth_from_body(attitude, (u, v, w)), attitude, (p, q, r))
-
-
-def _start_speed(start: Start, vehicle: Vehicle) -> float:
-    speed = vehicle.speed_from_rpm(start.rotors)
-    if not 0.0 <= speed <= vehicle.rotors.max_speed:
-        raise VehicleError(f"the rotors of {vehicle.name} cannot start at {start.rotors:g} rpm")
-    return speed
-
-
-def _check_height(start: Start, vehicle: Vehicle) -> None:
-    if vehicle.ground is None:
-        return
-    _, _, up = rotation_matrix(start.attitude)
-    lowest_m = start.z + float((vehicle.ground.contacts_m(vehicle.rotors) @ up).min())
-    depth_m = vehicle.ground_height_m - lowest_m
-    if depth_m > _DEEPEST_START_M:
-        raise VehicleError(f"{vehicle.name} would start {depth_m:.3g} m below the ground: start it higher")

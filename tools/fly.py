@@ -11,9 +11,8 @@ from autopilot.profile import ProfileError
 from autopilot.qp import SolverError
 from autopilot.tracks import TrackError
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, fail
-from plant.integrate import IntegrationError
+from plant.scenario import IntegrationError
 from plant.vehicle import VehicleError
-from tools.local import fly_locally
 from tools.plan import FlightPlan
 from tools.processes import FlightError, fly_processes
 from tools.recording import Recording, RecordingError, Summary, read_recording, write_recording
@@ -66,7 +65,11 @@ def keep_flight(plan: FlightPlan, summary: Summary) -> tuple[Recording, Report]:
 
 
 def _flight(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
-    return fly_processes(plan, progress) if plan.link == "udp" else fly_locally(plan, progress)
+    if plan.link == "udp":
+        return fly_processes(plan, progress)
+    from tools.local import fly_locally
+
+    return fly_locally(plan, progress)
 
 
 def prepare(out: Path) -> None:

@@ -8,9 +8,8 @@ from pathlib import Path
 from autopilot.planner import start_yaw
 from autopilot.profile import Profile, load_profile
 from autopilot.tracks import DURATION_S, Track, track
-from plant.scenario import NO_WIND, Start, Wind
+from plant.scenario import NO_WIND, Start, Wind, check_start
 from plant.vehicle import Vehicle, load_vehicle
-from plant.world import starting_world
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +71,7 @@ class FlightPlan:
         plant_vehicle_name = args.plant_vehicle or vehicle_name
         plant_vehicle = load_vehicle(plant_vehicle_name).without(args.without)
         start = _start_of(profile, to_fly)._replace(**args.start)
-        starting_world(start, plant_vehicle)
+        check_start(start, plant_vehicle)
         return cls(
             track_name=args.track,
             profile_name=args.profile,

@@ -15,9 +15,8 @@ from autopilot.process import FALLBACK_CODES, STATUS_CODES
 from autopilot.profile import Profile
 from autopilot.qp import QpStatus
 from autopilot.tracks import DURATION_S
-from plant.integrate import IntegrationError
 from plant.process import TRUTH_COLUMNS
-from plant.scenario import NO_WIND, Wind
+from plant.scenario import NO_WIND, IntegrationError, Wind
 from plant.vehicle import Vehicle
 from tools.local import fly_locally
 from tools.plan import FlightPlan

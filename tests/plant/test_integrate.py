@@ -9,9 +9,9 @@ import pytest
 
 from mavlink.hil import ActuatorCommand
 from plant.dynamics import Array, packed, runge_kutta_4
-from plant.integrate import IntegrationError, Integrator, dormand_prince, fixed_step, solver
+from plant.integrate import Integrator, dormand_prince, fixed_step, solver
 from plant.parameters import parameters_of
-from plant.scenario import Start
+from plant.scenario import IntegrationError, Start
 from plant.vehicle import load_vehicle
 from plant.world import CALM, Physics, World
 from tests.plant.flights import command, flight, hummingbird, states
