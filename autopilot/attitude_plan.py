@@ -130,7 +130,8 @@ class AttitudeMpc:
         self._H[moved:, moved:] = settings.slack_weight * np.eye(constrained.SLACKS)
         self._f[moved:] = settings.slack_weight
         self._G, self._h = np.zeros((rows, n)), np.zeros(rows)
-        largest = np.array(settings.largest_increment_n_m * len(settings.moves))
+        self._largest_increment = np.array(settings.largest_increment_n_m)
+        largest = np.concatenate([self._largest_increment] * len(settings.moves))
         self._lower = np.concatenate([-largest, np.zeros(constrained.SLACKS)])
         self._upper = np.concatenate([largest, np.full(constrained.SLACKS, _MOST_SLACK)])
 
@@ -170,7 +171,12 @@ class AttitudeMpc:
         )
 
     def condense(self, now: Situation, target: Target) -> Qp:
-        """Condense what was predicted to a QP; it lies in arrays that the next one overwrites."""
+        """Condense what was predicted to a QP; it lies in arrays that the next one overwrites.
+
+        The first move may always take back the moments last commanded, however large a fallback left them: without
+        them the rotors make the thrust alone, so that the hard limits can always be kept.
+        """
+        constrained.limit_first_move(now.u, self._largest_increment, self._lower, self._upper)
         constrained.quadratic_cost(
             self._responses,
             target.angles,

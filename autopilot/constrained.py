@@ -92,6 +92,21 @@ def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f:
 
 
 @compiled
+def limit_first_move(u: Array, largest: Array, lower: Array, upper: Array) -> None:
+    """Bound the first increments by `largest`, but let them take back all of u.
+
+    Args:
+        u: Moments last commanded, N m, (3,).
+        largest: Largest increments, N m, (3,).
+        lower: Of all variables, (n,); the first three are filled.
+        upper: The same.
+    """
+    for i in range(INPUTS):
+        lower[i] = min(-largest[i], -u[i])
+        upper[i] = max(largest[i], -u[i])
+
+
+@compiled
 def limit_rotors(
     rotors_from_moments: Array,
     rotors_from_thrust: Array,

@@ -104,16 +104,12 @@ class Autopilot:
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
+    """Return the longest interval of whole milliseconds that divides the control interval, as short as asked for."""
     wanted_s = profile.simulation.frame_interval_s
     if wanted_s is None:
         return control_interval_us
-    wanted_us = round(wanted_s * 1e6)
-    if wanted_us % 1000 or control_interval_us % wanted_us:
-        raise ProfileError(
-            f"profile {profile.name}: simulation.frame_interval_s: must be whole milliseconds and divide the control "
-            f"interval of {control_interval_us / 1e6:g} s"
-        )
-    return wanted_us
+    control_ms, wanted_ms = control_interval_us // 1000, round(wanted_s * 1e6) // 1000
+    return 1000 * max(ms for ms in range(1, control_ms + 1) if control_ms % ms == 0 and ms <= wanted_ms)
 
 
 def _build(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:

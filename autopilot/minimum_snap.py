@@ -12,7 +12,6 @@ from math import factorial, perm
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from autopilot.jet import Array, Jet
 
@@ -100,6 +99,8 @@ def _elements(durations: Array, stiffness: Array) -> Array:
 def _free_derivatives(elements: Array, points: Array) -> Array:
     """Return the derivatives at the inner points where the cost is least, (n - 2, order - 1, axes)."""
     before, after = elements[:-1], elements[1:]
+    from scipy.linalg import cho_solve_banded, cholesky_banded  # slow to load: most tracks do without
+
     pull = (
         before[:, 1, 1:, 0, :1] * points[:-2, None]
         + (before[:, 1, 1:, 1, :1] + after[:, 0, 1:, 0, :1]) * points[1:-1, None]

@@ -26,7 +26,7 @@ class SimulationSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only
     rotor_speed_rpm: Annotated[float, msgspec.Meta(ge=0.0)]
     """Of every rotor, in turns per minute."""
     frame_interval_s: ControlInterval | None = None
-    """Between two frames of the plant; the control interval where it is not given."""
+    """Between two frames of the plant at most: they divide the control interval. Without it, that interval."""
 
 
 class Profile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):

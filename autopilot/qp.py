@@ -2,13 +2,14 @@
 
 from enum import StrEnum
 from functools import cache
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
-import qpsolvers
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -73,6 +74,9 @@ class QpSolver:
             SolverError: There is no such solver, or it is not installed.
         """
         check_solver(name)
+        import qpsolvers  # slow to load: who only reads a result does without
+
+        self._qpsolvers = qpsolvers
         self._name = name
         self._sparse = name in qpsolvers.sparse_solvers and name not in qpsolvers.dense_solvers
         self._options = _options(name, tolerance, max_iterations)
@@ -83,9 +87,9 @@ class QpSolver:
         try:
             with catch_warnings():
                 simplefilter("ignore")
-                problem = qpsolvers.Problem(P, qp.f, G, qp.h, lb=qp.lower, ub=qp.upper)
-                solution = qpsolvers.solve_problem(problem, self._name, **self._options)
-        except (qpsolvers.QPError, ArithmeticError, ValueError):
+                problem = self._qpsolvers.Problem(P, qp.f, G, qp.h, lb=qp.lower, ub=qp.upper)
+                solution = self._qpsolvers.solve_problem(problem, self._name, **self._options)
+        except (self._qpsolvers.QPError, ArithmeticError, ValueError):
             return QpResult(QpStatus.NOT_ACCURATE, None)
         if not solution.found or solution.x is None:
             return QpResult(why_none(qp), None)
@@ -131,6 +135,8 @@ def why_none(qp: Qp) -> QpStatus:
 
 def installed_solvers() -> list[str]:
     """Return the names of the QP solvers that can be used here."""
+    import qpsolvers
+
     return sorted(qpsolvers.available_solvers)
 
 
@@ -140,6 +146,8 @@ def check_solver(name: str) -> None:
     Raises:
         SolverError: There is no such solver, or it is not installed.
     """
+    import qpsolvers
+
     if name in qpsolvers.available_solvers:
         return
     if name not in _known_solvers():
@@ -154,7 +162,7 @@ def box(n: int) -> Array:
     return np.vstack([np.eye(n), -np.eye(n)])
 
 
-def _filled(role: str, matrix: Array) -> csc_matrix:
+def _filled(role: str, matrix: Array) -> "csc_matrix":
     """Return a matrix as CSC: to build one anew costs five times what Clarabel takes, so the pattern is kept."""
     sparse = _full(role, *matrix.shape)
     np.asarray(sparse.data)[:] = matrix.ravel(order="F")
@@ -162,13 +170,17 @@ def _filled(role: str, matrix: Array) -> csc_matrix:
 
 
 @cache
-def _full(role: str, rows: int, columns: int) -> csc_matrix:
+def _full(role: str, rows: int, columns: int) -> "csc_matrix":
+    from scipy.sparse import csc_matrix
+
     del role  # two matrices of one shape are two matrices
     return csc_matrix(np.ones((rows, columns)))
 
 
 @cache
 def _known_solvers() -> frozenset[str]:
+    import qpsolvers
+
     suffix = "_solve_qp"
     return frozenset(entry.removesuffix(suffix) for entry in dir(qpsolvers) if entry.endswith(suffix))
 

@@ -30,6 +30,10 @@ def main(argv: list[str] | None = None) -> int:
             from tools.compare import compare
 
             return compare(args)
+        if args.command == "study":
+            from tools.studies import study
+
+            return study(args)
         from tools.bench import bench
 
         return bench(args)
@@ -43,6 +47,7 @@ def _parser() -> ArgumentParser:
     _add_fly(commands.add_parser("fly", help="fly a track and report how well it went"))
     _add_figures(commands.add_parser("figures", help="fly all that the thesis shows and draw its figures"))
     _add_compare(commands.add_parser("compare", help="fly several controllers on several tracks, side by side"))
+    _add_study(commands.add_parser("study", help="fly what shows how far profile flight reaches, and draw it"))
     _add_bench(commands.add_parser("bench", help="measure how fast it flies"))
     return parser
 
@@ -107,6 +112,24 @@ def _add_compare(parser: ArgumentParser) -> None:
         default=Path("out/compare"),
         metavar="DIR",
         help="folder for the tables (default %(default)s)",
+    )
+    add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def _add_study(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="tracks, speed, recovery, robustness, limits or scheduling (default: all of them)",
+    )
+    add(
+        "--out",
+        type=Path,
+        default=Path("out/study"),
+        metavar="DIR",
+        help="folder for figures and tables (default %(default)s)",
     )
     add("--quiet", action="store_true", help="say nothing but errors")
 

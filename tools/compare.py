@@ -1,8 +1,6 @@
 """`colibri compare`: controllers × tracks in one table, on the terminal, as Markdown and as CSV."""
 
 import argparse
-import csv
-from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
@@ -17,6 +15,7 @@ from tools.local import fly_locally
 from tools.plan import FlightPlan
 from tools.report import SETTLED_AFTER_S
 from tools.side_by_side import side_by_side
+from tools.tables import write_table
 
 DEFAULT_PROFILES = ("thesis", "thesis-euler", "thesis:global-lpv-mpc", "se3")
 COLUMNS = ("controller", "track", "RMS (m)", "maximum (m)", "effort (N m)", "QP p50 (µs)", "QP p99 (µs)")
@@ -51,8 +50,7 @@ def compare(args: argparse.Namespace) -> int:
         fail(str(error))
     make_folder(args.out)
     rows = side_by_side(row_of, jobs, "flights", quiet=args.quiet, worth=lambda _job: 1)
-    (args.out / "compare.md").write_text(markdown(rows), encoding="utf-8")
-    (args.out / "compare.csv").write_text(comma_separated(rows), encoding="utf-8")
+    write_table(args.out / "compare", COLUMNS, rows, names=2)
     if not args.quiet:
         _print(rows, args.out)
     return 0
@@ -67,19 +65,6 @@ def row_of(job: Job) -> tuple[str, ...]:
     prepare(plan.out)
     _, figures = keep_flight(plan, fly_locally(plan, lambda _sim_time_s: None))
     return (job.contender, job.track, *_cells(figures))
-
-
-def markdown(rows: list[tuple[str, ...]]) -> str:
-    """Return the rows as a Markdown table."""
-    lines = [COLUMNS, ("---", "---", *["---:"] * (len(COLUMNS) - 2)), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
-
-
-def comma_separated(rows: list[tuple[str, ...]]) -> str:
-    """Return the rows as CSV; a track with several options is quoted."""
-    text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows([COLUMNS, *rows])
-    return text.getvalue()
 
 
 def folder_name(track: str) -> str:

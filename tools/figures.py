@@ -25,7 +25,9 @@ ATTITUDE = ("phi", "theta", "psi")
 START_S = 10.0
 
 _WIDTH_IN, _DPI = 8.6, 150
-_LEFT_IN, _RIGHT_IN, _TOP_IN, _BOTTOM_IN = 0.85, 0.25, 0.8, 0.5
+TOP_IN = 0.8
+"""Room above the axes for a title and one row of a legend."""
+_LEFT_IN, _RIGHT_IN, _BOTTOM_IN = 0.85, 0.25, 0.5
 _ROW_IN, _ROW_GAP_IN, _COLUMN_GAP_IN = 1.4, 0.2, 0.95
 _TITLE_IN, _LABEL_IN = 0.45, 0.6
 _TIME_MARGIN = 0.015
@@ -149,13 +151,13 @@ def beside(panels: Iterable[Panel], span_s: tuple[float, float] | None) -> tuple
 def draw_times(series: Series, description: TimeFigure, title: str) -> Figure:
     """Draw panels over time; the legend stands above them."""
     labelled = any(curve.label for row in description.rows for panel in row for curve in panel.curves)
-    figure, grid = _grid(len(description.rows), len(description.rows[0]), _TOP_IN if labelled else _TITLE_IN)
+    figure, grid = axes_grid(len(description.rows), len(description.rows[0]), TOP_IN if labelled else _TITLE_IN)
     for axes_row, panels in zip(grid, description.rows, strict=True):
         for axes, panel in zip(axes_row, panels, strict=True):
             _draw_panel(axes, series, panel)
     for axes in grid[-1]:
         axes.set_xlabel("t (s)")
-    _head(figure, title)
+    put_head(figure, title)
     return figure
 
 
@@ -165,11 +167,11 @@ def draw_trajectory(series: Series, title: str) -> Figure:
     # Depth sorting would draw the reference over the path in places.
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
     figure.subplots_adjust(left=0.0, right=0.97, bottom=0.03, top=0.93)
-    axes.plot(*(series[name] for name in POSITION_REFERENCE), label="reference", **_line(REFERENCE))
-    axes.plot(*(series[name] for name in POSITION), label="flown", **_line(FLOWN))
+    axes.plot(*(series[name] for name in POSITION_REFERENCE), label="reference", **line_style(REFERENCE))
+    axes.plot(*(series[name] for name in POSITION), label="flown", **line_style(FLOWN))
     axes.plot(*(series[name][:1] for name in POSITION), "o", label="start", color=START_COLOR, markersize=8)
     to_scale = _scale(axes)
-    _head(figure, title if to_scale else f"{title}, axes not to scale")
+    put_head(figure, title if to_scale else f"{title}, axes not to scale")
     return figure
 
 
@@ -209,9 +211,12 @@ def _error_panels(series: Series) -> list[Panel]:
     return [Panel("distance (m)", distance, from_zero=True), Panel("error (m)", axes)]
 
 
-def _grid(rows: int, columns: int, top_in: float) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure with axes that share the time of their column. Fixed margins draw twice as fast as a layout."""
-    height_in = top_in + rows * _ROW_IN + (rows - 1) * _ROW_GAP_IN + _BOTTOM_IN
+def axes_grid(rows: int, columns: int, top_in: float, row_in: float = _ROW_IN) -> tuple[Figure, list[list[Axes]]]:
+    """Return a figure with axes that share the abscissa of their column.
+
+    Fixed margins draw twice as fast as a layout.
+    """
+    height_in = top_in + rows * row_in + (rows - 1) * _ROW_GAP_IN + _BOTTOM_IN
     figure = Figure(figsize=(_WIDTH_IN, height_in), dpi=_DPI)
     column_in = (_WIDTH_IN - _LEFT_IN - _RIGHT_IN - (columns - 1) * _COLUMN_GAP_IN) / columns
     grid = figure.subplots(rows, columns, sharex="col", squeeze=False)
@@ -221,7 +226,7 @@ def _grid(rows: int, columns: int, top_in: float) -> tuple[Figure, list[list[Axe
         bottom=_BOTTOM_IN / height_in,
         top=1.0 - top_in / height_in,
         wspace=_COLUMN_GAP_IN / column_in,
-        hspace=_ROW_GAP_IN / _ROW_IN,
+        hspace=_ROW_GAP_IN / row_in,
     )
     return figure, [list(axes_row) for axes_row in grid]
 
@@ -232,20 +237,20 @@ def _draw_panel(axes: Axes, series: Series, panel: Panel) -> None:
     shown = (t >= begin_s) & (t <= end_s)
     for curve in panel.curves:
         steps = "steps-pre" if curve.held else "default"
-        axes.plot(t[shown], series[curve.series][shown], label=curve.label, drawstyle=steps, **_line(curve.style))
+        axes.plot(t[shown], series[curve.series][shown], label=curve.label, drawstyle=steps, **line_style(curve.style))
     margin_s = _TIME_MARGIN * (end_s - begin_s)
     axes.set_xlim(begin_s - margin_s, end_s + margin_s)
     axes.set_ylabel(panel.quantity)
     axes.yaxis.set_label_coords(-_LABEL_IN / _width_in(axes), 0.5)
     axes.grid(color="#DDDDDD", linewidth=0.6)
-    axes.yaxis.set_major_locator(_ticks(6))
+    axes.yaxis.set_major_locator(round_ticks(6))
     if np.ptp(axes.dataLim.intervaly) < _NOTHING:
         axes.set_ylim(-1.0, 1.0)  # otherwise rounding errors fill the panel
     if panel.from_zero:
         axes.set_ylim(0.0, 1.1 * axes.dataLim.y1)
 
 
-def _ticks(intervals: int) -> MaxNLocator:
+def round_ticks(intervals: int) -> MaxNLocator:
     """Return a locator of round numbers, which take less room than those between them."""
     return MaxNLocator(intervals, steps=[1, 2, 5, 10])
 
@@ -254,14 +259,18 @@ def _width_in(axes: Axes) -> float:
     return axes.get_position().width * _WIDTH_IN
 
 
-def _line(style: Style) -> dict[str, Any]:
+def line_style(style: Style) -> dict[str, Any]:
+    """Return the arguments of matplotlib's `plot` that draw a line so."""
     # Wide lines would otherwise reach past their first and last sample.
     ends = {"solid_capstyle": "butt"}
     return {"color": style.color, "linewidth": style.width_pt, "linestyle": style.dashes} | ends
 
 
-def _head(figure: Figure, title: str) -> None:
-    """Put title and legend above the axes, where they hide no data; each label once."""
+def put_head(figure: Figure, title: str, columns: int | None = None) -> None:
+    """Put title and legend, in one row or in so many columns, above the axes, where they hide no data; each label once.
+
+    Legends fill column by column.
+    """
     pairs = (axes.get_legend_handles_labels() for axes in figure.axes)
     labelled = {label: handle for handles, labels in pairs for label, handle in zip(labels, handles, strict=True)}
     height_in = figure.get_figheight()
@@ -273,7 +282,7 @@ def _head(figure: Figure, title: str) -> None:
         labelled.keys(),
         loc="upper left",
         bbox_to_anchor=(0.2 / _WIDTH_IN, 1.0 - 0.38 / height_in),
-        ncols=len(labelled),
+        ncols=columns or len(labelled),
         frameon=False,
         borderaxespad=0.0,
     )
@@ -289,6 +298,6 @@ def _scale(axes: Any) -> bool:
     axes.zaxis.set_tick_params(pad=18 if tall else 8)
     for name, axis, length in zip(POSITION, (axes.xaxis, axes.yaxis, axes.zaxis), lengths, strict=True):
         axis.set_label_text(f"{name} (m)")
-        axis.set_major_locator(_ticks(3 if length < 0.7 else 6))
+        axis.set_major_locator(round_ticks(3 if length < 0.7 else 6))
         axis.labelpad = 32.0 if tall and name == "z" else 18.0
     return bool(ranges.min() >= _FLATTEST)

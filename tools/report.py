@@ -17,6 +17,7 @@ Array: TypeAlias = NDArray[np.float64]
 Report: TypeAlias = dict[str, Any]
 
 SETTLED_AFTER_S = 20.0
+_SMALL_M = 0.01
 
 
 def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
@@ -37,6 +38,9 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
         "vehicle": plan.vehicle_name,
         "plant_vehicle": plan.plant_vehicle_name,
         "integrator": plan.integrator,
+        "wind": str(plan.wind),
+        "without": list(plan.without),
+        "start": plan.start._asdict(),
         "sim_time_s": sim_time_s,
         "wall_time_s": summary.wall_time_s,
         "real_time_factor": sim_time_s / summary.wall_time_s,
@@ -67,6 +71,7 @@ def write_report(figures: Report, path: Path) -> None:
 def print_report(figures: Report, out: Path) -> None:
     """Show the report as a table on standard output."""
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     def times(name: str) -> str:
@@ -74,11 +79,12 @@ def print_report(figures: Report, out: Path) -> None:
 
     settled = figures["rmse_after_20s_m"]
     fallbacks = [f"{count} {name}" for name, count in figures["fallbacks"].items() if count]
-    table = Table(title=f"{figures['track']}, profile {figures['profile']}", show_header=False, title_justify="left")
+    title = escape(f"{figures['track']}, profile {figures['profile']}")
+    table = Table(title=title, show_header=False, title_justify="left")
     rows = {
-        "position error, RMS": f"{figures['rmse_m']:.4f} m",
-        f"position error, RMS after {SETTLED_AFTER_S:.0f} s": "-" if settled is None else f"{settled:.4f} m",
-        "position error, maximum": f"{figures['max_error_m']:.4f} m",
+        "position error, RMS": length(figures["rmse_m"]),
+        f"position error, RMS after {SETTLED_AFTER_S:.0f} s": "-" if settled is None else length(settled),
+        "position error, maximum": length(figures["max_error_m"]),
         "QP solve time, p50 / p99": times("solve_time_us"),
         "control step, p50 / p99": times("control_step_us"),
         "flown": f"{figures['sim_time_s']:.1f} s in {figures['wall_time_s']:.2f} s",
@@ -92,6 +98,11 @@ def print_report(figures: Report, out: Path) -> None:
     for name, value in rows.items():
         table.add_row(name, value)
     Console().print(table)
+
+
+def length(metres: float) -> str:
+    """Return a length as a person reads it: small ones in mm."""
+    return f"{metres:.4f} m" if metres >= _SMALL_M else f"{1e3 * metres:.3f} mm"
 
 
 def _counts(codes: NDArray[np.int64], names: dict[str, int]) -> dict[str, int]:

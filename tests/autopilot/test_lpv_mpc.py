@@ -122,6 +122,17 @@ def test_the_plan_itself_respects_the_rotors(fastest: float) -> None:
     assert bound > 10
 
 
+@pytest.mark.parametrize("u", [(3.0, 0.0, 0.0), (-2.0, 2.0, 0.5), (0.0, 0.0, -1.0)])
+def test_whatever_moments_a_fallback_left_the_next_qp_can_be_solved(u: tuple[float, float, float]) -> None:
+    """Moments that no rotor could make, further from what one can than the largest increment."""
+    controller, planner = build()
+    memory = controller.initial(VEHICLE.hover_speed)._replace(moments=np.array(u))
+    for thrust_speed in (100.0, VEHICLE.hover_speed, 800.0):
+        speeds = np.full(4, thrust_speed / VEHICLE.rotors.max_speed)
+        _, decision = controller.step(memory._replace(speeds=speeds), 0, turned(20, -30), planner.horizon(0))
+        assert decision.diagnostics.qp_status is QpStatus.SOLVED
+
+
 def test_commands_within_the_plans_limits_are_never_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     """The mixer's own clipping has nothing to do where a plan was had."""
     seen: list[np.ndarray] = []

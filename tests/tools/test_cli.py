@@ -90,7 +90,7 @@ BAD_INPUT = {
     ),
     "start speed": (
         (plain("spiral"), plain("--start"), plain("rotors=9000")),
-        "the rotors of AscTec Hummingbird (thesis) cannot start at 9000 rpm",
+        "the rotors of AscTec Hummingbird cannot start at 9000 rpm",
     ),
     "start in the ground": (
         (plain("spiral"), plain("--vehicle"), plain("hummingbird"), plain("--start"), plain("z=-1")),
@@ -140,7 +140,7 @@ def test_help_says_what_a_stranger_needs(package: str) -> None:
         (["--start", "psi=nan"], "argument --start: psi: must be a number, not nan"),
         (["--start", "psi"], "argument --start: psi: must be a number, not "),
         (["--without", "air"], "argument --without: invalid choice: 'air'"),
-        (["--start", "rotors=-1"], "the rotors of AscTec Hummingbird (thesis) cannot start at -1 rpm"),
+        (["--start", "rotors=-1"], "the rotors of AscTec Hummingbird cannot start at -1 rpm"),
     ],
 )
 def test_a_plant_that_cannot_start(options: list[str], line: str) -> None:
