@@ -32,6 +32,7 @@ _MARKER = 0xFD
 _HEADER = Struct("<BBBBBBBHB")
 """Marker, payload length, two flags, sequence, system, component, message id (its low 16 bits, its high 8)."""
 _CRC_BYTES = 2
+_CRC_START = 0xFFFF
 
 
 class Message(NamedTuple):
@@ -139,8 +140,7 @@ class _Layout:
 
     def crc(self, header_and_payload: bytes) -> bytes:
         """Return the checksum behind a header and a payload."""
-        crc: int = common.x25crc(header_and_payload[1:] + self._crc_extra).crc
-        return crc.to_bytes(_CRC_BYTES, "little")
+        return _crc16(header_and_payload[1:] + self._crc_extra, _CRC_START).to_bytes(_CRC_BYTES, "little")
 
     def read(self, payload: bytes) -> Any:
         """Return the fields of a payload, of which zeros at the end, and what a later dialect added, may be missing."""
@@ -166,6 +166,15 @@ def _whole_messages(datagram: bytes) -> list[Message] | None:
         fields = layout.read(frame[_HEADER.size : -_CRC_BYTES])
         messages.append(Message(layout.name, (system, component), fields, frame))
     return messages
+
+
+def _slow_crc16(data: bytes, _start: int) -> int:
+    crc: int = common.x25crc(data).crc
+    return crc
+
+
+_crc16: Callable[[bytes, int], int] = getattr(common, "mcrf4xx", None) or _slow_crc16
+"""The compiled checksum that pymavlink found, without the object that it puts around it."""
 
 
 def _message_named(name: str) -> Any:
