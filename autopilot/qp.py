@@ -22,6 +22,9 @@ LARGEST_RESIDUAL = 1e-6
 MOST_ITERATIONS = 100_000
 
 
+_NONE = np.empty(0)
+
+
 class SolverError(Exception):
     """A solver that cannot be used; the message says what to do."""
 
@@ -74,9 +77,12 @@ class QpSolver:
             SolverError: There is no such solver, or it is not installed.
         """
         check_solver(name)
-        import qpsolvers  # slow to load: who only reads a result does without
+        import qpsolvers  # slow to load, as is what is compiled: who only reads a result does without
+
+        from autopilot.optimality import residual
 
         self._qpsolvers = qpsolvers
+        self._residual = residual
         self._name = name
         self._sparse = name in qpsolvers.sparse_solvers and name not in qpsolvers.dense_solvers
         self._options = _options(name, tolerance, max_iterations)
@@ -94,29 +100,14 @@ class QpSolver:
         if not solution.found or solution.x is None:
             return QpResult(why_none(qp), None)
         x = np.asarray(solution.x, dtype=np.float64)
-        if not np.isfinite(x).all() or not residual(qp, x, solution.z, solution.z_box) <= LARGEST_RESIDUAL:
+        lower, upper, z, z_box = map(_some, (qp.lower, qp.upper, solution.z, solution.z_box))
+        if self._residual(qp.H, qp.f, qp.G, qp.h, lower, upper, x, z, z_box) > LARGEST_RESIDUAL:
             return QpResult(QpStatus.NOT_ACCURATE, None)
         return QpResult(QpStatus.SOLVED, x)
 
 
-def residual(qp: Qp, x: Array, z: Array | None, z_box: Array | None) -> float:
-    """Return by how much a solution misses the optimality conditions: by its worst constraint, or gradient over f.
-
-    Args:
-        qp: The problem.
-        x: The solution, (n,).
-        z: Multipliers of G x <= h, (m,); None where the solver gives none: then only feasibility counts.
-        z_box: Multipliers of the bounds, (n,), negative at a lower one; None or empty without.
-    """
-    missed = float((qp.G @ x - qp.h).max(initial=0.0))
-    if qp.lower is not None and qp.upper is not None:
-        missed = max(missed, float((qp.lower - x).max()), float((x - qp.upper).max()))
-    if z is None:
-        return missed
-    gradient = qp.H @ x + qp.f + z @ qp.G
-    if z_box is not None and len(z_box):
-        gradient += z_box
-    return max(missed, float(np.abs(gradient).max()) / (1.0 + float(np.abs(qp.f).max())))
+def _some(vector: Array | None) -> Array:
+    return _NONE if vector is None else np.ascontiguousarray(vector, dtype=np.float64)
 
 
 def why_none(qp: Qp) -> QpStatus:
