@@ -91,11 +91,8 @@ class QpSolver:
         """Solve a QP."""
         P, G = (_filled("P", qp.H), _filled("G", qp.G)) if self._sparse else (qp.H, qp.G)
         try:
-            with catch_warnings():
-                simplefilter("ignore")
-                problem = self._qpsolvers.Problem(P, qp.f, G, qp.h, lb=qp.lower, ub=qp.upper)
-                solution = self._qpsolvers.solve_problem(problem, self._name, **self._options)
-        except (self._qpsolvers.QPError, ArithmeticError, ValueError):
+            solution = self._quietly(qp, P, G) if self._sparse else self._solution(qp, P, G)
+        except (self._qpsolvers.QPError, ArithmeticError, ValueError, RuntimeWarning):
             return QpResult(QpStatus.NOT_ACCURATE, None)
         if not solution.found or solution.x is None:
             return QpResult(why_none(qp), None)
@@ -104,6 +101,16 @@ class QpSolver:
         if self._residual(qp.H, qp.f, qp.G, qp.h, lower, upper, x, z, z_box) > LARGEST_RESIDUAL:
             return QpResult(QpStatus.NOT_ACCURATE, None)
         return QpResult(QpStatus.SOLVED, x)
+
+    def _solution(self, qp: Qp, P: Any, G: Any) -> Any:
+        problem = self._qpsolvers.Problem(P, qp.f, G, qp.h, lb=qp.lower, ub=qp.upper)
+        return self._qpsolvers.solve_problem(problem, self._name, **self._options)
+
+    def _quietly(self, qp: Qp, P: Any, G: Any) -> Any:
+        """Solve without a word: the sparse solvers' interfaces warn of what they do with their matrices."""
+        with catch_warnings():
+            simplefilter("ignore")
+            return self._solution(qp, P, G)
 
 
 def _some(vector: Array | None) -> Array:
