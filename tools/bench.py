@@ -45,9 +45,9 @@ def bench(args: argparse.Namespace) -> int:
             figures["flights"] = rate_figures(profile, Path(folder), args.duration, args.runs, tell, beside=beside)
         if "thesis" in wanted:
             figures["thesis"] = thesis_figures(args.runs, tell)
-    _print(figures)
     if args.out:
         _write(figures, args.out)
+    _print(figures)
     return 0
 
 
