@@ -40,6 +40,7 @@ Part = Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
 
 
 _NO_YAW = np.empty(0)
+_NOWHERE = (0.0, 0.0, 0.0)
 
 
 class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -166,6 +167,17 @@ class LpvMpc:
         self._turn = recovery.TurnGains(
             settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.fastest_rad_s
         )
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        """Load what is compiled: three steps from hover, the last of them upside down."""
+        still = np.zeros((self._samples, 3))
+        level = np.zeros(self._samples)
+        references = Horizon(still, still, still, still, still, level, level, level)
+        memory = self.initial(self._vehicle.hover_speed)
+        for attitude in ((1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)):
+            state = VehicleState(_NOWHERE, _NOWHERE, attitude, _NOWHERE, _NOWHERE)
+            memory, _ = self.step(memory, 0, state, references)
 
     def _prepare_guidance(self, settings: GuidanceSettings) -> None:
         first, second = settings.poles

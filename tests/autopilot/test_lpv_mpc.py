@@ -58,8 +58,9 @@ def failing(monkeypatch: pytest.MonkeyPatch, status: QpStatus, after: int) -> No
 def test_without_a_solution_the_plan_goes_on_then_lqr_then_descent(
     monkeypatch: pytest.MonkeyPatch, status: QpStatus
 ) -> None:
+    controller, planner = build()
     failing(monkeypatch, status, after=3)
-    decisions = steps(*build(), ON_SPIRAL, 40)
+    decisions = steps(controller, planner, ON_SPIRAL, 40)
     settings = TABLE["fallback"]
     expected = (
         [None] * 3
@@ -74,8 +75,9 @@ def test_without_a_solution_the_plan_goes_on_then_lqr_then_descent(
 
 
 def test_without_any_plan_the_lqr_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    controller, planner = build()
     failing(monkeypatch, QpStatus.TIME_OUT, after=0)
-    assert steps(*build(), ON_SPIRAL, 1)[0].diagnostics.fallback is Fallback.LQR
+    assert steps(controller, planner, ON_SPIRAL, 1)[0].diagnostics.fallback is Fallback.LQR
 
 
 def test_a_solved_qp_ends_every_fallback() -> None:
