@@ -224,7 +224,7 @@ class AttitudeMpc:
             solve_time_s=solve_time_s,
             cost=float(z @ (0.5 * (qp.H @ z) + qp.f)),
             active=Active(*active),
-            slack=float(max(z[-constrained.SLACKS :])),
+            slack=max(z[-constrained.SLACKS :].tolist()),
             predicted=states,
             planned_squared=squared,
         )

@@ -6,13 +6,11 @@ charge taken, and the rotors' top speed in proportion to V.
 
 from math import sqrt
 
-import numpy as np
-
 from autopilot.controller import Array
 from plant.vehicle import Battery, Vehicle
 
 _SECONDS_PER_HOUR = 3600.0
-_TABLE = 101
+_INTERVALS = 100
 _BISECTIONS = 40
 
 
@@ -26,8 +24,8 @@ class BatteryModel:
         efficiency = vehicle.battery.efficiency if vehicle.battery else 1.0
         self._full_power_w = drag_torque * vehicle.rad_s_per_speed_unit * vehicle.rotors.max_speed / efficiency
         if self._battery:
-            self._charges_ah = np.linspace(0.0, self._battery.capacity_ah, _TABLE)
-            self._fastest = np.array([self._balance(self._battery, charge) for charge in self._charges_ah.tolist()])
+            self._step_ah = self._battery.capacity_ah / _INTERVALS
+            self._fastest = [self._balance(self._battery, self._step_ah * point) for point in range(_INTERVALS + 1)]
 
     def charge_after(self, charge_ah: float, speeds: Array, duration_s: float) -> float:
         """Return the charge taken, Ah, after `duration_s` at rotor speeds (4,), parts of the largest."""
@@ -39,7 +37,13 @@ class BatteryModel:
 
     def fastest(self, charge_ah: float) -> float:
         """Return the speed that all rotors can keep up together once `charge_ah` is taken, in parts of the largest."""
-        return 1.0 if self._battery is None else float(np.interp(charge_ah, self._charges_ah, self._fastest))
+        if self._battery is None:
+            return 1.0
+        whole, part = divmod(charge_ah / self._step_ah, 1.0)
+        if whole >= _INTERVALS:
+            return self._fastest[-1]
+        before, after = self._fastest[int(whole)], self._fastest[int(whole) + 1]
+        return before + part * (after - before)
 
     def _balance(self, battery: Battery, charge_ah: float) -> float:
         """Find the speed, in parts of the largest, at which the voltage left is just in that proportion."""

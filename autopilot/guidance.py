@@ -5,7 +5,7 @@ that is predicted, so that thrust points right whatever yaw does. The errors ahe
 Source of the flat output to thrust direction: Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018.
 """
 
-from math import atan2, cos, sin, sqrt
+from math import atan2, cos, floor, pi, sin, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -218,6 +218,82 @@ def end_of_motion(angles: Array, inertia: Array, disturbance_n_m: Array, interva
         end[2 * i] = here[i]
         end[2 * i + 1] = body_rate[i]
         end[6 + i] = end[9 + i] = inertia[i] * body_turn[i] - disturbance_n_m[i]
+
+
+@compiled
+def yaw_ahead(yaw_rad: float, wanted: Array, planned: Array, ahead: Array) -> float:
+    """Fill `ahead` with the yaw expected at each sample; return the full turns between the yaw wanted and this, rad.
+
+    As planned, and after the plan's end, or without one, turning as the yaw that is wanted does.
+
+    Args:
+        yaw_rad: Now.
+        wanted: At each sample, rad, (n,).
+        planned: By the last plan, from now, rad, (m,), m <= n; (0,) without one.
+        ahead: (n,); is filled.
+    """
+    ahead[0] = yaw_rad
+    for n in range(1, ahead.shape[0]):
+        path = planned if n < planned.shape[0] else wanted
+        ahead[n] = ahead[n - 1] + path[n] - path[n - 1]
+    turns: float = 2.0 * pi * floor((yaw_rad - wanted[0]) / (2.0 * pi) + 0.5)
+    return turns
+
+
+@compiled
+def guide(
+    position: Array,
+    velocity: Array,
+    up: Array,
+    yaw_rad: float,
+    thrust_n: float,
+    references: tuple[Array, Array, Array, Array],
+    planned_yaw: Array,
+    errors_ahead: Array,
+    gains: tuple[float, float],
+    disturbances: Array,
+    airframe: Airframe,
+    inertia: Array,
+    limits: Limits,
+    follows: float,
+    interval_s: float,
+    forces: Array,
+    angles: Array,
+    thrusts: Array,
+    end: Array,
+) -> float:
+    """Do all that the outer loop does; return the cosine of the angle from the thrust to where it must point.
+
+    Args:
+        position: Now, m, ENU, (3,).
+        velocity: Now, m/s, ENU, (3,).
+        up: Body z axis now, ENU, (3,).
+        yaw_rad: Now.
+        thrust_n: Now, N.
+        references: Position, velocity, acceleration (N + 2, 3) and yaw (N + 2,) at each sample from now.
+        planned_yaw: See `yaw_ahead`.
+        errors_ahead: Of `error_transition`, (N + 2, 2, 2).
+        gains: k1, 1/s², and k2, 1/s.
+        disturbances: Acceleration, m/s², ENU, and moment, N m, FLU, that the model does not explain, (6,).
+        airframe: The vehicle.
+        inertia: Ix, Iy, Iz, kg m², (3,).
+        limits: Of the forces.
+        follows: Part of the way to its command that thrust goes in a step.
+        interval_s: Between two samples.
+        forces: Is filled, N, ENU, (N + 2, 3).
+        angles: Is filled, rad, (N + 2, 3).
+        thrusts: Is filled: to command at each step, N, (N,).
+        end: Is filled, see `end_of_motion`.
+    """
+    wanted_forces(position, velocity, references[:3], errors_ahead, gains, disturbances[:3], airframe, limits, forces)
+    ahead = np.empty(forces.shape[0])
+    turns = yaw_ahead(yaw_rad, references[3], planned_yaw, ahead)
+    attitudes(forces, references[3] + turns, ahead, angles)
+    thrust_commands(thrust_n, forces, up, follows, limits, thrusts)
+    end_of_motion(angles, inertia, disturbances[3:], interval_s, end)
+    force = forces[0]
+    aligned: float = (force[0] * up[0] + force[1] * up[1] + force[2] * up[2]) / length(force)
+    return aligned
 
 
 @compiled

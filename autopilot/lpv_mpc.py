@@ -29,7 +29,7 @@ from autopilot.settings import (
     interval_us,
     read_settings,
 )
-from mavlink.frames import nearest_turn, rotation_matrix
+from mavlink.frames import rotation_matrix
 from plant.vehicle import Positive, Vehicle
 
 _RECOVER_BEYOND = cos(radians(75.0))
@@ -37,6 +37,10 @@ _RECOVER_BEYOND = cos(radians(75.0))
 
 
 Part = Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
+
+
+_NO_YAW = np.empty(0)
+_NOWHERE = (0.0, 0.0, 0.0)
 
 
 class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -103,6 +107,30 @@ class Memory(NamedTuple):
     age: int
 
 
+class Course(NamedTuple):
+    """What the outer loop asks for.
+
+    Attributes:
+        force: Wanted now, N, ENU, (3,).
+        aligned: Cosine of the angle from the thrust to it.
+        target: Of the attitude.
+    """
+
+    force: Array
+    aligned: float
+    target: Target
+
+
+class Choice(NamedTuple):
+    """What was chosen: squared rotor speeds (4,) in parts of the largest, their moments, and the plan to go on with."""
+
+    squared: Array
+    moments: Array
+    plan: Plan | None
+    age: int
+    diagnostics: Diagnostics
+
+
 class LpvMpc:
     """The control law. Its predicted outputs are the states of `prediction`.
 
@@ -139,11 +167,23 @@ class LpvMpc:
         self._turn = recovery.TurnGains(
             settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.fastest_rad_s
         )
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        """Load what is compiled: three steps from hover, the last of them upside down."""
+        still = np.zeros((self._samples, 3))
+        level = np.zeros(self._samples)
+        references = Horizon(still, still, still, still, still, level, level, level)
+        memory = self.initial(self._vehicle.hover_speed)
+        for attitude in ((1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)):
+            state = VehicleState(_NOWHERE, _NOWHERE, attitude, _NOWHERE, _NOWHERE)
+            memory, _ = self.step(memory, 0, state, references)
 
     def _prepare_guidance(self, settings: GuidanceSettings) -> None:
         first, second = settings.poles
         self._gains = (first * second, -(first + second))
         self._errors_ahead = guidance.error_transition(settings.poles, self._interval_s, self._samples)
+        self._span_n = float(self._allocation[0].sum())
         self._thrust_margin = settings.thrust_margin
         self._tilt_tangent = tan(radians(settings.largest_tilt_deg))
         self._position_error_m = settings.approach_speed_m_s * self._gains[1] / self._gains[0]
@@ -165,15 +205,15 @@ class LpvMpc:
         """Decide the rotor speeds to hold until the next control sample."""
         del time_us
         rotation = np.array(rotation_matrix(state.attitude))
-        measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2]])
+        measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2].tolist()])
         estimate = self.estimate(memory, measured)
-        now = self._situation(memory, state, estimate)
-        force, target = self.position(memory, now, state, references, estimate, rotation)
-        choice = self._choose(memory, now, target, force, rotation)
+        now, thrust_n = self._situation(memory, state, estimate)
+        course = self.position(memory, now, thrust_n, state, measured, references, estimate)
+        choice = self._choose(memory, now, course, rotation)
         commands, speeds, wrench = self.mix(memory, choice.squared, now.fastest)
         charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
         after = Memory(speeds, choice.moments, wrench, measured, estimate, charge_ah, choice.plan, choice.age)
-        phi, theta, psi = target.angles[0].tolist()
+        phi, theta, psi = course.target.angles[0].tolist()
         return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), choice.diagnostics)
 
     def estimate(self, memory: Memory, measured: Array) -> Array:
@@ -201,15 +241,43 @@ class LpvMpc:
         self,
         memory: Memory,
         now: Situation,
+        thrust_n: float,
         state: VehicleState,
+        measured: Array,
         references: Horizon,
         estimate: Array,
-        rotation: Array,
-    ) -> tuple[Array, Target]:
-        """Return the force wanted now, N, ENU, (3,), and what the attitude is to reach for it and those that follow."""
-        limits = self._limits(now.fastest)
-        forces = self._forces(state, references, estimate, limits)
-        return forces[0], self._target(memory, now, references, forces, rotation, limits)
+    ) -> Course:
+        """Return where the thrust must point now, and what the attitude is to reach for it and for what follows."""
+        forces, angles = np.empty((self._samples, 3)), np.empty((self._samples, 3))
+        thrusts, end = np.empty(self._attitude.horizon), np.empty(prediction.STATES + prediction.INPUTS)
+        planned_yaw = memory.plan.states[memory.age :, prediction.PSI].copy() if memory.plan else _NO_YAW
+        aligned = guidance.guide(
+            np.array(state.position_enu_m),
+            measured[:3],
+            measured[6:],
+            float(now.x[prediction.PSI]),
+            thrust_n,
+            (
+                references.position_enu_m,
+                references.velocity_enu_m_s,
+                references.acceleration_enu_m_s2,
+                references.yaw_rad,
+            ),
+            planned_yaw,
+            self._errors_ahead,
+            self._gains,
+            estimate[6:],
+            self._airframe,
+            self._inertia,
+            self._limits(now.fastest),
+            self._lag.planned,
+            self._interval_s,
+            forces,
+            angles,
+            thrusts,
+            end,
+        )
+        return Course(forces[0], aligned, Target(angles[1:-1], end, thrusts))
 
     def mix(self, memory: Memory, squared: Array, fastest: float) -> tuple[Array, Array, Array]:
         """Return the rotors' commands (4,), their speeds a sample later (4,), and the mean wrench until then (4,).
@@ -219,14 +287,14 @@ class LpvMpc:
             squared: Squared speeds that the plan commands, in parts of the largest, (4,).
             fastest: Largest speed that can be had, in parts of the largest.
         """
-        commands = rotor_lag.lead(memory.speeds, squared, self._lag, fastest)
-        speeds = rotor_lag.follow(memory.speeds, commands, self._lag)
-        return commands, speeds, 0.5 * (self._allocation @ (memory.speeds**2 + speeds**2))
+        return rotor_lag.actuate(memory.speeds, squared, self._lag, fastest, self._allocation)
 
-    def _choose(self, memory: Memory, now: Situation, target: Target, force: Array, rotation: Array) -> "Choice":
+    def _choose(self, memory: Memory, now: Situation, course: Course, rotation: Array) -> Choice:
         """Plan; where that cannot be had, fall back."""
-        if not self._upright(force, rotation):
-            return self._recover(now, force, rotation)
+        target = course.target
+        steep = float(rotation[2, 0]) ** 2 > 1.0 - _RECOVER_BEYOND**2
+        if steep or course.aligned < _RECOVER_BEYOND:
+            return self._recover(now, course.force, rotation)
         ahead = memory.plan.states[memory.age + 1 :] if memory.plan else None
         plan, diagnostics = self._attitude.plan(now, target, ahead)
         if plan is not None:
@@ -243,80 +311,30 @@ class LpvMpc:
             return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, None, age, how)
         return self._descend(now, age, diagnostics)
 
-    def _situation(self, memory: Memory, state: VehicleState, estimate: Array) -> Situation:
+    def _situation(self, memory: Memory, state: VehicleState, estimate: Array) -> tuple[Situation, float]:
+        """Return what a plan begins with, and the thrust now, N."""
         phi, theta, psi = state.euler
         p, q, r = state.rate_flu_rad_s
-        wrench = self._allocation @ (memory.speeds * memory.speeds)
-        x = np.array([phi, p, theta, q, psi, r, *wrench[1:]])
+        thrust_n, *moments_n_m = (self._allocation @ (memory.speeds * memory.speeds)).tolist()
+        x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
         momentum, fastest = float(self._momentum @ memory.speeds), self._battery.fastest(memory.charge_ah)
-        return Situation(x, memory.moments, estimate[9:], momentum, fastest)
+        return Situation(x, memory.moments, estimate[9:], momentum, fastest), thrust_n
 
     def _limits(self, fastest: float) -> guidance.Limits:
         """Return what the outer loop may ask for while rotors turn at `fastest` (parts of the largest) at most."""
-        span_n = float(self._allocation[0].sum())
+        span_n = self._span_n
         least_n, most_n = span_n * self._lag.least**2, span_n * fastest**2
         margin_n = self._thrust_margin * (most_n - least_n)
         return guidance.Limits(self._tilt_tangent, least_n + margin_n, most_n - margin_n, self._position_error_m)
 
-    def _forces(self, state: VehicleState, references: Horizon, estimate: Array, limits: guidance.Limits) -> Array:
-        forces = np.empty((self._samples, 3))
-        guidance.wanted_forces(
-            np.array(state.position_enu_m),
-            np.array(state.velocity_enu_m_s),
-            (references.position_enu_m, references.velocity_enu_m_s, references.acceleration_enu_m_s2),
-            self._errors_ahead,
-            self._gains,
-            estimate[6:9],
-            self._airframe,
-            limits,
-            forces,
-        )
-        return forces
-
-    def _target(
-        self,
-        memory: Memory,
-        now: Situation,
-        references: Horizon,
-        forces: Array,
-        rotation: Array,
-        limits: guidance.Limits,
-    ) -> Target:
-        yaw_now = float(now.x[prediction.PSI])
-        turns = nearest_turn(float(references.yaw_rad[0]), yaw_now) - float(references.yaw_rad[0])
-        wanted = references.yaw_rad + turns
-        angles = np.empty((self._samples, 3))
-        guidance.attitudes(forces, wanted, self._yaw_ahead(memory, yaw_now, wanted), angles)
-        thrust = np.empty(self._attitude.horizon)
-        thrust_now_n = float(self._allocation[0] @ (memory.speeds * memory.speeds))
-        guidance.thrust_commands(thrust_now_n, forces, rotation[:, 2].copy(), self._lag.planned, limits, thrust)
-        end = np.empty(prediction.STATES + prediction.INPUTS)
-        guidance.end_of_motion(angles, self._inertia, now.disturbance_n_m, self._interval_s, end)
-        return Target(angles[1:-1], end, thrust)
-
-    def _yaw_ahead(self, memory: Memory, yaw_now: float, wanted: Array) -> Array:
-        """Return the yaw expected at each sample: as planned, or keeping its distance to the yaw wanted."""
-        ahead: Array = wanted - wanted[0]
-        if memory.plan is not None:
-            planned = memory.plan.states[memory.age :, prediction.PSI]
-            ahead += planned[-1] - planned[0] - ahead[len(planned) - 1]
-            ahead[: len(planned)] = planned - planned[0]
-        ahead += yaw_now
-        return ahead
-
-    def _upright(self, force: Array, rotation: Array) -> bool:
-        """Tell whether Euler angles can describe the way to where the thrust must point."""
-        aligned = float(rotation[:, 2] @ force) / guidance.length(force)
-        return aligned > _RECOVER_BEYOND and float(rotation[2, 0]) ** 2 < 1.0 - _RECOVER_BEYOND**2
-
-    def _recover(self, now: Situation, force: Array, rotation: Array) -> "Choice":
+    def _recover(self, now: Situation, force: Array, rotation: Array) -> Choice:
         """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
         direction = rotation.T @ (force / guidance.length(force))
         moments = recovery.turning_moment(direction, now.x[list(prediction.RATES)], self._inertia, self._turn)
         squared = self._mixed(max(float(force @ rotation[:, 2]), 0.0), moments, now)
         return Choice(squared, self._allocation[1:] @ squared, None, 1, Diagnostics(fallback=Fallback.RECOVERY))
 
-    def _descend(self, now: Situation, age: int, diagnostics: Diagnostics) -> "Choice":
+    def _descend(self, now: Situation, age: int, diagnostics: Diagnostics) -> Choice:
         """Level and sink, the last resort."""
         end = np.zeros(prediction.STATES + prediction.INPUTS)
         end[prediction.PSI] = now.x[prediction.PSI]
@@ -331,16 +349,6 @@ class LpvMpc:
     def _mixed(self, thrust_n: float, moments: Array, now: Situation) -> Array:
         least, most = self._lag.least**2, now.fastest**2
         return recovery.prioritised(thrust_n, moments, self._from_thrust, self._from_moments, least, most)
-
-
-class Choice(NamedTuple):
-    """What was chosen: squared rotor speeds (4,) in parts of the largest, their moments, and the plan to go on with."""
-
-    squared: Array
-    moments: Array
-    plan: Plan | None
-    age: int
-    diagnostics: Diagnostics
 
 
 def airframe_of(vehicle: Vehicle) -> guidance.Airframe:

@@ -11,7 +11,7 @@ from autopilot.qp import QpStatus, SolverError
 from autopilot.tracks import TrackError, track
 from mavlink.link import LinkError, UdpLink
 from mavlink.lockstep import AutopilotEnd
-from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Status, Stop, fail
+from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Status, Stop, fail, undisturbed
 from plant.vehicle import VehicleError, load_vehicle
 
 DECISION_COLUMNS = (
@@ -64,7 +64,8 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     log = AutopilotLog(args.out) if args.out else None
     end = AutopilotEnd(system_id=args.system_id, frame_interval_us=autopilot.frame_interval_us, now_s=perf_counter())
     try:
-        Client(link, end, status, stop, log).fly(autopilot)
+        with undisturbed():
+            Client(link, end, status, stop, log).fly(autopilot)
     except (LinkError, DecisionError) as error:
         fail(str(error), EXIT_FAILED)
     finally:

@@ -22,6 +22,9 @@ LARGEST_RESIDUAL = 1e-6
 MOST_ITERATIONS = 100_000
 
 
+_NONE = np.empty(0)
+
+
 class SolverError(Exception):
     """A solver that cannot be used; the message says what to do."""
 
@@ -74,9 +77,12 @@ class QpSolver:
             SolverError: There is no such solver, or it is not installed.
         """
         check_solver(name)
-        import qpsolvers  # slow to load: who only reads a result does without
+        import qpsolvers  # slow to load, as is what is compiled: who only reads a result does without
+
+        from autopilot.optimality import residual
 
         self._qpsolvers = qpsolvers
+        self._residual = residual
         self._name = name
         self._sparse = name in qpsolvers.sparse_solvers and name not in qpsolvers.dense_solvers
         self._options = _options(name, tolerance, max_iterations)
@@ -85,38 +91,30 @@ class QpSolver:
         """Solve a QP."""
         P, G = (_filled("P", qp.H), _filled("G", qp.G)) if self._sparse else (qp.H, qp.G)
         try:
-            with catch_warnings():
-                simplefilter("ignore")
-                problem = self._qpsolvers.Problem(P, qp.f, G, qp.h, lb=qp.lower, ub=qp.upper)
-                solution = self._qpsolvers.solve_problem(problem, self._name, **self._options)
-        except (self._qpsolvers.QPError, ArithmeticError, ValueError):
+            solution = self._quietly(qp, P, G) if self._sparse else self._solution(qp, P, G)
+        except (self._qpsolvers.QPError, ArithmeticError, ValueError, RuntimeWarning):
             return QpResult(QpStatus.NOT_ACCURATE, None)
         if not solution.found or solution.x is None:
             return QpResult(why_none(qp), None)
         x = np.asarray(solution.x, dtype=np.float64)
-        if not np.isfinite(x).all() or not residual(qp, x, solution.z, solution.z_box) <= LARGEST_RESIDUAL:
+        lower, upper, z, z_box = map(_some, (qp.lower, qp.upper, solution.z, solution.z_box))
+        if self._residual(qp.H, qp.f, qp.G, qp.h, lower, upper, x, z, z_box) > LARGEST_RESIDUAL:
             return QpResult(QpStatus.NOT_ACCURATE, None)
         return QpResult(QpStatus.SOLVED, x)
 
+    def _solution(self, qp: Qp, P: Any, G: Any) -> Any:
+        problem = self._qpsolvers.Problem(P, qp.f, G, qp.h, lb=qp.lower, ub=qp.upper)
+        return self._qpsolvers.solve_problem(problem, self._name, **self._options)
 
-def residual(qp: Qp, x: Array, z: Array | None, z_box: Array | None) -> float:
-    """Return by how much a solution misses the optimality conditions: by its worst constraint, or gradient over f.
+    def _quietly(self, qp: Qp, P: Any, G: Any) -> Any:
+        """Solve without a word: the sparse solvers' interfaces warn of what they do with their matrices."""
+        with catch_warnings():
+            simplefilter("ignore")
+            return self._solution(qp, P, G)
 
-    Args:
-        qp: The problem.
-        x: The solution, (n,).
-        z: Multipliers of G x <= h, (m,); None where the solver gives none: then only feasibility counts.
-        z_box: Multipliers of the bounds, (n,), negative at a lower one; None or empty without.
-    """
-    missed = float((qp.G @ x - qp.h).max(initial=0.0))
-    if qp.lower is not None and qp.upper is not None:
-        missed = max(missed, float((qp.lower - x).max()), float((x - qp.upper).max()))
-    if z is None:
-        return missed
-    gradient = qp.H @ x + qp.f + z @ qp.G
-    if z_box is not None and len(z_box):
-        gradient += z_box
-    return max(missed, float(np.abs(gradient).max()) / (1.0 + float(np.abs(qp.f).max())))
+
+def _some(vector: Array | None) -> Array:
+    return _NONE if vector is None else np.ascontiguousarray(vector, dtype=np.float64)
 
 
 def why_none(qp: Qp) -> QpStatus:

@@ -69,3 +69,25 @@ def lead(speeds: Array, squared_commands: Array, lag: RotorLag, fastest: float) 
         command = speeds[i] + way / (lag.up if way > 0.0 else lag.down)
         commands[i] = min(max(command, lag.least), fastest)
     return commands
+
+
+@compiled
+def actuate(
+    speeds: Array, squared_commands: Array, lag: RotorLag, fastest: float, allocation: Array
+) -> tuple[Array, Array, Array]:
+    """Return the commands of `lead` (4,), the speeds that follow a sample later (4,), the mean wrench until then (4,).
+
+    Args:
+        speeds: Now, (4,).
+        squared_commands: Squared speeds that the plan commands, (4,).
+        lag: Of the rotors.
+        fastest: Largest speed that can be had.
+        allocation: From squared speeds to U1 (N), U2, U3, U4 (N m), (4, 4).
+    """
+    commands = lead(speeds, squared_commands, lag, fastest)
+    after = follow(speeds, commands, lag)
+    wrench = np.zeros(allocation.shape[0])
+    for row in range(allocation.shape[0]):
+        for i in range(speeds.shape[0]):
+            wrench[row] += 0.5 * allocation[row, i] * (speeds[i] * speeds[i] + after[i] * after[i])
+    return commands, after, wrench

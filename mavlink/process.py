@@ -1,13 +1,15 @@
 """What both processes share with the world: one-line errors, a clean end on a signal, status lines, log files."""
 
 import argparse
+import gc
 import json
 import os
 import signal
 import struct
 import sys
 from argparse import ArgumentTypeError
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from io import FileIO
 from math import inf, isfinite
 from pathlib import Path
@@ -41,6 +43,17 @@ def use_one_thread() -> None:
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Keep the garbage collector from all that exists already: to look at it again and again costs a flight time."""
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def number(text: str) -> float:

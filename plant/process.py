@@ -8,7 +8,7 @@ from time import perf_counter, sleep
 from mavlink.hil import ActuatorCommand
 from mavlink.link import LinkError, UdpLink
 from mavlink.lockstep import Outgoing, PlantEnd
-from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Progress, Status, Stop, TlogWriter, fail
+from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Progress, Status, Stop, TlogWriter, fail, undisturbed
 from plant.dynamics import STATE
 from plant.scenario import IntegrationError, Start
 from plant.vehicle import VehicleError, load_vehicle
@@ -35,7 +35,8 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000)
     server = Server(link, end, status, stop, logs)
     try:
-        server.fly(world, physics, duration_s=args.duration, speed=args.speed)
+        with undisturbed():
+            server.fly(world, physics, duration_s=args.duration, speed=args.speed)
     except (IntegrationError, LinkError) as error:
         fail(str(error), EXIT_FAILED)
     finally:

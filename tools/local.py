@@ -9,6 +9,7 @@ from autopilot.core import Autopilot, Step
 from autopilot.process import AutopilotLog
 from mavlink.hil import ActuatorCommand
 from mavlink.lockstep import Address, AutopilotEnd, PlantEnd
+from mavlink.process import undisturbed
 from plant.integrate import Integrator
 from plant.process import PlantLogs
 from plant.world import Physics, World, starting_world, state_frame
@@ -44,23 +45,23 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     interval_us = autopilot.frame_interval_us
     plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out)
     exchange: Exchange = InMemory(autopilot, interval_us, plant_logs) if plan.link == "memory" else Direct(autopilot)
-    began_s = perf_counter()
-    frames = 0
     try:
         plant_logs.write_world(world)
-        while world.time_us + interval_us <= plan.duration_s * 1e6:
-            if isfinite(plan.speed):
-                sleep(max(0.0, began_s + world.time_us / 1e6 / plan.speed - perf_counter()))
-            step, command = exchange(world)
-            world = physics.step(world, command, interval_us)
-            frames += 1
-            log.write(step)
-            plant_logs.write_world(world)
-            progress(world.time_us / 1e6)
+        with undisturbed():
+            began_s = perf_counter()
+            while world.time_us + interval_us <= plan.duration_s * 1e6:
+                if isfinite(plan.speed):
+                    sleep(max(0.0, began_s + world.time_us / 1e6 / plan.speed - perf_counter()))
+                step, command = exchange(world)
+                world = physics.step(world, command, interval_us)
+                log.write(step)
+                plant_logs.write_world(world)
+                progress(world.time_us / 1e6)
+            wall_time_s = perf_counter() - began_s
     finally:
         plant_logs.close()
         log.close()
-    return Summary(wall_time_s=perf_counter() - began_s, frames=frames, resent=0)
+    return Summary(wall_time_s, frames=world.time_us // interval_us, resent=0)
 
 
 class Direct:

@@ -11,6 +11,7 @@ from autopilot.lpv_mpc import LpvMpc, Memory
 from autopilot.planner import Planner, plan
 from autopilot.profile import load_profile
 from autopilot.qp import Qp, QpResult, QpSolver, QpStatus
+from autopilot.rotor_lag import lead, rotor_lag
 from autopilot.tracks import track
 from mavlink.frames import euler_from_quaternion, quaternion_from_euler
 from plant.vehicle import Vehicle, load_vehicle
@@ -57,8 +58,9 @@ def failing(monkeypatch: pytest.MonkeyPatch, status: QpStatus, after: int) -> No
 def test_without_a_solution_the_plan_goes_on_then_lqr_then_descent(
     monkeypatch: pytest.MonkeyPatch, status: QpStatus
 ) -> None:
+    controller, planner = build()
     failing(monkeypatch, status, after=3)
-    decisions = steps(*build(), ON_SPIRAL, 40)
+    decisions = steps(controller, planner, ON_SPIRAL, 40)
     settings = TABLE["fallback"]
     expected = (
         [None] * 3
@@ -73,8 +75,9 @@ def test_without_a_solution_the_plan_goes_on_then_lqr_then_descent(
 
 
 def test_without_any_plan_the_lqr_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    controller, planner = build()
     failing(monkeypatch, QpStatus.TIME_OUT, after=0)
-    assert steps(*build(), ON_SPIRAL, 1)[0].diagnostics.fallback is Fallback.LQR
+    assert steps(controller, planner, ON_SPIRAL, 1)[0].diagnostics.fallback is Fallback.LQR
 
 
 def test_a_solved_qp_ends_every_fallback() -> None:
@@ -133,22 +136,19 @@ def test_whatever_moments_a_fallback_left_the_next_qp_can_be_solved(u: tuple[flo
         assert decision.diagnostics.qp_status is QpStatus.SOLVED
 
 
-def test_commands_within_the_plans_limits_are_never_cut(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The mixer's own clipping has nothing to do where a plan was had."""
-    seen: list[np.ndarray] = []
-    from autopilot import rotor_lag
-
-    lead = rotor_lag.lead
-
-    def watch(speeds: np.ndarray, squared: np.ndarray, lag: rotor_lag.RotorLag, fastest: float) -> np.ndarray:
-        seen.append(lead(speeds, squared, lag._replace(least=-10.0), 10.0))
-        return lead(speeds, squared, lag, fastest)
-
-    monkeypatch.setattr(rotor_lag, "lead", watch)
+def test_commands_within_the_plans_limits_are_never_cut() -> None:
+    """The mixer's own clipping has nothing to do where a plan was had: without it, the same commands."""
+    lag = rotor_lag(VEHICLE, 0.008)._replace(least=-10.0)
+    controller, planner = build()
     for state in (turned(40, 0), turned(-30, 30, (4, -4, 2))):
-        steps(*build(), state, 20)
-    assert np.min(seen) >= 0.1 - 1e-6
-    assert np.max(seen) <= 1.0 + 1e-6
+        memory = controller.initial(VEHICLE.hover_speed)
+        for sample in range(20):
+            speeds = memory.speeds
+            memory, decision = controller.step(memory, 8000 * sample, state, planner.horizon(0))
+            planned = decision.diagnostics.planned_squared
+            assert planned is not None
+            uncut = lead(speeds, planned[0], lag, 10.0)
+            assert decision.rotor_speeds / VEHICLE.rotors.max_speed == pytest.approx(uncut, abs=1e-6)
 
 
 def test_soft_limits_give_way_only_where_they_must() -> None:
