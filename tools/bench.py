@@ -23,14 +23,14 @@ from tools.speed import CONTROL_S, LINKS, THESIS_LINKS, Tell, rate_figures, thes
 from tools.stages import MOVES, STAGES, stage_figures
 
 PROFILE = "flight"
-LONGEST_S = 1000.0
+SHORTEST_S, LONGEST_S = 0.1, 1000.0
 
 
 def bench(args: argparse.Namespace) -> int:
     """Measure what the command line says, print tables, write JSON; return the exit code."""
     wanted = args.only or ["stages", "flights", "thesis"]
-    if args.duration > LONGEST_S:
-        fail(f"--duration: at most {LONGEST_S:g} s, not {args.duration:g}")
+    if not SHORTEST_S <= args.duration <= LONGEST_S:
+        fail(f"--duration: {SHORTEST_S:g} to {LONGEST_S:g} s, not {args.duration:g}")
     if args.out:
         _check_writable(args.out)
     beside = "flights" in wanted and peer.installed()

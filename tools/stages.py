@@ -84,16 +84,20 @@ class Flight(NamedTuple):
 
 
 def measured_flight(profile: Profile, folder: Path, duration_s: float) -> Flight:
-    """Fly the lemniscate in memory, with every stage timed."""
+    """Fly the lemniscate in memory, with every stage timed from the second frame on: before that all is loaded."""
     flight = Flight({stage.name: [] for stage in (*STAGES, *LINK_STAGES)}, [], [], [])
     every = max(1, round(duration_s * 1e6 / _control_interval_us(profile) / _QPS))
-    seen = 0
+    seen, flying = 0, False
 
     def keep_qp(_result: Any, qp: Qp) -> None:
         nonlocal seen
         if seen % every == 0:
             flight.qps.append(deepcopy(qp))
         seen += 1
+
+    def begun(_sim_time_s: float) -> None:
+        nonlocal flying
+        flying = True
 
     keepers: dict[str, Callable[..., object]] = {
         "QP": keep_qp,
@@ -103,8 +107,8 @@ def measured_flight(profile: Profile, folder: Path, duration_s: float) -> Flight
     with ExitStack() as stack:
         for stage in (*STAGES, *LINK_STAGES):
             keeper = keepers.get(stage.name, lambda *_: None)
-            stack.enter_context(_timed(stage, flight.times_us[stage.name], keeper))
-        fly_locally(plan_of(profile, folder, duration_s, "memory"), lambda _sim_time_s: None)
+            stack.enter_context(_timed(stage, flight.times_us[stage.name], keeper, lambda: flying))
+        fly_locally(plan_of(profile, folder, duration_s, "memory"), begun)
     return flight
 
 
@@ -189,17 +193,20 @@ def _answer_datagrams(pipe: Connection, answers: Sequence[bytes]) -> None:
 
 
 @contextmanager
-def _timed(stage: Stage, times_us: list[float], keep: Callable[..., object]) -> Iterator[None]:
-    """Time every call of a method in µs, but for steps without a decision; `keep` is given result and arguments."""
+def _timed(
+    stage: Stage, times_us: list[float], keep: Callable[..., object], flying: Callable[[], bool]
+) -> Iterator[None]:
+    """Time every call of a method in flight, µs, but steps without a decision; `keep` gets result and arguments."""
     untimed = getattr(stage.owner, stage.method)
 
     def timed(self: Any, *args: Any, **kwargs: Any) -> Any:
         began_s = perf_counter()
         result = untimed(self, *args, **kwargs)
         took_s = perf_counter() - began_s
-        if stage is not CONTROL_STEP or result.decision is not None:
-            times_us.append(took_s * 1e6)
-        keep(result, *args)
+        if flying():
+            keep(result, *args)
+            if stage is not CONTROL_STEP or result.decision is not None:
+                times_us.append(took_s * 1e6)
         return result
 
     setattr(stage.owner, stage.method, timed)

@@ -38,9 +38,9 @@ def test_every_stage_takes_time_at_every_horizon(measured: dict[str, Any]) -> No
         assert all(0.0 < figure["p50"] <= figure["p99"] for figure in figures["us"].values())
 
 
-def test_a_stage_is_measured_once_a_control_step(measured: dict[str, Any]) -> None:
+def test_a_stage_is_measured_once_a_control_step_but_the_first(measured: dict[str, Any]) -> None:
     for figures in measured["stages"]["horizons"].values():
-        assert {figure["samples"] for figure in figures["us"].values()} == {25}
+        assert {figure["samples"] for figure in figures["us"].values()} == {24}
 
 
 def test_every_installed_solver_solves_the_qps_of_the_flight(measured: dict[str, Any]) -> None:
@@ -110,6 +110,7 @@ def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.Monkey
         ("--only", "nothing"),
         ("--runs", "0"),
         ("--duration", "0"),
+        ("--duration", "0.01"),
         ("--duration", "1000000"),
         ("--out", "/nowhere/figures.json"),
     ],
