@@ -1,7 +1,7 @@
 """Quadratic programs through qpsolvers; the one place that knows it. Every result is a value, never an exception."""
 
 from enum import StrEnum
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 from warnings import catch_warnings, simplefilter
 
@@ -23,6 +23,7 @@ MOST_ITERATIONS = 100_000
 
 
 _NONE = np.empty(0)
+_PATTERNS = 64
 
 
 class SolverError(Exception):
@@ -86,6 +87,7 @@ class QpSolver:
         self._name = name
         self._sparse = name in qpsolvers.sparse_solvers and name not in qpsolvers.dense_solvers
         self._options = _options(name, tolerance, max_iterations)
+        self.solve(Qp(np.eye(1), np.zeros(1), np.eye(1), np.ones(1)))  # loads what is loaded late, before any flight
 
     def solve(self, qp: Qp) -> QpResult:
         """Solve a QP."""
@@ -161,18 +163,20 @@ def box(n: int) -> Array:
 
 
 def _filled(role: str, matrix: Array) -> "csc_matrix":
-    """Return a matrix as CSC: to build one anew costs five times what Clarabel takes, so the pattern is kept."""
-    sparse = _full(role, *matrix.shape)
-    np.asarray(sparse.data)[:] = matrix.ravel(order="F")
+    """Return a matrix as CSC: to build one anew costs five times what Clarabel takes, so its pattern is kept."""
+    filled = matrix.T != 0.0
+    sparse = _pattern(role, matrix.shape, filled.tobytes())
+    np.asarray(sparse.data)[:] = matrix.T[filled]
     return sparse
 
 
-@cache
-def _full(role: str, rows: int, columns: int) -> "csc_matrix":
+@lru_cache(maxsize=_PATTERNS)
+def _pattern(role: str, shape: tuple[int, int], filled: bytes) -> "csc_matrix":
+    """Return a matrix of ones where the bytes of its transpose are."""
     from scipy.sparse import csc_matrix
 
-    del role  # two matrices of one shape are two matrices
-    return csc_matrix(np.ones((rows, columns)))
+    del role  # two matrices of one pattern are two matrices
+    return csc_matrix(np.frombuffer(filled, dtype=np.bool_).reshape(shape[::-1]).T.astype(np.float64))
 
 
 @cache

@@ -19,6 +19,7 @@ from tools.recording import Recording, RecordingError, Summary, read_recording, 
 from tools.report import Report, print_report, report, write_report
 
 LOGS = ("flight.csv", "flight.tlog", "plant.csv", "autopilot.csv", "report.json")
+_UPDATES = 500
 FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "rotors.png", "error.png")
 
 
@@ -123,8 +124,13 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Callable[[float], No
     bar = Progress(*columns, console=console, disable=not console.is_terminal)
     task = bar.add_task(escape(plan.track_name), total=plan.duration_s, speed="", start=False)
     first_s: list[float] = []
+    due_s = 0.0
 
     def show(sim_time_s: float) -> None:
+        nonlocal due_s
+        if sim_time_s < due_s:
+            return
+        due_s = sim_time_s + plan.duration_s / _UPDATES
         if not first_s:
             bar.start()  # not before something flies: an error of the start stands alone
             bar.start_task(task)
