@@ -115,7 +115,8 @@ class AttitudeMpc:
         self._lag = lag
         self._vehicle = vehicle
         self._from_thrust, self._from_moments = squared_speeds_from(vehicle)
-        self._terminal_weight, self._gain = self._riccati()
+        terminal_weight, self._gain = self._riccati()
+        self._weights = (self._output_weight, terminal_weight, self._increment_weight)
         self._prepare(settings)
 
     def _prepare(self, settings: AttitudeSettings) -> None:
@@ -176,30 +177,26 @@ class AttitudeMpc:
         The first move may always take back the moments last commanded, however large a fallback left them: without
         them the rotors make the thrust alone, so that the hard limits can always be kept.
         """
-        constrained.limit_first_move(now.u, self._largest_increment, self._lower, self._upper)
-        constrained.quadratic_cost(
+        constrained.condense(
             self._responses,
-            target.angles,
-            target.end,
+            target,
             now.u,
-            self._output_weight,
-            self._terminal_weight,
-            self._increment_weight,
-            self._H,
-            self._f,
-        )
-        row = constrained.limit_rotors(
+            self._weights,
             self._from_moments,
             self._from_thrust,
-            target.thrust_n,
-            now.u,
             self._starts,
+            self._checked,
+            self._limits,
+            self._largest_increment,
             self._lag.least**2,
             now.fastest**2,
+            self._H,
+            self._f,
             self._G,
             self._h,
+            self._lower,
+            self._upper,
         )
-        constrained.limit_motion(self._responses, self._checked, self._limits, row, self._G, self._h)
         return Qp(self._H, self._f, self._G, self._h, self._lower, self._upper)
 
     def read(self, now: Situation, target: Target, qp: Qp, z: Array, solve_time_s: float) -> tuple[Plan, Diagnostics]:
@@ -222,7 +219,7 @@ class AttitudeMpc:
         diagnostics = Diagnostics(
             QpStatus.SOLVED,
             solve_time_s=solve_time_s,
-            cost=float(z @ (0.5 * (qp.H @ z) + qp.f)),
+            cost=constrained.objective(qp.H, qp.f, z),
             active=Active(*active),
             slack=max(z[-constrained.SLACKS :].tolist()),
             predicted=states,

@@ -264,3 +264,63 @@ def count_active(
             else:
                 rates += 1
     return rotors, increments, angles, rates
+
+
+@compiled
+def condense(
+    responses: Array,
+    wanted: tuple[Array, Array, Array],
+    u: Array,
+    weights: tuple[Array, Array, Array],
+    from_moments: Array,
+    from_thrust: Array,
+    starts: Integers,
+    checked: Integers,
+    limits: Array,
+    largest_increment: Array,
+    squared_least: float,
+    squared_most: float,
+    H: Array,
+    f: Array,
+    G: Array,
+    h: Array,
+    lower: Array,
+    upper: Array,
+) -> None:
+    """Fill a whole QP; slacks keep their part of H and f.
+
+    Args:
+        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
+        wanted: Angles (N, 3) and end (12,) of `quadratic_cost`, and the thrust commanded at each step, N, (N,).
+        u: Moments last commanded, N m, (3,).
+        weights: Q (3,), S (12, 12) and R (3,).
+        from_moments: Squared speeds from U2, U3, U4, in parts of the largest, (4, 3).
+        from_thrust: The same from U1, (4,).
+        starts: Step of each move, (b,).
+        checked: See `limit_motion`.
+        limits: See `limit_motion`.
+        largest_increment: N m, (3,).
+        squared_least: Least squared speed, in parts of the largest.
+        squared_most: Largest squared speed, in the same parts.
+        H: (n, n).
+        f: (n,).
+        G: (m, n).
+        h: (m,).
+        lower: (n,).
+        upper: (n,).
+    """
+    limit_first_move(u, largest_increment, lower, upper)
+    quadratic_cost(responses, wanted[0], wanted[1], u, weights[0], weights[1], weights[2], H, f)
+    row = limit_rotors(from_moments, from_thrust, wanted[2], u, starts, squared_least, squared_most, G, h)
+    limit_motion(responses, checked, limits, row, G, h)
+
+
+@compiled
+def objective(H: Array, f: Array, z: Array) -> float:
+    """Return ½ zᵀHz + fᵀz."""
+    total = 0.0
+    for i in range(z.shape[0]):
+        total += f[i] * z[i]
+        for k in range(z.shape[0]):
+            total += 0.5 * z[i] * H[i, k] * z[k]
+    return total

@@ -215,8 +215,8 @@ def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float) -> None
     Raises:
         DecisionError: They cannot.
     """
-    speeds = np.asarray(rotor_speeds)
-    if speeds.shape != (4,) or not ((speeds >= 0.0) & (speeds <= max_speed)).all():
+    speeds = np.asarray(rotor_speeds).tolist()
+    if not isinstance(speeds, list) or len(speeds) != 4 or not all(0.0 <= speed <= max_speed for speed in speeds):
         raise DecisionError(
             f"controller {name} gave rotor speeds {rotor_speeds}: expected four from 0 to {max_speed:g}"
         )

@@ -89,7 +89,8 @@ class Memory(NamedTuple):
     Attributes:
         speeds: Rotor speeds now, as the lag has them, parts of the largest, (4,).
         moments: U2..U4 last commanded, N m, (3,).
-        wrench: Mean U1..U4 over the interval that ends now, (4,).
+        wrench: U1..U4 now, (4,).
+        mean_wrench: The same over the interval that ends now, (4,).
         measured: What the observer measured a sample ago, (9,); None before the first.
         estimate: Of the observer a sample ago, (12,).
         charge_ah: Charge taken from the battery.
@@ -100,6 +101,7 @@ class Memory(NamedTuple):
     speeds: Array
     moments: Array
     wrench: Array
+    mean_wrench: Array
     measured: Array | None
     estimate: Array
     charge_ah: float
@@ -199,7 +201,7 @@ class LpvMpc:
         """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
         speeds = np.full(4, rotor_speed / self._vehicle.rotors.max_speed)
         wrench = self._allocation @ (speeds * speeds)
-        return Memory(speeds, wrench[1:].copy(), wrench, None, np.zeros(observer.ESTIMATES), 0.0, None, 0)
+        return Memory(speeds, wrench[1:].copy(), wrench, wrench, None, np.zeros(observer.ESTIMATES), 0.0, None, 0)
 
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample."""
@@ -210,9 +212,11 @@ class LpvMpc:
         now, thrust_n = self._situation(memory, state, estimate)
         course = self.position(memory, now, thrust_n, state, measured, references, estimate)
         choice = self._choose(memory, now, course, rotation)
-        commands, speeds, wrench = self.mix(memory, choice.squared, now.fastest)
+        commands, speeds, wrench, mean_wrench = self.mix(memory, choice.squared, now.fastest)
         charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
-        after = Memory(speeds, choice.moments, wrench, measured, estimate, charge_ah, choice.plan, choice.age)
+        after = Memory(
+            speeds, choice.moments, wrench, mean_wrench, measured, estimate, charge_ah, choice.plan, choice.age
+        )
         phi, theta, psi = course.target.angles[0].tolist()
         return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), choice.diagnostics)
 
@@ -222,13 +226,13 @@ class LpvMpc:
             return observer.first_estimate(measured)
         middle = 0.5 * (memory.measured + measured)
         drag = np.empty(3)
-        guidance.drag_force(self._airframe, middle[:3], middle[6:], float(memory.wrench[0]), drag)
+        guidance.drag_force(self._airframe, middle[:3], middle[6:], float(memory.mean_wrench[0]), drag)
         return observer.observe(
             memory.estimate,
             memory.measured,
             measured,
-            float(memory.wrench[0]),
-            memory.wrench[1:],
+            float(memory.mean_wrench[0]),
+            memory.mean_wrench[1:],
             float(self._momentum @ memory.speeds),
             drag,
             self._airframe,
@@ -279,8 +283,8 @@ class LpvMpc:
         )
         return Course(forces[0], aligned, Target(angles[1:-1], end, thrusts))
 
-    def mix(self, memory: Memory, squared: Array, fastest: float) -> tuple[Array, Array, Array]:
-        """Return the rotors' commands (4,), their speeds a sample later (4,), and the mean wrench until then (4,).
+    def mix(self, memory: Memory, squared: Array, fastest: float) -> tuple[Array, Array, Array, Array]:
+        """Return the rotors' commands, their speeds and wrench a sample later, the mean wrench until then, (4,) each.
 
         Args:
             memory: Of the sample before.
@@ -298,8 +302,8 @@ class LpvMpc:
         ahead = memory.plan.states[memory.age + 1 :] if memory.plan else None
         plan, diagnostics = self._attitude.plan(now, target, ahead)
         if plan is not None:
-            squared = self._from_thrust * target.thrust_n[0] + self._from_moments @ plan.moments[0]
-            return Choice(squared, plan.moments[0], plan, 1, diagnostics)
+            assert diagnostics.planned_squared is not None, "a plan says what it commands"
+            return Choice(diagnostics.planned_squared[0], plan.moments[0], plan, 1, diagnostics)
         age = memory.age + 1
         if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._attitude.horizon - 1):
             moments = memory.plan.moments[memory.age]
@@ -315,7 +319,7 @@ class LpvMpc:
         """Return what a plan begins with, and the thrust now, N."""
         phi, theta, psi = state.euler
         p, q, r = state.rate_flu_rad_s
-        thrust_n, *moments_n_m = (self._allocation @ (memory.speeds * memory.speeds)).tolist()
+        thrust_n, *moments_n_m = memory.wrench.tolist()
         x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
         momentum, fastest = float(self._momentum @ memory.speeds), self._battery.fastest(memory.charge_ah)
         return Situation(x, memory.moments, estimate[9:], momentum, fastest), thrust_n

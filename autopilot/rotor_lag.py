@@ -74,8 +74,8 @@ def lead(speeds: Array, squared_commands: Array, lag: RotorLag, fastest: float) 
 @compiled
 def actuate(
     speeds: Array, squared_commands: Array, lag: RotorLag, fastest: float, allocation: Array
-) -> tuple[Array, Array, Array]:
-    """Return the commands of `lead` (4,), the speeds that follow a sample later (4,), the mean wrench until then (4,).
+) -> tuple[Array, Array, Array, Array]:
+    """Return commands as `lead` does, speeds and wrench a sample later, and the mean wrench until then, (4,) each.
 
     Args:
         speeds: Now, (4,).
@@ -86,8 +86,9 @@ def actuate(
     """
     commands = lead(speeds, squared_commands, lag, fastest)
     after = follow(speeds, commands, lag)
-    wrench = np.zeros(allocation.shape[0])
+    wrench, mean = np.zeros(allocation.shape[0]), np.zeros(allocation.shape[0])
     for row in range(allocation.shape[0]):
         for i in range(speeds.shape[0]):
-            wrench[row] += 0.5 * allocation[row, i] * (speeds[i] * speeds[i] + after[i] * after[i])
-    return commands, after, wrench
+            wrench[row] += allocation[row, i] * after[i] * after[i]
+            mean[row] += 0.5 * allocation[row, i] * (speeds[i] * speeds[i] + after[i] * after[i])
+    return commands, after, wrench, mean
