@@ -117,6 +117,12 @@ def _build(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:
     try:
         controller = factory(profile.table(profile.controller), vehicle, clock)
     except SettingsError as error:
+        if profile.controller not in profile.controllers:
+            known = ", ".join(profile.controllers)
+            raise ProfileError(
+                f"profile {profile.name} has no numbers for controller {profile.controller}, only for {known}: "
+                f"choose another profile, or add a table controllers.{profile.controller} to a copy of it"
+            ) from error
         raise ProfileError(f"profile {profile.name}: controllers.{profile.controller}: {error}") from error
     check_controller(profile.controller, controller)
     return controller

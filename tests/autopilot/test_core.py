@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from autopilot.core import Autopilot
-from autopilot.profile import Profile, load_profile
+from autopilot.profile import Profile, ProfileError, load_profile
 from autopilot.tracks import track
 from mavlink.frames import quaternion_from_euler
 from mavlink.hil import StateFrame
@@ -71,3 +71,8 @@ def test_yaw_is_unwrapped_by_continuity() -> None:
 )
 def test_frames_divide_the_control_interval(wanted_s: float | None, interval_us: int) -> None:
     assert build(flight(frame_interval_s=wanted_s)).frame_interval_us == interval_us
+
+
+def test_a_profile_without_numbers_for_a_control_law_says_for_which_it_has() -> None:
+    with pytest.raises(ProfileError, match="profile flight has no numbers for controller cascade, only for lpv-mpc, "):
+        build(msgspec.structs.replace(flight(), controller="cascade"))
