@@ -62,6 +62,16 @@ def test_two_processes_fly_the_same_flight(tmp_path: Path) -> None:
     assert len(flown[0].splitlines()) == 1 + 1501
 
 
+def test_daqp_and_clarabel_give_the_same_inputs(tmp_path: Path) -> None:
+    """Catching the lemniscate up, where limits bind, and along it: every input to 1e-4 N and N m."""
+    flown = []
+    for solver in ("daqp", "clarabel"):
+        fly(tmp_path / solver, "lemniscate", "--link", "direct", "--duration", "8", "--solver", solver)
+        flown.append(rows(tmp_path / solver / "flight.csv"))
+    for number in range(1, 5):
+        assert flown[1][f"U{number}"] == pytest.approx(flown[0][f"U{number}"], abs=1e-4)
+
+
 WRONG = {
     "20 % heavier": {"body__mass_kg": "0.8376"},
     "20 % lighter": {"body__mass_kg": "0.5584"},
