@@ -35,7 +35,19 @@ class BatteryModel:
         current_a = power_w / _voltage_v(self._battery, charge_ah, power_w)
         return charge_ah + current_a * duration_s / _SECONDS_PER_HOUR
 
-    def fastest(self, charge_ah: float) -> float:
+    def fastest_now(self, charge_ah: float, speeds: Array) -> float:
+        """Return the speed that a rotor can reach while all take the power that they take now, in parts of the largest.
+
+        Args:
+            charge_ah: Charge taken.
+            speeds: Rotor speeds now, parts of the largest, (4,).
+        """
+        if self._battery is None:
+            return 1.0
+        power_w = self._full_power_w * float((speeds * speeds) @ speeds)
+        return _voltage_v(self._battery, charge_ah, power_w) / self._battery.full_voltage_v
+
+    def fastest_together(self, charge_ah: float) -> float:
         """Return the speed that all rotors can keep up together once `charge_ah` is taken, in parts of the largest."""
         if self._battery is None:
             return 1.0

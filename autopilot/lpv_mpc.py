@@ -273,7 +273,7 @@ class LpvMpc:
             estimate[6:],
             self._airframe,
             self._inertia,
-            self._limits(now.fastest),
+            self._limits(self._battery.fastest_together(memory.charge_ah)),
             self._lag.planned,
             self._interval_s,
             forces,
@@ -321,11 +321,12 @@ class LpvMpc:
         p, q, r = state.rate_flu_rad_s
         thrust_n, *moments_n_m = memory.wrench.tolist()
         x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
-        momentum, fastest = float(self._momentum @ memory.speeds), self._battery.fastest(memory.charge_ah)
+        momentum = float(self._momentum @ memory.speeds)
+        fastest = self._battery.fastest_now(memory.charge_ah, memory.speeds)
         return Situation(x, memory.moments, estimate[9:], momentum, fastest), thrust_n
 
     def _limits(self, fastest: float) -> guidance.Limits:
-        """Return what the outer loop may ask for while rotors turn at `fastest` (parts of the largest) at most."""
+        """Return what the outer loop may ask for while all rotors can turn at `fastest`, parts of the largest."""
         span_n = self._span_n
         least_n, most_n = span_n * self._lag.least**2, span_n * fastest**2
         margin_n = self._thrust_margin * (most_n - least_n)
