@@ -7,27 +7,27 @@ from operator import itemgetter
 from struct import Struct
 from typing import Any, NamedTuple
 
-from pymavlink.dialects.v20 import common
+from pymavlink.dialects.v20 import development as mav
 
-AUTOPILOT_COMPONENT: int = common.MAV_COMP_ID_AUTOPILOT1
-PLANT_COMPONENT: int = common.MAV_COMP_ID_USER1
+AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
+PLANT_COMPONENT: int = mav.MAV_COMP_ID_USER1
 
-TYPE_QUADROTOR: int = common.MAV_TYPE_QUADROTOR
-TYPE_GENERIC: int = common.MAV_TYPE_GENERIC
-AUTOPILOT_GENERIC: int = common.MAV_AUTOPILOT_GENERIC
-AUTOPILOT_INVALID: int = common.MAV_AUTOPILOT_INVALID
-STATE_ACTIVE: int = common.MAV_STATE_ACTIVE
-MODE_ARMED: int = common.MAV_MODE_FLAG_SAFETY_ARMED
-MODE_CUSTOM: int = common.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-MODE_HIL: int = common.MAV_MODE_FLAG_HIL_ENABLED
-CMD_SET_MESSAGE_INTERVAL: int = common.MAV_CMD_SET_MESSAGE_INTERVAL
-MSG_ATTITUDE_QUATERNION: int = common.MAVLINK_MSG_ID_ATTITUDE_QUATERNION
-RESULT_ACCEPTED: int = common.MAV_RESULT_ACCEPTED
-RESULT_TEMPORARILY_REJECTED: int = common.MAV_RESULT_TEMPORARILY_REJECTED
-RESULT_DENIED: int = common.MAV_RESULT_DENIED
-RESULT_UNSUPPORTED: int = common.MAV_RESULT_UNSUPPORTED
+TYPE_QUADROTOR: int = mav.MAV_TYPE_QUADROTOR
+TYPE_GENERIC: int = mav.MAV_TYPE_GENERIC
+AUTOPILOT_GENERIC: int = mav.MAV_AUTOPILOT_GENERIC
+AUTOPILOT_INVALID: int = mav.MAV_AUTOPILOT_INVALID
+STATE_ACTIVE: int = mav.MAV_STATE_ACTIVE
+MODE_ARMED: int = mav.MAV_MODE_FLAG_SAFETY_ARMED
+MODE_CUSTOM: int = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+MODE_HIL: int = mav.MAV_MODE_FLAG_HIL_ENABLED
+CMD_SET_MESSAGE_INTERVAL: int = mav.MAV_CMD_SET_MESSAGE_INTERVAL
+MSG_ATTITUDE_QUATERNION: int = mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION
+RESULT_ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
+RESULT_TEMPORARILY_REJECTED: int = mav.MAV_RESULT_TEMPORARILY_REJECTED
+RESULT_DENIED: int = mav.MAV_RESULT_DENIED
+RESULT_UNSUPPORTED: int = mav.MAV_RESULT_UNSUPPORTED
 
-_HEADER_AND_CRC_V1 = common.HEADER_LEN_V1 + 2
+_HEADER_AND_CRC_V1 = mav.HEADER_LEN_V1 + 2
 _MARKER = 0xFD
 _HEADER = Struct("<BBBBBBBHB")
 """Marker, payload length, two flags, sequence, system, component, message id (its low 16 bits, its high 8)."""
@@ -63,7 +63,7 @@ class Codec:
 
     def __init__(self, system_id: int, component_id: int) -> None:
         """Speak as component `component_id` of system `system_id`."""
-        self._mav = common.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
+        self._mav = mav.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
         self._mav.robust_parsing = True
         self.source = (system_id, component_id)
         self.dropped: Counter[str] = Counter()
@@ -169,16 +169,16 @@ def _whole_messages(datagram: bytes) -> list[Message] | None:
 
 
 def _slow_crc16(data: bytes, _start: int) -> int:
-    crc: int = common.x25crc(data).crc
+    crc: int = mav.x25crc(data).crc
     return crc
 
 
-_crc16: Callable[[bytes, int], int] = getattr(common, "mcrf4xx", None) or _slow_crc16
+_crc16: Callable[[bytes, int], int] = getattr(mav, "mcrf4xx", None) or _slow_crc16
 """The compiled checksum that pymavlink found, without the object that it puts around it."""
 
 
 def _message_named(name: str) -> Any:
-    return getattr(common, f"MAVLink_{name.lower()}_message")
+    return getattr(mav, f"MAVLink_{name.lower()}_message")
 
 
 @cache
@@ -189,7 +189,7 @@ def _layout_named(name: str) -> _Layout | None:
 @cache
 def _layout(message_id: int) -> _Layout | None:
     """Return the layout of a message; None where the dialect has none, or some of its fields are text."""
-    definition = common.mavlink_map.get(message_id)
+    definition = mav.mavlink_map.get(message_id)
     if definition is None or "char" in definition.fieldtypes:
         return None
     return _Layout(definition)

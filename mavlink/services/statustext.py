@@ -1,0 +1,37 @@
+"""STATUSTEXT: a line for whoever watches, in chunks where it is long.
+
+Specification: mavlink.io, message STATUSTEXT (253): text beyond 50 bytes goes on in further messages with the same id
+that is not zero, counted by chunk_seq; a chunk that is not full ends it.
+"""
+
+from mavlink.dialect import mav
+from mavlink.services.service import Send, to_all
+
+CHUNK_BYTES = 50
+LONGEST_BYTES = 254
+
+ERROR: int = mav.MAV_SEVERITY_ERROR
+CRITICAL: int = mav.MAV_SEVERITY_CRITICAL
+WARNING: int = mav.MAV_SEVERITY_WARNING
+NOTICE: int = mav.MAV_SEVERITY_NOTICE
+INFO: int = mav.MAV_SEVERITY_INFO
+
+
+class StatusText:
+    """Numbers the texts that need more than one message."""
+
+    def __init__(self) -> None:
+        """Begin with id 1: 0 means a text of one chunk."""
+        self._next = 1
+
+    def say(self, severity: int, text: str) -> list[Send]:
+        """Return the messages that tell everybody `text`."""
+        data = text.encode()[:LONGEST_BYTES]
+        if len(data) <= CHUNK_BYTES:
+            return [to_all("STATUSTEXT", severity, data, 0, 0)]
+        number, self._next = self._next, self._next % 0xFFFF + 1
+        starts = range(0, len(data) + 1, CHUNK_BYTES)  # where the last chunk is full, an empty one ends the text
+        return [
+            to_all("STATUSTEXT", severity, data[start : start + CHUNK_BYTES], number, chunk)
+            for chunk, start in enumerate(starts)
+        ]
