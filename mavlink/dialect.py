@@ -7,7 +7,10 @@ from operator import itemgetter
 from struct import Struct
 from typing import Any, NamedTuple
 
-from pymavlink.dialects.v20 import development as mav
+from pymavlink.dialects.v20 import development
+
+mav: Any = development
+"""The dialect: its enumerations, for who speaks it."""
 
 AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
 PLANT_COMPONENT: int = mav.MAV_COMP_ID_USER1
