@@ -1,0 +1,109 @@
+"""The control loop: what the state frames tell, one control law, and the rotor command between its samples."""
+
+from typing import Any
+
+import numpy as np
+
+from autopilot.controller import (
+    Array,
+    Clock,
+    Controller,
+    Decision,
+    Horizon,
+    VehicleState,
+    check_controller,
+    check_rotor_speeds,
+    load_controller,
+)
+from autopilot.profile import Profile, ProfileError
+from autopilot.settings import SettingsError
+from mavlink.frames import euler_from_quaternion, nearest_turn
+from mavlink.hil import StateFrame
+from plant.vehicle import Vehicle
+
+
+class ControlLoop:
+    """One control law flying one vehicle.
+
+    Attributes:
+        vehicle: That it controls.
+        preview: The references that the law wants.
+        control_interval_us: Its sample.
+        frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
+        controls: Rotor speeds commanded now, in parts of the largest.
+    """
+
+    def __init__(self, profile: Profile, vehicle: Vehicle, clock: Clock) -> None:
+        """Control `vehicle` as `profile` says; `clock` only measures, it decides nothing.
+
+        Raises:
+            ControllerError: The profile's control law cannot be used.
+            ProfileError: Its table is wrong.
+            SolverError: Its solver cannot be used.
+        """
+        self._name = profile.controller
+        self._controller = _build(profile, vehicle, clock)
+        self.vehicle = vehicle
+        self.preview = self._controller.preview
+        self.control_interval_us = self._controller.control_interval_us
+        self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
+        self._memory: Any = None
+        self._yaw_rad = 0.0
+        self.controls = (0.0, 0.0, 0.0, 0.0)
+
+    def begin(self, rotor_speed: float, yaw_rad: float) -> None:
+        """Begin with every rotor at `rotor_speed` (the vehicle's unit), yaw unwrapped near `yaw_rad`."""
+        self._memory = self._controller.initial(rotor_speed)
+        self._yaw_rad = yaw_rad
+        self._command(np.full(4, rotor_speed))
+
+    def is_due(self, time_us: int) -> bool:
+        """Whether a control sample is at `time_us`."""
+        return time_us % self.control_interval_us == 0
+
+    def state(self, frame: StateFrame) -> VehicleState:
+        """Unwrap yaw by continuity: a quaternion forgets full turns."""
+        phi, theta, psi = euler_from_quaternion(frame.attitude)
+        self._yaw_rad = nearest_turn(psi, self._yaw_rad)
+        euler = (phi, theta, self._yaw_rad)
+        return VehicleState(frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
+
+    def decide(self, time_us: int, state: VehicleState, references: Horizon) -> Decision:
+        """Decide the rotor speeds to hold until the next control sample.
+
+        Raises:
+            DecisionError: The control law gave what no rotor can follow.
+        """
+        self._memory, decision = self._controller.step(self._memory, time_us, state, references)
+        self._command(decision.rotor_speeds)
+        return decision
+
+    def _command(self, rotor_speeds: Array) -> None:
+        check_rotor_speeds(self._name, rotor_speeds, self.vehicle.rotors.max_speed)
+        c1, c2, c3, c4 = (rotor_speeds / self.vehicle.rotors.max_speed).tolist()
+        self.controls = (c1, c2, c3, c4)
+
+
+def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
+    """Return the longest interval of whole milliseconds that divides the control interval, as short as asked for."""
+    wanted_s = profile.simulation.frame_interval_s
+    if wanted_s is None:
+        return control_interval_us
+    control_ms, wanted_ms = control_interval_us // 1000, round(wanted_s * 1e6) // 1000
+    return 1000 * max(ms for ms in range(1, control_ms + 1) if control_ms % ms == 0 and ms <= wanted_ms)
+
+
+def _build(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:
+    factory = load_controller(profile.controller)
+    try:
+        controller = factory(profile.table(profile.controller), vehicle, clock)
+    except SettingsError as error:
+        if profile.controller not in profile.controllers:
+            known = ", ".join(profile.controllers)
+            raise ProfileError(
+                f"profile {profile.name} has no numbers for controller {profile.controller}, only for {known}: "
+                f"choose another profile, or add a table controllers.{profile.controller} to a copy of it"
+            ) from error
+        raise ProfileError(f"profile {profile.name}: controllers.{profile.controller}: {error}") from error
+    check_controller(profile.controller, controller)
+    return controller

@@ -1,0 +1,148 @@
+"""The reference that leads the vehicle from wherever it is to whatever it shall do: smooth, within limits.
+
+The chain of integrators of `reference_chain` follows a target that may itself move; once on it, the target itself is
+the reference, to the last bit. An axis may have no target position, or neither position nor velocity: then the chain
+begins where the target does.
+"""
+
+from collections.abc import Sequence
+from enum import IntEnum
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from autopilot.controller import Array, Horizon, VehicleState
+from autopilot.reference_chain import Limits, advance
+from mavlink.frames import nearest_turn
+
+_REACHED = 1e-7
+
+
+class Kind(IntEnum):
+    """What of a target binds an axis."""
+
+    POSITION = 0
+    VELOCITY = 1
+    ACCELERATION = 2
+
+
+ALL_BOUND = (Kind.POSITION, Kind.POSITION, Kind.POSITION)
+
+
+class Reference(NamedTuple):
+    """Where the chain of integrators stands.
+
+    Attributes:
+        motion: Position, velocity, acceleration, jerk, ENU, (4, 3).
+        heading: Yaw, rad, unwrapped, and its rate, (2,).
+        on_target: Whether it is the target itself that is followed, to the last bit.
+    """
+
+    motion: Array
+    heading: Array
+    on_target: bool = False
+
+
+class Target(NamedTuple):
+    """What the reference shall become, at every instant of the preview.
+
+    Attributes:
+        motion: Position, velocity, acceleration, jerk, snap, ENU, (n, 5, 3).
+        kinds: What of it binds, for x, y and z.
+        heading: Yaw, rate, acceleration, (n, 3).
+        turns: Whether yaw itself binds; otherwise its rate.
+    """
+
+    motion: Array
+    kinds: tuple[Kind, Kind, Kind]
+    heading: Array
+    turns: bool = True
+
+
+def at_rest(state: VehicleState) -> Reference:
+    """Return a reference that stands still where the vehicle is."""
+    motion = np.zeros((4, 3))
+    motion[0] = state.position_enu_m
+    return Reference(motion, np.array([state.euler[2], 0.0]))
+
+
+def moving_with(state: VehicleState) -> Reference:
+    """Return a reference that takes over the vehicle's motion."""
+    motion = np.zeros((4, 3))
+    motion[0], motion[1] = state.position_enu_m, state.velocity_enu_m_s
+    return Reference(motion, np.array([state.euler[2], 0.0]))
+
+
+def still_target(
+    position_enu_m: Sequence[float], yaw_rad: float, samples: int, kinds: tuple[Kind, Kind, Kind] | None = None
+) -> Target:
+    """Return a target that stays at a place."""
+    motion, heading = np.zeros((samples, 5, 3)), np.zeros((samples, 3))
+    motion[:, 0] = position_enu_m
+    heading[:, 0] = yaw_rad
+    return Target(motion, kinds or ALL_BOUND, heading)
+
+
+def target_of(horizon: Horizon) -> Target:
+    """Return a planned horizon as a target."""
+    motion = np.stack(horizon[:5], axis=1)
+    return Target(motion, ALL_BOUND, np.stack(horizon[5:], axis=1))
+
+
+def lead(reference: Reference, target: Target, limits: Limits, interval_s: float) -> tuple[Horizon, Reference]:
+    """Return the references from now on, and where the chain stands at the second of them.
+
+    Args:
+        reference: Where it stands now.
+        target: From now on, as many instants as there shall be references.
+        limits: Of the approach.
+        interval_s: Between two instants.
+    """
+    if reference.on_target or _reached(reference, target):
+        return _on_target(reference, target)
+    count = len(target.motion)
+    motion, heading = np.empty((count, 5, 3)), np.empty((count, 3))
+    kinds = np.array(target.kinds, dtype=np.int64)
+    advance(
+        reference.motion,
+        reference.heading,
+        target.motion,
+        kinds,
+        target.heading,
+        target.turns,
+        limits,
+        interval_s,
+        motion,
+        heading,
+    )
+    return _horizon(motion, heading), Reference(motion[1, :4].copy(), heading[1, :2].copy())
+
+
+def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference]:
+    """Return the target itself, its yaw turned in full turns to where the reference's is."""
+    heading = target.heading
+    turns = round(float(reference.heading[0] - heading[0, 0]) / (2.0 * pi))
+    if turns:
+        heading = heading.copy()
+        heading[:, 0] += 2.0 * pi * turns
+    after = Reference(target.motion[1, :4].copy(), heading[1, :2].copy(), on_target=True)
+    return _horizon(target.motion, heading), after
+
+
+def _horizon(motion: Array, heading: Array) -> Horizon:
+    p, v, a, j, s = (np.ascontiguousarray(motion[:, order]) for order in range(5))
+    yaw, rate, acceleration = (np.ascontiguousarray(heading[:, order]) for order in range(3))
+    return Horizon(p, v, a, j, s, yaw, rate, acceleration)
+
+
+def _reached(reference: Reference, target: Target) -> bool:
+    if not target.turns or target.kinds != ALL_BOUND:
+        return False
+    yaw = nearest_turn(float(target.heading[0, 0]), float(reference.heading[0]))
+    away = max(
+        float(np.abs(reference.motion[:3] - target.motion[0, :3]).max()),
+        float(np.abs(reference.motion[3] - target.motion[0, 3]).max()) * 1e-2,
+    )
+    turned = max(abs(float(reference.heading[0]) - yaw), abs(float(reference.heading[1] - target.heading[0, 1])))
+    return max(away, turned) < _REACHED
