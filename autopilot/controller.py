@@ -70,6 +70,20 @@ class Horizon(NamedTuple):
     yaw_acceleration_rad_s2: Array
 
 
+class AttitudeDemand(NamedTuple):
+    """An attitude to hold and a thrust to make, from now on, as far apart as the preview asks.
+
+    Attributes:
+        angles: phi, theta, psi, rad, psi unwrapped, (n, 3).
+        angle_rates_rad_s: Their derivatives, (n, 3).
+        thrust_n: Along the body's z axis, N, (n,).
+    """
+
+    angles: Array
+    angle_rates_rad_s: Array
+    thrust_n: Array
+
+
 class VehicleState(NamedTuple):
     """What a control law knows of the vehicle.
 
@@ -168,6 +182,27 @@ class Controller(Protocol[Memory]):
             time_us: Simulated time, µs, a multiple of the control interval.
             state: The vehicle now.
             references: The references that `preview` asks for.
+        """
+        ...
+
+
+@runtime_checkable
+class AttitudeController(Controller[Memory], Protocol[Memory]):
+    """A control law that can also be told an attitude; one that cannot simply flies no mode that needs it.
+
+    Its two ways to decide share what they remember: a flight may change between them at any sample.
+    """
+
+    def step_attitude(
+        self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
+    ) -> tuple[Memory, Decision]:
+        """Decide the rotor speeds to hold until the next control sample.
+
+        Args:
+            memory: What the step before returned, of either kind.
+            time_us: Simulated time, µs, a multiple of the control interval.
+            state: The vehicle now.
+            demand: At the samples that `preview` asks for.
         """
         ...
 

@@ -1,12 +1,12 @@
 """Courses: how each order is flown, as a target for the reference to follow, sample after sample."""
 
 from math import atan2, copysign, cos, hypot, pi, sin, sqrt
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from autopilot.behaviour import Behaviour
-from autopilot.controller import VehicleState
+from autopilot.controller import AttitudeDemand, VehicleState
 from autopilot.orders import Circle, GoTo, Land
 from autopilot.planner import Planner
 from autopilot.reference import ALL_BOUND, Kind, Reference, Target, still_target, target_of
@@ -64,6 +64,19 @@ class Course(Protocol):
 
     def arrived(self, scene: Scene) -> bool:
         """Whether it is flown to its end."""
+        ...
+
+
+@runtime_checkable
+class AttitudeCourse(Protocol):
+    """A way to fly by attitude and thrust."""
+
+    def demand(self, scene: Scene) -> tuple[AttitudeDemand, bool]:
+        """Return what to hold from now on, and whether a vehicle that stands must leave the ground for it."""
+        ...
+
+    def sinking(self, scene: Scene) -> Reference:
+        """Return a reference that is below the vehicle where it is told to sink."""
         ...
 
 

@@ -1,0 +1,70 @@
+"""What must hold before the rotors may turn; every check says why it fails."""
+
+from collections.abc import Callable
+from math import acos, degrees
+from typing import NamedTuple
+
+from autopilot.controller import VehicleState
+from mavlink.frames import rotation_matrix
+
+LARGEST_TILT_DEG = 45.0
+LARGEST_SPEED_M_S = 0.5
+LEAST_CHARGE = 0.1
+LARGEST_THRUST_STICK = 0.6
+
+
+class Facts(NamedTuple):
+    """What the checks look at.
+
+    Attributes:
+        state: Of the vehicle; None before the first frame.
+        standing: Whether it stands on the ground.
+        charge: Part of the battery's charge that is left; 1 without a battery.
+        thrust_stick: Of the pilot, 0..1; None if the mode takes none, or no pilot is heard.
+        outside_fence: Why the vehicle may not be where it is; empty if it may.
+    """
+
+    state: VehicleState | None
+    standing: bool
+    charge: float
+    thrust_stick: float | None
+    outside_fence: str = ""
+
+
+def _tilt(facts: Facts) -> str:
+    assert facts.state is not None
+    tilt_deg = degrees(acos(min(1.0, max(-1.0, rotation_matrix(facts.state.attitude)[2][2]))))
+    return f"tilted by {tilt_deg:.0f} degrees, more than {LARGEST_TILT_DEG:.0f}" if tilt_deg > LARGEST_TILT_DEG else ""
+
+
+def _speed(facts: Facts) -> str:
+    assert facts.state is not None
+    fast = max(map(abs, facts.state.velocity_enu_m_s))
+    return f"moving at {fast:.1f} m/s" if fast > LARGEST_SPEED_M_S else ""
+
+
+def _standing(facts: Facts) -> str:
+    return "" if facts.standing else "not standing on the ground"
+
+
+def _charge(facts: Facts) -> str:
+    return f"battery at {facts.charge:.0%}" if facts.charge < LEAST_CHARGE else ""
+
+
+def _thrust_stick(facts: Facts) -> str:
+    high = facts.thrust_stick is not None and facts.thrust_stick > LARGEST_THRUST_STICK
+    return "thrust stick is up" if high else ""
+
+
+def _fence(facts: Facts) -> str:
+    return facts.outside_fence
+
+
+CHECKS: tuple[Callable[[Facts], str], ...] = (_tilt, _speed, _standing, _charge, _thrust_stick, _fence)
+
+
+def refusals(facts: Facts) -> list[str]:
+    """Return why the rotors may not be armed; empty if they may."""
+    if facts.state is None:
+        return ["no telemetry from the plant"]
+    return [reason for check in CHECKS if (reason := check(facts))]

@@ -1,0 +1,277 @@
+"""The pilot: modes, arming, take-off and landing; decides what the control law is given to follow."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple, TypeAlias
+
+from autopilot.arming import Facts, refusals
+from autopilot.behaviour import Behaviour
+from autopilot.controller import AttitudeDemand, Horizon, Preview, VehicleState
+from autopilot.courses import AttitudeCourse, Course, Scene, Stop, lifts
+from autopilot.landing import Landing, stands_at_first, watch
+from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
+from autopilot.reference import Reference, at_rest, lead, moving_with
+from mavlink.frames import Vector
+from mavlink.services.statustext import INFO, NOTICE, WARNING
+
+CourseMaker: TypeAlias = Callable[[Mode, Scene], Course | AttitudeCourse]
+_ORIGIN: Vector = (0.0, 0.0, 0.0)
+
+
+class Said(NamedTuple):
+    """A line for the ground station.
+
+    Attributes:
+        severity: MAV_SEVERITY.
+        text: The line.
+    """
+
+    severity: int
+    text: str
+
+
+class Guidance(NamedTuple):
+    """What the control law is to follow now; neither while the rotors stand or idle.
+
+    Attributes:
+        horizon: References of position and yaw.
+        attitude: References of attitude and thrust.
+        begins: Whether the rotors leave idle now: the control law begins anew.
+    """
+
+    horizon: Horizon | None = None
+    attitude: AttitudeDemand | None = None
+    begins: bool = False
+
+
+RESTS = Guidance()
+
+
+class Pilot:
+    """Flies courses, one mode after another.
+
+    Attributes:
+        state: Mode, and whether the rotors may turn.
+        behaviour: The numbers to fly by; whoever changes them replaces all of it.
+        home_enu_m: Where it took off, or was told to return to.
+        home_yaw_rad: Its heading there.
+        standing: Whether it stands on the ground.
+        course: What is flown.
+        reference: Where the reference stands.
+        speed_m_s: Cruise speed that was asked for; None for the parameters'.
+        armed_us: When the rotors were last armed; 0 before.
+        takeoff_us: When it last left the ground; 0 before.
+        landing_us: When it last stood again; 0 before.
+        flights: How often the rotors were armed.
+    """
+
+    def __init__(self, preview: Preview, behaviour: Behaviour, make_course: CourseMaker) -> None:
+        """Fly with the references that a control law previews; `make_course` says how each mode begins."""
+        self._preview = preview
+        self._make_course = make_course
+        self.state = FIRST
+        self.behaviour = behaviour
+        self.home_enu_m = _ORIGIN
+        self.home_yaw_rad = 0.0
+        self.standing = True
+        self.course: Course | AttitudeCourse = Stop()
+        self.reference: Reference | None = None
+        self.speed_m_s: float | None = None
+        self.armed_us = self.takeoff_us = self.landing_us = 0
+        self.flights = 0
+        self._home_is_chosen = False
+        self._landing = Landing()
+        self._now_us = 0
+        self._vehicle: VehicleState | None = None
+        self._facts = Facts(None, standing=True, charge=1.0, thrust_stick=None)
+        self._missing: tuple[Need, ...] = ()
+        self._said: list[Said] = []
+
+    def begin(self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None) -> None:
+        """See the vehicle for the first time: it stands, or it is picked up in flight, in `mode` or in hold."""
+        self._now_us, self._vehicle = now_us, vehicle
+        self.standing = mode is None and stands_at_first(vehicle, 0.0)
+        self.reference = moving_with(vehicle)
+        if self.standing:
+            self.set_home(vehicle.position_enu_m, vehicle.euler[2], chosen=False)
+            self.state = FIRST
+        else:
+            self.state = State(mode or Mode.HOLD, armed=True)
+            self._begin_flight()
+        self.course = self._make_course(self.state.mode, self.scene())
+
+    def sense(self, now_us: int, vehicle: VehicleState, facts: Facts, missing: Sequence[Need]) -> None:
+        """Take in what is known at a frame: the vehicle, what arming looks at, which needs of modes are not met."""
+        self._now_us, self._vehicle, self._facts, self._missing = now_us, vehicle, facts, tuple(missing)
+
+    def scene(self) -> Scene:
+        """Return what a course sees now."""
+        assert self._vehicle is not None, "the pilot has seen the vehicle"
+        assert self.reference is not None, "the pilot has seen the vehicle"
+        interval_us, samples = self._preview
+        behaviour = self.behaviour
+        if self.speed_m_s is not None:
+            behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=self.speed_m_s))
+        return Scene(
+            self._now_us, self._vehicle, self.reference, self.home_enu_m, behaviour, interval_us * 1e-6, samples
+        )
+
+    def refusals(self) -> list[str]:
+        """Return why the rotors may not be armed; empty if they may."""
+        return refusals(self._facts)
+
+    def arm(self, *, force: bool = False) -> Refusal | None:
+        """Let the rotors turn; return why not."""
+        if self.state.armed:
+            return None
+        reasons = [] if force and self._vehicle is not None else self.refusals()
+        if reasons:
+            return Refusal("not armed: " + "; ".join(reasons))
+        refusal = self._follow(Event.ARM, "rotors armed")
+        if refusal is None:
+            self.armed_us = self._now_us
+            self.flights += 1
+            if not self._home_is_chosen and self._vehicle is not None:
+                self.set_home(self._vehicle.position_enu_m, self._vehicle.euler[2], chosen=False)
+            self._engage(self.state.mode)
+        return refusal
+
+    def disarm(self, *, force: bool = False) -> Refusal | None:
+        """Stop the rotors; return why not."""
+        if not self.state.armed:
+            return None
+        if not self.standing and not force:
+            return Refusal("not disarmed: the vehicle is flying")
+        return self._follow(Event.DISARM, "rotors stopped in the air" if not self.standing else "rotors stopped")
+
+    def select(self, mode: Mode) -> Refusal | None:
+        """Change the mode; return why not."""
+        if mode is self.state.mode and mode is not Mode.HOLD:
+            return None
+        refusal = self._follow(Event.SELECT, "", mode)
+        if refusal is None:
+            self._engage(mode)
+        return refusal
+
+    def fly(self, mode: Mode, course: Course) -> Refusal | None:
+        """Change to `mode` and fly `course` in it; return why not."""
+        refusal = self._follow(Event.SELECT, "", mode)
+        if refusal is None:
+            self._take(course)
+        return refusal
+
+    def set_home(self, position_enu_m: Vector, yaw_rad: float, *, chosen: bool = True) -> None:
+        """Say where home is; where somebody chose it, a take-off does not move it."""
+        self.home_enu_m, self.home_yaw_rad = position_enu_m, yaw_rad
+        self._home_is_chosen = self._home_is_chosen or chosen
+
+    def happened(self, event: Event) -> None:
+        """Tell of an event that may change the mode: what is lost, what is finished."""
+        before = self.state
+        if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode:
+            self._engage(self.state.mode)
+
+    def step(self) -> Guidance:
+        """Return what to follow from now on. Called once a control sample."""
+        if not self.state.armed:
+            self.standing = self.standing or self._lies_still()
+            return RESTS
+        if isinstance(self.course, AttitudeCourse):
+            return self._step_attitude(self.course)
+        scene = self.scene()
+        target, limits = self.course.target(scene)
+        begins = False
+        if self.standing:
+            if not lifts(target, scene.state):
+                return self._idle(scene.state)
+            begins = self._begin_flight()
+        horizon, self.reference = lead(scene.reference, target, limits, scene.interval_s)
+        self._watch_ground(scene)
+        if self.course.arrived(scene):
+            self._arrive()
+        return Guidance(horizon=horizon, begins=begins)
+
+    def take_said(self) -> list[Said]:
+        """Return the lines for the ground station, and forget them."""
+        said, self._said = self._said, []
+        return said
+
+    def say(self, severity: int, text: str) -> None:
+        """Add a line for the ground station."""
+        self._said.append(Said(severity, text))
+
+    def _step_attitude(self, course: AttitudeCourse) -> Guidance:
+        scene = self.scene()
+        demand, lifting = course.demand(scene)
+        self.reference = moving_with(scene.state)
+        begins = False
+        if self.standing:
+            if not lifting:
+                return self._idle(scene.state)
+            begins = self._begin_flight()
+        sinking = course.sinking(scene)
+        self._landing, stands = watch(self._landing, self._now_us, scene.state, sinking)
+        if stands:
+            self._stand()
+        return Guidance(attitude=demand, begins=begins)
+
+    def _idle(self, vehicle: VehicleState) -> Guidance:
+        """Stand with idling rotors; not for ever."""
+        self.reference = at_rest(vehicle)
+        on_ground_us = self._now_us - max(self.armed_us, self.landing_us)
+        landed = self.landing_us > self.armed_us
+        behaviour = self.behaviour
+        allowed_s = behaviour.disarm_after_landing_s if landed else behaviour.disarm_on_ground_s
+        if allowed_s > 0.0 and on_ground_us >= allowed_s * 1e6:
+            event = Event.TOUCHED_DOWN if landed else Event.LEFT_STANDING
+            self._follow(event, f"{event}, rotors stopped")
+            self._engage(self.state.mode)
+        return RESTS
+
+    def _begin_flight(self) -> bool:
+        self.standing = False
+        self._landing = Landing()
+        self.takeoff_us = self._now_us
+        self.say(INFO, "take-off")
+        return True
+
+    def _watch_ground(self, scene: Scene) -> None:
+        self._landing, stands = watch(self._landing, self._now_us, scene.state, scene.reference)
+        if stands:
+            self._stand()
+
+    def _stand(self) -> None:
+        self.standing = True
+        self.landing_us = self._now_us
+        self.say(NOTICE, "landing detected")
+
+    def _lies_still(self) -> bool:
+        """Whether a vehicle whose rotors were stopped in the air has come to rest."""
+        vehicle = self._vehicle
+        assert vehicle is not None, "the pilot has seen the vehicle"
+        self.reference = at_rest(vehicle)
+        return max(map(abs, vehicle.velocity_enu_m_s)) < 0.05 and max(map(abs, vehicle.rate_flu_rad_s)) < 0.05
+
+    def _arrive(self) -> None:
+        if self.state.mode is Mode.TAKEOFF:
+            self.happened(Event.ARRIVED)
+        elif self.state.mode in (Mode.MISSION, Mode.TRACK):
+            self.happened(Event.FINISHED)
+
+    def _engage(self, mode: Mode) -> None:
+        if self.reference is not None:
+            self._take(self._make_course(mode, self.scene()))
+
+    def _take(self, course: Course | AttitudeCourse) -> None:
+        self.course = course
+        if self.reference is not None:
+            self.reference = self.reference._replace(on_target=False)
+
+    def _follow(self, event: Event, text: str, selected: Mode | None = None) -> Refusal | None:
+        after = following(self.state, event, selected, self._missing)
+        if isinstance(after, Refusal):
+            return after
+        if after != self.state and text:
+            self.say(WARNING if "lost" in event else INFO, text.format(mode=after.mode))
+        self.state = after
+        return None
