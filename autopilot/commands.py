@@ -116,13 +116,9 @@ class Commands:
         return _outcome(pilot.fly(Mode.TAKEOFF, Climb(height_m, None, scene)))
 
     def _height_of_takeoff(self, command: Command) -> float:
-        home_m = self._pilot.home_enu_m[2]
-        above_sea_m = command.z - self.origin.altitude_m
-        if command.frame in _RELATIVE:
-            return home_m + command.z
-        if command.frame is None and not (isnan(command.x) or command.p1 == -1.0):
-            return home_m + command.z
-        return above_sea_m
+        """Take z as above home, as most mean it, but from who says otherwise: QGC, which sends a pitch of -1."""
+        above_sea = command.p1 == -1.0 if command.frame is None else command.frame not in _RELATIVE
+        return command.z - self.origin.altitude_m if above_sea else self._pilot.home_enu_m[2] + command.z
 
     def _pause_or_go_on(self, command: Command) -> Outcome:
         if command.p1 == 0.0:

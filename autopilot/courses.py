@@ -1,7 +1,7 @@
 """Courses: how each order is flown, as a target for the reference to follow, sample after sample."""
 
 from math import atan2, copysign, cos, hypot, pi, sin, sqrt
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from autopilot.reference import ALL_BOUND, Kind, Reference, Target, still_target
 from autopilot.reference_chain import Limits
 from mavlink.dialect import mav
 from mavlink.frames import Vector
+from mavlink.setpoints import OffboardSetpoint, Sticks, TargetState
 
 _ALONG_BEYOND_M = 1.0
 """A way shorter than this does not turn the vehicle."""
@@ -20,6 +21,23 @@ _SLOW_M_S = 0.05
 _LIFT_M, _LIFT_M_S = 0.15, 0.05
 _CIRCLE_SHARE = 0.8
 """Part of the horizontal acceleration that a circle may need."""
+
+
+class Steered(NamedTuple):
+    """What clients ask for from moment to moment; None where nobody does.
+
+    Attributes:
+        sticks: Of a pilot.
+        setpoint: Of an offboard companion, in ENU.
+        leader: What is to be followed.
+    """
+
+    sticks: Sticks | None = None
+    setpoint: OffboardSetpoint | None = None
+    leader: TargetState | None = None
+
+
+NOT_STEERED = Steered()
 
 
 class Scene(NamedTuple):
@@ -33,6 +51,7 @@ class Scene(NamedTuple):
         behaviour: The numbers that it flies by.
         interval_s: Between two instants of a target.
         samples: How many instants a target has.
+        steered: What clients ask for from moment to moment.
     """
 
     now_us: int
@@ -42,6 +61,7 @@ class Scene(NamedTuple):
     behaviour: Behaviour
     interval_s: float
     samples: int
+    steered: Steered = NOT_STEERED
 
     @property
     def yaw_rad(self) -> float:
@@ -55,28 +75,43 @@ class Scene(NamedTuple):
         return (x, y, z)
 
 
+class Motion(NamedTuple):
+    """A course by position and yaw.
+
+    Attributes:
+        target: What the reference is to become.
+        limits: How fast.
+    """
+
+    target: Target
+    limits: Limits
+
+
+class Lean(NamedTuple):
+    """A course by attitude and thrust.
+
+    Attributes:
+        demand: What the control law is to hold.
+        reference: Where the reference stands meanwhile.
+        lifts: Whether a vehicle that stands must leave the ground for it.
+        sinks: Whether a vehicle in the air must sink.
+    """
+
+    demand: AttitudeDemand
+    reference: Reference
+    lifts: bool
+    sinks: bool
+
+
 class Course(Protocol):
     """A way to fly."""
 
-    def target(self, scene: Scene) -> tuple[Target, Limits]:
-        """Return what the reference is to become from now on, and how fast. Called once a control sample."""
+    def ask(self, scene: Scene) -> Motion | Lean:
+        """Return what is to be flown from now on. Called once a control sample."""
         ...
 
     def arrived(self, scene: Scene) -> bool:
         """Whether it is flown to its end."""
-        ...
-
-
-@runtime_checkable
-class AttitudeCourse(Protocol):
-    """A way to fly by attitude and thrust."""
-
-    def demand(self, scene: Scene) -> tuple[AttitudeDemand, bool]:
-        """Return what to hold from now on, and whether a vehicle that stands must leave the ground for it."""
-        ...
-
-    def sinking(self, scene: Scene) -> Reference:
-        """Return a reference that is below the vehicle where it is told to sink."""
         ...
 
 
@@ -100,12 +135,12 @@ class Way:
         along = atan2(north, east) if hypot(east, north) > _ALONG_BEYOND_M else scene.yaw_rad
         self._yaw_rad = along if order.yaw_rad is None else order.yaw_rad
 
-    def target(self, scene: Scene) -> tuple[Target, Limits]:
+    def ask(self, scene: Scene) -> Motion:
         """Return the place."""
         limits = scene.behaviour.limits
         if self._speed_m_s is not None:
             limits = limits._replace(speed_m_s=min(self._speed_m_s, scene.behaviour.fastest_m_s))
-        return still_target(self._place, self._yaw_rad, scene.samples), limits
+        return Motion(still_target(self._place, self._yaw_rad, scene.samples), limits)
 
     def arrived(self, scene: Scene) -> bool:
         """Whether the vehicle is there, and slow."""
@@ -121,10 +156,10 @@ class Climb:
         x, y, _ = scene.place
         self._way = Way(GoTo((x, y, height_enu_m), scene.yaw_rad if yaw_rad is None else yaw_rad), scene)
 
-    def target(self, scene: Scene) -> tuple[Target, Limits]:
+    def ask(self, scene: Scene) -> Motion:
         """Return the height above where it began."""
-        target, limits = self._way.target(scene)
-        return target, limits._replace(climb_m_s=scene.behaviour.takeoff_speed_m_s)
+        target, limits = self._way.ask(scene)
+        return Motion(target, limits._replace(climb_m_s=scene.behaviour.takeoff_speed_m_s))
 
     def arrived(self, scene: Scene) -> bool:
         """Whether the vehicle is there, and slow."""
@@ -139,15 +174,15 @@ class Stop:
         self._place: Vector | None = None
         self._yaw_rad = 0.0
 
-    def target(self, scene: Scene) -> tuple[Target, Limits]:
+    def ask(self, scene: Scene) -> Motion:
         """Return rest: of the velocity first, then of the place that it led to."""
         turning = abs(float(scene.reference.heading[1])) > _SLOW_M_S
         if self._place is None and not turning and _speed(scene.reference) < _SLOW_M_S:
             self._place, self._yaw_rad = scene.place, scene.yaw_rad
         if self._place is not None:
-            return still_target(self._place, self._yaw_rad, scene.samples), scene.behaviour.limits
+            return Motion(still_target(self._place, self._yaw_rad, scene.samples), scene.behaviour.limits)
         braking = still_target(scene.place, scene.yaw_rad, scene.samples, (Kind.VELOCITY,) * 3)
-        return braking._replace(turns=False), scene.behaviour.limits
+        return Motion(braking._replace(turns=False), scene.behaviour.limits)
 
     def arrived(self, scene: Scene) -> bool:
         """Whether it stands."""
@@ -166,18 +201,18 @@ class Sink:
         self._stop = Stop() if self._above else None
         self._xy = (x, y)
 
-    def target(self, scene: Scene) -> tuple[Target, Limits]:
+    def ask(self, scene: Scene) -> Motion:
         """Return the way there, then a descent that slows down towards the ground."""
         if self._stop is not None and not self._stop.arrived(scene):
             self._xy = scene.place[:2]
-            target, limits = self._stop.target(scene)
+            target, limits = self._stop.ask(scene)
             if not self._stop.arrived(scene):
-                return self._sinking(scene, target), limits
+                return Motion(self._sinking(scene, target), limits)
         self._above = self._above or self._way.arrived(scene)
         if not self._above:
-            return self._way.target(scene)
+            return self._way.ask(scene)
         target = still_target((*self._xy, scene.place[2]), scene.yaw_rad, scene.samples)
-        return self._sinking(scene, target), scene.behaviour.limits
+        return Motion(self._sinking(scene, target), scene.behaviour.limits)
 
     @staticmethod
     def _sinking(scene: Scene, target: Target) -> Target:
@@ -206,11 +241,11 @@ class Homeward:
         self._home = (home[0], home[1], height_m)
         self._far = far
 
-    def target(self, scene: Scene) -> tuple[Target, Limits]:
+    def ask(self, scene: Scene) -> Motion | Lean:
         """Return the target of the leg that is flown now."""
         while not self._legs or self._legs[0].arrived(scene):
             self._legs = [self._next_leg(scene)]
-        return self._legs[0].target(scene)
+        return self._legs[0].ask(scene)
 
     def _next_leg(self, scene: Scene) -> Course:
         if self._far:
@@ -244,10 +279,10 @@ class Round:
         self._began_us: int | None = None
         self.turns = 0.0
 
-    def target(self, scene: Scene) -> tuple[Target, Limits]:
+    def ask(self, scene: Scene) -> Motion:
         """Return the way to the circle, then the motion along it."""
         if self._began_us is None and not self._way.arrived(scene):
-            return self._way.target(scene)
+            return self._way.ask(scene)
         if self._began_us is None:
             self._began_us = scene.now_us
         fastest = sqrt(_CIRCLE_SHARE * scene.behaviour.limits.acceleration_m_s2 * self._radius_m)
@@ -271,7 +306,7 @@ class Round:
             heading[:, 0], heading[:, 1] = angles + copysign(0.5 * pi, rate), rate
         else:
             heading[:, 0], heading[:, 1] = angles + pi, rate
-        return Target(motion, ALL_BOUND, heading), scene.behaviour.limits
+        return Motion(Target(motion, ALL_BOUND, heading), scene.behaviour.limits)
 
     def arrived(self, scene: Scene) -> bool:
         """Never by itself."""
@@ -291,13 +326,13 @@ class OnTrack:
         self._way = Way(GoTo((x, y, z), float(first.yaw_rad[0])), scene)
         self._began_us = 0 if at_once else None
 
-    def target(self, scene: Scene) -> tuple[Target, Limits]:
+    def ask(self, scene: Scene) -> Motion:
         """Return the way to its first point, then the track."""
         if self._began_us is None:
             if not self._way.arrived(scene):
-                return self._way.target(scene)
+                return self._way.ask(scene)
             self._began_us = scene.now_us
-        return target_of(self._planner.horizon(scene.now_us - self._began_us)), scene.behaviour.limits
+        return Motion(target_of(self._planner.horizon(scene.now_us - self._began_us)), scene.behaviour.limits)
 
     def arrived(self, scene: Scene) -> bool:
         """Whether the track has ended."""

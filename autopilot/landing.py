@@ -24,17 +24,21 @@ class Landing(NamedTuple):
     since_us: int | None = None
 
 
-def watch(landing: Landing, now_us: int, state: VehicleState, reference: Reference) -> tuple[Landing, bool]:
+def watch(landing: Landing, now_us: int, state: VehicleState, sinks: bool) -> tuple[Landing, bool]:
     """Return what to remember, and whether the vehicle stands: its signs have lasted.
 
-    Only the ground can hold a vehicle that is told to sink: it is well above its reference, and yet it is still.
+    Only the ground can hold a vehicle that `sinks`: that is told to, and yet is still.
     """
-    below = float(reference.motion[0, 2]) < state.position_enu_m[2] - _BELOW_M
     still = max(map(abs, state.velocity_enu_m_s)) < _STILL_M_S and max(map(abs, state.rate_flu_rad_s)) < _LEVEL_RAD_S
-    if not (below and still):
+    if not (sinks and still):
         return Landing(), False
     since_us = now_us if landing.since_us is None else landing.since_us
     return Landing(since_us), now_us - since_us >= _FOR_US
+
+
+def is_below(reference: Reference, state: VehicleState) -> bool:
+    """Whether the reference is so far below the vehicle that it must sink."""
+    return float(reference.motion[0, 2]) < state.position_enu_m[2] - _BELOW_M
 
 
 def stands_at_first(state: VehicleState, home_z_m: float) -> bool:

@@ -7,14 +7,14 @@ from typing import NamedTuple, TypeAlias
 from autopilot.arming import Facts, refusals
 from autopilot.behaviour import Behaviour
 from autopilot.controller import AttitudeDemand, Horizon, Preview, VehicleState
-from autopilot.courses import AttitudeCourse, Course, Scene, Stop, lifts
-from autopilot.landing import Landing, stands_at_first, watch
+from autopilot.courses import NOT_STEERED, Course, Lean, Motion, Scene, Steered, Stop, lifts
+from autopilot.landing import Landing, is_below, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
 from autopilot.reference import Reference, at_rest, lead, moving_with
 from mavlink.frames import Vector
 from mavlink.services.statustext import INFO, NOTICE, WARNING
 
-CourseMaker: TypeAlias = Callable[[Mode, Scene], Course | AttitudeCourse]
+CourseMaker: TypeAlias = Callable[[Mode, Scene], Course]
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
@@ -74,7 +74,7 @@ class Pilot:
         self.home_enu_m = _ORIGIN
         self.home_yaw_rad = 0.0
         self.standing = True
-        self.course: Course | AttitudeCourse = Stop()
+        self.course: Course = Stop()
         self.reference: Reference | None = None
         self.speed_m_s: float | None = None
         self.armed_us = self.takeoff_us = self.landing_us = 0
@@ -85,6 +85,7 @@ class Pilot:
         self._vehicle: VehicleState | None = None
         self._facts = Facts(None, standing=True, charge=1.0, thrust_stick=None)
         self._missing: tuple[Need, ...] = ()
+        self._steered = NOT_STEERED
         self._said: list[Said] = []
 
     def begin(self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None) -> None:
@@ -100,9 +101,20 @@ class Pilot:
             self._begin_flight()
         self.course = self._make_course(self.state.mode, self.scene())
 
-    def sense(self, now_us: int, vehicle: VehicleState, facts: Facts, missing: Sequence[Need]) -> None:
-        """Take in what is known at a frame: the vehicle, what arming looks at, which needs of modes are not met."""
+    def sense(
+        self, now_us: int, vehicle: VehicleState, facts: Facts, missing: Sequence[Need], steered: Steered = NOT_STEERED
+    ) -> None:
+        """Take in what is known at a control sample.
+
+        Args:
+            now_us: Simulated time.
+            vehicle: The vehicle.
+            facts: What arming looks at.
+            missing: Needs of modes that nothing meets.
+            steered: What clients ask for.
+        """
         self._now_us, self._vehicle, self._facts, self._missing = now_us, vehicle, facts, tuple(missing)
+        self._steered = steered
 
     def scene(self) -> Scene:
         """Return what a course sees now."""
@@ -112,8 +124,16 @@ class Pilot:
         behaviour = self.behaviour
         if self.speed_m_s is not None:
             behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=self.speed_m_s))
+        interval_s = interval_us * 1e-6
         return Scene(
-            self._now_us, self._vehicle, self.reference, self.home_enu_m, behaviour, interval_us * 1e-6, samples
+            self._now_us,
+            self._vehicle,
+            self.reference,
+            self.home_enu_m,
+            behaviour,
+            interval_s,
+            samples,
+            self._steered,
         )
 
     def refusals(self) -> list[str]:
@@ -168,7 +188,8 @@ class Pilot:
     def happened(self, event: Event) -> None:
         """Tell of an event that may change the mode: what is lost, what is finished."""
         before = self.state
-        if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode:
+        stays = event in (Event.ARRIVED, Event.FINISHED)  # where the course that ends has led
+        if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode and not stays:
             self._engage(self.state.mode)
 
     def step(self) -> Guidance:
@@ -176,20 +197,18 @@ class Pilot:
         if not self.state.armed:
             self.standing = self.standing or self._lies_still()
             return RESTS
-        if isinstance(self.course, AttitudeCourse):
-            return self._step_attitude(self.course)
         scene = self.scene()
-        target, limits = self.course.target(scene)
-        begins = False
-        if self.standing:
-            if not lifts(target, scene.state):
-                return self._idle(scene.state)
-            begins = self._begin_flight()
-        horizon, self.reference = lead(scene.reference, target, limits, scene.interval_s)
-        self._watch_ground(scene)
+        asked = self.course.ask(scene)
+        lifting = asked.lifts if isinstance(asked, Lean) else lifts(asked.target, scene.state)
+        begins = self.standing and lifting
+        if self.standing and not lifting:
+            return self._idle(scene.state)
+        if begins:
+            self._begin_flight()
+        guidance = self._lean(asked, begins) if isinstance(asked, Lean) else self._move(scene, asked, begins)
         if self.course.arrived(scene):
             self._arrive()
-        return Guidance(horizon=horizon, begins=begins)
+        return guidance
 
     def take_said(self) -> list[Said]:
         """Return the lines for the ground station, and forget them."""
@@ -200,20 +219,16 @@ class Pilot:
         """Add a line for the ground station."""
         self._said.append(Said(severity, text))
 
-    def _step_attitude(self, course: AttitudeCourse) -> Guidance:
-        scene = self.scene()
-        demand, lifting = course.demand(scene)
-        self.reference = moving_with(scene.state)
-        begins = False
-        if self.standing:
-            if not lifting:
-                return self._idle(scene.state)
-            begins = self._begin_flight()
-        sinking = course.sinking(scene)
-        self._landing, stands = watch(self._landing, self._now_us, scene.state, sinking)
-        if stands:
-            self._stand()
-        return Guidance(attitude=demand, begins=begins)
+    def _move(self, scene: Scene, asked: Motion, begins: bool) -> Guidance:
+        horizon, self.reference = lead(scene.reference, asked.target, asked.limits, scene.interval_s)
+        self._watch_ground(scene.state, sinks=is_below(scene.reference, scene.state))
+        return Guidance(horizon=horizon, begins=begins)
+
+    def _lean(self, asked: Lean, begins: bool) -> Guidance:
+        assert self._vehicle is not None, "the pilot has seen the vehicle"
+        self.reference = asked.reference
+        self._watch_ground(self._vehicle, sinks=asked.sinks)
+        return Guidance(attitude=asked.demand, begins=begins)
 
     def _idle(self, vehicle: VehicleState) -> Guidance:
         """Stand with idling rotors; not for ever."""
@@ -228,15 +243,14 @@ class Pilot:
             self._engage(self.state.mode)
         return RESTS
 
-    def _begin_flight(self) -> bool:
+    def _begin_flight(self) -> None:
         self.standing = False
         self._landing = Landing()
         self.takeoff_us = self._now_us
         self.say(INFO, "take-off")
-        return True
 
-    def _watch_ground(self, scene: Scene) -> None:
-        self._landing, stands = watch(self._landing, self._now_us, scene.state, scene.reference)
+    def _watch_ground(self, vehicle: VehicleState, *, sinks: bool) -> None:
+        self._landing, stands = watch(self._landing, self._now_us, vehicle, sinks)
         if stands:
             self._stand()
 
@@ -262,7 +276,7 @@ class Pilot:
         if self.reference is not None:
             self._take(self._make_course(mode, self.scene()))
 
-    def _take(self, course: Course | AttitudeCourse) -> None:
+    def _take(self, course: Course) -> None:
         self.course = course
         if self.reference is not None:
             self.reference = self.reference._replace(on_target=False)
