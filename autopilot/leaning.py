@@ -3,12 +3,12 @@
 from math import cos, radians
 
 import numpy as np
+from mavlink.setpoints import AttitudeSetpoint, Sticks
 
 from autopilot.attitude_reference import AttitudeReference, ReferenceMemory, Wish, lean
 from autopilot.courses import Lean, Motion, Scene, Stop, lifts
 from autopilot.reference import Kind, Reference, lead, moving_with, still_target
 from autopilot.sticks import dead, stick_velocity, stick_yaw_rate
-from mavlink.setpoints import AttitudeSetpoint, Sticks
 
 _LIFTING, _SINKING = 0.9, 0.5
 """Thrust in parts of the weight from which on a vehicle takes off, and below which it must sink."""
@@ -92,9 +92,7 @@ class AltitudeSticks:
         upright = max(cos(scene.state.euler[0]) * cos(scene.state.euler[1]), 0.5)
         thrust_n = self._generator.weight_n * (1.0 + lift / self._gravity_m_s2) / upright
         tilt = radians(scene.behaviour.largest_tilt_deg)
-        wish = lean(
-            tilt * dead(sticks.roll), tilt * dead(sticks.pitch), stick_yaw_rate(sticks, scene), thrust_n
-        )
+        wish = lean(tilt * dead(sticks.roll), tilt * dead(sticks.pitch), stick_yaw_rate(sticks, scene), thrust_n)
         leaning = self._leaning.by_wish(wish, scene)
         sinks = float(reference.motion[0, 2]) < scene.state.position_enu_m[2] - 0.15
         return leaning._replace(reference=reference, lifts=lifting, sinks=sinks)

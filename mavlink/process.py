@@ -4,6 +4,7 @@ import argparse
 import gc
 import json
 import os
+import re
 import signal
 import struct
 import sys
@@ -29,7 +30,12 @@ _NUMBERS = msgspec.json.Encoder(enc_hook=float)
 
 
 class ArgumentParser(argparse.ArgumentParser):
-    """A parser whose errors are one line and exit code 2."""
+    """A parser whose errors are one line and exit code 2, and to which what begins like `-33.9,` is a value."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Take what argparse takes."""
+        super().__init__(*args, **options)
+        self._negative_number_matcher = re.compile(r"^-\.?\d")
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and where to read on."""
@@ -69,6 +75,14 @@ def positive(text: str) -> float:
     value = number(text)
     if value <= 0.0:
         raise ArgumentTypeError(f"must be above zero, not {text}")
+    return value
+
+
+def natural(text: str) -> int:
+    """Read a whole number from 0 on of the command line."""
+    value = int(text)
+    if value < 0:
+        raise ArgumentTypeError(f"must not be below zero, not {text}")
     return value
 
 

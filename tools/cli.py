@@ -3,7 +3,8 @@
 from math import inf
 from pathlib import Path
 
-from mavlink.process import EXIT_INTERRUPTED, ArgumentParser, fail, positive, speed, use_one_thread
+from mavlink.home import DEFAULT_HOME, home
+from mavlink.process import EXIT_INTERRUPTED, ArgumentParser, fail, natural, positive, speed, use_one_thread
 from plant.scenario import add_world_arguments
 
 TRACK_HELP = (
@@ -34,6 +35,10 @@ def main(argv: list[str] | None = None) -> int:
             from tools.studies import study
 
             return study(args)
+        if args.command == "sitl":
+            from tools.sitl import sitl
+
+            return sitl(args)
         from tools.bench import bench
 
         return bench(args)
@@ -45,6 +50,7 @@ def _parser() -> ArgumentParser:
     parser = ArgumentParser(prog="colibri", description="A quadrotor autopilot in pure Python, flown over MAVLink.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_fly(commands.add_parser("fly", help="fly a track and report how well it went"))
+    _add_sitl(commands.add_parser("sitl", help="stand ready for ground stations: QGroundControl, MAVSDK, MAVProxy"))
     _add_figures(commands.add_parser("figures", help="fly all that the thesis shows and draw its figures"))
     _add_compare(commands.add_parser("compare", help="fly several controllers on several tracks, side by side"))
     _add_study(commands.add_parser("study", help="fly what shows how far profile flight reaches, and draw it"))
@@ -78,6 +84,48 @@ def _add_fly(parser: ArgumentParser) -> None:
     )
     add("--quiet", action="store_true", help="say nothing but errors")
     add("--no-figures", action="store_true", help="draw no PNG figures")
+
+
+def _add_sitl(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add(
+        "--instance", type=natural, default=0, metavar="N", help="number of the (first) vehicle: its system id is N + 1"
+    )
+    add("--count", type=natural, default=1, metavar="N", help="how many vehicles (default 1)")
+    add(
+        "--home",
+        type=home,
+        default=DEFAULT_HOME,
+        metavar="LAT,LON,ALT,YAW",
+        help="where they stand, degrees and m, yaw clockwise from north (default Zurich: %(default)s)",
+    )
+    add("--identity", default="px4", choices=("px4", "generic"), help="what they say they are (default %(default)s)")
+    add(
+        "--gcs",
+        action="append",
+        default=[],
+        metavar="URL",
+        help="a ground station to call or to wait for: udpout:, udpin:, tcp: or tcpin:HOST:PORT; may be repeated "
+        "(default: udpout:127.0.0.1:14550, and udpout:127.0.0.1:14540 + N)",
+    )
+    add("--signing-key", type=Path, metavar="FILE", help="sign what is sent, refuse what is not signed with this key")
+    add("--insecure", action="store_true", help="let links leave this computer without a key")
+    add(
+        "--state",
+        type=Path,
+        default=Path("out/sitl"),
+        metavar="DIR",
+        help="for parameters and logs (default %(default)s)",
+    )
+    add("--plant-port", type=int, metavar="PORT", help="the plant's (default: 14560 + N; 0: any that is free)")
+    add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
+    add("--controller", metavar="NAME", help="control law, also of another package (default: the profile's)")
+    add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
+    add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
+    add_world_arguments(parser, start="standing at home")
+    add("--speed", type=speed, default=1.0, metavar="N", help="times real time, or max (default 1)")
+    add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
+    add("--quiet", action="store_true", help="say nothing but errors")
 
 
 def _add_figures(parser: ArgumentParser) -> None:
