@@ -35,6 +35,14 @@ class BatteryModel:
         current_a = power_w / _voltage_v(self._battery, charge_ah, power_w)
         return charge_ah + current_a * duration_s / _SECONDS_PER_HOUR
 
+    def terminal(self, charge_ah: float, speeds: Array) -> tuple[float, float]:
+        """Return the terminal voltage, V, and the current, A, at rotor speeds (4,), parts of the largest; 0 without."""
+        if self._battery is None:
+            return 0.0, 0.0
+        power_w = self._full_power_w * float((speeds * speeds) @ speeds)
+        voltage_v = _voltage_v(self._battery, charge_ah, power_w)
+        return voltage_v, power_w / voltage_v
+
     def fastest_now(self, charge_ah: float, speeds: Array) -> float:
         """Return the speed that a rotor can reach while all take the power that they take now, in parts of the largest.
 

@@ -154,6 +154,12 @@ class Snapshot:
         takeoff_us: Time of the last take-off; 0 before.
         landing_us: Time of the last landing; 0 before.
         flights: How often it was armed.
+        terminated: Whether the flight was ended for good.
+        ground_m: Height of the ground below, over the origin.
+        target_enu_m: Where the way leads, the next waypoint; nan for the setpoint itself.
+        fence_enabled: Whether the geofence is watched.
+        fence_breached: Whether the vehicle is where it must not be.
+        load: Part of the time between two frames that the autopilot computes, 0..1.
     """
 
     time_us: int
@@ -183,3 +189,9 @@ class Snapshot:
     takeoff_us: int = 0
     landing_us: int = 0
     flights: int = 0
+    terminated: bool = False
+    ground_m: float = 0.0
+    target_enu_m: Vector = NOWHERE
+    fence_enabled: bool = False
+    fence_breached: bool = False
+    load: float = 0.0

@@ -1,0 +1,53 @@
+"""The battery as the ground station is told of it: followed from the rotor speeds that are commanded."""
+
+from math import nan
+
+import numpy as np
+
+from autopilot.battery import BatteryModel
+from mavlink.snapshot import BatteryState, FourOf
+from plant.vehicle import Vehicle
+
+_CELL_V = 4.2
+_SECONDS_PER_HOUR = 3600.0
+_LEAST_CURRENT_A = 0.01
+
+
+class PowerMeter:
+    """Counts what one vehicle's battery gives.
+
+    Attributes:
+        charge_ah: Taken so far.
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        """Begin with a full battery."""
+        self._model = BatteryModel(vehicle)
+        self._battery = vehicle.battery
+        self._energy_wh = 0.0
+        self._speeds = np.zeros(4)
+        self.charge_ah = 0.0
+
+    def run(self, controls: FourOf, duration_s: float) -> None:
+        """Turn the rotors at `controls`, parts of the largest speed, for `duration_s`."""
+        self._speeds = np.array(controls)
+        voltage_v, current_a = self._model.terminal(self.charge_ah, self._speeds)
+        self.charge_ah += current_a * duration_s / _SECONDS_PER_HOUR
+        self._energy_wh += voltage_v * current_a * duration_s / _SECONDS_PER_HOUR
+
+    @property
+    def left(self) -> float:
+        """Part of the charge that is left; 1 without a battery."""
+        if self._battery is None:
+            return 1.0
+        return max(0.0, 1.0 - self.charge_ah / self._battery.capacity_ah)
+
+    def state(self) -> BatteryState | None:
+        """Return what to tell of it; None without a battery."""
+        if self._battery is None:
+            return None
+        voltage_v, current_a = self._model.terminal(self.charge_ah, self._speeds)
+        left_ah = self.left * self._battery.capacity_ah
+        left_s = left_ah / current_a * _SECONDS_PER_HOUR if current_a > _LEAST_CURRENT_A else nan
+        cells = max(1, round(self._battery.full_voltage_v / _CELL_V))
+        return BatteryState(cells, voltage_v, current_a, self.charge_ah, self.left, left_s, self._energy_wh)
