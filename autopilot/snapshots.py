@@ -2,10 +2,9 @@
 
 from math import nan
 
-import numpy as np
 from mavlink.setpoints import Sticks
 
-from autopilot.controller import AttitudeDemand, Decision, Fallback, Horizon, VehicleState
+from autopilot.controller import Array, AttitudeDemand, Decision, Fallback, Horizon, VehicleState
 from autopilot.forecast import Forecaster
 from autopilot.modes import ROWS, Mode, custom_mode
 from autopilot.pilot import Guidance, Pilot
@@ -169,7 +168,7 @@ def rates_of(demand: AttitudeDemand | None) -> Vector:
     return (nan, nan, nan) if demand is None else first(demand.angle_rates_rad_s)
 
 
-def first(column: np.ndarray) -> Vector:  # type: ignore[type-arg]
+def first(column: Array) -> Vector:
     """Return the first row of (n, 3)."""
     x, y, z = column[0].tolist()
     return (x, y, z)
