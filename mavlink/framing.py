@@ -29,7 +29,8 @@ class Framer:
 
     def take(self, chunk: bytes) -> list[bytes]:
         """Return the frames that are whole with `chunk`; the bytes of a half one wait for the next."""
-        data, frames, at = self._rest + chunk, [], 0
+        frames: list[bytes] = []
+        data, at = self._rest + chunk, 0
         while marker := _MARKERS.search(data, at):
             self.skipped += marker.start() - at
             at = marker.start()
