@@ -1,11 +1,17 @@
-"""UDP endpoints by URL: `udpin:HOST:PORT` waits for whoever sends, `udpout:HOST:PORT` speaks with that address only."""
+"""Endpoints by URL.
+
+`udpin:HOST:PORT` waits for whoever sends, `udpout:HOST:PORT` speaks with that address only; `tcpin:HOST:PORT` waits for
+clients, `tcp:HOST:PORT` calls a server. The link between plant and autopilot is UDP.
+"""
 
 import os
 import socket
+from ipaddress import ip_address
 from select import select
 from time import perf_counter
+from typing import Protocol
 
-Address = tuple[str, int]
+from mavlink.tcp import Address, TcpClient, TcpServer
 
 SPIN_S = 1e-3
 """How long to look for a datagram before going to sleep: on loopback a wake-up costs more than the exchange.
@@ -15,10 +21,46 @@ Each look gives the core away if somebody else could use it: that may be the ver
 """
 _give_way = getattr(os, "sched_yield", lambda: None)
 _LARGEST_DATAGRAM = 4096
+_DATAGRAMS_AT_ONCE = 64
+"""So that whoever sends without a pause cannot hold the process up."""
+_UDP = ("udpin", "udpout")
+_TCP = ("tcpin", "tcp")
 
 
 class LinkError(Exception):
     """A link that cannot be opened or used; the message is the one line that a user needs."""
+
+
+class GroundLink(Protocol):
+    """A link to ground stations: nothing that it does blocks.
+
+    Attributes:
+        url: The URL of the endpoint, with the port that it really has.
+        target: Whom it calls; None where it waits for others.
+    """
+
+    url: str
+
+    @property
+    def target(self) -> Address | None:
+        """Whom it calls; None where it waits for others."""
+        ...
+
+    def send(self, datagram: bytes, address: Address | None = None) -> None:
+        """Send whole frames to `address`; what cannot be sent now is lost."""
+        ...
+
+    def receive_now(self) -> list[tuple[bytes, Address]]:
+        """Return what has come, as whole frames, and from where."""
+        ...
+
+    def take_closed(self) -> list[Address]:
+        """Return whose connections have ended since last asked."""
+        ...
+
+    def close(self) -> None:
+        """Close every socket."""
+        ...
 
 
 class UdpLink:
@@ -26,13 +68,14 @@ class UdpLink:
 
     Attributes:
         url: The URL of the endpoint, with the port that it really has.
+        target: Whom it speaks with; None for whoever sends.
     """
 
     def __init__(self, sock: socket.socket, url: str, target: Address | None) -> None:
         """Wrap a bound socket; with a `target`, hear nobody else."""
         sock.setblocking(False)
         self._socket = sock
-        self._target = target
+        self.target = target
         self._waited_s = 0.0
         self.url = url
 
@@ -42,7 +85,7 @@ class UdpLink:
         Raises:
             LinkError: The target can never be reached from here.
         """
-        destination = address or self._target
+        destination = address or self.target
         assert destination is not None, "an endpoint that waits needs an address to send to"
         try:
             self._socket.sendto(datagram, destination)
@@ -69,6 +112,24 @@ class UdpLink:
         self._waited_s = perf_counter() - began_s
         return received
 
+    def receive_now(self) -> list[tuple[bytes, Address]]:
+        """Return the datagrams that have come, and their senders."""
+        received = []
+        for _ in range(_DATAGRAMS_AT_ONCE):
+            try:
+                datagram, sender = self._socket.recvfrom(_LARGEST_DATAGRAM)
+            except ConnectionRefusedError:
+                continue
+            except BlockingIOError:
+                break
+            if self.target is None or sender == self.target:
+                received.append((datagram, sender))
+        return received
+
+    def take_closed(self) -> list[Address]:
+        """Return nobody: UDP has no connections."""
+        return []
+
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
@@ -78,38 +139,85 @@ class UdpLink:
             datagram, sender = self._socket.recvfrom(_LARGEST_DATAGRAM)
         except (BlockingIOError, ConnectionRefusedError):
             return None
-        if self._target is not None and sender != self._target:
+        if self.target is not None and sender != self.target:
             return None
         return datagram, sender
 
 
 def open_link(url: str) -> UdpLink:
-    """Open the endpoint that `url` names; port 0 with `udpin:` takes any free port.
+    """Open the UDP endpoint that `url` names; port 0 with `udpin:` takes any free port.
 
     Raises:
         LinkError: The URL is malformed, the host unknown, or the port taken.
     """
-    scheme, host, port = _parse(url)
-    try:
-        address: Address = (socket.gethostbyname(host), port)
-    except OSError as error:
-        raise LinkError(f"{url}: unknown host {host}") from error
+    return _open_udp(url, *_parse(url, _UDP))
+
+
+def open_ground_link(url: str) -> GroundLink:
+    """Open the endpoint that `url` names, of UDP or TCP; port 0 takes any free port where it waits.
+
+    Raises:
+        LinkError: The URL is malformed, the host unknown, or the port taken.
+    """
+    scheme, host, port = _parse(url, (*_UDP, *_TCP))
+    if scheme in _UDP:
+        return _open_udp(url, scheme, host, port)
+    address = (_resolved(url, host), port)
+    if scheme == "tcp":
+        return TcpClient(url, address)
+    sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    if os.name == "posix":  # elsewhere this would let two programs have one port
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    _bind(sock, url, address, listen=True)
+    return TcpServer(sock, f"tcpin:{host}:{sock.getsockname()[1]}")
+
+
+def beyond_loopback(url: str) -> bool:
+    """Whether the endpoint that `url` names can be reached from, or reaches, another computer.
+
+    Raises:
+        LinkError: The URL is malformed, or the host unknown.
+    """
+    _, host, _ = _parse(url, (*_UDP, *_TCP))
+    return not ip_address(_resolved(url, host)).is_loopback
+
+
+def unsigned_refusal(url: str) -> str:
+    """Return the line that refuses to open a link beyond loopback without a key."""
+    return f"{url} reaches beyond this computer: give --signing-key FILE, or --insecure to let anybody fly the vehicle"
+
+
+def _open_udp(url: str, scheme: str, host: str, port: int) -> UdpLink:
+    address = (_resolved(url, host), port)
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     if scheme == "udpout":
         return UdpLink(sock, url, address)
-    try:
-        sock.bind(address)
-    except OSError as error:
-        sock.close()
-        raise LinkError(f"{url}: {error.strerror}; end the program that has this port, or name another") from error
+    _bind(sock, url, address)
     return UdpLink(sock, f"udpin:{host}:{sock.getsockname()[1]}", None)
 
 
-def _parse(url: str) -> tuple[str, str, int]:
+def _resolved(url: str, host: str) -> str:
+    try:
+        return socket.gethostbyname(host)
+    except (OSError, UnicodeError) as error:
+        raise LinkError(f"{url}: unknown host {host}") from error
+
+
+def _bind(sock: socket.socket, url: str, address: Address, *, listen: bool = False) -> None:
+    try:
+        sock.bind(address)
+        if listen:
+            sock.listen()
+    except OSError as error:
+        sock.close()
+        raise LinkError(f"{url}: {error.strerror}; end the program that has this port, or name another") from error
+
+
+def _parse(url: str, schemes: tuple[str, ...]) -> tuple[str, str, int]:
     scheme, _, rest = url.partition(":")
     host, _, port = rest.rpartition(":")
-    if scheme not in ("udpin", "udpout") or not host or not port.isdecimal() or int(port) > 65535:
-        raise LinkError(f"{url}: expected udpin:HOST:PORT or udpout:HOST:PORT")
-    if scheme == "udpout" and int(port) == 0:
+    if scheme not in schemes or not host or not port.isdecimal() or int(port) > 65535:
+        raise LinkError(f"{url}: expected " + " or ".join(f"{scheme}:HOST:PORT" for scheme in schemes))
+    if scheme in ("udpout", "tcp") and int(port) == 0:
         raise LinkError(f"{url}: port 0 is no port to send to")
     return scheme, host, int(port)
