@@ -1,0 +1,301 @@
+"""The files that a vehicle shows to its ground stations, as a port without input or output, and what is put together.
+
+Whatever names, offsets and data are asked for, nothing here raises: what cannot be done is refused.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from enum import Enum
+from typing import NamedTuple, Protocol, TypeAlias
+
+Names: TypeAlias = tuple[str, ...]
+"""Where something is: the names of the folders that lead there, and its own. The root is ()."""
+
+LONGEST_NAME_BYTES = 255
+MOST_FOLDERS_DEEP = 16
+
+
+class Refusal(Enum):
+    """Why something was not done."""
+
+    NOT_FOUND = "no such file or folder"
+    EXISTS = "exists already"
+    PROTECTED = "protected"
+    NO_SPACE = "no space left"
+    IS_FOLDER = "is a folder"
+    NOT_A_FOLDER = "is no folder"
+    NOT_EMPTY = "folder is not empty"
+    BAD_NAME = "no name for a file"
+    FAILED = "failed"
+
+
+class Entry(NamedTuple):
+    """What a folder holds.
+
+    Attributes:
+        name: In the folder.
+        is_folder: Or else a file.
+        size: Bytes; 0 of a folder.
+        modified_s: Last modification, s since 1970 UTC; 0 where nobody knows.
+    """
+
+    name: str
+    is_folder: bool
+    size: int = 0
+    modified_s: int = 0
+
+
+class Reading(NamedTuple):
+    """A file that is being read.
+
+    Attributes:
+        size: Bytes that it had when it was opened.
+        read: From an offset, so many bytes: fewer, or none, where the file ends.
+    """
+
+    size: int
+    read: Callable[[int, int], bytes | Refusal]
+
+
+class Quota(NamedTuple):
+    """How much may be kept.
+
+    Attributes:
+        size: Bytes, of all files together.
+        entries: Files and folders.
+    """
+
+    size: int
+    entries: int
+
+
+class Files(Protocol):
+    """Some files in folders."""
+
+    def list(self, names: Names) -> list[Entry] | Refusal:
+        """Return what a folder holds, by name."""
+        ...
+
+    def open(self, names: Names) -> Reading | Refusal:
+        """Open a file to read it."""
+        ...
+
+    def create(self, names: Names) -> Refusal | None:
+        """Make an empty file; one that exists is emptied."""
+        ...
+
+    def write(self, names: Names, offset: int, data: bytes) -> Refusal | None:
+        """Put `data` into a file; a gap before it is zeros."""
+        ...
+
+    def truncate(self, names: Names, size: int) -> Refusal | None:
+        """Keep the first `size` bytes of a file; nothing where it has fewer."""
+        ...
+
+    def remove(self, names: Names) -> Refusal | None:
+        """Remove a file."""
+        ...
+
+    def rename(self, old: Names, new: Names) -> Refusal | None:
+        """Give a file or folder another place, where nothing is yet."""
+        ...
+
+    def make_folder(self, names: Names) -> Refusal | None:
+        """Make a folder."""
+        ...
+
+    def remove_folder(self, names: Names) -> Refusal | None:
+        """Remove an empty folder."""
+        ...
+
+
+def names_of(path: str) -> Names | Refusal:
+    """Return the names in a path; what begins with a slash and what does not are the same.
+
+    There is no way up: a path with ".." leads nowhere.
+    """
+    names = tuple(name for name in path.split("/") if name not in ("", "."))
+    if ".." in names or "\0" in path:
+        return Refusal.NOT_FOUND
+    if len(names) > MOST_FOLDERS_DEEP or not all(map(_fits, names)):
+        return Refusal.BAD_NAME
+    return names
+
+
+def can_be_new(name: str) -> bool:
+    """Whether a new file or folder may be called this: what can be listed again, on any system."""
+    return name not in ("", ".", "..") and name.isprintable() and "/" not in name and _fits(name)
+
+
+def _fits(name: str) -> bool:
+    return len(name.encode(errors="surrogatepass")) <= LONGEST_NAME_BYTES
+
+
+def reading_of(data: bytes) -> Reading:
+    """Return a file that holds `data`."""
+    return Reading(len(data), lambda offset, count: data[offset : offset + count])
+
+
+class ReadOnly:
+    """Files that can be looked at."""
+
+    def __init__(self, files: Files) -> None:
+        """Show `files`."""
+        self._files = files
+
+    def list(self, names: Names) -> list[Entry] | Refusal:
+        """Return what a folder holds, by name."""
+        return self._files.list(names)
+
+    def open(self, names: Names) -> Reading | Refusal:
+        """Open a file to read it."""
+        return self._files.open(names)
+
+    def create(self, names: Names) -> Refusal:
+        """Refuse."""
+        del names
+        return Refusal.PROTECTED
+
+    def write(self, names: Names, offset: int, data: bytes) -> Refusal:
+        """Refuse."""
+        del names, offset, data
+        return Refusal.PROTECTED
+
+    def truncate(self, names: Names, size: int) -> Refusal:
+        """Refuse."""
+        del names, size
+        return Refusal.PROTECTED
+
+    def rename(self, old: Names, new: Names) -> Refusal:
+        """Refuse."""
+        del old, new
+        return Refusal.PROTECTED
+
+    remove = make_folder = remove_folder = create
+
+
+Generator: TypeAlias = Callable[[str], bytes]
+"""Makes the content of a file; it is given what stands behind the name's question mark: "withdefaults=1"."""
+
+
+class Tree:
+    """Files of several kinds in one tree: generated ones, mounted folders, and one at the root for all the rest."""
+
+    def __init__(self, root: Files, mounts: Mapping[str, Files], generated: Mapping[str, Generator]) -> None:
+        """Compose.
+
+        Args:
+            root: Whatever lies in no mount.
+            mounts: By path, "logs".
+            generated: By path, "@PARAM/param.pck". They can be read only.
+        """
+        self._root = root
+        self._mounts = {_known(path): files for path, files in mounts.items()}
+        self._generated = {_known(path): generator for path, generator in generated.items()}
+        fixed = (*self._mounts, *self._generated)
+        self._folders = {names[:depth] for names in fixed for depth in range(1, len(names))}
+
+    def list(self, names: Names) -> list[Entry] | Refusal:
+        """Return what a folder holds, by name."""
+        if names in self._generated:
+            return Refusal.NOT_A_FOLDER
+        files, rest = self._at(names)
+        found = files.list(rest)
+        if isinstance(found, Refusal):
+            if names not in self._folders:
+                return found
+            found = []
+        entries = {entry.name: entry for entry in found}
+        entries |= {entry.name: entry for entry in self._fixed_in(names)}
+        return [entries[name] for name in sorted(entries)]
+
+    def open(self, names: Names) -> Reading | Refusal:
+        """Open a file to read it; what is generated stays as it was when it was opened."""
+        if names:
+            name, _, query = names[-1].partition("?")
+            generator = self._generated.get((*names[:-1], name))
+            if generator is not None:
+                return reading_of(generator(query))
+        if names in self._folders:
+            return Refusal.IS_FOLDER
+        files, rest = self._at(names)
+        return files.open(rest)
+
+    def create(self, names: Names) -> Refusal | None:
+        """Make an empty file; one that exists is emptied."""
+        if self._is_fixed(names):
+            return Refusal.PROTECTED
+        files, rest = self._at(names)
+        return files.create(rest)
+
+    def write(self, names: Names, offset: int, data: bytes) -> Refusal | None:
+        """Put `data` into a file; a gap before it is zeros."""
+        if self._is_fixed(names):
+            return Refusal.PROTECTED
+        files, rest = self._at(names)
+        return files.write(rest, offset, data)
+
+    def truncate(self, names: Names, size: int) -> Refusal | None:
+        """Keep the first `size` bytes of a file; nothing where it has fewer."""
+        if self._is_fixed(names):
+            return Refusal.PROTECTED
+        files, rest = self._at(names)
+        return files.truncate(rest, size)
+
+    def remove(self, names: Names) -> Refusal | None:
+        """Remove a file."""
+        if self._is_fixed(names):
+            return Refusal.PROTECTED
+        files, rest = self._at(names)
+        return files.remove(rest)
+
+    def rename(self, old: Names, new: Names) -> Refusal | None:
+        """Give a file or folder another place, where nothing is yet, in the same mount."""
+        if self._is_fixed(old):
+            return Refusal.PROTECTED
+        if self._is_fixed(new):
+            return Refusal.EXISTS
+        files, rest = self._at(old)
+        new_files, new_rest = self._at(new)
+        return files.rename(rest, new_rest) if files is new_files else Refusal.PROTECTED
+
+    def make_folder(self, names: Names) -> Refusal | None:
+        """Make a folder."""
+        if self._is_fixed(names):
+            return Refusal.EXISTS
+        files, rest = self._at(names)
+        return files.make_folder(rest)
+
+    def remove_folder(self, names: Names) -> Refusal | None:
+        """Remove an empty folder."""
+        if self._is_fixed(names):
+            return Refusal.PROTECTED
+        files, rest = self._at(names)
+        return files.remove_folder(rest)
+
+    def _is_fixed(self, names: Names) -> bool:
+        return not names or names in self._generated or names in self._mounts or names in self._folders
+
+    def _at(self, names: Names) -> tuple[Files, Names]:
+        """Return the files that hold `names`, and the names there."""
+        for depth in range(len(names), 0, -1):
+            files = self._mounts.get(names[:depth])
+            if files is not None:
+                return files, names[depth:]
+        return self._root, names
+
+    def _fixed_in(self, folder: Names) -> Iterator[Entry]:
+        depth = len(folder)
+        for names in (*self._folders, *self._mounts):
+            if len(names) == depth + 1 and names[:depth] == folder:
+                yield Entry(names[-1], True)
+        for names, generator in self._generated.items():
+            if names[:-1] == folder:
+                yield Entry(names[-1], False, len(generator("")))
+
+
+def _known(path: str) -> Names:
+    """Return the names of a path that the program itself gives."""
+    names = names_of(path)
+    if isinstance(names, Refusal) or not names:
+        raise ValueError(path)
+    return names

@@ -1,0 +1,89 @@
+"""A shell over SERIAL_CONTROL: a line in, text out; a few commands that only tell, none that reaches the system.
+
+Specification: SERIAL_CONTROL (126), https://mavlink.io/en/messages/common.html#SERIAL_CONTROL, device SHELL.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import TypeAlias
+
+from mavlink.dialect import Message, mav
+from mavlink.services.service import Peer, Send, to
+
+DATA_BYTES = 70
+LONGEST_LINE_BYTES = 200
+LONGEST_ANSWER_BYTES = 20_000
+MESSAGES_A_POLL = 10
+MOST_PEERS = 16
+PROMPT = "colibri> "
+
+_SHELL: int = mav.SERIAL_CONTROL_DEV_SHELL
+_REPLY: int = mav.SERIAL_CONTROL_FLAG_REPLY
+_RESPOND: int = mav.SERIAL_CONTROL_FLAG_RESPOND
+
+Command: TypeAlias = Callable[[list[str]], str]
+"""Answers what was typed behind its name, with lines of text."""
+
+
+class Shell:
+    """Answers lines.
+
+    Attributes:
+        hears: SERIAL_CONTROL.
+    """
+
+    hears = frozenset({"SERIAL_CONTROL"})
+
+    def __init__(self, commands: Mapping[str, Command]) -> None:
+        """Know `commands`, by name, and "help"."""
+        self._commands = {"help": self._help, **commands}
+        self._lines: dict[Peer, bytes] = {}
+        self._answers: dict[Peer, bytes] = {}
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Take in what is typed. A reply of another shell is none of it."""
+        del now_us
+        fields = message.fields
+        if fields.device != _SHELL or fields.flags & _REPLY:
+            return ()
+        if peer not in self._lines and len(self._lines) >= MOST_PEERS:
+            forgotten = next(iter(self._lines))
+            del self._lines[forgotten]
+            self._answers.pop(forgotten, None)
+        typed = bytes(fields.data)[: fields.count]
+        *lines, begun = (self._lines.pop(peer, b"") + typed.replace(b"\r", b"\n")).split(b"\n")
+        self._lines[peer] = begun[:LONGEST_LINE_BYTES]
+        for line in lines if fields.flags & _RESPOND else ():
+            text = self._answer(line) + PROMPT
+            self._answers[peer] = (self._answers.get(peer, b"") + text.encode(errors="replace"))[:LONGEST_ANSWER_BYTES]
+        return ()
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        """Send more of the answers."""
+        del now_us
+        return self._due() if self._answers else ()
+
+    def _due(self) -> list[Send]:
+        sends: list[Send] = []
+        for peer, text in list(self._answers.items()):
+            for start in range(0, min(len(text), MESSAGES_A_POLL * DATA_BYTES), DATA_BYTES):
+                part = text[start : start + DATA_BYTES]
+                data = part.ljust(DATA_BYTES, b"\0")
+                sends.append(to(peer, "SERIAL_CONTROL", _SHELL, _REPLY, 0, 0, len(part), data))
+            self._answers[peer] = text[MESSAGES_A_POLL * DATA_BYTES :]
+            if not self._answers[peer]:
+                del self._answers[peer]
+        return sends
+
+    def _answer(self, line: bytes) -> str:
+        """Return what a line is answered with: itself, as a terminal shows what is typed, and the text."""
+        typed = "".join(letter for letter in line.decode(errors="replace") if letter.isprintable())
+        name, *arguments = typed.split() or [""]
+        if not name:
+            return "\n"
+        echo = " ".join((name, *arguments)) + "\n"
+        command = self._commands.get(name)
+        text = command(arguments) if command is not None else f"{name}: not a command, try help"
+        return echo + text.rstrip("\n") + "\n"
+
+    def _help(self, _: list[str]) -> str:
+        return " ".join(sorted(self._commands))
