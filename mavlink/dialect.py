@@ -34,6 +34,7 @@ _HEADER_AND_CRC_V1 = mav.HEADER_LEN_V1 + 2
 _MARKER = 0xFD
 _HEADER = Struct("<BBBBBBBHB")
 """Marker, payload length, two flags, sequence, system, component, message id (its low 16 bits, its high 8)."""
+_PARAM_VALUE = Struct("<I")
 _CRC_BYTES = 2
 _CRC_START = 0xFFFF
 
@@ -54,11 +55,36 @@ class Message(NamedTuple):
     frame: bytes
 
 
+class Bits(NamedTuple):
+    """A float field by its bits: a Python float would change those of a signalling NaN.
+
+    Attributes:
+        pattern: The 32 bits as an unsigned integer.
+    """
+
+    pattern: int
+
+
+def param_bits(message: Message) -> int:
+    """Return the 32 bits of `param_value` of a PARAM_SET or PARAM_VALUE, as an unsigned integer.
+
+    Parameters that are integers travel bytewise in that float (https://mavlink.io/en/services/parameter.html,
+    parameter encoding): its value in `message.fields` is another one where the bits are those of a signalling NaN.
+    """
+    return int.from_bytes(payload(message.frame)[: _PARAM_VALUE.size], "little")
+
+
+def payload(frame: bytes) -> bytes:
+    """Return the payload of a whole frame of MAVLink 1 or 2; zeros at its end may be missing."""
+    start = _HEADER.size if frame[0] == _MARKER else mav.HEADER_LEN_V1
+    return frame[start : start + frame[1]]
+
+
 class Codec:
     """Encodes as one component, decodes from anybody.
 
-    Whole MAVLink 2 frames whose fields are numbers, which is all that a flight sends, are read and written here:
-    pymavlink takes several times as long. Everything else is left to pymavlink, as is every judgement on bad input.
+    Whole MAVLink 2 frames, which is all that a flight sends, are read and written here: pymavlink takes several times
+    as long. MAVLink 1 is left to pymavlink, as is every judgement on bad input.
 
     Attributes:
         dropped: How many pieces of input were no message of this dialect, by reason.
@@ -68,17 +94,18 @@ class Codec:
         """Speak as component `component_id` of system `system_id`."""
         self._mav = mav.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
         self._mav.robust_parsing = True
+        self._sequence = 0
         self.source = (system_id, component_id)
         self.dropped: Counter[str] = Counter()
 
     def encode(self, name: str, *fields: Any) -> bytes:
-        """Encode message `name` with its fields in the order of the MAVLink definition, in wire units and frames."""
-        layout = _layout_named(name)
-        if layout is None:
-            frame = bytes(_message_named(name)(*fields).pack(self._mav))
-        else:
-            frame = layout.frame(fields, self._mav.seq, self.source)
-        self._mav.seq = (self._mav.seq + 1) % 256
+        """Encode message `name` with its fields in the order of the MAVLink definition, in wire units and frames.
+
+        Text is bytes, or a str that goes out as UTF-8; what is too long is cut. `param_value` of PARAM_VALUE and of
+        PARAM_SET may be `Bits`.
+        """
+        frame = _layout_named(name).frame(fields, self._sequence, self.source)
+        self._sequence = (self._sequence + 1) % 256
         return frame
 
     def decode(self, datagram: bytes) -> list[Message]:
@@ -109,7 +136,7 @@ class Codec:
 
 
 class _Layout:
-    """How a message whose fields are all numbers lies in a frame.
+    """How a message lies in a frame.
 
     Attributes:
         name: Message name.
@@ -123,20 +150,26 @@ class _Layout:
         self._crc_extra = bytes([definition.crc_extra])
         self._fields: Any = namedtuple("_fields", definition.fieldnames)  # type: ignore[misc]
         self._defaults: tuple[Any, ...] = definition.__init__.__defaults__ or ()
-        places = dict(zip(definition.ordered_fieldnames, _places(definition.array_lengths), strict=True))
+        order = [definition.fieldnames.index(name) for name in definition.ordered_fieldnames]
+        kinds = [definition.fieldtypes[i] for i in order]
+        lengths = [0 if kind == "char" else n for kind, n in zip(kinds, definition.array_lengths, strict=True)]
+        places = dict(zip(definition.ordered_fieldnames, _places(lengths), strict=True))
         self._in_order_of_fields = _getter([places[name] for name in definition.fieldnames])
-        self._in_order_of_wire = _getter([definition.fieldnames.index(name) for name in definition.ordered_fieldnames])
-        self._lengths: list[int] | None = definition.array_lengths if any(definition.array_lengths) else None
+        self._in_order_of_wire = _getter(order)
+        self._lengths: list[int] | None = lengths if any(lengths) else None
+        self._texts = [i for i, kind in enumerate(definition.fieldtypes) if kind == "char"]
 
     def frame(self, fields: Sequence[Any], sequence: int, source: tuple[int, int]) -> bytes:
         """Return the whole frame; fields of extensions may be missing, zeros at the end of the payload are left out."""
         missing = len(self._fields._fields) - len(fields)
         if missing:
             fields = (*fields, *self._defaults[-missing:])
+        if self._texts:
+            fields = [field.encode() if isinstance(field, str) else field for field in fields]
         values = self._in_order_of_wire(fields)
         if self._lengths is not None:
             values = _flat(values, self._lengths)
-        payload = self._payload.pack(*values).rstrip(b"\0") or b"\0"
+        payload = self._packed(values).rstrip(b"\0") or b"\0"
         header = _HEADER.pack(_MARKER, len(payload), 0, 0, sequence, *source, self._id & 0xFFFF, self._id >> 16)
         frame = header + payload
         return frame + self.crc(frame)
@@ -148,11 +181,32 @@ class _Layout:
     def read(self, payload: bytes) -> Any:
         """Return the fields of a payload, of which zeros at the end, and what a later dialect added, may be missing."""
         size = self._payload.size
-        return self._fields._make(self._in_order_of_fields(self._payload.unpack(payload.ljust(size, b"\0")[:size])))
+        values = self._in_order_of_fields(self._payload.unpack(payload.ljust(size, b"\0")[:size]))
+        return self._fields._make(self._with_text(values) if self._texts else values)
+
+    def _packed(self, values: Sequence[Any]) -> bytes:
+        return self._payload.pack(*values)
+
+    def _with_text(self, values: Sequence[Any]) -> list[Any]:
+        """Return the fields with text as pymavlink reads it: up to the first NUL; what is not ASCII is replaced."""
+        fields = list(values)
+        for i in self._texts:
+            fields[i] = fields[i].split(b"\0", 1)[0].decode("ascii", "replace")
+        return fields
+
+
+class _ParameterLayout(_Layout):
+    """Of PARAM_VALUE and PARAM_SET, whose float is the first of the wire and may be `Bits`."""
+
+    def _packed(self, values: Sequence[Any]) -> bytes:
+        value, *others = values
+        if not isinstance(value, Bits):
+            return super()._packed(values)
+        return _PARAM_VALUE.pack(value.pattern) + super()._packed([0.0, *others])[_PARAM_VALUE.size :]
 
 
 def _whole_messages(datagram: bytes) -> list[Message] | None:
-    """Return the messages of a datagram made of nothing but whole frames of numbers; None for any other."""
+    """Return the messages of a datagram made of nothing but whole MAVLink 2 frames; None for any other."""
     messages, end, after = [], len(datagram), 0
     while after < end:
         at = after
@@ -180,22 +234,17 @@ _crc16: Callable[[bytes, int], int] = getattr(mav, "mcrf4xx", None) or _slow_crc
 """The compiled checksum that pymavlink found, without the object that it puts around it."""
 
 
-def _message_named(name: str) -> Any:
-    return getattr(mav, f"MAVLink_{name.lower()}_message")
-
-
 @cache
-def _layout_named(name: str) -> _Layout | None:
-    return _layout(_message_named(name).id)
+def _layout_named(name: str) -> _Layout:
+    definition = getattr(mav, f"MAVLink_{name.lower()}_message")
+    return (_ParameterLayout if name in ("PARAM_VALUE", "PARAM_SET") else _Layout)(definition)
 
 
 @cache
 def _layout(message_id: int) -> _Layout | None:
-    """Return the layout of a message; None where the dialect has none, or some of its fields are text."""
+    """Return the layout of a message; None where the dialect has none."""
     definition = mav.mavlink_map.get(message_id)
-    if definition is None or "char" in definition.fieldtypes:
-        return None
-    return _Layout(definition)
+    return None if definition is None else _layout_named(definition.msgname)
 
 
 def _places(lengths: Sequence[int]) -> Iterator[int | slice]:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
 from mavlink import dialect
-from mavlink.dialect import Codec
+from mavlink.dialect import Bits, Codec, param_bits
 
 HEARTBEAT = (dialect.TYPE_QUADROTOR, dialect.AUTOPILOT_GENERIC, 0, 0, dialect.STATE_ACTIVE, 3)
 
@@ -80,17 +80,20 @@ def pymavlink_frame(name: str, payload: bytes) -> tuple[Any, bytes]:
 
 def unflattened(definition: Any, payload: bytes) -> list[Any]:
     flat = iter(definition.unpacker.unpack(payload))
-    return [[next(flat) for _ in range(length)] if length else next(flat) for length in definition.array_lengths]
+    types = dict(zip(definition.fieldnames, definition.fieldtypes, strict=True))
+    return [
+        [next(flat) for _ in range(length)] if length and types[field] != "char" else next(flat)
+        for field, length in zip(definition.ordered_fieldnames, definition.array_lengths, strict=True)
+    ]
 
 
-NUMERIC = sorted(
-    definition.msgname for definition in common.mavlink_map.values() if "char" not in definition.fieldtypes
-)
+NAMES = sorted(definition.msgname for definition in common.mavlink_map.values())
+WITH_TEXT = [name for name in NAMES if "char" in getattr(common, f"MAVLink_{name.lower()}_message").fieldtypes]
 
 
-@settings(max_examples=500)
-@given(st.data(), st.sampled_from(NUMERIC))
-def test_reads_and_writes_numbers_as_pymavlink_does(data: st.DataObject, name: str) -> None:
+@settings(max_examples=600)
+@given(st.data(), st.sampled_from(NAMES) | st.sampled_from(WITH_TEXT))
+def test_reads_and_writes_as_pymavlink_does(data: st.DataObject, name: str) -> None:
     size = getattr(common, f"MAVLink_{name.lower()}_message").unpacker.size
     expected, frame = pymavlink_frame(name, data.draw(st.binary(min_size=size, max_size=size)))
     codec = Codec(7, 9)
@@ -99,7 +102,64 @@ def test_reads_and_writes_numbers_as_pymavlink_does(data: st.DataObject, name: s
     listed = [list(field) if isinstance(field, tuple) else field for field in fields]
     assert repr(listed) == repr([getattr(expected, field) for field in expected.get_fieldnames()])
     assert (message.name, message.source, message.frame) == (name, (7, 9), frame)
-    assert codec.encode(name, *fields) == frame
+    if name not in WITH_TEXT:
+        assert codec.encode(name, *fields) == frame
+
+
+@given(st.binary(max_size=60).filter(lambda text: not text.endswith(b"\0")), st.sampled_from([0, 7]))
+def test_writes_text_as_pymavlink_does(text: bytes, chunk: int) -> None:
+    mav = common.MAVLink(None, srcSystem=7, srcComponent=9)
+    frame = bytes(common.MAVLink_statustext_message(6, text, 0, chunk).pack(mav))
+    assert Codec(7, 9).encode("STATUSTEXT", 6, text, 0, chunk) == frame
+
+
+def test_text_may_be_a_str_and_is_cut_where_it_is_too_long() -> None:
+    codec = Codec(7, 9)
+    (message,) = codec.decode(codec.encode("PARAM_REQUEST_READ", 1, 1, "A_NAME_OF_MORE_THAN_16", -1))
+    assert message.fields.param_id == "A_NAME_OF_MORE_T"
+    assert message.fields.param_index == -1
+
+
+SIGNALLING = [0x7F800001, 0x7FBFFFFF, 0xFF800001, 0xFFBFFFFF, -5000000 & 0xFFFFFFFF]
+PATTERNS = st.integers(0, 0xFFFFFFFF) | st.integers(0x7F800001, 0x7FBFFFFF) | st.integers(0xFF800001, 0xFFBFFFFF)
+
+
+@given(PATTERNS)
+def test_every_bit_of_a_parameter_survives(pattern: int) -> None:
+    codec = Codec(7, 9)
+    for frame in (
+        codec.encode("PARAM_VALUE", b"SYS_ID", Bits(pattern), 6, 3, 1),
+        codec.encode("PARAM_SET", 1, 1, "SYS_ID", Bits(pattern), 6),
+    ):
+        (message,) = codec.decode(frame)
+        assert param_bits(message) == pattern
+        assert (message.fields.param_id, message.fields.param_type) == ("SYS_ID", 6)
+
+
+@pytest.mark.parametrize("pattern", SIGNALLING)
+def test_the_bits_of_a_parameter_are_what_other_software_reads_in_place(pattern: int) -> None:
+    frame = Codec(7, 9).encode("PARAM_SET", 1, 1, b"A", Bits(pattern), 6)
+    assert int.from_bytes(frame[10:14], "little") == pattern
+
+
+def test_a_parameter_may_still_be_a_float_and_come_in_mavlink_1() -> None:
+    codec = Codec(7, 9)
+    mav = common.MAVLink(None, srcSystem=7, srcComponent=9)
+    parameter = common.MAVLink_param_set_message(1, 1, b"A", 2.5, 9)
+    old = bytes(parameter.pack(mav, force_mavlink1=True))
+    assert codec.encode("PARAM_SET", 1, 1, b"A", 2.5, 9) == bytes(
+        common.MAVLink_param_set_message(1, 1, b"A", 2.5, 9).pack(common.MAVLink(None, srcSystem=7, srcComponent=9))
+    )
+    (message,) = codec.decode(old)
+    assert param_bits(message) == 0x40200000
+
+
+@given(st.binary(max_size=4))
+def test_the_bits_of_a_parameter_need_no_zeros_at_the_end_of_the_payload(value: bytes) -> None:
+    codec = Codec(7, 9)
+    whole = value.ljust(4, b"\0")
+    (message,) = codec.decode(codec.encode("PARAM_SET", 0, 0, b"", Bits(int.from_bytes(whole, "little")), 0))
+    assert param_bits(message) == int.from_bytes(whole, "little")
 
 
 def test_fields_of_an_extension_may_be_left_out() -> None:
