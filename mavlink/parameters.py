@@ -146,6 +146,14 @@ class Parameters:
         """
         return self._values[name]
 
+    def default(self, name: str) -> Value:
+        """Return the default of a parameter.
+
+        Raises:
+            KeyError: There is none of that name.
+        """
+        return self._definitions[self._index[name]].default
+
     @property
     def values(self) -> Mapping[str, Value]:
         """All values as they are now."""
