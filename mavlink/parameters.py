@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from math import isfinite
+from math import copysign, inf, isfinite
 from re import fullmatch
 from struct import Struct
 from typing import TypeAlias
@@ -173,7 +173,7 @@ class Parameters:
         if index is None:
             return Refusal.DOES_NOT_EXIST
         definition = self._definitions[index]
-        if definition.kind == Kind.REAL and isfinite(value) and abs(value) <= LARGEST_REAL:
+        if definition.kind == Kind.REAL:
             value = float32(value)
         if value == self._values[name] and isinstance(value, type(self._values[name])):
             return None
@@ -210,8 +210,11 @@ class Parameters:
 
 
 def float32(value: float) -> float:
-    """Return the nearest number that 32 bits hold; `value` must not lie beyond their range."""
-    (rounded,) = _REAL.unpack(_REAL.pack(value))
+    """Return the nearest number that 32 bits hold, infinite where that lies beyond them."""
+    try:
+        (rounded,) = _REAL.unpack(_REAL.pack(value))
+    except OverflowError:
+        return copysign(inf, value)
     return float(rounded)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from mavlink.dialect import Bits, Message, param_bits
 from mavlink.parameters import Kind, Parameter, Parameters, Refusal, Value, bits_of, value_of
-from mavlink.services.service import Peer, Send, to, to_all
+from mavlink.services.service import Peer, Send, to
 
 INTERVAL_US = 2_000
 """Between two parameters of a list: 150 of them take 0.3 s."""
@@ -58,7 +58,7 @@ class ParameterService:
         """Tell everybody the value of a parameter that the vehicle changed by itself."""
         index = self._parameters.index(name)
         assert index is not None, "the vehicle knows its parameters"
-        return to_all(*self._value(index))
+        return self._value(index)
 
     def _begin_list(self, peer: Peer, now_us: int) -> None:
         """Begin a list. Who asks while one is on its way gets the rest of it, then what went before."""
@@ -72,7 +72,7 @@ class ParameterService:
         listing.last_us += due * INTERVAL_US
         sends = []
         for _ in range(min(due, listing.left, MOST_AT_ONCE)):
-            sends.append(Send(*self._value(listing.index), channel))
+            sends.append(self._value(listing.index, channel))
             listing.index = (listing.index + 1) % len(self._parameters)
             listing.left -= 1
         if listing.left == 0:
@@ -87,7 +87,7 @@ class ParameterService:
             known = None if self._parameters.at(index) is None else index
         if known is None:
             return _refuse(peer, name, index, Refusal.DOES_NOT_EXIST)
-        return to(peer, *self._value(known))
+        return self._value(known, peer.channel)
 
     def _set(self, name: str, wire_type: int, bits: int, peer: Peer) -> Iterable[Send]:
         """Set, and tell everybody what holds now; who was refused hears why first (write parameters)."""
@@ -97,14 +97,16 @@ class ParameterService:
             return (_refuse(peer, name, BY_ID, Refusal.DOES_NOT_EXIST),)
         value = _meant(definition, wire_type, bits)
         refusal = value if isinstance(value, Refusal) else self._parameters.set(name, value)
-        answer = to_all(*self._value(index))
+        answer = self._value(index)
         return (answer,) if refusal is None else (_refuse(peer, name, index, refusal), answer)
 
-    def _value(self, index: int) -> tuple[str, tuple[bytes, Bits, int, int, int]]:
+    def _value(self, index: int, channel: int | None = None) -> Send:
+        """Return the PARAM_VALUE for a channel, or for all of them."""
         definition = self._parameters.at(index)
         assert definition is not None, "indices are checked where they come from"
         bits = Bits(bits_of(definition.kind, self._parameters[definition.name]))
-        return "PARAM_VALUE", (definition.name.encode(), bits, definition.kind, len(self._parameters), index)
+        fields = (definition.name, bits, definition.kind, len(self._parameters), index)
+        return Send("PARAM_VALUE", fields, channel)
 
 
 def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | Refusal:

@@ -4,7 +4,7 @@ A line is vehicle id, component id, name, value and MAV_PARAM_TYPE, with tabs be
 """
 
 from mavlink.dialect import AUTOPILOT_COMPONENT
-from mavlink.parameters import LARGEST_REAL, Kind, Parameter, Parameters, Refusal, Value, float32
+from mavlink.parameters import Kind, Parameter, Parameters, Refusal, Value, float32
 
 _COLUMNS = 5
 _LARGEST_ID = 255
@@ -73,11 +73,9 @@ def _value(parameter: Parameter, text: str, kind: str) -> Value:
         raise ValueError(f"its type is {parameter.kind.value}, not {kind!r}")
     value: Value
     try:
-        value = int(text) if parameter.kind == Kind.INT else float(text)
+        value = int(text) if parameter.kind == Kind.INT else float32(float(text))
     except ValueError:
         raise ValueError(f"no number: {text!r}") from None
-    if isinstance(value, float) and abs(value) <= LARGEST_REAL:
-        value = float32(value)
     if parameter.refusal(value) == Refusal.VALUE_OUT_OF_RANGE:
         raise ValueError(f"{text} is not {_choices(parameter)}")
     return value
