@@ -1,7 +1,6 @@
 """Numbers of a table of tables, as parameters: where each lies, what it is called, and back."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from copy import deepcopy
 from itertools import count
 from math import isfinite
 from typing import Any, NamedTuple, TypeAlias
@@ -104,14 +103,21 @@ def changed(tree: Tree, numbers: Iterable[Number], values: Mapping[str, Value], 
 
     A parameter holds 32 bits: numbers that nobody changed keep their 64.
     """
-    wanted = [number for number in numbers if values[number.name] != defaults[number.name]]
-    if not wanted:
-        return tree
-    tree = deepcopy(tree)
-    for number in wanted:
-        *outer, last = number.path
-        read(tree, tuple(outer))[last] = number.applied(values[number.name])
+    for number in numbers:
+        if values[number.name] != defaults[number.name]:
+            tree = _with(tree, number.path, number.applied(values[number.name]))
     return tree
+
+
+def _with(tree: Any, path: Path, value: Value) -> Any:
+    """Return a tree with another number at `path`; the one given stays as it is."""
+    if not path:
+        return value
+    key, *rest = path
+    inner = _with(tree[key], tuple(rest), value)
+    if isinstance(key, str):
+        return {**tree, key: inner}
+    return [*tree[:key], inner, *tree[key + 1 :]]
 
 
 def is_number(value: Any) -> bool:

@@ -57,16 +57,19 @@ class Numbers:
 
     def _law_definitions(self) -> list[Parameter]:
         name = self._profile.controller
-        where = "controllers." + name + ".{} of the profile."
         return [
-            number.parameter(self._table, f"Control law {name}", where.format(described(number.path)))
+            number.parameter(
+                self._table, f"Control law {name}", f"controllers.{name}.{described(number.path)} of the profile."
+            )
             for number in self._law
         ]
 
     def _model_definitions(self) -> list[Parameter]:
-        what = "{} of the vehicle, as the autopilot believes it."
         return [
-            number.parameter(self._tree, "Vehicle model", what.format(described(number.path))) for number in self._model
+            number.parameter(
+                self._tree, "Vehicle model", f"{described(number.path)} of the vehicle, as the autopilot believes it."
+            )
+            for number in self._model
         ]
 
 

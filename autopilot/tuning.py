@@ -101,14 +101,16 @@ def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
 
 
 def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
-    """Hover for a control sample.
+    """Hover for two control samples, the second one a metre away from the reference.
 
     Raises:
         DecisionError: No rotor can follow what the law decides.
     """
     nothing = (0.0, 0.0, 0.0)
     still, straight = np.zeros((controller.preview.samples, 3)), np.zeros(controller.preview.samples)
-    state = VehicleState(nothing, nothing, (1.0, 0.0, 0.0, 0.0), nothing, nothing)
     references = Horizon(still, still, still, still, still, straight, straight, straight)
-    _, decision = controller.step(controller.initial(vehicle.hover_speed), 0, state, references)
-    check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)
+    memory = controller.initial(vehicle.hover_speed)
+    for sample, place in enumerate((nothing, (1.0, 1.0, 1.0))):
+        state = VehicleState(place, nothing, (1.0, 0.0, 0.0, 0.0), nothing, nothing)
+        memory, decision = controller.step(memory, sample * controller.control_interval_us, state, references)
+        check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)
