@@ -23,9 +23,9 @@ class BatteryModel:
         drag_torque = vehicle.rotors.torque_coefficient * vehicle.rotors.max_speed**2
         efficiency = vehicle.battery.efficiency if vehicle.battery else 1.0
         self._full_power_w = drag_torque * vehicle.rad_s_per_speed_unit * vehicle.rotors.max_speed / efficiency
+        self._fastest: dict[int, float] = {}
         if self._battery:
             self._step_ah = self._battery.capacity_ah / _INTERVALS
-            self._fastest = [self._balance(self._battery, self._step_ah * point) for point in range(_INTERVALS + 1)]
 
     def charge_after(self, charge_ah: float, speeds: Array, duration_s: float) -> float:
         """Return the charge taken, Ah, after `duration_s` at rotor speeds (4,), parts of the largest."""
@@ -61,9 +61,15 @@ class BatteryModel:
             return 1.0
         whole, part = divmod(charge_ah / self._step_ah, 1.0)
         if whole >= _INTERVALS:
-            return self._fastest[-1]
-        before, after = self._fastest[int(whole)], self._fastest[int(whole) + 1]
+            return self._balanced(self._battery, _INTERVALS)
+        before, after = self._balanced(self._battery, int(whole)), self._balanced(self._battery, int(whole) + 1)
         return before + part * (after - before)
+
+    def _balanced(self, battery: Battery, point: int) -> float:
+        """Return the balance at so many steps of charge; found when first asked for, so that it is quick to begin."""
+        if point not in self._fastest:
+            self._fastest[point] = self._balance(battery, self._step_ah * point)
+        return self._fastest[point]
 
     def _balance(self, battery: Battery, charge_ah: float) -> float:
         """Find the speed, in parts of the largest, at which the voltage left is just in that proportion."""
