@@ -9,6 +9,9 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import development
 
+from mavlink import definitions
+
+definitions.add_to(development)
 mav: Any = development
 """The dialect: its enumerations, for who speaks it."""
 

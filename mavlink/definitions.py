@@ -1,0 +1,146 @@
+"""Messages of MAVLink's common set that pymavlink's dialects leave out, defined as its generator would.
+
+Source: mavlink.io/en/messages/common.html. A message's CRC_EXTRA follows from its definition, so that a mistake here
+makes every peer drop the message: mavlink.io/en/guide/serialization.html.
+"""
+
+from collections.abc import Callable
+from struct import Struct
+from typing import Any, NamedTuple
+
+_SIZES = {"char": 1, "uint8_t": 1, "int8_t": 1, "uint16_t": 2, "int16_t": 2, "uint32_t": 4, "int32_t": 4}
+_SIZES |= {"float": 4, "uint64_t": 8, "int64_t": 8, "double": 8}
+_CODES = {"uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i"}
+_CODES |= {"float": "f", "uint64_t": "Q", "int64_t": "q", "double": "d"}
+
+
+class Field(NamedTuple):
+    """A field of a message.
+
+    Attributes:
+        kind: Its type, as MAVLink writes it.
+        name: Its name.
+        length: How many there are in the array; 0 where it is none.
+    """
+
+    kind: str
+    name: str
+    length: int = 0
+
+
+class Definition(NamedTuple):
+    """A message without extension fields."""
+
+    id: int
+    name: str
+    fields: tuple[Field, ...]
+
+
+MISSING = (
+    Definition(
+        80,
+        "COMMAND_CANCEL",
+        (Field("uint8_t", "target_system"), Field("uint8_t", "target_component"), Field("uint16_t", "command")),
+    ),
+    Definition(
+        290,
+        "ESC_INFO",
+        (
+            Field("uint8_t", "index"),
+            Field("uint64_t", "time_usec"),
+            Field("uint16_t", "counter"),
+            Field("uint8_t", "count"),
+            Field("uint8_t", "connection_type"),
+            Field("uint8_t", "info"),
+            Field("uint16_t", "failure_flags", 4),
+            Field("uint32_t", "error_count", 4),
+            Field("int16_t", "temperature", 4),
+        ),
+    ),
+    Definition(
+        291,
+        "ESC_STATUS",
+        (
+            Field("uint8_t", "index"),
+            Field("uint64_t", "time_usec"),
+            Field("int32_t", "rpm", 4),
+            Field("float", "voltage", 4),
+            Field("float", "current", 4),
+        ),
+    ),
+    Definition(
+        397,
+        "COMPONENT_METADATA",
+        (Field("uint32_t", "time_boot_ms"), Field("uint32_t", "file_crc"), Field("char", "uri", 100)),
+    ),
+)
+
+
+def add_to(dialect: Any) -> None:
+    """Give pymavlink's module `dialect` the messages that it lacks."""
+    for definition in MISSING:
+        if definition.id not in dialect.mavlink_map:
+            kind = _class_of(definition, dialect)
+            dialect.mavlink_map[definition.id] = kind
+            setattr(dialect, kind.__name__, kind)
+            setattr(dialect, f"MAVLINK_MSG_ID_{definition.name}", definition.id)
+
+
+def _class_of(definition: Definition, dialect: Any) -> Any:
+    fields = definition.fields
+    names = [field.name for field in fields]
+    # The wire has the largest types first, those of a size in the order of the definition.
+    ordered = sorted(fields, key=lambda field: -_SIZES[field.kind])
+    packing = Struct("<" + "".join(_code(field) for field in ordered))
+
+    def initialize(self: Any, *values: Any) -> None:
+        dialect.MAVLink_message.__init__(self, definition.id, definition.name)
+        self._fieldnames, self._instance_field, self._instance_offset = names, None, -1
+        for name, value in zip(names, values, strict=True):
+            setattr(self, name, value)
+
+    def pack(self: Any, mav: Any, force_mavlink1: bool = False) -> bytes:
+        values: list[Any] = []
+        for field in ordered:
+            value = getattr(self, field.name)
+            values.extend(value) if field.length and field.kind != "char" else values.append(value)
+        packer: Callable[..., bytes] = self._pack
+        return packer(mav, self.crc_extra, packing.pack(*values), force_mavlink1=force_mavlink1)
+
+    members = {
+        "__init__": initialize,
+        "pack": pack,
+        "id": definition.id,
+        "msgname": definition.name,
+        "fieldnames": names,
+        "ordered_fieldnames": [field.name for field in ordered],
+        "fieldtypes": [field.kind for field in fields],
+        "fielddisplays_by_name": {},
+        "fieldenums_by_name": {},
+        "fieldunits_by_name": {},
+        "native_format": bytearray(packing.format.encode()),
+        "orders": [ordered.index(field) for field in fields],
+        "lengths": [1 if field.kind == "char" else field.length or 1 for field in ordered],
+        "array_lengths": [field.length for field in ordered],
+        "crc_extra": _crc_extra(definition.name, ordered, dialect),
+        "unpacker": packing,
+        "instance_field": None,
+        "instance_offset": -1,
+    }
+    return type(f"MAVLink_{definition.name.lower()}_message", (dialect.MAVLink_message,), members)
+
+
+def _code(field: Field) -> str:
+    if field.kind == "char":
+        return f"{field.length}s"
+    return f"{field.length or ''}{_CODES[field.kind]}"
+
+
+def _crc_extra(name: str, ordered: list[Field], dialect: Any) -> int:
+    data = bytearray(f"{name} ".encode())
+    for field in ordered:
+        data += f"{field.kind} {field.name} ".encode()
+        if field.length:
+            data.append(field.length)
+    crc: int = dialect.x25crc(data).crc
+    return (crc & 0xFF) ^ (crc >> 8)

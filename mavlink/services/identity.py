@@ -1,0 +1,83 @@
+"""Who the autopilot says that it is.
+
+Ground stations choose how they speak to a vehicle by MAV_AUTOPILOT. As `px4` they offer everything that they can do
+with a PX4, whose custom modes and conventions Colibri follows; as `generic` only what needs no such knowledge. Either
+way AUTOPILOT_VERSION and the text at the start say that this is Colibri.
+"""
+
+from dataclasses import dataclass
+
+from mavlink.dialect import mav
+from mavlink.services.service import Fields
+
+Triple = tuple[int, int, int]
+
+PRODUCT = b"Colibri"
+UID2_BYTES = 18
+
+CAPABILITIES: int = (
+    mav.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mav.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mav.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+    | mav.MAV_PROTOCOL_CAPABILITY_FTP
+    | mav.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+    | mav.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | mav.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    | mav.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
+    | mav.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | mav.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mav.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """How the vehicle introduces itself.
+
+    Attributes:
+        name: As the user writes it.
+        autopilot: MAV_AUTOPILOT.
+        speaks: The release whose interface it follows, told as the version of the flight software; None for its own.
+    """
+
+    name: str
+    autopilot: int
+    speaks: Triple | None = None
+
+
+PX4 = Identity("px4", mav.MAV_AUTOPILOT_PX4, speaks=(1, 15, 0))
+GENERIC = Identity("generic", mav.MAV_AUTOPILOT_GENERIC)
+IDENTITIES = {identity.name: identity for identity in (PX4, GENERIC)}
+
+
+def version_of(text: str) -> Triple:
+    """Return major, minor and patch of a version like "0.2.1"; zeros for what is missing or no number."""
+    numbers = [int(part) & 0xFF if part.isdecimal() else 0 for part in text.split(".")[:3]]
+    major, minor, patch = (*numbers, 0, 0, 0)[:3]
+    return (major, minor, patch)
+
+
+def autopilot_version(identity: Identity, version: Triple, system_id: int) -> Fields:
+    """Return the fields of AUTOPILOT_VERSION (148) of Colibri `version`, flown as `system_id`.
+
+    The custom version begins with patch, minor and major of Colibri, where clients look for a vendor's version, and
+    goes on with its name. No version is an official one: ground stations would ask to update it to PX4's latest.
+    """
+    major, minor, patch = version
+    own = _packed(version)
+    custom = (patch, minor, major, *PRODUCT[:5])
+    uid2 = (*PRODUCT, *(0,) * (UID2_BYTES - len(PRODUCT) - 1), system_id)
+    shown = own if identity.speaks is None else _packed(identity.speaks)
+    return (CAPABILITIES, shown, own, 0, 0, custom, custom, (0,) * 8, 0, 0, system_id, uid2)
+
+
+def banner(identity: Identity, version: str) -> str:
+    """Say who this is, whatever its identity."""
+    spoken = "" if identity.speaks is None else f", speaking as {identity.name.upper()}"
+    return f"Colibri {version}{spoken}"
+
+
+def _packed(version: Triple) -> int:
+    major, minor, patch = version
+    kind: int = mav.FIRMWARE_VERSION_TYPE_DEV
+    return major << 24 | minor << 16 | patch << 8 | kind

@@ -1,0 +1,85 @@
+"""When each message is due on each channel: a grid of simulated time for each, without drift and without bursts."""
+
+from collections.abc import Hashable
+from heapq import heapify, heappop, heappush
+from typing import Generic, TypeVar
+
+Key = TypeVar("Key", bound=Hashable)
+
+GOLDEN = 0.6180339887498949
+"""Multiples of it, without their whole part, spread evenly however many there are."""
+STALE_ALLOWED = 64
+
+
+class _Entry(Generic[Key]):
+    __slots__ = ("interval_us", "key", "live", "phase_us")
+
+    def __init__(self, key: Key, interval_us: int, phase_us: int) -> None:
+        self.key = key
+        self.interval_us = interval_us
+        self.phase_us = phase_us
+        self.live = True
+
+    def after(self, now_us: int) -> int:
+        """Return the first time on the grid that is later than `now_us`."""
+        return now_us + self.interval_us - (now_us - self.phase_us) % self.interval_us
+
+
+class Schedule(Generic[Key]):
+    """Tells which keys are due. Keys of the same interval and phase are due together, whenever they were set."""
+
+    def __init__(self) -> None:
+        """Begin with nothing due ever."""
+        self._entries: dict[Key, _Entry[Key]] = {}
+        self._heap: list[tuple[int, int, _Entry[Key]]] = []
+        self._count = 0
+        self._now_us = 0
+
+    def set(self, key: Key, interval_us: int, spread: int, now_us: int) -> None:
+        """Have `key` due every `interval_us` (> 0); `spread` numbers the phases."""
+        entry = self._entries.get(key)
+        if entry is not None and entry.interval_us == interval_us:
+            return
+        self.drop(key)
+        phase_us = int(interval_us * (spread * GOLDEN % 1.0))
+        self._entries[key] = entry = _Entry(key, interval_us, phase_us)
+        self._push(entry, now_us)
+        if len(self._heap) > 2 * len(self._entries) + STALE_ALLOWED:
+            self._rebuild(now_us)
+
+    def drop(self, key: Key) -> None:
+        """Have `key` due no more."""
+        entry = self._entries.pop(key, None)
+        if entry is not None:
+            entry.live = False
+
+    def interval_us(self, key: Key) -> int | None:
+        """Return how often `key` is due; None if never."""
+        entry = self._entries.get(key)
+        return None if entry is None else entry.interval_us
+
+    def due(self, now_us: int) -> list[Key]:
+        """Return the keys due since the last call, each once however often it was; in order of their times."""
+        heap = self._heap
+        if now_us < self._now_us:  # a new flight has begun
+            self._rebuild(now_us)
+        self._now_us = now_us
+        if not heap or heap[0][0] > now_us:
+            return []
+        keys = []
+        while heap and heap[0][0] <= now_us:
+            entry = heappop(heap)[2]
+            if entry.live:
+                keys.append(entry.key)
+                self._push(entry, now_us)
+        return keys
+
+    def _push(self, entry: _Entry[Key], now_us: int) -> None:
+        self._count += 1
+        heappush(self._heap, (entry.after(now_us), self._count, entry))
+
+    def _rebuild(self, now_us: int) -> None:
+        entries = self._entries.values()
+        self._heap[:] = [(entry.after(now_us), number, entry) for number, entry in enumerate(entries)]
+        self._count = len(self._heap)
+        heapify(self._heap)

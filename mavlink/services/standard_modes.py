@@ -1,0 +1,101 @@
+"""The standard modes microservice: which modes there are, and setting one that means the same on every vehicle.
+
+Specification: mavlink.io/en/services/standard_modes.html. CURRENT_MODE is telemetry.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from math import isnan
+from typing import NamedTuple, TypeAlias
+
+from mavlink.dialect import Message, mav
+from mavlink.services.command import DENIED, FAILED, Command, Entry, Handler, Outcome
+from mavlink.services.service import Fields, Peer, Send, to, to_all
+
+MONITOR_EVERY_US = 10_000_000
+NAME_BYTES = 34
+"""Of AVAILABLE_MODES.mode_name, which ends with a zero."""
+
+
+class ModeInfo(NamedTuple):
+    """A flight mode, as ground stations list it.
+
+    Attributes:
+        name: For people.
+        custom_mode: Its number in HEARTBEAT.
+        standard_mode: MAV_STANDARD_MODE; 0 where it is none.
+        selectable: Whether people may choose it.
+        advanced: Whether it is "harder to fly".
+    """
+
+    name: str
+    custom_mode: int
+    standard_mode: int = 0
+    selectable: bool = True
+    advanced: bool = False
+
+
+SetMode: TypeAlias = Callable[[int, Command], Outcome]
+"""Flies the custom mode of the first argument, as the command asks."""
+
+
+class StandardModes:
+    """Lists the modes, and sets the standard ones."""
+
+    hears: frozenset[str] = frozenset()
+
+    def __init__(self, modes: Sequence[ModeInfo], set_mode: SetMode) -> None:
+        """Offer `modes`; `set_mode` sets one."""
+        self._modes = tuple(modes)
+        self._set_mode = set_mode
+        self._sequence = 0
+        self._monitor_at_us: int | None = None
+        self._changed = False
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:  # noqa: ARG002
+        """Everything comes as a command."""
+        return ()
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        """Tell at a low rate that the modes have changed, once they have."""
+        if not self._changed and (self._monitor_at_us is None or 0 < self._monitor_at_us - now_us <= MONITOR_EVERY_US):
+            return ()
+        self._changed, self._monitor_at_us = False, now_us + MONITOR_EVERY_US
+        return (to_all("AVAILABLE_MODES_MONITOR", self._sequence),)
+
+    def change(self, modes: Sequence[ModeInfo]) -> None:
+        """Offer other modes from now on; ground stations hear of it and ask for them."""
+        self._modes = tuple(modes)
+        self._sequence = (self._sequence + 1) % 256
+        self._changed = True
+
+    def handlers(self) -> dict[int, Handler | Entry]:
+        """Return who obeys the commands of this service."""
+        return {mav.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard_mode}
+
+    def available_modes(self, command: Command) -> list[Send] | Outcome:
+        """Answer REQUEST_MESSAGE of AVAILABLE_MODES: param2 is an index from 1, or 0 for all modes."""
+        index = 0.0 if isnan(command.p2) else command.p2
+        numbers = range(1, len(self._modes) + 1)
+        if index == 0.0:
+            return [to(command.peer, "AVAILABLE_MODES", *self._fields(number)) for number in numbers]
+        if index not in numbers:
+            return Outcome(DENIED)
+        return [to(command.peer, "AVAILABLE_MODES", *self._fields(int(index)))]
+
+    def monitor(self, command: Command) -> list[Send]:
+        """Answer REQUEST_MESSAGE of AVAILABLE_MODES_MONITOR."""
+        return [to(command.peer, "AVAILABLE_MODES_MONITOR", self._sequence)]
+
+    def _fields(self, index: int) -> Fields:
+        mode = self._modes[index - 1]
+        properties = 0 if mode.selectable else mav.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
+        properties |= mav.MAV_MODE_PROPERTY_ADVANCED if mode.advanced else 0
+        name = mode.name.encode()[:NAME_BYTES]
+        return (len(self._modes), index, mode.standard_mode, mode.custom_mode, properties, name)
+
+    def _set_standard_mode(self, command: Command) -> Outcome:
+        """MAV_CMD_DO_SET_STANDARD_MODE (262): "MAV_RESULT_FAILED if the mode is not supported by the vehicle"."""
+        for mode in self._modes:
+            if mode.standard_mode == command.p1 and mode.standard_mode and mode.selectable:
+                return self._set_mode(mode.custom_mode, command)
+        return Outcome(FAILED, "There is no such standard mode")

@@ -1,0 +1,140 @@
+"""Messages of the control law: what it steers to, and how its model predictive control comes to a decision."""
+
+from math import atan2, degrees, hypot, isnan
+
+from mavlink.dialect import mav
+from mavlink.frames import euler_from_quaternion, frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
+from mavlink.geodesy import geodetic_of
+from mavlink.services.service import Fields
+from mavlink.snapshot import Forecast, Setpoint, Snapshot
+from mavlink.telemetry.wire import UNKNOWN_U16, boot_ms, minus, yaw_ned
+
+POINTS = 5
+"""That TRAJECTORY_REPRESENTATION_WAYPOINTS holds."""
+FLOATS = 58
+"""That DEBUG_FLOAT_ARRAY holds."""
+ARRAY_NAME = b"lpv_mpc"
+ARRAY_HEAD = (
+    "status",
+    "fallback",
+    "iterations",
+    "solve_us",
+    "step_us",
+    "cost",
+    "slack",
+    "active_rotors",
+    "active_increments",
+    "active_angles",
+    "active_rates",
+)
+"""The first floats of DEBUG_FLOAT_ARRAY "lpv_mpc" (id 0); the squared rotor speeds of the plan's steps follow, four a
+step, as parts of the largest. Codes are those of `SolverState`."""
+
+
+def attitude_target(s: Snapshot) -> Fields:
+    """ATTITUDE_TARGET (83): quaternion NED/FRD, rates FRD rad/s, thrust 0..1."""
+    setpoint = s.setpoint
+    rates = frd_from_flu(setpoint.rate_flu_rad_s)
+    ignore = sum(1 << bit for bit, rate in enumerate(rates) if isnan(rate))
+    if any(map(isnan, setpoint.attitude)):
+        ignore |= mav.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
+    return (boot_ms(s), ignore, ned_frd_from_enu_flu(setpoint.attitude), *rates, setpoint.thrust)
+
+
+def position_target_local_ned(s: Snapshot) -> Fields:
+    """POSITION_TARGET_LOCAL_NED (85): nan, and a bit of the mask, for what is not steered to."""
+    position = ned_from_enu(s.setpoint.position_enu_m)
+    moving = _moving_ned(s.setpoint)
+    return (boot_ms(s), mav.MAV_FRAME_LOCAL_NED, _ignored((*position, *moving)), *position, *moving)
+
+
+def position_target_global_int(s: Snapshot) -> Fields:
+    """POSITION_TARGET_GLOBAL_INT (87): degE7 and m above the sea; the rest as POSITION_TARGET_LOCAL_NED."""
+    moving = _moving_ned(s.setpoint)
+    mask = _ignored((*ned_from_enu(s.setpoint.position_enu_m), *moving))
+    east, north, up = s.setpoint.position_enu_m
+    if isnan(east) or isnan(north):
+        place = (0.0, 0.0)
+    else:
+        latitude, longitude, _ = geodetic_of((east, north, 0.0), s.origin)
+        place = (1e7 * latitude, 1e7 * longitude)
+    return (boot_ms(s), mav.MAV_FRAME_GLOBAL, mask, *place, up + s.origin.altitude_m, *moving)
+
+
+def nav_controller_output(s: Snapshot) -> Fields:
+    """NAV_CONTROLLER_OUTPUT (62): degrees and m to where the way leads; distance zero where it leads nowhere."""
+    roll, pitch, yaw = euler_from_quaternion(s.setpoint.attitude)
+    target = s.setpoint.position_enu_m if any(map(isnan, s.target_enu_m)) else s.target_enu_m
+    east, north, up = (0.0, 0.0, 0.0) if any(map(isnan, target)) else minus(target, s.position_enu_m)
+    distance = hypot(east, north)
+    heading = yaw if isnan(s.setpoint.yaw_rad) else s.setpoint.yaw_rad
+    towards = atan2(north, east) if distance > 0.0 else heading
+    bearings = (degrees(yaw_ned(heading)), degrees(yaw_ned(towards)))
+    return (degrees(roll), degrees(-pitch), *bearings, distance, up, 0.0, 0.0)
+
+
+def trajectory_representation_waypoints(s: Snapshot) -> Fields | None:
+    """TRAJECTORY_REPRESENTATION_WAYPOINTS (332): five points of the predicted horizon, its end the last; local NED."""
+    points = _spread(s.solver.horizon)
+    if not points:
+        return None
+    rows = [_row(point) for point in points] + [NOT_A_POINT] * (POINTS - len(points))
+    columns = tuple(zip(*rows, strict=True))
+    return (s.time_us, len(points), *columns, (UNKNOWN_U16,) * POINTS)
+
+
+def debug_float_array(s: Snapshot) -> Fields:
+    """DEBUG_FLOAT_ARRAY (350) "lpv_mpc": laid out as `ARRAY_HEAD` says."""
+    solver = s.solver
+    times_us = (1e6 * solver.solve_time_s, 1e6 * solver.step_time_s)
+    head = (solver.status, solver.fallback, solver.iterations, *times_us, solver.cost, solver.slack, *solver.active)
+    planned = [speed for step in solver.planned_squared for speed in step]
+    whole_steps = (FLOATS - len(head)) // 4 * 4
+    data = (*map(float, head), *planned[:whole_steps])
+    return (s.time_us, ARRAY_NAME, 0, data + (0.0,) * (FLOATS - len(data)))
+
+
+def named_value_float(s: Snapshot) -> list[Fields]:
+    """NAMED_VALUE_FLOAT (251), one a figure of the solver; names have at most ten letters."""
+    solver = s.solver
+    figures = {
+        b"mpc_status": solver.status,
+        b"mpc_fall": solver.fallback,
+        b"mpc_iter": solver.iterations,
+        b"mpc_us": 1e6 * solver.solve_time_s,
+        b"step_us": 1e6 * solver.step_time_s,
+        b"mpc_cost": solver.cost,
+        b"mpc_slack": solver.slack,
+        b"mpc_active": sum(solver.active),
+    }
+    return [(boot_ms(s), name, float(value)) for name, value in figures.items()]
+
+
+NOT_A_POINT = (float("nan"),) * 11
+
+
+def _row(point: Forecast) -> tuple[float, ...]:
+    motion = (point.position_enu_m, point.velocity_enu_m_s, point.acceleration_enu_m_s2)
+    return (*(x for vector in motion for x in ned_from_enu(vector)), yaw_ned(point.yaw_rad), -point.yaw_rate_rad_s)
+
+
+def _spread(horizon: tuple[Forecast, ...]) -> list[Forecast]:
+    """Return up to five points, evenly spread over the horizon's steps."""
+    count = min(POINTS, len(horizon))
+    return [horizon[(number + 1) * len(horizon) // count - 1] for number in range(count)]
+
+
+def _moving_ned(setpoint: Setpoint) -> tuple[float, ...]:
+    velocity, acceleration = setpoint.velocity_enu_m_s, setpoint.acceleration_enu_m_s2
+    return (
+        *ned_from_enu(velocity),
+        *ned_from_enu(acceleration),
+        yaw_ned(setpoint.yaw_rad),
+        -setpoint.yaw_rate_rad_s,
+    )
+
+
+def _ignored(values: tuple[float, ...]) -> int:
+    """POSITION_TARGET_TYPEMASK: bits 0 to 8 for position, velocity, acceleration; 10 and 11 for yaw and its rate."""
+    force_bit = 9
+    return sum(1 << (bit + (bit >= force_bit)) for bit, value in enumerate(values) if isnan(value))

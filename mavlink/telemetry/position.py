@@ -1,0 +1,102 @@
+"""Messages of where the vehicle is, how it moves, and where it came from."""
+
+from math import atan2, cos, hypot, isfinite, nan, sin
+
+from mavlink.dialect import mav
+from mavlink.frames import euler_from_quaternion, ned_from_enu
+from mavlink.geodesy import geodetic_of
+from mavlink.services.service import Fields
+from mavlink.snapshot import Snapshot
+from mavlink.telemetry.wire import (
+    UNKNOWN_U16,
+    airspeed_m_s,
+    boot_ms,
+    compass_cdeg,
+    degrees_e7,
+    height_above_home_m,
+    place_of,
+    velocity_ned_cm_s,
+    yaw_ned,
+)
+
+SATELLITES = 12
+"""As many as a receiver in the open sees; there is none: the position is the state itself."""
+DILUTION_E2 = 70
+RANGE_CM = (0, 10_000)
+PERCENT = 100
+
+
+def global_position_int(s: Snapshot) -> Fields:
+    """GLOBAL_POSITION_INT (33): degE7, mm, cm/s NED, centidegrees."""
+    place = place_of(s)
+    altitudes_mm = (1e3 * place.altitude_m, 1e3 * height_above_home_m(s))
+    return (boot_ms(s), *degrees_e7(place), *altitudes_mm, *velocity_ned_cm_s(s), heading_cdeg(s))
+
+
+def local_position_ned(s: Snapshot) -> Fields:
+    """LOCAL_POSITION_NED (32): m and m/s."""
+    return (boot_ms(s), *ned_from_enu(s.position_enu_m), *ned_from_enu(s.velocity_enu_m_s))
+
+
+def home_position(s: Snapshot) -> Fields | None:
+    """HOME_POSITION (242): its ground level, its heading in q, and an approach straight from above."""
+    if s.home is None:
+        return None
+    place = geodetic_of(s.home.position_enu_m, s.origin)
+    local = ned_from_enu(s.home.position_enu_m)
+    half = 0.5 * yaw_ned(s.home.yaw_rad)
+    surface = (cos(half), 0.0, 0.0, sin(half))
+    return (*degrees_e7(place), 1e3 * place.altitude_m, *local, surface, *local, s.time_us)
+
+
+def gps_global_origin(s: Snapshot) -> Fields:
+    """GPS_GLOBAL_ORIGIN (49): degE7, mm."""
+    return (*degrees_e7(s.origin), 1e3 * s.origin.altitude_m, s.time_us)
+
+
+def gps_raw_int(s: Snapshot) -> Fields:
+    """GPS_RAW_INT (24): what a good receiver would give; course is unknown at rest."""
+    place, (east, north, _) = place_of(s), s.velocity_enu_m_s
+    speed = hypot(east, north)
+    course = compass_cdeg(atan2(north, east)) if speed > 0.1 else UNKNOWN_U16
+    fix = (mav.GPS_FIX_TYPE_3D_FIX, *degrees_e7(place), 1e3 * place.altitude_m, DILUTION_E2, DILUTION_E2)
+    return (s.time_us, *fix, min(100.0 * speed, UNKNOWN_U16 - 1), course, SATELLITES)
+
+
+def altitude(s: Snapshot) -> Fields:
+    """ALTITUDE (141), m: monotonic, above the sea, the origin, home, the terrain; clearance below."""
+    above_origin = s.position_enu_m[2]
+    above_sea, above_ground = above_origin + s.origin.altitude_m, above_origin - s.ground_m
+    clearance = max(0.0, above_ground) if isfinite(above_ground) else -1.0
+    terrain = above_ground if isfinite(above_ground) else -1001.0  # below -1000 is unknown
+    return (s.time_us, above_sea, above_sea, above_origin, height_above_home_m(s), terrain, clearance)
+
+
+def vfr_hud(s: Snapshot) -> Fields:
+    """VFR_HUD (74): m/s, degrees, percent, m."""
+    east, north, up = s.velocity_enu_m_s
+    throttle = PERCENT * sum(s.controls) / len(s.controls)
+    altitude_m = s.position_enu_m[2] + s.origin.altitude_m
+    _, _, yaw = euler_from_quaternion(s.attitude)
+    return (airspeed_m_s(s), hypot(east, north), compass_cdeg(yaw) / 100, throttle, altitude_m, up)
+
+
+def distance_sensor(s: Snapshot) -> Fields:
+    """DISTANCE_SENSOR (132): height above the ground, cm, as a sensor that looks down would see it."""
+    height_cm = max(0.0, 100.0 * (s.position_enu_m[2] - s.ground_m))
+    sensor = (mav.MAV_DISTANCE_SENSOR_LASER, 0, mav.MAV_SENSOR_ROTATION_PITCH_270, 0)
+    return (boot_ms(s), *RANGE_CM, height_cm, *sensor, 0.0, 0.0, (0.0,) * 4, PERCENT)
+
+
+def wind_cov(s: Snapshot) -> Fields | None:
+    """WIND_COV (231): where the wind blows to, NED, m/s; None while it is not known."""
+    if not all(map(isfinite, s.wind_enu_m_s)):
+        return None
+    altitude_m = s.position_enu_m[2] + s.origin.altitude_m
+    return (s.time_us, *ned_from_enu(s.wind_enu_m_s), nan, nan, altitude_m, 0.0, 0.0)
+
+
+def heading_cdeg(s: Snapshot) -> int:
+    """Heading on the compass, 0 to 35999; UINT16_MAX where it is not known."""
+    _, _, yaw = euler_from_quaternion(s.attitude)
+    return compass_cdeg(yaw) if isfinite(yaw) else UNKNOWN_U16

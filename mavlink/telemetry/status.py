@@ -1,0 +1,87 @@
+"""Messages of the system's state: what works, which mode is flown, what time it is."""
+
+from math import isfinite
+
+from mavlink.dialect import mav
+from mavlink.services.service import Fields
+from mavlink.snapshot import Snapshot
+from mavlink.telemetry.wire import UNKNOWN_U16, Constants, boot_ms
+
+SENSORS: int = (
+    mav.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | mav.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | mav.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | mav.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | mav.MAV_SYS_STATUS_SENSOR_GPS
+    | mav.MAV_SYS_STATUS_AHRS
+    | mav.MAV_SYS_STATUS_LOGGING
+)
+CONTROLS: int = (
+    mav.MAV_SYS_STATUS_SENSOR_ANGULAR_RATE_CONTROL
+    | mav.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+    | mav.MAV_SYS_STATUS_SENSOR_YAW_POSITION
+    | mav.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
+    | mav.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+    | mav.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+)
+ESTIMATED: int = (
+    mav.ESTIMATOR_ATTITUDE
+    | mav.ESTIMATOR_VELOCITY_HORIZ
+    | mav.ESTIMATOR_VELOCITY_VERT
+    | mav.ESTIMATOR_POS_HORIZ_REL
+    | mav.ESTIMATOR_POS_HORIZ_ABS
+    | mav.ESTIMATOR_POS_VERT_ABS
+    | mav.ESTIMATOR_POS_VERT_AGL
+    | mav.ESTIMATOR_PRED_POS_HORIZ_REL
+    | mav.ESTIMATOR_PRED_POS_HORIZ_ABS
+)
+
+
+def sys_status(s: Snapshot) -> Fields:
+    """SYS_STATUS (1): present, enabled and healthy parts; load in thousandths, mV, cA, percent.
+
+    The geofence is healthy while it is not breached, whether it is watched or not: consoles cry out at the bit alone.
+    """
+    parts = SENSORS | CONTROLS | mav.MAV_SYS_STATUS_PREARM_CHECK
+    if s.battery:
+        parts |= mav.MAV_SYS_STATUS_SENSOR_BATTERY
+    if s.sticks:
+        parts |= mav.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+    fence = mav.MAV_SYS_STATUS_GEOFENCE
+    present, enabled = parts | fence, parts | (fence if s.fence_enabled else 0)
+    health = parts | (0 if s.fence_breached else fence)
+    if not (s.armable or s.armed):  # "always healthy when armed"
+        health &= ~mav.MAV_SYS_STATUS_PREARM_CHECK
+    return (present, enabled, health, 1e3 * s.load, *_battery(s), 0, 0, 0, 0, 0, 0)
+
+
+def extended_sys_state(s: Snapshot) -> Fields:
+    """EXTENDED_SYS_STATE (245): no VTOL; landed, taking off, in the air or landing."""
+    return (mav.MAV_VTOL_STATE_UNDEFINED, s.landed_state)
+
+
+def current_mode(s: Snapshot) -> Fields:
+    """CURRENT_MODE (436)."""
+    return (s.standard_mode, s.custom_mode, s.intended_custom_mode)
+
+
+def system_time(s: Snapshot, c: Constants) -> Fields:
+    """SYSTEM_TIME (2): Unix time µs, 0 where it is not known; ms since the start."""
+    return (c.boot_unix_us + s.time_us if c.boot_unix_us else 0, boot_ms(s))
+
+
+def flight_information(s: Snapshot) -> Fields:
+    """FLIGHT_INFORMATION (264): times since the start in µs (their names lie) and ms; the number of the flight."""
+    return (boot_ms(s), s.flight_started_us, s.takeoff_us, s.flights, s.landing_us // 1000)
+
+
+def estimator_status(s: Snapshot) -> Fields:
+    """ESTIMATOR_STATUS (230): the state is fed back, so that all of it is known and nothing contradicts it."""
+    finite = all(map(isfinite, (*s.position_enu_m, *s.velocity_enu_m_s, *s.attitude)))
+    return (s.time_us, ESTIMATED if finite else 0, *(0.0,) * 8)
+
+
+def _battery(s: Snapshot) -> tuple[float, float, float]:
+    if s.battery is None:
+        return (UNKNOWN_U16, -1, -1)
+    return (1e3 * s.battery.voltage_v, 100.0 * s.battery.current_a, 100.0 * s.battery.remaining)
