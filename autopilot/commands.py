@@ -148,7 +148,7 @@ class Commands:
         if not isnan(z):
             height_m = pilot.home_enu_m[2] + z if frame in _RELATIVE else z - self.origin.altitude_m
             place = (place[0], place[1], height_m)
-        refused = self._unreachable(place)
+        refused = self.unreachable(place)
         if refused:
             return Outcome(DENIED, f"reposition refused: {refused}")
         only_height = isnan(x) and isnan(y)
@@ -156,7 +156,8 @@ class Commands:
         way = Way(GoTo(place, yaw, speed if speed > 0.0 else None), scene)
         return _outcome(pilot.fly(Mode.HOLD, way))
 
-    def _unreachable(self, place: Vector) -> str:
+    def unreachable(self, place: Vector) -> str:
+        """Return why the vehicle may not fly to a place; empty if it may."""
         away = hypot(place[0], place[1])
         if not isfinite(away) or away > FARTHEST_M or not -HIGHEST_M < place[2] < HIGHEST_M:
             return "too far away"
@@ -184,7 +185,7 @@ class Commands:
             return Outcome(DENIED, f"orbit refused: a speed of {speed:g} m/s")
         if not 0.0 <= yaw <= mav.ORBIT_YAW_BEHAVIOUR_UNCHANGED:
             return Outcome(DENIED, "orbit refused: no such yaw behaviour")
-        refused = self._unreachable((x, y, z))
+        refused = self.unreachable((x, y, z))
         if refused:
             return Outcome(DENIED, f"orbit refused: {refused}")
         return _outcome(pilot.fly(Mode.ORBIT, Round(Circle((x, y, z), radius, speed, int(yaw)), scene)))

@@ -157,6 +157,7 @@ class Snapshot:
         terminated: Whether the flight was ended for good.
         ground_m: Height of the ground below, over the origin.
         target_enu_m: Where the way leads, the next waypoint; nan for the setpoint itself.
+        gps_ok: Whether there is GPS.
         fence_enabled: Whether the geofence is watched.
         fence_breached: Whether the vehicle is where it must not be.
         load: Part of the time between two frames that the autopilot computes, 0..1.
@@ -192,6 +193,7 @@ class Snapshot:
     terminated: bool = False
     ground_m: float = 0.0
     target_enu_m: Vector = NOWHERE
+    gps_ok: bool = True
     fence_enabled: bool = False
     fence_breached: bool = False
     load: float = 0.0

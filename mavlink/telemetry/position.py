@@ -55,7 +55,10 @@ def gps_global_origin(s: Snapshot) -> Fields:
 
 
 def gps_raw_int(s: Snapshot) -> Fields:
-    """GPS_RAW_INT (24): what a good receiver would give; course is unknown at rest."""
+    """GPS_RAW_INT (24): what a good receiver would give, or none; course is unknown at rest."""
+    if not s.gps_ok:
+        nothing = (UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16)
+        return (s.time_us, mav.GPS_FIX_TYPE_NO_GPS, 0, 0, 0, *nothing, 0)
     place, (east, north, _) = place_of(s), s.velocity_enu_m_s
     speed = hypot(east, north)
     course = compass_cdeg(atan2(north, east)) if speed > 0.1 else UNKNOWN_U16

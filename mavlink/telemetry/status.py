@@ -50,6 +50,8 @@ def sys_status(s: Snapshot) -> Fields:
     fence = mav.MAV_SYS_STATUS_GEOFENCE
     present, enabled = parts | fence, parts | (fence if s.fence_enabled else 0)
     health = parts | (0 if s.fence_breached else fence)
+    if not s.gps_ok:
+        health &= ~mav.MAV_SYS_STATUS_SENSOR_GPS
     if not (s.armable or s.armed):  # "always healthy when armed"
         health &= ~mav.MAV_SYS_STATUS_PREARM_CHECK
     return (present, enabled, health, 1e3 * s.load, *_battery(s), 0, 0, 0, 0, 0, 0)

@@ -1,0 +1,162 @@
+"""Missions, geofence and rally points in flight: the plans that were uploaded, and the course that flies a mission."""
+
+from collections.abc import Sequence
+
+from autopilot.commands import Commands
+from autopilot.courses import Climb, Course, Homeward, Lean, Motion, Round, Scene, Sink, Stop, Way
+from autopilot.geofence import Geofence, check_fence, check_fence_item
+from autopilot.mission import MissionExecutor, Reached, SetHome
+from autopilot.mission_items import check_item, check_mission, check_rally_item
+from autopilot.mission_legs import Defaults, Situation
+from autopilot.modes import Event, Mode
+from autopilot.orders import Circle, GoTo, Hold, Land, Order, Return, TakeOff
+from autopilot.pilot import Pilot
+from mavlink.frames import Vector
+from mavlink.services.mission import MissionService, Vehicle
+from mavlink.services.mission_items import ACCEPTED, FENCE, MISSION, RALLY, MissionItem, Plan
+from mavlink.services.mission_upload import Rules
+from mavlink.services.statustext import INFO, StatusText
+
+
+class Missions:
+    """The plans of one vehicle.
+
+    Attributes:
+        service: Speaks the mission protocol.
+        executor: Flies the mission.
+    """
+
+    def __init__(self, pilot: Pilot, commands: Commands, text: StatusText) -> None:
+        """Begin without plans."""
+        self._pilot = pilot
+        self._commands = commands
+        self.executor = MissionExecutor()
+        self._fence = Geofence((), commands.origin)
+        rules = {
+            MISSION: Rules(check_item, check_mission),
+            FENCE: Rules(check_fence_item, check_fence),
+            RALLY: Rules(check_rally_item, lambda _: ACCEPTED),
+        }
+        vehicle = Vehicle(self._load, lambda: self.executor.progress, self._set_current, commands.guided_goto)
+        self.service = MissionService(rules, vehicle, text)
+
+    @property
+    def has_mission(self) -> bool:
+        """Whether there is something to fly."""
+        return bool(self.executor.items)
+
+    @property
+    def has_fence(self) -> bool:
+        """Whether there is a geofence."""
+        return bool(self.service.plans[FENCE].items)
+
+    def fence_refusal(self, place: Vector) -> str:
+        """Return why the vehicle may not fly to a place; empty if it may."""
+        return self._fence.refusal(place)
+
+    def moved_origin(self) -> None:
+        """See the geofence from another origin."""
+        self._fence = Geofence(self.service.plans[FENCE].items, self._commands.origin)
+
+    def course(self) -> Course:
+        """Return the course of the mission, from its current item on."""
+        behaviour = self._pilot.behaviour
+        self.executor.defaults = Defaults(
+            max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m
+        )
+        self.executor.start()
+        return MissionCourse(self.executor, self)
+
+    def watch_mode(self, mode: Mode) -> None:
+        """Pause the mission once another mode flies."""
+        if self.executor.active and mode is not Mode.MISSION:
+            for event in self.executor.pause(item_flown=mode is Mode.RETURN):
+                if isinstance(event, Reached):
+                    self.service.reached(event.seq)
+
+    def flown(self, event: Reached | SetHome) -> None:
+        """Take note of what the mission did."""
+        if isinstance(event, Reached):
+            self.service.reached(event.seq)
+            return
+        scene = self._pilot.scene()
+        self._pilot.set_home(event.position_enu_m or scene.state.position_enu_m, scene.state.euler[2])
+
+    def says_return(self) -> None:
+        """Leave the rest of the flight to mode return."""
+        self._pilot.happened(Event.RETURN_ITEM)
+
+    def situation(self, scene: Scene, *, arrived: bool, turns: float) -> Situation:
+        """Return what the mission sees."""
+        state = scene.state
+        return Situation(
+            state.position_enu_m,
+            state.velocity_enu_m_s,
+            state.euler[2],
+            self._pilot.standing,
+            arrived,
+            turns,
+            scene.home_enu_m,
+            self._commands.origin,
+        )
+
+    def _load(self, plan_type: int, plan: Plan) -> None:
+        items: Sequence[MissionItem] = plan.items
+        if plan_type == MISSION:
+            self.executor.load(items)
+            self._pilot.say(INFO, f"mission of {len(items)} items" if items else "mission cleared")
+        elif plan_type == FENCE:
+            self._fence = Geofence(items, self._commands.origin)
+            self._pilot.say(INFO, "geofence loaded" if items else "geofence cleared")
+
+    def _set_current(self, seq: int, reset: bool) -> str:
+        return self.executor.set_current(seq, reset)
+
+
+class MissionCourse:
+    """Flies what the executor orders, one course after another."""
+
+    def __init__(self, executor: MissionExecutor, missions: Missions) -> None:
+        """Begin with the current item."""
+        self._executor = executor
+        self._missions = missions
+        self._order: Order = Hold()
+        self._course: Course = Stop()
+        self._done = False
+
+    def ask(self, scene: Scene) -> Motion | Lean:
+        """Return what the order of now asks for."""
+        arrived = self._course.arrived(scene)
+        turns = self._course.turns if isinstance(self._course, Round) else 0.0
+        step = self._executor.step(self._missions.situation(scene, arrived=arrived, turns=turns), scene.now_us)
+        for event in step.events:
+            self._missions.flown(event)
+        if step.order is not self._order:
+            self._order = step.order
+            self._course = course_of(step.order, scene)
+        self._done = not step.flying
+        if isinstance(step.order, Return) and step.flying:
+            self._missions.says_return()
+        return self._course.ask(scene)
+
+    def arrived(self, scene: Scene) -> bool:
+        """Whether the mission is flown to its end."""
+        del scene
+        return self._done
+
+
+def course_of(order: Order, scene: Scene) -> Course:
+    """Return how an order is flown."""
+    match order:
+        case GoTo():
+            return Way(order, scene)
+        case Circle():
+            return Round(order, scene)
+        case TakeOff():
+            return Climb(order.height_enu_m, order.yaw_rad, scene)
+        case Land():
+            return Sink(order, scene)
+        case Return():
+            return Homeward(scene)
+        case Hold():
+            return Stop()

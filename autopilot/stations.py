@@ -1,0 +1,278 @@
+"""The vehicle's side towards ground stations: all services, put together around one pilot, on one hub."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version as version_of_package
+from math import pi
+
+from autopilot.calibration import Calibration
+from autopilot.commands import Commands
+from autopilot.failures import Failures
+from autopilot.missions import Missions
+from autopilot.modes import MODES, custom_mode, mode_of_custom
+from autopilot.pilot import Pilot
+from mavlink.dialect import AUTOPILOT_COMPONENT, mav
+from mavlink.files import Files, Tree
+from mavlink.flight_log import FlightLog
+from mavlink.framing import Framer
+from mavlink.geodesy import Geodetic, enu_of
+from mavlink.hub import Hub, Outgoing
+from mavlink.memory import Memory
+from mavlink.parameters import Parameters
+from mavlink.services.command import ACCEPTED, DENIED, Command, CommandService, Entry, Handler, Outcome
+from mavlink.services.follow import Follow
+from mavlink.services.ftp import Ftp
+from mavlink.services.heartbeat import HeartbeatService
+from mavlink.services.identity import IDENTITIES, autopilot_version, banner, version_of
+from mavlink.services.log import Logs
+from mavlink.services.manual import Manual
+from mavlink.services.metadata import Metadata
+from mavlink.services.offboard import Offboard
+from mavlink.services.origin import OriginService, Setters
+from mavlink.services.parameter import ParameterService
+from mavlink.services.metadata_json import metadata_json
+from mavlink.services.parameter_pack import packed_for
+from mavlink.services.rates import SDK, SILENT
+from mavlink.services.service import Peer, Send, to
+from mavlink.services.shell import Shell
+from mavlink.services.standard_modes import ModeInfo, StandardModes
+from mavlink.services.statustext import INFO, StatusText
+from mavlink.services.stream import StreamService
+from mavlink.services.time import TimeService
+from mavlink.signing import Signing
+from mavlink.snapshot import Snapshot
+from mavlink.telemetry.table import telemetry
+from mavlink.telemetry.wire import Constants
+
+VERSION = version_of_package("colibri-sitl")
+LOGS = "logs"
+LOG_LINK = -1
+"""The link on which the flight log is a listener like any other."""
+REBOOT, SHUT_DOWN = 1.0, 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class StationSettings:
+    """What a vehicle is towards ground stations.
+
+    Attributes:
+        system_id: MAVLink system id.
+        identity: A name of `identity.IDENTITIES`.
+        origin: Of the ENU frame.
+        boot_unix_us: Unix time at the start; 0 where nobody knows it.
+        signing: Judges and signs frames.
+        files: What can be read and written by file transfer, the logs in folder `logs`.
+    """
+
+    system_id: int
+    identity: str
+    origin: Geodetic
+    boot_unix_us: int = 0
+    signing: Signing | None = None
+    files: Files | None = None
+
+
+class Stations:
+    """Serves any number of ground stations.
+
+    Attributes:
+        hub: Where the links meet.
+        offboard: The setpoints of companions.
+        manual: The sticks of a pilot.
+        follow: The target to follow.
+        missions: The plans.
+        commands: What obeys.
+        failures: What is injected.
+        log: Of each flight.
+        restart: 1 once a ground station has asked for a restart, 2 for the end; 0 before.
+    """
+
+    def __init__(self, settings: StationSettings, pilot: Pilot, parameters: Parameters) -> None:
+        """Serve for `pilot`, with `parameters`."""
+        self._settings = settings
+        self._identity = IDENTITIES[settings.identity]
+        self._pilot = pilot
+        self._parameters = parameters
+        self._text = StatusText()
+        self._calibration = Calibration()
+        self.failures = Failures()
+        self.restart = 0.0
+        self.offboard, self.manual, self.follow = Offboard(), Manual(), Follow()
+        self.commands = Commands(pilot, settings.origin, lambda place: self.missions.fence_refusal(place))
+        self.missions = Missions(pilot, self.commands, self._text)
+        self._heartbeat = HeartbeatService(self._identity)
+        self._streams = StreamService(telemetry(Constants(boot_unix_us=settings.boot_unix_us)))
+        modes = [ModeInfo(row.mode.title(), custom_mode(row.mode), row.standard, row.selectable) for row in MODES]
+        self._modes = StandardModes(modes, self._select)
+        files = self._files(settings.files or Memory())
+        self.log = FlightLog(files, (LOGS,))
+        self._framer = Framer()
+        services = (
+            self._heartbeat,
+            CommandService(self._handlers(), self._text),
+            self._streams,
+            self._modes,
+            TimeService(),
+            ParameterService(parameters),
+            self.missions.service,
+            self.offboard,
+            self.manual,
+            self.follow,
+            OriginService(Setters(self._set_origin, self._set_home, self._set_mode), self._text),
+            Ftp(files),
+            Logs(files, (LOGS,), lambda: self.log.name),
+            Shell({"ver": lambda _: self.banner() + "\n", "status": lambda _: self._status(), "param": self._param}),
+        )
+        self.hub = Hub(
+            settings.system_id, AUTOPILOT_COMPONENT, services, signing=settings.signing, observers=(self._streams,)
+        )
+        self._log_channel = self.hub.open(LOG_LINK, None)
+        self._streams.use(self._log_channel, SILENT)
+        self._logs_stream = False
+
+    def banner(self) -> str:
+        """Say who this is."""
+        return banner(self._identity, VERSION)
+
+    def use(self, channel: int, kind: str) -> None:
+        """Stream to `channel` what its kind gets by default."""
+        self._streams.use(channel, kind)
+
+    def update(self, snapshot: Snapshot) -> None:
+        """Take in the vehicle as it is now. Called once a control sample."""
+        self._heartbeat.update(snapshot)
+        self._streams.update(snapshot)
+        origin = snapshot.origin
+        self.offboard.update(snapshot.position_enu_m, self._pilot.scene().state.euler[2], origin, snapshot.home)
+        self.follow.update(origin)
+        if snapshot.armed is not self._logs_stream:
+            self._logs_stream = snapshot.armed
+            self._streams.use(self._log_channel, SDK if snapshot.armed else SILENT)
+
+    def poll(self, now_us: int) -> list[Outgoing]:
+        """Do what is due; return what to send. Called once a frame."""
+        for severity, text in self._pilot.take_said():
+            self.say(severity, text)
+        for text in self._calibration.poll(now_us):
+            self.say(INFO, text)
+        self.hub.poll(now_us)
+        outbox = self.hub.take_outbox()
+        self.log.update(self._pilot.state.armed, now_us)
+        if not any(outgoing.link == LOG_LINK for outgoing in outbox):
+            return outbox
+        for outgoing in outbox:
+            if outgoing.link == LOG_LINK:
+                self.log.record(now_us, self._framer.take(outgoing.datagram))
+        return [outgoing for outgoing in outbox if outgoing.link != LOG_LINK]
+
+    def say(self, severity: int, text: str) -> None:
+        """Tell everybody a line."""
+        self.hub.send(self._text.say(severity, text))
+
+    def _files(self, root: Files) -> Files:
+        metadata = Metadata(metadata_json(self._parameters))
+        self._metadata = metadata
+        pack = {"@PARAM/param.pck": lambda query: packed_for(self._parameters, query) or b""}
+        return Tree(root, {}, {**metadata.files, **pack})
+
+    def _handlers(self) -> Mapping[int, Handler | Entry]:
+        streams = self._streams
+        streams.provide("AUTOPILOT_VERSION", lambda command: [to(command.peer, "AUTOPILOT_VERSION", *self._version())])
+        streams.provide("HEARTBEAT", lambda command: self._heartbeat_now(command.peer))
+        streams.provide("AVAILABLE_MODES", self._modes.available_modes)
+        streams.provide("AVAILABLE_MODES_MONITOR", self._modes.monitor)
+        streams.provide("COMPONENT_METADATA", lambda command: self._metadata.provide(command.peer, command.now_us))
+        streams.provide(
+            "MISSION_CURRENT", lambda command: [to(command.peer, "MISSION_CURRENT", *self.missions.service.current())]
+        )
+        return {
+            **self.commands.handlers(),
+            **streams.handlers(),
+            **self._modes.handlers(),
+            mav.MAV_CMD_DO_SET_MISSION_CURRENT: self.missions.service.do_set_mission_current,
+            mav.MAV_CMD_DO_SET_MODE: self._engaging(self.commands.handlers()[mav.MAV_CMD_DO_SET_MODE]),
+            mav.MAV_CMD_PREFLIGHT_CALIBRATION: lambda command: self._calibration.begin(
+                command, armed=self._pilot.state.armed
+            ),
+            mav.MAV_CMD_INJECT_FAILURE: lambda command: self.failures.inject(
+                command, enabled=self._pilot.behaviour.inject_failures
+            ),
+            mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._restart,
+            mav.MAV_CMD_PREFLIGHT_STORAGE: self._storage,
+            mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN: lambda command: _denied(
+                self._set_origin(Geodetic(command.x, command.y, command.z))
+            ),
+        }
+
+    def _engaging(self, handler: Handler) -> Handler:
+        """Let whoever asks for a steered mode be the one who steers."""
+
+        def obey(command: Command) -> Outcome:
+            for service in (self.offboard, self.manual, self.follow):
+                service.engage(command.peer, command.now_us)
+            return handler(command)
+
+        return obey
+
+    def _select(self, number: int, command: Command) -> Outcome:
+        del command
+        return self.commands.select(mode_of_custom(number))
+
+    def _version(self) -> Sequence[object]:
+        return autopilot_version(self._identity, version_of(VERSION), self._settings.system_id)
+
+    def _heartbeat_now(self, peer: Peer) -> list[Send]:
+        snapshot = self._streams.snapshot
+        return [] if snapshot is None else [to(peer, "HEARTBEAT", *self._heartbeat.fields(snapshot))]
+
+    def _set_origin(self, place: Geodetic) -> str:
+        if self._pilot.state.armed:
+            return "origin refused: the rotors are armed"
+        self.commands.origin = place
+        self.missions.moved_origin()
+        return ""
+
+    def _set_home(self, place: Geodetic) -> str:
+        home = enu_of(place, self.commands.origin)
+        refused = self.commands.unreachable(home)
+        if not refused:
+            self._pilot.set_home(home, self._pilot.home_yaw_rad)
+        return f"home refused: {refused}" if refused else ""
+
+    def _set_mode(self, base_mode: int, number: int) -> str:
+        return self.commands.set_custom_mode(base_mode, number).reason
+
+    def _restart(self, command: Command) -> Outcome:
+        if self._pilot.state.armed:
+            return Outcome(DENIED, "restart refused: the rotors are armed")
+        if command.p1 not in (REBOOT, SHUT_DOWN):
+            return Outcome(DENIED, "restart with 1, shut down with 2")
+        self.restart = command.p1
+        return Outcome()
+
+    def _storage(self, command: Command) -> Outcome:
+        """Parameters are stored as they change; what is left to obey is the reset."""
+        if command.p1 == 2.0:
+            if self._pilot.state.armed:
+                return Outcome(DENIED, "parameters refused: the rotors are armed")
+            self._parameters.reset()
+        return Outcome(ACCEPTED) if command.p1 in (0.0, 1.0, 2.0) else Outcome(DENIED, "storage: 0, 1 or 2")
+
+    def _status(self) -> str:
+        mode, armed = self._pilot.state
+        x, y, z = self._pilot.scene().state.position_enu_m
+        reasons = "; ".join(self._pilot.refusals()) or "ready to arm"
+        yaw_deg = (90.0 - self._pilot.scene().state.euler[2] * 180.0 / pi) % 360.0
+        return (
+            f"{self.banner()}\nmode {mode}, {'armed' if armed else 'disarmed'}, {reasons}\n"
+            f"east {x:.2f} north {y:.2f} up {z:.2f} m, heading {yaw_deg:.0f} degrees\n"
+        )
+
+    def _param(self, arguments: list[str]) -> str:
+        shown = arguments[1:] if arguments[:1] == ["show"] else arguments
+        names = [p.name for p in self._parameters if not shown or p.name.startswith(shown[0].upper().rstrip("*"))]
+        return "".join(f"{name} {self._parameters[name]:g}\n" for name in names) or "no such parameter\n"
+
+
+def _denied(reason: str) -> Outcome:
+    return Outcome(DENIED, reason) if reason else Outcome()
