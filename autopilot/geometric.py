@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from autopilot.controller import Array, Clock, Decision, Horizon, Preview, VehicleState
+from autopilot.controller import Array, AttitudeDemand, Clock, Decision, Horizon, Preview, VehicleState
 from autopilot.mixer import Mixer
 from autopilot.settings import ControlInterval, Table, interval_us, read_settings
-from mavlink.frames import nearest_turn, rotation_matrix
+from mavlink.frames import nearest_turn, quaternion_from_euler, rotation_matrix
 from plant.vehicle import Positive, Vehicle
 
 _LEAST_FORCE = 0.05
@@ -82,6 +82,21 @@ class GeometricController:
         speeds = self._mixer.rotor_speeds(np.array([max(thrust_n, 0.0), *moment_n_m]))
         return None, Decision(speeds, euler_of(target.rotation, float(references.yaw_rad[0])))
 
+    def step_attitude(
+        self, memory: None, time_us: int, state: VehicleState, demand: AttitudeDemand
+    ) -> tuple[None, Decision]:
+        """Decide the same for an attitude and a thrust."""
+        del memory, time_us
+        phi, theta, psi = demand.angles[0].tolist()
+        R = np.array(rotation_matrix(state.attitude))
+        target = Target(
+            np.array(rotation_matrix(quaternion_from_euler(phi, theta, psi))),
+            body_rate_of(phi, theta, demand.angle_rates_rad_s[0]),
+        )
+        moment_n_m = self._moment(R, np.array(state.rate_flu_rad_s), target)
+        speeds = self._mixer.rotor_speeds(np.array([max(float(demand.thrust_n[0]), 0.0), *moment_n_m]))
+        return None, Decision(speeds, (phi, theta, psi))
+
     def _demand(self, state: VehicleState, references: Horizon, R: Array) -> tuple[Array, Array]:
         """Return the specific force wanted, m/s², [15], and its derivative along the motion, m/s³."""
         gravity = np.array([0.0, 0.0, self._gravity_m_s2])
@@ -132,6 +147,12 @@ def euler_of(rotation: Array, near_yaw_rad: float) -> tuple[float, float, float]
     theta = float(np.arcsin(np.clip(-rotation[2, 0], -1.0, 1.0)))
     psi = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
     return phi, theta, nearest_turn(psi, near_yaw_rad)
+
+
+def body_rate_of(phi: float, theta: float, angle_rates: Array) -> Array:
+    """Return p, q, r, rad/s, (3,), of Euler-angle rates (3,): the inverse of THESIS [2.7]."""
+    s, c, st, ct = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+    return np.array([[1.0, 0.0, -st], [0.0, c, s * ct], [0.0, -s, c * ct]]) @ angle_rates
 
 
 def vee(skew: Array) -> Array:

@@ -297,6 +297,55 @@ def guide(
 
 
 @compiled
+def hold_attitude(
+    up: Array,
+    yaw_rad: float,
+    thrust_n: float,
+    demanded: tuple[Array, Array],
+    disturbance_n_m: Array,
+    inertia: Array,
+    limits: Limits,
+    follows: float,
+    interval_s: float,
+    force: Array,
+    angles: Array,
+    thrusts: Array,
+    end: Array,
+) -> float:
+    """Do what `guide` does where attitude and thrust are demanded themselves; return the same cosine.
+
+    Args:
+        up: Body z axis now, ENU, (3,).
+        yaw_rad: Now.
+        thrust_n: Now, N.
+        demanded: phi, theta, psi, rad, (N + 2, 3), and thrust, N, (N + 2,), at each sample from now.
+        disturbance_n_m: Moment that the model does not explain, (3,).
+        inertia: Ix, Iy, Iz, kg m², (3,).
+        limits: Of the thrust.
+        follows: Part of the way to its command that thrust goes in a step.
+        interval_s: Between two samples.
+        force: Is filled: demanded now, N, ENU, (3,).
+        angles: Is filled, rad, (N + 2, 3): psi in the full turn that the vehicle is in.
+        thrusts: Is filled: to command at each step, N, (N,).
+        end: Is filled, see `end_of_motion`.
+    """
+    turns = 2.0 * pi * floor((yaw_rad - demanded[0][0, 2]) / (2.0 * pi) + 0.5)
+    along = np.zeros((angles.shape[0], 3))
+    for n in range(angles.shape[0]):
+        angles[n] = demanded[0][n]
+        angles[n, 2] += turns
+        along[n, 2] = min(max(demanded[1][n], limits.least_thrust_n), limits.most_thrust_n)
+    thrust_commands(thrust_n, along, np.array([0.0, 0.0, 1.0]), follows, limits, thrusts)
+    end_of_motion(angles, inertia, disturbance_n_m, interval_s, end)
+    phi, theta, psi = angles[0]
+    force[0] = along[0, 2] * (cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi))
+    force[1] = along[0, 2] * (cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi))
+    force[2] = along[0, 2] * cos(phi) * cos(theta)
+    aligned: float = (force[0] * up[0] + force[1] * up[1] + force[2] * up[2]) / along[0, 2]
+    return aligned
+
+
+@compiled
 def length(vector: Array) -> float:
     """Return the length of a vector (3,)."""
     return sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])

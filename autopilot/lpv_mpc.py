@@ -2,85 +2,40 @@
 
 from collections.abc import Mapping
 from math import cos, radians, tan
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
 
 from autopilot import guidance, observer, prediction, recovery, rotor_lag
 from autopilot.attitude_plan import (
     AttitudeMpc,
-    AttitudeSettings,
     Plan,
     Situation,
     Target,
     squared_speeds_from,
 )
 from autopilot.battery import BatteryModel
-from autopilot.controller import Array, Clock, Decision, Diagnostics, Fallback, Horizon, Preview, VehicleState
-from autopilot.qp import QpSolver
-from autopilot.settings import (
-    ControlInterval,
-    Count,
-    Degrees,
-    Negative,
-    QpSettings,
-    Table,
-    interval_us,
-    read_settings,
+from autopilot.controller import (
+    Array,
+    AttitudeDemand,
+    Clock,
+    Decision,
+    Diagnostics,
+    Fallback,
+    Horizon,
+    Preview,
+    VehicleState,
 )
+from autopilot.lpv_mpc_settings import GuidanceSettings, LpvMpcSettings, ObserverSettings
+from autopilot.qp import QpSolver
+from autopilot.settings import interval_us, read_settings
 from mavlink.frames import rotation_matrix
-from plant.vehicle import Positive, Vehicle
+from plant.vehicle import Vehicle
 
 _RECOVER_BEYOND = cos(radians(75.0))
 """A thrust axis further from where it must point, or a steeper pitch, is for the recovery law."""
-
-
-Part = Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
-
-
 _NO_YAW = np.empty(0)
 _NOWHERE = (0.0, 0.0, 0.0)
-
-
-class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The position loop."""
-
-    poles: tuple[Negative, Negative]
-    approach_speed_m_s: Positive
-    largest_tilt_deg: Degrees
-    thrust_margin: Annotated[float, msgspec.Meta(ge=0.0, lt=0.5)]
-
-
-class ObserverSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The disturbance observers."""
-
-    acceleration_rad_s: Positive
-    moment_rad_s: Positive
-    most_m_s2: Positive
-    most_n_m: Positive
-
-
-class FallbackSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What flies when no plan can be had."""
-
-    shifted_samples: Count
-    lqr_samples: Count
-    descent_thrust: Part
-    turn_1_s: Positive
-    rate_1_s: Positive
-    fastest_rad_s: Positive
-
-
-class LpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The control law."""
-
-    control_interval_s: ControlInterval
-    guidance: GuidanceSettings
-    observer: ObserverSettings
-    attitude: AttitudeSettings
-    fallback: FallbackSettings
-    qp: QpSettings
 
 
 class Memory(NamedTuple):
@@ -121,6 +76,24 @@ class Course(NamedTuple):
     force: Array
     aligned: float
     target: Target
+
+
+class Seen(NamedTuple):
+    """What a decision begins with.
+
+    Attributes:
+        rotation: Body to earth, (3, 3).
+        measured: By the observer, (9,).
+        estimate: Of the observer, (12,).
+        now: For the attitude's plan.
+        thrust_n: Now, N.
+    """
+
+    rotation: Array
+    measured: Array
+    estimate: Array
+    now: Situation
+    thrust_n: float
 
 
 class Choice(NamedTuple):
@@ -180,6 +153,7 @@ class LpvMpc:
         for attitude in ((1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)):
             state = VehicleState(_NOWHERE, _NOWHERE, attitude, _NOWHERE, _NOWHERE)
             memory, _ = self.step(memory, 0, state, references)
+        self.step_attitude(memory, 0, state, AttitudeDemand(still, still, level))
 
     def _prepare_guidance(self, settings: GuidanceSettings) -> None:
         first, second = settings.poles
@@ -206,16 +180,39 @@ class LpvMpc:
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample."""
         del time_us
+        seen = self._see(memory, state)
+        course = self.position(memory, seen.now, seen.thrust_n, state, seen.measured, references, seen.estimate)
+        return self._decide(memory, seen, course)
+
+    def step_attitude(
+        self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
+    ) -> tuple[Memory, Decision]:
+        """Decide the same for an attitude and a thrust, which is kept within what the rotors leave to the moments."""
+        del time_us
+        seen = self._see(memory, state)
+        return self._decide(memory, seen, self.attitude(memory, seen, demand))
+
+    def _see(self, memory: Memory, state: VehicleState) -> Seen:
         rotation = np.array(rotation_matrix(state.attitude))
         measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2].tolist()])
         estimate = self.estimate(memory, measured)
         now, thrust_n = self._situation(memory, state, estimate)
-        course = self.position(memory, now, thrust_n, state, measured, references, estimate)
-        choice = self._choose(memory, now, course, rotation)
-        commands, speeds, wrench, mean_wrench = self.mix(memory, choice.squared, now.fastest)
+        return Seen(rotation, measured, estimate, now, thrust_n)
+
+    def _decide(self, memory: Memory, seen: Seen, course: Course) -> tuple[Memory, Decision]:
+        choice = self._choose(memory, seen.now, course, seen.rotation)
+        commands, speeds, wrench, mean_wrench = self.mix(memory, choice.squared, seen.now.fastest)
         charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
         after = Memory(
-            speeds, choice.moments, wrench, mean_wrench, measured, estimate, charge_ah, choice.plan, choice.age
+            speeds,
+            choice.moments,
+            wrench,
+            mean_wrench,
+            seen.measured,
+            seen.estimate,
+            charge_ah,
+            choice.plan,
+            choice.age,
         )
         phi, theta, psi = course.target.angles[0].tolist()
         return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), choice.diagnostics)
@@ -282,6 +279,27 @@ class LpvMpc:
             end,
         )
         return Course(forces[0], aligned, Target(angles[1:-1], end, thrusts))
+
+    def attitude(self, memory: Memory, seen: Seen, demand: AttitudeDemand) -> Course:
+        """Return the course that a demanded attitude is, its thrust within the limits of the position loop's."""
+        angles, force = np.empty((self._samples, 3)), np.empty(3)
+        thrusts, end = np.empty(self._attitude.horizon), np.empty(prediction.STATES + prediction.INPUTS)
+        aligned = guidance.hold_attitude(
+            seen.measured[6:],
+            float(seen.now.x[prediction.PSI]),
+            seen.thrust_n,
+            (demand.angles, demand.thrust_n),
+            seen.estimate[9:],
+            self._inertia,
+            self._limits(self._battery.fastest_together(memory.charge_ah)),
+            self._lag.planned,
+            self._interval_s,
+            force,
+            angles,
+            thrusts,
+            end,
+        )
+        return Course(force, aligned, Target(angles[1:-1], end, thrusts))
 
     def mix(self, memory: Memory, squared: Array, fastest: float) -> tuple[Array, Array, Array, Array]:
         """Return the rotors' commands, their speeds and wrench a sample later, the mean wrench until then, (4,) each.
