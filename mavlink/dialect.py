@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import development
 
+from mavlink.extensions import with_later_fields
+
 mav: Any = development
 """The dialect: its enumerations, for who speaks it."""
 
@@ -117,6 +119,7 @@ class _Layout:
 
     def __init__(self, definition: Any) -> None:
         """Take the layout from pymavlink's class of the message."""
+        definition = with_later_fields(definition)
         self.name: str = definition.msgname
         self._id: int = definition.id
         self._payload: Struct = definition.unpacker
