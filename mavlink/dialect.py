@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from pymavlink.dialects.v20 import development
 
 from mavlink import definitions
+from mavlink.extensions import with_later_fields
 
 definitions.add_to(development)
 mav: Any = development
@@ -182,6 +183,7 @@ class _Layout:
 
     def __init__(self, definition: Any) -> None:
         """Take the layout from pymavlink's class of the message."""
+        definition = with_later_fields(definition)
         self.name: str = definition.msgname
         self._id: int = definition.id
         self._size: int = definition.unpacker.size

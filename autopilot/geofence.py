@@ -1,0 +1,175 @@
+"""The geofence: polygons and circles that the vehicle must stay inside or outside of.
+
+Items: https://mavlink.io/en/messages/common.html#MAV_CMD_NAV_FENCE_RETURN_POINT and those after it. The vehicle must
+be inside all inclusion zones of a group, of at least one group (their parameter 2), and outside every exclusion zone.
+Zones reach from the ground to the sky.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import hypot, inf, isfinite, isnan
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from autopilot.controller import Array
+from autopilot.mission_items import FARTHEST_M, check_place
+from mavlink.dialect import mav
+from mavlink.frames import Vector
+from mavlink.geodesy import Geodetic, enu_of
+from mavlink.services.mission_items import ACCEPTED, DEGREES, GLOBAL_FRAMES, MissionItem
+from mavlink.services.mission_upload import Rules
+
+RETURN_POINT: int = mav.MAV_CMD_NAV_FENCE_RETURN_POINT
+POLYGONS: tuple[int, ...] = (
+    mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+    mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
+)
+CIRCLES: tuple[int, ...] = (mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION)
+INCLUSIONS: tuple[int, ...] = (POLYGONS[0], CIRCLES[0])
+FEWEST_VERTICES = 3
+EDGE_M = 1e-6
+"""So close to an edge counts as inside: what rounding leaves of a point that lies on it."""
+
+
+def check_fence_item(item: MissionItem) -> int:
+    """Return the MAV_MISSION_RESULT of an item of a geofence."""
+    if item.command not in (RETURN_POINT, *POLYGONS, *CIRCLES):
+        return int(mav.MAV_MISSION_UNSUPPORTED)
+    if item.frame not in GLOBAL_FRAMES:
+        return int(mav.MAV_MISSION_UNSUPPORTED_FRAME)
+    if item.command in POLYGONS and not (item.p1 >= FEWEST_VERTICES and isfinite(item.p1) and item.p1 == int(item.p1)):
+        return int(mav.MAV_MISSION_INVALID_PARAM1)
+    if item.command in CIRCLES and not 0.0 < item.p1 <= FARTHEST_M:
+        return int(mav.MAV_MISSION_INVALID_PARAM1)
+    if item.command in INCLUSIONS and not (isnan(item.p2) or isfinite(item.p2)):
+        return int(mav.MAV_MISSION_INVALID_PARAM2)
+    return check_place(item)
+
+
+def check_fence(items: Sequence[MissionItem]) -> int:
+    """Return the MAV_MISSION_RESULT of valid items together: each polygon must be whole, and of one mind."""
+    at = 0
+    while at < len(items):
+        first = items[at]
+        length = int(first.p1) if first.command in POLYGONS else 1
+        vertices = items[at : at + length]
+        if len(vertices) < length or any((v.command, v.p1) != (first.command, first.p1) for v in vertices[1:]):
+            return int(mav.MAV_MISSION_INVALID_PARAM1)
+        if first.command == POLYGONS[0] and any(_group(v) != _group(first) for v in vertices):
+            return int(mav.MAV_MISSION_INVALID_PARAM2)
+        at += length
+    return ACCEPTED
+
+
+FENCE_RULES = Rules(check_fence_item, check_fence)
+
+
+class Zone(Protocol):
+    """An area of the ground."""
+
+    def depth_m(self, east_m: float, north_m: float) -> float:
+        """Return how far a point is inside, m; negative outside."""
+        ...
+
+
+class Disc(NamedTuple):
+    """A circle's inside.
+
+    Attributes:
+        east_m: Of its centre.
+        north_m: Of its centre.
+        radius_m: m.
+    """
+
+    east_m: float
+    north_m: float
+    radius_m: float
+
+    def depth_m(self, east_m: float, north_m: float) -> float:
+        """Return how far a point is inside, m; negative outside."""
+        return self.radius_m - hypot(east_m - self.east_m, north_m - self.north_m)
+
+
+class Polygon:
+    """A polygon's inside: where a ray to infinity crosses its edges an odd number of times, whichever way they turn."""
+
+    def __init__(self, vertices_m: Iterable[tuple[float, float]]) -> None:
+        """Take the corners, east and north, m."""
+        self._from: Array = np.array(list(vertices_m), dtype=float)
+        self._along = np.roll(self._from, -1, axis=0) - self._from
+        squared = np.einsum("ij,ij->i", self._along, self._along)
+        self._squared = np.where(squared > 0.0, squared, 1.0)
+
+    def depth_m(self, east_m: float, north_m: float) -> float:
+        """Return how far a point is inside, m; negative outside."""
+        to = np.array((east_m, north_m)) - self._from
+        part = np.clip(np.einsum("ij,ij->i", to, self._along) / self._squared, 0.0, 1.0)
+        away = to - part[:, None] * self._along
+        nearest = float(np.sqrt(np.einsum("ij,ij->i", away, away).min()))
+        # An edge is crossed where just one of its ends is north of the point: a corner so counts once, not twice.
+        starts, ends = to[:, 1] >= 0.0, (to - self._along)[:, 1] >= 0.0
+        side = self._along[:, 0] * to[:, 1] - self._along[:, 1] * to[:, 0]
+        crossed = (starts != ends) & ((side > 0.0) == (self._along[:, 1] > 0.0))
+        return nearest if np.count_nonzero(crossed) % 2 else -nearest
+
+
+class Geofence:
+    """A fence, seen from the origin of the ENU frame.
+
+    Attributes:
+        return_point_enu_m: East and north of where to fly after a breach, m; None where the fence names no such place.
+        highest_m: No higher than this, z of ENU; infinite without limit.
+    """
+
+    def __init__(self, items: Sequence[MissionItem], origin: Geodetic, *, highest_m: float = inf) -> None:
+        """Build the fence of valid items; without any it holds nothing back."""
+        self.highest_m = highest_m
+        self.return_point_enu_m: tuple[float, float] | None = None
+        self._groups: dict[float, list[Zone]] = {}
+        self._exclusions: list[Zone] = []
+        at = 0
+        while at < len(items):
+            first = items[at]
+            length = int(first.p1) if first.command in POLYGONS else 1
+            self._add(first, [_place(item, origin) for item in items[at : at + length]])
+            at += length
+
+    def _add(self, item: MissionItem, places: Sequence[tuple[float, float]]) -> None:
+        if item.command == RETURN_POINT:
+            self.return_point_enu_m = places[0]
+            return
+        zone: Zone = Polygon(places) if item.command in POLYGONS else Disc(*places[0], item.p1)
+        if item.command in INCLUSIONS:
+            self._groups.setdefault(_group(item), []).append(zone)
+        else:
+            self._exclusions.append(zone)
+
+    def margin_m(self, position_enu_m: Vector) -> float:
+        """Return how far a position is from the nearest breach, m; negative by how much it breaches the fence."""
+        east, north, up = position_enu_m
+        if not (isfinite(east) and isfinite(north) and isfinite(up)):
+            return -inf
+        margin = self.highest_m - up
+        if self._groups:
+            groups: Mapping[float, list[Zone]] = self._groups
+            margin = min(margin, max(min(zone.depth_m(east, north) for zone in zones) for zones in groups.values()))
+        return min(margin, *(-zone.depth_m(east, north) for zone in self._exclusions), inf)
+
+    def inside(self, position_enu_m: Vector) -> bool:
+        """Whether a position is within the fence; its edge is."""
+        return self.margin_m(position_enu_m) >= -EDGE_M
+
+    def refusal(self, position_enu_m: Vector) -> str:
+        """Return why the vehicle may not fly to a position; empty if it may."""
+        if position_enu_m[2] > self.highest_m + EDGE_M:
+            return f"higher than the {self.highest_m:g} m of the geofence"
+        return "" if self.inside(position_enu_m) else "outside the geofence"
+
+
+def _group(item: MissionItem) -> float:
+    return 0.0 if isnan(item.p2) else item.p2
+
+
+def _place(item: MissionItem, origin: Geodetic) -> tuple[float, float]:
+    east, north, _ = enu_of(Geodetic(item.x * DEGREES, item.y * DEGREES, 0.0), origin)
+    return east, north
