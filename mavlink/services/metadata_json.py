@@ -1,50 +1,23 @@
-"""Component metadata: what the parameters mean, as JSON files that ground stations fetch by FTP.
+"""What the parameters mean, as the JSON file that ground stations fetch by FTP: COMP_METADATA_TYPE_PARAMETER.
 
-Specification: https://mavlink.io/en/services/component_information.html, and the schemas parameter.schema.json and
-general.schema.json of the MAVLink repository. The version of both is 1: QGroundControl takes no other.
+Specification: https://mavlink.io/en/services/component_metadata.html, and component_metadata/parameter.schema.json of
+the MAVLink repository. The version is 1: QGroundControl takes no other.
 """
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
-from zlib import crc32
 
 from mavlink.parameters import LARGEST_INT, LARGEST_REAL, LEAST_INT, Kind, Parameter
 
-GENERAL_NAME, PARAMETER_NAME = "general.json", "parameter.json"
-URI = "mftp:///"
-"""What a name follows: the files lie at the root of this component's FTP."""
-TYPE_PARAMETER = 1
-"""COMP_METADATA_TYPE_PARAMETER, which this pymavlink does not know."""
-
 _VERSION = 1
-_ALL_BITS = 0xFFFFFFFF
 _TYPES = {Kind.INT: "Int32", Kind.REAL: "Float"}
 
 
 def metadata_json(parameters: Iterable[Parameter]) -> bytes:
-    """Return the parameters' metadata: COMP_METADATA_TYPE_PARAMETER."""
-    return _encoded({"version": _VERSION, "parameters": [_entry(parameter) for parameter in parameters]})
-
-
-def general_json(files: Mapping[int, tuple[str, bytes]], version: str) -> bytes:
-    """Return the general metadata: COMP_METADATA_TYPE_GENERAL.
-
-    Args:
-        files: COMP_METADATA_TYPE -> name and content of each other file.
-        version: Of the firmware: numbers between three points at most.
-    """
-    types = [{"type": kind, "uri": URI + name, "fileCrc": file_crc(content)} for kind, (name, content) in files.items()]
-    names = {"vendorName": "Colibri", "modelName": "Colibri", "firmwareVersion": version}
-    return _encoded({"version": _VERSION, **names, "metadataTypes": types})
-
-
-def file_crc(content: bytes) -> int:
-    """Return MAVLink's CRC-32 of a file: ISO 3309's, but begun with 0 and not inverted.
-
-    Source: https://mavlink.io/en/guide/crc.html; as PX4 and QGroundControl compute it.
-    """
-    return crc32(content, _ALL_BITS) ^ _ALL_BITS
+    """Return the file."""
+    content = {"version": _VERSION, "parameters": [_entry(parameter) for parameter in parameters]}
+    return json.dumps(content, separators=(",", ":")).encode()
 
 
 def _entry(parameter: Parameter) -> dict[str, Any]:
@@ -77,7 +50,3 @@ def _entry(parameter: Parameter) -> dict[str, Any]:
 def _shortest(parameter: Parameter, value: float) -> float:
     """Return a number as it was meant before it was rounded to 32 bits, if seven digits say it."""
     return value if parameter.kind == Kind.INT else float(f"{value:.7g}")
-
-
-def _encoded(content: dict[str, Any]) -> bytes:
-    return json.dumps(content, separators=(",", ":")).encode()

@@ -16,7 +16,8 @@ INTERVAL_US = 2_000
 MOST_AT_ONCE = 20
 BY_ID = -1
 """param_index of who names a parameter by its id."""
-_EXACT_IN_FLOAT = 2**24
+_NOT_EXACT_IN_FLOAT = 2**24
+"""From here on, a float can be the nearest of two integers."""
 
 
 @dataclass(slots=True)
@@ -122,7 +123,7 @@ def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | Refusal:
     value = value_of(Kind(wire_type), bits)
     if wire_type == definition.kind:
         return value
-    if isinstance(value, float) and value.is_integer() and abs(value) <= _EXACT_IN_FLOAT:
+    if isinstance(value, float) and value.is_integer() and abs(value) < _NOT_EXACT_IN_FLOAT:
         return int(value)
     return Refusal.TYPE_MISMATCH
 

@@ -1,9 +1,9 @@
-"""Component metadata."""
+"""Metadata of the parameters."""
 
 import json
 
 from mavlink.parameters import Kind, Parameter
-from mavlink.services.metadata_json import TYPE_PARAMETER, file_crc, general_json, metadata_json
+from mavlink.services.metadata_json import metadata_json
 
 SPEED = Parameter(
     name="SPEED",
@@ -50,23 +50,3 @@ def test_parameters_as_the_schema_has_them() -> None:
             },
         ],
     }
-
-
-def test_the_general_file_names_the_others_with_their_checksums() -> None:
-    content = metadata_json([SPEED])
-    general = json.loads(general_json({TYPE_PARAMETER: ("parameter.json", content)}, "0.1.0"))
-    assert general["version"] == 1
-    assert general["metadataTypes"] == [{"type": 1, "uri": "mftp:///parameter.json", "fileCrc": file_crc(content)}]
-
-
-def test_the_checksum_is_mavlinks() -> None:
-    """Bit by bit, from the polynomial: begun with 0, not inverted."""
-    content = bytes(range(256)) + b"123456789"
-    crc = 0
-    for byte in content:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ (0xEDB88320 if crc & 1 else 0)
-    assert file_crc(content) == crc
-    assert file_crc(b"123456789") == 0x2DFD2D88
-    assert file_crc(b"") == 0

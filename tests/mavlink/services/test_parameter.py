@@ -126,7 +126,7 @@ def test_a_set_is_told_to_everybody() -> None:
         ("LIMITED", 1.5, REAL32, Refusal.TYPE_MISMATCH),
         ("LIMITED", float("nan"), REAL32, Refusal.TYPE_MISMATCH),
         ("LIMITED", 3.0, REAL32, Refusal.VALUE_OUT_OF_RANGE),
-        ("INTEGER", 16777218.0, REAL32, Refusal.TYPE_MISMATCH),
+        ("INTEGER", 16777216.0, REAL32, Refusal.TYPE_MISMATCH),
         ("INTEGER", 1.0, mav.MAV_PARAM_TYPE_UINT8, Refusal.TYPE_UNSUPPORTED),
         ("INTEGER", 1.0, 0, Refusal.TYPE_UNSUPPORTED),
         ("INTEGER", 1.0, 255, Refusal.TYPE_UNSUPPORTED),
@@ -147,7 +147,7 @@ def test_who_is_refused_hears_why_and_what_holds(name: str, value: Any, kind: in
 def test_an_integer_as_a_float_is_obeyed_where_it_can_mean_but_one() -> None:
     """As MAVProxy sets one after it has read the packed file, and DroneKit always."""
     parameters = parameters_of()
-    for value in (-7.0, 16777216.0, 0.0):
+    for value in (-7.0, 16777215.0, 0.0):
         (answer,) = Talk(parameters).set("INTEGER", value, REAL32)
         assert (answer.fields.param_type, as_int(answer)) == (INT32, int(value))
         assert parameters["INTEGER"] == value
