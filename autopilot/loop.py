@@ -6,6 +6,8 @@ import numpy as np
 
 from autopilot.controller import (
     Array,
+    AttitudeController,
+    AttitudeDemand,
     Clock,
     Controller,
     Decision,
@@ -30,6 +32,7 @@ class ControlLoop:
         preview: The references that the law wants.
         control_interval_us: Its sample.
         frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
+        takes_attitude: Whether the law can be told an attitude and a thrust.
         controls: Rotor speeds commanded now, in parts of the largest.
     """
 
@@ -45,15 +48,21 @@ class ControlLoop:
         self._controller = _build(profile, vehicle, clock)
         self.vehicle = vehicle
         self.preview = self._controller.preview
+        self.takes_attitude = isinstance(self._controller, AttitudeController)
         self.control_interval_us = self._controller.control_interval_us
         self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
         self._memory: Any = None
         self._yaw_rad = 0.0
         self.controls = (0.0, 0.0, 0.0, 0.0)
 
-    def begin(self, rotor_speed: float, yaw_rad: float) -> None:
-        """Begin with every rotor at `rotor_speed` (the vehicle's unit), yaw unwrapped near `yaw_rad`."""
-        self._memory = self._controller.initial(rotor_speed)
+    def begin(self, rotor_speed: float, yaw_rad: float, *, afresh: bool = True) -> None:
+        """Begin with every rotor at `rotor_speed` (the vehicle's unit), yaw unwrapped near `yaw_rad`.
+
+        Unless all begins `afresh`, a law that remembers its battery goes on with the charge that is left.
+        """
+        before, self._memory = self._memory, self._controller.initial(rotor_speed)
+        if not afresh and hasattr(before, "charge_ah"):
+            self._memory = self._memory._replace(charge_ah=before.charge_ah)
         self._yaw_rad = yaw_rad
         self._command(np.full(4, rotor_speed))
 
@@ -77,6 +86,22 @@ class ControlLoop:
         self._memory, decision = self._controller.step(self._memory, time_us, state, references)
         self._command(decision.rotor_speeds)
         return decision
+
+    def decide_attitude(self, time_us: int, state: VehicleState, demand: AttitudeDemand) -> Decision:
+        """Decide the rotor speeds by which a law that takes attitudes follows `demand`.
+
+        Raises:
+            DecisionError: The control law gave what no rotor can follow.
+        """
+        assert isinstance(self._controller, AttitudeController), "asked for only where attitudes are taken"
+        self._memory, decision = self._controller.step_attitude(self._memory, time_us, state, demand)
+        self._command(decision.rotor_speeds)
+        return decision
+
+    def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
+        """Go on with a law of the same kind and rhythm, built from other numbers; it takes over what is remembered."""
+        self._controller = controller
+        self.vehicle = vehicle
 
     def _command(self, rotor_speeds: Array) -> None:
         check_rotor_speeds(self._name, rotor_speeds, self.vehicle.rotors.max_speed)

@@ -2,17 +2,15 @@
 
 from math import nan
 
-from mavlink.setpoints import Sticks
-
 from autopilot.controller import Array, AttitudeDemand, Decision, Fallback, Horizon, VehicleState
 from autopilot.forecast import Forecaster
 from autopilot.modes import ROWS, Mode, custom_mode
 from autopilot.pilot import Guidance, Pilot
 from autopilot.power import PowerMeter
 from autopilot.qp import QpStatus
+from autopilot.stations import Stations
 from mavlink.dialect import mav
 from mavlink.frames import Vector, quaternion_from_euler
-from mavlink.geodesy import Geodetic
 from mavlink.snapshot import NO_SETPOINT, NOT_SOLVED, FourOf, Home, Setpoint, Snapshot, SolverState
 from plant.vehicle import Vehicle
 
@@ -48,8 +46,7 @@ class Photographer:
         duration_s: float,
         controls: FourOf,
         power: PowerMeter,
-        origin: Geodetic,
-        sticks: Sticks | None,
+        stations: Stations,
     ) -> Snapshot:
         """Return the vehicle as it is now.
 
@@ -62,9 +59,9 @@ class Photographer:
             duration_s: How long it took.
             controls: Rotor commands, parts of the largest speed.
             power: Its battery.
-            origin: Of the ENU frame.
-            sticks: Of a pilot on the ground, if there is one.
+            stations: What ground stations say.
         """
+        sticks = pilot.scene().steered.sticks
         mode, armed = pilot.state
         before, self._velocity = self._velocity or state.velocity_enu_m_s, state.velocity_enu_m_s
         ax, ay, az = ((new - old) / self._interval_s for new, old in zip(state.velocity_enu_m_s, before, strict=True))
@@ -84,7 +81,10 @@ class Photographer:
             acceleration_enu_m_s2=(ax, ay, az),
             attitude=state.attitude,
             rate_flu_rad_s=state.rate_flu_rad_s,
-            origin=origin,
+            origin=stations.commands.origin,
+            gps_ok=not stations.failures.gps_off,
+            fence_enabled=stations.missions.has_fence,
+            fence_breached=bool(stations.missions.fence_refusal(state.position_enu_m)),
             home=Home(pilot.home_enu_m, pilot.home_yaw_rad),
             rotor_speeds_rad_s=(c1 * speed, c2 * speed, c3 * speed, c4 * speed),
             controls=controls,

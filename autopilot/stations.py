@@ -27,10 +27,10 @@ from mavlink.services.identity import IDENTITIES, autopilot_version, banner, ver
 from mavlink.services.log import Logs
 from mavlink.services.manual import Manual
 from mavlink.services.metadata import Metadata
+from mavlink.services.metadata_json import metadata_json
 from mavlink.services.offboard import Offboard
 from mavlink.services.origin import OriginService, Setters
 from mavlink.services.parameter import ParameterService
-from mavlink.services.metadata_json import metadata_json
 from mavlink.services.parameter_pack import packed_for
 from mavlink.services.rates import SDK, SILENT
 from mavlink.services.service import Peer, Send, to
@@ -97,7 +97,7 @@ class Stations:
         self._calibration = Calibration()
         self.failures = Failures()
         self.restart = 0.0
-        self.offboard, self.manual, self.follow = Offboard(), Manual(), Follow()
+        self.offboard, self.manual, self.follow = Offboard(), Manual(settings.system_id), Follow()
         self.commands = Commands(pilot, settings.origin, lambda place: self.missions.fence_refusal(place))
         self.missions = Missions(pilot, self.commands, self._text)
         self._heartbeat = HeartbeatService(self._identity)
@@ -178,7 +178,6 @@ class Stations:
     def _handlers(self) -> Mapping[int, Handler | Entry]:
         streams = self._streams
         streams.provide("AUTOPILOT_VERSION", lambda command: [to(command.peer, "AUTOPILOT_VERSION", *self._version())])
-        streams.provide("HEARTBEAT", lambda command: self._heartbeat_now(command.peer))
         streams.provide("AVAILABLE_MODES", self._modes.available_modes)
         streams.provide("AVAILABLE_MODES_MONITOR", self._modes.monitor)
         streams.provide("COMPONENT_METADATA", lambda command: self._metadata.provide(command.peer, command.now_us))
@@ -191,9 +190,7 @@ class Stations:
             **self._modes.handlers(),
             mav.MAV_CMD_DO_SET_MISSION_CURRENT: self.missions.service.do_set_mission_current,
             mav.MAV_CMD_DO_SET_MODE: self._engaging(self.commands.handlers()[mav.MAV_CMD_DO_SET_MODE]),
-            mav.MAV_CMD_PREFLIGHT_CALIBRATION: lambda command: self._calibration.begin(
-                command, armed=self._pilot.state.armed
-            ),
+            mav.MAV_CMD_PREFLIGHT_CALIBRATION: Entry(self._calibrate, frames=None, interruptible=True),
             mav.MAV_CMD_INJECT_FAILURE: lambda command: self.failures.inject(
                 command, enabled=self._pilot.behaviour.inject_failures
             ),
@@ -214,16 +211,15 @@ class Stations:
 
         return obey
 
+    def _calibrate(self, command: Command) -> Outcome:
+        return self._calibration.begin(command, armed=self._pilot.state.armed)
+
     def _select(self, number: int, command: Command) -> Outcome:
         del command
         return self.commands.select(mode_of_custom(number))
 
     def _version(self) -> Sequence[object]:
         return autopilot_version(self._identity, version_of(VERSION), self._settings.system_id)
-
-    def _heartbeat_now(self, peer: Peer) -> list[Send]:
-        snapshot = self._streams.snapshot
-        return [] if snapshot is None else [to(peer, "HEARTBEAT", *self._heartbeat.fields(snapshot))]
 
     def _set_origin(self, place: Geodetic) -> str:
         if self._pilot.state.armed:

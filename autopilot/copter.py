@@ -1,0 +1,274 @@
+"""The whole vehicle as a pure composition: frames of the plant and datagrams of ground stations in, answers out."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from autopilot.arming import Facts
+from autopilot.attitude_reference import AttitudeReference
+from autopilot.companion import Companion
+from autopilot.controller import Clock, Decision, VehicleState
+from autopilot.core import Step
+from autopilot.courses import Climb, Course, Homeward, OnTrack, Scene, Sink, Steered, Stop
+from autopilot.leader import Following
+from autopilot.leaning import AltitudeSticks, Stabilized
+from autopilot.loop import ControlLoop
+from autopilot.modes import MANUAL, Event, Mode, Need
+from autopilot.orders import Land
+from autopilot.parameters import Numbers, behaviour, definitions
+from autopilot.pilot import Guidance, Pilot
+from autopilot.planner import Planner, plan
+from autopilot.power import PowerMeter
+from autopilot.profile import Profile
+from autopilot.reference import Reference, target_of
+from autopilot.snapshots import Photographer
+from autopilot.stations import Stations, StationSettings
+from autopilot.sticks import PositionSticks
+from autopilot.tracks import Track, track
+from autopilot.tuning import Tuning, builder
+from mavlink.hil import ActuatorCommand, StateFrame
+from mavlink.hub import Outgoing
+from mavlink.parameters import Parameters, Value
+from mavlink.services.statustext import INFO
+from plant.vehicle import Vehicle
+
+_STILL = (0.0, 0.0, 0.0, 0.0)
+_LEADER_LOST_US = 10_000_000
+
+
+class Received(NamedTuple):
+    """What came from a ground station.
+
+    Attributes:
+        datagram: The bytes.
+        link: Number of the link.
+        address: Where from.
+        loopback: Whether from this computer.
+    """
+
+    datagram: bytes
+    link: int
+    address: tuple[str, int] | None
+    loopback: bool = True
+
+
+class Copter:
+    """A vehicle that ground stations fly.
+
+    Attributes:
+        frame_interval_us: How often it wants a frame.
+        pilot: Decides what is flown.
+        parameters: All numbers that can be changed.
+        stations: What ground stations see and say.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        vehicle: Vehicle,
+        settings: StationSettings,
+        clock: Clock,
+        *,
+        values: dict[str, Value] | None = None,
+        first: Track | None = None,
+    ) -> None:
+        """Fly `vehicle` by `profile`; `clock` only measures, it decides nothing.
+
+        Args:
+            profile: The control law and its numbers.
+            vehicle: That it controls.
+            settings: Towards ground stations.
+            clock: Seconds.
+            values: Of parameters that were changed before.
+            first: A track that is flown from time 0 on, the vehicle being in the air; None: it stands, or is picked
+                up in hold.
+
+        Raises:
+            ControllerError: The profile's control law cannot be used.
+            ProfileError: Its table is wrong.
+            SolverError: Its solver cannot be used.
+            ImpossibleError: The values of the parameters make an impossible vehicle.
+        """
+        numbers = Numbers(profile, vehicle)
+        self.parameters = Parameters(definitions(profile, vehicle, settings.system_id))
+        self.parameters.load(values or {})
+        flown, believed = numbers.applied(self.parameters.values)
+        self._loop = ControlLoop(flown, believed, clock)
+        self._tuning = Tuning(numbers, builder(profile.controller, clock), self._loop)
+        self.parameters.check = self._tuning.check
+        self._references = profile.references
+        self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
+        self._clock = clock
+        self.frame_interval_us = self._loop.frame_interval_us
+        self._interval_s = self._loop.control_interval_us * 1e-6
+        self._attitude = AttitudeReference(believed, self._loop.preview) if self._loop.takes_attitude else None
+        self.pilot = Pilot(self._loop.preview, behaviour(self.parameters), self._course)
+        self.stations = Stations(settings, self.pilot, self.parameters)
+        self._power = PowerMeter(believed)
+        self._photographer = Photographer(believed, self._interval_s)
+        self._first = first
+        self._planners: dict[str, Planner] = {}
+        self._time_us: int | None = None
+        self._controls = _STILL
+        self._mode = self.pilot.state.mode
+
+    def step(self, frame: StateFrame) -> Step:
+        """Answer a frame of the plant.
+
+        Raises:
+            DecisionError: The control law gave what no rotor can follow.
+        """
+        started_s = self._clock()
+        if self._time_us is None or frame.time_us != self._time_us + self.frame_interval_us:
+            self._begin(frame)
+        self._time_us = frame.time_us
+        state = self._loop.state(frame)
+        decision = None
+        if self._loop.is_due(frame.time_us):
+            self._sense(frame.time_us, state)
+            guidance = self.pilot.step()
+            decision = self._decide(frame.time_us, state, guidance)
+            duration_s = self._clock() - started_s
+            self._report(frame.time_us, state, guidance, decision, duration_s)
+        command = ActuatorCommand(frame.time_us, self._controls, armed=self.pilot.state.armed)
+        return Step(command, decision, duration_s if decision else self._clock() - started_s)
+
+    def serve(self, inbox: Sequence[Received]) -> list[Outgoing]:
+        """Hear ground stations, and return what to send them; after `step`, while the plant integrates."""
+        now_us = self._time_us
+        if now_us is None:
+            return []
+        hub = self.stations.hub
+        for datagram, link, address, loopback in inbox:
+            hub.receive(datagram, link, address, now_us, loopback=loopback)
+        if self.parameters.take_changed():
+            self._adopt()
+        return self.stations.poll(now_us)
+
+    def _begin(self, frame: StateFrame) -> None:
+        """See the vehicle for the first time, or anew after frames were missed."""
+        vehicle = self._loop.vehicle
+        if self._time_us is None:
+            self._loop.begin(self._start_speed if frame.time_us == 0 else vehicle.hover_speed, self._first_yaw())
+            state = self._loop.state(frame)
+            self.pilot.begin(frame.time_us, state, mode=Mode.TRACK if self._first else None)
+            self._controls = _STILL if self.pilot.standing else self._loop.controls
+            self.stations.say(INFO, self.stations.banner())
+            return
+        self._loop.begin(vehicle.hover_speed, self._loop.state(frame).euler[2])
+
+    def _first_yaw(self) -> float:
+        return float(self._planner_of(self._first).horizon(0).yaw_rad[0]) if self._first else 0.0
+
+    def _sense(self, now_us: int, state: VehicleState) -> None:
+        pilot, stations = self.pilot, self.stations
+        behaviour = pilot.behaviour
+        sticks = stations.manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6))
+        setpoint = stations.offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6))
+        leader = stations.follow.latest(now_us, _LEADER_LOST_US)
+        met = {
+            Need.ATTITUDE_CONTROL: self._attitude is not None,
+            Need.STICKS: sticks is not None,
+            Need.SETPOINTS: setpoint is not None,
+            Need.MISSION: stations.missions.has_mission,
+            Need.CIRCLE: False,
+            Need.FLYING: not pilot.standing,
+        }
+        missing = tuple(need for need, there in met.items() if not there)
+        thrust = sticks.thrust if sticks is not None and pilot.state.mode is Mode.STABILIZED else None
+        outside = stations.missions.fence_refusal(state.position_enu_m) if stations.missions.has_fence else ""
+        facts = Facts(state, pilot.standing, self._power.left, thrust, outside)
+        pilot.sense(now_us, state, facts, missing, Steered(sticks, setpoint, leader))
+        if pilot.state.armed:
+            if pilot.state.mode is Mode.OFFBOARD and setpoint is None:
+                pilot.happened(Event.SETPOINTS_LOST)
+            elif pilot.state.mode in MANUAL and sticks is None:
+                pilot.happened(Event.STICKS_LOST)
+
+    def _decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
+        loop = self._loop
+        if guidance.begins:
+            loop.begin(loop.vehicle.rotors.idle_speed, state.euler[2], afresh=False)
+        if guidance.horizon is not None:
+            decision = loop.decide(now_us, state, guidance.horizon)
+        elif guidance.attitude is not None:
+            decision = loop.decide_attitude(now_us, state, guidance.attitude)
+        else:
+            self._controls = _STILL
+            return None
+        self._controls = loop.controls
+        return decision
+
+    def _report(
+        self, now_us: int, state: VehicleState, guidance: Guidance, decision: Decision | None, duration_s: float
+    ) -> None:
+        pilot, stations = self.pilot, self.stations
+        idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
+        least = idle if pilot.state.armed else 0.0
+        c1, c2, c3, c4 = (max(control, least) for control in self._controls)
+        self._power.run((c1, c2, c3, c4), self._interval_s)
+        stations.missions.watch_mode(pilot.state.mode)
+        stations.update(
+            self._photographer.take(
+                now_us,
+                state,
+                pilot,
+                guidance,
+                decision,
+                duration_s,
+                (c1, c2, c3, c4),
+                self._power,
+                stations,
+            )
+        )
+
+    def _adopt(self) -> None:
+        """Fly by the parameters as they are now."""
+        self.pilot.behaviour = behaviour(self.parameters)
+        tuned = self._tuning.take()
+        if tuned is not None:
+            self._loop.adopt(tuned.controller, tuned.vehicle)
+            self._photographer = Photographer(tuned.vehicle, self._interval_s)
+            if self._attitude is not None:
+                self._attitude = AttitudeReference(tuned.vehicle, self._loop.preview)
+
+    def _course(self, mode: Mode, scene: Scene) -> Course:
+        """Return how a mode begins."""
+        if mode is Mode.TAKEOFF:
+            return Climb(scene.home_enu_m[2] + scene.behaviour.takeoff_height_m, None, scene)
+        if mode is Mode.LAND:
+            return Sink(Land(), scene)
+        if mode is Mode.RETURN:
+            return Homeward(scene)
+        if mode is Mode.MISSION:
+            return self.stations.missions.course()
+        if mode is Mode.OFFBOARD:
+            return Companion(self._attitude)
+        if mode is Mode.FOLLOW:
+            return Following()
+        if mode is Mode.POSITION:
+            return PositionSticks()
+        if mode is Mode.TRACK:
+            return self._on_track(scene)
+        if mode is Mode.STABILIZED and self._attitude is not None:
+            return Stabilized(self._attitude)
+        if mode is Mode.ALTITUDE and self._attitude is not None:
+            return AltitudeSticks(self._attitude, self._loop.vehicle.gravity_m_s2)
+        return Stop()
+
+    def _on_track(self, scene: Scene) -> OnTrack:
+        if self._first is not None:
+            first, self._first = self._first, None
+            course = OnTrack(self._planner_of(first), first.duration_s, scene, at_once=True)
+            self.pilot.reference = _at_start(self._planner_of(first))
+            return course
+        chosen = track(scene.behaviour.track)
+        return OnTrack(self._planner_of(chosen), chosen.duration_s, scene)
+
+    def _planner_of(self, flown: Track) -> Planner:
+        return plan(flown, self._references, self._loop.preview)
+
+
+def _at_start(planner: Planner) -> Reference:
+    """Return a reference that is on a track from its first point on."""
+    target = target_of(planner.horizon(0))
+    return Reference(target.motion[0, :4].copy(), target.heading[0, :2].copy(), on_target=True)
