@@ -1,10 +1,9 @@
-"""Messages of MAVLink's common set that pymavlink's dialects leave out, defined as its generator would.
+"""Messages of MAVLink's common set that pymavlink's dialects leave out, defined as its generator would, to be read.
 
 Source: mavlink.io/en/messages/common.html. A message's CRC_EXTRA follows from its definition, so that a mistake here
 makes every peer drop the message: mavlink.io/en/guide/serialization.html.
 """
 
-from collections.abc import Callable
 from struct import Struct
 from typing import Any, NamedTuple
 
@@ -99,17 +98,8 @@ def _class_of(definition: Definition, dialect: Any) -> Any:
         for name, value in zip(names, values, strict=True):
             setattr(self, name, value)
 
-    def pack(self: Any, mav: Any, force_mavlink1: bool = False) -> bytes:
-        values: list[Any] = []
-        for field in ordered:
-            value = getattr(self, field.name)
-            values.extend(value) if field.length and field.kind != "char" else values.append(value)
-        packer: Callable[..., bytes] = self._pack
-        return packer(mav, self.crc_extra, packing.pack(*values), force_mavlink1=force_mavlink1)
-
     members = {
         "__init__": initialize,
-        "pack": pack,
         "id": definition.id,
         "msgname": definition.name,
         "fieldnames": names,

@@ -69,7 +69,9 @@ def fitted(name: str, encoder: Encoder) -> Encoder:
 
 
 def _float32(value: float) -> float:
-    return max(-LARGEST_FLOAT32, min(LARGEST_FLOAT32, value)) if isfinite(value) else value
+    if -LARGEST_FLOAT32 <= value <= LARGEST_FLOAT32 or not isfinite(value):
+        return value
+    return LARGEST_FLOAT32 if value > 0.0 else -LARGEST_FLOAT32
 
 
 def _integer(low: int, high: int) -> Callable[[float], int]:

@@ -37,7 +37,7 @@ def on_the_wire(sends: list[Send]) -> list[Message]:
 
 FLOATS = st.floats(width=32)
 BYTES = st.integers(0, 255)
-ANY_LONG = st.tuples(st.integers(0, 65535), BYTES, *[FLOATS] * 7).map(
+ANY_LONG = st.tuples(st.integers(0, 500) | st.integers(0, 65535), BYTES, *[FLOATS] * 7).map(
     lambda f: message("COMMAND_LONG", 1, 1, f[0], f[1], *f[2:])
 )
 INT32 = st.integers(-(2**31), 2**31 - 1)

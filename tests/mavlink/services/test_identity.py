@@ -46,7 +46,7 @@ def test_versions(text: str, version: tuple[int, int, int]) -> None:
     assert version_of(text) == version
 
 
-@given(st.text(max_size=30))
+@given(st.text("0123456789.rc-²٣", max_size=20))
 def test_any_text_is_some_version(text: str) -> None:
     on_the_wire([Send("AUTOPILOT_VERSION", autopilot_version(PX4, version_of(text), 255))])
 

@@ -22,6 +22,8 @@ FRAME_US = 4_000
 ATTITUDE, HOME, HEARTBEAT = 30, 242, 0
 SET, GET, REQUEST = 511, 510, 512
 
+MESSAGE_IDS = FLOATS | st.sampled_from([30.0, 242.0, 244.0])
+
 
 def flying(kind: str = SILENT) -> StreamService:
     stream = StreamService(TELEMETRY, {"AUTOPILOT_VERSION": lambda command: [to(command.peer, "AUTOPILOT_VERSION")]})
@@ -281,7 +283,7 @@ def test_asking_again_and_again_for_a_slow_stream_does_not_put_it_off() -> None:
     st.lists(
         st.tuples(
             st.sampled_from([SET, GET, REQUEST, 520, 519]),
-            FLOATS | st.sampled_from([30.0, 242.0, 244.0]),
+            MESSAGE_IDS,
             FLOATS,
             PEERS,
         )
