@@ -33,7 +33,7 @@ from mavlink.services.origin import OriginService, Setters
 from mavlink.services.parameter import ParameterService
 from mavlink.services.parameter_pack import packed_for
 from mavlink.services.rates import SDK, SILENT
-from mavlink.services.service import Peer, Send, to
+from mavlink.services.service import to
 from mavlink.services.shell import Shell
 from mavlink.services.standard_modes import ModeInfo, StandardModes
 from mavlink.services.statustext import INFO, StatusText
