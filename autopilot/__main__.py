@@ -1,7 +1,9 @@
 """`python -m autopilot`: the command line of the autopilot."""
 
 import sys
+from pathlib import Path
 
+from mavlink.home import DEFAULT_HOME, home
 from mavlink.process import ArgumentParser, add_common_arguments, begin
 
 DEFAULT_PLANT = "udpout:127.0.0.1:14560"
@@ -16,11 +18,17 @@ def _parser() -> ArgumentParser:
     )
     add = parser.add_argument
     add("--plant", default=DEFAULT_PLANT, metavar="URL", help="the plant to call (default %(default)s)")
-    add("--track", default="spiral", metavar="TRACK", help="what to fly, as in `colibri fly` (default %(default)s)")
+    add("--track", metavar="TRACK", help="what to fly, as in `colibri fly` (default spiral; with --gcs: what is asked)")
     add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
     add("--controller", metavar="NAME", help="control law (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml to control (default: the profile's)")
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
+    add("--gcs", action="append", default=[], metavar="URL", help="a ground station: udpout:, udpin:, tcp: or tcpin:")
+    add("--home", type=home, default=DEFAULT_HOME, metavar="LAT,LON,ALT,YAW", help="the origin (default %(default)s)")
+    add("--identity", default="px4", choices=("px4", "generic"), help="towards ground stations (default %(default)s)")
+    add("--state", type=Path, metavar="DIR", help="keeps parameters, logs, files (default: nothing is kept)")
+    add("--signing-key", type=Path, metavar="FILE", help="sign what is sent, refuse what is not signed with this key")
+    add("--insecure", action="store_true", help="let links leave this computer without a key")
     add_common_arguments(parser, "autopilot.csv (references, solver, times)")
     return parser
 

@@ -59,6 +59,7 @@ class Copter:
         pilot: Decides what is flown.
         parameters: All numbers that can be changed.
         stations: What ground stations see and say.
+        solve_time_s: Of the last QP.
     """
 
     def __init__(
@@ -109,7 +110,7 @@ class Copter:
         self._planners: dict[str, Planner] = {}
         self._time_us: int | None = None
         self._controls = _STILL
-        self._mode = self.pilot.state.mode
+        self.solve_time_s = 0.0
 
     def step(self, frame: StateFrame) -> Step:
         """Answer a frame of the plant.
@@ -196,6 +197,7 @@ class Copter:
             self._controls = _STILL
             return None
         self._controls = loop.controls
+        self.solve_time_s = decision.diagnostics.solve_time_s
         return decision
 
     def _report(

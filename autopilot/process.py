@@ -5,7 +5,9 @@ from pathlib import Path
 from time import perf_counter
 
 from autopilot.controller import Active, ControllerError, DecisionError, Fallback
+from autopilot.copter import Copter
 from autopilot.core import Autopilot, Step
+from autopilot.ground_process import Ground, GroundError, open_ground
 from autopilot.profile import ProfileError, load_profile
 from autopilot.qp import QpStatus, SolverError
 from autopilot.tracks import TrackError, track
@@ -25,6 +27,8 @@ STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, 
 FALLBACK_CODES: dict[Fallback | None, int] = {None: -1} | {fallback: code for code, fallback in enumerate(Fallback)}
 """How `fallback` is written: -1 is none."""
 
+TRACK = "spiral"
+"""What flies where nothing else is said."""
 _SILENCE_SAID_AFTER_S = 2.0
 _WAIT_AT_MOST_S = 0.1
 
@@ -58,37 +62,49 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     try:
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
-        autopilot = Autopilot(profile, vehicle, track(args.track), perf_counter)
-    except (ProfileError, VehicleError, TrackError, ControllerError, SolverError) as error:
+        ground = open_ground(args, profile, vehicle, status) if args.gcs else None
+        autopilot = ground.copter if ground else Autopilot(profile, vehicle, track(args.track or TRACK), perf_counter)
+    except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, GroundError) as error:
         fail(str(error))
     log = AutopilotLog(args.out) if args.out else None
     end = AutopilotEnd(system_id=args.system_id, frame_interval_us=autopilot.frame_interval_us, now_s=perf_counter())
     try:
         with undisturbed():
-            Client(link, end, status, stop, log).fly(autopilot)
+            Client(link, end, status, stop, log, ground).fly(autopilot)
     except (LinkError, DecisionError) as error:
         fail(str(error), EXIT_FAILED)
     finally:
         link.close()
+        if ground:
+            ground.close()
         if log:
             log.close()
-    return EXIT_INTERRUPTED
+    return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
 
 
 class Client:
     """Drives the autopilot's end of the conversation over a link."""
 
-    def __init__(self, link: UdpLink, end: AutopilotEnd, status: Status, stop: Stop, log: AutopilotLog | None) -> None:
-        """Serve `end` on `link` until `stop`."""
+    def __init__(
+        self,
+        link: UdpLink,
+        end: AutopilotEnd,
+        status: Status,
+        stop: Stop,
+        log: AutopilotLog | None,
+        ground: Ground | None = None,
+    ) -> None:
+        """Serve `end` on `link` until `stop`, and `ground` beside it."""
         self._link = link
         self._end = end
         self._status = status
         self._stop = stop
         self._log = log
+        self._ground = ground
         self._heard = False
         self._refusal_said = False
 
-    def fly(self, autopilot: Autopilot) -> None:
+    def fly(self, autopilot: Autopilot | Copter) -> None:
         """Answer every frame until told to stop."""
         self._status.say("calling", "waiting for the plant at " + self._link.url.removeprefix("udpout:"))
         due_s = 0.0
@@ -100,10 +116,14 @@ class Client:
                 self._link.send(datagram)
             if step and self._log:
                 self._log.write(step)  # while the plant integrates
+            if step and self._ground:
+                autopilot = self._ground.serve(perf_counter())
+                if self._ground.shut_down:
+                    break
             self._say_what_changed()
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
-    def _answer(self, autopilot: Autopilot, datagram: bytes) -> Step | None:
+    def _answer(self, autopilot: Autopilot | Copter, datagram: bytes) -> Step | None:
         frame = self._end.receive(datagram, perf_counter())
         if frame is None:
             return None

@@ -1,0 +1,226 @@
+"""Ground stations as the process sees them: links, key, parameter file, logs, and what the terminal is told."""
+
+import argparse
+from pathlib import Path
+from time import perf_counter, time
+
+from autopilot.copter import Copter
+from autopilot.ground_links import GroundLinks, open_links
+from autopilot.parameters import ImpossibleError, definitions
+from autopilot.profile import Profile
+from autopilot.stations import REBOOT, SHUT_DOWN, StationSettings
+from autopilot.tracks import track
+from mavlink.folder import Folder
+from mavlink.link import LinkError
+from mavlink.parameters import Parameters, Value
+from mavlink.process import Status
+from mavlink.services.parameter_file import ParameterFileError, read, write
+from mavlink.signing import Signing, SigningError, parse_key, tick_at
+from plant.vehicle import Vehicle
+
+KEY = "signing.key"
+TIMESTAMP = "signing.timestamp"
+FILES = "files"
+_TELL_EVERY_S = 0.5
+_SAVE_EVERY_S = 10.0
+
+
+class GroundError(Exception):
+    """Ground stations cannot be served as asked; the message is the one line that a user needs."""
+
+
+class Ground:
+    """Serves ground stations beside the plant, and keeps what must outlive the process.
+
+    Attributes:
+        copter: The vehicle; another one after a restart.
+        shut_down: Whether a ground station has asked for the end.
+    """
+
+    def __init__(self, args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status) -> None:
+        """Open links and files as the command line says.
+
+        Raises:
+            GroundError: Something of it cannot be used.
+        """
+        self._args = args
+        self._profile = profile
+        self._vehicle = vehicle
+        self._status = status
+        self._state: Path | None = args.state
+        self._signing = self._read_key()
+        try:
+            links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
+            self._folder = Folder(self._state / FILES) if self._state else None
+        except LinkError as error:
+            raise GroundError(str(error)) from error
+        except OSError as error:
+            raise GroundError(f"cannot write to --state {self._state}: {error.strerror}") from error
+        self._links = GroundLinks(links)
+        self._first = track(args.track) if args.track else None
+        self.copter = self._vehicle_anew()
+        self.shut_down = False
+        self._revision = self.copter.parameters.revision
+        self._told_s = self._saved_s = perf_counter()
+        self._told_us = 0
+        self._heard: set[str] = set()
+        self._mode: tuple[str, bool] | None = None
+        for link in links:
+            self._status.say("ground", _invitation(link.url), url=link.url)
+
+    def serve(self, now_s: float) -> Copter:
+        """Hear and answer ground stations; return the vehicle that flies on."""
+        stations = self.copter.stations
+        self._links.send(self.copter.serve(self._links.receive(stations)))
+        if stations.restart:
+            self._restart(stations.restart)
+        if now_s >= self._told_s + _TELL_EVERY_S:
+            self._tell(now_s)
+        if self.copter.parameters.revision != self._revision:
+            self._save_parameters()
+        return self.copter
+
+    def close(self) -> None:
+        """Write what is left to write, and let go of everything."""
+        self.copter.stations.log.close()
+        self._save_signing()
+        self._links.close()
+        if self._folder:
+            self._folder.close()
+
+    def _restart(self, kind: float) -> None:
+        if kind == SHUT_DOWN:
+            self.shut_down = True
+            self._status.say("said", "shut down by a ground station")
+        elif kind == REBOOT:
+            self.copter.stations.log.close()
+            self.copter = self._vehicle_anew()
+            self._revision = self.copter.parameters.revision
+            self._status.say("said", "restarted by a ground station")
+
+    def _vehicle_anew(self) -> Copter:
+        args = self._args
+        settings = StationSettings(
+            system_id=args.system_id,
+            identity=args.identity,
+            origin=args.home.origin,
+            boot_unix_us=round(time() * 1e6),
+            signing=self._signing,
+            files=self._folder,
+        )
+        try:
+            copter = Copter(
+                self._profile, self._vehicle, settings, perf_counter, values=self._read_parameters(), first=self._first
+            )
+        except ImpossibleError as error:
+            raise GroundError(f"{self._parameter_path()}: {error}") from error
+        self._links.introduce(copter.stations)
+        return copter
+
+    def _parameter_path(self) -> Path:
+        """Each control law and vehicle has its own parameters."""
+        assert self._state is not None, "asked for only where something is kept"
+        return self._state / f"{self._profile.controller}-{self._vehicle.name.lower().replace(' ', '-')}.params"
+
+    def _read_parameters(self) -> dict[str, Value]:
+        if self._state is None:
+            return {}
+        path = self._parameter_path()
+        try:
+            text = path.read_text()
+        except FileNotFoundError:
+            return {}
+        except (OSError, UnicodeDecodeError) as error:
+            raise GroundError(f"cannot read parameters from {path}: {error}") from error
+        try:
+            return read(text, Parameters(definitions(self._profile, self._vehicle, self._args.system_id)))
+        except ParameterFileError as error:
+            raise GroundError(f"{path}: {error}; correct or remove it") from error
+
+    def _save_parameters(self) -> None:
+        self._revision = self.copter.parameters.revision
+        if self._state is not None:
+            _replace(self._parameter_path(), write(self.copter.parameters, self._args.system_id).encode())
+
+    def _read_key(self) -> Signing:
+        kept = 0
+        key = None
+        path: Path | None = self._args.signing_key
+        try:
+            if self._state and (self._state / TIMESTAMP).exists():
+                kept = int((self._state / TIMESTAMP).read_text())
+            if path is None and self._state and (self._state / KEY).exists():
+                path = self._state / KEY
+            if path is not None:
+                key = parse_key(path.read_bytes())
+        except OSError as error:
+            raise GroundError(f"cannot read signing key {path}: {error.strerror}") from error
+        except (SigningError, ValueError) as error:
+            raise GroundError(f"signing key {path}: {error}") from error
+        return Signing(key, max(kept, tick_at(time())))
+
+    def _save_signing(self) -> None:
+        if self._state is None or not (self._signing.active or self._signing.key_changed):
+            return
+        _replace(self._state / TIMESTAMP, str(self._signing.timestamp).encode())
+        if self._signing.key_changed:
+            self._signing.key_changed = False
+            key = self._signing.key
+            if key is None:
+                (self._state / KEY).unlink(missing_ok=True)
+            else:
+                _replace(self._state / KEY, key)
+                (self._state / KEY).chmod(0o600)
+
+    def _tell(self, now_s: float) -> None:
+        pilot = self.copter.pilot
+        scene = pilot.scene()
+        facts = self._links.facts(self.copter.stations, now_s - self._told_s)
+        if self._status.as_json:
+            self._status.say(
+                "status",
+                "",
+                mode=pilot.state.mode,
+                armed=pilot.state.armed,
+                position_enu_m=scene.state.position_enu_m,
+                speed_m_s=sum(v * v for v in scene.state.velocity_enu_m_s) ** 0.5,
+                sim_time_s=scene.now_us * 1e-6,
+                times_real_time=(scene.now_us - self._told_us) * 1e-6 / (now_s - self._told_s),
+                solve_time_us=self.copter.solve_time_s * 1e6,
+                links=facts,
+            )
+        self._told_s, self._told_us = now_s, scene.now_us
+        for link in facts:
+            for who in link["heard"]:
+                if f"{link['url']} {who}" not in self._heard:
+                    self._heard.add(f"{link['url']} {who}")
+                    self._status.say("heard", f"system {who} is heard on {link['url']}")
+        if self._signing.key_changed or now_s >= self._saved_s + _SAVE_EVERY_S:
+            self._saved_s = now_s
+            self._save_signing()
+
+
+def open_ground(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status) -> Ground:
+    """Return what serves ground stations as the command line says.
+
+    Raises:
+        GroundError: Something of it cannot be used.
+    """
+    return Ground(args, profile, vehicle, status)
+
+
+def _invitation(url: str) -> str:
+    scheme, _, rest = url.partition(":")
+    calls = scheme in ("udpout", "tcp")
+    return f"calls ground stations at {rest} ({scheme})" if calls else f"waits for ground stations on {rest} ({scheme})"
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all; what cannot be written is not worth a crash."""
+    new = path.with_suffix(path.suffix + ".new")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        new.write_bytes(content)
+        new.replace(path)
+    except OSError:
+        return
