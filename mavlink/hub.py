@@ -97,9 +97,9 @@ class Hub:
         return channel.number
 
     def close(self, link: int, address: Address) -> None:
-        """Forget the channel to `address`, as its connection has ended; a fixed one stays for the next connection."""
+        """Forget the channel to `address`, as its connection has ended."""
         number = self._numbers.get((link, address))
-        if number is not None and not self._channels[number].fixed:
+        if number is not None:
             self._forget(number)
 
     def receive(

@@ -34,6 +34,9 @@ class LinkError(Exception):
 class GroundLink(Protocol):
     """A link to ground stations: nothing that it does blocks.
 
+    Each time: `receive_now`, then open channels for `take_opened`, hear what was received, and close channels for
+    `take_closed`.
+
     Attributes:
         url: The URL of the endpoint, with the port that it really has.
         target: Whom it calls; None where it waits for others.
@@ -52,6 +55,10 @@ class GroundLink(Protocol):
 
     def receive_now(self) -> list[tuple[bytes, Address]]:
         """Return what has come, as whole frames, and from where."""
+        ...
+
+    def take_opened(self) -> list[Address]:
+        """Return who is to be spoken to unasked since last asked: whom the link calls, who has connected."""
         ...
 
     def take_closed(self) -> list[Address]:
@@ -77,6 +84,7 @@ class UdpLink:
         self._socket = sock
         self.target = target
         self._waited_s = 0.0
+        self._opened = [] if target is None else [target]
         self.url = url
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
@@ -125,6 +133,11 @@ class UdpLink:
             if self.target is None or sender == self.target:
                 received.append((datagram, sender))
         return received
+
+    def take_opened(self) -> list[Address]:
+        """Return the target, once."""
+        opened, self._opened = self._opened, []
+        return opened
 
     def take_closed(self) -> list[Address]:
         """Return nobody: UDP has no connections."""

@@ -95,6 +95,7 @@ class TcpServer:
         sock.setblocking(False)
         self._socket = sock
         self._connections: dict[Address, Connection] = {}
+        self._opened: list[Address] = []
         self._closed: list[Address] = []
         self.url = url
         self.target: Address | None = None
@@ -116,6 +117,11 @@ class TcpServer:
         ]
         self._forget_dead()
         return received
+
+    def take_opened(self) -> list[Address]:
+        """Return the clients that have come since last asked: some say nothing before they hear something."""
+        opened, self._opened = self._opened, []
+        return opened
 
     def take_closed(self) -> list[Address]:
         """Return the clients that have gone since last asked."""
@@ -140,6 +146,7 @@ class TcpServer:
                 sock.close()
             else:
                 self._connections[address] = connection
+                self._opened.append(address)
 
     def _forget_dead(self) -> None:
         for address in [connection.address for connection in self._connections.values() if not connection.alive]:
@@ -160,6 +167,7 @@ class TcpClient:
         self._socket: socket.socket | None = None
         self._connection: Connection | None = None
         self._call_again_s = 0.0
+        self._opened: list[Address] = []
         self._closed: list[Address] = []
         self.url = url
         self.target: Address = target
@@ -180,6 +188,11 @@ class TcpClient:
         received = [(frame, self.target) for frame in connection.receive_now()]
         self._notice_end(connection)
         return received
+
+    def take_opened(self) -> list[Address]:
+        """Return the server if it has answered a call since last asked."""
+        opened, self._opened = self._opened, []
+        return opened
 
     def take_closed(self) -> list[Address]:
         """Return the server if a connection to it has ended since last asked."""
@@ -202,6 +215,8 @@ class TcpClient:
             self._connection = _established(self._socket, self.target)
             if self._connection is None:
                 self._hang_up()
+            else:
+                self._opened.append(self.target)
         return self._connection
 
     def _notice_end(self, connection: Connection) -> None:

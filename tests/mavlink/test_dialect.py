@@ -67,15 +67,15 @@ def test_an_unknown_message_is_counted() -> None:
     assert codec.dropped == {"unknown": 1}
 
 
-def pymavlink_frame(name: str, payload: bytes) -> tuple[Any, bytes]:
-    """Return what pymavlink reads from a payload, and the frame that it writes of that."""
+def pymavlink_frame(name: str, payload: bytes) -> tuple[Any, bytes, list[Any]]:
+    """Return what pymavlink reads from a payload, the frame that it writes of that, and the fields that it wrote."""
     mav = common.MAVLink(None, srcSystem=7, srcComponent=9)
     definition = getattr(common, f"MAVLink_{name.lower()}_message")
     numbers = dict(zip(definition.ordered_fieldnames, unflattened(definition, payload), strict=True))
     fields = [numbers[field] for field in definition.fieldnames]
     frame = bytes(definition(*fields).pack(mav))
     (message,) = mav.parse_buffer(frame)
-    return message, frame
+    return message, frame, fields
 
 
 def unflattened(definition: Any, payload: bytes) -> list[Any]:
@@ -95,15 +95,16 @@ WITH_TEXT = [name for name in NAMES if "char" in getattr(common, f"MAVLink_{name
 @given(st.data(), st.sampled_from(NAMES) | st.sampled_from(WITH_TEXT))
 def test_reads_and_writes_as_pymavlink_does(data: st.DataObject, name: str) -> None:
     size = getattr(common, f"MAVLink_{name.lower()}_message").unpacker.size
-    expected, frame = pymavlink_frame(name, data.draw(st.binary(min_size=size, max_size=size)))
+    expected, frame, written = pymavlink_frame(name, data.draw(st.binary(min_size=size, max_size=size)))
     codec = Codec(7, 9)
     (message,) = codec.decode(frame)
     fields = [getattr(message.fields, field) for field in expected.get_fieldnames()]
     listed = [list(field) if isinstance(field, tuple) else field for field in fields]
     assert repr(listed) == repr([getattr(expected, field) for field in expected.get_fieldnames()])
     assert (message.name, message.source, message.frame) == (name, (7, 9), frame)
+    assert codec.encode(name, *written) == frame
     if name not in WITH_TEXT:
-        assert codec.encode(name, *fields) == frame
+        assert Codec(7, 9).encode(name, *fields) == frame
 
 
 @given(st.binary(max_size=60).filter(lambda text: not text.endswith(b"\0")), st.sampled_from([0, 7]))
@@ -191,3 +192,61 @@ def test_a_good_frame_among_noise_is_found_and_the_noise_is_counted(order: list[
     decoded = [message.frame for message in fast.decode(datagram)]
     assert decoded == [message.frame for message in slow._parsed(datagram)]  # noqa: SLF001
     assert fast.dropped == slow.dropped
+
+
+SIGNATURE = b"\x03" + bytes(range(12))
+
+
+def sealed_heartbeat() -> bytes:
+    codec = Codec(7, 9)
+    codec.seal = lambda _: SIGNATURE
+    return codec.encode("HEARTBEAT", *HEARTBEAT)
+
+
+def test_what_is_sealed_is_the_whole_frame_that_says_that_it_is_signed() -> None:
+    codec, sealed = Codec(7, 9), []
+    codec.seal = lambda frame: sealed.append(frame) or SIGNATURE  # type: ignore[func-returns-value]
+    frame = codec.encode("HEARTBEAT", *HEARTBEAT)
+    assert frame == sealed[0] + SIGNATURE
+    assert frame[2] == dialect.SIGNED
+    codec.seal = None
+    assert codec.encode("HEARTBEAT", *HEARTBEAT)[2:5] == b"\0\0\1"
+
+
+@pytest.mark.parametrize("beside", [b"", b"\xfd", b"\xfd\x00\xff"])
+def test_signed_frames_are_read_with_their_signature(beside: bytes) -> None:
+    signed = sealed_heartbeat()
+    messages = Codec(1, 1).decode(heartbeat() + signed + signed + heartbeat() + beside)
+    assert [message.frame for message in messages] == [heartbeat(), signed, signed, heartbeat()]
+
+
+def test_signed_frames_do_not_need_pymavlink(monkeypatch: pytest.MonkeyPatch) -> None:
+    codec = Codec(1, 1)
+    monkeypatch.setattr(codec, "_parsed", lambda _: [])
+    assert len(codec.decode(sealed_heartbeat() + heartbeat())) == 2
+    assert codec.decode(sealed_heartbeat()[:-1]) == []
+
+
+def test_an_unknown_message_is_kept_on_demand() -> None:
+    codec = Codec(1, 1, keep_unknown=True)
+    unknown = heartbeat()[:7] + b"\xff\xff\xff" + heartbeat()[10:]
+    kept, known = codec.decode(unknown + heartbeat())
+    assert (kept.name, kept.source, kept.fields, kept.frame) == (dialect.UNKNOWN, (7, 9), None, unknown)
+    assert known.name == "HEARTBEAT"
+    assert not codec.dropped
+
+
+@pytest.mark.parametrize("old", [False, True])
+def test_what_a_frame_tells_without_being_decoded(old: bool) -> None:
+    mav = common.MAVLink(None, srcSystem=7, srcComponent=9)
+    mav.seq = 77
+    frame = bytes(common.MAVLink_heartbeat_message(*HEARTBEAT).pack(mav, force_mavlink1=old))
+    assert dialect.sequence_of(frame) == 77
+    assert dialect.payload(frame) == bytes([0, 0, 0, 0, *HEARTBEAT[:3], *HEARTBEAT[4:]])
+    assert dialect.intact(frame) is True
+    assert dialect.intact(frame[:-1] + bytes([frame[-1] ^ 1])) is False
+
+
+def test_nobody_can_tell_whether_an_unknown_message_is_intact() -> None:
+    assert dialect.intact(heartbeat()[:7] + b"\xff\xff\xff" + heartbeat()[10:]) is None
+    assert dialect.intact(sealed_heartbeat()) is True

@@ -104,6 +104,8 @@ def test_a_target_that_does_not_listen_is_heard_from_later(server: UdpLink) -> N
     with closing(client):
         client.send(b"anybody?", client.target)
         assert client.receive_now() == []
+        assert client.take_opened() == [client.target]
+        assert client.take_opened() == client.take_closed() == []
 
 
 @pytest.mark.parametrize(

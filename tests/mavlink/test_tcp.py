@@ -88,6 +88,19 @@ def test_half_a_frame_waits_for_the_other_half_of_the_same_client(server: Ground
         assert awaited(server.receive_now) == [(TEXT, one.getsockname()), (HEARTBEAT, one.getsockname())]
 
 
+def test_a_client_that_says_nothing_is_noticed_and_can_be_spoken_to(server: GroundLink) -> None:
+    with caller(server) as client:
+
+        def opened() -> list[Address]:
+            server.receive_now()
+            return server.take_opened()
+
+        assert awaited(opened) == [client.getsockname()]
+        assert server.take_opened() == []
+        server.send(TEXT, client.getsockname())
+        assert client.recv(1000) == TEXT
+
+
 def test_a_client_that_has_gone_is_forgotten(server: GroundLink) -> None:
     with caller(server) as client:
         client.sendall(HEARTBEAT)
@@ -158,6 +171,7 @@ def test_a_client_calls_again(server: GroundLink, monkeypatch: pytest.MonkeyPatc
     url, port = server.url, port_of(server)
     with closing(client_of(server)) as client:
         exchange(client, server)
+        assert client.take_opened() == [client.target]
         server.close()
 
         def closed() -> list[Address]:
@@ -171,6 +185,8 @@ def test_a_client_calls_again(server: GroundLink, monkeypatch: pytest.MonkeyPatc
             sleep(0.002)
         with closing(open_ground_link(url)) as again:
             exchange(client, again)
+            assert client.take_opened() == [client.target]
+            assert client.take_opened() == []
 
 
 def test_a_client_waits_before_it_calls_again(server: GroundLink) -> None:
