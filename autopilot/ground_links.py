@@ -34,31 +34,37 @@ class GroundLinks:
         """Serve `links`; those with a target are called, whether anybody hears it or not."""
         self._links = tuple(links)
         self._loopback = [not beyond_loopback(link.url) for link in links]
+        self._opened: list[tuple[int, Address]] = []
         self._counts: dict[int, tuple[int, int]] = {}
 
     def introduce(self, stations: Stations) -> None:
-        """Open a channel to everybody that is called."""
-        for number, link in enumerate(self._links):
-            if link.target is not None:
-                channel = stations.hub.open(number, link.target)
-                stations.use(channel, SDK if link.target[1] in SDK_PORTS else GCS)
+        """Open a channel to everybody that is connected already."""
+        for number, address in self._opened:
+            self._open(stations, number, address)
+
+    def _open(self, stations: Stations, number: int, address: Address) -> None:
+        channel = stations.hub.open(number, address)
+        stations.use(channel, SDK if address[1] in SDK_PORTS else GCS)
 
     def receive(self, stations: Stations) -> list[Received]:
         """Return what has come; forget connections that have ended."""
         inbox = []
         for number, link in enumerate(self._links):
+            for address in link.take_opened():
+                self._opened.append((number, address))
+                self._open(stations, number, address)
             for datagram, address in link.receive_now():
                 inbox.append(Received(datagram, number, address, self._is_loopback(number, address)))
             for address in link.take_closed():
+                self._opened = [opened for opened in self._opened if opened != (number, address)]
                 stations.hub.close(number, address)
         return inbox
 
     def send(self, outbox: Iterable[Outgoing]) -> None:
         """Send each datagram on its link; what cannot be sent is lost, as on any network."""
         for number, address, datagram in outbox:
-            link = self._links[number]
             try:
-                link.send(datagram, None if address == link.target else address)
+                self._links[number].send(datagram, address)
             except LinkError:
                 continue
 

@@ -1,8 +1,10 @@
 """Ground stations as the process sees them: links, key, parameter file, logs, and what the terminal is told."""
 
 import argparse
+from math import hypot
 from pathlib import Path
 from time import perf_counter, time
+from typing import Any
 
 from autopilot.copter import Copter
 from autopilot.ground_links import GroundLinks, open_links
@@ -174,22 +176,10 @@ class Ground:
 
     def _tell(self, now_s: float) -> None:
         pilot = self.copter.pilot
-        scene = pilot.scene()
         facts = self._links.facts(self.copter.stations, now_s - self._told_s)
         if self._status.as_json:
-            self._status.say(
-                "status",
-                "",
-                mode=pilot.state.mode,
-                armed=pilot.state.armed,
-                position_enu_m=scene.state.position_enu_m,
-                speed_m_s=sum(v * v for v in scene.state.velocity_enu_m_s) ** 0.5,
-                sim_time_s=scene.now_us * 1e-6,
-                times_real_time=(scene.now_us - self._told_us) * 1e-6 / (now_s - self._told_s),
-                solve_time_us=self.copter.solve_time_s * 1e6,
-                links=facts,
-            )
-        self._told_s, self._told_us = now_s, scene.now_us
+            self._status.say("status", "", **self._facts(now_s), links=facts)
+        self._told_s, self._told_us = now_s, pilot.scene().now_us
         for link in facts:
             for who in link["heard"]:
                 if f"{link['url']} {who}" not in self._heard:
@@ -198,6 +188,19 @@ class Ground:
         if self._signing.key_changed or now_s >= self._saved_s + _SAVE_EVERY_S:
             self._saved_s = now_s
             self._save_signing()
+
+    def _facts(self, now_s: float) -> dict[str, Any]:
+        pilot = self.copter.pilot
+        now_us, state = pilot.scene().now_us, pilot.scene().state
+        return {
+            "mode": pilot.state.mode,
+            "armed": pilot.state.armed,
+            "position_enu_m": state.position_enu_m,
+            "speed_m_s": hypot(*state.velocity_enu_m_s),
+            "sim_time_s": now_us * 1e-6,
+            "times_real_time": (now_us - self._told_us) * 1e-6 / (now_s - self._told_s),
+            "solve_time_us": self.copter.solve_time_s * 1e6,
+        }
 
 
 def open_ground(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status) -> Ground:
