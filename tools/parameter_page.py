@@ -1,4 +1,4 @@
-"""`python -m tools.parameter_page FOLDER`: writes `parameters.md`, the parameters of profile `flight`, from themselves."""
+"""`python -m tools.parameter_page FOLDER`: writes `parameters.md`, the parameters of profile `flight`."""
 
 import sys
 from collections.abc import Iterator
