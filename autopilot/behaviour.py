@@ -1,10 +1,12 @@
 """The numbers that a flight is flown by, apart from those of the control law: speeds, heights, times."""
 
 from dataclasses import dataclass
+from math import radians
 
 from autopilot.reference_chain import Limits
 
 _LIMITS = Limits()
+_STICK_YAW_RATE_RAD_S = radians(120.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +51,7 @@ class Behaviour:
     setpoints_lost_s: float = 1.0
     sticks_lost_s: float = 0.5
     largest_tilt_deg: float = 35.0
-    stick_yaw_rate_rad_s: float = 2.0
+    stick_yaw_rate_rad_s: float = _STICK_YAW_RATE_RAD_S
     stick_speed_m_s: float = 5.0
     track: str = "spiral"
     orbit_radius_m: float = 10.0

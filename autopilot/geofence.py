@@ -96,18 +96,20 @@ class Polygon:
     def __init__(self, vertices_m: Iterable[tuple[float, float]]) -> None:
         """Take the corners, east and north, m."""
         self._from: Array = np.array(list(vertices_m), dtype=float)
-        self._along = np.roll(self._from, -1, axis=0) - self._from
+        self._to = np.roll(self._from, -1, axis=0)
+        self._along = self._to - self._from
         squared = np.einsum("ij,ij->i", self._along, self._along)
         self._squared = np.where(squared > 0.0, squared, 1.0)
 
     def depth_m(self, east_m: float, north_m: float) -> float:
         """Return how far a point is inside, m; negative outside."""
-        to = np.array((east_m, north_m)) - self._from
+        to = np.array((east_m, north_m)) - self._from  # each edge's start to the point
         part = np.clip(np.einsum("ij,ij->i", to, self._along) / self._squared, 0.0, 1.0)
         away = to - part[:, None] * self._along
         nearest = float(np.sqrt(np.einsum("ij,ij->i", away, away).min()))
-        # An edge is crossed where just one of its ends is north of the point: a corner so counts once, not twice.
-        starts, ends = to[:, 1] >= 0.0, (to - self._along)[:, 1] >= 0.0
+        # An edge is crossed where just one of its ends is north of the point. Both edges of a corner compare the same
+        # two numbers, so that a ray through it crosses once or not at all, however they round.
+        starts, ends = self._from[:, 1] > north_m, self._to[:, 1] > north_m
         side = self._along[:, 0] * to[:, 1] - self._along[:, 1] * to[:, 0]
         crossed = (starts != ends) & ((side > 0.0) == (self._along[:, 1] > 0.0))
         return nearest if np.count_nonzero(crossed) % 2 else -nearest

@@ -122,12 +122,12 @@ class MissionExecutor:
         return ""
 
     def pause(self, *, item_flown: bool = False) -> tuple[MissionEvent, ...]:
-        """Stop flying it; `start` goes on with the current item, or after it if another flies that to its end."""
+        """Stop flying it; `start` goes on with the current item, or after it if it is a return that another flies."""
         if not self.active:
             return ()
         seq = self.progress.seq
         self._leave()
-        if not item_flown:
+        if not item_flown or self._items[seq].command != mav.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             self._show(seq, PAUSED)
             return ()
         self._advance()

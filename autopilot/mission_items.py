@@ -153,13 +153,15 @@ def check_item(item: MissionItem) -> int:
         return int(ACCEPTED if item.command in SKIPPED else mav.MAV_MISSION_UNSUPPORTED)
     if item.command == mav.MAV_CMD_DO_SET_HOME and item.p1 != 1.0:
         allowed = allowed._replace(place=True, height=True)
-    if item.frame not in GLOBAL_FRAMES and (allowed.place or item.frame != mav.MAV_FRAME_MISSION):
+    here = allowed.here and is_here(item)
+    placeless = not allowed.height and (here or not allowed.place)
+    if item.frame not in GLOBAL_FRAMES and not (placeless and item.frame == mav.MAV_FRAME_MISSION):
         return int(mav.MAV_MISSION_UNSUPPORTED_FRAME)
     checks = (allowed.p1, allowed.p2, allowed.p3, allowed.p4)
     for index, (check, value) in enumerate(zip(checks, (item.p1, item.p2, item.p3, item.p4), strict=True)):
         if not check(value):
             return int(mav.MAV_MISSION_INVALID_PARAM1) + index
-    if allowed.place and not (allowed.here and is_here(item)):
+    if allowed.place and not here:
         result = check_place(item)
         if result != ACCEPTED:
             return result

@@ -10,7 +10,7 @@ With e = reference - target, each step of the cascade asks the next for
 and bounds what it adds to the target's own motion. A target that is reached is followed exactly, whatever it does.
 """
 
-from math import floor, pi, sqrt
+from math import floor, pi, radians, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -48,8 +48,8 @@ class Limits(NamedTuple):
     acceleration_m_s2: float = 3.0
     lift_m_s2: float = 3.0
     jerk_m_s3: float = 12.0
-    yaw_rate_rad_s: float = 1.05
-    yaw_acceleration_rad_s2: float = 3.0
+    yaw_rate_rad_s: float = radians(60.0)
+    yaw_acceleration_rad_s2: float = radians(180.0)
 
 
 @compiled

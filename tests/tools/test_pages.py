@@ -1,0 +1,11 @@
+"""Pages that are written from the code say what the code says."""
+
+from pathlib import Path
+
+from tools import parameter_page
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_the_page_of_parameters_is_current() -> None:
+    assert (DOCS / "parameters.md").read_text() == parameter_page.page()
