@@ -1,8 +1,8 @@
 """The reference that leads the vehicle from wherever it is to whatever it shall do: smooth, within limits.
 
 The chain of integrators of `reference_chain` follows a target that may itself move; once on it, the target itself is
-the reference, to the last bit. An axis may have no target position, or neither position nor velocity: then the chain
-begins where the target does.
+the reference, to the last bit, until it jumps. An axis may have no target position, or neither position nor velocity:
+then the chain begins where the target does.
 """
 
 from collections.abc import Sequence
@@ -36,12 +36,10 @@ class Reference(NamedTuple):
     Attributes:
         motion: Position, velocity, acceleration, jerk, ENU, (4, 3).
         heading: Yaw, rad, unwrapped, and its rate, (2,).
-        on_target: Whether it is the target itself that is followed, to the last bit.
     """
 
     motion: Array
     heading: Array
-    on_target: bool = False
 
 
 class Target(NamedTuple):
@@ -99,7 +97,7 @@ def lead(reference: Reference, target: Target, limits: Limits, interval_s: float
         limits: Of the approach.
         interval_s: Between two instants.
     """
-    if reference.on_target or _reached(reference, target):
+    if _is_on(reference, target):
         return _on_target(reference, target)
     count = len(target.motion)
     motion, heading = np.empty((count, 5, 3)), np.empty((count, 3))
@@ -126,7 +124,7 @@ def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference
     if turns:
         heading = heading.copy()
         heading[:, 0] += 2.0 * pi * turns
-    after = Reference(target.motion[1, :4].copy(), heading[1, :2].copy(), on_target=True)
+    after = Reference(target.motion[1, :4].copy(), heading[1, :2].copy())
     return _horizon(target.motion, heading), after
 
 
@@ -136,7 +134,8 @@ def _horizon(motion: Array, heading: Array) -> Horizon:
     return Horizon(p, v, a, j, s, yaw, rate, acceleration)
 
 
-def _reached(reference: Reference, target: Target) -> bool:
+def _is_on(reference: Reference, target: Target) -> bool:
+    """Whether the reference has reached the target, or still is on it: a target may jump, a reference may not."""
     if not target.turns or target.kinds != ALL_BOUND:
         return False
     yaw = nearest_turn(float(target.heading[0, 0]), float(reference.heading[0]))
