@@ -88,8 +88,7 @@ class Logs:
         if message.name == "LOG_ERASE":
             self._erase()
         elif message.name == "LOG_REQUEST_END":
-            self._listings.pop(peer, None)
-            self._transfers = deque(transfer for transfer in self._transfers if transfer.peer != peer)
+            self._stop(peer)
         return ()
 
     def poll(self, now_us: int) -> Iterable[Send]:
@@ -139,7 +138,7 @@ class Logs:
         if len(self._shown) >= MOST_PEERS:
             forgotten = next(iter(self._shown))
             del self._shown[forgotten]
-            self._listings.pop(forgotten, None)
+            self._stop(forgotten)
         self._shown[peer] = logs[-LAST_ID:]
         return self._shown[peer]
 
@@ -158,6 +157,10 @@ class Logs:
         if not asked_again and len(of_peer) < MOST_TRANSFERS_OF_A_PEER:
             self._transfers.append(transfer)
         return ()
+
+    def _stop(self, peer: Peer) -> None:
+        self._listings.pop(peer, None)
+        self._transfers = deque(transfer for transfer in self._transfers if transfer.peer != peer)
 
     def _erase(self) -> None:
         found = self._files.list(self._folder)
