@@ -332,7 +332,10 @@ def test_entries_have_times_where_they_are_asked_for(client: Client) -> None:
 
 
 def test_a_name_that_cannot_be_told_is_skipped(client: Client, memory: Memory) -> None:
-    memory.create(("y" * 255,))
+    longest = DATA_BYTES - len(b"F\t0\0")
+    memory.create(("x" * longest,))
+    assert client.listed(b"/")[-1] == b"F%s\t0" % (b"x" * longest)
+    memory.create(("y" * (longest + 1),))
     assert client.listed(b"/")[-1] == b"S"
     memory.create(("z",))
     assert client.listed(b"/")[-2:] == [b"S", b"Fz\t0"]
@@ -386,6 +389,13 @@ def test_a_repeated_request_gets_the_remembered_answer(
     client.now_us += ftp.REMEMBERED_FOR_US + 1
     client.sequence -= 1
     assert client.send(opcode, data)[0].opcode == Opcode.NAK
+
+
+def test_a_refusal_is_not_remembered(client: Client, memory: Memory) -> None:
+    """Nothing was done, so that it may well be done when it is asked for again."""
+    assert client.ask(Opcode.REMOVE, b"new").error == Error.NOT_FOUND
+    memory.create(("new",))
+    assert client.send(Opcode.REMOVE, b"new")[0].opcode == Opcode.ACK
 
 
 def test_a_file_is_not_emptied_by_a_repeated_request(client: Client, memory: Memory) -> None:
@@ -456,6 +466,7 @@ def test_an_idle_session_ends(client: Client) -> None:
 def test_a_session_that_its_client_lost_is_taken_over_but_not_one_in_use(client: Client) -> None:
     client.do(Opcode.OPEN_TO_READ, b"text")
     client.do(Opcode.OPEN_TO_READ, b"text")  # the answer was lost, and MAVSDK asks with another number
+    assert client.ask(Opcode.OPEN_TO_READ, b"@PARAM/param.pck").error == Error.NO_SESSIONS
     assert client.ask(Opcode.CREATE, b"new").error == Error.NO_SESSIONS
     assert b"Fnew\t0" not in client.listed(b"/")
     assert client.do(Opcode.READ, size=3) == TEXT[:3]
