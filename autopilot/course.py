@@ -1,10 +1,10 @@
 """What a course is: it sees the scene, sample after sample, and asks for a motion, or for an attitude and a thrust."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 from autopilot.behaviour import Behaviour
-from autopilot.controller import AttitudeDemand, VehicleState
-from autopilot.reference import Kind, Reference, Target
+from autopilot.controller import AttitudeDemand, Horizon, VehicleState
+from autopilot.reference import Kind, Reference, Target, target_of
 from autopilot.reference_chain import Limits
 from mavlink.frames import Vector
 from mavlink.setpoints import OffboardSetpoint, Sticks, TargetState
@@ -82,6 +82,23 @@ class Motion(NamedTuple):
     limits: Limits
 
 
+class Planned(NamedTuple):
+    """A course along a plan.
+
+    Attributes:
+        horizon: What the reference is to become.
+        limits: How fast, until it is that.
+    """
+
+    horizon: Horizon
+    limits: Limits
+
+    @property
+    def target(self) -> Target:
+        """The plan as a target."""
+        return target_of(self.horizon)
+
+
 class Lean(NamedTuple):
     """A course by attitude and thrust.
 
@@ -98,10 +115,13 @@ class Lean(NamedTuple):
     sinks: bool
 
 
+Asked: TypeAlias = Motion | Planned | Lean
+
+
 class Course(Protocol):
     """A way to fly."""
 
-    def ask(self, scene: Scene) -> Motion | Lean:
+    def ask(self, scene: Scene) -> Asked:
         """Return what is to be flown from now on. Called once a control sample."""
         ...
 

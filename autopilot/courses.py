@@ -4,10 +4,10 @@ from collections.abc import Callable
 from math import atan2, dist, hypot
 from typing import TypeAlias
 
-from autopilot.course import Course, Endless, Lean, Motion, Scene
+from autopilot.course import Asked, Course, Endless, Motion, Planned, Scene
 from autopilot.orders import GoTo, Land
 from autopilot.planner import Planner
-from autopilot.reference import Kind, still_target, target_of
+from autopilot.reference import Kind, still_target
 from mavlink.frames import Vector
 
 Leg: TypeAlias = Callable[[Scene], Course]
@@ -127,7 +127,7 @@ class Legs:
         self._ahead = [first, *others]
         self._course: Course | None = None
 
-    def ask(self, scene: Scene) -> Motion | Lean:
+    def ask(self, scene: Scene) -> Asked:
         """Return what the leg that is flown now asks for."""
         if self._course is None or (self._ahead and self._course.arrived(scene)):
             self._course = self._ahead.pop(0)(scene)
@@ -147,9 +147,9 @@ class Along:
         self._duration_s = duration_s
         self._began_us = began_us
 
-    def ask(self, scene: Scene) -> Motion:
+    def ask(self, scene: Scene) -> Planned:
         """Return the track."""
-        return Motion(target_of(self._planner.horizon(scene.now_us - self._began_us)), scene.behaviour.limits)
+        return Planned(self._planner.horizon(scene.now_us - self._began_us), scene.behaviour.limits)
 
     def arrived(self, scene: Scene) -> bool:
         """Whether the track has ended."""

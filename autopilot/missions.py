@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from autopilot.circling import Round
 from autopilot.commands import Commands
-from autopilot.course import Course, Lean, Motion, Scene
+from autopilot.course import Asked, Course, Scene
 from autopilot.courses import Climb, Stop, Way, homeward, landing
 from autopilot.geofence import Geofence, check_fence, check_fence_item
 from autopilot.mission import MissionExecutor, Reached, SetHome
@@ -126,7 +126,7 @@ class MissionCourse:
         self._course: Course = Stop()
         self._done = False
 
-    def ask(self, scene: Scene) -> Motion | Lean:
+    def ask(self, scene: Scene) -> Asked:
         """Return what the order of now asks for."""
         arrived = self._course.arrived(scene)
         turns = self._course.turns if isinstance(self._course, Round) else 0.0

@@ -7,11 +7,11 @@ from typing import NamedTuple, TypeAlias
 from autopilot.arming import Facts, refusals
 from autopilot.behaviour import Behaviour
 from autopilot.controller import AttitudeDemand, Horizon, Preview, VehicleState
-from autopilot.course import NOT_STEERED, Course, Lean, Motion, Scene, Steered, lifts
+from autopilot.course import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
 from autopilot.courses import Stop
 from autopilot.landing import Landing, is_below, lies_still, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
-from autopilot.reference import Reference, at_rest, lead, moving_with
+from autopilot.reference import Reference, at_rest, lead, lead_along, moving_with
 from mavlink.frames import Vector
 from mavlink.services.statustext import INFO, NOTICE, WARNING
 
@@ -108,20 +108,19 @@ class Pilot:
             self._begin_flight()
         self._engage(self.state.mode)
 
-    def sense(
-        self, now_us: int, vehicle: VehicleState, facts: Facts, missing: Sequence[Need], steered: Steered = NOT_STEERED
-    ) -> None:
-        """Take in what is known at a control sample.
+    def sense(self, now_us: int, vehicle: VehicleState, steered: Steered = NOT_STEERED) -> None:
+        """Take in what a control sample needs.
 
         Args:
             now_us: Simulated time.
             vehicle: The vehicle.
-            facts: What arming looks at.
-            missing: Needs of modes that nothing meets.
             steered: What clients ask for.
         """
-        self._now_us, self._vehicle, self._facts, self._missing = now_us, vehicle, facts, tuple(missing)
-        self._steered = steered
+        self._now_us, self._vehicle, self._steered = now_us, vehicle, steered
+
+    def take_stock(self, facts: Facts, missing: Sequence[Need]) -> None:
+        """Take in what orders are judged by: what arming looks at, and needs of modes that nothing meets."""
+        self._facts, self._missing = facts, tuple(missing)
 
     def scene(self) -> Scene:
         """Return what a course sees now."""
@@ -210,11 +209,10 @@ class Pilot:
             return RESTS
         scene = self.scene()
         asked = self.course.ask(scene)
-        lifting = asked.lifts if isinstance(asked, Lean) else lifts(asked.target, scene.state)
-        if self.standing and not lifting:
-            self._idle()
-            return RESTS
         if self.standing:
+            if not (asked.lifts if isinstance(asked, Lean) else lifts(asked.target, scene.state)):
+                self._idle()
+                return RESTS
             self._begin_flight()
         begins, self._idles = self._idles, False
         guidance = self._lean(asked, begins) if isinstance(asked, Lean) else self._move(scene, asked, begins)
@@ -231,8 +229,12 @@ class Pilot:
         """Add a line for the ground station."""
         self._said.append(Said(severity, text))
 
-    def _move(self, scene: Scene, asked: Motion, begins: bool) -> Guidance:
-        horizon, self.reference = lead(scene.reference, asked.target, asked.limits, scene.interval_s)
+    def _move(self, scene: Scene, asked: Motion | Planned, begins: bool) -> Guidance:
+        reference, limits, interval_s = scene.reference, asked.limits, scene.interval_s
+        if isinstance(asked, Planned):
+            horizon, self.reference = lead_along(reference, asked.horizon, limits, interval_s)
+        else:
+            horizon, self.reference = lead(reference, asked.target, limits, interval_s)
         self._watch_ground(scene.state, sinks=is_below(scene.reference, scene.state))
         return Guidance(horizon=horizon, begins=begins)
 

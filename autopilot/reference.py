@@ -17,6 +17,8 @@ from autopilot.reference_chain import Limits, advance
 from mavlink.frames import nearest_turn
 
 _REACHED = 1e-7
+_IN_ITS_SCALE = np.array([[1.0], [1.0], [1.0], [1e-2]])
+"""Jerk is the last of the chain to settle, and the largest number of it."""
 
 
 class Kind(IntEnum):
@@ -97,7 +99,7 @@ def lead(reference: Reference, target: Target, limits: Limits, interval_s: float
         limits: Of the approach.
         interval_s: Between two instants.
     """
-    if _is_on(reference, target):
+    if target.turns and target.kinds == ALL_BOUND and _is_at(reference, target.motion[0, :4], target.heading[0]):
         return _on_target(reference, target)
     count = len(target.motion)
     motion, heading = np.empty((count, 5, 3)), np.empty((count, 3))
@@ -128,20 +130,29 @@ def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference
     return _horizon(target.motion, heading), after
 
 
+def lead_along(reference: Reference, plan: Horizon, limits: Limits, interval_s: float) -> tuple[Horizon, Reference]:
+    """Do the same for a plan, without the arrays of a target once it is reached: tracks are in a hurry every sample."""
+    if not _is_at(reference, _motion_at(plan, 0), (plan.yaw_rad[0], plan.yaw_rate_rad_s[0])):
+        return lead(reference, target_of(plan), limits, interval_s)
+    turns = round(float(reference.heading[0] - plan.yaw_rad[0]) / (2.0 * pi))
+    if turns:
+        plan = plan._replace(yaw_rad=plan.yaw_rad + 2.0 * pi * turns)
+    return plan, Reference(_motion_at(plan, 1), np.array([plan.yaw_rad[1], plan.yaw_rate_rad_s[1]]))
+
+
+def _motion_at(plan: Horizon, sample: int) -> Array:
+    return np.array([column[sample] for column in plan[:4]])
+
+
 def _horizon(motion: Array, heading: Array) -> Horizon:
     p, v, a, j, s = (np.ascontiguousarray(motion[:, order]) for order in range(5))
     yaw, rate, acceleration = (np.ascontiguousarray(heading[:, order]) for order in range(3))
     return Horizon(p, v, a, j, s, yaw, rate, acceleration)
 
 
-def _is_on(reference: Reference, target: Target) -> bool:
-    """Whether the reference has reached the target, or still is on it: a target may jump, a reference may not."""
-    if not target.turns or target.kinds != ALL_BOUND:
+def _is_at(reference: Reference, motion: Array, heading: Sequence[float] | Array) -> bool:
+    """Whether the reference has reached a target, or still is on it: a target may jump, a reference may not."""
+    yaw = nearest_turn(float(heading[0]), float(reference.heading[0]))
+    if max(abs(float(reference.heading[0]) - yaw), abs(float(reference.heading[1]) - heading[1])) >= _REACHED:
         return False
-    yaw = nearest_turn(float(target.heading[0, 0]), float(reference.heading[0]))
-    away = max(
-        float(np.abs(reference.motion[:3] - target.motion[0, :3]).max()),
-        float(np.abs(reference.motion[3] - target.motion[0, 3]).max()) * 1e-2,
-    )
-    turned = max(abs(float(reference.heading[0]) - yaw), abs(float(reference.heading[1] - target.heading[0, 1])))
-    return max(away, turned) < _REACHED
+    return bool((np.abs(reference.motion - motion) * _IN_ITS_SCALE).max() < _REACHED)

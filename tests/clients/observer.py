@@ -1,0 +1,194 @@
+"""Sees what a vehicle really does, on a link of its own: clients are judged by this, not by what they say."""
+
+import socket
+from collections.abc import Callable
+from select import select
+from threading import Condition, Event, Thread
+from time import monotonic
+from typing import Any, NamedTuple, Self
+
+from autopilot.modes import Mode, mode_of_custom
+from mavlink.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Codec, mav
+from mavlink.frames import Vector, euler_from_quaternion, frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
+
+ON_GROUND: int = mav.MAV_LANDED_STATE_ON_GROUND
+GIVE_UP_AFTER_S = 60.0
+
+_SYSTEM_ID = 240
+_LOOK_EVERY_S = 0.05
+_INTERVALS_US = {
+    "LOCAL_POSITION_NED": 50_000,
+    "ATTITUDE_QUATERNION": 50_000,
+    "EXTENDED_SYS_STATE": 100_000,
+}
+_NEEDED = {"HEARTBEAT", "ATTITUDE_QUATERNION", "EXTENDED_SYS_STATE"}
+
+
+class Sight(NamedTuple):
+    """The vehicle at an instant.
+
+    Attributes:
+        time_s: Simulated time.
+        position_enu_m: From the origin.
+        velocity_enu_m_s: Of it.
+        euler_rad: Roll, pitch, yaw; FLU to ENU.
+        rate_flu_rad_s: Body rates.
+        mode: The flight mode.
+        armed: Whether the rotors may turn.
+        landed: MAV_LANDED_STATE.
+    """
+
+    time_s: float
+    position_enu_m: Vector
+    velocity_enu_m_s: Vector
+    euler_rad: Vector
+    rate_flu_rad_s: Vector
+    mode: Mode | None
+    armed: bool
+    landed: int
+
+    @property
+    def height_m(self) -> float:
+        """Above the origin."""
+        return self.position_enu_m[2]
+
+    @property
+    def flying(self) -> bool:
+        """Whether it is off the ground."""
+        return self.landed not in (ON_GROUND, mav.MAV_LANDED_STATE_UNDEFINED)
+
+
+class Observer:
+    """Records what a vehicle sends to a port of this computer.
+
+    Attributes:
+        url: The link that the vehicle is to serve.
+    """
+
+    def __init__(self, port: int = 0) -> None:
+        """Listen on `port`; 0: any that is free."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4_000_000)
+        self._socket.bind(("127.0.0.1", port))
+        self.url = f"udpout:127.0.0.1:{self._socket.getsockname()[1]}"
+        self._codec = Codec(_SYSTEM_ID, mav.MAV_COMP_ID_MISSIONPLANNER)
+        self._vehicle: tuple[str, int] | None = None
+        self._system_id = 0
+        self._has_asked = False
+        self._latest: dict[str, Any] = {}
+        self._sights: list[Sight] = []
+        self._texts: list[str] = []
+        self._news = Condition()
+        self._ended = Event()
+        self._thread = Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> Self:
+        """Begin."""
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End."""
+        self._ended.set()
+        self._thread.join()
+        self._socket.close()
+
+    @property
+    def sights(self) -> list[Sight]:
+        """What was seen so far, about 20 times a simulated second."""
+        with self._news:
+            return list(self._sights)
+
+    @property
+    def texts(self) -> list[str]:
+        """The STATUSTEXT lines so far."""
+        with self._news:
+            return list(self._texts)
+
+    @property
+    def now(self) -> Sight:
+        """The vehicle as it was seen last."""
+        with self._news:
+            return self._sights[-1]
+
+    def modes(self) -> list[Mode]:
+        """Return the modes that were flown armed, each once in a row."""
+        modes = [sight.mode for sight in self.sights if sight.armed and sight.mode]
+        return [mode for before, mode in zip([None, *modes], modes, strict=False) if mode is not before]
+
+    def in_mode(self, mode: Mode) -> list[Sight]:
+        """Return what was seen in a mode, in flight."""
+        return [sight for sight in self.sights if sight.mode is mode and sight.armed and sight.flying]
+
+    def wait(self, condition: Callable[[Sight], bool], what: str, within_s: float = GIVE_UP_AFTER_S) -> Sight:
+        """Return the first sight from now on that meets `condition`.
+
+        Args:
+            condition: To be met.
+            what: It, in words.
+            within_s: Wall-clock bound for what hangs.
+
+        Raises:
+            AssertionError: In vain.
+        """
+        with self._news:
+            seen = len(self._sights) - 1
+            give_up_s = monotonic() + within_s
+            while True:
+                for sight in self._sights[max(seen, 0) :]:
+                    if condition(sight):
+                        return sight
+                seen = len(self._sights)
+                left_s = give_up_s - monotonic()
+                last = self._sights[-1] if self._sights else None
+                assert left_s > 0.0, f"waited in vain for {what}; {last}; {self._texts}"
+                self._news.wait(left_s)
+
+    def _run(self) -> None:
+        while not self._ended.is_set():
+            if not select([self._socket], [], [], _LOOK_EVERY_S)[0]:
+                continue
+            datagram, self._vehicle = self._socket.recvfrom(4096)
+            for message in self._codec.decode(datagram):
+                if message.source[1] == AUTOPILOT_COMPONENT:
+                    self._system_id = message.source[0]
+                    self._take(message.name, message.fields)
+
+    def _take(self, name: str, fields: Any) -> None:
+        self._latest[name] = fields
+        if name == "HEARTBEAT" and not self._has_asked:
+            self._ask()
+        elif name == "STATUSTEXT":
+            with self._news:
+                self._texts.append(fields.text)
+                self._news.notify_all()
+        elif name == "LOCAL_POSITION_NED" and self._latest.keys() >= _NEEDED:
+            with self._news:
+                self._sights.append(self._sight())
+                self._news.notify_all()
+
+    def _ask(self) -> None:
+        """Ask for the rates at which to see, once: loopback loses nothing."""
+        assert self._vehicle is not None, "it has just been heard"
+        self._has_asked = True
+        for name, interval_us in _INTERVALS_US.items():
+            number = getattr(mav, f"MAVLINK_MSG_ID_{name}")
+            fields = (
+                *(self._system_id, AUTOPILOT_COMPONENT, mav.MAV_CMD_SET_MESSAGE_INTERVAL, 0),
+                *(number, interval_us, 0, 0, 0, 0, 0),
+            )
+            self._socket.sendto(self._codec.encode("COMMAND_LONG", *fields), self._vehicle)
+
+    def _sight(self) -> Sight:
+        where, heartbeat = self._latest["LOCAL_POSITION_NED"], self._latest["HEARTBEAT"]
+        attitude = self._latest["ATTITUDE_QUATERNION"]
+        return Sight(
+            where.time_boot_ms * 1e-3,
+            ned_from_enu((where.x, where.y, where.z)),
+            ned_from_enu((where.vx, where.vy, where.vz)),
+            euler_from_quaternion(ned_frd_from_enu_flu((attitude.q1, attitude.q2, attitude.q3, attitude.q4))),
+            frd_from_flu((attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed)),
+            mode_of_custom(heartbeat.custom_mode),
+            bool(heartbeat.base_mode & MODE_ARMED),
+            self._latest["EXTENDED_SYS_STATE"].landed_state,
+        )
