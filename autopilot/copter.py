@@ -60,6 +60,7 @@ class Copter:
         pilot: Decides what is flown.
         parameters: All numbers that can be changed.
         stations: What ground stations see and say.
+        power: The battery, as far as the autopilot knows.
         solve_time_s: Of the last QP.
     """
 
@@ -105,7 +106,7 @@ class Copter:
         self._attitude = AttitudeReference(believed, self._loop.preview) if self._loop.takes_attitude else None
         self.pilot = Pilot(self._loop.preview, behaviour(self.parameters), self._course)
         self.stations = Stations(settings, self.pilot, self.parameters)
-        self._power = PowerMeter(believed)
+        self.power = PowerMeter(believed)
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
         self._time_us: int | None = None
@@ -194,7 +195,7 @@ class Copter:
         missing = tuple(need for need, there in met.items() if not there)
         thrust = sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None
         outside = stations.missions.fence_refusal(state.position_enu_m) if stations.missions.has_fence else ""
-        facts = Facts(state, pilot.standing, self._power.left, thrust, outside)
+        facts = Facts(state, pilot.standing, self.power.left, thrust, outside)
         pilot.take_stock(facts, missing)
 
     def _decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
@@ -218,7 +219,7 @@ class Copter:
         idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
         least = idle if pilot.state.armed else 0.0
         c1, c2, c3, c4 = (max(control, least) for control in self._controls)
-        self._power.run((c1, c2, c3, c4), self._interval_s)
+        self.power.run((c1, c2, c3, c4), self._interval_s)
         stations.missions.watch_mode(pilot.state.mode)
         stations.update(
             self._photographer.take(
@@ -229,7 +230,7 @@ class Copter:
                 decision,
                 self._step_time_s,
                 (c1, c2, c3, c4),
-                self._power,
+                self.power,
                 stations,
             )
         )
