@@ -77,6 +77,13 @@ def test_groups_of_inclusions() -> None:
     assert not either.inside((10.0, 0.0, 0.0))
 
 
+def test_a_circle_of_no_radius_is_none() -> None:
+    """MAVSDK cannot send a polygon alone: who wants no circle sends this one."""
+    assert check([item(DISC_IN, 0.0, 0.0, 0.0)]) == ACCEPTED
+    around = fence(*polygon(IN, SQUARE), item(DISC_IN, 1e4, 1e4, 0.0), item(DISC_OUT, 0.0, 0.0, 0.0))
+    assert around.margin_m((-5.0, 0.0, 0.0)) == pytest.approx(5.0, abs=0.02)
+
+
 def test_where_to_return() -> None:
     assert fence(item(BACK, 3.0, -4.0)).return_point_enu_m == pytest.approx((3.0, -4.0), abs=0.02)
     assert fence().return_point_enu_m is None
@@ -141,7 +148,7 @@ def test_nothing_closer_than_the_margin_changes_sides(east: float, north: float,
         ({"p1": 3.5}, mav.MAV_MISSION_INVALID_PARAM1),
         ({"p1": nan}, mav.MAV_MISSION_INVALID_PARAM1),
         ({"p1": inf}, mav.MAV_MISSION_INVALID_PARAM1),
-        ({"command": DISC_IN, "p1": 0.0}, mav.MAV_MISSION_INVALID_PARAM1),
+        ({"command": DISC_IN, "p1": -1.0}, mav.MAV_MISSION_INVALID_PARAM1),
         ({"command": DISC_OUT, "p1": nan}, mav.MAV_MISSION_INVALID_PARAM1),
         ({"p2": inf}, mav.MAV_MISSION_INVALID_PARAM2),
         ({"x": 900000001}, mav.MAV_MISSION_INVALID_PARAM5_X),
