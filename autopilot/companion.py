@@ -3,12 +3,12 @@
 from math import isnan
 
 import numpy as np
-from mavlink.setpoints import AttitudeSetpoint, PositionSetpoint
 
 from autopilot.attitude_reference import AttitudeReference
 from autopilot.courses import Lean, Motion, Scene, Stop
 from autopilot.leaning import Leaning
 from autopilot.reference import Kind, Target, still_target
+from mavlink.setpoints import AttitudeSetpoint, PositionSetpoint
 
 
 class Companion:

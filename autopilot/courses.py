@@ -4,7 +4,6 @@ from math import atan2, copysign, cos, hypot, pi, sin, sqrt
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from mavlink.setpoints import OffboardSetpoint, Sticks, TargetState
 
 from autopilot.behaviour import Behaviour
 from autopilot.controller import AttitudeDemand, VehicleState
@@ -14,6 +13,7 @@ from autopilot.reference import ALL_BOUND, Kind, Reference, Target, still_target
 from autopilot.reference_chain import Limits
 from mavlink.dialect import mav
 from mavlink.frames import Vector
+from mavlink.setpoints import OffboardSetpoint, Sticks, TargetState
 
 _ALONG_BEYOND_M = 1.0
 """A way shorter than this does not turn the vehicle."""

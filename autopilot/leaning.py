@@ -3,12 +3,12 @@
 from math import cos, radians
 
 import numpy as np
-from mavlink.setpoints import AttitudeSetpoint, Sticks
 
 from autopilot.attitude_reference import AttitudeReference, ReferenceMemory, Wish, lean
 from autopilot.courses import Lean, Motion, Scene, Stop, lifts
 from autopilot.reference import Kind, Reference, lead, moving_with, still_target
 from autopilot.sticks import dead, stick_velocity, stick_yaw_rate
+from mavlink.setpoints import AttitudeSetpoint, Sticks
 
 _LIFTING, _SINKING = 0.9, 0.5
 """Thrust in parts of the weight from which on a vehicle takes off, and below which it must sink."""

@@ -1,10 +1,9 @@
 """Sticks to velocity, for a pilot who flies by place."""
 
-from mavlink.setpoints import Sticks, turned
-
 from autopilot.courses import Motion, Scene
 from autopilot.reference import Kind, Target, still_target
 from mavlink.frames import Vector
+from mavlink.setpoints import Sticks, turned
 
 _DEADZONE = 0.05
 _SLOW_M_S, _SLOW_RAD_S = 0.1, 0.05
