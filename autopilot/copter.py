@@ -110,6 +110,8 @@ class Copter:
         self._planners: dict[str, Planner] = {}
         self._time_us: int | None = None
         self._controls = _STILL
+        self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
+        self._step_time_s = 0.0
         self.solve_time_s = 0.0
 
     def step(self, frame: StateFrame) -> Step:
@@ -128,16 +130,19 @@ class Copter:
             self._sense(frame.time_us, state)
             guidance = self.pilot.step()
             decision = self._decide(frame.time_us, state, guidance)
-            duration_s = self._clock() - started_s
-            self._report(frame.time_us, state, guidance, decision, duration_s)
+            self._sample = (frame.time_us, state, guidance, decision)
         command = ActuatorCommand(frame.time_us, self._controls, armed=self.pilot.state.armed)
-        return Step(command, decision, duration_s if decision else self._clock() - started_s)
+        self._step_time_s = self._clock() - started_s
+        return Step(command, decision, self._step_time_s)
 
     def serve(self, inbox: Sequence[Received]) -> list[Outgoing]:
-        """Hear ground stations, and return what to send them; after `step`, while the plant integrates."""
+        """Hear ground stations, and return what to send them; after each `step`, while the plant integrates."""
         now_us = self._time_us
         if now_us is None:
             return []
+        if self._sample is not None:
+            sample, self._sample = self._sample, None
+            self._report(*sample)
         hub = self.stations.hub
         for datagram, link, address, loopback in inbox:
             hub.receive(datagram, link, address, now_us, loopback=loopback)
@@ -161,11 +166,22 @@ class Copter:
         return float(self._planner_of(self._first).horizon(0).yaw_rad[0]) if self._first else 0.0
 
     def _sense(self, now_us: int, state: VehicleState) -> None:
+        """Take in what steers the vehicle, and what has ceased to."""
         pilot, stations = self.pilot, self.stations
         behaviour = pilot.behaviour
         sticks = stations.manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6))
         setpoint = stations.offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6))
-        leader = stations.follow.latest(now_us, _LEADER_LOST_US)
+        pilot.sense(now_us, state, Steered(sticks, setpoint, stations.follow.latest(now_us, _LEADER_LOST_US)))
+        if pilot.state.armed:
+            if pilot.state.mode is Mode.OFFBOARD and setpoint is None:
+                pilot.happened(Event.SETPOINTS_LOST)
+            elif pilot.state.mode in MANUAL and sticks is None:
+                pilot.happened(Event.STICKS_LOST)
+
+    def _take_stock(self, state: VehicleState) -> None:
+        """Take in what orders of ground stations are judged by."""
+        pilot, stations = self.pilot, self.stations
+        sticks, setpoint, _ = pilot.scene().steered
         met = {
             Need.ATTITUDE_CONTROL: self._attitude is not None,
             Need.STICKS: sticks is not None,
@@ -178,12 +194,7 @@ class Copter:
         thrust = sticks.thrust if sticks is not None and pilot.state.mode is Mode.STABILIZED else None
         outside = stations.missions.fence_refusal(state.position_enu_m) if stations.missions.has_fence else ""
         facts = Facts(state, pilot.standing, self._power.left, thrust, outside)
-        pilot.sense(now_us, state, facts, missing, Steered(sticks, setpoint, leader))
-        if pilot.state.armed:
-            if pilot.state.mode is Mode.OFFBOARD and setpoint is None:
-                pilot.happened(Event.SETPOINTS_LOST)
-            elif pilot.state.mode in MANUAL and sticks is None:
-                pilot.happened(Event.STICKS_LOST)
+        pilot.take_stock(facts, missing)
 
     def _decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         loop = self._loop
@@ -200,10 +211,9 @@ class Copter:
         self.solve_time_s = decision.diagnostics.solve_time_s
         return decision
 
-    def _report(
-        self, now_us: int, state: VehicleState, guidance: Guidance, decision: Decision | None, duration_s: float
-    ) -> None:
+    def _report(self, now_us: int, state: VehicleState, guidance: Guidance, decision: Decision | None) -> None:
         pilot, stations = self.pilot, self.stations
+        self._take_stock(state)
         idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
         least = idle if pilot.state.armed else 0.0
         c1, c2, c3, c4 = (max(control, least) for control in self._controls)
@@ -216,7 +226,7 @@ class Copter:
                 pilot,
                 guidance,
                 decision,
-                duration_s,
+                self._step_time_s,
                 (c1, c2, c3, c4),
                 self._power,
                 stations,

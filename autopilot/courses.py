@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from autopilot.behaviour import Behaviour
-from autopilot.controller import AttitudeDemand, VehicleState
+from autopilot.controller import AttitudeDemand, Horizon, VehicleState
 from autopilot.orders import Circle, GoTo, Land
 from autopilot.planner import Planner
 from autopilot.reference import ALL_BOUND, Kind, Reference, Target, still_target, target_of
@@ -87,6 +87,23 @@ class Motion(NamedTuple):
     limits: Limits
 
 
+class Planned(NamedTuple):
+    """A course along a plan.
+
+    Attributes:
+        horizon: What the reference is to become.
+        limits: How fast, until it is that.
+    """
+
+    horizon: Horizon
+    limits: Limits
+
+    @property
+    def target(self) -> Target:
+        """The plan as a target."""
+        return target_of(self.horizon)
+
+
 class Lean(NamedTuple):
     """A course by attitude and thrust.
 
@@ -106,7 +123,7 @@ class Lean(NamedTuple):
 class Course(Protocol):
     """A way to fly."""
 
-    def ask(self, scene: Scene) -> Motion | Lean:
+    def ask(self, scene: Scene) -> Motion | Planned | Lean:
         """Return what is to be flown from now on. Called once a control sample."""
         ...
 
@@ -241,7 +258,7 @@ class Homeward:
         self._home = (home[0], home[1], height_m)
         self._far = far
 
-    def ask(self, scene: Scene) -> Motion | Lean:
+    def ask(self, scene: Scene) -> Motion | Planned | Lean:
         """Return the target of the leg that is flown now."""
         while not self._legs or self._legs[0].arrived(scene):
             self._legs = [self._next_leg(scene)]
@@ -326,13 +343,13 @@ class OnTrack:
         self._way = Way(GoTo((x, y, z), float(first.yaw_rad[0])), scene)
         self._began_us = 0 if at_once else None
 
-    def ask(self, scene: Scene) -> Motion:
+    def ask(self, scene: Scene) -> Motion | Planned:
         """Return the way to its first point, then the track."""
         if self._began_us is None:
             if not self._way.arrived(scene):
                 return self._way.ask(scene)
             self._began_us = scene.now_us
-        return Motion(target_of(self._planner.horizon(scene.now_us - self._began_us)), scene.behaviour.limits)
+        return Planned(self._planner.horizon(scene.now_us - self._began_us), scene.behaviour.limits)
 
     def arrived(self, scene: Scene) -> bool:
         """Whether the track has ended."""

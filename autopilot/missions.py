@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from autopilot.commands import Commands
-from autopilot.courses import Climb, Course, Homeward, Lean, Motion, Round, Scene, Sink, Stop, Way
+from autopilot.courses import Climb, Course, Homeward, Lean, Motion, Planned, Round, Scene, Sink, Stop, Way
 from autopilot.geofence import Geofence, check_fence, check_fence_item
 from autopilot.mission import MissionExecutor, Reached, SetHome
 from autopilot.mission_items import check_item, check_mission, check_rally_item
@@ -124,7 +124,7 @@ class MissionCourse:
         self._course: Course = Stop()
         self._done = False
 
-    def ask(self, scene: Scene) -> Motion | Lean:
+    def ask(self, scene: Scene) -> Motion | Planned | Lean:
         """Return what the order of now asks for."""
         arrived = self._course.arrived(scene)
         turns = self._course.turns if isinstance(self._course, Round) else 0.0

@@ -7,10 +7,10 @@ from typing import NamedTuple, TypeAlias
 from autopilot.arming import Facts, refusals
 from autopilot.behaviour import Behaviour
 from autopilot.controller import AttitudeDemand, Horizon, Preview, VehicleState
-from autopilot.courses import NOT_STEERED, Course, Lean, Motion, Scene, Steered, Stop, lifts
+from autopilot.courses import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, Stop, lifts
 from autopilot.landing import Landing, is_below, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
-from autopilot.reference import Reference, at_rest, lead, moving_with
+from autopilot.reference import Reference, at_rest, keep_to, lead, moving_with
 from mavlink.frames import Vector
 from mavlink.services.statustext import INFO, NOTICE, WARNING
 
@@ -101,20 +101,19 @@ class Pilot:
             self._begin_flight()
         self.course = self._make_course(self.state.mode, self.scene())
 
-    def sense(
-        self, now_us: int, vehicle: VehicleState, facts: Facts, missing: Sequence[Need], steered: Steered = NOT_STEERED
-    ) -> None:
-        """Take in what is known at a control sample.
+    def sense(self, now_us: int, vehicle: VehicleState, steered: Steered = NOT_STEERED) -> None:
+        """Take in what a control sample needs.
 
         Args:
             now_us: Simulated time.
             vehicle: The vehicle.
-            facts: What arming looks at.
-            missing: Needs of modes that nothing meets.
             steered: What clients ask for.
         """
-        self._now_us, self._vehicle, self._facts, self._missing = now_us, vehicle, facts, tuple(missing)
-        self._steered = steered
+        self._now_us, self._vehicle, self._steered = now_us, vehicle, steered
+
+    def take_stock(self, facts: Facts, missing: Sequence[Need]) -> None:
+        """Take in what orders are judged by: what arming looks at, and needs of modes that nothing meets."""
+        self._facts, self._missing = facts, tuple(missing)
 
     def scene(self) -> Scene:
         """Return what a course sees now."""
@@ -199,11 +198,10 @@ class Pilot:
             return RESTS
         scene = self.scene()
         asked = self.course.ask(scene)
-        lifting = asked.lifts if isinstance(asked, Lean) else lifts(asked.target, scene.state)
-        begins = self.standing and lifting
-        if self.standing and not lifting:
-            return self._idle(scene.state)
+        begins = self.standing
         if begins:
+            if not (asked.lifts if isinstance(asked, Lean) else lifts(asked.target, scene.state)):
+                return self._idle(scene.state)
             self._begin_flight()
         guidance = self._lean(asked, begins) if isinstance(asked, Lean) else self._move(scene, asked, begins)
         if self.course.arrived(scene):
@@ -219,8 +217,11 @@ class Pilot:
         """Add a line for the ground station."""
         self._said.append(Said(severity, text))
 
-    def _move(self, scene: Scene, asked: Motion, begins: bool) -> Guidance:
-        horizon, self.reference = lead(scene.reference, asked.target, asked.limits, scene.interval_s)
+    def _move(self, scene: Scene, asked: Motion | Planned, begins: bool) -> Guidance:
+        if isinstance(asked, Planned) and scene.reference.on_target:
+            horizon, self.reference = keep_to(scene.reference, asked.horizon)
+        else:
+            horizon, self.reference = lead(scene.reference, asked.target, asked.limits, scene.interval_s)
         self._watch_ground(scene.state, sinks=is_below(scene.reference, scene.state))
         return Guidance(horizon=horizon, begins=begins)
 

@@ -130,6 +130,20 @@ def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference
     return _horizon(target.motion, heading), after
 
 
+def keep_to(reference: Reference, planned: Horizon) -> tuple[Horizon, Reference]:
+    """Return the plan that a reference is on already, its yaw turned in full turns to where the reference's is.
+
+    The same as `lead`, without the arrays of a target in between: a flight along a track is in a hurry every sample.
+    """
+    yaw = planned.yaw_rad
+    turns = round(float(reference.heading[0] - yaw[0]) / (2.0 * pi))
+    if turns:
+        yaw = yaw + 2.0 * pi * turns
+        planned = planned._replace(yaw_rad=yaw)
+    motion = np.array([column[1] for column in planned[:4]])
+    return planned, Reference(motion, np.array([yaw[1], planned.yaw_rate_rad_s[1]]), on_target=True)
+
+
 def _horizon(motion: Array, heading: Array) -> Horizon:
     p, v, a, j, s = (np.ascontiguousarray(motion[:, order]) for order in range(5))
     yaw, rate, acceleration = (np.ascontiguousarray(heading[:, order]) for order in range(3))

@@ -1,5 +1,6 @@
 """`colibri`: the one command. Loads only what the subcommand needs."""
 
+from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
@@ -69,7 +70,20 @@ def _add_fly(parser: ArgumentParser) -> None:
         choices=("udp", "memory", "direct"),
         help="udp: two processes (default); memory: one process, same codec, same flight; direct: without the codec",
     )
-    add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")
+    add(
+        "--gcs",
+        action="append",
+        default=[],
+        metavar="URL",
+        help="a ground station that may watch and command: udpout:, udpin:, tcp: or tcpin:HOST:PORT; may be repeated",
+    )
+    _add_signing(add)
+    add(
+        "--speed",
+        type=speed,
+        metavar="N",
+        help="times real time, or max (default: max; 1 where a ground station is invited by --gcs)",
+    )
     add("--seed", type=int, default=0, metavar="N", help="seed of everything random (default %(default)s)")
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
@@ -108,8 +122,7 @@ def _add_sitl(parser: ArgumentParser) -> None:
         help="a ground station to call or to wait for: udpout:, udpin:, tcp: or tcpin:HOST:PORT; may be repeated "
         "(default: udpout:127.0.0.1:14550, and udpout:127.0.0.1:14540 + N)",
     )
-    add("--signing-key", type=Path, metavar="FILE", help="sign what is sent, refuse what is not signed with this key")
-    add("--insecure", action="store_true", help="let links leave this computer without a key")
+    _add_signing(add)
     add(
         "--state",
         type=Path,
@@ -126,6 +139,11 @@ def _add_sitl(parser: ArgumentParser) -> None:
     add("--speed", type=speed, default=1.0, metavar="N", help="times real time, or max (default 1)")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def _add_signing(add: Callable[..., object]) -> None:
+    add("--signing-key", type=Path, metavar="FILE", help="sign what is sent, refuse what is not signed with this key")
+    add("--insecure", action="store_true", help="let links leave this computer without a key")
 
 
 def _add_figures(parser: ArgumentParser) -> None:

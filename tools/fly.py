@@ -13,7 +13,7 @@ from autopilot.tracks import TrackError
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, fail
 from plant.scenario import IntegrationError
 from plant.vehicle import VehicleError
-from tools.plan import FlightPlan
+from tools.plan import FlightPlan, PlanError
 from tools.processes import FlightError, fly_processes
 from tools.recording import Recording, RecordingError, Summary, read_recording, write_recording
 from tools.report import Report, print_report, report, write_report
@@ -27,12 +27,12 @@ def fly(args: argparse.Namespace) -> int:
     """Fly as the command line says; return the exit code."""
     try:
         plan = FlightPlan.from_arguments(args)
-    except (ProfileError, VehicleError, TrackError) as error:
+    except (PlanError, ProfileError, VehicleError, TrackError) as error:
         fail(str(error))
     prepare(plan.out)
     try:
-        with _progress(plan, quiet=args.quiet) as progress:
-            summary = _flight(plan, progress)
+        with _progress(plan, quiet=args.quiet) as (progress, say):
+            summary = _flight(plan, progress, say)
     except (ControllerError, ProfileError, SolverError) as error:
         fail(str(error))
     except (IntegrationError, DecisionError) as error:
@@ -65,9 +65,9 @@ def keep_flight(plan: FlightPlan, summary: Summary) -> tuple[Recording, Report]:
     return recording, figures
 
 
-def _flight(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
+def _flight(plan: FlightPlan, progress: Callable[[float], None], say: Callable[[str], None]) -> Summary:
     if plan.link == "udp":
-        return fly_processes(plan, progress)
+        return fly_processes(plan, progress, say)
     from tools.local import fly_locally
 
     return fly_locally(plan, progress)
@@ -104,10 +104,10 @@ def _keep(plan: FlightPlan) -> Recording | None:
 
 
 @contextmanager
-def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Callable[[float], None]]:
-    """Show a bar with simulated time and speed on standard error."""
+def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
+    """Show on standard error a bar with simulated time and speed, and above it what there is to say."""
     if quiet:
-        yield lambda _sim_time_s: None
+        yield lambda _sim_time_s: None, lambda _text: None
         return
     from rich.console import Console
     from rich.markup import escape
@@ -120,7 +120,7 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Callable[[float], No
         TextColumn("{task.fields[speed]}"),
         TimeElapsedColumn(),
     )
-    console = Console(stderr=True)
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
     bar = Progress(*columns, console=console, disable=not console.is_terminal)
     task = bar.add_task(escape(plan.track_name), total=plan.duration_s, speed="", start=False)
     first_s: list[float] = []
@@ -140,7 +140,7 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Callable[[float], No
         bar.update(task, completed=sim_time_s, speed=speed)
 
     try:
-        yield show
+        yield show, lambda text: console.print(text, markup=False)
         bar.update(task, completed=plan.duration_s)
     finally:
         bar.stop()

@@ -13,6 +13,25 @@ from plant.vehicle import Vehicle, load_vehicle
 
 
 @dataclass(frozen=True, slots=True)
+class GroundAccess:
+    """Which ground stations may watch and command a flight.
+
+    Attributes:
+        links: URLs to call or to wait on; none where nobody is invited.
+        signing_key: File of the key that both sides sign with.
+        insecure: Whether links may leave this computer without one.
+    """
+
+    links: tuple[str, ...] = ()
+    signing_key: Path | None = None
+    insecure: bool = False
+
+
+class PlanError(Exception):
+    """What was asked for does not go together; the message is the one line that a user needs."""
+
+
+@dataclass(frozen=True, slots=True)
 class FlightPlan:
     """A flight as it was asked for.
 
@@ -31,6 +50,7 @@ class FlightPlan:
         duration_s: Simulated time to fly.
         out: Folder for all that the flight leaves.
         solver: QP solver asked for; None for the profile's.
+        ground: Who may watch and command.
         track: The track to fly.
         profile: The profile, with controller and solver as asked for.
         vehicle: The vehicle that the autopilot controls.
@@ -51,6 +71,7 @@ class FlightPlan:
     duration_s: float
     out: Path
     solver: str | None
+    ground: GroundAccess
     track: Track
     profile: Profile
     vehicle: Vehicle
@@ -61,10 +82,14 @@ class FlightPlan:
         """Resolve the command line.
 
         Raises:
+            PlanError: Ground stations are invited to a flight that has no links to them.
             ProfileError: The profile cannot be read.
             VehicleError: A vehicle cannot be read, or cannot start as the profile says.
             TrackError: There is no such track, or its file cannot be flown.
         """
+        ground = GroundAccess(tuple(args.gcs), args.signing_key, args.insecure)
+        if ground.links and args.link != "udp":
+            raise PlanError(f"--gcs needs --link udp: over {args.link} there is no autopilot to connect to")
         to_fly = track(args.track)
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle_name = args.vehicle or profile.simulation.vehicle
@@ -82,11 +107,12 @@ class FlightPlan:
             start=start,
             integrator=args.integrator or profile.simulation.integrator,
             link=args.link,
-            speed=args.speed,
+            speed=args.speed or (1.0 if ground.links else inf),
             seed=args.seed,
             duration_s=args.duration,
             out=args.out,
             solver=args.solver,
+            ground=ground,
             track=to_fly,
             profile=profile,
             vehicle=load_vehicle(vehicle_name),
@@ -107,8 +133,9 @@ class FlightPlan:
         unset = dict.fromkeys(("solver", "vehicle", "plant_vehicle", "integrator"))
         chosen = {"track": track_name, "profile": profile, "controller": controller, "link": link, "out": out}
         world = {"wind": NO_WIND, "without": (), "start": {}}
+        ground = {"gcs": (), "signing_key": None, "insecure": False}
         return cls.from_arguments(
-            argparse.Namespace(**chosen, **unset, **world, speed=inf, seed=0, duration=DURATION_S)
+            argparse.Namespace(**chosen, **unset, **world, **ground, speed=inf, seed=0, duration=DURATION_S)
         )
 
     @property

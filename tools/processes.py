@@ -5,16 +5,18 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from math import isfinite
 from select import select
-from typing import IO, Any
+from typing import Any
 
 from tools.plan import FlightPlan
 from tools.recording import Summary
 
 _LOOK_EVERY_S = 0.1
 _GRACE_S = 3.0
+_TOLD = ("ground", "heard", "said")
+"""Events of the autopilot that a user who has invited ground stations wants to read."""
 
 
 class FlightError(Exception):
@@ -32,34 +34,41 @@ class FlightError(Exception):
         self.said = said
 
 
-def fly_processes(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
-    """Fly `plan` as two processes on a free port; `progress` is told the simulated time in s.
+def fly_processes(
+    plan: FlightPlan, progress: Callable[[float], None], say: Callable[[str], None] = lambda _: None
+) -> Summary:
+    """Fly `plan` as two processes on a free port. Both are gone when this returns or raises.
 
-    Both are gone when this returns or raises.
+    Args:
+        plan: What to fly.
+        progress: Is told the simulated time in s.
+        say: Is told in words where ground stations may connect, and which have.
 
     Raises:
         FlightError: One of them ended before the flight did.
     """
     processes: dict[str, subprocess.Popen[bytes]] = {}
     try:
-        plant = processes["plant"] = _start("plant", *_plant_options(plan), stdout=subprocess.PIPE)
-        assert plant.stdout is not None
-        for event in _events(plant.stdout, lambda: _check_alive(processes)):
-            if event["event"] == "listening":
+        processes["plant"] = _start("plant", *_plant_options(plan), stdout=subprocess.PIPE)
+        for name, event in _events(processes, lambda: _check_alive(processes)):
+            if name == "autopilot":
+                if event["event"] in _TOLD:
+                    say(event["text"])
+            elif event["event"] == "listening":
                 url = event["url"].replace("udpin", "udpout")
-                processes["autopilot"] = _start("autopilot", "--plant", url, *_autopilot_options(plan))
+                said = subprocess.PIPE if plan.ground.links else subprocess.DEVNULL
+                processes["autopilot"] = _start("autopilot", "--plant", url, *_autopilot_options(plan), stdout=said)
             elif event["event"] == "progress":
                 progress(event["sim_time_s"])
             elif event["event"] == "ended":
                 return Summary(event["wall_time_s"], event["frames"], event["resent"])
-        plant.wait()
         _check_alive(processes)
-        raise FlightError("the plant ended without a word", 1, said=False)
+        raise FlightError("a process ended before the flight did", 1, said=False)
     finally:
         _end(list(processes.values()))
 
 
-def _start(package: str, *options: str, stdout: int = subprocess.DEVNULL) -> subprocess.Popen[bytes]:
+def _start(package: str, *options: str, stdout: int) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", package, "--json", "--with-parent", *options]
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=stdout)
 
@@ -85,23 +94,32 @@ def _autopilot_options(plan: FlightPlan) -> list[str]:
         *("--vehicle", plan.vehicle_name),
         *("--controller", plan.profile.controller),
         *(("--solver", plan.solver) if plan.solver else ()),
+        *(f"--gcs={url}" for url in plan.ground.links),
+        *(("--signing-key", str(plan.ground.signing_key)) if plan.ground.signing_key else ()),
+        *(("--insecure",) if plan.ground.insecure else ()),
         *("--out", str(plan.out)),
     ]
 
 
-def _events(stream: IO[bytes], look: Callable[[], None]) -> Iterator[dict[str, Any]]:
-    """Yield the JSON lines of a process until it closes its output; `look` is called while nothing comes."""
-    rest = b""
+def _events(
+    processes: Mapping[str, subprocess.Popen[bytes]], look: Callable[[], None]
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the JSON lines of each process until one ends; `look` is called while nothing comes."""
+    rest = dict.fromkeys(("plant", "autopilot"), b"")
     while True:
-        ready, _, _ = select([stream], [], [], _LOOK_EVERY_S)
+        streams = {process.stdout: name for name, process in processes.items() if process.stdout is not None}
+        ready, _, _ = select(list(streams), [], [], _LOOK_EVERY_S)
         if not ready:
             look()
-            continue
-        chunk = os.read(stream.fileno(), 65536)
-        if not chunk:
-            return
-        *lines, rest = (rest + chunk).split(b"\n")
-        yield from map(json.loads, lines)
+        for stream in ready:
+            name = streams[stream]
+            chunk = os.read(stream.fileno(), 65536)
+            if not chunk:
+                processes[name].wait()
+                return
+            *lines, rest[name] = (rest[name] + chunk).split(b"\n")
+            for line in lines:
+                yield name, json.loads(line)
 
 
 def _check_alive(processes: dict[str, subprocess.Popen[bytes]]) -> None:

@@ -46,7 +46,8 @@ def fly(out: Path, duration_s: float) -> Flight:
     arguments = {"profile": "thesis", "link": "direct", "speed": np.inf, "seed": 0, "duration": duration_s, "out": out}
     files = {"controller": None, "solver": None, "vehicle": None, "plant_vehicle": None, "integrator": "rk4"}
     world: dict[str, Any] = {"wind": NO_WIND, "without": (), "start": {}}
-    plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files, **world))
+    ground: dict[str, Any] = {"gcs": (), "signing_key": None, "insecure": False}
+    plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files, **world, **ground))
     fly_locally(plan, lambda _sim_time_s: None)
     recording = read_recording(plan)
     series = flight_series(recording, plan)
