@@ -12,7 +12,8 @@ from autopilot.parameters import ImpossibleError, definitions
 from autopilot.profile import Profile
 from autopilot.stations import REBOOT, SHUT_DOWN, StationSettings
 from autopilot.tracks import track
-from mavlink.folder import Folder, Quota
+from mavlink.files import Quota
+from mavlink.folder import Folder
 from mavlink.link import LinkError
 from mavlink.parameters import Parameters, Value
 from mavlink.process import Status
