@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from mavlink.dialect import mav
-from tests.clients.station import ACCEPTED, Station
+from tests.clients.ports import OnPort
+from tests.clients.station import ACCEPTED, HOLD, Ack, Station
 from tests.runs import fly, states
 
 DURATION = ("--duration", "6")
@@ -17,14 +18,15 @@ WATCHED = ("HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY", "AUTOPILOT
 @pytest.mark.parametrize("track", ["spiral", "lemniscate"])
 def test_a_watched_flight_is_the_same_bit_for_bit(tmp_path: Path, track: str) -> None:
     alone = fly(tmp_path / "alone", track, "--link", "memory", *DURATION)
-    with Station(255) as one, Station(245) as other:
+    stations = Station(255), Station(245)
+    with OnPort(stations[0]) as one, OnPort(stations[1]) as other:
         links = ("--gcs", one.url, "--gcs", other.url, "--speed", "max")
         watched = fly(tmp_path / "watched", track, *links, *DURATION)
-        for station in (one, other):
-            assert not [name for name in WATCHED if station.counts[name] < 3], station.counts
-            assert {ack.target for ack in station.acks} == {station.identity}
-            assert {ack.result for ack in station.acks} == {ACCEPTED}
-            assert {ack.command for ack in station.acks} == set(station.sent)
+    for station in stations:
+        assert not [name for name in WATCHED if station.counts[name] < 3], station.counts
+        assert {ack.target for ack in station.acks} == {station.identity}
+        assert {ack.result for ack in station.acks} == {ACCEPTED}
+        assert {ack.command for ack in station.acks} == set(station.sent)
     assert watched["trajectory_sha256"] == alone["trajectory_sha256"]
     assert watched["rmse_m"] == alone["rmse_m"]
     flown = [(tmp_path / name / "plant.csv").read_bytes() for name in ("alone", "watched")]
@@ -32,17 +34,19 @@ def test_a_watched_flight_is_the_same_bit_for_bit(tmp_path: Path, track: str) ->
 
 
 def test_a_flight_is_paced_to_the_wall_clock_once_somebody_may_watch(tmp_path: Path) -> None:
-    with Station(255) as station:
-        report = fly(tmp_path, "hover", "--gcs", station.url, "--duration", "1.5")
-        assert station.counts["HEARTBEAT"] >= 1
+    station = Station(255)
+    with OnPort(station) as port:
+        report = fly(tmp_path, "hover", "--gcs", port.url, "--duration", "1.5")
+    assert station.counts["HEARTBEAT"] >= 1
     assert report["wall_time_s"] > 1.4
 
 
 def test_a_ground_station_may_take_over(tmp_path: Path) -> None:
     """A track is a mode like any other: another one can be chosen."""
-    with Station(255, orders=[(mav.MAV_CMD_DO_SET_MODE, 1, 4, 3)]) as station:
-        report = fly(tmp_path, "lemniscate", "--gcs", station.url, "--speed", "max", "--duration", "10")
-        assert station.acks[0] == (mav.MAV_CMD_DO_SET_MODE, ACCEPTED, station.identity)
+    station = Station(255, orders=[HOLD])
+    with OnPort(station) as port:
+        report = fly(tmp_path, "lemniscate", "--gcs", port.url, "--speed", "max", "--duration", "10")
+    assert station.acks[Ack(mav.MAV_CMD_DO_SET_MODE, ACCEPTED, station.identity)] == 1
     flown = states(tmp_path)
     assert report["max_error_m"] > 1.0
     assert abs(flown[-1, 1:4]).max() < 1e-3  # it holds still
