@@ -180,18 +180,26 @@ Generator: TypeAlias = Callable[[str], bytes]
 class Tree:
     """Files of several kinds in one tree: generated ones, mounted folders, and one at the root for all the rest."""
 
-    def __init__(self, root: Files, mounts: Mapping[str, Files], generated: Mapping[str, Generator]) -> None:
+    def __init__(
+        self,
+        root: Files,
+        mounts: Mapping[str, Files],
+        generated: Mapping[str, Generator],
+        aliases: Mapping[str, str] | None = None,
+    ) -> None:
         """Compose.
 
         Args:
             root: Whatever lies in no mount.
             mounts: By path, "logs".
             generated: By path, "@PARAM/param.pck". They can be read only.
+            aliases: Second paths of folders at the root, "@MAV_LOG": "logs".
         """
         self._root = root
         self._mounts = {_known(path): files for path, files in mounts.items()}
         self._generated = {_known(path): generator for path, generator in generated.items()}
-        fixed = (*self._mounts, *self._generated)
+        self._aliases = {_known(path): _known(target) for path, target in (aliases or {}).items()}
+        fixed = (*self._mounts, *self._generated, *self._aliases)
         self._folders = {names[:depth] for names in fixed for depth in range(1, len(names))}
 
     def list(self, names: Names) -> list[Entry] | Refusal:
@@ -273,7 +281,8 @@ class Tree:
         return files.remove_folder(rest)
 
     def _is_fixed(self, names: Names) -> bool:
-        return not names or names in self._generated or names in self._mounts or names in self._folders
+        fixed = (self._generated, self._mounts, self._folders, self._aliases)
+        return not names or any(names in places for places in fixed)
 
     def _at(self, names: Names) -> tuple[Files, Names]:
         """Return the files that hold `names`, and the names there."""
@@ -281,11 +290,14 @@ class Tree:
             files = self._mounts.get(names[:depth])
             if files is not None:
                 return files, names[depth:]
+            target = self._aliases.get(names[:depth])
+            if target is not None:
+                return self._root, (*target, *names[depth:])
         return self._root, names
 
     def _fixed_in(self, folder: Names) -> Iterator[Entry]:
         depth = len(folder)
-        for names in (*self._folders, *self._mounts):
+        for names in (*self._folders, *self._mounts, *self._aliases):
             if len(names) == depth + 1 and names[:depth] == folder:
                 yield Entry(names[-1], True)
         for names, generator in self._generated.items():

@@ -68,7 +68,10 @@ class FlightLog:
             self._files.remove((*self._folder, log.name))
         number = _number(logs[-1].name) + 1 if logs else 1
         name = f"{number:05}{SUFFIX}"
-        self.refusal = self._files.create((*self._folder, name))
+        place = (*self._folder, name)
+        self.refusal = self._files.create(place)
+        if self.refusal is Refusal.NOT_FOUND and self._folder:  # a ground station removed it
+            self.refusal = self._files.make_folder(self._folder) or self._files.create(place)
         self.name = name if self.refusal is None else None
         self._size = 0
         self._waiting.clear()

@@ -15,6 +15,10 @@ from mavlink.services.service import Peer, Send, to
 
 BLOCK_BYTES = 90
 MESSAGES_A_POLL = 20
+MESSAGES_A_POLL_OF_A_LONG_PART = 8
+SHORT_BYTES = 256 * BLOCK_BYTES
+"""What a client's socket surely holds until it is read: MAVSDK and QGroundControl ask for no more at once. MAVProxy
+asks for a whole log, and cannot read it as fast as it could be sent."""
 MOST_TRANSFERS_OF_A_PEER = 32
 MOST_PEERS = 16
 LAST_ID = 0xFFFF
@@ -84,8 +88,7 @@ class Logs:
         if message.name == "LOG_ERASE":
             self._erase()
         elif message.name == "LOG_REQUEST_END":
-            self._listings.pop(peer, None)
-            self._transfers = deque(transfer for transfer in self._transfers if transfer.peer != peer)
+            self._stop(peer)
         return ()
 
     def poll(self, now_us: int) -> Iterable[Send]:
@@ -102,7 +105,8 @@ class Logs:
         share = max(MESSAGES_A_POLL // max(len(self._transfers), 1), 1)
         for _ in range(min(len(self._transfers), MESSAGES_A_POLL)):
             transfer = self._transfers.popleft()
-            sends += _blocks(transfer, share)
+            is_long = transfer.end - transfer.offset > SHORT_BYTES
+            sends += _blocks(transfer, min(share, MESSAGES_A_POLL_OF_A_LONG_PART) if is_long else share)
             if transfer.offset < transfer.end:
                 self._transfers.append(transfer)
         return sends
@@ -134,7 +138,7 @@ class Logs:
         if len(self._shown) >= MOST_PEERS:
             forgotten = next(iter(self._shown))
             del self._shown[forgotten]
-            self._listings.pop(forgotten, None)
+            self._stop(forgotten)
         self._shown[peer] = logs[-LAST_ID:]
         return self._shown[peer]
 
@@ -142,8 +146,10 @@ class Logs:
         logs = self._shown[peer] if peer in self._shown else self._look(peer)
         reading = self._files.open((*self._folder, logs[number].name)) if number < len(logs) else Refusal.NOT_FOUND
         if isinstance(reading, Refusal) or offset >= reading.size or count == 0:
-            return (_block(peer, number, offset, b""),)
+            return (_block(peer, number, offset, b""),)  # "zero for end of log"
         transfer = _Transfer(peer, number, reading, offset, offset + count)
+        # A client that asks for another log has turned away from the one before.
+        self._transfers = deque(known for known in self._transfers if known.peer != peer or known.id == number)
         of_peer = [known for known in self._transfers if known.peer == peer]
         asked_again = any(
             (known.id, known.end) == (number, transfer.end) and known.offset <= offset for known in of_peer
@@ -151,6 +157,10 @@ class Logs:
         if not asked_again and len(of_peer) < MOST_TRANSFERS_OF_A_PEER:
             self._transfers.append(transfer)
         return ()
+
+    def _stop(self, peer: Peer) -> None:
+        self._listings.pop(peer, None)
+        self._transfers = deque(transfer for transfer in self._transfers if transfer.peer != peer)
 
     def _erase(self) -> None:
         found = self._files.list(self._folder)

@@ -1,0 +1,285 @@
+"""A whole vehicle in one process: plant and autopilot in lockstep on simulated time, flown by clients over MAVLink.
+
+Nothing is simulated of the links but the bytes: a client encodes what it sends, and decodes what it is sent.
+"""
+
+from collections import Counter, defaultdict
+from collections.abc import Callable
+from math import nan
+from typing import Any
+
+from msgspec.structs import replace
+
+from autopilot.copter import Copter, Received
+from autopilot.modes import Mode, custom_mode, mode_of_custom
+from autopilot.profile import Profile, load_profile
+from autopilot.stations import StationSettings
+from autopilot.tracks import Track
+from mavlink.dialect import Codec, Message, mav
+from mavlink.frames import Vector, euler_from_quaternion
+from mavlink.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
+from mavlink.hil import ActuatorCommand
+from mavlink.parameters import Value
+from mavlink.services.command import NOT_GIVEN
+from plant.scenario import Start
+from plant.vehicle import Vehicle, load_vehicle
+from plant.world import CALM, Physics, World, starting_world, state_frame
+
+SYSTEM, COMPONENT = 1, 1
+GCS_PORT, SDK_PORT = 14550, 14540
+STANDING = Start()
+"""On its feet: z counts from where the vehicle stands."""
+NO_CLOCK_S = 0.0
+ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
+_KEPT = 4000
+_AS_IT_IS = load_profile("flight")
+FLIGHT = replace(_AS_IT_IS, simulation=replace(_AS_IT_IS.simulation, frame_interval_s=None))
+"""The flight profile with a frame for each control sample and none between: a third less to compute."""
+
+
+class Client:
+    """A ground station, or whatever else speaks MAVLink to the vehicle.
+
+    Attributes:
+        system: Its system id.
+        component: Its component id.
+        address: Where the vehicle sees it.
+        heard: Messages from the vehicle that were decoded, by name, the latest last.
+        acks: Every COMMAND_ACK, in order.
+        texts: Every STATUSTEXT, in order.
+    """
+
+    def __init__(self, system: int = 255, component: int = 190, port: int = GCS_PORT, link: int = 0) -> None:
+        """Be a component at a port of this computer."""
+        self.system, self.component = system, component
+        self.link = link
+        self.address = ("127.0.0.1", port)
+        self._codec = Codec(system, component)
+        self._to_send: list[bytes] = []
+        self.heard: defaultdict[str, list[Any]] = defaultdict(list)
+        self.counts: Counter[str] = Counter()
+        self.acks: list[Any] = []
+        self.texts: list[str] = []
+
+    def send(self, name: str, *fields: Any) -> None:
+        """Send a message with the next frame."""
+        self._to_send.append(self._codec.encode(name, *fields))
+
+    def send_raw(self, datagram: bytes) -> None:
+        """Send any bytes with the next frame."""
+        self._to_send.append(datagram)
+
+    def take_sent(self) -> list[Received]:
+        """Return what is on its way to the vehicle, and forget it."""
+        sent, self._to_send = self._to_send, []
+        return [Received(datagram, self.link, self.address) for datagram in sent]
+
+    def receive(self, datagram: bytes) -> None:
+        """Decode what the vehicle sent."""
+        for message in self._codec.decode(datagram):
+            self._hear(message)
+
+    def _hear(self, message: Message) -> None:
+        if message.source != (SYSTEM, COMPONENT):
+            return
+        self.counts[message.name] += 1
+        kept = self.heard[message.name]
+        kept.append(message.fields)
+        if len(kept) > _KEPT:
+            del kept[: _KEPT // 2]
+        if message.name == "COMMAND_ACK":
+            self.acks.append(message.fields)
+        elif message.name == "STATUSTEXT":
+            self.texts.append(message.fields.text)
+
+    def latest(self, name: str) -> Any:
+        """Return the last message of a name."""
+        assert self.heard[name], f"no {name} was heard"
+        return self.heard[name][-1]
+
+    def said(self, part: str) -> bool:
+        """Whether a STATUSTEXT said so."""
+        return any(part in text for text in self.texts)
+
+
+class CopterFlight:
+    """A vehicle and its surroundings.
+
+    Attributes:
+        copter: The autopilot.
+        world: The plant.
+        client: The first ground station.
+        rotors: The last command to the plant.
+        path: Positions, ENU, one a control sample, once `record` is set.
+    """
+
+    def __init__(
+        self,
+        *,
+        start: Start = STANDING,
+        values: dict[str, Value] | None = None,
+        profile: Profile | None = None,
+        vehicle: Vehicle | None = None,
+        wind_enu_m_s: Vector = CALM,
+        first: Track | None = None,
+        origin: Geodetic = DEFAULT_ORIGIN,
+        client: Client | None = None,
+    ) -> None:
+        """Begin at `start`, with parameters `values`; `vehicle` is the plant's, where it is not the autopilot's."""
+        self._profile = profile or FLIGHT
+        self._believed = load_vehicle(self._profile.simulation.vehicle)
+        self._settings = StationSettings(system_id=SYSTEM, identity="px4", origin=origin)
+        self._physics = Physics(vehicle or self._believed, "rk4", wind_enu_m_s)
+        self.world: World = starting_world(start, self._believed)
+        self.copter = self._copter(values, first)
+        self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
+        self.client = client or Client()
+        self._clients: list[Client] = []
+        self.add(self.client)
+        self.step()
+        self.step()
+
+    def _copter(self, values: dict[str, Value] | None, first: Track | None) -> Copter:
+        return Copter(self._profile, self._believed, self._settings, lambda: NO_CLOCK_S, values=values, first=first)
+
+    def add(self, client: Client) -> Client:
+        """Connect another client."""
+        self._clients.append(client)
+        self.copter.stations.hub.open(client.link, client.address)
+        return client
+
+    def restart(self) -> None:
+        """Start the autopilot anew, wherever the vehicle is."""
+        self.copter = self._copter(None, None)
+        for client in self._clients:
+            self.copter.stations.hub.open(client.link, client.address)
+
+    def step(self) -> None:
+        """Fly one frame."""
+        frame = state_frame(self.world)
+        self.rotors = self.copter.step(frame).command
+        self.world = self._physics.step(self.world, self.rotors, self.copter.frame_interval_us)
+        inbox = [received for client in self._clients for received in client.take_sent()]
+        for link, address, datagram in self.copter.serve(inbox):
+            for client in self._clients:
+                if (client.link, client.address) == (link, address):
+                    client.receive(datagram)
+
+    def run(self, seconds: float, each_frame: Callable[[], None] | None = None) -> None:
+        """Fly for so long; call `each_frame` before each frame."""
+        end_us = self.world.time_us + round(seconds * 1e6)
+        while self.world.time_us < end_us:
+            if each_frame:
+                each_frame()
+            self.step()
+
+    def until(self, condition: Callable[[], object], at_most_s: float, what: str = "") -> float:
+        """Fly until `condition()`; return how long that took, s of simulated time."""
+        began_us = self.world.time_us
+        while not condition():
+            assert self.world.time_us < began_us + at_most_s * 1e6, f"{what or 'it'} took longer than {at_most_s} s"
+            self.step()
+        return (self.world.time_us - began_us) * 1e-6
+
+    def send(self, name: str, *fields: Any) -> None:
+        """Send a message from the first client."""
+        self.client.send(name, *fields)
+
+    def command(self, number: int, *params: float, client: Client | None = None, confirmation: int = 0) -> int:
+        """Send a COMMAND_LONG and return the MAV_RESULT; parameters that are left out are 0."""
+        who = client or self.client
+        values = (*params, *(0.0,) * (7 - len(params)))
+        who.send("COMMAND_LONG", SYSTEM, COMPONENT, number, confirmation, *values)
+        return self._result(number, who)
+
+    def command_int(
+        self, number: int, *params: float, frame: int, x: int = NOT_GIVEN, y: int = NOT_GIVEN, z: float = nan
+    ) -> int:
+        """Send a COMMAND_INT and return the MAV_RESULT; x, y, z that are left out are not given."""
+        values = (*params, *(0.0,) * (4 - len(params)))
+        self.client.send("COMMAND_INT", SYSTEM, COMPONENT, frame, number, 0, 0, *values, x, y, z)
+        return self._result(number, self.client)
+
+    def _result(self, number: int, who: Client) -> int:
+        before = len(who.acks)
+        self.until(lambda: len(who.acks) > before, 0.1, f"COMMAND_ACK of {number}")
+        self.step()
+        (ack,) = who.acks[before:]
+        assert ack.command == number
+        return int(ack.result)
+
+    def select(self, mode: Mode) -> int:
+        """Choose a mode by DO_SET_MODE; return the MAV_RESULT."""
+        number = custom_mode(mode)
+        return self.command(mav.MAV_CMD_DO_SET_MODE, 1.0, number >> 16 & 0xFF, number >> 24 & 0xFF)
+
+    def arm(self) -> int:
+        """Arm; return the MAV_RESULT."""
+        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+
+    def disarm(self, magic: float = 0.0) -> int:
+        """Disarm, or try to; return the MAV_RESULT."""
+        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, magic)
+
+    def set(self, name: str, value: Value) -> None:
+        """Set a parameter as a ground station does, and see that it was taken."""
+        parameters = self.copter.parameters
+        parameters.set(name, value)
+        self.step()
+        assert parameters[name] == value
+
+    def take_off(self, height_m: float = 2.5) -> None:
+        """Arm, climb above home and stay."""
+        assert self.command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, height_m) == ACCEPTED
+        assert self.arm() == ACCEPTED
+        self.until(lambda: self.mode is Mode.HOLD, 5.0 + 2.0 * height_m, "take-off")
+        self.run(1.0)
+
+    def go(self, east_m: float, north_m: float, up_m: float, yaw_rad: float = nan, speed_m_s: float = -1.0) -> int:
+        """Reposition to a place, ENU from the origin; return the MAV_RESULT."""
+        there = geodetic_of((east_m, north_m, up_m), self._settings.origin)
+        x, y = round(there.latitude_deg * 1e7), round(there.longitude_deg * 1e7)
+        params = (speed_m_s, 1.0, 0.0, yaw_rad)
+        frame = mav.MAV_FRAME_GLOBAL
+        return self.command_int(mav.MAV_CMD_DO_REPOSITION, *params, frame=frame, x=x, y=y, z=there.altitude_m)
+
+    @property
+    def now_s(self) -> float:
+        """Simulated time, s."""
+        return self.world.time_us * 1e-6
+
+    @property
+    def mode(self) -> Mode:
+        """The flight mode."""
+        return self.copter.pilot.state.mode
+
+    @property
+    def armed(self) -> bool:
+        """Whether the rotors may turn."""
+        return self.copter.pilot.state.armed
+
+    @property
+    def told_mode(self) -> Mode | None:
+        """The flight mode of the last HEARTBEAT."""
+        return mode_of_custom(self.client.latest("HEARTBEAT").custom_mode)
+
+    @property
+    def position(self) -> Vector:
+        """Of the plant, m, ENU."""
+        x, y, z = self.world.state[6:9]
+        return (x, y, z)
+
+    @property
+    def velocity(self) -> Vector:
+        """Of the plant, m/s, ENU."""
+        return state_frame(self.world).velocity_enu_m_s
+
+    @property
+    def yaw_rad(self) -> float:
+        """Of the plant, counter-clockwise from east."""
+        return self.euler[2]
+
+    @property
+    def euler(self) -> Vector:
+        """Roll, pitch, yaw of the plant, rad."""
+        return euler_from_quaternion(state_frame(self.world).attitude)

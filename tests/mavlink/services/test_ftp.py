@@ -1,0 +1,554 @@
+"""File transfer: what clients ask for, in order, twice, at once, and in words that mean nothing."""
+
+import random
+from struct import Struct
+from typing import NamedTuple
+from zlib import crc32
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mavlink.dialect import Codec
+from mavlink.files import ReadOnly, Tree
+from mavlink.memory import Memory
+from mavlink.services import ftp
+from mavlink.services.ftp import Ftp
+from mavlink.services.ftp_wire import DATA_BYTES, Error, Opcode
+from mavlink.services.service import Peer, Send
+
+HEADER = Struct("<HBBBBBBI")
+PEER = Peer(3, 245, 190)
+OTHER = Peer(4, 255, 230)
+POLL_US = 4000
+TEXT = bytes(range(256)) * 20
+
+
+class Reply(NamedTuple):
+    sequence: int
+    session: int
+    opcode: int
+    size: int
+    req_opcode: int
+    burst_complete: int
+    padding: int
+    offset: int
+    data: bytes
+
+    @property
+    def error(self) -> int:
+        assert self.opcode == Opcode.NAK
+        assert self.size == len(self.data) == (2 if self.data[0] == Error.FAIL_ERRNO else 1)
+        return self.data[0]
+
+
+def parsed(send: Send) -> Reply:
+    (message,) = Codec(1, 1).decode(Codec(1, 1).encode(send.name, *send.fields))
+    payload = bytes(message.fields.payload).ljust(251, b"\0")
+    header = HEADER.unpack_from(payload)
+    return Reply._make((*header, payload[HEADER.size :][: header[3]]))
+
+
+class Client:
+    """Asks one question after the other."""
+
+    def __init__(self, service: Ftp, peer: Peer = PEER, session: int = 0) -> None:
+        self.service = service
+        self.peer = peer
+        self.session = session
+        self.sequence = 0
+        self.now_us = 0
+
+    def send(self, opcode: int, data: bytes = b"", offset: int = 0, size: int | None = None) -> list[Reply]:
+        size = len(data) if size is None else size
+        header = HEADER.pack(self.sequence % 0x10000, self.session, opcode, size, 0, 0, 0, offset)
+        fields = (0, 1, 1, (header + data).ljust(251, b"\0"))
+        (message,) = Codec(*self.peer[1:]).decode(Codec(*self.peer[1:]).encode("FILE_TRANSFER_PROTOCOL", *fields))
+        sends = list(self.service.receive(message, self.peer, self.now_us))
+        assert all(send.channel == self.peer.channel for send in sends)
+        assert all(send.fields[:3] == (0, self.peer.system, self.peer.component) for send in sends)
+        return [parsed(send) for send in sends]
+
+    def ask(self, opcode: int, data: bytes = b"", offset: int = 0, size: int | None = None) -> Reply:
+        self.sequence += 1
+        (reply,) = self.send(opcode, data, offset, size)
+        assert reply.sequence == (self.sequence + 1) % 0x10000
+        assert (reply.session, reply.req_opcode) == (self.session, opcode)
+        return reply
+
+    def do(self, opcode: int, data: bytes = b"", offset: int = 0, size: int | None = None) -> bytes:
+        reply = self.ask(opcode, data, offset, size)
+        assert reply.opcode == Opcode.ACK, reply
+        return reply.data
+
+    def poll(self) -> list[Reply]:
+        self.now_us += POLL_US
+        return [parsed(send) for send in self.service.poll(self.now_us)]
+
+    def burst(self, offset: int = 0, size: int = DATA_BYTES) -> list[Reply]:
+        self.sequence += 1
+        replies = self.send(Opcode.BURST, b"", offset, size)
+        while not replies or not (replies[-1].burst_complete or replies[-1].opcode == Opcode.NAK):
+            replies += self.poll()
+        return replies
+
+    def listed(self, path: bytes, opcode: int = Opcode.LIST) -> list[bytes]:
+        entries: list[bytes] = []
+        while True:
+            reply = self.ask(opcode, path, offset=len(entries))
+            if reply.opcode == Opcode.NAK:
+                assert reply.error == Error.END_OF_FILE
+                return entries
+            assert reply.data.endswith(b"\0")
+            entries += reply.data[:-1].split(b"\0")
+
+
+@pytest.fixture
+def memory() -> Memory:
+    memory = Memory()
+    memory.create(("text",))
+    memory.write(("text",), 0, TEXT)
+    return memory
+
+
+@pytest.fixture
+def service(memory: Memory) -> Ftp:
+    return Ftp(Tree(memory, {"logs": ReadOnly(Memory())}, {"@PARAM/param.pck": lambda query: b"Q" + query.encode()}))
+
+
+@pytest.fixture
+def client(service: Ftp) -> Client:
+    return Client(service)
+
+
+def test_a_file_is_read(client: Client) -> None:
+    assert int.from_bytes(client.do(Opcode.OPEN_TO_READ, b"/text"), "little") == len(TEXT)
+    assert client.do(Opcode.READ, offset=10, size=20) == TEXT[10:30]
+    assert client.do(Opcode.READ, offset=len(TEXT) - 5, size=DATA_BYTES) == TEXT[-5:]
+    assert client.do(Opcode.READ, offset=3, size=0) == TEXT[3 : 3 + DATA_BYTES]
+    past = client.ask(Opcode.READ, offset=len(TEXT), size=1)
+    assert (past.error, past.offset) == (Error.END_OF_FILE, len(TEXT))
+    assert client.do(Opcode.TERMINATE) == b""
+    assert client.ask(Opcode.READ, size=1).error == Error.INVALID_SESSION
+
+
+@pytest.mark.parametrize("path", [b"text", b"/text", b"//./text", b"/text\0", b"/text\0garbage"])
+def test_a_path_may_be_said_in_several_ways(client: Client, path: bytes) -> None:
+    assert client.ask(Opcode.OPEN_TO_READ, path).opcode == Opcode.ACK
+
+
+def test_a_path_may_have_a_query(client: Client) -> None:
+    client.do(Opcode.OPEN_TO_READ, b"@PARAM/param.pck?withdefaults=1")
+    assert client.do(Opcode.READ, size=100) == b"Qwithdefaults=1"
+
+
+@pytest.mark.parametrize("size", [DATA_BYTES, 80, 1])
+@pytest.mark.parametrize("length", [0, 1, 80, 160, DATA_BYTES, 2 * DATA_BYTES, 1000])
+def test_a_burst_brings_the_rest_of_a_file(client: Client, memory: Memory, size: int, length: int) -> None:
+    memory.truncate(("text",), length)
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    replies = client.burst(0, size)
+    if length == 0:
+        assert [reply.error for reply in replies] == [Error.END_OF_FILE]
+        return
+    assert b"".join(reply.data for reply in replies) == TEXT[:length]
+    assert [reply.sequence for reply in replies] == [client.sequence + 1 + number for number in range(len(replies))]
+    assert [reply.offset for reply in replies] == list(range(0, length, size))
+    assert [reply.burst_complete for reply in replies] == [0] * (len(replies) - 1) + [1]
+    assert {reply.req_opcode for reply in replies} == {Opcode.BURST}
+
+
+def test_a_burst_is_paced(client: Client) -> None:
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    assert client.send(Opcode.BURST, size=100) == []
+    assert len(client.poll()) == ftp.BURST_PACKETS_A_POLL
+    assert len(client.poll()) == ftp.BURST_PACKETS_A_POLL
+
+
+def test_bursts_of_several_clients_share_the_pace(service: Ftp) -> None:
+    clients = [Client(service, Peer(number, 1, number)) for number in range(20)]
+    for client in clients:
+        client.do(Opcode.OPEN_TO_READ, b"text")
+        client.send(Opcode.BURST, size=10)
+    served = [send.channel for _ in range(5) for send in service.poll(0)]
+    assert len(served) == 5 * ftp.BURST_PACKETS_A_POLL
+    assert set(served) == set(range(20))
+
+
+def test_a_client_that_is_gone_is_not_sent_a_large_file(client: Client, memory: Memory) -> None:
+    memory.write(("text",), 4_000_000, b"x")
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    replies = client.burst(0, DATA_BYTES)
+    assert len(replies) == ftp.LONGEST_BURST
+    assert replies[-1].burst_complete
+    assert len(replies[-1].data) == DATA_BYTES  # a shorter one would mean the end of the file
+    assert client.poll() == []
+
+
+@pytest.mark.parametrize("opcode", [Opcode.TERMINATE, Opcode.RESET, Opcode.OPEN_TO_READ])
+def test_a_burst_ends_with_its_session(client: Client, opcode: int) -> None:
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    client.send(Opcode.BURST, size=1)
+    assert client.poll()
+    client.do(opcode, b"text" if opcode == Opcode.OPEN_TO_READ else b"")
+    assert client.poll() == []
+
+
+def test_a_new_burst_replaces_the_old_one_and_gaps_are_filled_meanwhile(client: Client) -> None:
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    client.send(Opcode.BURST, size=1)
+    client.poll()
+    assert client.do(Opcode.READ, offset=5, size=1) == TEXT[5:6]
+    assert [reply.offset for reply in client.poll()] == list(range(8, 16))
+    client.send(Opcode.BURST, offset=100, size=1)
+    assert [reply.offset for reply in client.poll()] == list(range(100, 108))
+
+
+def test_a_file_that_is_cut_while_it_is_read_ends(client: Client, memory: Memory) -> None:
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    client.send(Opcode.BURST, size=100)
+    client.poll()
+    memory.truncate(("text",), 850)
+    (last,) = client.poll()
+    assert (last.offset, last.size, last.burst_complete) == (800, 50, 1)
+    client.send(Opcode.BURST, size=100)
+    memory.remove(("text",))
+    (gone,) = client.poll()
+    assert gone.error == Error.NOT_FOUND
+    assert client.poll() == []
+
+
+def test_a_file_that_grows_ends_where_it_ended_when_it_was_opened(client: Client, memory: Memory) -> None:
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    memory.write(("text",), len(TEXT), b"more")
+    assert b"".join(reply.data for reply in client.burst()) == TEXT
+    client.do(Opcode.TERMINATE)
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    assert b"".join(reply.data for reply in client.burst()) == TEXT + b"more"
+
+
+def test_a_file_is_written(client: Client, memory: Memory) -> None:
+    assert client.do(Opcode.CREATE, b"new") == b""
+    second = client.ask(Opcode.WRITE, b"world", offset=6)
+    assert (second.opcode, second.offset, second.size) == (Opcode.ACK, 6, 0)  # MAVProxy tells the parts by the offset
+    client.do(Opcode.WRITE, b"hello ", offset=0)
+    client.do(Opcode.TERMINATE)
+    assert client.ask(Opcode.WRITE, b"x").error == Error.INVALID_SESSION
+    client.do(Opcode.OPEN_TO_WRITE, b"new")
+    client.do(Opcode.WRITE, b"H", offset=0)
+    assert memory.open(("new",)).read(0, 100) == b"Hello world"  # type: ignore[union-attr]
+    client.do(Opcode.CREATE, b"new")
+    assert memory.open(("new",)).size == 0  # type: ignore[union-attr]
+
+
+def test_opening_to_write_makes_a_file(client: Client) -> None:
+    client.do(Opcode.OPEN_TO_WRITE, b"made")
+    assert b"Fmade\t0" in client.listed(b"/")
+
+
+def test_what_is_open_to_read_is_not_written_and_the_reverse(client: Client) -> None:
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    assert client.ask(Opcode.WRITE, b"x").error == Error.PROTECTED
+    client.do(Opcode.TERMINATE)
+    client.do(Opcode.OPEN_TO_WRITE, b"text")
+    assert client.ask(Opcode.READ, size=1).error == Error.INVALID_SESSION
+    assert client.ask(Opcode.BURST, size=1).error == Error.INVALID_SESSION
+
+
+@pytest.mark.parametrize(
+    ("opcode", "data", "offset", "error"),
+    [
+        (Opcode.OPEN_TO_READ, b"nope", 0, Error.NOT_FOUND),
+        (Opcode.OPEN_TO_READ, b"../text", 0, Error.NOT_FOUND),
+        (Opcode.OPEN_TO_READ, b"\xff\xfe", 0, Error.NOT_FOUND),
+        (Opcode.OPEN_TO_READ, b"logs", 0, Error.FAIL_ERRNO),
+        (Opcode.LIST, b"nope", 0, Error.NOT_FOUND),
+        (Opcode.LIST, b"text", 0, Error.FAIL_ERRNO),
+        (Opcode.LIST, b"", 99, Error.END_OF_FILE),
+        (Opcode.LIST, b"logs", 0, Error.END_OF_FILE),
+        (Opcode.CREATE, b"@PARAM/param.pck", 0, Error.PROTECTED),
+        (Opcode.OPEN_TO_WRITE, b"@PARAM/param.pck", 0, Error.PROTECTED),
+        (Opcode.CREATE, b"logs/new", 0, Error.PROTECTED),
+        (Opcode.CREATE, b"nope/new", 0, Error.NOT_FOUND),
+        (Opcode.CREATE, b"tab\tname", 0, Error.FAIL_ERRNO),
+        (Opcode.REMOVE, b"nope", 0, Error.NOT_FOUND),
+        (Opcode.MAKE_FOLDER, b"text", 0, Error.EXISTS),
+        (Opcode.MAKE_FOLDER, b"/", 0, Error.EXISTS),
+        (Opcode.REMOVE_FOLDER, b"text", 0, Error.FAIL_ERRNO),
+        (Opcode.RENAME, b"nope\0new", 0, Error.NOT_FOUND),
+        (Opcode.RENAME, b"text\0logs", 0, Error.EXISTS),
+        (Opcode.RENAME, b"text", 0, Error.INVALID_DATA_SIZE),
+        (Opcode.RENAME, b"text\0", 0, Error.INVALID_DATA_SIZE),
+        (Opcode.RENAME, b"text\0..", 0, Error.NOT_FOUND),
+        (Opcode.TRUNCATE, b"text", len(TEXT) + 1, Error.END_OF_FILE),
+        (Opcode.TRUNCATE, b"nope", 0, Error.NOT_FOUND),
+        (Opcode.CHECKSUM, b"nope", 0, Error.NOT_FOUND),
+        (17, b"text", 0, Error.UNKNOWN_COMMAND),
+        (200, b"", 0, Error.UNKNOWN_COMMAND),
+    ],
+)
+def test_refusals(client: Client, opcode: int, data: bytes, offset: int, error: int) -> None:
+    client.session = 77
+    refused = client.ask(opcode, data, offset)  # which checks that the session is echoed: else MAVProxy waits on
+    assert refused.error == error
+    assert client.listed(b"/") == [b"D@PARAM", b"Dlogs", b"Ftext\t%d" % len(TEXT)]
+
+
+def test_changes(client: Client) -> None:
+    client.do(Opcode.MAKE_FOLDER, b"d")
+    client.do(Opcode.RENAME, b"text\0d/renamed\0")
+    assert client.ask(Opcode.REMOVE_FOLDER, b"d").data == bytes((Error.FAIL_ERRNO, 39))  # ENOTEMPTY
+    client.do(Opcode.TRUNCATE, b"d/renamed", offset=3)
+    assert client.listed(b"d") == [b"Frenamed\t3"]
+    client.do(Opcode.REMOVE, b"d/renamed")
+    client.do(Opcode.REMOVE_FOLDER, b"d")
+    assert client.listed(b"/") == [b"D@PARAM", b"Dlogs"]
+
+
+@pytest.mark.parametrize("opcode", [Opcode.CREATE, Opcode.WRITE, Opcode.LIST, Opcode.READ, Opcode.NONE])
+def test_a_size_that_no_payload_has_is_refused(client: Client, opcode: int) -> None:
+    assert client.ask(opcode, b"x" * DATA_BYTES, size=240).error == Error.INVALID_DATA_SIZE
+
+
+def test_an_answer_is_not_answered(client: Client) -> None:
+    assert client.send(Opcode.ACK) == client.send(Opcode.NAK, bytes([Error.UNKNOWN_COMMAND])) == []
+
+
+def test_none_is_acknowledged(client: Client) -> None:
+    assert client.do(Opcode.NONE) == b""
+
+
+def test_a_long_folder_is_listed_in_parts(client: Client, memory: Memory) -> None:
+    memory.make_folder(("many",))
+    names = [f"{number:03}" + "x" * (number % 200) for number in range(300)]
+    for name in names:
+        memory.create(("many", name))
+    assert client.listed(b"many") == [b"F%s\t0" % name.encode() for name in names]
+
+
+def test_entries_have_times_where_they_are_asked_for(client: Client) -> None:
+    expected = [b"D@PARAM\t0\t0", b"Dlogs\t0\t0", b"Ftext\t%d\t0" % len(TEXT)]
+    assert client.listed(b"/", Opcode.LIST_WITH_TIME) == expected
+
+
+def test_a_name_that_cannot_be_told_is_skipped(client: Client, memory: Memory) -> None:
+    longest = DATA_BYTES - len(b"F\t0\0")
+    memory.create(("x" * longest,))
+    assert client.listed(b"/")[-1] == b"F%s\t0" % (b"x" * longest)
+    memory.create(("y" * (longest + 1),))
+    assert client.listed(b"/")[-1] == b"S"
+    memory.create(("z",))
+    assert client.listed(b"/")[-2:] == [b"S", b"Fz\t0"]
+
+
+@pytest.mark.parametrize("length", [0, 1, 1000, ftp.CHECKSUM_BYTES_A_POLL, 3 * ftp.CHECKSUM_BYTES_A_POLL + 1])
+def test_checksum(client: Client, memory: Memory, length: int) -> None:
+    """https://mavlink.io/en/guide/crc.html: from 0, not inverted; a large file takes some polls."""
+    data = random.Random(length).randbytes(length)
+    memory.create(("data",))
+    memory.write(("data",), 0, data)
+    client.sequence += 1
+    replies = client.send(Opcode.CHECKSUM, b"data")
+    polls = 0
+    while not replies:
+        polls += 1
+        if polls == 2:  # asked again, with another number, by a client that lost patience
+            client.sequence += 1
+            assert client.send(Opcode.CHECKSUM, b"data") == []
+        replies = client.poll()
+    assert polls == max(length - 1, 0) // ftp.CHECKSUM_BYTES_A_POLL
+    (reply,) = replies
+    assert reply.sequence == client.sequence + 1
+    bits = 0
+    for byte in data[:1000]:
+        bits ^= byte
+        for _ in range(8):
+            bits = bits >> 1 ^ (0xEDB88320 if bits & 1 else 0)
+    assert length > 1000 or int.from_bytes(reply.data, "little") == bits
+    assert int.from_bytes(reply.data, "little") == crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
+    assert client.poll() == []
+
+
+@pytest.mark.parametrize(
+    ("opcode", "data"),
+    [
+        (Opcode.MAKE_FOLDER, b"d"),
+        (Opcode.REMOVE, b"text"),
+        (Opcode.RENAME, b"text\0other"),
+        (Opcode.REMOVE_FOLDER, b"empty"),
+    ],
+)
+def test_a_repeated_request_gets_the_remembered_answer(
+    client: Client, memory: Memory, opcode: int, data: bytes
+) -> None:
+    memory.make_folder(("empty",))
+    first = client.ask(opcode, data)
+    assert client.send(opcode, data) == [first]
+    assert first.opcode == Opcode.ACK
+    assert client.ask(opcode, data).opcode == Opcode.NAK  # with another number it is another request
+    client.now_us += ftp.REMEMBERED_FOR_US + 1
+    client.sequence -= 1
+    assert client.send(opcode, data)[0].opcode == Opcode.NAK
+
+
+def test_a_refusal_is_not_remembered(client: Client, memory: Memory) -> None:
+    """Nothing was done, so that it may well be done when it is asked for again."""
+    assert client.ask(Opcode.REMOVE, b"new").error == Error.NOT_FOUND
+    memory.create(("new",))
+    assert client.send(Opcode.REMOVE, b"new")[0].opcode == Opcode.ACK
+
+
+def test_a_file_is_not_emptied_by_a_repeated_request(client: Client, memory: Memory) -> None:
+    client.do(Opcode.CREATE, b"new")
+    created = client.sequence
+    client.do(Opcode.WRITE, b"hello")
+    client.sequence = created
+    assert client.send(Opcode.CREATE, b"new")[0].opcode == Opcode.ACK
+    assert memory.open(("new",)).size == 5  # type: ignore[union-attr]
+
+
+def test_a_new_client_with_the_numbers_of_the_old_one_is_served_anew(client: Client) -> None:
+    for _ in range(2):
+        client.sequence = 0
+        client.do(Opcode.CREATE, b"new")
+        client.do(Opcode.WRITE, b"hello")
+        client.do(Opcode.TERMINATE)
+        client.do(Opcode.REMOVE, b"new")
+        client.do(Opcode.RESET)
+
+
+def test_memory_is_bounded(service: Ftp) -> None:
+    for number in range(1500):
+        client = Client(service, Peer(number, number % 256, 1), number % 256)
+        client.ask(Opcode.MAKE_FOLDER, b"%d" % number)
+        client.ask(Opcode.CREATE, b"text")
+        client.send(Opcode.BURST, size=1)
+        client.send(Opcode.CHECKSUM, b"text")
+    assert len(service._sessions) <= ftp.MOST_SESSIONS  # noqa: SLF001
+    assert len(service._remembered) <= ftp.MOST_REMEMBERED  # noqa: SLF001
+    assert len(service._bursts) <= ftp.MOST_SESSIONS  # noqa: SLF001
+    assert len(service._checksums) <= ftp.MOST_SESSIONS  # noqa: SLF001
+
+
+def test_every_client_has_its_own_sessions(service: Ftp, memory: Memory) -> None:
+    memory.create(("other",))
+    memory.write(("other",), 0, b"other")
+    one, two = Client(service), Client(service, OTHER)
+    one.do(Opcode.OPEN_TO_READ, b"text")
+    two.do(Opcode.OPEN_TO_READ, b"other")
+    assert one.do(Opcode.READ, size=5) == TEXT[:5]
+    assert two.do(Opcode.READ, size=5) == b"other"
+    two.do(Opcode.RESET)
+    assert one.do(Opcode.READ, size=5) == TEXT[:5]
+    assert two.ask(Opcode.READ, size=5).error == Error.INVALID_SESSION
+
+
+def test_a_client_may_have_several_sessions_but_not_too_many(service: Ftp) -> None:
+    for session in range(ftp.MOST_SESSIONS_OF_A_PEER):
+        Client(service, PEER, session).do(Opcode.OPEN_TO_READ, b"text")
+    full = Client(service, PEER, 200)
+    assert full.ask(Opcode.OPEN_TO_READ, b"text").error == Error.NO_SESSIONS
+    assert full.ask(Opcode.CREATE, b"never").error == Error.NO_SESSIONS
+    assert b"Fnever\t0" not in full.listed(b"/")
+    Client(service, OTHER).do(Opcode.OPEN_TO_READ, b"text")
+    Client(service, PEER, 3).do(Opcode.TERMINATE)
+    full.do(Opcode.OPEN_TO_READ, b"text")
+
+
+def test_an_idle_session_ends(client: Client) -> None:
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    client.now_us += ftp.SESSION_ENDS_AFTER_US
+    client.do(Opcode.READ, size=1)
+    client.now_us += ftp.SESSION_ENDS_AFTER_US + 1
+    assert client.ask(Opcode.READ, size=1).error == Error.INVALID_SESSION
+
+
+def test_a_session_that_its_client_lost_is_taken_over_but_not_one_in_use(client: Client) -> None:
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    client.do(Opcode.OPEN_TO_READ, b"text")  # the answer was lost, and MAVSDK asks with another number
+    assert client.ask(Opcode.OPEN_TO_READ, b"@PARAM/param.pck").error == Error.NO_SESSIONS
+    assert client.ask(Opcode.CREATE, b"new").error == Error.NO_SESSIONS
+    assert b"Fnew\t0" not in client.listed(b"/")
+    assert client.do(Opcode.READ, size=3) == TEXT[:3]
+    client.now_us += ftp.TAKEN_OVER_AFTER_US
+    client.do(Opcode.CREATE, b"new")
+    client.do(Opcode.WRITE, b"x")
+
+
+def test_a_session_is_ended_as_often_as_it_is_asked_for(client: Client) -> None:
+    """MAVSDK fails a download that is complete if the end, asked for again after a lost answer, is refused."""
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    assert client.do(Opcode.TERMINATE) == client.do(Opcode.TERMINATE) == b""
+
+
+def test_numbers_go_round(client: Client) -> None:
+    client.sequence = 0xFFFD
+    client.do(Opcode.OPEN_TO_READ, b"text")
+    client.sequence = 0xFFFE
+    assert [reply.sequence for reply in client.burst(0, 239)][:3] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_transfer_survives_loss(service: Ftp, memory: Memory, seed: int) -> None:
+    """Requests and answers are lost; the client asks again in the same words, as the specification says."""
+    chance = random.Random(seed)
+    client = Client(service, session=seed)
+    data = chance.randbytes(3000)
+
+    def do(opcode: int, what: bytes = b"", offset: int = 0, size: int | None = None) -> Reply:
+        client.sequence += 1
+        while True:
+            client.now_us += 50_000
+            if chance.random() < 0.3:
+                continue
+            (reply,) = client.send(opcode, what, offset, size)
+            if chance.random() < 0.7:
+                return reply
+
+    assert do(Opcode.MAKE_FOLDER, b"d").opcode == Opcode.ACK
+    assert do(Opcode.CREATE, b"d/up").opcode == Opcode.ACK
+    for offset in range(0, len(data), 200):
+        assert do(Opcode.WRITE, data[offset : offset + 200], offset).opcode == Opcode.ACK
+    assert do(Opcode.TERMINATE).opcode == Opcode.ACK
+    assert do(Opcode.RENAME, b"d/up\0d/file").opcode == Opcode.ACK
+    assert do(Opcode.OPEN_TO_READ, b"d/file").opcode == Opcode.ACK
+    read = b"".join(do(Opcode.READ, offset=offset, size=200).data for offset in range(0, len(data), 200))
+    assert read == data
+    assert do(Opcode.REMOVE, b"d/file").opcode == Opcode.ACK
+    assert do(Opcode.REMOVE_FOLDER, b"d").opcode == Opcode.ACK
+    assert [entry.name for entry in memory.list(())] == ["text"]  # type: ignore[union-attr]
+
+
+PATHS = st.sampled_from([b"", b"text", b"d", b"d/e", b"logs", b"logs/x", b"@PARAM/param.pck", b"..", b"a\0b", b"\xff"])
+REQUESTS = st.one_of(
+    st.binary(max_size=251),
+    st.builds(
+        lambda sequence, session, opcode, size, offset, data: (
+            HEADER.pack(sequence, session, opcode, min(size, 255), 0, 0, 0, offset) + data
+        ),
+        st.integers(0, 3),
+        st.integers(0, 2),
+        st.integers(0, 18),
+        st.one_of(st.integers(0, 12), st.integers(0, 255)),
+        st.one_of(st.integers(0, 20), st.integers(0, 0xFFFFFFFF)),
+        st.one_of(PATHS, st.binary(max_size=239)),
+    ),
+)
+
+
+@given(st.lists(st.tuples(REQUESTS, st.sampled_from([PEER, OTHER]), st.integers(0, 30_000_000)), max_size=60))
+def test_nothing_that_is_asked_raises(requests: list[tuple[bytes, Peer, int]]) -> None:
+    memory = Memory()
+    memory.create(("text",))
+    service = Ftp(Tree(memory, {"logs": ReadOnly(Memory())}, {"@PARAM/param.pck": lambda query: query.encode()}))
+    codec = Codec(255, 190)
+    now_us = 0
+    for payload, peer, later_us in requests:
+        now_us += later_us
+        (message,) = codec.decode(codec.encode("FILE_TRANSFER_PROTOCOL", 0, 1, 1, payload.ljust(251, b"\0")))
+        for send in (*service.receive(message, peer, now_us), *service.poll(now_us)):
+            reply = parsed(send)
+            assert reply.opcode in (Opcode.ACK, Opcode.NAK)
+            assert reply.size <= DATA_BYTES
+            if reply.opcode == Opcode.NAK:
+                assert reply.error in set(Error)
