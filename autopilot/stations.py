@@ -6,7 +6,7 @@ from importlib.metadata import version as version_of_package
 from math import pi
 
 from autopilot.calibration import Calibration
-from autopilot.commands import Commands
+from autopilot.commands import HIGHEST_M, Commands
 from autopilot.failures import Failures
 from autopilot.missions import Missions
 from autopilot.modes import MODES, custom_mode, mode_of_custom
@@ -15,7 +15,7 @@ from mavlink.dialect import AUTOPILOT_COMPONENT, mav
 from mavlink.files import Files, Tree
 from mavlink.flight_log import FlightLog
 from mavlink.framing import Framer
-from mavlink.geodesy import Geodetic, enu_of
+from mavlink.geodesy import Geodetic, is_on_earth
 from mavlink.hub import Hub, Outgoing
 from mavlink.memory import Memory
 from mavlink.parameters import Parameters
@@ -61,7 +61,8 @@ class StationSettings:
         origin: Of the ENU frame.
         boot_unix_us: Unix time at the start; 0 where nobody knows it.
         signing: Judges and signs frames.
-        files: What can be read and written by file transfer, the logs in folder `logs`.
+        files: What can be read and written by file transfer.
+        logs: Where the logs of flights go; None: into folder `logs` of the files.
     """
 
     system_id: int
@@ -70,6 +71,7 @@ class StationSettings:
     boot_unix_us: int = 0
     signing: Signing | None = None
     files: Files | None = None
+    logs: Files | None = None
 
 
 class Stations:
@@ -118,7 +120,7 @@ class Stations:
             self.offboard,
             self.manual,
             self.follow,
-            OriginService(Setters(self._set_origin, self._set_home, self._set_mode), self._text),
+            OriginService(Setters(self._set_origin, self.commands.move_home, self._set_mode), self._text),
             Ftp(files),
             Logs(files, (LOGS,), lambda: self.log.name),
             Shell({"ver": lambda _: self.banner() + "\n", "status": lambda _: self._status(), "param": self._param}),
@@ -173,7 +175,8 @@ class Stations:
         metadata = Metadata(metadata_json(self._parameters))
         self._metadata = metadata
         pack = {"@PARAM/param.pck": lambda query: packed_for(self._parameters, query) or b""}
-        return Tree(root, {}, {**metadata.files, **pack})
+        mounts = {} if self._settings.logs is None else {LOGS: self._settings.logs}
+        return Tree(root, mounts, {**metadata.files, **pack}, {"@MAV_LOG": LOGS})
 
     def _handlers(self) -> Mapping[int, Handler | Entry]:
         streams = self._streams
@@ -222,18 +225,13 @@ class Stations:
         return autopilot_version(self._identity, version_of(VERSION), self._settings.system_id)
 
     def _set_origin(self, place: Geodetic) -> str:
+        if not is_on_earth(place.latitude_deg, place.longitude_deg) or not abs(place.altitude_m) <= HIGHEST_M:
+            return "origin refused: not a latitude, longitude and altitude"
         if self._pilot.state.armed:
             return "origin refused: the rotors are armed"
         self.commands.origin = place
         self.missions.moved_origin()
         return ""
-
-    def _set_home(self, place: Geodetic) -> str:
-        home = enu_of(place, self.commands.origin)
-        refused = self.commands.unreachable(home)
-        if not refused:
-            self._pilot.set_home(home, self._pilot.home_yaw_rad)
-        return f"home refused: {refused}" if refused else ""
 
     def _set_mode(self, base_mode: int, number: int) -> str:
         return self.commands.set_custom_mode(base_mode, number).reason
