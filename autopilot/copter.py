@@ -187,12 +187,13 @@ class Copter:
             Need.STICKS: sticks is not None,
             Need.SETPOINTS: setpoint is not None,
             Need.MISSION: stations.missions.has_mission,
+            Need.INSIDE_FENCE: not stations.missions.leaves_fence,
             Need.CIRCLE: False,
             Need.FLYING: not pilot.standing,
         }
         missing = tuple(need for need, there in met.items() if not there)
         thrust = sticks.thrust if sticks is not None and pilot.state.mode is Mode.STABILIZED else None
-        outside = stations.missions.fence_refusal(state.position_enu_m) if stations.missions.has_fence else ""
+        outside = stations.missions.breach(state.position_enu_m, self._time_us or 0)
         facts = Facts(state, pilot.standing, self._power.left, thrust, outside)
         pilot.take_stock(facts, missing)
 

@@ -12,6 +12,7 @@ from autopilot.parameters import ImpossibleError, definitions
 from autopilot.profile import Profile
 from autopilot.stations import REBOOT, SHUT_DOWN, StationSettings
 from autopilot.tracks import track
+from mavlink.files import Quota
 from mavlink.folder import Folder
 from mavlink.link import LinkError
 from mavlink.parameters import Parameters, Value
@@ -23,6 +24,8 @@ from plant.vehicle import Vehicle
 KEY = "signing.key"
 TIMESTAMP = "signing.timestamp"
 FILES = "files"
+LOGS = "logs"
+LOG_QUOTA = Quota(512 << 20, 200)
 _TELL_EVERY_S = 0.5
 _SAVE_EVERY_S = 10.0
 
@@ -54,6 +57,7 @@ class Ground:
         try:
             links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
             self._folder = Folder(self._state / FILES) if self._state else None
+            self._logs = Folder(self._state / LOGS, LOG_QUOTA) if self._state else None
         except LinkError as error:
             raise GroundError(str(error)) from error
         except OSError as error:
@@ -87,8 +91,9 @@ class Ground:
         self.copter.stations.log.close()
         self._save_signing()
         self._links.close()
-        if self._folder:
-            self._folder.close()
+        for folder in (self._folder, self._logs):
+            if folder:
+                folder.close()
 
     def _restart(self, kind: float) -> None:
         if kind == SHUT_DOWN:
@@ -109,6 +114,7 @@ class Ground:
             boot_unix_us=round(time() * 1e6),
             signing=self._signing,
             files=self._folder,
+            logs=self._logs,
         )
         try:
             copter = Copter(

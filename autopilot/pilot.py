@@ -174,7 +174,7 @@ class Pilot:
 
     def fly(self, mode: Mode, course: Course) -> Refusal | None:
         """Change to `mode` and fly `course` in it; return why not."""
-        refusal = self._follow(Event.SELECT, "", mode)
+        refusal = self._follow(Event.SELECT, "", mode, met=(Need.CIRCLE,))
         if refusal is None:
             self._take(course)
         return refusal
@@ -282,8 +282,10 @@ class Pilot:
         if self.reference is not None:
             self.reference = self.reference._replace(on_target=False)
 
-    def _follow(self, event: Event, text: str, selected: Mode | None = None) -> Refusal | None:
-        after = following(self.state, event, selected, self._missing)
+    def _follow(
+        self, event: Event, text: str, selected: Mode | None = None, met: Sequence[Need] = ()
+    ) -> Refusal | None:
+        after = following(self.state, event, selected, [need for need in self._missing if need not in met])
         if isinstance(after, Refusal):
             return after
         if after != self.state and text:
