@@ -55,16 +55,17 @@ class Ground:
         self._state: Path | None = args.state
         self._signing = self._read_key()
         try:
-            links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
             self._folder = Folder(self._state / FILES) if self._state else None
             self._logs = Folder(self._state / LOGS, LOG_QUOTA) if self._state else None
-        except LinkError as error:
-            raise GroundError(str(error)) from error
         except OSError as error:
             raise GroundError(f"cannot write to --state {self._state}: {error.strerror}") from error
-        self._links = GroundLinks(links)
         self._first = track(args.track) if args.track else None
         self.copter = self._vehicle_anew()
+        try:
+            links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
+        except LinkError as error:
+            raise GroundError(str(error)) from error
+        self._links = GroundLinks(links)
         self.shut_down = False
         self._revision = self.copter.parameters.revision
         self._told_s = self._saved_s = perf_counter()
@@ -102,6 +103,7 @@ class Ground:
         elif kind == REBOOT:
             self.copter.stations.log.close()
             self.copter = self._vehicle_anew()
+            self._links.introduce(self.copter.stations)
             self._revision = self.copter.parameters.revision
             self._status.say("said", "restarted by a ground station")
 
@@ -122,7 +124,6 @@ class Ground:
             )
         except ImpossibleError as error:
             raise GroundError(f"{self._parameter_path()}: {error}") from error
-        self._links.introduce(copter.stations)
         return copter
 
     def _parameter_path(self) -> Path:
