@@ -2,7 +2,7 @@
 
 Items: https://mavlink.io/en/messages/common.html#MAV_CMD_NAV_FENCE_RETURN_POINT and those after it. The vehicle must
 be inside all inclusion zones of a group, of at least one group (their parameter 2), and outside every exclusion zone.
-Zones reach from the ground to the sky.
+Zones reach from the ground to the sky. A circle of radius 0 is none: clients that must send some circle send that one.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -39,7 +39,7 @@ def check_fence_item(item: MissionItem) -> int:
         return int(mav.MAV_MISSION_UNSUPPORTED_FRAME)
     if item.command in POLYGONS and not (item.p1 >= FEWEST_VERTICES and isfinite(item.p1) and item.p1 == int(item.p1)):
         return int(mav.MAV_MISSION_INVALID_PARAM1)
-    if item.command in CIRCLES and not 0.0 < item.p1 <= FARTHEST_M:
+    if item.command in CIRCLES and not 0.0 <= item.p1 <= FARTHEST_M:
         return int(mav.MAV_MISSION_INVALID_PARAM1)
     if item.command in INCLUSIONS and not (isnan(item.p2) or isfinite(item.p2)):
         return int(mav.MAV_MISSION_INVALID_PARAM2)
@@ -139,6 +139,8 @@ class Geofence:
     def _add(self, item: MissionItem, places: Sequence[tuple[float, float]]) -> None:
         if item.command == RETURN_POINT:
             self.return_point_enu_m = places[0]
+            return
+        if item.command in CIRCLES and item.p1 == 0.0:
             return
         zone: Zone = Polygon(places) if item.command in POLYGONS else Disc(*places[0], item.p1)
         if item.command in INCLUSIONS:

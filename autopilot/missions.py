@@ -8,7 +8,7 @@ from autopilot.course import Asked, Course, Scene
 from autopilot.courses import Climb, Stop, Way, homeward, landing
 from autopilot.geofence import Geofence, check_fence, check_fence_item
 from autopilot.mission import MissionExecutor, Reached, SetHome
-from autopilot.mission_items import check_item, check_mission, check_rally_item
+from autopilot.mission_items import check_item, check_mission, check_rally_item, places
 from autopilot.mission_legs import Defaults, Situation
 from autopilot.modes import Event, Mode
 from autopilot.orders import Circle, GoTo, Hold, Land, Order, Return, TakeOff
@@ -17,7 +17,9 @@ from mavlink.frames import Vector
 from mavlink.services.mission import MissionService, Vehicle
 from mavlink.services.mission_items import ACCEPTED, FENCE, MISSION, RALLY, MissionItem, Plan
 from mavlink.services.mission_upload import Rules
-from mavlink.services.statustext import INFO, StatusText
+from mavlink.services.statustext import INFO, WARNING, StatusText
+
+_LOOK_EVERY_US = 100_000
 
 
 class Missions:
@@ -34,6 +36,8 @@ class Missions:
         self._commands = commands
         self.executor = MissionExecutor()
         self._fence = Geofence((), commands.origin)
+        self._outside = self._breach = ""
+        self._breach_due_us = 0
         rules = {
             MISSION: Rules(check_item, check_mission),
             FENCE: Rules(check_fence_item, check_fence),
@@ -48,6 +52,11 @@ class Missions:
         return bool(self.executor.items)
 
     @property
+    def leaves_fence(self) -> bool:
+        """Whether the mission goes to a place where the geofence does not let the vehicle be."""
+        return bool(self._outside)
+
+    @property
     def has_fence(self) -> bool:
         """Whether there is a geofence."""
         return bool(self.service.plans[FENCE].items)
@@ -56,9 +65,16 @@ class Missions:
         """Return why the vehicle may not fly to a place; empty if it may."""
         return self._fence.refusal(place)
 
+    def breach(self, place: Vector, now_us: int) -> str:
+        """Return why the vehicle may not be where it is; looked at ten times a second, fences take time."""
+        if self.has_fence and now_us >= self._breach_due_us:
+            self._breach_due_us = now_us + _LOOK_EVERY_US
+            self._breach = self._fence.refusal(place)
+        return self._breach
+
     def moved_origin(self) -> None:
         """See the geofence from another origin."""
-        self._fence = Geofence(self.service.plans[FENCE].items, self._commands.origin)
+        self._fence_in(self.service.plans[FENCE].items)
 
     def course(self) -> Course:
         """Return the course of the mission, from its current item on."""
@@ -108,8 +124,23 @@ class Missions:
             self.executor.load(items)
             self._pilot.say(INFO, f"mission of {len(items)} items" if items else "mission cleared")
         elif plan_type == FENCE:
-            self._fence = Geofence(items, self._commands.origin)
             self._pilot.say(INFO, "geofence loaded" if items else "geofence cleared")
+            self._fence_in(items)
+        self._check_mission()
+
+    def _fence_in(self, items: Sequence[MissionItem]) -> None:
+        self._fence = Geofence(items, self._commands.origin)
+        self._breach, self._breach_due_us = "", 0
+        self._check_mission()
+
+    def _check_mission(self) -> None:
+        """Look for an item that leads outside the geofence; the way between two items is not looked at."""
+        pilot, before = self._pilot, self._outside
+        found = places(self.executor.items, pilot.home_enu_m, self._commands.origin) if self.has_fence else ()
+        outside = [(seq, refused) for seq, place in found if (refused := self.fence_refusal(place))]
+        self._outside = f"item {outside[0][0]} of the mission: {outside[0][1]}" if outside else ""
+        if self._outside and self._outside != before:
+            pilot.say(WARNING, self._outside)
 
     def _set_current(self, seq: int, reset: bool) -> str:
         return self.executor.set_current(seq, reset)

@@ -35,6 +35,7 @@ class Need(Enum):
     STICKS = "no MANUAL_CONTROL is heard"
     SETPOINTS = "no offboard setpoints are heard: send them before the mode"
     MISSION = "there is no mission"
+    INSIDE_FENCE = "the mission leads outside the geofence"
     CIRCLE = "command DO_ORBIT says where"
     FLYING = "the vehicle is not flying"
 
@@ -116,7 +117,14 @@ MODES: tuple[ModeRow, ...] = (
     ModeRow(Mode.LAND, AUTO, 6, mav.MAV_STANDARD_MODE_LAND, (), False, True, "sinks here, then disarms"),
     ModeRow(Mode.RETURN, AUTO, 5, mav.MAV_STANDARD_MODE_SAFE_RECOVERY, (), False, True, "climbs, flies home and lands"),
     ModeRow(
-        Mode.MISSION, AUTO, 4, mav.MAV_STANDARD_MODE_MISSION, (Need.MISSION,), True, True, "flies the uploaded mission"
+        Mode.MISSION,
+        AUTO,
+        4,
+        mav.MAV_STANDARD_MODE_MISSION,
+        (Need.MISSION, Need.INSIDE_FENCE),
+        True,
+        True,
+        "flies the uploaded mission",
     ),
     ModeRow(Mode.OFFBOARD, 6, 0, 0, (Need.SETPOINTS,), True, True, "follows the setpoints of a companion"),
     ModeRow(

@@ -84,7 +84,7 @@ class Photographer:
             origin=stations.commands.origin,
             gps_ok=not stations.failures.gps_off,
             fence_enabled=stations.missions.has_fence,
-            fence_breached=bool(stations.missions.fence_refusal(state.position_enu_m)),
+            fence_breached=bool(stations.missions.breach(state.position_enu_m, now_us)),
             home=Home(pilot.home_enu_m, pilot.home_yaw_rad),
             rotor_speeds_rad_s=(c1 * speed, c2 * speed, c3 * speed, c4 * speed),
             controls=controls,

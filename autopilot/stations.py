@@ -61,7 +61,8 @@ class StationSettings:
         origin: Of the ENU frame.
         boot_unix_us: Unix time at the start; 0 where nobody knows it.
         signing: Judges and signs frames.
-        files: What can be read and written by file transfer, the logs in folder `logs`.
+        files: What can be read and written by file transfer.
+        logs: Where the logs of flights go; None: into folder `logs` of the files.
     """
 
     system_id: int
@@ -70,6 +71,7 @@ class StationSettings:
     boot_unix_us: int = 0
     signing: Signing | None = None
     files: Files | None = None
+    logs: Files | None = None
 
 
 class Stations:
@@ -173,7 +175,8 @@ class Stations:
         metadata = Metadata(metadata_json(self._parameters))
         self._metadata = metadata
         pack = {"@PARAM/param.pck": lambda query: packed_for(self._parameters, query) or b""}
-        return Tree(root, {}, {**metadata.files, **pack})
+        mounts = {} if self._settings.logs is None else {LOGS: self._settings.logs}
+        return Tree(root, mounts, {**metadata.files, **pack}, {"@MAV_LOG": LOGS})
 
     def _handlers(self) -> Mapping[int, Handler | Entry]:
         streams = self._streams

@@ -77,6 +77,12 @@ def test_groups_of_inclusions() -> None:
     assert not either.inside((10.0, 0.0, 0.0))
 
 
+def test_a_circle_of_no_radius_is_none() -> None:
+    """MAVSDK cannot send a polygon alone: who wants no circle sends this one."""
+    around = fence(*polygon(IN, SQUARE), item(DISC_IN, 1e4, 1e4, 0.0), item(DISC_OUT, 0.0, 0.0, 0.0))
+    assert around.margin_m((-5.0, 0.0, 0.0)) == pytest.approx(5.0, abs=0.02)
+
+
 def test_where_to_return() -> None:
     assert fence(item(BACK, 3.0, -4.0)).return_point_enu_m == pytest.approx((3.0, -4.0), abs=0.02)
     assert fence().return_point_enu_m is None
@@ -125,9 +131,9 @@ def test_a_polygon_has_the_sum_of_angles_as_its_measure(
 def test_nothing_closer_than_the_margin_changes_sides(east: float, north: float, angle: float, part: float) -> None:
     for zone in (Polygon(HORSESHOE), Disc(1.0, 2.0, 30.0)):
         depth = zone.depth_m(east, north)
-        step = min(part, 0.999 * abs(depth))
+        step = min(part, max(0.999 * abs(depth) - 1e-9, 0.0))
         there = zone.depth_m(east + step * cos(angle), north + step * sin(angle))
-        assert there * depth >= 0.0
+        assert there * depth >= 0.0 or abs(depth) < 1e-9
         assert abs(there - depth) <= step + 1e-9
     assert Disc(0.0, 0.0, 1.0).depth_m(east, north) == 1.0 - hypot(east, north)
 
@@ -141,7 +147,7 @@ def test_nothing_closer_than_the_margin_changes_sides(east: float, north: float,
         ({"p1": 3.5}, mav.MAV_MISSION_INVALID_PARAM1),
         ({"p1": nan}, mav.MAV_MISSION_INVALID_PARAM1),
         ({"p1": inf}, mav.MAV_MISSION_INVALID_PARAM1),
-        ({"command": DISC_IN, "p1": 0.0}, mav.MAV_MISSION_INVALID_PARAM1),
+        ({"command": DISC_IN, "p1": -1.0}, mav.MAV_MISSION_INVALID_PARAM1),
         ({"command": DISC_OUT, "p1": nan}, mav.MAV_MISSION_INVALID_PARAM1),
         ({"p2": inf}, mav.MAV_MISSION_INVALID_PARAM2),
         ({"x": 900000001}, mav.MAV_MISSION_INVALID_PARAM5_X),
