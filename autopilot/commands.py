@@ -1,9 +1,10 @@
 """MAVLink commands to the vehicle, each checked and handed to the pilot: what is not finite or too large is denied."""
 
 from collections.abc import Callable, Mapping
-from math import hypot, isfinite, isnan, nan, pi
+from math import cos, hypot, isfinite, isnan, nan, pi, radians, sin
 
-from autopilot.courses import Climb, Round, Stop, Way
+from autopilot.circling import Round
+from autopilot.courses import Climb, Stop, Way
 from autopilot.modes import Mode, Refusal, mode_of, mode_of_custom
 from autopilot.orders import Circle, GoTo
 from autopilot.pilot import Pilot
@@ -25,6 +26,14 @@ FORCE_MAGIC = 21196
 FARTHEST_M = 100_000.0
 HIGHEST_M = 10_000.0
 SMALLEST_RADIUS_M = 1.0
+LARGEST_YAW_RAD = 4.0 * pi
+LARGEST_TURN_DEG = 360.0
+_YAW_BEHAVIOURS = range(mav.ORBIT_YAW_BEHAVIOUR_UNCHANGED + 1)
+_POINTS = 72
+"""Of a circle, that must all be inside the fence."""
+_OVER_GROUND = (mav.SPEED_TYPE_AIRSPEED, mav.SPEED_TYPE_GROUNDSPEED)
+"""SPEED_TYPE: without an airspeed sensor one is as good as the other."""
+_SAME_SPEED, _DEFAULT_SPEED = -1.0, -2.0
 _RELATIVE = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
@@ -102,18 +111,17 @@ class Commands:
     def _take_off(self, command: Command) -> Outcome:
         """Climb to z, or to the parameter's height: QGC sends it above sea level, others above home."""
         pilot = self._pilot
-        base_m = pilot.home_enu_m[2]
-        height_m = base_m + pilot.behaviour.takeoff_height_m
+        height_m = pilot.ground_m + pilot.behaviour.takeoff_height_m
         if not isnan(command.z):
             height_m = self._height_of_takeoff(command)
-        if not isfinite(height_m) or not base_m < height_m < HIGHEST_M:
-            return Outcome(DENIED, "take-off refused: not a height above home")
+        if not pilot.ground_m < height_m < HIGHEST_M:
+            return _denied("take-off", "not a height above the ground")
         scene = pilot.scene()
         x, y, _ = scene.place
         refused = self._fence((x, y, height_m))
         if refused:
-            return Outcome(DENIED, f"take-off refused: {refused}")
-        return _outcome(pilot.fly(Mode.TAKEOFF, Climb(height_m, None, scene)))
+            return _denied("take-off", refused)
+        return _outcome(pilot.fly(Mode.TAKEOFF, Climb(height_m, None, scene, pilot.behaviour.takeoff_speed_m_s)))
 
     def _height_of_takeoff(self, command: Command) -> float:
         """Take z as above home, as most mean it, but from who says otherwise: QGC, which sends a pitch of -1."""
@@ -126,35 +134,44 @@ class Commands:
         return self._select(Mode.MISSION) if command.p1 == 1.0 else Outcome(DENIED, "pause with 0, go on with 1")
 
     def _reposition(self, command: Command) -> Outcome:
-        speed = command.p1 if command.p1 > 0.0 else nan
-        if not (isnan(command.p4) or abs(command.p4) <= 4.0 * pi):
-            return Outcome(DENIED, "reposition refused: yaw is in radians")
-        if isnan(command.x) and isnan(command.y) and isnan(command.z) and isnan(command.p4):
+        """Fly to a place, or stop where none is given. Whoever asks means it, with or without the flag that says so."""
+        if command.p2 not in (0.0, 1.0) and not isnan(command.p2):
+            return _denied("reposition", f"a flag of {command.p2:g} is not known")
+        if not (isnan(command.p4) or abs(command.p4) <= LARGEST_YAW_RAD):
+            return _denied("reposition", "yaw is in radians")
+        speed = nan if command.p1 in (-1.0, 0.0) else command.p1
+        if not (isnan(speed) or self._may_fly_at(speed)):
+            return _denied("reposition", f"a speed of {speed:g} m/s")
+        if all(map(isnan, (command.x, command.y, command.z, command.p4))):
             return _outcome(self._pilot.fly(Mode.HOLD, Stop()))
         frame = mav.MAV_FRAME_GLOBAL if command.frame is None else command.frame
         return self._go(command.x, command.y, command.z, frame, command.p4, speed)
 
     def _go(self, x: float, y: float, z: float, frame: int, yaw_ned: float, speed: float) -> Outcome:
         pilot = self._pilot
-        if pilot.standing or not pilot.state.armed:
-            return Outcome(DENIED, "reposition refused: the vehicle is not flying")
+        if not self._flies:
+            return _denied("reposition", "the vehicle is not flying")
         scene = pilot.scene()
-        if isnan(x) and isnan(y):
-            place = scene.place
-        elif is_on_earth(x, y):
-            place = (*enu_of(Geodetic(x, y, 0.0), self.origin)[:2], scene.place[2])
-        else:
-            return Outcome(DENIED, "reposition refused: not a latitude and longitude")
+        place, only_height = scene.place, isnan(x) and isnan(y)
+        if not only_height:
+            if not is_on_earth(x, y):
+                return _denied("reposition", "not a latitude and longitude")
+            place = (*enu_of(Geodetic(x, y, 0.0), self.origin)[:2], place[2])
         if not isnan(z):
             height_m = pilot.home_enu_m[2] + z if frame in _RELATIVE else z - self.origin.altitude_m
             place = (place[0], place[1], height_m)
         refused = self.unreachable(place)
         if refused:
-            return Outcome(DENIED, f"reposition refused: {refused}")
-        only_height = isnan(x) and isnan(y)
+            return _denied("reposition", refused)
         yaw = 0.5 * pi - yaw_ned if not isnan(yaw_ned) else scene.yaw_rad if only_height else None
-        way = Way(GoTo(place, yaw, speed if speed > 0.0 else None), scene)
-        return _outcome(pilot.fly(Mode.HOLD, way))
+        return _outcome(pilot.fly(Mode.HOLD, Way(GoTo(place, yaw, None if isnan(speed) else speed), scene)))
+
+    @property
+    def _flies(self) -> bool:
+        return self._pilot.state.armed and not self._pilot.standing
+
+    def _may_fly_at(self, speed_m_s: float) -> bool:
+        return 0.0 < speed_m_s <= self._pilot.behaviour.fastest_m_s
 
     def unreachable(self, place: Vector) -> str:
         """Return why the vehicle may not fly to a place; empty if it may."""
@@ -166,39 +183,51 @@ class Commands:
     def _orbit(self, command: Command) -> Outcome:
         """Fly around; z is above sea level whatever the frame says, as MAVSDK and PX4 take it."""
         pilot = self._pilot
+        if not self._flies:
+            return _denied("orbit", "the vehicle is not flying")
         scene = pilot.scene()
-        if pilot.standing:
-            return Outcome(DENIED, "orbit refused: the vehicle is not flying")
         x, y, z = scene.place
-        if not (isnan(command.x) or isnan(command.y)):
+        if not (isnan(command.x) and isnan(command.y)):
             if not is_on_earth(command.x, command.y):
-                return Outcome(DENIED, "orbit refused: not a latitude and longitude")
+                return _denied("orbit", "not a latitude and longitude")
             x, y, _ = enu_of(Geodetic(command.x, command.y, 0.0), self.origin)
         if not isnan(command.z):
             z = command.z - self.origin.altitude_m
         radius = pilot.behaviour.orbit_radius_m if isnan(command.p1) else command.p1
         speed = None if isnan(command.p2) else abs(command.p2)
         yaw = 0.0 if isnan(command.p3) else command.p3
-        if not SMALLEST_RADIUS_M <= abs(radius) <= FARTHEST_M:
-            return Outcome(DENIED, f"orbit refused: a radius of {radius:g} m")
-        if speed is not None and not 0.0 < speed <= pilot.behaviour.fastest_m_s:
-            return Outcome(DENIED, f"orbit refused: a speed of {speed:g} m/s")
-        if not 0.0 <= yaw <= mav.ORBIT_YAW_BEHAVIOUR_UNCHANGED:
-            return Outcome(DENIED, "orbit refused: no such yaw behaviour")
-        refused = self.unreachable((x, y, z))
+        circle = Circle((x, y, z), radius, speed, int(yaw) if yaw in _YAW_BEHAVIOURS else -1)
+        refused = self._no_circle(circle)
         if refused:
-            return Outcome(DENIED, f"orbit refused: {refused}")
-        return _outcome(pilot.fly(Mode.ORBIT, Round(Circle((x, y, z), radius, speed, int(yaw)), scene)))
+            return _denied("orbit", refused)
+        return _outcome(pilot.fly(Mode.ORBIT, Round(circle, scene)))
+
+    def _no_circle(self, circle: Circle) -> str:
+        """Return why the vehicle may not fly a circle; empty if it may."""
+        (x, y, z), radius, speed, yaw_behaviour = circle
+        if not SMALLEST_RADIUS_M <= abs(radius) <= FARTHEST_M:
+            return f"a radius of {radius:g} m"
+        if speed is not None and not self._may_fly_at(speed):
+            return f"a speed of {speed:g} m/s"
+        if yaw_behaviour not in _YAW_BEHAVIOURS:
+            return "no such yaw behaviour"
+        angles = (2.0 * pi * point / _POINTS for point in range(_POINTS))
+        around = ((x + radius * cos(angle), y + radius * sin(angle), z) for angle in angles)
+        return next(filter(None, map(self.unreachable, around)), "")
 
     def _change_speed(self, command: Command) -> Outcome:
-        if command.p2 == -1.0:
-            return Outcome()
-        if command.p2 == -2.0:
+        """Set the speed over ground; -1 leaves it, -2 is the parameters'."""
+        kind, speed, _, relative = command[1:5]
+        if kind not in _OVER_GROUND and not isnan(kind):
+            return Outcome(UNSUPPORTED, "speed refused: only that over ground can be set")
+        if relative == 1.0:
+            return Outcome(UNSUPPORTED, "speed refused: only absolute ones can be set")
+        if speed == _DEFAULT_SPEED:
             self._pilot.speed_m_s = None
-        elif 0.0 < command.p2 <= self._pilot.behaviour.fastest_m_s:
-            self._pilot.speed_m_s = command.p2
-        else:
-            return Outcome(DENIED, f"a speed of {command.p2:g} m/s refused")
+        elif self._may_fly_at(speed):
+            self._pilot.speed_m_s = speed
+        elif speed != _SAME_SPEED:
+            return _denied("speed", f"{speed:g} m/s")
         return Outcome()
 
     def _set_home(self, command: Command) -> Outcome:
@@ -207,35 +236,48 @@ class Commands:
             scene = pilot.scene()
             pilot.set_home(scene.state.position_enu_m, scene.state.euler[2])
             return Outcome()
+        if command.p1 != 0.0 and not isnan(command.p1):
+            return _denied("home", "1 is here, 0 is there")
         if not is_on_earth(command.x, command.y) or not isfinite(command.z):
-            return Outcome(DENIED, "home refused: not a latitude, longitude and altitude")
-        home = enu_of(Geodetic(command.x, command.y, command.z), self.origin)
-        if hypot(home[0], home[1]) > FARTHEST_M or abs(home[2]) > HIGHEST_M:
-            return Outcome(DENIED, "home refused: too far away")
-        pilot.set_home(home, pilot.home_yaw_rad)
-        return Outcome()
+            return _denied("home", "not a latitude, longitude and altitude")
+        refused = self.move_home(Geodetic(command.x, command.y, command.z))
+        return Outcome(DENIED, refused) if refused else Outcome()
+
+    def move_home(self, place: Geodetic) -> str:
+        """Have home at a place on earth; return why not."""
+        home = enu_of(place, self.origin)
+        refused = self.unreachable(home)
+        if not refused:
+            self._pilot.set_home(home, self._pilot.home_yaw_rad)
+        return f"home refused: {refused}" if refused else ""
 
     def _terminate(self, command: Command) -> Outcome:
-        if command.p1 >= 0.5:
+        if command.p1 == 1.0:
             return _outcome(self._pilot.disarm(force=True))
-        return Outcome(DENIED, "nothing to undo: the flight is not terminated")
+        return Outcome(DENIED, "flight terminated by 1 alone, and never undone")
 
     def _turn(self, command: Command) -> Outcome:
-        if not isfinite(command.p1):
-            return Outcome(DENIED, "turn refused: no angle")
-        pilot = self._pilot
-        if pilot.standing:
+        """Turn on the spot; the angle counts clockwise from north, or from the heading now where p4 is 1."""
+        angle, _, way, relative = (0.0 if isnan(value) else value for value in command[1:5])
+        if isnan(command.p1) or abs(angle) > LARGEST_TURN_DEG or way not in (-1.0, 0.0, 1.0):
+            return _denied("turn", "not an angle and a direction")
+        if relative not in (0.0, 1.0):
+            return _denied("turn", "1 counts from the heading, 0 from north")
+        if not self._flies:
             return Outcome(TEMPORARILY_REJECTED, "turn refused: the vehicle is not flying")
-        scene = pilot.scene()
-        yaw = 0.5 * pi - command.p1 * pi / 180.0
-        if command.p4 == 1.0:
-            yaw = scene.yaw_rad - command.p1 * pi / 180.0 * (-1.0 if command.p3 < 0.0 else 1.0)
-        return _outcome(pilot.fly(Mode.HOLD, Way(GoTo(scene.place, yaw), scene)))
+        scene = self._pilot.scene()
+        zero_rad = scene.yaw_rad if relative else 0.5 * pi
+        yaw = zero_rad - radians(-angle if relative and way < 0.0 else angle)
+        return _outcome(self._pilot.fly(Mode.HOLD, Way(GoTo(scene.place, yaw), scene)))
 
     def _check(self, command: Command) -> Outcome:
         del command
         reasons = self._pilot.refusals()
         return Outcome(FAILED, "not ready: " + "; ".join(reasons)) if reasons else Outcome(ACCEPTED)
+
+
+def _denied(what: str, reason: str) -> Outcome:
+    return Outcome(DENIED, f"{what} refused: {reason}")
 
 
 def _outcome(refusal: Refusal | None) -> Outcome:

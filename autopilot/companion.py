@@ -1,17 +1,23 @@
-"""The course of an offboard companion: its setpoints, from moment to moment."""
+"""The course of an offboard companion: its setpoints, from moment to moment, no faster than anything else flies."""
 
-from math import isnan
+from math import hypot, isnan
 
 import numpy as np
 
 from autopilot.attitude_reference import AttitudeReference
-from autopilot.courses import Lean, Motion, Scene, Stop
+from autopilot.course import Endless, Lean, Motion, Scene
+from autopilot.courses import Stop
 from autopilot.leaning import Leaning
 from autopilot.reference import Kind, Target, still_target
+from mavlink.frames import Vector
 from mavlink.setpoints import AttitudeSetpoint, PositionSetpoint
 
+UP = 2
+_BRAKE_1_S = 2.0
+"""How fast an acceleration fades where the speed comes near what is allowed."""
 
-class Companion:
+
+class Companion(Endless):
     """The setpoints of an offboard companion; where they end, stop."""
 
     def __init__(self, attitude: AttitudeReference | None) -> None:
@@ -32,35 +38,47 @@ class Companion:
             return self._leaning.by_setpoint(setpoint, scene)
         return self._hold.ask(scene)
 
-    def arrived(self, scene: Scene) -> bool:
-        """Never by itself."""
-        del scene
-        return False
-
 
 def position_target(setpoint: PositionSetpoint, scene: Scene) -> Target:
     """Return a setpoint as a target: each axis bound by the lowest derivative that is given."""
     target = still_target(scene.place, scene.yaw_rad, scene.samples)
+    velocity = allowed_velocity(setpoint.velocity_m_s, scene)
+    ahead_s = (scene.now_us - setpoint.time_us) * 1e-6 + scene.interval_s * np.arange(scene.samples)
     kinds = []
-    ahead_s = scene.interval_s * np.arange(scene.samples)
-    age_s = (scene.now_us - setpoint.time_us) * 1e-6
     for axis in range(3):
-        p, v, a = (
-            vector[axis] for vector in (setpoint.position_enu_m, setpoint.velocity_m_s, setpoint.acceleration_m_s2)
-        )
-        v_or_0, a_or_0 = (0.0 if isnan(value) else value for value in (v, a))
+        p, v, a = setpoint.position_enu_m[axis], velocity[axis], setpoint.acceleration_m_s2[axis]
+        v_or_0 = 0.0 if isnan(v) else v
         if not isnan(p):
             kinds.append(Kind.POSITION)
-            target.motion[:, 0, axis] = p + v_or_0 * (age_s + ahead_s)
+            target.motion[:, 0, axis] = p + v_or_0 * ahead_s
         elif not isnan(v) or isnan(a):
             kinds.append(Kind.VELOCITY)
         else:
             kinds.append(Kind.ACCELERATION)
         target.motion[:, 1, axis] = v_or_0
-        target.motion[:, 2, axis] = a_or_0
+        if not isnan(a):
+            target.motion[:, 2, axis] = allowed_acceleration(a, axis, scene)
     x, y, z = kinds
-    rate = 0.0 if isnan(setpoint.yaw_rate_rad_s) else setpoint.yaw_rate_rad_s
-    target.heading[:, 1] = rate
+    target.heading[:, 1] = 0.0 if isnan(setpoint.yaw_rate_rad_s) else setpoint.yaw_rate_rad_s
     if not isnan(setpoint.yaw_rad):
         target.heading[:, 0] = setpoint.yaw_rad
     return target._replace(kinds=(x, y, z), turns=not isnan(setpoint.yaw_rad))
+
+
+def allowed_velocity(velocity: Vector, scene: Scene) -> Vector:
+    """Return a velocity, or the part of it that may be flown; nan stays nan."""
+    x, y, z = velocity
+    fast = hypot(*(0.0 if isnan(v) else v for v in (x, y)))
+    share = min(1.0, scene.behaviour.fastest_m_s / fast) if fast > 0.0 else 1.0
+    limits = scene.behaviour.limits
+    return (share * x, share * y, z if isnan(z) else min(max(z, -limits.sink_m_s), limits.climb_m_s))
+
+
+def allowed_acceleration(acceleration: float, axis: int, scene: Scene) -> float:
+    """Return an acceleration, or the part of it that leads to no forbidden speed and that may be flown."""
+    limits, speed = scene.behaviour.limits, scene.velocity[axis]
+    up, down, most = scene.behaviour.fastest_m_s, scene.behaviour.fastest_m_s, limits.acceleration_m_s2
+    if axis == UP:
+        up, down, most = limits.climb_m_s, limits.sink_m_s, limits.lift_m_s2
+    least = max(-most, _BRAKE_1_S * (-down - speed))
+    return min(max(acceleration, least), min(most, _BRAKE_1_S * (up - speed)))

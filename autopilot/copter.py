@@ -8,7 +8,8 @@ from autopilot.attitude_reference import AttitudeReference
 from autopilot.companion import Companion
 from autopilot.controller import Clock, Decision, VehicleState
 from autopilot.core import Step
-from autopilot.courses import Climb, Course, Homeward, OnTrack, Scene, Sink, Steered, Stop
+from autopilot.course import Course, Scene, Steered
+from autopilot.courses import Along, Climb, Stop, homeward, landing, to_track
 from autopilot.leader import Following
 from autopilot.leaning import AltitudeSticks, Stabilized
 from autopilot.loop import ControlLoop
@@ -16,12 +17,12 @@ from autopilot.modes import MANUAL, Event, Mode, Need
 from autopilot.orders import Land
 from autopilot.parameters import Numbers, behaviour, definitions
 from autopilot.pilot import Guidance, Pilot
-from autopilot.planner import Planner, plan
+from autopilot.planner import Planner, plan, start_yaw
 from autopilot.power import PowerMeter
 from autopilot.profile import Profile
 from autopilot.reference import Reference, target_of
 from autopilot.snapshots import Photographer
-from autopilot.stations import Stations, StationSettings
+from autopilot.stations import REBOOT, Stations, StationSettings
 from autopilot.sticks import PositionSticks
 from autopilot.tracks import Track, track
 from autopilot.tuning import Tuning, builder
@@ -29,6 +30,7 @@ from mavlink.hil import ActuatorCommand, StateFrame
 from mavlink.hub import Outgoing
 from mavlink.parameters import Parameters, Value
 from mavlink.services.statustext import INFO
+from mavlink.setpoints import OffboardSetpoint, Sticks
 from plant.vehicle import Vehicle
 
 _STILL = (0.0, 0.0, 0.0, 0.0)
@@ -102,12 +104,11 @@ class Copter:
         self.frame_interval_us = self._loop.frame_interval_us
         self._interval_s = self._loop.control_interval_us * 1e-6
         self._attitude = AttitudeReference(believed, self._loop.preview) if self._loop.takes_attitude else None
-        self.pilot = Pilot(self._loop.preview, behaviour(self.parameters), self._course)
+        self.pilot = Pilot(self._loop.preview, behaviour(self.parameters), self._course, self._missing)
         self.stations = Stations(settings, self.pilot, self.parameters)
         self._power = PowerMeter(believed)
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
-        self._planners: dict[str, Planner] = {}
         self._time_us: int | None = None
         self._controls = _STILL
         self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
@@ -152,25 +153,24 @@ class Copter:
 
     def _begin(self, frame: StateFrame) -> None:
         """See the vehicle for the first time, or anew after frames were missed."""
-        vehicle = self._loop.vehicle
-        if self._time_us is None:
-            self._loop.begin(self._start_speed if frame.time_us == 0 else vehicle.hover_speed, self._first_yaw())
-            state = self._loop.state(frame)
-            self.pilot.begin(frame.time_us, state, mode=Mode.TRACK if self._first else None)
-            self._controls = _STILL if self.pilot.standing else self._loop.controls
-            self.stations.say(INFO, self.stations.banner())
+        loop, hover_speed = self._loop, self._loop.vehicle.hover_speed
+        if self._time_us is not None and frame.time_us > self._time_us:
+            loop.begin(hover_speed, loop.state(frame).euler[2])
             return
-        self._loop.begin(vehicle.hover_speed, self._loop.state(frame).euler[2])
+        if self._time_us is not None:  # another flight: nothing that any service remembers is of any use
+            self.stations.restart = REBOOT
+        loop.begin(self._start_speed if frame.time_us == 0 else hover_speed, self._first_yaw())
+        self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None)
+        self._controls = _STILL if self.pilot.standing else loop.controls
+        self.stations.say(INFO, self.stations.banner())
 
     def _first_yaw(self) -> float:
-        return float(self._planner_of(self._first).horizon(0).yaw_rad[0]) if self._first else 0.0
+        return start_yaw(self._first, self._references) if self._first else 0.0
 
     def _sense(self, now_us: int, state: VehicleState) -> None:
         """Take in what steers the vehicle, and what has ceased to."""
         pilot, stations = self.pilot, self.stations
-        behaviour = pilot.behaviour
-        sticks = stations.manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6))
-        setpoint = stations.offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6))
+        sticks, setpoint = self._heard(now_us)
         pilot.sense(now_us, state, Steered(sticks, setpoint, stations.follow.latest(now_us, _LEADER_LOST_US)))
         if pilot.state.armed:
             if pilot.state.mode is Mode.OFFBOARD and setpoint is None:
@@ -180,22 +180,34 @@ class Copter:
 
     def _take_stock(self, state: VehicleState) -> None:
         """Take in what orders of ground stations are judged by."""
-        pilot, stations = self.pilot, self.stations
-        sticks, setpoint, _ = pilot.scene().steered
+        pilot = self.pilot
+        sticks = pilot.scene().steered.sticks
+        thrust = sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None
+        outside = self.stations.missions.breach(state.position_enu_m, self._time_us or 0)
+        pilot.take_stock(Facts(state, pilot.standing, self._power.left, thrust, outside))
+
+    def _missing(self) -> list[Need]:
+        """Return needs of modes that nothing meets now: the message before the one that asks may have met one."""
+        sticks, setpoint = self._heard(self._time_us or 0)
+        missions = self.stations.missions
         met = {
             Need.ATTITUDE_CONTROL: self._attitude is not None,
             Need.STICKS: sticks is not None,
             Need.SETPOINTS: setpoint is not None,
-            Need.MISSION: stations.missions.has_mission,
-            Need.INSIDE_FENCE: not stations.missions.leaves_fence,
+            Need.MISSION: missions.has_mission,
+            Need.INSIDE_FENCE: not missions.leaves_fence,
             Need.CIRCLE: False,
-            Need.FLYING: not pilot.standing,
+            Need.FLYING: not self.pilot.standing,
         }
-        missing = tuple(need for need, there in met.items() if not there)
-        thrust = sticks.thrust if sticks is not None and pilot.state.mode is Mode.STABILIZED else None
-        outside = stations.missions.breach(state.position_enu_m, self._time_us or 0)
-        facts = Facts(state, pilot.standing, self._power.left, thrust, outside)
-        pilot.take_stock(facts, missing)
+        return [need for need, there in met.items() if not there]
+
+    def _heard(self, now_us: int) -> tuple[Sticks | None, OffboardSetpoint | None]:
+        """Return the sticks and the setpoint that are obeyed, where they are fresh."""
+        stations, behaviour = self.stations, self.pilot.behaviour
+        return (
+            stations.manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6)),
+            stations.offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6)),
+        )
 
     def _decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         loop = self._loop
@@ -247,11 +259,13 @@ class Copter:
     def _course(self, mode: Mode, scene: Scene) -> Course:
         """Return how a mode begins."""
         if mode is Mode.TAKEOFF:
-            return Climb(scene.home_enu_m[2] + scene.behaviour.takeoff_height_m, None, scene)
+            behaviour = scene.behaviour
+            high_m = self.pilot.ground_m + behaviour.takeoff_height_m
+            return Climb(high_m, None, scene, behaviour.takeoff_speed_m_s)
         if mode is Mode.LAND:
-            return Sink(Land(), scene)
+            return landing(Land())
         if mode is Mode.RETURN:
-            return Homeward(scene)
+            return homeward(scene)
         if mode is Mode.MISSION:
             return self.stations.missions.course()
         if mode is Mode.OFFBOARD:
@@ -268,20 +282,17 @@ class Copter:
             return AltitudeSticks(self._attitude, self._loop.vehicle.gravity_m_s2)
         return Stop()
 
-    def _on_track(self, scene: Scene) -> OnTrack:
+    def _on_track(self, scene: Scene) -> Course:
         if self._first is not None:
             first, self._first = self._first, None
-            course = OnTrack(self._planner_of(first), first.duration_s, scene, at_once=True)
-            self.pilot.reference = _at_start(self._planner_of(first))
-            return course
+            planner = plan(first, self._references, self._loop.preview)
+            self.pilot.reference = _at_start(planner, scene.now_us)
+            return Along(planner, first.duration_s, 0)
         chosen = track(scene.behaviour.track)
-        return OnTrack(self._planner_of(chosen), chosen.duration_s, scene)
-
-    def _planner_of(self, flown: Track) -> Planner:
-        return plan(flown, self._references, self._loop.preview)
+        return to_track(plan(chosen, self._references, self._loop.preview), chosen.duration_s)
 
 
-def _at_start(planner: Planner) -> Reference:
-    """Return a reference that is on a track from its first point on."""
-    target = target_of(planner.horizon(0))
-    return Reference(target.motion[0, :4].copy(), target.heading[0, :2].copy(), on_target=True)
+def _at_start(planner: Planner, now_us: int) -> Reference:
+    """Return a reference that is on a track that began at time 0."""
+    target = target_of(planner.horizon(now_us))
+    return Reference(target.motion[0, :4].copy(), target.heading[0, :2].copy())

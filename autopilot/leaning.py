@@ -5,9 +5,11 @@ from math import cos, radians
 import numpy as np
 
 from autopilot.attitude_reference import AttitudeReference, ReferenceMemory, Wish, lean
-from autopilot.courses import Lean, Motion, Scene, Stop, lifts
+from autopilot.course import Endless, Lean, Motion, Scene, lifts
+from autopilot.courses import Stop
+from autopilot.landing import is_below
 from autopilot.reference import Kind, Reference, lead, moving_with, still_target
-from autopilot.sticks import dead, stick_velocity, stick_yaw_rate
+from autopilot.sticks import dead, stick_climb, stick_yaw_rate
 from mavlink.setpoints import AttitudeSetpoint, Sticks
 
 _LIFTING, _SINKING = 0.9, 0.5
@@ -33,39 +35,35 @@ class Leaning:
         """Return what a companion's setpoint asks for."""
         return self.by_wish(self._generator.from_setpoint(setpoint), scene)
 
-    def by_sticks(self, sticks: Sticks, scene: Scene) -> Lean:
-        """Return what a pilot's sticks ask for."""
-        return self.by_wish(self._generator.from_sticks(sticks), scene)
-
     def by_wish(self, wish: Wish, scene: Scene) -> Lean:
         """Return what is asked for, as smoothly as the vehicle can follow."""
         if self._memory is None:
             self._memory = self._generator.initial(scene.state)
         self._memory, demand = self._generator.step(self._memory, scene.state, wish)
+        # nan asks for no thrust of its own: a vehicle that stands stays, one that flies does not sink
         share = wish.thrust_n / self._generator.weight_n
         return Lean(demand, moving_with(scene.state), lifts=share > _LIFTING, sinks=share < _SINKING)
 
 
-class Stabilized:
+class Stabilized(Endless):
     """Sticks to tilt, yaw rate and thrust."""
 
     def __init__(self, generator: AttitudeReference) -> None:
         """Begin with the attitude that the vehicle has."""
         self._leaning = Leaning(generator)
+        self._generator = generator
         self._stop = Stop()
 
     def ask(self, scene: Scene) -> Motion | Lean:
         """Return what the sticks ask for; without sticks, stop."""
         sticks = scene.steered.sticks
-        return self._stop.ask(scene) if sticks is None else self._leaning.by_sticks(sticks, scene)
-
-    def arrived(self, scene: Scene) -> bool:
-        """Never by itself."""
-        del scene
-        return False
+        if sticks is None:
+            return self._stop.ask(scene)
+        thrust_n = self._generator.thrust_for_stick(sticks.thrust)
+        return self._leaning.by_wish(wish_of(sticks, thrust_n, scene), scene)
 
 
-class AltitudeSticks:
+class AltitudeSticks(Endless):
     """Sticks to tilt, yaw rate and climb; height is held while its stick is in the middle."""
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
@@ -91,15 +89,13 @@ class AltitudeSticks:
         lift = min(max(wanted + self._offset_m_s2, -_MOST_LIFT_M_S2), _MOST_LIFT_M_S2)
         upright = max(cos(scene.state.euler[0]) * cos(scene.state.euler[1]), 0.5)
         thrust_n = self._generator.weight_n * (1.0 + lift / self._gravity_m_s2) / upright
-        tilt = radians(scene.behaviour.largest_tilt_deg)
-        wish = lean(tilt * dead(sticks.roll), tilt * dead(sticks.pitch), stick_yaw_rate(sticks, scene), thrust_n)
-        leaning = self._leaning.by_wish(wish, scene)
-        sinks = float(reference.motion[0, 2]) < scene.state.position_enu_m[2] - 0.15
+        leaning = self._leaning.by_wish(wish_of(sticks, thrust_n, scene), scene)
+        sinks = is_below(reference, scene.state)
         return leaning._replace(reference=reference, lifts=lifting, sinks=sinks)
 
     def _climb(self, sticks: Sticks, scene: Scene) -> tuple[Reference, bool]:
         """Return the height's reference, where the vehicle is otherwise, and whether it is to leave the ground."""
-        climb_m_s = stick_velocity(sticks, scene)[2]
+        climb_m_s = stick_climb(sticks, scene)
         rests = abs(float(scene.reference.motion[1, 2])) < _SINKING * 0.1
         if climb_m_s != 0.0:
             self._height_m = None
@@ -116,7 +112,8 @@ class AltitudeSticks:
         moved[:, 2] = after.motion[:, 2]
         return Reference(moved, np.array([scene.state.euler[2], 0.0])), lifts(target, scene.state)
 
-    def arrived(self, scene: Scene) -> bool:
-        """Never by itself."""
-        del scene
-        return False
+
+def wish_of(sticks: Sticks, thrust_n: float, scene: Scene) -> Wish:
+    """Return the tilt and the turn that sticks ask for, with a thrust."""
+    tilt = radians(scene.behaviour.largest_tilt_deg)
+    return lean(tilt * dead(sticks.roll), tilt * dead(sticks.pitch), stick_yaw_rate(sticks, scene), thrust_n)

@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 
+from autopilot.circling import Round
 from autopilot.commands import Commands
-from autopilot.courses import Climb, Course, Homeward, Lean, Motion, Planned, Round, Scene, Sink, Stop, Way
+from autopilot.course import Asked, Course, Scene
+from autopilot.courses import Climb, Stop, Way, homeward, landing
 from autopilot.geofence import Geofence, check_fence, check_fence_item
 from autopilot.mission import MissionExecutor, Reached, SetHome
 from autopilot.mission_items import check_item, check_mission, check_rally_item, places
@@ -155,7 +157,7 @@ class MissionCourse:
         self._course: Course = Stop()
         self._done = False
 
-    def ask(self, scene: Scene) -> Motion | Planned | Lean:
+    def ask(self, scene: Scene) -> Asked:
         """Return what the order of now asks for."""
         arrived = self._course.arrived(scene)
         turns = self._course.turns if isinstance(self._course, Round) else 0.0
@@ -186,8 +188,8 @@ def course_of(order: Order, scene: Scene) -> Course:
         case TakeOff():
             return Climb(order.height_enu_m, order.yaw_rad, scene)
         case Land():
-            return Sink(order, scene)
+            return landing(order)
         case Return():
-            return Homeward(scene)
+            return homeward(scene)
         case Hold():
             return Stop()

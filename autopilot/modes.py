@@ -158,6 +158,7 @@ MANUAL = (Mode.STABILIZED, Mode.ALTITUDE, Mode.POSITION)
 TRANSITIONS: tuple[Transition, ...] = (
     Transition((), Event.SELECT, armed=False, target=None),
     Transition((), Event.ARM, armed=False, target=None),
+    Transition((Mode.LAND, Mode.RETURN, Mode.ORBIT, Mode.FOLLOW), Event.DISARM, True, Mode.HOLD, disarms=True),
     Transition((), Event.DISARM, armed=True, target=None, disarms=True),
     Transition((), Event.TOUCHED_DOWN, armed=True, target=Mode.HOLD, disarms=True),
     Transition((), Event.LEFT_STANDING, armed=True, target=Mode.HOLD, disarms=True),
@@ -205,7 +206,7 @@ def following(state: State, event: Event, selected: Mode | None, missing: Sequen
     else:
         return Refusal(f"nothing follows from '{event}' in {state.mode}")
     mode = row.target or selected or state.mode
-    if event is Event.SELECT and state.armed:
+    if event is Event.SELECT and (state.armed or not ROWS[mode].selectable):
         reason = first_missing(mode, missing)
         if reason:
             return Refusal(f"{mode} refused: {reason}")

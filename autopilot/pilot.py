@@ -7,10 +7,11 @@ from typing import NamedTuple, TypeAlias
 from autopilot.arming import Facts, refusals
 from autopilot.behaviour import Behaviour
 from autopilot.controller import AttitudeDemand, Horizon, Preview, VehicleState
-from autopilot.courses import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, Stop, lifts
-from autopilot.landing import Landing, is_below, stands_at_first, watch
+from autopilot.course import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
+from autopilot.courses import Stop
+from autopilot.landing import Landing, is_below, lies_still, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
-from autopilot.reference import Reference, at_rest, keep_to, lead, moving_with
+from autopilot.reference import Reference, at_rest, lead, lead_along, moving_with
 from mavlink.frames import Vector
 from mavlink.services.statustext import INFO, NOTICE, WARNING
 
@@ -62,11 +63,25 @@ class Pilot:
         armed_us: When the rotors were last armed; 0 before.
         takeoff_us: When it last left the ground; 0 before.
         landing_us: When it last stood again; 0 before.
+        ground_m: Height of where it last stood, z of ENU.
         flights: How often the rotors were armed.
     """
 
-    def __init__(self, preview: Preview, behaviour: Behaviour, make_course: CourseMaker) -> None:
-        """Fly with the references that a control law previews; `make_course` says how each mode begins."""
+    def __init__(
+        self,
+        preview: Preview,
+        behaviour: Behaviour,
+        make_course: CourseMaker,
+        missing: Callable[[], Sequence[Need]],
+    ) -> None:
+        """Begin on the ground, or in the air: see `begin`.
+
+        Args:
+            preview: The references that a control law previews.
+            behaviour: The numbers to fly by.
+            make_course: Says how each mode begins.
+            missing: Says which needs of modes nothing meets at the moment.
+        """
         self._preview = preview
         self._make_course = make_course
         self.state = FIRST
@@ -79,27 +94,32 @@ class Pilot:
         self.speed_m_s: float | None = None
         self.armed_us = self.takeoff_us = self.landing_us = 0
         self.flights = 0
+        self.ground_m = 0.0
         self._home_is_chosen = False
+        self._course_is_chosen = False
+        self._idles = True
         self._landing = Landing()
         self._now_us = 0
         self._vehicle: VehicleState | None = None
         self._facts = Facts(None, standing=True, charge=1.0, thrust_stick=None)
-        self._missing: tuple[Need, ...] = ()
+        self._missing = missing
         self._steered = NOT_STEERED
         self._said: list[Said] = []
 
     def begin(self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None) -> None:
         """See the vehicle for the first time: it stands, or it is picked up in flight, in `mode` or in hold."""
         self._now_us, self._vehicle = now_us, vehicle
-        self.standing = mode is None and stands_at_first(vehicle, 0.0)
+        self.armed_us = self.takeoff_us = self.landing_us = 0
+        self.standing = self._idles = mode is None and stands_at_first(vehicle, 0.0)
         self.reference = moving_with(vehicle)
         if self.standing:
-            self.set_home(vehicle.position_enu_m, vehicle.euler[2], chosen=False)
+            if not self._home_is_chosen:
+                self.set_home(vehicle.position_enu_m, vehicle.euler[2], chosen=False)
             self.state = FIRST
         else:
             self.state = State(mode or Mode.HOLD, armed=True)
             self._begin_flight()
-        self.course = self._make_course(self.state.mode, self.scene())
+        self._engage(self.state.mode)
 
     def sense(self, now_us: int, vehicle: VehicleState, steered: Steered = NOT_STEERED) -> None:
         """Take in what a control sample needs.
@@ -111,9 +131,9 @@ class Pilot:
         """
         self._now_us, self._vehicle, self._steered = now_us, vehicle, steered
 
-    def take_stock(self, facts: Facts, missing: Sequence[Need]) -> None:
-        """Take in what orders are judged by: what arming looks at, and needs of modes that nothing meets."""
-        self._facts, self._missing = facts, tuple(missing)
+    def take_stock(self, facts: Facts) -> None:
+        """Take in what arming is judged by."""
+        self._facts = facts
 
     def scene(self) -> Scene:
         """Return what a course sees now."""
@@ -121,8 +141,10 @@ class Pilot:
         assert self.reference is not None, "the pilot has seen the vehicle"
         interval_us, samples = self._preview
         behaviour = self.behaviour
-        if self.speed_m_s is not None:
-            behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=self.speed_m_s))
+        speed = behaviour.limits.speed_m_s if self.speed_m_s is None else self.speed_m_s
+        speed = min(speed, behaviour.fastest_m_s)
+        if speed != behaviour.limits.speed_m_s:
+            behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed))
         interval_s = interval_us * 1e-6
         return Scene(
             self._now_us,
@@ -152,7 +174,8 @@ class Pilot:
             self.flights += 1
             if not self._home_is_chosen and self._vehicle is not None:
                 self.set_home(self._vehicle.position_enu_m, self._vehicle.euler[2], chosen=False)
-            self._engage(self.state.mode)
+            if not self._course_is_chosen:
+                self._engage(self.state.mode)
         return refusal
 
     def disarm(self, *, force: bool = False) -> Refusal | None:
@@ -161,7 +184,7 @@ class Pilot:
             return None
         if not self.standing and not force:
             return Refusal("not disarmed: the vehicle is flying")
-        return self._follow(Event.DISARM, "rotors stopped in the air" if not self.standing else "rotors stopped")
+        return self._stop_rotors(Event.DISARM, "rotors stopped" if self.standing else "rotors stopped in the air")
 
     def select(self, mode: Mode) -> Refusal | None:
         """Change the mode; return why not."""
@@ -173,10 +196,10 @@ class Pilot:
         return refusal
 
     def fly(self, mode: Mode, course: Course) -> Refusal | None:
-        """Change to `mode` and fly `course` in it; return why not."""
+        """Change to `mode` and fly `course` in it, now or once the rotors are armed; return why not."""
         refusal = self._follow(Event.SELECT, "", mode, met=(Need.CIRCLE,))
         if refusal is None:
-            self._take(course)
+            self.course, self._course_is_chosen = course, True
         return refusal
 
     def set_home(self, position_enu_m: Vector, yaw_rad: float, *, chosen: bool = True) -> None:
@@ -194,15 +217,16 @@ class Pilot:
     def step(self) -> Guidance:
         """Return what to follow from now on. Called once a control sample."""
         if not self.state.armed:
-            self.standing = self.standing or self._lies_still()
+            self._rest()
             return RESTS
         scene = self.scene()
         asked = self.course.ask(scene)
-        begins = self.standing
-        if begins:
+        if self.standing:
             if not (asked.lifts if isinstance(asked, Lean) else lifts(asked.target, scene.state)):
-                return self._idle(scene.state)
+                self._idle()
+                return RESTS
             self._begin_flight()
+        begins, self._idles = self._idles, False
         guidance = self._lean(asked, begins) if isinstance(asked, Lean) else self._move(scene, asked, begins)
         if self.course.arrived(scene):
             self._arrive()
@@ -218,10 +242,11 @@ class Pilot:
         self._said.append(Said(severity, text))
 
     def _move(self, scene: Scene, asked: Motion | Planned, begins: bool) -> Guidance:
-        if isinstance(asked, Planned) and scene.reference.on_target:
-            horizon, self.reference = keep_to(scene.reference, asked.horizon)
+        reference, limits, interval_s = scene.reference, asked.limits, scene.interval_s
+        if isinstance(asked, Planned):
+            horizon, self.reference = lead_along(reference, asked.horizon, limits, interval_s)
         else:
-            horizon, self.reference = lead(scene.reference, asked.target, asked.limits, scene.interval_s)
+            horizon, self.reference = lead(reference, asked.target, limits, interval_s)
         self._watch_ground(scene.state, sinks=is_below(scene.reference, scene.state))
         return Guidance(horizon=horizon, begins=begins)
 
@@ -231,18 +256,34 @@ class Pilot:
         self._watch_ground(self._vehicle, sinks=asked.sinks)
         return Guidance(attitude=asked.demand, begins=begins)
 
-    def _idle(self, vehicle: VehicleState) -> Guidance:
-        """Stand with idling rotors; not for ever."""
+    def _rest(self) -> None:
+        """Lie, or fall, with the rotors standing still or idle."""
+        vehicle = self._vehicle
+        assert vehicle is not None, "the pilot has seen the vehicle"
+        self._idles = True
         self.reference = at_rest(vehicle)
+        self.standing = self.standing or lies_still(vehicle)
+        if self.standing:
+            self.ground_m = vehicle.position_enu_m[2]
+
+    def _idle(self) -> None:
+        """Stand with idling rotors; not for ever."""
+        self._rest()
         on_ground_us = self._now_us - max(self.armed_us, self.landing_us)
         landed = self.landing_us > self.armed_us
         behaviour = self.behaviour
         allowed_s = behaviour.disarm_after_landing_s if landed else behaviour.disarm_on_ground_s
         if allowed_s > 0.0 and on_ground_us >= allowed_s * 1e6:
             event = Event.TOUCHED_DOWN if landed else Event.LEFT_STANDING
-            self._follow(event, f"{event}, rotors stopped")
+            self._stop_rotors(event, f"{event}, rotors stopped")
+
+    def _stop_rotors(self, event: Event, text: str) -> Refusal | None:
+        """Stop the rotors, and forget what was asked for this flight alone."""
+        refusal = self._follow(event, text)
+        if refusal is None:
+            self.speed_m_s = None
             self._engage(self.state.mode)
-        return RESTS
+        return refusal
 
     def _begin_flight(self) -> None:
         self.standing = False
@@ -260,13 +301,6 @@ class Pilot:
         self.landing_us = self._now_us
         self.say(NOTICE, "landing detected")
 
-    def _lies_still(self) -> bool:
-        """Whether a vehicle whose rotors were stopped in the air has come to rest."""
-        vehicle = self._vehicle
-        assert vehicle is not None, "the pilot has seen the vehicle"
-        self.reference = at_rest(vehicle)
-        return max(map(abs, vehicle.velocity_enu_m_s)) < 0.05 and max(map(abs, vehicle.rate_flu_rad_s)) < 0.05
-
     def _arrive(self) -> None:
         if self.state.mode is Mode.TAKEOFF:
             self.happened(Event.ARRIVED)
@@ -275,17 +309,13 @@ class Pilot:
 
     def _engage(self, mode: Mode) -> None:
         if self.reference is not None:
-            self._take(self._make_course(mode, self.scene()))
-
-    def _take(self, course: Course) -> None:
-        self.course = course
-        if self.reference is not None:
-            self.reference = self.reference._replace(on_target=False)
+            self.course, self._course_is_chosen = self._make_course(mode, self.scene()), False
 
     def _follow(
         self, event: Event, text: str, selected: Mode | None = None, met: Sequence[Need] = ()
     ) -> Refusal | None:
-        after = following(self.state, event, selected, [need for need in self._missing if need not in met])
+        missing = [need for need in self._missing() if need not in met]
+        after = following(self.state, event, selected, missing)
         if isinstance(after, Refusal):
             return after
         if after != self.state and text:

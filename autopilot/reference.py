@@ -1,8 +1,8 @@
 """The reference that leads the vehicle from wherever it is to whatever it shall do: smooth, within limits.
 
 The chain of integrators of `reference_chain` follows a target that may itself move; once on it, the target itself is
-the reference, to the last bit. An axis may have no target position, or neither position nor velocity: then the chain
-begins where the target does.
+the reference, to the last bit, until it jumps. An axis may have no target position, or neither position nor velocity:
+then the chain begins where the target does.
 """
 
 from collections.abc import Sequence
@@ -17,6 +17,8 @@ from autopilot.reference_chain import Limits, advance
 from mavlink.frames import nearest_turn
 
 _REACHED = 1e-7
+_IN_ITS_SCALE = np.array([[1.0], [1.0], [1.0], [1e-2]])
+"""Jerk is the last of the chain to settle, and the largest number of it."""
 
 
 class Kind(IntEnum):
@@ -36,12 +38,10 @@ class Reference(NamedTuple):
     Attributes:
         motion: Position, velocity, acceleration, jerk, ENU, (4, 3).
         heading: Yaw, rad, unwrapped, and its rate, (2,).
-        on_target: Whether it is the target itself that is followed, to the last bit.
     """
 
     motion: Array
     heading: Array
-    on_target: bool = False
 
 
 class Target(NamedTuple):
@@ -99,7 +99,7 @@ def lead(reference: Reference, target: Target, limits: Limits, interval_s: float
         limits: Of the approach.
         interval_s: Between two instants.
     """
-    if reference.on_target or _reached(reference, target):
+    if target.turns and target.kinds == ALL_BOUND and _is_at(reference, target.motion[0, :4], target.heading[0]):
         return _on_target(reference, target)
     count = len(target.motion)
     motion, heading = np.empty((count, 5, 3)), np.empty((count, 3))
@@ -126,22 +126,22 @@ def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference
     if turns:
         heading = heading.copy()
         heading[:, 0] += 2.0 * pi * turns
-    after = Reference(target.motion[1, :4].copy(), heading[1, :2].copy(), on_target=True)
+    after = Reference(target.motion[1, :4].copy(), heading[1, :2].copy())
     return _horizon(target.motion, heading), after
 
 
-def keep_to(reference: Reference, planned: Horizon) -> tuple[Horizon, Reference]:
-    """Return the plan that a reference is on already, its yaw turned in full turns to where the reference's is.
-
-    The same as `lead`, without the arrays of a target in between: a flight along a track is in a hurry every sample.
-    """
-    yaw = planned.yaw_rad
-    turns = round(float(reference.heading[0] - yaw[0]) / (2.0 * pi))
+def lead_along(reference: Reference, plan: Horizon, limits: Limits, interval_s: float) -> tuple[Horizon, Reference]:
+    """Do the same for a plan, without the arrays of a target once it is reached: tracks are in a hurry every sample."""
+    if not _is_at(reference, _motion_at(plan, 0), (plan.yaw_rad[0], plan.yaw_rate_rad_s[0])):
+        return lead(reference, target_of(plan), limits, interval_s)
+    turns = round(float(reference.heading[0] - plan.yaw_rad[0]) / (2.0 * pi))
     if turns:
-        yaw = yaw + 2.0 * pi * turns
-        planned = planned._replace(yaw_rad=yaw)
-    motion = np.array([column[1] for column in planned[:4]])
-    return planned, Reference(motion, np.array([yaw[1], planned.yaw_rate_rad_s[1]]), on_target=True)
+        plan = plan._replace(yaw_rad=plan.yaw_rad + 2.0 * pi * turns)
+    return plan, Reference(_motion_at(plan, 1), np.array([plan.yaw_rad[1], plan.yaw_rate_rad_s[1]]))
+
+
+def _motion_at(plan: Horizon, sample: int) -> Array:
+    return np.array([column[sample] for column in plan[:4]])
 
 
 def _horizon(motion: Array, heading: Array) -> Horizon:
@@ -150,13 +150,9 @@ def _horizon(motion: Array, heading: Array) -> Horizon:
     return Horizon(p, v, a, j, s, yaw, rate, acceleration)
 
 
-def _reached(reference: Reference, target: Target) -> bool:
-    if not target.turns or target.kinds != ALL_BOUND:
+def _is_at(reference: Reference, motion: Array, heading: Sequence[float] | Array) -> bool:
+    """Whether the reference has reached a target, or still is on it: a target may jump, a reference may not."""
+    yaw = nearest_turn(float(heading[0]), float(reference.heading[0]))
+    if max(abs(float(reference.heading[0]) - yaw), abs(float(reference.heading[1]) - heading[1])) >= _REACHED:
         return False
-    yaw = nearest_turn(float(target.heading[0, 0]), float(reference.heading[0]))
-    away = max(
-        float(np.abs(reference.motion[:3] - target.motion[0, :3]).max()),
-        float(np.abs(reference.motion[3] - target.motion[0, 3]).max()) * 1e-2,
-    )
-    turned = max(abs(float(reference.heading[0]) - yaw), abs(float(reference.heading[1] - target.heading[0, 1])))
-    return max(away, turned) < _REACHED
+    return bool((np.abs(reference.motion - motion) * _IN_ITS_SCALE).max() < _REACHED)

@@ -6,7 +6,7 @@ from importlib.metadata import version as version_of_package
 from math import pi
 
 from autopilot.calibration import Calibration
-from autopilot.commands import Commands
+from autopilot.commands import HIGHEST_M, Commands
 from autopilot.failures import Failures
 from autopilot.missions import Missions
 from autopilot.modes import MODES, custom_mode, mode_of_custom
@@ -15,7 +15,7 @@ from mavlink.dialect import AUTOPILOT_COMPONENT, mav
 from mavlink.files import Files, Tree
 from mavlink.flight_log import FlightLog
 from mavlink.framing import Framer
-from mavlink.geodesy import Geodetic, enu_of
+from mavlink.geodesy import Geodetic, is_on_earth
 from mavlink.hub import Hub, Outgoing
 from mavlink.memory import Memory
 from mavlink.parameters import Parameters
@@ -120,7 +120,7 @@ class Stations:
             self.offboard,
             self.manual,
             self.follow,
-            OriginService(Setters(self._set_origin, self._set_home, self._set_mode), self._text),
+            OriginService(Setters(self._set_origin, self.commands.move_home, self._set_mode), self._text),
             Ftp(files),
             Logs(files, (LOGS,), lambda: self.log.name),
             Shell({"ver": lambda _: self.banner() + "\n", "status": lambda _: self._status(), "param": self._param}),
@@ -225,18 +225,13 @@ class Stations:
         return autopilot_version(self._identity, version_of(VERSION), self._settings.system_id)
 
     def _set_origin(self, place: Geodetic) -> str:
+        if not is_on_earth(place.latitude_deg, place.longitude_deg) or not abs(place.altitude_m) <= HIGHEST_M:
+            return "origin refused: not a latitude, longitude and altitude"
         if self._pilot.state.armed:
             return "origin refused: the rotors are armed"
         self.commands.origin = place
         self.missions.moved_origin()
         return ""
-
-    def _set_home(self, place: Geodetic) -> str:
-        home = enu_of(place, self.commands.origin)
-        refused = self.commands.unreachable(home)
-        if not refused:
-            self._pilot.set_home(home, self._pilot.home_yaw_rad)
-        return f"home refused: {refused}" if refused else ""
 
     def _set_mode(self, base_mode: int, number: int) -> str:
         return self.commands.set_custom_mode(base_mode, number).reason

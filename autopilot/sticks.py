@@ -1,69 +1,80 @@
 """Sticks to velocity, for a pilot who flies by place."""
 
-from autopilot.courses import Motion, Scene
+from math import hypot
+
+from autopilot.course import Endless, Motion, Scene
 from autopilot.reference import Kind, Target, still_target
-from mavlink.frames import Vector
 from mavlink.setpoints import Sticks, turned
 
 _DEADZONE = 0.05
 _SLOW_M_S, _SLOW_RAD_S = 0.1, 0.05
+_MIDDLE = Sticks(0.0, 0.0, 0.5, 0.0)
 
 
-class PositionSticks:
+class PositionSticks(Endless):
     """Sticks to velocity; what is not asked to move is held where it came to rest."""
 
     def __init__(self) -> None:
         """Hold nothing yet."""
-        self._place: list[float | None] = [None, None, None]
+        self._xy: tuple[float, float] | None = None
+        self._z: float | None = None
         self._yaw_rad: float | None = None
 
     def ask(self, scene: Scene) -> Motion:
         """Return velocities along the heading, or places."""
-        sticks = scene.steered.sticks
-        velocity, yaw_rate = (0.0, 0.0, 0.0), 0.0
-        if sticks is not None:
-            velocity, yaw_rate = stick_velocity(sticks, scene), stick_yaw_rate(sticks, scene)
-        at_rest = [abs(float(speed)) < _SLOW_M_S for speed in scene.reference.motion[1]]
-        still = (velocity[0] == velocity[1] == 0.0 and at_rest[0] and at_rest[1],) * 2
-        still = (*still, velocity[2] == 0.0 and at_rest[2])  # type: ignore[assignment]
+        sticks = scene.steered.sticks or _MIDDLE
         target = still_target(scene.place, scene.yaw_rad, scene.samples)
-        kinds = []
-        for axis, rests in enumerate(still):
-            moves = velocity[axis] != 0.0 or (axis < 2 and (velocity[0] != 0.0 or velocity[1] != 0.0))
-            place = None if moves else self._place[axis]
-            place = scene.place[axis] if rests and place is None else place
-            self._place[axis] = place
-            kinds.append(Kind.VELOCITY if place is None else Kind.POSITION)
-            target.motion[:, 0, axis] = scene.place[axis] if place is None else place
-            target.motion[:, 1, axis] = velocity[axis]
-        self._hold_yaw(target, yaw_rate, scene)
-        limits = scene.behaviour.limits
-        x, y, z = kinds
-        return Motion(target._replace(kinds=(x, y, z), turns=self._yaw_rad is not None), limits)
+        horizontally = self._move(target, stick_velocity(sticks, scene), scene)
+        vertically = self._climb(target, stick_climb(sticks, scene), scene)
+        self._turn(target, stick_yaw_rate(sticks, scene), scene)
+        kinds = (horizontally, horizontally, vertically)
+        return Motion(target._replace(kinds=kinds, turns=self._yaw_rad is not None), scene.behaviour.limits)
 
-    def _hold_yaw(self, target: Target, yaw_rate: float, scene: Scene) -> None:
-        turning = abs(float(scene.reference.heading[1])) > _SLOW_RAD_S
+    def _move(self, target: Target, velocity: tuple[float, float], scene: Scene) -> Kind:
+        if velocity != (0.0, 0.0):
+            self._xy = None
+        elif self._xy is None and hypot(*scene.velocity[:2]) < _SLOW_M_S:
+            self._xy = scene.place[:2]
+        target.motion[:, 1, :2] = velocity
+        if self._xy is None:
+            return Kind.VELOCITY
+        target.motion[:, 0, :2] = self._xy
+        return Kind.POSITION
+
+    def _climb(self, target: Target, climb_m_s: float, scene: Scene) -> Kind:
+        if climb_m_s != 0.0:
+            self._z = None
+        elif self._z is None and abs(scene.velocity[2]) < _SLOW_M_S:
+            self._z = scene.place[2]
+        target.motion[:, 1, 2] = climb_m_s
+        if self._z is None:
+            return Kind.VELOCITY
+        target.motion[:, 0, 2] = self._z
+        return Kind.POSITION
+
+    def _turn(self, target: Target, yaw_rate: float, scene: Scene) -> None:
         if yaw_rate != 0.0:
             self._yaw_rad = None
-        elif self._yaw_rad is None and not turning:
+        elif self._yaw_rad is None and abs(float(scene.reference.heading[1])) < _SLOW_RAD_S:
             self._yaw_rad = scene.yaw_rad
         target.heading[:, 1] = yaw_rate
         if self._yaw_rad is not None:
             target.heading[:, 0] = self._yaw_rad
 
-    def arrived(self, scene: Scene) -> bool:
-        """Never by itself."""
-        del scene
-        return False
+
+def stick_velocity(sticks: Sticks, scene: Scene) -> tuple[float, float]:
+    """Return the velocity east and north, m/s, that sticks ask for: of full sticks, in any direction, the largest."""
+    ahead, left = dead(sticks.pitch), -dead(sticks.roll)
+    behaviour = scene.behaviour
+    speed = min(behaviour.stick_speed_m_s, behaviour.fastest_m_s) / max(1.0, hypot(ahead, left))
+    east, north, _ = turned((speed * ahead, speed * left, 0.0), scene.state.euler[2])
+    return east, north
 
 
-def stick_velocity(sticks: Sticks, scene: Scene) -> Vector:
-    """Return the velocity, m/s, ENU, that sticks ask for."""
-    limits, behaviour = scene.behaviour.limits, scene.behaviour
-    x, y, _ = turned((dead(sticks.pitch), -dead(sticks.roll), 0.0), scene.state.euler[2])
+def stick_climb(sticks: Sticks, scene: Scene) -> float:
+    """Return the speed upwards, m/s, that sticks ask for."""
     up = dead(2.0 * sticks.thrust - 1.0)
-    climb = up * (limits.climb_m_s if up > 0.0 else limits.sink_m_s)
-    return (behaviour.stick_speed_m_s * x, behaviour.stick_speed_m_s * y, climb)
+    return up * (scene.behaviour.limits.climb_m_s if up > 0.0 else scene.behaviour.limits.sink_m_s)
 
 
 def stick_yaw_rate(sticks: Sticks, scene: Scene) -> float:
