@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out/spiral
 
-.PHONY: setup fly test lint fuzz bench lock clean
+.PHONY: setup fly test lint fuzz soak bench lock clean
 
 setup: .venv/.ready
 
@@ -31,6 +31,10 @@ test: lint
 
 fuzz: setup
 	$(BIN)/python -m tests.fuzz
+
+# Two ground stations and a companion on one vehicle, for ten minutes by the clock.
+soak: setup
+	$(BIN)/python -m tests.clients.soak
 
 bench: setup
 	$(BIN)/colibri bench

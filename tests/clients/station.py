@@ -161,7 +161,7 @@ class Companion(Station):
         angle = _RATE_RAD_S * self.time_s
         x, y, z = place = (_RADIUS_M * cos(angle), _RADIUS_M * sin(angle), -_HEIGHT_M)
         away_m = dist(self.position_ned_m, place)
-        self._caught_up = self._caught_up or away_m < 0.1
+        self._caught_up = self._caught_up or away_m < 0.15
         if self._caught_up:
             self.off_m = max(self.off_m, away_m)
         motion = (x, y, z, -_RATE_RAD_S * y, _RATE_RAD_S * x, *[0.0] * 6)
