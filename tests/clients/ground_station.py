@@ -9,7 +9,9 @@ from typing import Any, Self, TypeAlias
 
 from pymavlink.dialects.v20 import development as mavlink2
 
-GIVE_UP_AFTER_S = 30.0
+from tests.clients.observer import Observer, Sight
+
+GIVE_UP_AFTER_S = 60.0
 
 Message: TypeAlias = Any
 Address: TypeAlias = tuple[str, int]
@@ -94,6 +96,16 @@ class GroundStation:
                     return message
         said = [message.text for message in self.heard if message.get_type() == "STATUSTEXT"]
         raise AssertionError(f"waited in vain for {name}; the vehicle said {said}")
+
+    def until(
+        self, seen: Observer, condition: Callable[[Sight], bool], what: str, within_s: float = GIVE_UP_AFTER_S
+    ) -> Sight:
+        """Listen until the vehicle, as the observer sees it, meets `condition`."""
+        give_up_s = monotonic() + within_s
+        while not condition(sight := seen.now):
+            assert monotonic() < give_up_s, f"waited in vain for {what}; {sight}; {seen.texts}"
+            self.pump(0.02)
+        return sight
 
     def hear_for(self, messages: int) -> list[Message]:
         """Return the next messages, that many at least."""
