@@ -1,6 +1,7 @@
 """A ground station of pymavlink alone, none of our code between it and the vehicle: asks, commands, listens."""
 
 import socket
+from collections import deque
 from collections.abc import Callable, Iterable
 from math import nan
 from select import select
@@ -37,6 +38,7 @@ class GroundStation:
         self.mav.robust_parsing = True
         self.heard: list[Message] = []
         self.peers: list[Address] = []
+        self._unread: deque[Message] = deque()
         self._announced = announced
         self._heartbeat_due_s = 0.0
 
@@ -91,7 +93,9 @@ class GroundStation:
         """
         give_up_s = monotonic() + within_s
         while monotonic() < give_up_s:
-            for message in self.pump():
+            self._unread += self.pump() if not self._unread else ()
+            while self._unread:
+                message = self._unread.popleft()
                 if message.get_type() == name and condition(message):
                     return message
         said = [message.text for message in self.heard if message.get_type() == "STATUSTEXT"]
