@@ -61,6 +61,7 @@ class Copter:
         pilot: Decides what is flown.
         parameters: All numbers that can be changed.
         stations: What ground stations see and say.
+        power: The battery, as far as the autopilot knows.
         solve_time_s: Of the last QP.
     """
 
@@ -106,7 +107,7 @@ class Copter:
         self._attitude = AttitudeReference(believed, self._loop.preview) if self._loop.takes_attitude else None
         self.pilot = Pilot(self._loop.preview, behaviour(self.parameters), self._course, self._missing)
         self.stations = Stations(settings, self.pilot, self.parameters)
-        self._power = PowerMeter(believed)
+        self.power = PowerMeter(believed)
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
         self._time_us: int | None = None
@@ -184,7 +185,7 @@ class Copter:
         sticks = pilot.scene().steered.sticks
         thrust = sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None
         outside = self.stations.missions.breach(state.position_enu_m, self._time_us or 0)
-        pilot.take_stock(Facts(state, pilot.standing, self._power.left, thrust, outside))
+        pilot.take_stock(Facts(state, pilot.standing, self.power.left, thrust, outside))
 
     def _missing(self) -> list[Need]:
         """Return needs of modes that nothing meets now: the message before the one that asks may have met one."""
@@ -230,7 +231,7 @@ class Copter:
         idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
         least = idle if pilot.state.armed else 0.0
         c1, c2, c3, c4 = (max(control, least) for control in self._controls)
-        self._power.run((c1, c2, c3, c4), self._interval_s)
+        self.power.run((c1, c2, c3, c4), self._interval_s)
         stations.missions.watch_mode(pilot.state.mode)
         stations.update(
             self._photographer.take(
@@ -241,7 +242,7 @@ class Copter:
                 decision,
                 self._step_time_s,
                 (c1, c2, c3, c4),
-                self._power,
+                self.power,
                 stations,
             )
         )
