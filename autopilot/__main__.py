@@ -9,7 +9,8 @@ from mavlink.process import ArgumentParser, add_common_arguments, begin
 DEFAULT_PLANT = "udpout:127.0.0.1:14560"
 
 
-def _parser() -> ArgumentParser:
+def command_line() -> ArgumentParser:
+    """Return what reads the command line."""
     parser = ArgumentParser(
         prog="python -m autopilot",
         description="The autopilot: takes the vehicle's state from a plant and answers with rotor commands, "
@@ -35,7 +36,7 @@ def _parser() -> ArgumentParser:
 
 def main() -> int:
     """Run the autopilot; return the exit code."""
-    args = _parser().parse_args()
+    args = command_line().parse_args()
     link, status, stop = begin("autopilot", args.plant, args)
     from autopilot.process import run
 

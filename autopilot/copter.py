@@ -30,6 +30,7 @@ from mavlink.hil import ActuatorCommand, StateFrame
 from mavlink.hub import Outgoing
 from mavlink.parameters import Parameters, Value
 from mavlink.services.statustext import INFO
+from mavlink.setpoints import OffboardSetpoint, Sticks
 from plant.vehicle import Vehicle
 
 _STILL = (0.0, 0.0, 0.0, 0.0)
@@ -60,6 +61,7 @@ class Copter:
         pilot: Decides what is flown.
         parameters: All numbers that can be changed.
         stations: What ground stations see and say.
+        power: The battery, as far as the autopilot knows.
         solve_time_s: Of the last QP.
     """
 
@@ -103,9 +105,9 @@ class Copter:
         self.frame_interval_us = self._loop.frame_interval_us
         self._interval_s = self._loop.control_interval_us * 1e-6
         self._attitude = AttitudeReference(believed, self._loop.preview) if self._loop.takes_attitude else None
-        self.pilot = Pilot(self._loop.preview, behaviour(self.parameters), self._course)
+        self.pilot = Pilot(self._loop.preview, behaviour(self.parameters), self._course, self._missing)
         self.stations = Stations(settings, self.pilot, self.parameters)
-        self._power = PowerMeter(believed)
+        self.power = PowerMeter(believed)
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
         self._time_us: int | None = None
@@ -169,9 +171,7 @@ class Copter:
     def _sense(self, now_us: int, state: VehicleState) -> None:
         """Take in what steers the vehicle, and what has ceased to."""
         pilot, stations = self.pilot, self.stations
-        behaviour = pilot.behaviour
-        sticks = stations.manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6))
-        setpoint = stations.offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6))
+        sticks, setpoint = self._heard(now_us)
         pilot.sense(now_us, state, Steered(sticks, setpoint, stations.follow.latest(now_us, _LEADER_LOST_US)))
         if pilot.state.armed:
             if pilot.state.mode is Mode.OFFBOARD and setpoint is None:
@@ -181,22 +181,34 @@ class Copter:
 
     def _take_stock(self, state: VehicleState) -> None:
         """Take in what orders of ground stations are judged by."""
-        pilot, stations = self.pilot, self.stations
-        sticks, setpoint, _ = pilot.scene().steered
+        pilot = self.pilot
+        sticks = pilot.scene().steered.sticks
+        thrust = sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None
+        outside = self.stations.missions.breach(state.position_enu_m, self._time_us or 0)
+        pilot.take_stock(Facts(state, pilot.standing, self.power.left, thrust, outside))
+
+    def _missing(self) -> list[Need]:
+        """Return needs of modes that nothing meets now: the message before the one that asks may have met one."""
+        sticks, setpoint = self._heard(self._time_us or 0)
+        missions = self.stations.missions
         met = {
             Need.ATTITUDE_CONTROL: self._attitude is not None,
             Need.STICKS: sticks is not None,
             Need.SETPOINTS: setpoint is not None,
-            Need.MISSION: stations.missions.has_mission,
-            Need.INSIDE_FENCE: not stations.missions.leaves_fence,
+            Need.MISSION: missions.has_mission,
+            Need.INSIDE_FENCE: not missions.leaves_fence,
             Need.CIRCLE: False,
-            Need.FLYING: not pilot.standing,
+            Need.FLYING: not self.pilot.standing,
         }
-        missing = tuple(need for need, there in met.items() if not there)
-        thrust = sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None
-        outside = stations.missions.breach(state.position_enu_m, self._time_us or 0)
-        facts = Facts(state, pilot.standing, self._power.left, thrust, outside)
-        pilot.take_stock(facts, missing)
+        return [need for need, there in met.items() if not there]
+
+    def _heard(self, now_us: int) -> tuple[Sticks | None, OffboardSetpoint | None]:
+        """Return the sticks and the setpoint that are obeyed, where they are fresh."""
+        stations, behaviour = self.stations, self.pilot.behaviour
+        return (
+            stations.manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6)),
+            stations.offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6)),
+        )
 
     def _decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         loop = self._loop
@@ -219,7 +231,7 @@ class Copter:
         idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
         least = idle if pilot.state.armed else 0.0
         c1, c2, c3, c4 = (max(control, least) for control in self._controls)
-        self._power.run((c1, c2, c3, c4), self._interval_s)
+        self.power.run((c1, c2, c3, c4), self._interval_s)
         stations.missions.watch_mode(pilot.state.mode)
         stations.update(
             self._photographer.take(
@@ -230,7 +242,7 @@ class Copter:
                 decision,
                 self._step_time_s,
                 (c1, c2, c3, c4),
-                self._power,
+                self.power,
                 stations,
             )
         )

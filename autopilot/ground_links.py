@@ -24,7 +24,15 @@ def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[Gro
     for url in urls:
         if beyond_loopback(url) and not (signed or insecure):
             raise LinkError(unsigned_refusal(url))
-    return [open_ground_link(url) for url in urls]
+    links: list[GroundLink] = []
+    try:
+        for url in urls:
+            links.append(open_ground_link(url))
+    except LinkError:
+        for link in links:
+            link.close()
+        raise
+    return links
 
 
 class GroundLinks:

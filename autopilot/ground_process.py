@@ -55,16 +55,17 @@ class Ground:
         self._state: Path | None = args.state
         self._signing = self._read_key()
         try:
-            links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
             self._folder = Folder(self._state / FILES) if self._state else None
             self._logs = Folder(self._state / LOGS, LOG_QUOTA) if self._state else None
-        except LinkError as error:
-            raise GroundError(str(error)) from error
         except OSError as error:
             raise GroundError(f"cannot write to --state {self._state}: {error.strerror}") from error
-        self._links = GroundLinks(links)
         self._first = track(args.track) if args.track else None
         self.copter = self._vehicle_anew()
+        try:
+            links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
+        except LinkError as error:
+            raise GroundError(str(error)) from error
+        self._links = GroundLinks(links)
         self.shut_down = False
         self._revision = self.copter.parameters.revision
         self._told_s = self._saved_s = perf_counter()
@@ -102,6 +103,7 @@ class Ground:
         elif kind == REBOOT:
             self.copter.stations.log.close()
             self.copter = self._vehicle_anew()
+            self._links.introduce(self.copter.stations)
             self._revision = self.copter.parameters.revision
             self._status.say("said", "restarted by a ground station")
 
@@ -122,7 +124,6 @@ class Ground:
             )
         except ImpossibleError as error:
             raise GroundError(f"{self._parameter_path()}: {error}") from error
-        self._links.introduce(copter.stations)
         return copter
 
     def _parameter_path(self) -> Path:
@@ -151,21 +152,30 @@ class Ground:
             _replace(self._parameter_path(), write(self.copter.parameters, self._args.system_id).encode())
 
     def _read_key(self) -> Signing:
-        kept = 0
-        key = None
         path: Path | None = self._args.signing_key
+        if path is None and self._state and (self._state / KEY).exists():
+            path = self._state / KEY
         try:
-            if self._state and (self._state / TIMESTAMP).exists():
-                kept = int((self._state / TIMESTAMP).read_text())
-            if path is None and self._state and (self._state / KEY).exists():
-                path = self._state / KEY
-            if path is not None:
-                key = parse_key(path.read_bytes())
+            key = None if path is None else parse_key(path.read_bytes())
         except OSError as error:
             raise GroundError(f"cannot read signing key {path}: {error.strerror}") from error
-        except (SigningError, ValueError) as error:
+        except SigningError as error:
             raise GroundError(f"signing key {path}: {error}") from error
-        return Signing(key, max(kept, tick_at(time())))
+        return Signing(key, max(self._read_timestamp(), tick_at(time())))
+
+    def _read_timestamp(self) -> int:
+        """Return the last timestamp of the run before: none of it may be signed with again."""
+        if self._state is None:
+            return 0
+        path = self._state / TIMESTAMP
+        try:
+            return int(path.read_text())
+        except (FileNotFoundError, NotADirectoryError):
+            return 0
+        except OSError as error:
+            raise GroundError(f"cannot read {path}: {error.strerror}") from error
+        except ValueError as error:
+            raise GroundError(f"{path}: not a whole number; remove it once the clock is right") from error
 
     def _save_signing(self) -> None:
         if self._state is None or not (self._signing.active or self._signing.key_changed):

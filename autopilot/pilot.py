@@ -9,7 +9,7 @@ from autopilot.behaviour import Behaviour
 from autopilot.controller import AttitudeDemand, Horizon, Preview, VehicleState
 from autopilot.course import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
 from autopilot.courses import Stop
-from autopilot.landing import Landing, is_below, lies_still, stands_at_first, watch
+from autopilot.landing import Landing, is_below, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
 from autopilot.reference import Reference, at_rest, lead, lead_along, moving_with
 from mavlink.frames import Vector
@@ -67,8 +67,21 @@ class Pilot:
         flights: How often the rotors were armed.
     """
 
-    def __init__(self, preview: Preview, behaviour: Behaviour, make_course: CourseMaker) -> None:
-        """Fly with the references that a control law previews; `make_course` says how each mode begins."""
+    def __init__(
+        self,
+        preview: Preview,
+        behaviour: Behaviour,
+        make_course: CourseMaker,
+        missing: Callable[[], Sequence[Need]],
+    ) -> None:
+        """Begin on the ground, or in the air: see `begin`.
+
+        Args:
+            preview: The references that a control law previews.
+            behaviour: The numbers to fly by.
+            make_course: Says how each mode begins.
+            missing: Says which needs of modes nothing meets at the moment.
+        """
         self._preview = preview
         self._make_course = make_course
         self.state = FIRST
@@ -89,7 +102,7 @@ class Pilot:
         self._now_us = 0
         self._vehicle: VehicleState | None = None
         self._facts = Facts(None, standing=True, charge=1.0, thrust_stick=None)
-        self._missing: tuple[Need, ...] = ()
+        self._missing = missing
         self._steered = NOT_STEERED
         self._said: list[Said] = []
 
@@ -118,9 +131,9 @@ class Pilot:
         """
         self._now_us, self._vehicle, self._steered = now_us, vehicle, steered
 
-    def take_stock(self, facts: Facts, missing: Sequence[Need]) -> None:
-        """Take in what orders are judged by: what arming looks at, and needs of modes that nothing meets."""
-        self._facts, self._missing = facts, tuple(missing)
+    def take_stock(self, facts: Facts) -> None:
+        """Take in what arming is judged by."""
+        self._facts = facts
 
     def scene(self) -> Scene:
         """Return what a course sees now."""
@@ -184,8 +197,7 @@ class Pilot:
 
     def fly(self, mode: Mode, course: Course) -> Refusal | None:
         """Change to `mode` and fly `course` in it, now or once the rotors are armed; return why not."""
-        self._missing = tuple(need for need in self._missing if need is not Need.CIRCLE)
-        refusal = self._follow(Event.SELECT, "", mode)
+        refusal = self._follow(Event.SELECT, "", mode, met=(Need.CIRCLE,))
         if refusal is None:
             self.course, self._course_is_chosen = course, True
         return refusal
@@ -250,7 +262,8 @@ class Pilot:
         assert vehicle is not None, "the pilot has seen the vehicle"
         self._idles = True
         self.reference = at_rest(vehicle)
-        self.standing = self.standing or lies_still(vehicle)
+        self._landing, lies = watch(self._landing, self._now_us, vehicle, sinks=True)
+        self.standing = self.standing or lies
         if self.standing:
             self.ground_m = vehicle.position_enu_m[2]
 
@@ -270,6 +283,7 @@ class Pilot:
         refusal = self._follow(event, text)
         if refusal is None:
             self.speed_m_s = None
+            self._landing = Landing()
             self._engage(self.state.mode)
         return refusal
 
@@ -299,8 +313,11 @@ class Pilot:
         if self.reference is not None:
             self.course, self._course_is_chosen = self._make_course(mode, self.scene()), False
 
-    def _follow(self, event: Event, text: str, selected: Mode | None = None) -> Refusal | None:
-        after = following(self.state, event, selected, self._missing)
+    def _follow(
+        self, event: Event, text: str, selected: Mode | None = None, met: Sequence[Need] = ()
+    ) -> Refusal | None:
+        missing = [need for need in self._missing() if need not in met]
+        after = following(self.state, event, selected, missing)
         if isinstance(after, Refusal):
             return after
         if after != self.state and text:

@@ -101,7 +101,7 @@ class Client:
         self._stop = stop
         self._log = log
         self._ground = ground
-        self._heard = False
+        self._frame_came = self._heard = False
         self._refusal_said = False
 
     def fly(self, autopilot: Autopilot | Copter) -> None:
@@ -127,17 +127,18 @@ class Client:
         frame = self._end.receive(datagram, perf_counter())
         if frame is None:
             return None
+        self._frame_came = True
         step = autopilot.step(frame)
         self._end.answer(step.command)
         return step
 
     def _say_what_changed(self) -> None:
         silent = self._end.silence_s(perf_counter()) > _SILENCE_SAID_AFTER_S
-        if not self._heard and not silent:
+        if not self._heard and self._frame_came and not silent:
             self._heard = True
             self._status.say("flying", "the plant sends frames")
         elif self._heard and silent:
-            self._heard = False
+            self._frame_came = self._heard = False
             self._status.say("silence", f"no frame for {_SILENCE_SAID_AFTER_S:.0f} s, waiting for a plant")
         if self._end.refused is not None and not self._refusal_said:
             self._refusal_said = True

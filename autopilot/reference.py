@@ -16,7 +16,8 @@ from autopilot.controller import Array, Horizon, VehicleState
 from autopilot.reference_chain import Limits, advance
 from mavlink.frames import nearest_turn
 
-_REACHED = 1e-7
+_REACHED = 1e-5
+"""Nobody feels a step so small; the chain, whose snap changes once a sample, stays no further off a moving target."""
 _IN_ITS_SCALE = np.array([[1.0], [1.0], [1.0], [1e-2]])
 """Jerk is the last of the chain to settle, and the largest number of it."""
 

@@ -7,7 +7,9 @@ With e = reference - target, each step of the cascade asks the next for
     jerk          j_t + k_a (wanted acceleration - a)
     snap          s_t + k_j (wanted jerk - j)
 
-and bounds what it adds to the target's own motion. A target that is reached is followed exactly, whatever it does.
+and bounds what it adds to the target's own motion. The acceleration is bounded by what the jerk can end within 1 / k_v,
+too: more could not be taken back in time, and would overshoot. A target that is reached is followed exactly, whatever
+it does.
 """
 
 from math import floor, pi, radians, sqrt
@@ -114,6 +116,7 @@ def _drive_axes(
         if kinds[i] == 0:
             distance_squared += (p[i] - target[0, i]) ** 2
     distance = sqrt(distance_squared)
+    strongest = min(strongest, jerkiest / K_VELOCITY)
     stopping = _STOPPING * strongest
     speed, slope = _approach(distance, stopping, fastest, K_POSITION)
     for i in range(first, last):

@@ -24,6 +24,7 @@ from mavlink.link import LinkError, UdpLink, open_link
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
+LAST_SYSTEM_ID = 255
 
 _NUMBERS = msgspec.json.Encoder(enc_hook=float)
 """The shortest digits that keep every bit, as `str` has them, in a tenth of its time; but no word for nan and inf."""
@@ -86,6 +87,14 @@ def natural(text: str) -> int:
     return value
 
 
+def system_id(text: str) -> int:
+    """Read a MAVLink system id of the command line."""
+    value = int(text)
+    if not 1 <= value <= LAST_SYSTEM_ID:
+        raise ArgumentTypeError(f"must be from 1 to {LAST_SYSTEM_ID}, not {text}")
+    return value
+
+
 def speed(text: str) -> float:
     """Read how many times real time to fly: a number above zero, or `max`."""
     return inf if text == "max" else positive(text)
@@ -101,18 +110,25 @@ def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
 class Stop:
     """Becomes true when the process shall end: SIGINT, SIGTERM, or (if asked for) the death of its parent."""
 
-    def __init__(self, *, with_parent: bool = False) -> None:
-        """Take over SIGINT and SIGTERM."""
+    def __init__(self, *, with_parent: bool = False, starting: bool = False) -> None:
+        """Take over SIGINT and SIGTERM; `starting`: until first asked they end the process at once.
+
+        What is still loading has nothing to put in order, and may load for seconds before it asks.
+        """
         self._signalled = False
+        self._starting = starting
         self._parent = os.getppid() if with_parent else None
         signal.signal(signal.SIGINT, self._handle)
         signal.signal(signal.SIGTERM, self._handle)
 
     def __bool__(self) -> bool:
         """Whether to end now."""
+        self._starting = False
         return self._signalled or (self._parent is not None and os.getppid() != self._parent)
 
     def _handle(self, _signal: int, _frame: FrameType | None) -> None:
+        if self._starting:
+            os._exit(EXIT_INTERRUPTED)
         self._signalled = True
 
 
@@ -137,7 +153,7 @@ class Status:
 def add_common_arguments(parser: ArgumentParser, log: str) -> None:
     """Add the options that both processes have; `log` names what `--out` writes."""
     add = parser.add_argument
-    add("--system-id", type=int, default=1, choices=range(1, 256), metavar="ID", help="MAVLink system (default 1)")
+    add("--system-id", type=system_id, default=1, metavar="ID", help="MAVLink system (default 1)")
     add("--out", type=Path, metavar="DIR", help=f"write {log} there")
     add("--json", action="store_true", help="status as JSON lines on standard output")
     add("--with-parent", action="store_true", help="end when the process that started this one ends")
@@ -146,7 +162,7 @@ def add_common_arguments(parser: ArgumentParser, log: str) -> None:
 def begin(name: str, url: str, args: argparse.Namespace) -> tuple[UdpLink, Status, Stop]:
     """Open the link at `url` and take over signals, or end with one line. To be called before numpy is loaded."""
     use_one_thread()
-    stop = Stop(with_parent=args.with_parent)
+    stop = Stop(with_parent=args.with_parent, starting=True)
     try:
         link = open_link(url)
     except LinkError as error:

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -16,7 +17,7 @@ from typing import IO, Any
 from autopilot.profile import ProfileError, load_profile
 from mavlink.home import HomePlace
 from mavlink.link import LinkError, beyond_loopback, open_link, unsigned_refusal
-from mavlink.process import EXIT_FAILED, Stop, fail
+from mavlink.process import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
 from plant.scenario import Start
 from plant.vehicle import VehicleError, load_vehicle
 from tools.sitl_status import StatusLines
@@ -96,8 +97,8 @@ def _check(args: argparse.Namespace) -> None:
         fail(unsigned_refusal(exposed[0]))
     if vehicle.ground is None and "z" not in args.start:
         fail(f"vehicle {name} has no ground to stand on: fly a vehicle with a table ground, or give --start z=...")
-    if args.instance + args.count > LARGEST_FLEET:
-        fail(f"--instance and --count: instances go from 0 to {LARGEST_FLEET - 1}")
+    if not 1 <= args.count <= LARGEST_FLEET - args.instance:
+        fail(f"--instance and --count: at least one vehicle, instances from 0 to {LARGEST_FLEET - 1}")
     if args.count > 1 and any(url.startswith(("udpin:", "tcpin:")) and not url.endswith(":0") for url in args.gcs):
         fail("--gcs: several vehicles cannot wait on one port; let them call, by udpout: or tcp:, or fly one")
     for instance in range(args.instance, args.instance + args.count):
@@ -112,7 +113,10 @@ def _check_port(url: str) -> None:
 
 
 def _plant_url(args: argparse.Namespace, instance: int) -> str:
-    return f"udpin:127.0.0.1:{PLANT_PORT + instance if args.plant_port is None else args.plant_port}"
+    port = PLANT_PORT + instance
+    if args.plant_port is not None:
+        port = args.plant_port + instance - args.instance if args.plant_port else 0
+    return f"udpin:127.0.0.1:{port}"
 
 
 def _start_plant(member: Member, args: argparse.Namespace) -> None:
@@ -151,31 +155,40 @@ def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -
 
 
 def _process(package: str, *options: str) -> subprocess.Popen[bytes]:
+    """Start it out of reach of the terminal's Ctrl-C: that is for this process, which ends the others."""
     command = [sys.executable, "-m", package, "--json", "--with-parent", *options]
-    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, process_group=0)
 
 
-def _watch(fleet: list[Member], args: argparse.Namespace, stop: Stop, lines: StatusLines) -> int:
-    """Hear what the processes say until one ends or the user has had enough."""
-    while not stop:
-        streams = {
-            process.stdout: (member, name)
-            for member in fleet
-            for name, process in member.processes()
-            if process.stdout is not None
-        }
-        ready, _, _ = select(list(streams), [], [], _LOOK_EVERY_S)
-        for stream in ready:
-            member, name = streams[stream]
-            for event in _events(member, stream):
-                if name == "plant" and event["event"] == "listening":
-                    _start_autopilot(member, args, event["url"])
-                lines.hear(member.instance, name, event)
+def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines: StatusLines) -> int:
+    """Hear what the processes say until the last vehicle ends or the user has had enough."""
+    flying = list(fleet)
+    while flying and not stop:
+        over = [member for member in flying if _has_ended(member)]
+        _hear(flying, args, lines)
         lines.show(perf_counter())
-        code = _ended(fleet, stop)
-        if code is not None:
-            return code
+        for member in over:
+            _finish(member)
+            lines.forget(member.instance)
+            flying.remove(member)
     return 0
+
+
+def _hear(fleet: Sequence[Member], args: argparse.Namespace, lines: StatusLines) -> None:
+    """Take in what the processes of `fleet` have said."""
+    streams = {
+        process.stdout: (member, name)
+        for member in fleet
+        for name, process in member.processes()
+        if process.stdout is not None
+    }
+    ready, _, _ = select(list(streams), [], [], _LOOK_EVERY_S)
+    for stream in ready:
+        member, name = streams[stream]
+        for event in _events(member, stream):
+            if name == "plant" and event["event"] == "listening":
+                _start_autopilot(member, args, event["url"])
+            lines.hear(member.instance, name, event)
 
 
 def _events(member: Member, stream: IO[bytes]) -> list[dict[str, Any]]:
@@ -184,28 +197,32 @@ def _events(member: Member, stream: IO[bytes]) -> list[dict[str, Any]]:
     return [json.loads(line) for line in whole]
 
 
-def _ended(fleet: list[Member], stop: Stop) -> int | None:
-    """Return the exit code once a process has ended; None while all go on."""
-    for member in fleet:
-        for name, process in member.processes():
-            code = process.poll()
-            if code is None or stop:
-                continue
-            if code == 0 and name == "plant":
-                return 0
-            if code < 0:
-                fail(
-                    f"the {name} of instance {member.instance} was killed by {signal.Signals(-code).name}", EXIT_FAILED
-                )
-            return code or EXIT_FAILED
-    return None
+def _has_ended(member: Member) -> bool:
+    return any(process.poll() is not None for _, process in member.processes())
+
+
+def _finish(member: Member) -> None:
+    """End what is left of a vehicle whose time is over, or that a ground station has shut down.
+
+    Where a process came to another end, everything ends, with its exit code.
+    """
+    for name, process in member.processes():
+        code = process.poll()
+        if not code:
+            continue
+        if code < 0:
+            fail(f"the {name} of instance {member.instance} was killed by {signal.Signals(-code).name}", EXIT_FAILED)
+        if code not in (EXIT_FAILED, EXIT_BAD_INPUT):  # of these it has said why
+            fail(f"the {name} of instance {member.instance} ended with exit code {code}", EXIT_FAILED)
+        raise SystemExit(code)
+    _end([process for _, process in member.processes()])
 
 
 def _end(processes: list[subprocess.Popen[bytes]]) -> None:
     """Ask each process to end, then make it."""
     for process in processes:
         if process.poll() is None:
-            process.send_signal(signal.SIGINT)
+            process.terminate()
     for process in processes:
         try:
             process.wait(_GRACE_S)

@@ -1,15 +1,29 @@
 """What `colibri sitl` shows: one live line a vehicle on a terminal, and a line for each thing that happens."""
 
 import sys
-from typing import Any
+from typing import Any, Literal
 
-from rich.console import Console
+from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
 
 _REDRAW_EVERY_S = 0.5
-_TOLD = ("listening", "ground", "said", "heard", "silence", "answered", "refused", "flying")
+_TOLD = ("ground", "said", "heard", "silence", "answered", "refused", "flying")
 """Events that get a line of their own."""
+_COLUMNS: tuple[tuple[str, int, Literal["left", "right"]], ...] = (
+    ("id", 3, "right"),
+    ("time", 6, "right"),
+    ("real", 6, "right"),
+    ("mode", 10, "left"),
+    ("rotors", 8, "left"),
+    ("east", 6, "right"),
+    ("north", 6, "right"),
+    ("up", 7, "right"),
+    ("speed", 8, "right"),
+    ("solver", 6, "right"),
+)
+"""Heading, least width, and where the text stands; as wide as what is common needs, so that columns stay in place."""
+_LINK_SIDES: tuple[Literal["left", "right"], ...] = ("right", "left", "left", "right", "right")
 
 
 class StatusLines:
@@ -40,6 +54,10 @@ class StatusLines:
             self._live.start()
         self._live.update(status_table(self._facts), refresh=True)
 
+    def forget(self, instance: int) -> None:
+        """Show vehicle `instance` no more."""
+        self._facts.pop(instance, None)
+
     def close(self) -> None:
         """Leave the terminal as it was."""
         if self._live is not None:
@@ -47,28 +65,41 @@ class StatusLines:
         sys.stderr.flush()
 
 
-def status_table(facts: dict[int, dict[str, Any]]) -> Table:
-    """Return one row a vehicle: what it does, where it is, who listens, how long the control law takes."""
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    for heading in ("id", "time", "× real", "mode", "", "east north up", "speed", "solver", "ground stations"):
-        table.add_column(heading, no_wrap=True)
+def status_table(facts: dict[int, dict[str, Any]]) -> Group:
+    """Return a row for each vehicle: what it does, where it is, how long its QP takes; and one for each of its links.
+
+    Of a fleet, links on which nobody is heard are left out. It fits 80 columns.
+    """
+    vehicles = Table(box=None, padding=(0, 1, 0, 0), header_style="dim")
+    for heading, width, side in _COLUMNS:
+        vehicles.add_column(heading, no_wrap=True, min_width=width, justify=side)
+    links = Table(box=None, padding=(0, 2, 0, 0), show_header=False, style="dim")
+    for side in _LINK_SIDES:
+        links.add_column(no_wrap=True, justify=side)
     for instance, fact in sorted(facts.items()):
-        x, y, z = fact["position_enu_m"]
-        table.add_row(
-            str(instance + 1),
-            f"{fact['sim_time_s']:.0f} s",
-            f"{fact['times_real_time']:.2f}",
-            fact["mode"],
-            "armed" if fact["armed"] else "disarmed",
-            f"{x:.1f} {y:.1f} {z:.1f} m",
-            f"{fact['speed_m_s']:.1f} m/s",
-            f"{fact['solve_time_us']:.0f} µs",
-            ", ".join(link_text(link) for link in fact["links"]),
-        )
-    return table
+        system = str(instance + 1)
+        vehicles.add_row(system, *_vehicle_texts(fact))
+        for link in fact["links"]:
+            if link["heard"] or len(facts) == 1:
+                links.add_row(f"{system:>3}", *_link_texts(link))
+    return Group(vehicles, links)
 
 
-def link_text(link: dict[str, Any]) -> str:
-    """Return a link in words: who is heard on it, and messages a second in and out."""
-    who = " ".join(link["heard"]) or "nobody"
-    return f"{link['url']} {who} (in {link['received_hz']:.0f}, out {link['sent_hz']:.0f} /s)"
+def _vehicle_texts(fact: dict[str, Any]) -> tuple[str, ...]:
+    """Return the columns of a vehicle behind its id."""
+    x, y, z = (round(value, 1) + 0.0 for value in fact["position_enu_m"])  # + 0.0: no minus before a zero
+    return (
+        f"{fact['sim_time_s']:.0f} s",
+        f"x {fact['times_real_time']:.2f}",
+        fact["mode"],
+        "armed" if fact["armed"] else "disarmed",
+        *(f"{x:.1f}", f"{y:.1f}", f"{z:.1f} m"),
+        f"{fact['speed_m_s']:.1f} m/s",
+        f"{fact['solve_time_us']:.0f} µs",
+    )
+
+
+def _link_texts(link: dict[str, Any]) -> tuple[str, ...]:
+    """Return the columns of a link: its URL, who is heard on it, messages a second in and out."""
+    who = " ".join(link["heard"]) or "nobody yet"
+    return (link["url"], f"hears {who}", f"{link['received_hz']:.0f}/s in", f"{link['sent_hz']:.0f}/s out")
