@@ -1,6 +1,6 @@
 """The whole vehicle as a pure composition: frames of the plant and datagrams of ground stations in, answers out."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from autopilot.arming import Facts
@@ -137,7 +137,7 @@ class Copter:
         self._step_time_s = self._clock() - started_s
         return Step(command, decision, self._step_time_s)
 
-    def serve(self, inbox: Sequence[Received]) -> list[Outgoing]:
+    def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
         """Hear ground stations, and return what to send them; after each `step`, while the plant integrates."""
         now_us = self._time_us
         if now_us is None:
