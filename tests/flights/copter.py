@@ -113,6 +113,14 @@ class Client:
         return any(part in text for text in self.texts)
 
 
+def in_the_air(height_m: float = 5.0, **settings: Any) -> "CopterFlight":
+    """Return a vehicle that is picked up in flight, in hold above home, without having had to take off."""
+    start = Start(z=height_m, psi=90.0, rotors=FLIGHT.simulation.rotor_speed_rpm)
+    flight = CopterFlight(start=start, **settings)
+    assert flight.copter.pilot.state == (Mode.HOLD, True)
+    return flight
+
+
 class CopterFlight:
     """A vehicle and its surroundings.
 
