@@ -1,6 +1,7 @@
 """Sees what a vehicle really does, on a link of its own: clients are judged by this, not by what they say."""
 
 import socket
+from collections import Counter
 from collections.abc import Callable
 from select import select
 from threading import Condition, Event, Thread
@@ -8,7 +9,7 @@ from time import monotonic
 from typing import Any, NamedTuple, Self
 
 from autopilot.modes import Mode, mode_of_custom
-from mavlink.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Codec, mav
+from mavlink.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Codec, Message, mav
 from mavlink.frames import Vector, euler_from_quaternion, frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
 ON_GROUND: int = mav.MAV_LANDED_STATE_ON_GROUND
@@ -78,6 +79,7 @@ class Observer:
         self._latest: dict[str, Any] = {}
         self._sights: list[Sight] = []
         self._texts: list[str] = []
+        self._counts: Counter[str] = Counter()
         self._news = Condition()
         self._ended = Event()
         self._thread = Thread(target=self._run, daemon=True)
@@ -110,6 +112,18 @@ class Observer:
         """The vehicle as it was seen last."""
         with self._news:
             return self._sights[-1]
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How many messages of each name came so far, from whomever."""
+        with self._news:
+            return self._counts.copy()
+
+    @property
+    def fix(self) -> int:
+        """GPS_FIX_TYPE of the last GPS_RAW_INT."""
+        with self._news:
+            return int(self._latest["GPS_RAW_INT"].fix_type)
 
     def modes(self) -> list[Mode]:
         """Return the modes that were flown armed, each once in a row."""
@@ -144,28 +158,56 @@ class Observer:
                 assert left_s > 0.0, f"waited in vain for {what}; {last}; {self._texts}"
                 self._news.wait(left_s)
 
+    def ask(self, answer: str, name: str, *fields: Any, within_s: float = 5.0) -> Any:
+        """Send message `name` to the vehicle; return the fields of the first message `answer` after it.
+
+        Args:
+            answer: Name of the message that answers.
+            name: Of what is sent; its fields begin with the target system and component, which are filled in.
+            *fields: The other fields.
+            within_s: Wall-clock bound for what hangs.
+        """
+        with self._news:
+            assert self._vehicle is not None, "nobody to ask"
+            before = self._counts[answer]
+            target = (self._system_id, AUTOPILOT_COMPONENT)
+            self._socket.sendto(self._codec.encode(name, *target, *fields), self._vehicle)
+            assert self._news.wait_for(lambda: self._counts[answer] > before, within_s), f"no {answer}"
+            return self._latest[answer]
+
+    def plan_length(self, mission_type: int = mav.MAV_MISSION_TYPE_MISSION) -> int:
+        """Return how many items of a plan the vehicle has."""
+        return int(self.ask("MISSION_COUNT", "MISSION_REQUEST_LIST", mission_type).count)
+
+    def parameter(self, name: str) -> float:
+        """Return a REAL32 parameter of the vehicle."""
+        value = self.ask("PARAM_VALUE", "PARAM_REQUEST_READ", name, -1)
+        assert value.param_id == name
+        return float(value.param_value)
+
     def _run(self) -> None:
         while not self._ended.is_set():
             if not select([self._socket], [], [], _LOOK_EVERY_S)[0]:
                 continue
             datagram, self._vehicle = self._socket.recvfrom(4096)
-            for message in self._codec.decode(datagram):
-                if message.source[1] == AUTOPILOT_COMPONENT:
-                    self._system_id = message.source[0]
-                    self._take(message.name, message.fields)
+            with self._news:
+                for message in self._codec.decode(datagram):
+                    self._take(message)
+                self._news.notify_all()
 
-    def _take(self, name: str, fields: Any) -> None:
+    def _take(self, message: Message) -> None:
+        name, fields = message.name, message.fields
+        self._counts[name] += 1
+        if name == "STATUSTEXT":
+            self._texts.append(fields.text)
+        if message.source[1] != AUTOPILOT_COMPONENT:
+            return
+        self._system_id = message.source[0]
         self._latest[name] = fields
         if name == "HEARTBEAT" and not self._has_asked:
             self._ask()
-        elif name == "STATUSTEXT":
-            with self._news:
-                self._texts.append(fields.text)
-                self._news.notify_all()
         elif name == "LOCAL_POSITION_NED" and self._latest.keys() >= _NEEDED:
-            with self._news:
-                self._sights.append(self._sight())
-                self._news.notify_all()
+            self._sights.append(self._sight())
 
     def _ask(self) -> None:
         """Ask for the rates at which to see, once: loopback loses nothing."""
