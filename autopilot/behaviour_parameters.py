@@ -89,7 +89,7 @@ ROWS = (
         "Closer to home it does not climb.",
     ),
     Row("NAV_ACC_RAD", "acceptance_m", "m", 0.05, 200.0, "Acceptance radius", "Closer to a place than this: arrived."),
-    Row("COM_DISARM_LAND", "disarm_after_landing_s", "s", 0.0, 300.0, "Disarm so long after a landing"),
+    Row("COM_DISARM_LAND", "disarm_after_landing_s", "s", 0.0, 300.0, "Disarm so long after a landing", "0: never."),
     Row("COM_DISARM_PRFLT", "disarm_on_ground_s", "s", 0.0, 3600.0, "Disarm if not flying so long", "0: never."),
     Row(
         "COM_OF_LOSS_T",

@@ -25,6 +25,8 @@ from mavlink.services.command import (
 FORCE_MAGIC = 21196
 FARTHEST_M = 100_000.0
 HIGHEST_M = 10_000.0
+LEAST_CLIMB_M = 0.2
+"""Less would not lift the feet for sure."""
 SMALLEST_RADIUS_M = 1.0
 LARGEST_YAW_RAD = 4.0 * pi
 LARGEST_TURN_DEG = 360.0
@@ -114,7 +116,7 @@ class Commands:
         height_m = pilot.ground_m + pilot.behaviour.takeoff_height_m
         if not isnan(command.z):
             height_m = self._height_of_takeoff(command)
-        if not pilot.ground_m < height_m < HIGHEST_M:
+        if not pilot.ground_m + LEAST_CLIMB_M <= height_m < HIGHEST_M:
             return _denied("take-off", "not a height above the ground")
         scene = pilot.scene()
         x, y, _ = scene.place

@@ -1,9 +1,11 @@
 """The links to ground stations: what came on any of them, and where each answer goes."""
 
-from collections.abc import Iterable, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
 from ipaddress import ip_address
 from typing import Any
 
+from autopilot.controller import Clock
 from autopilot.copter import Received
 from autopilot.stations import Stations
 from mavlink.channel import Address
@@ -13,6 +15,9 @@ from mavlink.services.rates import GCS, SDK
 
 SDK_PORTS = range(14540, 14550)
 """Where SDKs wait for a PX4, and so for us: they ask for nothing, and expect everything."""
+SHARE = 0.25
+"""Part of all time that hearing others may take: at real time a frame leaves more than half of its time to that."""
+MOST_SAVED_S = 0.005
 
 
 def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[GroundLink]:
@@ -35,12 +40,43 @@ def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[Gro
     return links
 
 
+class Allowance:
+    """How much time is left for what others send: a share of all time that passes, whatever they do.
+
+    Who takes more than that is heard less often, and the control law not a moment later.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        """Begin with all that can be saved up."""
+        self._clock = clock
+        self._earned_s = clock()
+        self._began_s = 0.0
+        self._left_s = MOST_SAVED_S
+
+    def earn(self) -> None:
+        """Take in the share of the time that has passed."""
+        now_s = self._clock()
+        self._left_s = min(self._left_s + SHARE * (now_s - self._earned_s), MOST_SAVED_S)
+        self._earned_s = now_s
+
+    def begin(self) -> bool:
+        """Begin to spend time, if there is any left."""
+        self._began_s = self._clock()
+        return self._left_s > 0.0
+
+    def end(self) -> None:
+        """End to spend time; what was too much is owed."""
+        self._left_s -= self._clock() - self._began_s
+
+
 class GroundLinks:
     """Carries datagrams between links and a vehicle's hub."""
 
-    def __init__(self, links: Sequence[GroundLink]) -> None:
+    def __init__(self, links: Sequence[GroundLink], clock: Clock) -> None:
         """Serve `links`; those with a target are called, whether anybody hears it or not."""
         self._links = tuple(links)
+        self._waiting: list[deque[tuple[bytes, Address]]] = [deque() for _ in links]
+        self._allowance = Allowance(clock)
         self._loopback = [not beyond_loopback(link.url) for link in links]
         self._opened: list[tuple[int, Address]] = []
         self._counts: dict[int, tuple[int, int]] = {}
@@ -54,19 +90,39 @@ class GroundLinks:
         channel = stations.hub.open(number, address)
         stations.use(channel, SDK if address[1] in SDK_PORTS else GCS)
 
-    def receive(self, stations: Stations) -> list[Received]:
-        """Return what has come; forget connections that have ended."""
-        inbox = []
+    def receive(self, stations: Stations) -> Iterator[Received]:
+        """Yield what has come, as much of it as there is time for; forget connections that have ended.
+
+        What there is no time for waits, first here, then in the system, which in the end drops it.
+        """
+        self._allowance.earn()
         for number, link in enumerate(self._links):
+            if not self._waiting[number]:
+                self._waiting[number].extend(link.receive_now())
             for address in link.take_opened():
                 self._opened.append((number, address))
                 self._open(stations, number, address)
-            for datagram, address in link.receive_now():
-                inbox.append(Received(datagram, number, address, self._is_loopback(number, address)))
+        yield from self._in_turn()
+        for number, link in enumerate(self._links):
             for address in link.take_closed():
-                self._opened = [opened for opened in self._opened if opened != (number, address)]
-                stations.hub.close(number, address)
-        return inbox
+                self._forget(stations, number, address)
+
+    def _in_turn(self) -> Iterator[Received]:
+        """Yield a datagram of each link after the other, so that none has to wait for one that is flooded."""
+        while any(self._waiting):
+            for number, waiting in enumerate(self._waiting):
+                if not waiting:
+                    continue
+                if not self._allowance.begin():
+                    return
+                datagram, address = waiting.popleft()
+                yield Received(datagram, number, address, self._is_loopback(number, address))
+                self._allowance.end()
+
+    def _forget(self, stations: Stations, number: int, address: Address) -> None:
+        self._opened = [opened for opened in self._opened if opened != (number, address)]
+        self._waiting[number] = deque(each for each in self._waiting[number] if each[1] != address)
+        stations.hub.close(number, address)
 
     def send(self, outbox: Iterable[Outgoing]) -> None:
         """Send each datagram on its link; what cannot be sent is lost, as on any network."""

@@ -65,7 +65,7 @@ class Ground:
             links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
         except LinkError as error:
             raise GroundError(str(error)) from error
-        self._links = GroundLinks(links)
+        self._links = GroundLinks(links, perf_counter)
         self.shut_down = False
         self._revision = self.copter.parameters.revision
         self._told_s = self._saved_s = perf_counter()

@@ -9,8 +9,6 @@ _BELOW_M = 0.15
 _STILL_M_S = 0.15
 _LEVEL_RAD_S = 0.5
 _FOR_US = 400_000
-_RESTS = 0.05
-"""m/s and rad/s."""
 
 STANDING_BELOW_M = 0.5
 STANDING_SLOWER_M_S = 0.3
@@ -29,7 +27,7 @@ class Landing(NamedTuple):
 def watch(landing: Landing, now_us: int, state: VehicleState, sinks: bool) -> tuple[Landing, bool]:
     """Return what to remember, and whether the vehicle stands: its signs have lasted.
 
-    Only the ground can hold a vehicle that `sinks`: that is told to, and yet is still.
+    Only the ground can hold a vehicle that `sinks`: that is told to, or whose rotors do not turn, and yet is still.
     """
     still = max(map(abs, state.velocity_enu_m_s)) < _STILL_M_S and max(map(abs, state.rate_flu_rad_s)) < _LEVEL_RAD_S
     if not (sinks and still):
@@ -47,8 +45,3 @@ def stands_at_first(state: VehicleState, home_z_m: float) -> bool:
     """Guess whether a vehicle that is seen for the first time stands: low and still."""
     still = max(map(abs, state.velocity_enu_m_s)) < STANDING_SLOWER_M_S
     return still and abs(state.position_enu_m[2] - home_z_m) < STANDING_BELOW_M
-
-
-def lies_still(state: VehicleState) -> bool:
-    """Whether a vehicle whose rotors were stopped in the air has come to rest."""
-    return max(map(abs, state.velocity_enu_m_s)) < _RESTS and max(map(abs, state.rate_flu_rad_s)) < _RESTS

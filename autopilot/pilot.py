@@ -9,7 +9,7 @@ from autopilot.behaviour import Behaviour
 from autopilot.controller import AttitudeDemand, Horizon, Preview, VehicleState
 from autopilot.course import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
 from autopilot.courses import Stop
-from autopilot.landing import Landing, is_below, lies_still, stands_at_first, watch
+from autopilot.landing import Landing, is_below, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
 from autopilot.reference import Reference, at_rest, lead, lead_along, moving_with
 from mavlink.frames import Vector
@@ -262,7 +262,8 @@ class Pilot:
         assert vehicle is not None, "the pilot has seen the vehicle"
         self._idles = True
         self.reference = at_rest(vehicle)
-        self.standing = self.standing or lies_still(vehicle)
+        self._landing, lies = watch(self._landing, self._now_us, vehicle, sinks=True)
+        self.standing = self.standing or lies
         if self.standing:
             self.ground_m = vehicle.position_enu_m[2]
 
@@ -282,6 +283,7 @@ class Pilot:
         refusal = self._follow(event, text)
         if refusal is None:
             self.speed_m_s = None
+            self._landing = Landing()
             self._engage(self.state.mode)
         return refusal
 

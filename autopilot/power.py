@@ -25,13 +25,12 @@ class PowerMeter:
         self._model = BatteryModel(vehicle)
         self._battery = vehicle.battery
         self._energy_wh = 0.0
-        self._speeds = np.zeros(4)
+        self._now = self._model.terminal(0.0, np.zeros(4))
         self.charge_ah = 0.0
 
     def run(self, controls: FourOf, duration_s: float) -> None:
         """Turn the rotors at `controls`, parts of the largest speed, for `duration_s`."""
-        self._speeds = np.array(controls)
-        voltage_v, current_a = self._model.terminal(self.charge_ah, self._speeds)
+        voltage_v, current_a = self._now = self._model.terminal(self.charge_ah, np.array(controls))
         self.charge_ah += current_a * duration_s / _SECONDS_PER_HOUR
         self._energy_wh += voltage_v * current_a * duration_s / _SECONDS_PER_HOUR
 
@@ -46,7 +45,7 @@ class PowerMeter:
         """Return what to tell of it; None without a battery."""
         if self._battery is None:
             return None
-        voltage_v, current_a = self._model.terminal(self.charge_ah, self._speeds)
+        voltage_v, current_a = self._now
         left_ah = self.left * self._battery.capacity_ah
         left_s = left_ah / current_a * _SECONDS_PER_HOUR if current_a > _LEAST_CURRENT_A else nan
         cells = max(1, round(self._battery.full_voltage_v / _CELL_V))

@@ -19,16 +19,18 @@ from autopilot.profile import load_profile
 from autopilot.qp import installed_solvers
 from mavlink.process import fail
 from tools import peer
+from tools.serving import ALONE, CHANNELS, WATCHED, serving_figures
 from tools.speed import CONTROL_S, LINKS, THESIS_LINKS, Tell, rate_figures, thesis_figures
 from tools.stages import MOVES, STAGES, stage_figures
 
 PROFILE = "flight"
 SHORTEST_S, LONGEST_S = 0.1, 1000.0
+_SERVED = ("p50 µs", "p99 µs", "messages a second")
 
 
 def bench(args: argparse.Namespace) -> int:
     """Measure what the command line says, print tables, write JSON; return the exit code."""
-    wanted = args.only or ["stages", "flights", "thesis"]
+    wanted = args.only or ["stages", "flights", "ground", "thesis"]
     if not SHORTEST_S <= args.duration <= LONGEST_S:
         fail(f"--duration: {SHORTEST_S:g} to {LONGEST_S:g} s, not {args.duration:g}")
     if args.out:
@@ -43,6 +45,8 @@ def bench(args: argparse.Namespace) -> int:
             figures["stages"] = stage_figures(profile, Path(folder), args.duration, tell)
         if "flights" in wanted:
             figures["flights"] = rate_figures(profile, Path(folder), args.duration, args.runs, tell, beside=beside)
+        if "ground" in wanted:
+            figures["ground"] = serving_figures(profile, Path(folder), args.duration, args.runs, tell)
         if "thesis" in wanted:
             figures["thesis"] = thesis_figures(args.runs, tell)
     if args.out:
@@ -60,7 +64,8 @@ def parts(wanted: list[str], runs: int, *, beside: bool) -> int:
     """Return how often `tell` will be called."""
     stages = 1 + len(MOVES) * (1 + len(installed_solvers()))
     flights = 1 + runs * len(CONTROL_S) * (len(LINKS) + beside)
-    parts = {"stages": stages, "flights": flights, "thesis": runs * len(THESIS_LINKS)}
+    ground = len(CHANNELS) + 2 * runs
+    parts = {"stages": stages, "flights": flights, "ground": ground, "thesis": runs * len(THESIS_LINKS)}
     return sum(parts[section] for section in set(wanted))
 
 
@@ -92,6 +97,9 @@ def _print(figures: Mapping[str, Any]) -> None:
             for name, figure in rate.items()
         }
         console.print(_spread(f"{title}, {settings['runs']} runs", rows))
+    if "ground" in figures:
+        for table in _ground_tables(figures["ground"]):
+            console.print(table)
     if "thesis" in figures:
         console.print(_spread(f"spiral, profile thesis, {settings['runs']} flights a link", figures["thesis"]))
 
@@ -107,6 +115,18 @@ def _stage_tables(stages: Mapping[str, Any]) -> Iterator[Table]:
     for name, figure in stages["link"].items():
         link.add_row(name, _number(figure["p50"]), _number(figure["p99"]))
     yield link
+
+
+def _ground_tables(ground: Mapping[str, Any]) -> Iterator[Table]:
+    serve = _table(f"{ground['track']}, profile {PROFILE}: to serve ground stations after a frame", _SERVED)
+    for channels, figure in ground["serve"].items():
+        serve.add_row(f"{channels} connected", *(_number(figure[name]) for name in ("p50", "p99", "messages_hz")))
+    yield serve
+    steps = _table("control step at real time, µs", ("p50", "p99"))
+    for name in (ALONE, WATCHED):
+        figure = ground["control_step_us"][name]
+        steps.add_row(name, _number(figure["p50"]), _number(figure["p99"]))
+    yield steps
 
 
 def _by_horizon(title: str, figures: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:

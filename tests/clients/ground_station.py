@@ -1,6 +1,7 @@
 """A ground station of pymavlink alone, none of our code between it and the vehicle: asks, commands, listens."""
 
 import socket
+from collections import deque
 from collections.abc import Callable, Iterable
 from math import nan
 from select import select
@@ -9,7 +10,9 @@ from typing import Any, Self, TypeAlias
 
 from pymavlink.dialects.v20 import development as mavlink2
 
-GIVE_UP_AFTER_S = 30.0
+from tests.clients.observer import Observer, Sight
+
+GIVE_UP_AFTER_S = 60.0
 
 Message: TypeAlias = Any
 Address: TypeAlias = tuple[str, int]
@@ -35,6 +38,7 @@ class GroundStation:
         self.mav.robust_parsing = True
         self.heard: list[Message] = []
         self.peers: list[Address] = []
+        self._unread: deque[Message] = deque()
         self._announced = announced
         self._heartbeat_due_s = 0.0
 
@@ -89,11 +93,23 @@ class GroundStation:
         """
         give_up_s = monotonic() + within_s
         while monotonic() < give_up_s:
-            for message in self.pump():
+            self._unread += self.pump() if not self._unread else ()
+            while self._unread:
+                message = self._unread.popleft()
                 if message.get_type() == name and condition(message):
                     return message
         said = [message.text for message in self.heard if message.get_type() == "STATUSTEXT"]
         raise AssertionError(f"waited in vain for {name}; the vehicle said {said}")
+
+    def until(
+        self, seen: Observer, condition: Callable[[Sight], bool], what: str, within_s: float = GIVE_UP_AFTER_S
+    ) -> Sight:
+        """Listen until the vehicle, as the observer sees it, meets `condition`."""
+        give_up_s = monotonic() + within_s
+        while not condition(sight := seen.now):
+            assert monotonic() < give_up_s, f"waited in vain for {what}; {sight}; {seen.texts}"
+            self.pump(0.02)
+        return sight
 
     def hear_for(self, messages: int) -> list[Message]:
         """Return the next messages, that many at least."""

@@ -5,10 +5,11 @@ Nothing is simulated of the links but the bytes: a client encodes what it sends,
 
 from collections import Counter, defaultdict
 from collections.abc import Callable
+from dataclasses import replace
 from math import nan
 from typing import Any
 
-from msgspec.structs import replace
+from msgspec import structs
 
 from autopilot.copter import Copter, Received
 from autopilot.modes import Mode, custom_mode, mode_of_custom
@@ -31,9 +32,11 @@ STANDING = Start()
 """On its feet: z counts from where the vehicle stands."""
 NO_CLOCK_S = 0.0
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
+DENIED: int = mav.MAV_RESULT_DENIED
+FORCE = 21196.0
 _KEPT = 4000
 _AS_IT_IS = load_profile("flight")
-FLIGHT = replace(_AS_IT_IS, simulation=replace(_AS_IT_IS.simulation, frame_interval_s=None))
+FLIGHT = structs.replace(_AS_IT_IS, simulation=structs.replace(_AS_IT_IS.simulation, frame_interval_s=None))
 """The flight profile with a frame for each control sample and none between: a third less to compute."""
 
 
@@ -90,7 +93,14 @@ class Client:
         if message.name == "COMMAND_ACK":
             self.acks.append(message.fields)
         elif message.name == "STATUSTEXT":
-            self.texts.append(message.fields.text)
+            self._hear_text(message.fields)
+
+    def _hear_text(self, fields: Any) -> None:
+        """Take in a line; a long one comes in chunks of 50 characters."""
+        if fields.chunk_seq:
+            self.texts[-1] += fields.text
+        else:
+            self.texts.append(fields.text)
 
     def latest(self, name: str) -> Any:
         """Return the last message of a name."""
@@ -148,6 +158,10 @@ class CopterFlight:
         self.copter.stations.hub.open(client.link, client.address)
         return client
 
+    def put(self, start: Start) -> None:
+        """Put the vehicle elsewhere, at this very time."""
+        self.world = replace(starting_world(start, self._believed), time_us=self.world.time_us)
+
     def restart(self) -> None:
         """Start the autopilot anew, wherever the vehicle is."""
         self.copter = self._copter(None, None)
@@ -180,6 +194,22 @@ class CopterFlight:
             assert self.world.time_us < began_us + at_most_s * 1e6, f"{what or 'it'} took longer than {at_most_s} s"
             self.step()
         return (self.world.time_us - began_us) * 1e-6
+
+    def path(self, seconds: float) -> list[Vector]:
+        """Fly for so long; return where it was at each frame."""
+        end_us = self.world.time_us + round(seconds * 1e6)
+        return self.path_until(lambda: self.world.time_us >= end_us, seconds + 1.0)
+
+    def path_until(self, condition: Callable[[], object], at_most_s: float) -> list[Vector]:
+        """Fly until `condition()`; return where it was at each frame."""
+        path = [self.position]
+
+        def note_and_ask() -> object:
+            path.append(self.position)
+            return condition()
+
+        self.until(note_and_ask, at_most_s)
+        return path
 
     def send(self, name: str, *fields: Any) -> None:
         """Send a message from the first client."""
@@ -217,9 +247,23 @@ class CopterFlight:
         """Arm; return the MAV_RESULT."""
         return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
+    def arm_by_force(self) -> int:
+        """Arm whatever the checks say; return the MAV_RESULT."""
+        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE)
+
     def disarm(self, magic: float = 0.0) -> int:
         """Disarm, or try to; return the MAV_RESULT."""
         return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, magic)
+
+    def stick(self, pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: float = 0.0) -> None:
+        """Send sticks once: forward, right, up (0..1, the middle is 0.5), clockwise."""
+        axes = (pitch, roll, thrust, yaw)
+        self.send("MANUAL_CONTROL", SYSTEM, *(round(1000.0 * axis) for axis in axes), 0)
+
+    def drain(self, part: float) -> None:
+        """Have the autopilot believe that so much of the battery's charge is gone."""
+        assert self._believed.battery is not None
+        self.copter.power.charge_ah += part * self._believed.battery.capacity_ah
 
     def set(self, name: str, value: Value) -> None:
         """Set a parameter as a ground station does, and see that it was taken."""
@@ -234,6 +278,11 @@ class CopterFlight:
         assert self.arm() == ACCEPTED
         self.until(lambda: self.mode is Mode.HOLD, 5.0 + 2.0 * height_m, "take-off")
         self.run(1.0)
+
+    def land(self) -> None:
+        """Land where it is, and wait until the rotors have stopped."""
+        assert self.select(Mode.LAND) == ACCEPTED
+        self.until(lambda: not self.armed, 5.0 + 2.0 * self.position[2], "landing")
 
     def go(self, east_m: float, north_m: float, up_m: float, yaw_rad: float = nan, speed_m_s: float = -1.0) -> int:
         """Reposition to a place, ENU from the origin; return the MAV_RESULT."""

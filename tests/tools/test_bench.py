@@ -10,7 +10,7 @@ import pytest
 
 from autopilot.profile import load_profile
 from autopilot.qp import installed_solvers
-from tools import bench, peer, speed, stages
+from tools import bench, peer, serving, speed, stages
 from tools.cli import main
 from tools.variants import plan_of, toml_lines, with_intervals, with_moves
 
@@ -93,6 +93,18 @@ def test_the_spiral_flies_through_the_whole_command(tmp_path: Path) -> None:
     thesis = figures_of(tmp_path / "thesis.json", "--only", "thesis")["thesis"]
     assert {name.partition(":")[0] for name in thesis} == set(speed.THESIS_LINKS)
     assert all(0.0 < figure["min"] <= figure["median"] <= figure["max"] for figure in thesis.values())
+
+
+def test_serving_ground_stations_is_measured_and_what_it_does_to_the_control_step(tmp_path: Path) -> None:
+    ground = figures_of(tmp_path / "ground.json", "--only", "ground")["ground"]
+    assert {int(channels) for channels in ground["serve"]} == set(serving.CHANNELS)
+    rates = [figure["messages_hz"] for figure in ground["serve"].values()]
+    assert rates[0] == 0.0
+    assert rates == sorted(set(rates))
+    assert all(0.0 < figure["p50"] <= figure["p99"] for figure in ground["serve"].values())
+    steps = ground["control_step_us"]
+    assert set(steps) == {serving.ALONE, serving.WATCHED}
+    assert {figure["samples"] for figure in steps.values()} == {24}
 
 
 def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -189,8 +189,8 @@ def drawn(*instances: int) -> list[str]:
 
 def test_the_status_line_fits_a_terminal() -> None:
     assert drawn(0) == [
-        " id    time   real mode       rotors     east  north      up     speed solver",
-        "  1 12346 s x 1.00 stabilized disarmed    0.0 -123.5  78.9 m  12.3 m/s 123 µs",
+        " id    time   real mode       rotors     east  north      up    speed solver",
+        "  1 12346 s x 1.00 stabilized disarmed    0.0 -123.5  78.9 m 12.3 m/s 123 µs",
         "  1  udpout:127.0.0.1:14550  hears 255/190     2/s in  61/s out",
         "  1  udpout:127.0.0.1:14540  hears nobody yet  0/s in   0/s out",
     ]

@@ -1,0 +1,58 @@
+"""DroneKit 2 flies the vehicle, in a process of its own; what it says is held against what an observer sees."""
+
+import subprocess
+import sys
+from math import dist, hypot
+from pathlib import Path
+
+from autopilot.modes import Mode
+from mavlink.geodesy import Geodetic, enu_of
+from mavlink.home import DEFAULT_HOME
+from tests.clients.vehicle import Vehicle, vehicle
+
+PROGRAMS = Path(__file__).parent / "programs"
+SPEED = 4.0
+GIVE_UP_AFTER_S = 180.0
+
+
+def place(latitude_deg: float, longitude_deg: float, height_m: float) -> tuple[float, float, float]:
+    """Return a place in ENU; `height_m` is above home."""
+    origin = Geodetic(*DEFAULT_HOME[:3])
+    x, y, _ = enu_of(Geodetic(latitude_deg, longitude_deg, DEFAULT_HOME.altitude_m), origin)
+    return (x, y, height_m)
+
+
+def said(program: str, flown: Vehicle) -> list[str]:
+    """Run a program against a vehicle; return what it printed."""
+    command = [sys.executable, str(PROGRAMS / program), f"udpout:127.0.0.1:{flown.port}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=GIVE_UP_AFTER_S)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout.splitlines()
+
+
+def test_it_arms_takes_off_goes_somewhere_and_lands(tmp_path: Path) -> None:
+    with vehicle(tmp_path, speed=SPEED) as flown:
+        lines = said("dronekit_flight.py", flown)
+        assert lines[0] == "connected LOITER False 3 100"
+        assert lines[1].startswith("parameters ")
+        assert lines[2] == "set 4.5"
+        assert [line for line in lines[3:] if not line.startswith("text")] == ["armed", "up", "there", "landed"]
+        assert "text landed, rotors stopped" in lines
+
+        seen = flown.seen.wait(lambda sight: not sight.armed, "the end of the flight")
+        assert flown.seen.modes()[-3:] == [Mode.TAKEOFF, Mode.HOLD, Mode.LAND]
+        assert min(dist(sight.position_enu_m, place(47.3978, 8.5456, 6.0)) for sight in flown.seen.sights) < 0.3
+        assert max(hypot(*sight.velocity_enu_m_s[:2]) for sight in flown.seen.sights) < 4.2
+        assert not seen.flying
+        (kept,) = flown.state.glob("0/*.params")
+        assert "MIS_TAKEOFF_ALT\t4.5" in kept.read_text(encoding="utf-8")
+
+
+def test_it_flies_a_mission(tmp_path: Path) -> None:
+    with vehicle(tmp_path, speed=SPEED) as flown:
+        lines = said("dronekit_mission.py", flown)
+        assert lines == ["downloaded [16, 16, 21]", "armed", "mission", "last item", "landed"]
+        flown.seen.wait(lambda sight: not sight.armed, "the end of the flight")
+        assert [mode for mode in flown.seen.modes() if mode is not Mode.HOLD] == [Mode.MISSION]
+        assert min(dist(sight.position_enu_m, place(47.3978, 8.545594, 4.0)) for sight in flown.seen.sights) < 1.0
+        assert hypot(*flown.seen.now.position_enu_m[:2]) < 0.3
