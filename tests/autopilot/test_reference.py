@@ -72,7 +72,7 @@ def long_enough_s(limits: Limits, place: Vector) -> float:
     return 25.0 + hypot(*place) / slowest_m_s + pi / limits.yaw_rate_rad_s
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(LIMITS, PLACES, ANGLES)
 def test_from_rest_to_rest_within_the_limits_without_overshoot_to_the_last_bit(
     limits: Limits, place: Vector, yaw_rad: float
@@ -94,7 +94,7 @@ def test_a_jerk_too_low_for_the_acceleration_does_not_overshoot() -> None:
     assert motions[:, 0, 0].max() <= 40.0 + 1e-9
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(LIMITS, st.tuples(reals(12.0), reals(12.0), reals(3.0)), reals(3.0))
 def test_a_velocity_is_reached_and_a_vehicle_stops_from_any(limits: Limits, velocity: Vector, rate: float) -> None:
     target = still_target(ORIGIN, 0.0, SAMPLES, (Kind.VELOCITY,) * 3)._replace(turns=False)
@@ -142,7 +142,7 @@ def test_a_plan_that_is_reached_is_the_reference_whatever_the_turn(turns: int, s
     assert (target_of(plan).motion == target.motion).all()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(LIMITS, PLACES, PLACES)
 def test_a_target_that_jumps_takes_the_reference_along_within_the_limits(
     limits: Limits, place: Vector, jumped: Vector

@@ -61,15 +61,17 @@ def test_offboard_velocity_and_yaw_rate_and_what_silence_does() -> None:
 
 
 def test_no_velocity_or_acceleration_leads_beyond_what_is_allowed() -> None:
-    flight = offboard(velocity=(30.0, 30.0, 20.0))
-    stream(flight, 5.0, velocity=(30.0, 30.0, 20.0))
+    flight = in_the_air(values={"MPC_XY_VEL_MAX": 4.0})
+    stream(flight, EVERY_S, velocity=(30.0, 30.0, 20.0))
+    assert flight.select(Mode.OFFBOARD) == ACCEPTED
+    stream(flight, 3.0, velocity=(30.0, 30.0, 20.0))
     reference = flight.copter.pilot.scene().velocity
-    assert hypot(*reference[:2]) <= 12.01  # MPC_XY_VEL_MAX
-    assert reference[2] <= 3.01
-    stream(flight, 6.0, acceleration=(-40.0, 0.0, -9.0))
+    assert 3.9 < hypot(*reference[:2]) <= 4.01  # MPC_XY_VEL_MAX
+    assert 2.9 < reference[2] <= 3.01
+    stream(flight, 4.0, acceleration=(-40.0, 0.0, -9.0))
     reference = flight.copter.pilot.scene().velocity
-    assert -12.01 <= reference[0] < -9.0
-    assert reference[2] >= -1.51
+    assert -4.01 <= reference[0] < -3.5
+    assert -1.51 <= reference[2] < -1.2
 
 
 def test_offboard_acceleration() -> None:

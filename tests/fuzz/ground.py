@@ -13,7 +13,7 @@ from tests.fuzz.vehicle import SITUATIONS, BrokenError, Target
 
 MOST_GROWTH_MIB = 4.0
 _A_FRAME = 40
-_FRAMES_A_SITUATION = 25
+_FRAMES_A_SITUATION = 15
 
 
 class GroundOutcome(NamedTuple):
