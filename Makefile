@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out/spiral
 
-.PHONY: setup fly test lint fuzz soak bench lock clean
+.PHONY: setup fly test test-clients lint fuzz soak bench lock clean
 
 setup: .venv/.ready
 
@@ -29,6 +29,20 @@ lint: setup
 test: lint
 	$(BIN)/python -m pytest -n 2
 
+# Real ground stations, minutes of them, in an environment of their own. MAVSDK-Python's examples run from a checkout of
+# theirs: make test-clients MAVSDK_EXAMPLES=FOLDER; TABLE=FILE writes what came of them as Markdown.
+test-clients: setup .venv-clients/.ready
+ifneq ($(MAVSDK_EXAMPLES),)
+	$(BIN)/python -m tests.clients.mavsdk_examples $(MAVSDK_EXAMPLES) --python .venv-clients/bin/python $(if $(TABLE),--table $(TABLE))
+endif
+	$(BIN)/python -m pytest tests/clients -m clients
+
+.venv-clients/.ready: requirements-clients.lock
+	@echo "setting up .venv-clients from requirements-clients.lock (once)"
+	@$(PYTHON) -m venv --clear .venv-clients
+	@.venv-clients/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-clients.lock
+	@touch $@
+
 fuzz: setup
 	$(BIN)/python -m tests.fuzz
 
@@ -45,4 +59,4 @@ lock:
 	  --extra dev pyproject.toml -o requirements.lock
 
 clean:
-	rm -rf .venv out dist
+	rm -rf .venv .venv-clients out dist
