@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out/spiral
 
-.PHONY: setup fly test test-clients lint fuzz soak bench lock clean
+.PHONY: setup fly test lint fuzz soak bench lock clean
 
 setup: .venv/.ready
 
@@ -29,18 +29,18 @@ lint: setup
 test: lint
 	$(BIN)/python -m pytest -n 2
 
-# Real ground stations, minutes of them, in an environment of their own. MAVSDK-Python's examples run from a checkout of
-# theirs: make test-clients MAVSDK_EXAMPLES=FOLDER; TABLE=FILE writes what came of them as Markdown.
+# MAVSDK, MAVProxy and DroneKit fly the vehicle: minutes each. MAVSDK_EXAMPLES=FOLDER, a checkout of MAVSDK-Python, has
+# its examples flown too; they need the ports 14540 and 50051. TABLE=FILE keeps what came of them, as Markdown.
 test-clients: setup .venv-clients/.ready
-ifneq ($(MAVSDK_EXAMPLES),)
-	$(BIN)/python -m tests.clients.mavsdk_examples $(MAVSDK_EXAMPLES) --python .venv-clients/bin/python $(if $(TABLE),--table $(TABLE))
-endif
-	$(BIN)/python -m pytest tests/clients -m clients
+	COLIBRI_CLIENTS=.venv-clients $(BIN)/python -m pytest -m clients tests/clients
+	$(if $(MAVSDK_EXAMPLES),$(BIN)/python -m tests.clients.mavsdk_examples $(MAVSDK_EXAMPLES) \
+	  --python .venv-clients/bin/python $(if $(TABLE),--table $(TABLE)))
 
 .venv-clients/.ready: requirements-clients.lock
-	@echo "setting up .venv-clients from requirements-clients.lock (once)"
+	@echo "setting up .venv-clients from requirements-clients.lock (once, about three minutes)"
 	@$(PYTHON) -m venv --clear .venv-clients
-	@.venv-clients/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-clients.lock
+	@.venv-clients/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes \
+	  -r requirements-clients.lock
 	@touch $@
 
 fuzz: setup
@@ -57,6 +57,8 @@ bench: setup
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
 	  --extra dev pyproject.toml -o requirements.lock
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
+	  --extra clients pyproject.toml -o requirements-clients.lock
 
 clean:
 	rm -rf .venv .venv-clients out dist
