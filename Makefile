@@ -29,6 +29,20 @@ lint: setup
 test: lint
 	$(BIN)/python -m pytest -n 2
 
+# MAVSDK, MAVProxy and DroneKit fly the vehicle: minutes each. MAVSDK_EXAMPLES=FOLDER, a checkout of MAVSDK-Python, has
+# its examples flown too; they need the ports 14540 and 50051.
+test-clients: setup .venv-clients/.ready
+	COLIBRI_CLIENTS=.venv-clients $(BIN)/python -m pytest -m clients tests/clients
+	$(if $(MAVSDK_EXAMPLES),$(BIN)/python -m tests.clients.mavsdk_examples $(MAVSDK_EXAMPLES) \
+	  --python .venv-clients/bin/python)
+
+.venv-clients/.ready: requirements-clients.lock
+	@echo "setting up .venv-clients from requirements-clients.lock (once, about three minutes)"
+	@$(PYTHON) -m venv --clear .venv-clients
+	@.venv-clients/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes \
+	  -r requirements-clients.lock
+	@touch $@
+
 fuzz: setup
 	$(BIN)/python -m tests.fuzz
 
@@ -43,6 +57,8 @@ bench: setup
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
 	  --extra dev pyproject.toml -o requirements.lock
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
+	  --extra clients pyproject.toml -o requirements-clients.lock
 
 clean:
-	rm -rf .venv out dist
+	rm -rf .venv .venv-clients out dist

@@ -89,6 +89,7 @@ class AttitudeReference:
 
     Attributes:
         weight_n: Of the vehicle.
+        limits: How far; whoever changes them replaces all of it.
         most_thrust_n: Of all rotors at their top speed.
     """
 
@@ -98,14 +99,14 @@ class AttitudeReference:
         self.most_thrust_n = float(vehicle.allocation()[0].sum()) * vehicle.rotors.max_speed**2
         self._interval_s = preview.interval_us * 1e-6
         self._samples = preview.samples
-        self._limits = limits
+        self.limits = limits
         level = VehicleState(_NOWHERE, _NOWHERE, (1.0, 0.0, 0.0, 0.0), _NOWHERE, _NOWHERE)
         self.step(self.initial(level), level, lean(0.0, 0.0, 0.0, self.weight_n))
 
     def initial(self, state: VehicleState, thrust_n: float | None = None) -> ReferenceMemory:
         """Begin with the attitude that the vehicle has, and the thrust that it makes, N: its weight if None."""
         angles, rates = np.array(state.euler), np.zeros(3)
-        limit_tilt(angles, rates, self._limits.slew.largest_tilt_rad)
+        limit_tilt(angles, rates, self.limits.slew.largest_tilt_rad)
         return ReferenceMemory(angles, rates, self.weight_n if thrust_n is None else thrust_n)
 
     def step(self, memory: ReferenceMemory, state: VehicleState, wish: Wish) -> tuple[ReferenceMemory, AttitudeDemand]:
@@ -121,7 +122,7 @@ class AttitudeReference:
             wish.yaw_rate_rad_s,
             wish.thrust_n,
             self.weight_n,
-            self._limits.slew,
+            self.limits.slew,
             self._interval_s,
             angles,
             rates,
@@ -132,8 +133,8 @@ class AttitudeReference:
 
     def from_sticks(self, sticks: Sticks) -> Wish:
         """Return what stabilized flight makes of sticks."""
-        tilt = self._limits.stick_tilt_rad
-        yaw_rate = -self._limits.stick_yaw_rate_rad_s * sticks.yaw
+        tilt = self.limits.stick_tilt_rad
+        yaw_rate = -self.limits.stick_yaw_rate_rad_s * sticks.yaw
         return lean(tilt * sticks.roll, tilt * sticks.pitch, yaw_rate, self.thrust_for_stick(sticks.thrust))
 
     def from_setpoint(self, setpoint: AttitudeSetpoint) -> Wish:
@@ -160,7 +161,7 @@ class AttitudeReference:
 
     def _near(self, psi: float, yaw_rad: float) -> float:
         """Return the demanded yaw in the vehicle's own full turn, no further from its yaw than allowed."""
-        furthest = self._limits.yaw_ahead_rad
+        furthest = self.limits.yaw_ahead_rad
         return min(max(nearest_turn(psi, yaw_rad), yaw_rad - furthest), yaw_rad + furthest)
 
 

@@ -1,10 +1,12 @@
 """The whole vehicle as a pure composition: frames of the plant and datagrams of ground stations in, answers out."""
 
 from collections.abc import Iterable
+from math import radians
 from typing import NamedTuple
 
 from autopilot.arming import Facts
-from autopilot.attitude_reference import AttitudeReference
+from autopilot.attitude_reference import DEFAULT_LIMITS, AttitudeLimits, AttitudeReference
+from autopilot.behaviour import Behaviour
 from autopilot.companion import Companion
 from autopilot.controller import Clock, Decision, VehicleState
 from autopilot.core import Step
@@ -104,8 +106,9 @@ class Copter:
         self._clock = clock
         self.frame_interval_us = self._loop.frame_interval_us
         self._interval_s = self._loop.control_interval_us * 1e-6
-        self._attitude = AttitudeReference(believed, self._loop.preview) if self._loop.takes_attitude else None
-        self.pilot = Pilot(self._loop.preview, behaviour(self.parameters), self._course, self._missing)
+        flies_by = behaviour(self.parameters)
+        self._attitude = self._attitude_reference(believed, flies_by) if self._loop.takes_attitude else None
+        self.pilot = Pilot(self._loop.preview, flies_by, self._course, self._missing)
         self.stations = Stations(settings, self.pilot, self.parameters)
         self.power = PowerMeter(believed)
         self._photographer = Photographer(believed, self._interval_s)
@@ -250,12 +253,17 @@ class Copter:
     def _adopt(self) -> None:
         """Fly by the parameters as they are now."""
         self.pilot.behaviour = behaviour(self.parameters)
+        if self._attitude is not None:
+            self._attitude.limits = attitude_limits(self.pilot.behaviour)
         tuned = self._tuning.take()
         if tuned is not None:
             self._loop.adopt(tuned.controller, tuned.vehicle)
             self._photographer = Photographer(tuned.vehicle, self._interval_s)
             if self._attitude is not None:
-                self._attitude = AttitudeReference(tuned.vehicle, self._loop.preview)
+                self._attitude = self._attitude_reference(tuned.vehicle, self.pilot.behaviour)
+
+    def _attitude_reference(self, vehicle: Vehicle, flies_by: Behaviour) -> AttitudeReference:
+        return AttitudeReference(vehicle, self._loop.preview, attitude_limits(flies_by))
 
     def _course(self, mode: Mode, scene: Scene) -> Course:
         """Return how a mode begins."""
@@ -297,3 +305,14 @@ def _at_start(planner: Planner, now_us: int) -> Reference:
     """Return a reference that is on a track that began at time 0."""
     target = target_of(planner.horizon(now_us))
     return Reference(target.motion[0, :4].copy(), target.heading[0, :2].copy())
+
+
+def attitude_limits(flies_by: Behaviour) -> AttitudeLimits:
+    """Return how far full sticks go."""
+    yaw_rate_rad_s = flies_by.stick_yaw_rate_rad_s
+    slew = DEFAULT_LIMITS.slew
+    return DEFAULT_LIMITS._replace(
+        stick_tilt_rad=radians(flies_by.largest_tilt_deg),
+        stick_yaw_rate_rad_s=yaw_rate_rad_s,
+        slew=slew._replace(yaw_rate_rad_s=max(slew.yaw_rate_rad_s, yaw_rate_rad_s)),
+    )

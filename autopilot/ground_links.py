@@ -126,11 +126,13 @@ class GroundLinks:
 
     def send(self, outbox: Iterable[Outgoing]) -> None:
         """Send each datagram on its link; what cannot be sent is lost, as on any network."""
+        self._allowance.begin()
         for number, address, datagram in outbox:
             try:
                 self._links[number].send(datagram, address)
             except LinkError:
                 continue
+        self._allowance.end()
 
     def facts(self, stations: Stations, interval_s: float) -> list[dict[str, Any]]:
         """Return, for each link, who is heard and how many messages a second come and go."""

@@ -1,7 +1,6 @@
 """The plant as a process: a lockstep server on a link, driven by the wall clock, with its logs."""
 
 import argparse
-from math import isfinite
 from pathlib import Path
 from time import perf_counter, sleep
 
@@ -21,6 +20,7 @@ DEFAULT_START = Start(y=-1.0, z=2.0, psi=90.0, rotors=4740.0)
 
 _SILENCE_SAID_AFTER_S = 2.0
 _WAIT_AT_MOST_S = 0.1
+_CATCH_UP_S = 0.1
 
 
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
@@ -71,6 +71,25 @@ class PlantLogs:
         self._tlog.close()
 
 
+class Pace:
+    """When each frame is due by the wall clock.
+
+    A flight that was held up for longer than a moment stays late: it does not hurry past those who fly it.
+    """
+
+    def __init__(self, speed: float, now_s: float) -> None:
+        """Begin now, at `speed` times real time; infinite for flat out."""
+        self._speed = speed
+        self._began_s = now_s
+
+    def due_s(self, time_us: int, now_s: float) -> float:
+        """Return the wall-clock time at which simulated time `time_us` is due."""
+        due_s = self._began_s + time_us / 1e6 / self._speed
+        held_up_s = max(0.0, now_s - due_s - _CATCH_UP_S)
+        self._began_s += held_up_s
+        return due_s + held_up_s
+
+
 class Server:
     """Drives the plant's end of the conversation over a link."""
 
@@ -89,11 +108,12 @@ class Server:
         while not self._stop and self._end.peer is None:
             self._receive(_WAIT_AT_MOST_S)
         began_s = perf_counter()
+        pace = Pace(speed, began_s)
         progress = Progress(self._status)
         interval_us = self._end.frame_interval_us
         frames = 0
         while not self._stop and world.time_us + interval_us <= duration_s * 1e6:
-            self._pace(began_s + world.time_us / 1e6 / speed if isfinite(speed) else 0.0)
+            self._wait_until(pace.due_s(world.time_us, perf_counter()))
             command = self._exchange(world)
             if command is None:
                 break
@@ -155,6 +175,6 @@ class Server:
             self._logs.write_traffic(self._time_us, self._end.received, sent)
         self._end.received.clear()
 
-    def _pace(self, due_s: float) -> None:
+    def _wait_until(self, due_s: float) -> None:
         while not self._stop and (early_s := due_s - perf_counter()) > 0.0:
             sleep(min(early_s, _WAIT_AT_MOST_S))

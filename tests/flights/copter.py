@@ -6,7 +6,7 @@ Nothing is simulated of the links but the bytes: a client encodes what it sends,
 from collections import Counter, defaultdict
 from collections.abc import Callable
 from dataclasses import replace
-from math import nan
+from math import nan, pi
 from typing import Any
 
 from msgspec import structs
@@ -17,7 +17,8 @@ from autopilot.profile import Profile, load_profile
 from autopilot.stations import StationSettings
 from autopilot.tracks import Track
 from mavlink.dialect import Codec, Message, mav
-from mavlink.frames import Vector, euler_from_quaternion
+from mavlink.files import Files
+from mavlink.frames import Vector, euler_from_quaternion, ned_from_enu
 from mavlink.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from mavlink.hil import ActuatorCommand
 from mavlink.parameters import Value
@@ -134,11 +135,12 @@ class CopterFlight:
         first: Track | None = None,
         origin: Geodetic = DEFAULT_ORIGIN,
         client: Client | None = None,
+        files: Files | None = None,
     ) -> None:
         """Begin at `start`, with parameters `values`; `vehicle` is the plant's, where it is not the autopilot's."""
         self._profile = profile or FLIGHT
         self._believed = load_vehicle(self._profile.simulation.vehicle)
-        self._settings = StationSettings(system_id=SYSTEM, identity="px4", origin=origin)
+        self._settings = StationSettings(system_id=SYSTEM, identity="px4", origin=origin, files=files)
         self._physics = Physics(vehicle or self._believed, "rk4", wind_enu_m_s)
         self.world: World = starting_world(start, self._believed)
         self.copter = self._copter(values, first)
@@ -259,6 +261,23 @@ class CopterFlight:
         """Send sticks once: forward, right, up (0..1, the middle is 0.5), clockwise."""
         axes = (pitch, roll, thrust, yaw)
         self.send("MANUAL_CONTROL", SYSTEM, *(round(1000.0 * axis) for axis in axes), 0)
+
+    def setpoint(
+        self,
+        position: Vector | None = None,
+        velocity: Vector | None = None,
+        acceleration: Vector | None = None,
+        yaw_rad: float | None = None,
+        yaw_rate_rad_s: float | None = None,
+    ) -> None:
+        """Send an offboard setpoint once, ENU; what is None is masked."""
+        groups = (position, velocity, acceleration)
+        mask = sum(0b111 << 3 * place for place, group in enumerate(groups) if group is None)
+        mask |= (yaw_rad is None) << 10 | (yaw_rate_rad_s is None) << 11
+        ned = [value for group in groups for value in ned_from_enu(group or (0.0, 0.0, 0.0))]
+        yaw = 0.0 if yaw_rad is None else 0.5 * pi - yaw_rad
+        fields = (mav.MAV_FRAME_LOCAL_NED, mask, *ned, yaw, -(yaw_rate_rad_s or 0.0))
+        self.send("SET_POSITION_TARGET_LOCAL_NED", 0, SYSTEM, COMPONENT, *fields)
 
     def drain(self, part: float) -> None:
         """Have the autopilot believe that so much of the battery's charge is gone."""
