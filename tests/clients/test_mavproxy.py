@@ -90,7 +90,7 @@ def test_parameters(tmp_path: Path) -> None:
         names = (tmp_path / "mav.parm").read_text(encoding="utf-8").split()[::2]
         assert "MIS_TAKEOFF_ALT" in names
         shown = proxy.type("param show *", rf"(?s){min(names)} +\S.*{max(names)} +\S+")
-        assert [line.split()[0] for line in shown[0].splitlines()] == sorted(names)
+        assert sorted(line.split()[0] for line in shown[0].splitlines()) == sorted(names)
         proxy.type("param set MIS_TAKEOFF_ALT 4.25", r"> ")
         proxy.type("param set SYS_FAILURE_EN 1", r"> ")
         proxy.type("param fetch", r"Received \d+ parameters")
