@@ -95,13 +95,17 @@ class AttitudeReference:
 
     def __init__(self, vehicle: Vehicle, preview: Preview, limits: AttitudeLimits = DEFAULT_LIMITS) -> None:
         """Demand what `limits` allow at the samples of `preview`; what is compiled is loaded here."""
-        self.weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
-        self.most_thrust_n = float(vehicle.allocation()[0].sum()) * vehicle.rotors.max_speed**2
+        self.adopt(vehicle)
         self._interval_s = preview.interval_us * 1e-6
         self._samples = preview.samples
         self.limits = limits
         level = VehicleState(_NOWHERE, _NOWHERE, (1.0, 0.0, 0.0, 0.0), _NOWHERE, _NOWHERE)
         self.step(self.initial(level), level, lean(0.0, 0.0, 0.0, self.weight_n))
+
+    def adopt(self, vehicle: Vehicle) -> None:
+        """Go on for a vehicle of other numbers."""
+        self.weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
+        self.most_thrust_n = float(vehicle.allocation()[0].sum()) * vehicle.rotors.max_speed**2
 
     def initial(self, state: VehicleState, thrust_n: float | None = None) -> ReferenceMemory:
         """Begin with the attitude that the vehicle has, and the thrust that it makes, N: its weight if None."""

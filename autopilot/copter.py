@@ -107,7 +107,9 @@ class Copter:
         self.frame_interval_us = self._loop.frame_interval_us
         self._interval_s = self._loop.control_interval_us * 1e-6
         flies_by = behaviour(self.parameters)
-        self._attitude = self._attitude_reference(believed, flies_by) if self._loop.takes_attitude else None
+        self._attitude: AttitudeReference | None = None
+        if self._loop.takes_attitude:
+            self._attitude = AttitudeReference(believed, self._loop.preview, attitude_limits(flies_by))
         self.pilot = Pilot(self._loop.preview, flies_by, self._course, self._missing)
         self.stations = Stations(settings, self.pilot, self.parameters)
         self.power = PowerMeter(believed)
@@ -260,10 +262,7 @@ class Copter:
             self._loop.adopt(tuned.controller, tuned.vehicle)
             self._photographer = Photographer(tuned.vehicle, self._interval_s)
             if self._attitude is not None:
-                self._attitude = self._attitude_reference(tuned.vehicle, self.pilot.behaviour)
-
-    def _attitude_reference(self, vehicle: Vehicle, flies_by: Behaviour) -> AttitudeReference:
-        return AttitudeReference(vehicle, self._loop.preview, attitude_limits(flies_by))
+                self._attitude.adopt(tuned.vehicle)
 
     def _course(self, mode: Mode, scene: Scene) -> Course:
         """Return how a mode begins."""

@@ -1,15 +1,15 @@
 """Courses by attitude and thrust: what sticks or a companion ask for, made smooth, and height held under sticks."""
 
-from math import cos, radians
+from math import cos
 
 import numpy as np
 
-from autopilot.attitude_reference import AttitudeReference, ReferenceMemory, Wish, lean
+from autopilot.attitude_reference import AttitudeReference, ReferenceMemory, Wish
 from autopilot.course import Endless, Lean, Motion, Scene, lifts
 from autopilot.courses import Stop
 from autopilot.landing import is_below
 from autopilot.reference import Kind, Reference, lead, moving_with, still_target
-from autopilot.sticks import dead, stick_climb, stick_yaw_rate
+from autopilot.sticks import stick_climb, without_play
 from mavlink.setpoints import AttitudeSetpoint, Sticks
 
 _LIFTING, _SINKING = 0.9, 0.5
@@ -17,6 +17,8 @@ _LIFTING, _SINKING = 0.9, 0.5
 _HEIGHT_1_S2, _CLIMB_1_S, _INTEGRAL_1_S3 = 9.0, 6.0, 4.0
 """Poles of the height loop near -3 and -2, 1/s; the integral removes what a wrong mass or a tired battery leave."""
 _MOST_LIFT_M_S2, _MOST_OFFSET_M_S2 = 6.0, 4.0
+_LEAST_UPRIGHT = 0.5
+_RESTS_M_S = 0.025
 
 
 class Leaning:
@@ -59,8 +61,7 @@ class Stabilized(Endless):
         sticks = scene.steered.sticks
         if sticks is None:
             return self._stop.ask(scene)
-        thrust_n = self._generator.thrust_for_stick(sticks.thrust)
-        return self._leaning.by_wish(wish_of(sticks, thrust_n, scene), scene)
+        return self._leaning.by_wish(self._generator.from_sticks(without_play(sticks)), scene)
 
 
 class AltitudeSticks(Endless):
@@ -81,25 +82,28 @@ class AltitudeSticks(Endless):
         if sticks is None:
             return self._stop.ask(scene)
         reference, lifting = self._climb(sticks, scene)
-        height_error = float(reference.motion[0, 2]) - scene.state.position_enu_m[2]
-        climb_error = float(reference.motion[1, 2]) - scene.state.velocity_enu_m_s[2]
-        step = _INTEGRAL_1_S3 * height_error * scene.interval_s
-        self._offset_m_s2 = min(max(self._offset_m_s2 + step, -_MOST_OFFSET_M_S2), _MOST_OFFSET_M_S2)
-        wanted = float(reference.motion[2, 2]) + _HEIGHT_1_S2 * height_error + _CLIMB_1_S * climb_error
-        lift = min(max(wanted + self._offset_m_s2, -_MOST_LIFT_M_S2), _MOST_LIFT_M_S2)
-        upright = max(cos(scene.state.euler[0]) * cos(scene.state.euler[1]), 0.5)
-        thrust_n = self._generator.weight_n * (1.0 + lift / self._gravity_m_s2) / upright
-        leaning = self._leaning.by_wish(wish_of(sticks, thrust_n, scene), scene)
-        sinks = is_below(reference, scene.state)
-        return leaning._replace(reference=reference, lifts=lifting, sinks=sinks)
+        wish = self._generator.from_sticks(without_play(sticks))._replace(thrust_n=self._thrust_n(reference, scene))
+        leaning = self._leaning.by_wish(wish, scene)
+        return leaning._replace(reference=reference, lifts=lifting, sinks=is_below(reference, scene.state))
+
+    def _thrust_n(self, reference: Reference, scene: Scene) -> float:
+        """Return the thrust that brings the vehicle to the height of the reference, whatever it leans."""
+        height_m, climb_m_s, lift_m_s2 = (float(order) for order in reference.motion[:3, 2])
+        state = scene.state
+        height_error, climb_error = height_m - state.position_enu_m[2], climb_m_s - state.velocity_enu_m_s[2]
+        self._offset_m_s2 += _INTEGRAL_1_S3 * height_error * scene.interval_s
+        self._offset_m_s2 = min(max(self._offset_m_s2, -_MOST_OFFSET_M_S2), _MOST_OFFSET_M_S2)
+        wanted = lift_m_s2 + _HEIGHT_1_S2 * height_error + _CLIMB_1_S * climb_error + self._offset_m_s2
+        lift = min(max(wanted, -_MOST_LIFT_M_S2), _MOST_LIFT_M_S2)
+        upright = max(cos(state.euler[0]) * cos(state.euler[1]), _LEAST_UPRIGHT)
+        return self._generator.weight_n * (1.0 + lift / self._gravity_m_s2) / upright
 
     def _climb(self, sticks: Sticks, scene: Scene) -> tuple[Reference, bool]:
         """Return the height's reference, where the vehicle is otherwise, and whether it is to leave the ground."""
         climb_m_s = stick_climb(sticks, scene)
-        rests = abs(float(scene.reference.motion[1, 2])) < _SINKING * 0.1
         if climb_m_s != 0.0:
             self._height_m = None
-        elif self._height_m is None and rests:
+        elif self._height_m is None and abs(scene.velocity[2]) < _RESTS_M_S:
             self._height_m = scene.place[2]
         kind = Kind.VELOCITY if self._height_m is None else Kind.POSITION
         height_m = scene.place[2] if self._height_m is None else self._height_m
@@ -111,9 +115,3 @@ class AltitudeSticks(Endless):
         moved = moving_with(scene.state).motion
         moved[:, 2] = after.motion[:, 2]
         return Reference(moved, np.array([scene.state.euler[2], 0.0])), lifts(target, scene.state)
-
-
-def wish_of(sticks: Sticks, thrust_n: float, scene: Scene) -> Wish:
-    """Return the tilt and the turn that sticks ask for, with a thrust."""
-    tilt = radians(scene.behaviour.largest_tilt_deg)
-    return lean(tilt * dead(sticks.roll), tilt * dead(sticks.pitch), stick_yaw_rate(sticks, scene), thrust_n)

@@ -82,6 +82,11 @@ def stick_yaw_rate(sticks: Sticks, scene: Scene) -> float:
     return -dead(sticks.yaw) * scene.behaviour.stick_yaw_rate_rad_s
 
 
+def without_play(sticks: Sticks) -> Sticks:
+    """Return sticks whose play around the middle does nothing; thrust has none."""
+    return sticks._replace(pitch=dead(sticks.pitch), roll=dead(sticks.roll), yaw=dead(sticks.yaw))
+
+
 def dead(stick: float) -> float:
     """Return a stick's deflection, -1..1, without the play around its middle."""
     beyond = max(abs(stick) - _DEADZONE, 0.0) / (1.0 - _DEADZONE)

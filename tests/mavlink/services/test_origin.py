@@ -1,0 +1,82 @@
+"""SET_GPS_GLOBAL_ORIGIN, SET_HOME_POSITION and SET_MODE."""
+
+from collections.abc import Iterable
+
+import pytest
+
+from mavlink.dialect import Message
+from mavlink.geodesy import Geodetic
+from mavlink.services.origin import OriginService, Setters
+from mavlink.services.service import Send
+from mavlink.services.statustext import StatusText
+from tests.mavlink.services.peers import GROUND, message, on_the_wire
+
+Q = [1.0, 0.0, 0.0, 0.0]
+
+
+class Vehicle:
+    """Remembers what it was told; refuses with `reason`."""
+
+    def __init__(self, reason: str = "") -> None:
+        self.reason = reason
+        self.told: list[object] = []
+        self.service = OriginService(Setters(self.take, self.take, self.take_mode), StatusText())
+
+    def take(self, place: Geodetic) -> str:
+        self.told.append(place)
+        return self.reason
+
+    def take_mode(self, base: int, custom: int) -> str:
+        self.told.append((base, custom))
+        return self.reason
+
+    def hear(self, received: Message) -> list[Message]:
+        sends: Iterable[Send] = self.service.receive(received, GROUND, 1_000_000)
+        return on_the_wire(list(sends))
+
+
+def origin(latitude: int, longitude: int, altitude: int) -> Message:
+    return message("SET_GPS_GLOBAL_ORIGIN", 1, latitude, longitude, altitude)
+
+
+def home(latitude: int, longitude: int, altitude: int) -> Message:
+    return message("SET_HOME_POSITION", 1, latitude, longitude, altitude, 0, 0, 0, Q, 0, 0, 0)
+
+
+def test_the_origin_is_answered_with_the_integers_that_were_sent() -> None:
+    vehicle = Vehicle()
+    (answer,) = vehicle.hear(origin(473977423, -85455947, 488123))
+    assert answer.name == "GPS_GLOBAL_ORIGIN"
+    fields = answer.fields
+    assert (fields.latitude, fields.longitude, fields.altitude) == (473977423, -85455947, 488123)
+    assert vehicle.told == [pytest.approx(Geodetic(47.3977423, -8.5455947, 488.123))]
+
+
+def test_home_and_mode_are_not_answered() -> None:
+    vehicle = Vehicle()
+    assert vehicle.hear(home(473977423, 85455947, 488000)) == []
+    assert vehicle.hear(message("SET_MODE", 1, 209, 50593792)) == []
+    assert vehicle.told == [pytest.approx(Geodetic(47.3977423, 8.5455947, 488.0)), (209, 50593792)]
+
+
+@pytest.mark.parametrize("received", [origin(1, 2, 3), home(1, 2, 3), message("SET_MODE", 1, 1, 99)])
+def test_a_refusal_is_told_in_words(received: Message) -> None:
+    (answer,) = Vehicle("because").hear(received)
+    assert answer.name == "STATUSTEXT"
+    assert answer.fields.text == "because"
+
+
+@pytest.mark.parametrize("make", [origin, home])
+@pytest.mark.parametrize(
+    "place", [(900000001, 0, 0), (0, -1800000001, 0), (-(2**31), 2**31 - 1, 0), (0, 0, 20_000_001), (0, 0, -1_000_001)]
+)
+def test_what_is_no_place_is_never_handed_on(make: object, place: tuple[int, int, int]) -> None:
+    vehicle = Vehicle()
+    assert callable(make)
+    (answer,) = vehicle.hear(make(*place))
+    assert answer.name == "STATUSTEXT"
+    assert vehicle.told == []
+
+
+def test_nothing_is_ever_due() -> None:
+    assert list(Vehicle().service.poll(10**9)) == []
