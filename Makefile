@@ -30,11 +30,11 @@ test: lint
 	$(BIN)/python -m pytest -n 2
 
 # MAVSDK, MAVProxy and DroneKit fly the vehicle: minutes each. MAVSDK_EXAMPLES=FOLDER, a checkout of MAVSDK-Python, has
-# its examples flown too; they need the ports 14540 and 50051.
+# its examples flown too; they need the ports 14540 and 50051. TABLE=FILE keeps what came of them, as Markdown.
 test-clients: setup .venv-clients/.ready
 	COLIBRI_CLIENTS=.venv-clients $(BIN)/python -m pytest -m clients tests/clients
 	$(if $(MAVSDK_EXAMPLES),$(BIN)/python -m tests.clients.mavsdk_examples $(MAVSDK_EXAMPLES) \
-	  --python .venv-clients/bin/python)
+	  --python .venv-clients/bin/python $(if $(TABLE),--table $(TABLE)))
 
 .venv-clients/.ready: requirements-clients.lock
 	@echo "setting up .venv-clients from requirements-clients.lock (once, about three minutes)"

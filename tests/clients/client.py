@@ -4,7 +4,7 @@ import os
 import re
 import signal
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -23,15 +23,15 @@ class Client:
         folder: Where it runs.
     """
 
-    def __init__(self, command: Sequence[str], folder: Path) -> None:
-        """Start `command` in `folder`; what it prints is kept there too."""
+    def __init__(self, command: Sequence[str], folder: Path, environment: Mapping[str, str] | None = None) -> None:
+        """Start `command` in `folder`, with more in its environment; what it prints is kept in the folder, too."""
         self.folder = folder
         self._printed = folder / "printed.txt"
         with self._printed.open("wb") as printed:
             self.process = subprocess.Popen(
                 command,
                 cwd=folder,
-                env={**os.environ, "PYTHONUNBUFFERED": "1"},
+                env={**os.environ, "PYTHONUNBUFFERED": "1", **(environment or {})},
                 stdin=subprocess.PIPE,
                 stdout=printed,
                 stderr=subprocess.STDOUT,

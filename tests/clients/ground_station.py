@@ -38,6 +38,7 @@ class GroundStation:
         self.mav.robust_parsing = True
         self.heard: list[Message] = []
         self.peers: list[Address] = []
+        self._tell: Callable[[bytes], None] = lambda _: None
         self._unread: deque[Message] = deque()
         self._announced = announced
         self._heartbeat_due_s = 0.0
@@ -62,8 +63,13 @@ class GroundStation:
 
     def write(self, datagram: bytes) -> None:
         """Send a frame to everybody; called by `mav`."""
+        self._tell(datagram)
         for peer in self.peers:
             self._socket.sendto(datagram, peer)
+
+    def listen_to_sent(self, listener: Callable[[bytes], None]) -> None:
+        """Tell `listener` every frame that is sent from now on."""
+        self._tell = listener
 
     def call(self, port: int) -> None:
         """Speak to a vehicle that waits on `port`."""

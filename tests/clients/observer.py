@@ -79,6 +79,7 @@ class Observer:
         self._latest: dict[str, Any] = {}
         self._sights: list[Sight] = []
         self._texts: list[str] = []
+        self._modes: list[Mode] = []
         self._counts: Counter[str] = Counter()
         self._news = Condition()
         self._ended = Event()
@@ -126,9 +127,9 @@ class Observer:
             return int(self._latest["GPS_RAW_INT"].fix_type)
 
     def modes(self) -> list[Mode]:
-        """Return the modes that were flown armed, each once in a row."""
-        modes = [sight.mode for sight in self.sights if sight.armed and sight.mode]
-        return [mode for before, mode in zip([None, *modes], modes, strict=False) if mode is not before]
+        """Return the modes of armed heartbeats, each once in a row: one is sent whenever the mode changes."""
+        with self._news:
+            return list(self._modes)
 
     def in_mode(self, mode: Mode) -> list[Sight]:
         """Return what was seen in a mode, in flight."""
@@ -185,6 +186,11 @@ class Observer:
         assert value.param_id == name
         return float(value.param_value)
 
+    def set_parameter(self, name: str, value: float) -> None:
+        """Set a REAL32 parameter of the vehicle."""
+        told = self.ask("PARAM_VALUE", "PARAM_SET", name, value, mav.MAV_PARAM_TYPE_REAL32)
+        assert (told.param_id, told.param_value) == (name, value)
+
     def _run(self) -> None:
         while not self._ended.is_set():
             if not select([self._socket], [], [], _LOOK_EVERY_S)[0]:
@@ -204,10 +210,17 @@ class Observer:
             return
         self._system_id = message.source[0]
         self._latest[name] = fields
-        if name == "HEARTBEAT" and not self._has_asked:
-            self._ask()
+        if name == "HEARTBEAT":
+            self._note_mode(fields)
         elif name == "LOCAL_POSITION_NED" and self._latest.keys() >= _NEEDED:
             self._sights.append(self._sight())
+
+    def _note_mode(self, heartbeat: Any) -> None:
+        mode = mode_of_custom(heartbeat.custom_mode)
+        if heartbeat.base_mode & MODE_ARMED and mode and self._modes[-1:] != [mode]:
+            self._modes.append(mode)
+        if not self._has_asked:
+            self._ask()
 
     def _ask(self) -> None:
         """Ask for the rates at which to see, once: loopback loses nothing."""

@@ -3,23 +3,23 @@
 import sys
 
 from mavsdk.plugins.offboard import Attitude, Offboard
-from mavsdk.plugins.param import Param
 
 from tests.clients.mavsdk_scripts.connection import connected, take_off, until
 
 ROLLS_DEG = (15.0, -15.0, 0.0)
+HOVER = 0.34
+"""Part of the largest thrust that carries this vehicle."""
 
 
 def main(url: str) -> None:
     """Fly the vehicle at `url`."""
     with connected(url) as vehicle:
         action, telemetry = take_off(vehicle, 10.0)
-        hover = Param(vehicle).get_param_float("MPC_THR_HOVER")
         offboard = Offboard(vehicle)
-        offboard.set_attitude(Attitude(0.0, 0.0, 0.0, hover))
+        offboard.set_attitude(Attitude(0.0, 0.0, 0.0, HOVER))
         offboard.start()
         for roll_deg in ROLLS_DEG:
-            offboard.set_attitude(Attitude(roll_deg, 0.0, 0.0, hover))
+            offboard.set_attitude(Attitude(roll_deg, 0.0, 0.0, HOVER))
             until(lambda: abs(telemetry.attitude_euler().roll_deg - roll_deg) < 1.0, "the roll")  # noqa: B023
         offboard.stop()
         action.hold()

@@ -1,4 +1,4 @@
-"""Everything that telemetry tells of a vehicle on the ground."""
+"""Everything that telemetry tells of a vehicle on the ground; of wind it knows nothing there."""
 
 import sys
 from time import time

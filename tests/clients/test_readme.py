@@ -1,0 +1,103 @@
+"""README's snippets for ground stations, as they stand there; only their ports are other ones."""
+
+import re
+import socket
+import subprocess
+import sys
+from math import dist, hypot
+from pathlib import Path
+
+import pytest
+
+from autopilot.modes import Mode
+from mavlink.geodesy import Geodetic, enu_of
+from mavlink.home import DEFAULT_HOME
+from tests.clients.mavproxy import MavProxy
+from tests.clients.vehicle import Vehicle, vehicle
+from tools.sitl import GROUND_PORT, SDK_PORT
+
+README = Path(__file__).parents[2] / "README.md"
+GIVE_UP_AFTER_S = 120.0
+SPEED = 4.0
+
+
+def snippets(beginning: str) -> list[str]:
+    """Return the fenced blocks behind the line that begins so, in the section of ground stations."""
+    _, _, behind = README.read_text(encoding="utf-8").partition("\n## Connect QGroundControl / MAVSDK / MAVProxy")
+    _, _, behind = behind.partition("\n## ")[0].partition(beginning)
+    assert behind, f"README has no line that begins with {beginning}"
+    return re.findall(r"```\w*\n(.*?)```", behind, re.DOTALL)
+
+
+def free_port() -> int:
+    """Return a port of this computer that nobody has."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.bind(("127.0.0.1", 0))
+        return int(sock.getsockname()[1])
+
+
+def run(code: str, default_port: int, port: int, folder: Path) -> None:
+    """Run a snippet as a program, on another port."""
+    assert code.count(str(default_port)) == 1
+    program = folder / "snippet.py"
+    program.write_text(code.replace(str(default_port), str(port)), encoding="utf-8")
+    command = [sys.executable, str(program)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=GIVE_UP_AFTER_S)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def assert_landed(flown: Vehicle) -> None:
+    """Hold that the flight is over, on the ground."""
+    landed = flown.seen.wait(lambda sight: not sight.armed, "the end of the flight")
+    assert abs(landed.height_m) < 0.05
+
+
+def went_to(flown: Vehicle, latitude_deg: float, longitude_deg: float, height_m: float) -> bool:
+    """Whether the vehicle came to within 0.3 m of a place."""
+    origin = Geodetic(*DEFAULT_HOME[:3])
+    x, y, _ = enu_of(Geodetic(latitude_deg, longitude_deg, DEFAULT_HOME.altitude_m), origin)
+    return min(dist(sight.position_enu_m, (x, y, height_m)) for sight in flown.seen.sights) < 0.3
+
+
+def test_the_command_is_all_that_qgroundcontrol_needs() -> None:
+    """What QGroundControl does then is in test_qgroundcontrol.py."""
+    assert snippets(" / DroneKit")[0] == ".venv/bin/colibri sitl\n"
+
+
+def test_mavsdk(tmp_path: Path) -> None:
+    port = free_port()
+    with vehicle(tmp_path, links=(f"udpout:127.0.0.1:{port}",), speed=SPEED) as flown:
+        run(snippets("**MAVSDK**")[0], SDK_PORT, port, tmp_path)
+        assert_landed(flown)
+        assert abs(max(sight.height_m for sight in flown.seen.sights) - 5.0) < 0.1
+
+
+def test_dronekit(tmp_path: Path) -> None:
+    port = free_port()
+    with vehicle(tmp_path, links=(f"udpout:127.0.0.1:{port}",), speed=SPEED) as flown:
+        run(snippets("**DroneKit**")[0], GROUND_PORT, port, tmp_path)
+        assert_landed(flown)
+        assert flown.seen.modes()[-1] is Mode.LAND
+
+
+@pytest.mark.clients
+def test_mavproxy(tmp_path: Path) -> None:
+    port = free_port()
+    command = snippets("**MAVProxy**")[0].split()
+    assert command[:1] == ["mavproxy.py"]
+    (option,) = command[1:]
+    connection = option.removeprefix("--master=").replace(str(GROUND_PORT), str(port))
+    arm, take_off, go, return_home = snippets("**MAVProxy**")[1].splitlines()
+    with (
+        vehicle(tmp_path, links=(f"udpout:127.0.0.1:{port}",), speed=SPEED) as flown,
+        MavProxy(tmp_path, connection) as proxy,
+    ):
+        proxy.type(arm, "COMPONENT_ARM_DISARM: ACCEPTED")
+        proxy.type(take_off, "NAV_TAKEOFF: ACCEPTED")
+        proxy.expect("AP: height reached: hold")
+        proxy.type(go, "DO_REPOSITION: ACCEPTED")
+        flown.seen.wait(lambda sight: sight.height_m > 6.9 and hypot(*sight.velocity_enu_m_s) < 0.05, "the place")
+        proxy.type(return_home, "NAV_RETURN_TO_LAUNCH: ACCEPTED")
+        assert_landed(flown)
+        assert went_to(flown, 47.3978, 8.5456, 7.0)
+        assert hypot(*flown.seen.now.position_enu_m[:2]) < 0.3
