@@ -12,6 +12,7 @@ from autopilot.controller import Clock, Decision, VehicleState
 from autopilot.core import Step
 from autopilot.course import Course, Scene, Steered
 from autopilot.courses import Along, Climb, Stop, homeward, landing, to_track
+from autopilot.instants import instants
 from autopilot.leader import Following
 from autopilot.leaning import AltitudeSticks, Stabilized
 from autopilot.loop import ControlLoop
@@ -110,7 +111,8 @@ class Copter:
         self._attitude: AttitudeReference | None = None
         if self._loop.takes_attitude:
             self._attitude = AttitudeReference(believed, self._loop.preview, attitude_limits(flies_by))
-        self.pilot = Pilot(self._loop.preview, flies_by, self._course, self._missing)
+        self._instants = instants(self._loop.preview, self._loop.control_interval_us)
+        self.pilot = Pilot(self._instants, flies_by, self._course, self._missing)
         self.stations = Stations(settings, self.pilot, self.parameters)
         self.power = PowerMeter(believed)
         self._photographer = Photographer(believed, self._interval_s)
@@ -293,11 +295,12 @@ class Copter:
     def _on_track(self, scene: Scene) -> Course:
         if self._first is not None:
             first, self._first = self._first, None
-            planner = plan(first, self._references, self._loop.preview)
+            planner = plan(first, self._references, self._instants.preview)
+            for_law = None if self._instants.rows is None else plan(first, self._references, self._loop.preview)
             self.pilot.reference = _at_start(planner, scene.now_us)
-            return Along(planner, first.duration_s, 0)
+            return Along(planner, first.duration_s, 0, for_law)
         chosen = track(scene.behaviour.track)
-        return to_track(plan(chosen, self._references, self._loop.preview), chosen.duration_s)
+        return to_track(plan(chosen, self._references, self._instants.preview), chosen.duration_s)
 
 
 def _at_start(planner: Planner, now_us: int) -> Reference:

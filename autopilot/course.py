@@ -88,10 +88,12 @@ class Planned(NamedTuple):
     Attributes:
         horizon: What the reference is to become.
         limits: How fast, until it is that.
+        for_law: The same as the control law previews it, where that is something else.
     """
 
     horizon: Horizon
     limits: Limits
+    for_law: Horizon | None = None
 
     @property
     def target(self) -> Target:

@@ -141,15 +141,23 @@ class Legs:
 class Along:
     """A track, from a moment on; past its end, its last point."""
 
-    def __init__(self, planner: Planner, duration_s: float, began_us: int) -> None:
-        """Fly a track that began, or begins, at `began_us`."""
+    def __init__(
+        self, planner: Planner, duration_s: float, began_us: int, planner_for_law: Planner | None = None
+    ) -> None:
+        """Fly a track that began, or begins, at `began_us`.
+
+        A control law that previews references other than a control sample apart has a planner of its own.
+        """
         self._planner = planner
+        self._planner_for_law = planner_for_law
         self._duration_s = duration_s
         self._began_us = began_us
 
     def ask(self, scene: Scene) -> Planned:
         """Return the track."""
-        return Planned(self._planner.horizon(scene.now_us - self._began_us), scene.behaviour.limits)
+        since_us = scene.now_us - self._began_us
+        for_law = self._planner_for_law.horizon(since_us) if self._planner_for_law else None
+        return Planned(self._planner.horizon(since_us), scene.behaviour.limits, for_law)
 
     def arrived(self, scene: Scene) -> bool:
         """Whether the track has ended."""

@@ -18,6 +18,7 @@ SDK_PORTS = range(14540, 14550)
 SHARE = 0.25
 """Part of all time that hearing others may take: at real time a frame leaves more than half of its time to that."""
 MOST_SAVED_S = 0.005
+MOST_OWED_S = 0.02
 
 
 def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[GroundLink]:
@@ -65,8 +66,8 @@ class Allowance:
         return self._left_s > 0.0
 
     def end(self) -> None:
-        """End to spend time; what was too much is owed."""
-        self._left_s -= self._clock() - self._began_s
+        """End to spend time; what was too much is owed, if it can have been spent here and not by other processes."""
+        self._left_s = max(self._left_s - (self._clock() - self._began_s), -MOST_OWED_S)
 
 
 class GroundLinks:

@@ -30,7 +30,7 @@ _TELL_EVERY_S = 0.5
 _SAVE_EVERY_S = 10.0
 
 
-class GroundError(Exception):
+class GroundError(LinkError):
     """Ground stations cannot be served as asked; the message is the one line that a user needs."""
 
 

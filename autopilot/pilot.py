@@ -4,14 +4,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+
 from autopilot.arming import Facts, refusals
 from autopilot.behaviour import Behaviour
-from autopilot.controller import AttitudeDemand, Horizon, Preview, VehicleState
+from autopilot.controller import AttitudeDemand, Horizon, VehicleState
 from autopilot.course import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
 from autopilot.courses import Stop
+from autopilot.instants import Instants
 from autopilot.landing import Landing, is_below, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
-from autopilot.reference import Reference, at_rest, lead, lead_along, moving_with
+from autopilot.reference import Reference, at_rest, lead, lead_along, moving_with, still_target
 from mavlink.frames import Vector
 from mavlink.services.statustext import INFO, NOTICE, WARNING
 
@@ -69,7 +72,7 @@ class Pilot:
 
     def __init__(
         self,
-        preview: Preview,
+        instants: Instants,
         behaviour: Behaviour,
         make_course: CourseMaker,
         missing: Callable[[], Sequence[Need]],
@@ -77,12 +80,12 @@ class Pilot:
         """Begin on the ground, or in the air: see `begin`.
 
         Args:
-            preview: The references that a control law previews.
+            instants: At which references are planned, and which of them the control law previews.
             behaviour: The numbers to fly by.
             make_course: Says how each mode begins.
             missing: Says which needs of modes nothing meets at the moment.
         """
-        self._preview = preview
+        self._instants = instants
         self._make_course = make_course
         self.state = FIRST
         self.behaviour = behaviour
@@ -105,6 +108,13 @@ class Pilot:
         self._missing = missing
         self._steered = NOT_STEERED
         self._said: list[Said] = []
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        """Load what is compiled: a take-off is no time for that."""
+        interval_us, samples = self._instants.preview
+        motionless = Reference(np.zeros((4, 3)), np.zeros(2))
+        lead(motionless, still_target((1.0, 0.0, 0.0), 0.0, samples), self.behaviour.limits, interval_us * 1e-6)
 
     def begin(self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None) -> None:
         """See the vehicle for the first time: it stands, or it is picked up in flight, in `mode` or in hold."""
@@ -139,7 +149,7 @@ class Pilot:
         """Return what a course sees now."""
         assert self._vehicle is not None, "the pilot has seen the vehicle"
         assert self.reference is not None, "the pilot has seen the vehicle"
-        interval_us, samples = self._preview
+        interval_us, samples = self._instants.preview
         behaviour = self.behaviour
         speed = behaviour.limits.speed_m_s if self.speed_m_s is None else self.speed_m_s
         speed = min(speed, behaviour.fastest_m_s)
@@ -242,13 +252,21 @@ class Pilot:
         self._said.append(Said(severity, text))
 
     def _move(self, scene: Scene, asked: Motion | Planned, begins: bool) -> Guidance:
+        horizon = self._lead(scene, asked)
+        self._watch_ground(scene.state, sinks=is_below(scene.reference, scene.state))
+        return Guidance(horizon=horizon, begins=begins)
+
+    def _lead(self, scene: Scene, asked: Motion | Planned) -> Horizon:
+        """Move the reference on, and return what the control law previews of it."""
         reference, limits, interval_s = scene.reference, asked.limits, scene.interval_s
         if isinstance(asked, Planned):
             horizon, self.reference = lead_along(reference, asked.horizon, limits, interval_s)
+            if asked.for_law is not None and horizon.position_enu_m is asked.horizon.position_enu_m:
+                turned = horizon.yaw_rad[0] - asked.horizon.yaw_rad[0]
+                return asked.for_law._replace(yaw_rad=asked.for_law.yaw_rad + turned)
         else:
             horizon, self.reference = lead(reference, asked.target, limits, interval_s)
-        self._watch_ground(scene.state, sinks=is_below(scene.reference, scene.state))
-        return Guidance(horizon=horizon, begins=begins)
+        return self._instants.for_law(horizon)
 
     def _lean(self, asked: Lean, begins: bool) -> Guidance:
         assert self._vehicle is not None, "the pilot has seen the vehicle"

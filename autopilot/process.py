@@ -3,18 +3,21 @@
 import argparse
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 from autopilot.controller import Active, ControllerError, DecisionError, Fallback
-from autopilot.copter import Copter
 from autopilot.core import Autopilot, Step
-from autopilot.ground_process import Ground, GroundError, open_ground
-from autopilot.profile import ProfileError, load_profile
+from autopilot.profile import Profile, ProfileError, load_profile
 from autopilot.qp import QpStatus, SolverError
 from autopilot.tracks import TrackError, track
 from mavlink.link import LinkError, UdpLink
 from mavlink.lockstep import AutopilotEnd
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Status, Stop, fail, undisturbed
-from plant.vehicle import VehicleError, load_vehicle
+from plant.vehicle import Vehicle, VehicleError, load_vehicle
+
+if TYPE_CHECKING:
+    from autopilot.copter import Copter
+    from autopilot.ground_process import Ground
 
 DECISION_COLUMNS = (
     *("t", "phi_ref", "theta_ref", "psi_ref"),
@@ -62,9 +65,9 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     try:
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
-        ground = open_ground(args, profile, vehicle, status) if args.gcs else None
+        ground = _ground(args, profile, vehicle, status) if args.gcs else None
         autopilot = ground.copter if ground else Autopilot(profile, vehicle, track(args.track or TRACK), perf_counter)
-    except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, GroundError) as error:
+    except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
         fail(str(error))
     log = AutopilotLog(args.out) if args.out else None
     end = AutopilotEnd(system_id=args.system_id, frame_interval_us=autopilot.frame_interval_us, now_s=perf_counter())
@@ -82,6 +85,13 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
 
 
+def _ground(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status) -> "Ground":
+    """Load what serves ground stations only where there are any: it is as much as all the rest."""
+    from autopilot.ground_process import open_ground
+
+    return open_ground(args, profile, vehicle, status)
+
+
 class Client:
     """Drives the autopilot's end of the conversation over a link."""
 
@@ -92,7 +102,7 @@ class Client:
         status: Status,
         stop: Stop,
         log: AutopilotLog | None,
-        ground: Ground | None = None,
+        ground: "Ground | None" = None,
     ) -> None:
         """Serve `end` on `link` until `stop`, and `ground` beside it."""
         self._link = link
@@ -104,7 +114,7 @@ class Client:
         self._frame_came = self._heard = False
         self._refusal_said = False
 
-    def fly(self, autopilot: Autopilot | Copter) -> None:
+    def fly(self, autopilot: "Autopilot | Copter") -> None:
         """Answer every frame until told to stop."""
         self._status.say("calling", "waiting for the plant at " + self._link.url.removeprefix("udpout:"))
         due_s = 0.0
@@ -123,7 +133,7 @@ class Client:
             self._say_what_changed()
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
-    def _answer(self, autopilot: Autopilot | Copter, datagram: bytes) -> Step | None:
+    def _answer(self, autopilot: "Autopilot | Copter", datagram: bytes) -> Step | None:
         frame = self._end.receive(datagram, perf_counter())
         if frame is None:
             return None

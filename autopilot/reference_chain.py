@@ -12,7 +12,7 @@ too: more could not be taken back in time, and would overshoot. A target that is
 it does.
 """
 
-from math import floor, pi, radians, sqrt
+from math import ceil, floor, pi, radians, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -26,6 +26,8 @@ Integers: TypeAlias = NDArray[np.int64]
 K_POSITION, K_VELOCITY, K_ACCELERATION, K_JERK = 1.5, 4.0, 12.0, 36.0
 """Each loop about three times as fast as the one around it, 1/s."""
 K_YAW, K_YAW_RATE = 2.0, 8.0
+_LONGEST_STEP_S = 0.02
+"""The quickest loop, of the jerk, must not answer to itself: 36 / s times this is below 1."""
 _STOPPING = 0.6
 """Part of the acceleration that stopping may count on; the rest is for keeping to it."""
 
@@ -67,22 +69,29 @@ def advance(
     out: Array,
     out_heading: Array,
 ) -> None:
-    """Fill `out` (n, 5, 3) and `out_heading` (n, 3) from now on; the snap and yaw acceleration act until the next."""
+    """Fill `out` (n, 5, 3) and `out_heading` (n, 3) from now on; the snap and yaw acceleration act until the next.
+
+    Between instants that are too far apart for its loops the chain takes several steps.
+    """
+    steps = ceil(dt / _LONGEST_STEP_S)
+    step = dt / steps
     p, v, a, j = motion[0].copy(), motion[1].copy(), motion[2].copy(), motion[3].copy()
     snap = np.empty(3)
     yaw, rate = heading[0], heading[1]
     for k in range(target.shape[0]):
-        _drive(p, v, a, j, target[k], kinds, limits, snap)
-        acceleration = _turn(yaw, rate, yaw_target[k], turns, limits)
-        for i in range(3):
-            out[k, 0, i], out[k, 1, i], out[k, 2, i], out[k, 3, i], out[k, 4, i] = p[i], v[i], a[i], j[i], snap[i]
-            p[i] += dt * (v[i] + dt * (a[i] / 2.0 + dt * (j[i] / 6.0 + dt * snap[i] / 24.0)))
-            v[i] += dt * (a[i] + dt * (j[i] / 2.0 + dt * snap[i] / 6.0))
-            a[i] += dt * (j[i] + dt * snap[i] / 2.0)
-            j[i] += dt * snap[i]
-        out_heading[k, 0], out_heading[k, 1], out_heading[k, 2] = yaw, rate, acceleration
-        yaw += dt * (rate + dt * acceleration / 2.0)
-        rate += dt * acceleration
+        for part in range(steps):
+            _drive(p, v, a, j, target[k], kinds, limits, snap)
+            acceleration = _turn(yaw, rate, yaw_target[k], turns, limits)
+            if part == 0:
+                out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = p, v, a, j, snap
+                out_heading[k, 0], out_heading[k, 1], out_heading[k, 2] = yaw, rate, acceleration
+            for i in range(3):
+                p[i] += step * (v[i] + step * (a[i] / 2.0 + step * (j[i] / 6.0 + step * snap[i] / 24.0)))
+                v[i] += step * (a[i] + step * (j[i] / 2.0 + step * snap[i] / 6.0))
+                a[i] += step * (j[i] + step * snap[i] / 2.0)
+                j[i] += step * snap[i]
+            yaw += step * (rate + step * acceleration / 2.0)
+            rate += step * acceleration
 
 
 @compiled

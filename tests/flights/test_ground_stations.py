@@ -6,24 +6,31 @@ from pathlib import Path
 
 import pytest
 
+from autopilot.modes import Mode
+from autopilot.profile import load_profile
 from mavlink.dialect import mav
+from plant.scenario import Start
 from tests.clients.ports import OnPort
 from tests.clients.station import ACCEPTED, HOLD, Ack, Station
+from tests.flights.copter import CopterFlight
 from tests.runs import fly, states
 
 DURATION = ("--duration", "6")
 WATCHED = ("HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY", "AUTOPILOT_VERSION", "PARAM_VALUE", "PING")
 
 
-@pytest.mark.parametrize("track", ["spiral", "lemniscate"])
-def test_a_watched_flight_is_the_same_bit_for_bit(tmp_path: Path, track: str) -> None:
-    alone = fly(tmp_path / "alone", track, "--link", "memory", *DURATION)
-    stations = Station(255), Station(245)
+@pytest.mark.parametrize(
+    ("track", "profile"), [("spiral", "flight"), ("lemniscate", "flight"), ("circle", "se3"), ("wave", "thesis")]
+)
+def test_a_watched_flight_is_the_same_bit_for_bit(tmp_path: Path, track: str, profile: str) -> None:
+    asked = ("--profile", profile, *DURATION)
+    alone = fly(tmp_path / "alone", track, "--link", "memory", *asked)
+    stations = Station(255, every=2), Station(245, every=2)
     with OnPort(stations[0]) as one, OnPort(stations[1]) as other:
-        links = ("--gcs", one.url, "--gcs", other.url, "--speed", "max")
-        watched = fly(tmp_path / "watched", track, *links, *DURATION)
+        links = ("--gcs", one.url, "--gcs", other.url, "--speed", "3")
+        watched = fly(tmp_path / "watched", track, *links, *asked)
     for station in stations:
-        assert not [name for name in WATCHED if station.counts[name] < 3], station.counts
+        assert not [name for name in WATCHED if not station.counts[name]], station.counts
         assert {ack.target for ack in station.acks} == {station.identity}
         assert {ack.result for ack in station.acks} == {ACCEPTED}
         assert {ack.command for ack in station.acks} == set(station.sent)
@@ -31,6 +38,24 @@ def test_a_watched_flight_is_the_same_bit_for_bit(tmp_path: Path, track: str) ->
     assert watched["rmse_m"] == alone["rmse_m"]
     flown = [(tmp_path / name / "plant.csv").read_bytes() for name in ("alone", "watched")]
     assert flown[0] == flown[1]
+
+
+def test_nothing_is_compiled_or_loaded_in_flight() -> None:
+    """It would hold the vehicle up for seconds, at its first take-off of all times."""
+    command = [sys.executable, "-m", "tests.flights.compiled_in_flight"]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == ""
+
+
+@pytest.mark.parametrize("profile", ["se3", "thesis"])
+def test_every_control_law_flies_where_it_is_sent(profile: str) -> None:
+    """One previews a single reference, the other two that are four control samples apart."""
+    flight = CopterFlight(profile=load_profile(profile), start=Start(z=5.0, rotors=4740.0))
+    assert flight.go(3.0, 1.0, 6.0) == ACCEPTED
+    flight.run(8.0)
+    assert flight.position == pytest.approx((3.0, 1.0, 6.0), abs=0.05)
+    assert flight.select(Mode.TRACK) == ACCEPTED
+    flight.run(20.0)
+    assert flight.mode is Mode.TRACK
 
 
 def test_a_flight_is_paced_to_the_wall_clock_once_somebody_may_watch(tmp_path: Path) -> None:
