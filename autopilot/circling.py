@@ -36,7 +36,7 @@ class Round(Endless):
         entry = (x + self._radius_m * cos(self._angle), y + self._radius_m * sin(self._angle), z)
         yaw_rad = float(self._heading(np.array([self._angle]), 0.0)[0, 0])
         self._way = Way(GoTo(entry, yaw_rad, order.speed_m_s), scene)
-        self._circles = False
+        self._circles, self._rate = False, 0.0
         self.turns = 0.0
 
     def ask(self, scene: Scene) -> Motion:
@@ -45,7 +45,8 @@ class Round(Endless):
             if not self._joins(scene):
                 return self._way.ask(scene)
             self._circles, self._angle = True, self._angle_of(scene.place)
-        rate = self._turn * self._speed_m_s(scene) / self._radius_m
+            self._rate = self._rate_of(scene)
+        rate = self._rate = self._towards(self._turn * self._speed_m_s(scene) / self._radius_m, scene)
         angles: Array = self._angle + rate * scene.interval_s * np.arange(scene.samples, dtype=np.float64)
         self._angle = float(angles[1])
         self.turns += abs(rate) * scene.interval_s / (2.0 * pi)
@@ -55,6 +56,16 @@ class Round(Endless):
     def _angle_of(self, place: Vector) -> float:
         """Return where a place is seen from the centre, counter-clockwise from east; its own place counts as east."""
         return atan2(place[1] - self._order.center_enu_m[1], place[0] - self._order.center_enu_m[0])
+
+    def _rate_of(self, scene: Scene) -> float:
+        """Return how fast the reference goes around, rad/s, counter-clockwise."""
+        (vx, vy, _), angle = scene.velocity, self._angle
+        return (vy * cos(angle) - vx * sin(angle)) / self._radius_m
+
+    def _towards(self, wanted: float, scene: Scene) -> float:
+        """Return the rate of now, rad/s: no sooner the one that is wanted than the vehicle can gain that speed."""
+        most = _SHARE * scene.behaviour.limits.acceleration_m_s2 * scene.interval_s / self._radius_m
+        return min(max(wanted, self._rate - most), self._rate + most)
 
     def _joins(self, scene: Scene) -> bool:
         """Whether the reference is on the circle, and not about to leave it but along it."""

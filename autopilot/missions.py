@@ -168,6 +168,8 @@ class MissionCourse:
             self._order = step.order
             self._course = course_of(step.order, scene)
         self._done = not step.flying
+        if self._done and isinstance(self._course, Round):
+            self._course = Stop()
         if isinstance(step.order, Return) and step.flying:
             self._missions.says_return()
         return self._course.ask(scene)

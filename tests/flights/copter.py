@@ -9,6 +9,7 @@ from dataclasses import replace
 from math import nan, pi
 from typing import Any
 
+import pytest
 from msgspec import structs
 
 from autopilot.copter import Copter, Received
@@ -103,6 +104,13 @@ class Client:
         else:
             self.texts.append(fields.text)
 
+    def forget(self) -> None:
+        """Forget all but the latest of each message."""
+        for kept in self.heard.values():
+            del kept[:-1]
+        self.acks.clear()
+        self.texts.clear()
+
     def latest(self, name: str) -> Any:
         """Return the last message of a name."""
         assert self.heard[name], f"no {name} was heard"
@@ -111,6 +119,14 @@ class Client:
     def said(self, part: str) -> bool:
         """Whether a STATUSTEXT said so."""
         return any(part in text for text in self.texts)
+
+
+def in_the_air(height_m: float = 5.0, **settings: Any) -> "CopterFlight":
+    """Return a vehicle that is picked up in flight, in hold above home, without having had to take off."""
+    start = Start(z=height_m, psi=90.0, rotors=FLIGHT.simulation.rotor_speed_rpm)
+    flight = CopterFlight(start=start, **settings)
+    assert flight.copter.pilot.state == (Mode.HOLD, True)
+    return flight
 
 
 class CopterFlight:
@@ -180,6 +196,11 @@ class CopterFlight:
             for client in self._clients:
                 if (client.link, client.address) == (link, address):
                     client.receive(datagram)
+
+    def skip(self, frames: int) -> None:
+        """Have the plant go on by itself for some frames, with the last command."""
+        for _ in range(frames):
+            self.world = self._physics.step(self.world, self.rotors, self.copter.frame_interval_us)
 
     def run(self, seconds: float, each_frame: Callable[[], None] | None = None) -> None:
         """Fly for so long; call `each_frame` before each frame."""
@@ -286,10 +307,9 @@ class CopterFlight:
 
     def set(self, name: str, value: Value) -> None:
         """Set a parameter as a ground station does, and see that it was taken."""
-        parameters = self.copter.parameters
-        parameters.set(name, value)
+        self.copter.parameters.set(name, value)
         self.step()
-        assert parameters[name] == value
+        assert self.copter.parameters[name] == pytest.approx(value, rel=1e-6)  # they are of 32 bits
 
     def take_off(self, height_m: float = 2.5) -> None:
         """Arm, climb above home and stay."""

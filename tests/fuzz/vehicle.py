@@ -87,9 +87,8 @@ class Target:
         Raises:
             BrokenError: Something did not hold.
         """
-        for shooter in self._shooters:
-            shooter.acks.clear()
-        self.flight.client.acks.clear()
+        for client in (*self._shooters, self.flight.client):
+            client.forget()
         self.flight.step()
         for place, shooter in enumerate(self._shooters):
             commands, self._unanswered[place] = self._unanswered[place], []
