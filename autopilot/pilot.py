@@ -11,7 +11,7 @@ from autopilot.course import NOT_STEERED, Course, Lean, Motion, Planned, Scene, 
 from autopilot.courses import Stop
 from autopilot.landing import Landing, is_below, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
-from autopilot.reference import Reference, at_rest, lead, lead_along, moving_with
+from autopilot.reference import Reference, at_rest, lead, lead_along, load, moving_with
 from mavlink.frames import Vector
 from mavlink.services.statustext import INFO, NOTICE, WARNING
 
@@ -74,7 +74,7 @@ class Pilot:
         make_course: CourseMaker,
         missing: Callable[[], Sequence[Need]],
     ) -> None:
-        """Begin on the ground, or in the air: see `begin`.
+        """Begin on the ground, or in the air: see `begin`. What is compiled is loaded here.
 
         Args:
             preview: The references that a control law previews.
@@ -82,6 +82,8 @@ class Pilot:
             make_course: Says how each mode begins.
             missing: Says which needs of modes nothing meets at the moment.
         """
+        interval_us, samples = preview
+        load(behaviour.limits, samples, interval_us * 1e-6)
         self._preview = preview
         self._make_course = make_course
         self.state = FIRST

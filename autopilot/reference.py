@@ -120,6 +120,11 @@ def lead(reference: Reference, target: Target, limits: Limits, interval_s: float
     return _horizon(motion, heading), Reference(motion[1, :4].copy(), heading[1, :2].copy())
 
 
+def load(limits: Limits, samples: int, interval_s: float) -> None:
+    """Load what is compiled, so that no flight waits for it; the arguments are those of the flight to come."""
+    lead(Reference(np.zeros((4, 3)), np.zeros(2)), still_target((1.0, 1.0, 1.0), 1.0, samples), limits, interval_s)
+
+
 def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference]:
     """Return the target itself, its yaw turned in full turns to where the reference's is."""
     heading = target.heading
