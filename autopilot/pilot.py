@@ -77,7 +77,7 @@ class Pilot:
         make_course: CourseMaker,
         missing: Callable[[], Sequence[Need]],
     ) -> None:
-        """Begin on the ground, or in the air: see `begin`.
+        """Begin on the ground, or in the air: see `begin`. What is compiled is loaded here.
 
         Args:
             instants: At which references are planned, and which of them the control law previews.

@@ -1,11 +1,23 @@
-"""Links other than the one that calls by UDP: a TCP server, with pymavlink and with MAVSDK."""
+"""A TCP server, with pymavlink and with MAVSDK; MAVSDK with a vehicle that is no PX4."""
 
 import socket
+import sys
 from pathlib import Path
 
 from pymavlink.dialects.v20 import development as mavlink2
 
+from tests.clients.client import Client
 from tests.clients.vehicle import vehicle
+
+ROOT = Path(__file__).parents[2]
+WITHIN_S = 120.0
+"""A wall-clock bound for what hangs."""
+
+
+def run(module: str, url: str, folder: Path) -> None:
+    """Run a program for MAVSDK 4 to its good end."""
+    with Client([sys.executable, "-m", f"tests.clients.{module}", url], folder, {"PYTHONPATH": str(ROOT)}) as client:
+        client.wait(WITHIN_S)
 
 
 class Wire:
@@ -31,3 +43,17 @@ def test_a_client_of_the_tcp_server(tmp_path: Path) -> None:
                         names[message.get_type()] = getattr(message, "target_system", 0)
                 assert names["COMMAND_ACK"] == own
                 assert "BAD_DATA" not in names
+
+
+def test_mavsdk_over_tcp(tmp_path: Path) -> None:
+    with vehicle(tmp_path, links=("tcpin:127.0.0.1:0",), speed=3.0) as flown:
+        run("mavsdk_scripts.takeoff_and_land", f"tcpout://127.0.0.1:{flown.port}", tmp_path)
+        flown.seen.wait(lambda sight: not sight.armed, "the end of the flight")
+        assert 4.7 < max(sight.height_m for sight in flown.seen.sights) < 5.1
+
+
+def test_mavsdk_with_a_generic_vehicle(tmp_path: Path) -> None:
+    with vehicle(tmp_path, "--identity", "generic", speed=3.0) as flown:
+        run("programs.mavsdk_generic", flown.mavsdk_url, tmp_path)
+        flown.seen.wait(lambda sight: not sight.armed, "the end of the flight")
+        assert 2.7 < max(sight.height_m for sight in flown.seen.sights) < 3.1
