@@ -18,7 +18,6 @@ SDK_PORTS = range(14540, 14550)
 SHARE = 0.25
 """Part of all time that hearing others may take: at real time a frame leaves more than half of its time to that."""
 MOST_SAVED_S = 0.005
-MOST_OWED_S = 0.02
 
 
 def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[GroundLink]:
@@ -44,12 +43,14 @@ def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[Gro
 class Allowance:
     """How much time is left for what others send: a share of all time that passes, whatever they do.
 
-    Who takes more than that is heard less often, and the control law not a moment later.
+    Who takes more than that is heard less often, and the control law not a moment later. What other processes take of
+    a busy computer meanwhile is no sender's doing: only the processor's time is counted.
     """
 
-    def __init__(self, clock: Clock) -> None:
-        """Begin with all that can be saved up."""
+    def __init__(self, clock: Clock, processor_clock: Clock) -> None:
+        """Begin with all that can be saved up; one clock runs always, the other while this process does."""
         self._clock = clock
+        self._processor_clock = processor_clock
         self._earned_s = clock()
         self._began_s = 0.0
         self._left_s = MOST_SAVED_S
@@ -62,22 +63,28 @@ class Allowance:
 
     def begin(self) -> bool:
         """Begin to spend time, if there is any left."""
-        self._began_s = self._clock()
+        self._began_s = self._processor_clock()
         return self._left_s > 0.0
 
     def end(self) -> None:
-        """End to spend time; what was too much is owed, if it can have been spent here and not by other processes."""
-        self._left_s = max(self._left_s - (self._clock() - self._began_s), -MOST_OWED_S)
+        """End to spend time; what was too much is owed."""
+        self._left_s -= self._processor_clock() - self._began_s
 
 
 class GroundLinks:
     """Carries datagrams between links and a vehicle's hub."""
 
-    def __init__(self, links: Sequence[GroundLink], clock: Clock) -> None:
-        """Serve `links`; those with a target are called, whether anybody hears it or not."""
+    def __init__(self, links: Sequence[GroundLink], clock: Clock, processor_clock: Clock) -> None:
+        """Serve `links`; those with a target are called, whether anybody hears it or not.
+
+        Args:
+            links: All there are.
+            clock: Runs always, s.
+            processor_clock: Runs while this process does, s.
+        """
         self._links = tuple(links)
         self._waiting: list[deque[tuple[bytes, Address]]] = [deque() for _ in links]
-        self._allowance = Allowance(clock)
+        self._allowance = Allowance(clock, processor_clock)
         self._loopback = [not beyond_loopback(link.url) for link in links]
         self._opened: list[tuple[int, Address]] = []
         self._counts: dict[int, tuple[int, int]] = {}

@@ -3,7 +3,7 @@
 import argparse
 from math import hypot
 from pathlib import Path
-from time import perf_counter, time
+from time import perf_counter, thread_time, time
 from typing import Any
 
 from autopilot.copter import Copter
@@ -65,7 +65,7 @@ class Ground:
             links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
         except LinkError as error:
             raise GroundError(str(error)) from error
-        self._links = GroundLinks(links, perf_counter)
+        self._links = GroundLinks(links, perf_counter, thread_time)
         self.shut_down = False
         self._revision = self.copter.parameters.revision
         self._told_s = self._saved_s = perf_counter()

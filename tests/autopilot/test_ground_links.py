@@ -72,7 +72,7 @@ def heard_in_a_frame(links: GroundLinks, stations: Stations, clock: Clock, takes
 @pytest.mark.parametrize("takes_s", [1e-5, 1e-3, 2e-2])
 def test_a_flood_takes_its_share_of_the_time_and_no_more(stations: Stations, takes_s: float) -> None:
     clock = Clock()
-    links = GroundLinks([FakeLink(0, 10**9)], clock)
+    links = GroundLinks([FakeLink(0, 10**9)], clock, clock)
     spent_s = 0.0
     while clock.now_s < 10.0:
         spent_s += takes_s * heard_in_a_frame(links, stations, clock, takes_s).total()
@@ -90,7 +90,7 @@ def test_a_process_that_was_put_to_sleep_hears_again_soon(stations: Stations) ->
 
 def test_a_flooded_link_is_not_heard_before_others(stations: Stations) -> None:
     clock = Clock()
-    links = GroundLinks([FakeLink(0, 10**9), FakeLink(1, 10)], clock)
+    links = GroundLinks([FakeLink(0, 10**9), FakeLink(1, 10)], clock, clock)
     heard: Counter[int] = Counter()
     for _ in range(40):
         heard += heard_in_a_frame(links, stations, clock, 5e-4)
@@ -101,14 +101,14 @@ def test_a_flooded_link_is_not_heard_before_others(stations: Stations) -> None:
 
 def test_what_comes_in_good_measure_is_heard_at_once(stations: Stations) -> None:
     clock = Clock()
-    links = GroundLinks([FakeLink(0, 20), FakeLink(1, 20)], clock)
+    links = GroundLinks([FakeLink(0, 20), FakeLink(1, 20)], clock, clock)
     assert heard_in_a_frame(links, stations, clock, 1e-4) == {0: 20, 1: 20}
 
 
 def test_the_last_words_of_a_connection_are_heard_and_open_no_other(stations: Stations) -> None:
     clock = Clock()
     link = FakeLink(0, 3)
-    links = GroundLinks([link], clock)
+    links = GroundLinks([link], clock, clock)
     before = len(stations.hub.channels)
     link.opened, link.closed = [HERE], [HERE]
     for received in links.receive(stations):
@@ -120,8 +120,24 @@ def test_the_last_words_of_a_connection_are_heard_and_open_no_other(stations: St
 def test_a_connection_that_ends_takes_what_there_was_no_time_for_with_it(stations: Stations) -> None:
     clock = Clock()
     link = FakeLink(0, 50)
-    links = GroundLinks([link], clock)
+    links = GroundLinks([link], clock, clock)
     link.opened, link.closed = [HERE], [HERE]
     assert heard_in_a_frame(links, stations, clock, 1.0) == {0: 1}
     clock.now_s += 100.0
     assert not heard_in_a_frame(links, stations, clock, 1.0)
+
+
+def test_a_busy_computer_makes_nobody_deaf(stations: Stations) -> None:
+    """Time that other processes take, while a datagram is heard or sent, is not spent by who sent it."""
+    clock, processor_clock = Clock(), Clock()
+    link = FakeLink(0, 0)
+    links = GroundLinks([link], clock, processor_clock)
+    for _ in range(20):
+        link.waiting = 1
+        heard = 0
+        for _ in links.receive(stations):
+            heard += 1
+            clock.now_s += 0.2
+            processor_clock.now_s += 1e-4
+        assert heard == 1
+        clock.now_s += FRAME_S
