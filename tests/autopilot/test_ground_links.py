@@ -80,14 +80,6 @@ def test_a_flood_takes_its_share_of_the_time_and_no_more(stations: Stations, tak
     assert 0.5 * SHARE * clock.now_s < spent_s < SHARE * clock.now_s + MOST_SAVED_S + takes_s
 
 
-def test_a_process_that_was_put_to_sleep_hears_again_soon(stations: Stations) -> None:
-    clock = Clock()
-    links = GroundLinks([FakeLink(0, 10**9)], clock)
-    assert heard_in_a_frame(links, stations, clock, 100.0) == {0: 1}
-    clock.now_s += 0.1
-    assert heard_in_a_frame(links, stations, clock, 1e-3)[0] > 0
-
-
 def test_a_flooded_link_is_not_heard_before_others(stations: Stations) -> None:
     clock = Clock()
     links = GroundLinks([FakeLink(0, 10**9), FakeLink(1, 10)], clock, clock)
