@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from autopilot.attitude_plan import squared_speeds_from
@@ -50,6 +50,7 @@ def test_too_much_tilting_moment_keeps_its_direction() -> None:
     assert wrench[1] > 0.3
 
 
+@settings(max_examples=40)
 @given(quaternions(), vectors(10.0))
 def test_the_thrust_axis_gets_where_it_must_point(q: Quaternion, rate: Vector) -> None:
     """From any attitude and rotation, with moments as asked: upright, and turning no more, in three seconds."""

@@ -31,13 +31,13 @@ def vehicle_file(folder: Path, **changes: str) -> str:
 @pytest.mark.parametrize(
     ("track", "duration_s", "reach_m"),
     [
-        ("spiral", 40, 0.001),
+        ("spiral", 30, 0.001),
         ("expanding-spiral", 100, 0.005),
-        ("line", 40, 0.001),
-        ("wave", 40, 0.002),
-        ("crown", 40, 0.003),
-        ("lemniscate", 40, 0.005),
-        ("lemniscate:yaw=fixed", 40, 0.002),
+        ("line", 30, 0.001),
+        ("wave", 30, 0.002),
+        ("crown", 30, 0.003),
+        ("lemniscate", 32, 0.005),
+        ("lemniscate:yaw=fixed", 32, 0.002),
     ],
 )
 def test_every_track_is_tracked(tmp_path: Path, track: str, duration_s: int, reach_m: float) -> None:
@@ -84,7 +84,7 @@ WRONG = {
 @pytest.mark.parametrize("what", WRONG)
 def test_a_wrong_model_costs_little(tmp_path: Path, what: str) -> None:
     other = ("--plant-vehicle", vehicle_file(tmp_path, **WRONG[what]))
-    figures = fly(tmp_path / "out", "spiral", "--link", "memory", "--duration", "40", *other)
+    figures = fly(tmp_path / "out", "spiral", "--link", "memory", "--duration", "25", *other)
     error = rows(tmp_path / "out" / "flight.csv")
     assert figures["plant_vehicle"] == other[1]
     assert largest_error_m(error, 20.0) < 0.001
@@ -108,7 +108,7 @@ def largest_error_m(flown: dict[str, np.ndarray], after_s: float) -> float:
 def test_with_tight_limits_constraints_bind_and_it_still_flies(tmp_path: Path) -> None:
     """600 rad/s at most, hover at 497: take the spiral up from 2 m away, never ask for more."""
     vehicle = ("--vehicle", vehicle_file(tmp_path, rotors__max_speed="600.0", rotors__idle_speed="60.0"))
-    figures = fly(tmp_path / "out", "spiral", "--link", "memory", "--duration", "40", *vehicle)
+    figures = fly(tmp_path / "out", "spiral", "--link", "memory", "--duration", "25", *vehicle)
     truth = rows(tmp_path / "out" / "plant.csv")
     assert max(truth[f"omega{number}"].max() for number in range(1, 5)) <= 600.0
     assert figures["constrained_samples"]["rotors"] > 10
@@ -135,10 +135,10 @@ def test_any_start_is_recovered_from(tmp_path: Path, start: str) -> None:
         assert not recovering[flown["t"][1:] > 1.0].any()
 
 
-@pytest.mark.parametrize("lap_s", [4.0, 2.0, 1.0])
+@pytest.mark.parametrize("lap_s", [4.0, 1.0])
 def test_what_no_vehicle_can_follow_is_followed_upright_and_never_lost(tmp_path: Path, lap_s: float) -> None:
     """Up to 36 m/s and 400 m/s²: it saturates, stays within the size of the figure, and does not fall."""
-    figures = fly(tmp_path, f"lemniscate:lap={lap_s}", "--link", "memory", "--duration", "60")
+    figures = fly(tmp_path, f"lemniscate:lap={lap_s}", "--link", "memory", "--duration", "40")
     flown = rows(tmp_path / "flight.csv")
     late = flown["t"] > 20.0
     assert figures["constrained_samples"]["rotors"] + figures["constrained_samples"]["rates"] > 0
