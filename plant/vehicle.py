@@ -9,6 +9,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.sensor_parts import Sensors
+
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
 Part: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
@@ -169,6 +171,7 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     drag: Drag | None = None
     ground: Ground | None = None
     battery: Battery | None = None
+    sensors: Sensors | None = None
 
     def __post_init__(self) -> None:
         """Check what a range cannot say."""
