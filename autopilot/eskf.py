@@ -6,7 +6,7 @@ pressure it is the offset of the barometer, and height stays; for GPS it is posi
 """
 
 from collections.abc import Callable
-from math import asin, hypot, inf, isfinite, radians
+from math import inf, isfinite, radians
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,8 @@ class Kind:
     Attributes:
         test: The last.
         accepted_us: When it was last believed.
+        rejected_us: Since when it is not; None while it is.
+        resets: How often it had to be believed.
     """
 
     def __init__(self, numbers: int, patience_us: int, doubted: tuple[int, int, float]) -> None:
@@ -64,7 +66,7 @@ class Kind:
         self.gate = FIVE_SIGMA[numbers - 1]
         self.test = Test(-1, (0.0,) * numbers, 0.0, self.gate)
         self.accepted_us = 0
-        self._rejected_us: int | None = None
+        self.rejected_us: int | None = None
         self._patience_us = patience_us
         self._doubted = doubted
         self._y = np.zeros(numbers)
@@ -89,18 +91,13 @@ class Kind:
     def accept(self, time_us: int) -> None:
         """Note that a measurement was believed."""
         self.accepted_us = time_us
-        self._rejected_us = None
+        self.rejected_us = None
 
     def reject(self, time_us: int) -> bool:
         """Note that a measurement was not believed; return whether this has lasted too long."""
-        if self._rejected_us is None:
-            self._rejected_us = time_us
-        return time_us - self._rejected_us >= self._patience_us
-
-    @property
-    def is_rejected(self) -> bool:
-        """Whether the last measurement was."""
-        return self._rejected_us is not None
+        if self.rejected_us is None:
+            self.rejected_us = time_us
+        return time_us - self.rejected_us >= self._patience_us
 
 
 class Filter:
@@ -116,8 +113,6 @@ class Filter:
         """Believe what `sensors` say of themselves."""
         self._sensors, self._gravity = sensors, gravity_m_s2
         self._field = np.array(field_enu_gauss)
-        self._strength = hypot(*field_enu_gauss)
-        self._dip = asin(field_enu_gauss[2] / self._strength)
         self._noise = noise_of(sensors)
         gps = sensors.gps
         self._horizontal = gps.horizontal_noise_m**2 + _PLACE_STEP_M**2 / 12.0
@@ -176,9 +171,9 @@ class Filter:
             x[10 + i] = gain * aligned.rate[i]
             P[GYRO_BIAS + i, GYRO_BIAS + i] = gain * rate
 
-    def predict(self, sample: Array) -> None:
-        """Go on by one sample."""
-        predict(self.x, self.P, sample, self._noise, self._gravity)
+    def predict(self, samples: Array, row: int) -> None:
+        """Go on by one sample of many."""
+        predict(self.x, self.P, samples, row, self._noise, self._gravity)
 
     def fuse_fix(self, fix: GpsFix, place_enu_m: Vector, after_s: float, time_us: int) -> Reason | None:
         """Fuse a fix measured `after_s` after the filter's time; return why a part of it was rejected, if one was."""
@@ -201,10 +196,10 @@ class Filter:
 
     def fuse_field(self, field: Vector, time_us: int) -> Reason | None:
         """Fuse a magnetic field; return why it was rejected, if it was."""
-        own = tuple(measured - iron for measured, iron in zip(field, self.x[20:].tolist(), strict=True))
-        if not self._is_of_earth(own) and not self.field.reject(time_us):
-            return Reason.FIELD
         measured = np.array(field)
+        is_of_earth = update.is_of_earth(self.x, measured, self._field, _STRENGTH_PART, _DIP_RAD)
+        if not is_of_earth and not self.field.reject(time_us):
+            return Reason.FIELD
         believed = self.field.fuse(self, time_us, update.fuse_field, measured, self._field, self._field_variance)
         return None if believed else Reason.INNOVATION
 
@@ -217,16 +212,6 @@ class Filter:
     def resets(self) -> int:
         """How often something was taken anew."""
         return sum(kind.resets for kind in self._kinds)
-
-    def _is_of_earth(self, field: tuple[float, ...]) -> bool:
-        """Whether strength and inclination of a field, less the vehicle's own, can be the earth's."""
-        strength = hypot(*field)
-        if abs(strength - self._strength) > _STRENGTH_PART * self._strength:
-            return False
-        up = update.up_in_body(self.x).tolist()
-        along = sum(f * u for f, u in zip(field, up, strict=True))
-        dip = asin(max(-1.0, min(1.0, along / strength)))
-        return abs(dip - self._dip) <= _DIP_RAD
 
     def _of_place(self, fix: GpsFix) -> tuple[float, float]:
         """Return the variances of the white noise of a fix: as described, and more if it claims to be worse."""

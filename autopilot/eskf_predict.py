@@ -4,7 +4,7 @@ J. Solà, Quaternion kinematics for the error-state Kalman filter, arXiv:1711.02
 the attitude rotates body vectors into the earth frame, and its error is a small rotation in the body frame.
 """
 
-from math import cos, sin, sqrt
+from math import cos, exp, sin, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from mavlink.compiled import compiled
 
 Array: TypeAlias = NDArray[np.float64]
+Three: TypeAlias = tuple[float, float, float]
+Four: TypeAlias = tuple[float, float, float, float]
+Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS, GPS_DRIFT, BARO_OFFSET, HARD_IRON = 0, 3, 6, 9, 12, 15, 18, 19
 """Where the parts of the error state begin: m and m/s ENU, rad FLU, rad/s, m/s², m ENU, m, gauss FLU."""
@@ -60,63 +63,67 @@ class Noise(NamedTuple):
 
 
 @compiled
-def strap_down(x: Array, sample: Array, gravity: float) -> tuple[Array, Array]:
+def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine, Three, Three]:
     """Move the nominal state on by one sample, Solà's (260) with the attitude at the middle of the interval.
 
     Returns:
-        The rotation at the middle, (3, 3); specific force without its bias, FLU, and the angle turned, rad FLU, (6,).
+        The rotation at the middle, row by row; specific force without its bias, FLU; the angle turned, rad, FLU.
     """
-    dt = sample[INTERVAL]
-    motion = np.zeros(6)
-    if sample[BLIND_RATE] == 0.0:
-        for i in range(3):
-            motion[3 + i] = (sample[RATE + i] - x[10 + i]) * dt
-    q = x[6:10]
-    middle = _turned(q, 0.5 * motion[3], 0.5 * motion[4], 0.5 * motion[5])
-    R = _matrix(middle)
-    if sample[BLIND_FORCE] == 0.0:
-        for i in range(3):
-            motion[i] = sample[FORCE + i] - x[13 + i]
-    else:
-        for i in range(3):
-            motion[i] = R[2, i] * gravity
-    for i in range(3):
-        a = R[i, 0] * motion[0] + R[i, 1] * motion[1] + R[i, 2] * motion[2] - (gravity if i == 2 else 0.0)
-        x[i] += (x[3 + i] + 0.5 * a * dt) * dt
-        x[3 + i] += a * dt
-    after = _turned(q, motion[3], motion[4], motion[5])
-    scale = 1.0 / sqrt(after[0] ** 2 + after[1] ** 2 + after[2] ** 2 + after[3] ** 2)
-    for i in range(4):
-        x[6 + i] = after[i] * scale
-    return R, motion
+    dt = samples[row, INTERVAL]
+    a, b, c = 0.0, 0.0, 0.0
+    if samples[row, BLIND_RATE] == 0.0:
+        a = (samples[row, RATE] - x[10]) * dt
+        b = (samples[row, RATE + 1] - x[11]) * dt
+        c = (samples[row, RATE + 2] - x[12]) * dt
+    q = (x[6], x[7], x[8], x[9])
+    R = _matrix(_turned(q, 0.5 * a, 0.5 * b, 0.5 * c))
+    fx, fy, fz = R[6] * gravity, R[7] * gravity, R[8] * gravity
+    if samples[row, BLIND_FORCE] == 0.0:
+        fx = samples[row, FORCE] - x[13]
+        fy = samples[row, FORCE + 1] - x[14]
+        fz = samples[row, FORCE + 2] - x[15]
+    dvx = (R[0] * fx + R[1] * fy + R[2] * fz) * dt
+    dvy = (R[3] * fx + R[4] * fy + R[5] * fz) * dt
+    dvz = (R[6] * fx + R[7] * fy + R[8] * fz - gravity) * dt
+    x[0] += (x[3] + 0.5 * dvx) * dt
+    x[1] += (x[4] + 0.5 * dvy) * dt
+    x[2] += (x[5] + 0.5 * dvz) * dt
+    x[3] += dvx
+    x[4] += dvy
+    x[5] += dvz
+    w, i, j, k = _turned(q, a, b, c)
+    scale = 1.0 / sqrt(w * w + i * i + j * j + k * k)
+    x[6], x[7], x[8], x[9] = w * scale, i * scale, j * scale, k * scale
+    return R, (fx, fy, fz), (a, b, c)
 
 
 @compiled
-def predict(x: Array, P: Array, sample: Array, noise: Noise, gravity: float) -> None:
+def predict(x: Array, P: Array, samples: Array, row: int, noise: Noise, gravity: float) -> None:
     """Move state (23,) and covariance (22, 22) on by one sample, in place: P = F P Fᵀ + Q, Solà's (270) and (271)."""
-    dt = sample[INTERVAL]
-    R, motion = strap_down(x, sample, gravity)
-    decay = np.exp(-dt / noise.gps_drift_time_s)
-    fx, fy, fz = motion[0] * dt, motion[1] * dt, motion[2] * dt
-    push = np.empty((3, 3))
-    for i in range(3):
-        push[i, 0] = -(R[i, 1] * fz - R[i, 2] * fy)
-        push[i, 1] = -(R[i, 2] * fx - R[i, 0] * fz)
-        push[i, 2] = -(R[i, 0] * fy - R[i, 1] * fx)
-    back = _matrix(_turned(np.array([1.0, 0.0, 0.0, 0.0]), -motion[3], -motion[4], -motion[5]))
-    lever = R * dt
-    if sample[BLIND_FORCE] != 0.0:
-        push[:] = 0.0
-        lever[:] = 0.0
-    bias = dt if sample[BLIND_RATE] == 0.0 else 0.0
+    dt = samples[row, INTERVAL]
+    sees_force, sees_rate = samples[row, BLIND_FORCE] == 0.0, samples[row, BLIND_RATE] == 0.0
+    R, force, turn = strap_down(x, samples, row, gravity)
+    decay = exp(-dt / noise.gps_drift_time_s)
+    F = np.zeros((9, 3))
+    push, lever, back = F[:3], F[3:6], F[6:]
+    if sees_force:
+        fx, fy, fz = force[0] * dt, force[1] * dt, force[2] * dt
+        for i in range(3):
+            a, b, c = R[3 * i], R[3 * i + 1], R[3 * i + 2]
+            push[i, 0], push[i, 1], push[i, 2] = c * fy - b * fz, a * fz - c * fx, b * fx - a * fy
+            lever[i, 0], lever[i, 1], lever[i, 2] = a * dt, b * dt, c * dt
+    unturned = _matrix(_turned((1.0, 0.0, 0.0, 0.0), -turn[0], -turn[1], -turn[2]))
+    for i in range(9):
+        back[i // 3, i % 3] = unturned[i]
+    bias = dt if sees_rate else 0.0
     _carry(P, push, lever, back, bias, decay, dt)
     _carry(P.T, push, lever, back, bias, decay, dt)
-    force = noise.force if sample[BLIND_FORCE] == 0.0 else _BLIND_FORCE_DENSITY
-    rate = noise.rate if sample[BLIND_RATE] == 0.0 else _BLIND_RATE_DENSITY
+    force_noise = noise.force if sees_force else _BLIND_FORCE_DENSITY
+    rate_noise = noise.rate if sees_rate else _BLIND_RATE_DENSITY
     for i in range(3):
         x[16 + i] *= decay
-        P[VELOCITY + i, VELOCITY + i] += force * dt
-        P[ATTITUDE + i, ATTITUDE + i] += rate * dt
+        P[VELOCITY + i, VELOCITY + i] += force_noise * dt
+        P[ATTITUDE + i, ATTITUDE + i] += rate_noise * dt
         P[GYRO_BIAS + i, GYRO_BIAS + i] += noise.gyro_bias * dt
         P[ACCEL_BIAS + i, ACCEL_BIAS + i] += noise.accel_bias * dt
         P[GPS_DRIFT + i, GPS_DRIFT + i] += noise.gps_drift[i] * (1.0 - decay * decay)
@@ -142,13 +149,15 @@ def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravi
             about east, north and up, rad (9,).
     """
     ahead = x.copy()
-    delay = 0.0
-    for i in range(count):
-        sample = samples[(first + i) % len(samples)]
-        delay += sample[INTERVAL]
-        strap_down(ahead, sample, gravity)
+    delay, row = 0.0, first
+    for _ in range(count):
+        delay += samples[row, INTERVAL]
+        strap_down(ahead, samples, row, gravity)
+        row += 1
+        if row == len(samples):
+            row = 0
     now[:10] = ahead[:10]
-    R = _matrix(x[6:10])
+    R = _matrix((x[6], x[7], x[8], x[9]))
     for i in range(3):
         p, v = POSITION + i, VELOCITY + i
         now[10 + i] = sqrt(P[p, p] + delay * (2.0 * P[p, v] + delay * P[v, v]))
@@ -156,7 +165,7 @@ def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravi
         variance = 0.0
         for j in range(3):
             for k in range(3):
-                variance += R[i, j] * P[ATTITUDE + j, ATTITUDE + k] * R[i, k]
+                variance += R[3 * i + j] * P[ATTITUDE + j, ATTITUDE + k] * R[3 * i + k]
         now[16 + i] = sqrt(variance)
 
 
@@ -187,29 +196,36 @@ def _bound(P: Array, part: int, most: float) -> None:
 
 
 @compiled
-def _turned(q: Array, x: float, y: float, z: float) -> Array:
+def _turned(q: Four, x: float, y: float, z: float) -> Four:
     """Return the quaternion turned by a rotation vector in the body frame, rad: q ⊗ Exp."""
-    half = 0.5 * sqrt(x * x + y * y + z * z)
-    if half < _SMALL_TURN:
-        square = half * half
+    square = 0.25 * (x * x + y * y + z * z)
+    if square < _SMALL_TURN * _SMALL_TURN:
         c = 1.0 - square * (0.5 - square / 24.0)
         s = 0.5 * (1.0 - square * (1.0 / 6.0 - square / 120.0))
     else:
+        half = sqrt(square)
         c, s = cos(half), 0.5 * sin(half) / half
     x, y, z = s * x, s * y, s * z
-    turned = np.empty(4)
-    turned[0] = q[0] * c - q[1] * x - q[2] * y - q[3] * z
-    turned[1] = q[0] * x + q[1] * c + q[2] * z - q[3] * y
-    turned[2] = q[0] * y - q[1] * z + q[2] * c + q[3] * x
-    turned[3] = q[0] * z + q[1] * y - q[2] * x + q[3] * c
-    return turned
+    w, i, j, k = q
+    return (
+        w * c - i * x - j * y - k * z,
+        w * x + i * c + j * z - k * y,
+        w * y - i * z + j * c + k * x,
+        w * z + i * y - j * x + k * c,
+    )
 
 
 @compiled
-def _matrix(q: Array) -> Array:
+def _matrix(q: Four) -> Nine:
     w, x, y, z = q
-    R = np.empty((3, 3))
-    R[0, 0], R[0, 1], R[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-    R[1, 0], R[1, 1], R[1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-    R[2, 0], R[2, 1], R[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-    return R
+    return (
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - w * z),
+        2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y),
+        2.0 * (y * z + w * x),
+        1.0 - 2.0 * (x * x + y * y),
+    )

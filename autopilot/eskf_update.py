@@ -7,7 +7,7 @@ Every `fuse_…` returns NIS = yᵀ S⁻¹ y, and writes the innovation y to its
 is no number, nothing else changes.
 """
 
-from math import inf, sqrt
+from math import asin, inf, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -101,9 +101,19 @@ def doubt(P: Array, first: int, count: int, variance: float) -> None:
 
 
 @compiled
-def up_in_body(x: Array) -> Array:
-    """Return the direction of up, FLU, (3,)."""
-    return _in_body(x, np.array([0.0, 0.0, 1.0]))
+def is_of_earth(x: Array, measured: Array, field: Array, strength_part: float, dip_rad: float) -> bool:
+    """Whether a magnetic field, gauss FLU, less the vehicle's own, has strength and dip of the earth's, gauss ENU."""
+    up = _in_body(x, np.array([0.0, 0.0, 1.0]))
+    own, earth, along = 0.0, 0.0, 0.0
+    for i in range(3):
+        axis = measured[i] - x[20 + i]
+        own += axis * axis
+        earth += field[i] * field[i]
+        along += axis * up[i]
+    own, earth = sqrt(own), sqrt(earth)
+    if not abs(own - earth) <= strength_part * earth:
+        return False
+    return abs(asin(min(max(along / own, -1.0), 1.0)) - asin(field[2] / earth)) <= dip_rad
 
 
 @compiled

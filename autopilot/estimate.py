@@ -1,7 +1,6 @@
 """What the estimator knows of the vehicle, how well, and what it trusts."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import IntFlag, StrEnum
 from typing import NamedTuple
 
@@ -133,8 +132,7 @@ class Health(NamedTuple):
         return flags
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+class Estimate(NamedTuple):
     """The vehicle at one instant.
 
     Attributes:

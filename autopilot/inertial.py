@@ -23,14 +23,14 @@ class _Axes:
     """One of the two, watched."""
 
     def __init__(self, source: Source, group: Updated, largest: float, noise: float, rejected: Rejected) -> None:
-        self._source, self._group, self._rejected = source, group, rejected
+        self._source, self._group, self._rejected = source, int(group), rejected
         self._watch = Watch(-largest, largest, _PATIENCE_US if noise > 0.0 else inf)
         self._time_us: int | None = None
         self.value: Vector = (0.0, 0.0, 0.0)
 
     def read(self, frame: SensorFrame, value: Vector) -> bool:
         """Read a value; return whether the one that is held can be used at this frame."""
-        if frame.has(self._group):
+        if frame.updated & self._group == self._group:
             reason = self._watch.reason(value, frame.time_us)
             if reason is None:
                 self.value, self._time_us = value, frame.time_us

@@ -129,7 +129,7 @@ def record(
     """Measure along a path."""
     faults = faults or Faults()
     dt = INTERVAL_US * 1e-6
-    t = np.arange(round(duration_s / dt)) * dt
+    t: Array = np.arange(round(duration_s / dt), dtype=np.float64) * dt
     motion = motion_along(path, t)
     chances = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(5)]
     force, accel_bias = _inertial(motion.force, sensors, dt, chances[0], faults.accel_bias_m_s2, gyro=False)
@@ -204,9 +204,7 @@ def _pressures(motion: Motion, sensors: Sensors, dt: float, chance: np.random.Ge
     return pressures + drift + chance.normal(size=len(height)) * part.noise_pa
 
 
-def gauss_markov(
-    count: int, axes: int, dt: float, sigma: float, time_s: float, chance: np.random.Generator
-) -> Array:
+def gauss_markov(count: int, axes: int, dt: float, sigma: float, time_s: float, chance: np.random.Generator) -> Array:
     """Return a first-order Gauss-Markov process, (count, axes), stationary from its beginning."""
     decay = exp(-dt / time_s)
     white = chance.normal(size=(count, axes)) * sigma
@@ -222,7 +220,8 @@ def _fixes(
 ) -> Iterator[tuple[int, GpsFix]]:
     part = sensors.gps
     told = np.flatnonzero(_due(len(t), INTERVAL_US * 1e-6, part.rate_hz))[1:]
-    measured = motion_along(path, t[told] - part.delay_s)
+    times: Array = t[told] - part.delay_s
+    measured = motion_along(path, times)
     noise = np.array([part.horizontal_noise_m, part.horizontal_noise_m, part.vertical_noise_m])
     drift = gauss_markov(len(told), 3, 1.0 / part.rate_hz, 1.0, part.drift_time_s, chance)
     drift *= np.array([part.horizontal_drift_m, part.horizontal_drift_m, part.vertical_drift_m])
@@ -231,14 +230,17 @@ def _fixes(
     begin_s, end_s = faults.gps_lost_s
     for k, place, speed in zip(told.tolist(), places, speeds, strict=True):
         if not begin_s <= t[k] < end_s:
-            yield k, GpsFix(
-                time_us=k * INTERVAL_US,
-                fix_type=part.fix_type,
-                place=_on_wire(geodetic_of(tuple(place.tolist()), origin)),
-                velocity_enu_m_s=tuple(np.round(speed, 2).tolist()),
-                horizontal_accuracy_m=round(sqrt(part.horizontal_noise_m**2 + part.horizontal_drift_m**2), 2),
-                vertical_accuracy_m=round(sqrt(part.vertical_noise_m**2 + part.vertical_drift_m**2), 2),
-                satellites=part.satellites,
+            yield (
+                k,
+                GpsFix(
+                    time_us=k * INTERVAL_US,
+                    fix_type=part.fix_type,
+                    place=_on_wire(geodetic_of(tuple(place.tolist()), origin)),
+                    velocity_enu_m_s=tuple(np.round(speed, 2).tolist()),
+                    horizontal_accuracy_m=round(sqrt(part.horizontal_noise_m**2 + part.horizontal_drift_m**2), 2),
+                    vertical_accuracy_m=round(sqrt(part.vertical_noise_m**2 + part.vertical_drift_m**2), 2),
+                    satellites=part.satellites,
+                ),
             )
 
 

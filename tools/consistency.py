@@ -55,9 +55,7 @@ def errors_of(x: Array, P: Array, position: Vector | Array, velocity: Vector | A
     )
     turn = estimated.T @ rotation
     small = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    return Errors(
-        np.concatenate([position - x[:3], velocity - x[3:6], small]), P[:NAVIGATION, :NAVIGATION].copy()
-    )
+    return Errors(np.concatenate([position - x[:3], velocity - x[3:6], small]), P[:NAVIGATION, :NAVIGATION].copy())
 
 
 class Bounds(NamedTuple):
@@ -73,8 +71,8 @@ class Bounds(NamedTuple):
 
 def bounds(numbers: int, flights: int, level: float = 0.95) -> Bounds:
     """Return where the mean of χ² of `numbers` degrees of freedom over `flights` lies, with probability `level`."""
-    both = chi2.ppf([0.5 - 0.5 * level, 0.5 + 0.5 * level], numbers * flights) / flights
-    return Bounds(float(both[0]), float(both[1]))
+    lower, upper = (float(chi2.ppf(part, numbers * flights)) for part in (0.5 - 0.5 * level, 0.5 + 0.5 * level))
+    return Bounds(lower / flights, upper / flights)
 
 
 def share_within(means: Array, within: Bounds) -> float:
