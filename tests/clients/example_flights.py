@@ -84,10 +84,9 @@ def do_orbit(evidence: Evidence) -> None:
 def mission(evidence: Evidence) -> None:
     """Past the three places within the 3 m that MAVSDK asks for, 25 m high, at most 10 m/s fast; then home."""
     lands(evidence, HOME)
-    sights = evidence.seen.in_mode(Mode.MISSION)
     for latitude, longitude in (*IRCHEL, IRCHEL_LAST):
-        assert closest_m(sights, place(latitude, longitude, 25.0)) < 3.0
-    assert max(map(speed_m_s, sights)) < 10.5
+        assert closest_m(evidence.seen.sights, place(latitude, longitude, 25.0)) < 3.0
+    assert max(map(speed_m_s, evidence.seen.in_mode(Mode.MISSION))) < 10.5
     assert evidence.seen.modes()[-1] is Mode.RETURN
     evidence.client.wait_printed(r"Mission progress: (\d+)/\1\b")
 
