@@ -70,7 +70,7 @@ def hello(evidence: Evidence) -> None:
 
 def logs(evidence: Evidence) -> None:
     """The log of the flight before is the file that the vehicle keeps, byte for byte."""
-    kept = sorted((evidence.state / "0" / "files" / "logs").iterdir())
+    kept = sorted((evidence.state / "0" / "logs").iterdir())
     got = sorted(evidence.client.folder.glob("log-*.ulog"))
     assert kept
     assert [path.read_bytes() for path in got] == [path.read_bytes() for path in kept]

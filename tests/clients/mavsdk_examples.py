@@ -105,7 +105,7 @@ def _run(example: Example, folder: Path, python: Path) -> Result:
                     before = next(other for other in EXAMPLES if other.name == example.after)
                     _judge(before, folder, python, room / "before", flown)
                 _judge(example, folder, python, room / "client", flown)
-        except (AssertionError, ArithmeticError, LookupError, ValueError) as failure:
+        except (AssertionError, ArithmeticError, LookupError, OSError, ValueError) as failure:
             where = extract_tb(failure.__traceback__)[-1]
             return Result(example, f"{where.name}: {where.line}\n{failure}", monotonic() - began_s)
     return Result(example, "", monotonic() - began_s)
