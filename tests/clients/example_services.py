@@ -65,7 +65,7 @@ def all_params(evidence: Evidence) -> None:
 
 def hello(evidence: Evidence) -> None:
     """The line reaches the other ground station."""
-    assert "Hello world!" in evidence.seen.texts
+    evidence.seen.wait(lambda _: "Hello world!" in evidence.seen.texts, "the line", 5.0)
 
 
 def logs(evidence: Evidence) -> None:
