@@ -63,11 +63,6 @@ def all_params(evidence: Evidence) -> None:
     assert len(re.findall(r"(?m)^[A-Z][A-Z0-9_]*: [-\d.e]+$", evidence.client.printed)) == count
 
 
-def hello(evidence: Evidence) -> None:
-    """The line reaches the other ground station."""
-    evidence.seen.wait(lambda _: "Hello world!" in evidence.seen.texts, "the line", 5.0)
-
-
 def logs(evidence: Evidence) -> None:
     """The log of the flight before is the file that the vehicle keeps, byte for byte."""
     kept = sorted((evidence.state / "0" / "logs").iterdir())
