@@ -79,7 +79,7 @@ def table(results: Sequence[Result]) -> str:
 
 
 def _shows(example: Example) -> str:
-    return (example.judge.__doc__ or "").strip().rstrip(".")
+    return (example.judge.__doc__ or "").partition("\n")[0].strip().rstrip(".")
 
 
 def _parser() -> argparse.ArgumentParser:
