@@ -224,6 +224,15 @@ def test_no_process_outlives_a_parent_that_was_killed(tmp_path: Path) -> None:
     wait_for(lambda: not any(alive(child) for child in children), "both processes to end")
 
 
+@pytest.mark.parametrize("package", ["plant", "autopilot"])
+def test_a_process_whose_parent_was_gone_before_it_began_ends(package: str) -> None:
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    link = ("--link", "udpin:127.0.0.1:0") if package == "plant" else ("--plant", "udpout:127.0.0.1:9")
+    command = [sys.executable, "-m", package, "--json", "--parent", str(gone.pid), *link]
+    assert subprocess.run(command, capture_output=True, check=False, timeout=60.0).returncode == 130
+
+
 def alive(process: psutil.Process) -> bool:
     return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
 
