@@ -9,11 +9,13 @@ number that a broken sensor sends.
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from math import atan2, degrees, hypot, nan
+from typing import TypeAlias
 
 from mavlink.atmosphere import altitude_m
 from mavlink.dialect import Codec, Message
 from mavlink.frames import Vector, frd_from_flu, ned_from_enu
 from mavlink.geodesy import Geodetic
+from mavlink.hil import StateFrame
 
 
 class Updated(IntFlag):
@@ -87,6 +89,10 @@ class SensorFrame:
     def has(self, group: Updated) -> bool:
         """Whether a group is new."""
         return self.updated & group == group
+
+
+Frame: TypeAlias = StateFrame | SensorFrame
+"""What a plant tells its autopilot at one instant of simulated time."""
 
 
 def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:

@@ -8,23 +8,39 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from mavlink.atmosphere import pressure_pa, temperature_c
+from mavlink.feedback import Feedback
 from mavlink.frames import Vector, earth_from_body
 from mavlink.geodesy import Geodetic
-from mavlink.hil import StateFrame
 from mavlink.magnetic_field import field_enu_gauss
-from mavlink.sensors import SensorFrame, Updated
+from mavlink.sensors import Frame, SensorFrame, Updated
 from plant.chance import Source, streams
 from plant.dynamics import attitude_of
 from plant.gps import GpsReceiver
 from plant.sensor_errors import GaussMarkov, accelerometer, gyroscope
 from plant.sensor_parts import Barometer, Magnetometer, Sensors
-from plant.world import Physics, World
+from plant.vehicle import Vehicle
+from plant.world import Physics, World, state_frame
 
-Tell: TypeAlias = Callable[[World], StateFrame | SensorFrame]
+Tell: TypeAlias = Callable[[World], Frame]
 """What the plant tells the autopilot of a world."""
 
 _ROUNDING = 1e-9
 _INERTIAL = Updated.ACCELEROMETER | Updated.GYROSCOPE
+
+
+def tells(
+    feedback: Feedback, vehicle: Vehicle, physics: Physics, origin: Geodetic, *, seed: int, interval_us: int
+) -> Tell:
+    """Return what makes of each world, in order, the frame that the autopilot is told."""
+    if feedback is Feedback.STATE:
+        return state_frame
+    assert vehicle.sensors is not None, "only what has sensors serves them"
+    return SensorSuite(vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us).measure
+
+
+def served_by(vehicle: Vehicle) -> list[Feedback]:
+    """Return the feedback that a vehicle can give."""
+    return [Feedback.STATE] if vehicle.sensors is None else list(Feedback)
 
 
 class Rate:
