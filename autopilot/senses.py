@@ -40,7 +40,7 @@ def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> Est
     sensors = vehicle.sensors
     if sensors is None:
         raise VehicleError(f"{vehicle.name} has no sensors: fly a vehicle with a table sensors, or --feedback state")
-    from autopilot import estimator  # type: ignore[attr-defined] # only where there is something to estimate
+    from autopilot import estimator  # only where there is something to estimate
 
     gravity_m_s2 = vehicle.gravity_m_s2
     return lambda interval_us: estimator.Estimator(sensors, gravity_m_s2, origin, interval_us)
