@@ -7,7 +7,7 @@ import numpy as np
 
 from mavlink.frames import Vector, earth_from_body, normalized
 from mavlink.hil import ActuatorCommand, StateFrame
-from plant.dynamics import CHARGE, ROTORS, FourOf, attitude_of, packed
+from plant.dynamics import CHARGE, ROTORS, Array, FourOf, attitude_of, packed, specific_force
 from plant.integrate import Integrator, solver
 from plant.parameters import parameters_of
 from plant.scenario import IntegrationError, Start, check_start
@@ -73,14 +73,21 @@ class Physics:
         Raises:
             IntegrationError: The state cannot be integrated any further.
         """
-        x = np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
-        x, voltage_v = self._integrate(x, self._target(command), self._parameters, duration_us * 1e-6)
+        x, voltage_v = self._integrate(_vector(world), self._target(command), self._parameters, duration_us * 1e-6)
         end = x.tolist()
         if not all(map(isfinite, end)):
             raise IntegrationError("the state has left what the model describes: it is no longer finite")
         state = (*end[:9], *normalized(attitude_of(end)))
         voltage_v = voltage_v if self._has_battery else nan
         return World(world.time_us + duration_us, state, tuple(end[ROTORS]), end[CHARGE], voltage_v)
+
+    def specific_force(self, world: World) -> Vector:
+        """Return what an ideal accelerometer at the centre of mass measures, m/s² in FLU: (0, 0, g) at rest and level.
+
+        Rotors without lag turn as they did up to now.
+        """
+        force: Vector = specific_force(_vector(world), self._parameters)
+        return force
 
     def _target(self, command: ActuatorCommand) -> FourOf:
         """Return the rotor speeds that a command asks for: at least idle while armed, none while not."""
@@ -89,6 +96,10 @@ class Physics:
         c1, c2, c3, c4 = command.controls
         idle, top = self._idle, self._top
         return (max(c1 * top, idle), max(c2 * top, idle), max(c3 * top, idle), max(c4 * top, idle))
+
+
+def _vector(world: World) -> Array:
+    return np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
 
 
 def state_frame(world: World) -> StateFrame:

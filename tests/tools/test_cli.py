@@ -42,6 +42,19 @@ BAD_INPUT = {
     "vehicle": ((plain("spiral"), plain("--vehicle"), plain("dragonfly")), "unknown vehicle dragonfly: choose"),
     "solver": ((plain("spiral"), plain("--solver"), plain("simplex")), "unknown solver simplex: installed are"),
     "extra": ((plain("spiral"), plain("--solver"), plain("gurobi")), "gurobi is not installed: pip install"),
+    "feedback": (
+        (plain("spiral"), plain("--feedback"), plain("hope")),
+        "argument --feedback: must be state or sensors",
+    ),
+    "no sensors": (
+        (plain("spiral"), plain("--feedback"), plain("sensors"), plain("--vehicle"), plain("hummingbird-thesis")),
+        "--feedback sensors: vehicle hummingbird-thesis has no table sensors",
+    ),
+    "no ground to stand on": (
+        (plain("spiral"), plain("--feedback"), plain("sensors"), plain("--without"), plain("ground")),
+        "--feedback sensors: vehicle hummingbird has no ground to stand on",
+    ),
+    "seed": ((plain("spiral"), plain("--seed"), plain("-1")), "argument --seed: must not be below zero, not -1"),
     "missing key": (
         (plain("spiral"), plain("--vehicle"), edited(VEHICLE, "mass_kg = 0.698", "")),
         "hummingbird.toml: body: Object missing required field `mass_kg`",
