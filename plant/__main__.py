@@ -3,7 +3,7 @@
 import sys
 from math import inf
 
-from mavlink.process import ArgumentParser, add_common_arguments, begin, positive, speed
+from mavlink.process import ArgumentParser, add_common_arguments, begin, natural, positive, speed
 from plant.scenario import add_world_arguments
 
 DEFAULT_LINK = "udpin:127.0.0.1:14560"
@@ -27,6 +27,7 @@ def _parser() -> ArgumentParser:
         help="rk4: fixed steps of 1 ms (default); adaptive: Dormand-Prince to 1e-9",
     )
     add_world_arguments(parser, start="y=-1,z=2,psi=90,rotors=4740, all else 0")
+    add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
     add("--rate", type=positive, default=250.0, metavar="HZ", help="frames, if the autopilot asks for no other rate")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")

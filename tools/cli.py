@@ -84,7 +84,7 @@ def _add_fly(parser: ArgumentParser) -> None:
         metavar="N",
         help="times real time, or max (default: max; 1 where a ground station is invited by --gcs)",
     )
-    add("--seed", type=int, default=0, metavar="N", help="seed of everything random (default %(default)s)")
+    add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
@@ -136,6 +136,7 @@ def _add_sitl(parser: ArgumentParser) -> None:
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
     add_world_arguments(parser, start="standing at home")
+    add("--seed", type=natural, default=0, metavar="N", help="seed of all that is random; vehicle N adds N (default 0)")
     add("--speed", type=speed, default=1.0, metavar="N", help="times real time, or max (default 1)")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--quiet", action="store_true", help="say nothing but errors")

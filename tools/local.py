@@ -40,8 +40,8 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     """
     autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, perf_counter)
     integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
-    physics = Physics(plan.plant_vehicle, integrator, plan.wind.velocity_enu_m_s)
-    world = starting_world(plan.start, plan.plant_vehicle)
+    physics = Physics(plan.plant_vehicle, integrator, plan.weather)
+    world = starting_world(plan.start, plan.plant_vehicle, plan.weather)
     interval_us = autopilot.frame_interval_us
     plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out)
     exchange: Exchange = InMemory(autopilot, interval_us, plant_logs) if plan.link == "memory" else Direct(autopilot)
