@@ -73,12 +73,17 @@ def scales(intensity: Intensity, height_m: float) -> Scales:
     return Scales(sigma_w / slope**0.4, sigma_w, height_m / slope**1.2, height_m)
 
 
+def eddy_velocity(eddies: Eddies, scale: Scales) -> tuple[float, float, float]:
+    """Return what the eddies add to the wind: along it, across it to the left, and upwards, m/s."""
+    horizontal = scale.sigma_uv_m_s
+    return horizontal * eddies.u, horizontal * _across(eddies.v), scale.sigma_w_m_s * _across(eddies.w)
+
+
 class Turbulence:
     """The turbulence of one seed."""
 
-    def __init__(self, intensity: Intensity, seed: int) -> None:
-        """Blow with `intensity`; everything that is by chance follows from `seed`."""
-        self._intensity: Intensity = intensity
+    def __init__(self, seed: int) -> None:
+        """Let everything that is by chance follow from `seed`."""
         self._key = np.random.SeedSequence(seed, spawn_key=_KEY).generate_state(2, np.uint64)
         self._block: tuple[int, list[list[float]]] = (-1, [])
 
@@ -87,23 +92,13 @@ class Turbulence:
         u, v1, v2, w1, w2 = self._noise(0)
         return Eddies(1, u, (v1, 0.5 * (v1 + v2)), (w1, 0.5 * (w1 + w2)))
 
-    def step(self, eddies: Eddies, airspeed_m_s: float, height_m: float, duration_s: float) -> Eddies:
+    def step(self, eddies: Eddies, scale: Scales, airspeed_m_s: float, duration_s: float) -> Eddies:
         """Return the eddies that meet the vehicle after `duration_s`."""
-        lengths = scales(self._intensity, height_m)
         way_m = max(airspeed_m_s, LEAST_AIRSPEED_M_S) * duration_s
         n1, n2, n3, n4, n5 = self._noise(eddies.frame)
-        along, up = way_m / lengths.length_uv_m, way_m / lengths.length_w_m
+        along, up = way_m / scale.length_uv_m, way_m / scale.length_w_m
         u = exp(-along) * eddies.u + sqrt(-expm1(-2.0 * along)) * n1
         return Eddies(eddies.frame + 1, u, _twice(eddies.v, along, n2, n3), _twice(eddies.w, up, n4, n5))
-
-    def velocity_m_s(self, eddies: Eddies, height_m: float) -> tuple[float, float, float]:
-        """Return what the eddies add to the wind: along it, across it to the left, and upwards."""
-        sigma = scales(self._intensity, height_m)
-        return (
-            sigma.sigma_uv_m_s * eddies.u,
-            sigma.sigma_uv_m_s * _across(eddies.v),
-            sigma.sigma_w_m_s * _across(eddies.w),
-        )
 
     def _noise(self, frame: int) -> list[float]:
         """Return a frame's white noise: independent, of variance 1."""

@@ -9,22 +9,23 @@ from scipy.signal import welch
 
 from plant.air import Air
 from plant.dynamics import Array
-from plant.turbulence import LEAST_AIRSPEED_M_S, Eddies, Turbulence, scales
+from plant.turbulence import LEAST_AIRSPEED_M_S, Turbulence, eddy_velocity, scales
 from plant.weather import Intensity, Weather, wind
 
 FOOT = 0.3048
 KNOT = 1852.0 / 3600.0
 AIRSPEED_M_S, HEIGHT_M = 10.0, 30.0
+SCALE = scales("moderate", HEIGHT_M)
 
 
-def blow(steps: int, step_s: float, seed: int = 1, intensity: Intensity = "moderate") -> Array:
+def blow(steps: int, step_s: float, seed: int = 1) -> Array:
     """Return the velocities along, across and upwards, (steps, 3), m/s."""
-    turbulence = Turbulence(intensity, seed)
+    turbulence = Turbulence(seed)
     eddies = turbulence.begin()
     velocities = []
     for _ in range(steps):
-        velocities.append(turbulence.velocity_m_s(eddies, HEIGHT_M))
-        eddies = turbulence.step(eddies, AIRSPEED_M_S, HEIGHT_M, step_s)
+        velocities.append(eddy_velocity(eddies, SCALE))
+        eddies = turbulence.step(eddies, SCALE, AIRSPEED_M_S, step_s)
     return np.array(velocities)
 
 
@@ -56,7 +57,7 @@ def test_below_ten_and_above_a_thousand_feet_it_is_as_there(height_ft: float, as
 @pytest.mark.parametrize(("axis", "formula"), [(0, along), (1, across), (2, across)])
 def test_the_spectrum_is_drydens(axis: int, formula: Callable[[Array, float, float], Array]) -> None:
     step_s = 0.02
-    sigma_uv, sigma_w, length_uv, length_w = scales("moderate", HEIGHT_M)
+    sigma_uv, sigma_w, length_uv, length_w = SCALE
     sigma, length = (sigma_w, length_w) if axis == 2 else (sigma_uv, length_uv)
     frequencies, measured = welch(blow(1 << 17, step_s)[:, axis], fs=1.0 / step_s, nperseg=4096)
     shown = (frequencies > 0.02) & (frequencies < 5.0)  # above, a sampled spectrum holds what lies beyond 25 Hz too
@@ -68,7 +69,7 @@ def test_the_spectrum_is_drydens(axis: int, formula: Callable[[Array, float, flo
 @pytest.mark.parametrize("step_s", [0.004, 0.5])
 def test_variance_and_memory_do_not_depend_on_the_step(step_s: float) -> None:
     """The correlation of eddies that drift past: exp(-a t) along, exp(-a t)(1 - a t / 2) across, a = V / L."""
-    sigma_uv, sigma_w, length_uv, length_w = scales("moderate", HEIGHT_M)
+    sigma_uv, sigma_w, length_uv, length_w = SCALE
     rows = {0: (sigma_uv, length_uv, 1.0), 1: (sigma_uv, length_uv, 0.5), 2: (sigma_w, length_w, 0.5)}
     every = round(2.0 / step_s)
     products = []
@@ -86,19 +87,19 @@ def test_variance_and_memory_do_not_depend_on_the_step(step_s: float) -> None:
 
 def test_it_blows_from_the_first_frame_on() -> None:
     first = np.array([blow(1, 0.004, seed)[0] for seed in range(2000)])
-    sigma_uv, sigma_w, _, _ = scales("moderate", HEIGHT_M)
+    sigma_uv, sigma_w, _, _ = SCALE
     assert first.std(axis=0) == pytest.approx([sigma_uv, sigma_uv, sigma_w], rel=0.06)
     assert np.abs(np.corrcoef(first.T) - np.eye(3)).max() < 0.08
 
 
 def test_a_memory_has_one_future() -> None:
-    turbulence = Turbulence("severe", 7)
+    turbulence = Turbulence(7)
     history = [turbulence.begin()]
     for _ in range(600):
-        history.append(turbulence.step(history[-1], 5.0, HEIGHT_M, 0.004))
-    again = Turbulence("severe", 7)
+        history.append(turbulence.step(history[-1], SCALE, 5.0, 0.004))
+    again = Turbulence(7)
     for frame in (599, 3, 300, 255, 256):
-        assert again.step(history[frame], 5.0, HEIGHT_M, 0.004) == history[frame + 1]
+        assert again.step(history[frame], SCALE, 5.0, 0.004) == history[frame + 1]
 
 
 def test_seeds_differ() -> None:
@@ -124,7 +125,6 @@ def test_the_eddies_are_along_the_wind() -> None:
 
 
 def test_who_drifts_with_the_air_still_meets_eddies() -> None:
-    turbulence = Turbulence("light", 1)
+    turbulence = Turbulence(1)
     begin = turbulence.begin()
-    assert turbulence.step(begin, 0.0, HEIGHT_M, 0.1) == turbulence.step(begin, LEAST_AIRSPEED_M_S, HEIGHT_M, 0.1)
-    assert isinstance(begin, Eddies)
+    assert turbulence.step(begin, SCALE, 0.0, 0.1) == turbulence.step(begin, SCALE, LEAST_AIRSPEED_M_S, 0.1)
