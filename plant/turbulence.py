@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from plant.chance import Source
 from plant.weather import Intensity
 
 FEET_PER_M = 1.0 / 0.3048
@@ -29,8 +30,6 @@ LEAST_AIRSPEED_M_S = 1.0
 _SQRT_3 = sqrt(3.0)
 _BLOCK = 256
 _NOISES = 5
-_KEY = (0xD2,)
-"""Keeps this chance apart from that of everything else that has the same seed."""
 
 
 class Eddies(NamedTuple):
@@ -84,7 +83,7 @@ class Turbulence:
 
     def __init__(self, seed: int) -> None:
         """Let everything that is by chance follow from `seed`."""
-        self._key = np.random.SeedSequence(seed, spawn_key=_KEY).generate_state(2, np.uint64)
+        self._key = np.random.SeedSequence(seed, spawn_key=(Source.WEATHER,)).generate_state(2, np.uint64)
         self._block: tuple[int, list[list[float]]] = (-1, [])
 
     def begin(self) -> Eddies:

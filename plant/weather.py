@@ -131,12 +131,11 @@ class Weather(NamedTuple):
     seed: int = 0
 
     def options(self) -> list[str]:
-        """Return the command line that `add_weather_arguments` reads back, `--seed` included."""
+        """Return the command line that `add_weather_arguments` reads back; `--seed` is not only the weather's."""
         return [
             *("--wind", str(self.wind)),
             *(f"--gust={gust}" for gust in self.gusts),
             *(("--turbulence", self.turbulence) if self.turbulence else ()),
-            *("--seed", str(self.seed)),
         ]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from mavlink.frames import Vector, earth_from_body, normalized
 from mavlink.hil import ActuatorCommand, StateFrame
 from plant.air import CALM, Air
-from plant.dynamics import CHARGE, ROTORS, FourOf, attitude_of, packed
+from plant.dynamics import CHARGE, ROTORS, Array, FourOf, attitude_of, packed, specific_force
 from plant.integrate import Integrator, solver
 from plant.parameters import parameters_of
 from plant.scenario import IntegrationError, Start, check_start
@@ -82,10 +82,8 @@ class Physics:
         Raises:
             IntegrationError: The state cannot be integrated any further.
         """
-        x = np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
-        if self._air.steady is None:
-            self._wind[:] = world.wind_enu_m_s
-        x, voltage_v = self._integrate(x, self._target(command), self._parameters, duration_us * 1e-6)
+        self._feel_wind(world)
+        x, voltage_v = self._integrate(_vector(world), self._target(command), self._parameters, duration_us * 1e-6)
         end = x.tolist()
         if not all(map(isfinite, end)):
             raise IntegrationError("the state has left what the model describes: it is no longer finite")
@@ -98,6 +96,19 @@ class Physics:
             wind, eddies = self._air.go_on(world.eddies, time_us, end[8], velocity, duration_us)
         return World(time_us, state, tuple(end[ROTORS]), end[CHARGE], voltage_v, wind, eddies)
 
+    def specific_force(self, world: World) -> Vector:
+        """Return what an ideal accelerometer at the centre of mass measures, m/s² in FLU: (0, 0, g) at rest and level.
+
+        Rotors without lag turn as they did up to now.
+        """
+        self._feel_wind(world)
+        force: Vector = specific_force(_vector(world), self._parameters)
+        return force
+
+    def _feel_wind(self, world: World) -> None:
+        if self._air.steady is None:
+            self._wind[:] = world.wind_enu_m_s
+
     def _target(self, command: ActuatorCommand) -> FourOf:
         """Return the rotor speeds that a command asks for: at least idle while armed, none while not."""
         if not command.armed:
@@ -105,6 +116,10 @@ class Physics:
         c1, c2, c3, c4 = command.controls
         idle, top = self._idle, self._top
         return (max(c1 * top, idle), max(c2 * top, idle), max(c3 * top, idle), max(c4 * top, idle))
+
+
+def _vector(world: World) -> Array:
+    return np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
 
 
 def state_frame(world: World) -> StateFrame:

@@ -34,6 +34,7 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
         "controller": plan.profile.controller,
         "link": plan.link,
         "seed": plan.seed,
+        "feedback": plan.feedback,
         "solver": plan.profile.table(plan.profile.controller).get("qp", {}).get("solver"),
         "vehicle": plan.vehicle_name,
         "plant_vehicle": plan.plant_vehicle_name,

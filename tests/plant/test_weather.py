@@ -129,7 +129,7 @@ def test_the_command_line_is_read_back(wind: Wind, gusts: list[Gust], turbulence
     parser = ArgumentParser()
     add_weather_arguments(parser)
     parser.add_argument("--seed", type=natural)
-    assert weather_of(parser.parse_args(weather.options())) == weather
+    assert weather_of(parser.parse_args([*weather.options(), f"--seed={seed}"])) == weather
 
 
 def test_air_that_may_change_but_does_not_is_a_constant_wind(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from mavlink.feedback import Feedback
 from plant.weather import NO_WIND
 from tools.figures import (
     Curve,
@@ -43,7 +44,15 @@ class Flight(NamedTuple):
 
 
 def fly(out: Path, duration_s: float) -> Flight:
-    arguments = {"profile": "thesis", "link": "direct", "speed": np.inf, "seed": 0, "duration": duration_s, "out": out}
+    arguments = {
+        "profile": "thesis",
+        "link": "direct",
+        "speed": np.inf,
+        "seed": 0,
+        "feedback": Feedback.STATE,
+        "duration": duration_s,
+        "out": out,
+    }
     files = {"controller": None, "solver": None, "vehicle": None, "plant_vehicle": None, "integrator": "rk4"}
     world: dict[str, Any] = {"wind": NO_WIND, "gust": (), "turbulence": None, "without": (), "start": {}}
     ground: dict[str, Any] = {"gcs": (), "signing_key": None, "insecure": False}
