@@ -79,7 +79,7 @@ def _plant_options(plan: FlightPlan) -> list[str]:
         *("--vehicle", plan.plant_vehicle_name),
         *("--integrator", plan.integrator),
         *(f"--without={part}" for part in plan.without),
-        *("--wind", str(plan.wind)),
+        *plan.weather.options(),
         *("--start", str(plan.start)),
         *("--seed", str(plan.seed)),
         *("--duration", repr(plan.duration_s)),
