@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+from mavlink.feedback import Feedback, feedback
 from mavlink.home import DEFAULT_HOME, home
 from mavlink.process import ArgumentParser, add_common_arguments, begin
 
@@ -13,8 +14,8 @@ def command_line() -> ArgumentParser:
     """Return what reads the command line."""
     parser = ArgumentParser(
         prog="python -m autopilot",
-        description="The autopilot: takes the vehicle's state from a plant and answers with rotor commands, "
-        "over MAVLink/UDP. Start `python -m plant` in another terminal, before or after.",
+        description="The autopilot: takes the vehicle's state, or what its sensors measure, from a plant and answers "
+        "with rotor commands, over MAVLink/UDP. Start `python -m plant` in another terminal, before or after.",
         epilog="Example: python -m autopilot --track spiral",
     )
     add = parser.add_argument
@@ -23,6 +24,13 @@ def command_line() -> ArgumentParser:
     add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
     add("--controller", metavar="NAME", help="control law (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml to control (default: the profile's)")
+    add(
+        "--feedback",
+        type=feedback,
+        default=Feedback.STATE,
+        metavar="state|sensors",
+        help="what to ask the plant for: the true state (default), or what sensors measure",
+    )
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--gcs", action="append", default=[], metavar="URL", help="a ground station: udpout:, udpin:, tcp: or tcpin:")
     add("--home", type=home, default=DEFAULT_HOME, metavar="LAT,LON,ALT,YAW", help="the origin (default %(default)s)")

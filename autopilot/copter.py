@@ -9,7 +9,7 @@ from autopilot.attitude_reference import DEFAULT_LIMITS, AttitudeLimits, Attitud
 from autopilot.behaviour import Behaviour
 from autopilot.companion import Companion
 from autopilot.controller import Clock, Decision, VehicleState
-from autopilot.core import Step
+from autopilot.core import STILL, Step
 from autopilot.course import Course, Scene, Steered
 from autopilot.courses import Along, Climb, Stop, homeward, landing, to_track
 from autopilot.instants import instants
@@ -24,6 +24,7 @@ from autopilot.planner import Planner, plan, start_yaw
 from autopilot.power import PowerMeter
 from autopilot.profile import Profile
 from autopilot.reference import Reference, target_of
+from autopilot.senses import Estimator, Senses
 from autopilot.snapshots import Photographer
 from autopilot.stations import REBOOT, Stations, StationSettings
 from autopilot.sticks import PositionSticks
@@ -32,11 +33,11 @@ from autopilot.tuning import Tuning, builder
 from mavlink.hil import ActuatorCommand, StateFrame
 from mavlink.hub import Outgoing
 from mavlink.parameters import Parameters, Value
+from mavlink.sensors import Frame
 from mavlink.services.statustext import INFO
 from mavlink.setpoints import OffboardSetpoint, Sticks
 from plant.vehicle import Vehicle
 
-_STILL = (0.0, 0.0, 0.0, 0.0)
 _LEADER_LOST_US = 10_000_000
 
 
@@ -77,6 +78,7 @@ class Copter:
         *,
         values: dict[str, Value] | None = None,
         first: Track | None = None,
+        estimator: Estimator | None = None,
     ) -> None:
         """Fly `vehicle` by `profile`; `clock` only measures, it decides nothing.
 
@@ -88,6 +90,7 @@ class Copter:
             values: Of parameters that were changed before.
             first: A track that is flown from time 0 on, the vehicle being in the air; None: it stands, or is picked
                 up in hold.
+            estimator: Makes what turns frames of sensors into states; None: frames are states.
 
         Raises:
             ControllerError: The profile's control law cannot be used.
@@ -106,6 +109,7 @@ class Copter:
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock
         self.frame_interval_us = self._loop.frame_interval_us
+        self._senses = Senses(estimator, self.frame_interval_us)
         self._interval_s = self._loop.control_interval_us * 1e-6
         flies_by = behaviour(self.parameters)
         self._attitude: AttitudeReference | None = None
@@ -118,22 +122,27 @@ class Copter:
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
         self._time_us: int | None = None
-        self._controls = _STILL
+        self._controls = STILL
         self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
         self._step_time_s = 0.0
         self.solve_time_s = 0.0
 
-    def step(self, frame: StateFrame) -> Step:
-        """Answer a frame of the plant.
+    def step(self, frame: Frame) -> Step:
+        """Answer a frame of the plant; on sensors nothing is known, and nobody served, before the first estimate.
 
         Raises:
             DecisionError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
+        known = self._senses.state(frame)
+        if known is None:
+            if self._time_us is not None:  # another flight, of which nothing is known yet
+                self.stations.restart = REBOOT
+            return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
         if self._time_us is None or frame.time_us != self._time_us + self.frame_interval_us:
-            self._begin(frame)
+            self._begin(known)
         self._time_us = frame.time_us
-        state = self._loop.state(frame)
+        state = self._loop.state(known)
         decision = None
         if self._loop.is_due(frame.time_us):
             self._sense(frame.time_us, state)
@@ -167,9 +176,12 @@ class Copter:
             return
         if self._time_us is not None:  # another flight: nothing that any service remembers is of any use
             self.stations.restart = REBOOT
-        loop.begin(self._start_speed if frame.time_us == 0 else hover_speed, self._first_yaw())
+        speed = self._start_speed if frame.time_us == 0 else hover_speed
+        if self._senses.estimate is not None:  # it was at rest
+            speed = loop.vehicle.rotors.idle_speed
+        loop.begin(speed, self._first_yaw())
         self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None)
-        self._controls = _STILL if self.pilot.standing else loop.controls
+        self._controls = STILL if self.pilot.standing else loop.controls
         self.stations.say(INFO, self.stations.banner())
 
     def _first_yaw(self) -> float:
@@ -226,7 +238,7 @@ class Copter:
         elif guidance.attitude is not None:
             decision = loop.decide_attitude(now_us, state, guidance.attitude)
         else:
-            self._controls = _STILL
+            self._controls = STILL
             return None
         self._controls = loop.controls
         self.solve_time_s = decision.diagnostics.solve_time_s

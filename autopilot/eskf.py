@@ -29,7 +29,7 @@ from autopilot.eskf_predict import (
     predict,
 )
 from autopilot.estimate import Reason, Test, Tests
-from autopilot.pressure import METRES_PER_PASCAL, pressure_height_m, pressure_height_slope
+from mavlink.atmosphere import METRES_PER_PASCAL, altitude_m, altitude_slope_m_pa
 from mavlink.frames import Vector
 from mavlink.sensors import GpsFix
 from plant.vehicle import Sensors
@@ -188,8 +188,8 @@ class Filter:
 
     def fuse_pressure(self, pressure_pa: float, time_us: int) -> Reason | None:
         """Fuse a pressure; return why it was rejected, if it was."""
-        height = pressure_height_m(pressure_pa)
-        sigma = self._sensors.barometer.noise_pa * pressure_height_slope(pressure_pa)
+        height = altitude_m(pressure_pa)
+        sigma = self._sensors.barometer.noise_pa * altitude_slope_m_pa(pressure_pa)
         variance = max(-sigma, _LEAST_NOISE) ** 2
         believed = self.pressure.fuse(self, time_us, update.fuse_pressure_height, height, variance)
         return None if believed else Reason.INNOVATION

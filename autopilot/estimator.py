@@ -19,9 +19,9 @@ from autopilot.eskf import Filter
 from autopilot.eskf_predict import SAMPLE, look_ahead
 from autopilot.estimate import Estimate, Health, Reason, Source
 from autopilot.inertial import Inertial, Reading, sample_between
-from autopilot.pressure import pressure_height_m
 from autopilot.sensor_watch import GpsWatch, Rejected, Watch
 from autopilot.strays import LONGEST_GAP_US, Strays
+from mavlink.atmosphere import altitude_m
 from mavlink.frames import Vector
 from mavlink.geodesy import Geodetic, enu_of
 from mavlink.hil import StateFrame
@@ -102,7 +102,7 @@ class Estimator:
         before, self._reading = self._reading, self._inertial.read(frame)
         field, pressure_pa, fix = self._field_of(frame), self._pressure_of(frame), self._fix_of(frame)
         if self._estimate is None or last_us is None:
-            height = None if pressure_pa is None else pressure_height_m(pressure_pa)
+            height = None if pressure_pa is None else altitude_m(pressure_pa)
             aligned = self._alignment.feed(frame.time_us, self._reading, field, height, fix)
             if aligned is None:
                 return None

@@ -9,7 +9,9 @@ from autopilot.controller import Active, ControllerError, DecisionError, Fallbac
 from autopilot.core import Autopilot, Step
 from autopilot.profile import Profile, ProfileError, load_profile
 from autopilot.qp import QpStatus, SolverError
+from autopilot.senses import Estimator, estimator_for
 from autopilot.tracks import TrackError, track
+from mavlink.dialect import RESULT_UNSUPPORTED
 from mavlink.link import LinkError, UdpLink
 from mavlink.lockstep import AutopilotEnd
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Status, Stop, fail, undisturbed
@@ -34,6 +36,12 @@ TRACK = "spiral"
 """What flies where nothing else is said."""
 _SILENCE_SAID_AFTER_S = 2.0
 _WAIT_AT_MOST_S = 0.1
+
+
+def _refusal(result: int) -> str:
+    if result == RESULT_UNSUPPORTED:
+        return "the plant's vehicle has no sensors"
+    return "the plant flies at another frame rate or feedback, and will not change it in mid-flight"
 
 
 class AutopilotLog:
@@ -65,12 +73,18 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     try:
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
-        ground = _ground(args, profile, vehicle, status) if args.gcs else None
-        autopilot = ground.copter if ground else Autopilot(profile, vehicle, track(args.track or TRACK), perf_counter)
+        estimator = estimator_for(args.feedback, vehicle, args.home.origin)
+        ground = _ground(args, profile, vehicle, estimator, status) if args.gcs else None
+        autopilot = ground.copter if ground else _alone(args, profile, vehicle, estimator)
     except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
         fail(str(error))
     log = AutopilotLog(args.out) if args.out else None
-    end = AutopilotEnd(system_id=args.system_id, frame_interval_us=autopilot.frame_interval_us, now_s=perf_counter())
+    end = AutopilotEnd(
+        system_id=args.system_id,
+        frame_interval_us=autopilot.frame_interval_us,
+        now_s=perf_counter(),
+        feedback=args.feedback,
+    )
     try:
         with undisturbed():
             Client(link, end, status, stop, log, ground).fly(autopilot)
@@ -85,11 +99,17 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
 
 
-def _ground(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status) -> "Ground":
+def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None) -> Autopilot:
+    return Autopilot(profile, vehicle, track(args.track or TRACK), perf_counter, estimator=estimator)
+
+
+def _ground(
+    args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None, status: Status
+) -> "Ground":
     """Load what serves ground stations only where there are any: it is as much as all the rest."""
     from autopilot.ground_process import open_ground
 
-    return open_ground(args, profile, vehicle, status)
+    return open_ground(args, profile, vehicle, estimator, status)
 
 
 class Client:
@@ -152,4 +172,4 @@ class Client:
             self._status.say("silence", f"no frame for {_SILENCE_SAID_AFTER_S:.0f} s, waiting for a plant")
         if self._end.refused is not None and not self._refusal_said:
             self._refusal_said = True
-            self._status.say("refused", "the plant flies at another frame rate, and will not change it in mid-flight")
+            self._status.say("refused", _refusal(self._end.refused))

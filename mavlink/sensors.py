@@ -9,10 +9,13 @@ number that a broken sensor sends.
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from math import atan2, degrees, hypot, nan
+from typing import TypeAlias
 
+from mavlink.atmosphere import altitude_m
 from mavlink.dialect import Codec, Message
 from mavlink.frames import Vector, frd_from_flu, ned_from_enu
 from mavlink.geodesy import Geodetic
+from mavlink.hil import StateFrame
 
 
 class Updated(IntFlag):
@@ -39,7 +42,7 @@ class GpsFix:
     """What a GPS receiver tells.
 
     Attributes:
-        time_us: Simulated time at which it is told, µs; it was measured before.
+        time_us: Simulated time from which it is told, µs; it was measured the receiver's delay before, exactly.
         fix_type: How good it is (`FixType`, or any number that a simulator sends).
         place: Position.
         velocity_enu_m_s: Velocity, m/s, ENU.
@@ -88,8 +91,12 @@ class SensorFrame:
         return self.updated & group == group
 
 
-def encode_sensors(codec: Codec, frame: SensorFrame, pressure_altitude_m: float) -> list[bytes]:
-    """Encode a frame as HIL_SENSOR, and HIL_GPS if there is a fix."""
+Frame: TypeAlias = StateFrame | SensorFrame
+"""What a plant tells its autopilot at one instant of simulated time."""
+
+
+def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
+    """Encode a frame as HIL_SENSOR, and HIL_GPS if there is a fix; the pressure altitude is the standard's."""
     messages = [
         codec.encode(
             "HIL_SENSOR",
@@ -99,7 +106,7 @@ def encode_sensors(codec: Codec, frame: SensorFrame, pressure_altitude_m: float)
             *frd_from_flu(frame.magnetic_field_flu_gauss),
             frame.pressure_pa / 100.0,
             0.0,
-            pressure_altitude_m,
+            altitude_m(frame.pressure_pa),
             frame.temperature_c,
             frame.updated,
         )

@@ -3,7 +3,8 @@
 import sys
 from math import inf
 
-from mavlink.process import ArgumentParser, add_common_arguments, begin, positive, speed
+from mavlink.home import DEFAULT_HOME, home
+from mavlink.process import ArgumentParser, add_common_arguments, begin, natural, positive, speed
 from plant.scenario import add_world_arguments
 
 DEFAULT_LINK = "udpin:127.0.0.1:14560"
@@ -12,8 +13,9 @@ DEFAULT_LINK = "udpin:127.0.0.1:14560"
 def _parser() -> ArgumentParser:
     parser = ArgumentParser(
         prog="python -m plant",
-        description="The quadrotor and its world: integrates the nonlinear vehicle, sends its state and takes rotor "
-        "commands over MAVLink/UDP. In lockstep: it waits for each answer, however long that takes. "
+        description="The quadrotor and its world: integrates the nonlinear vehicle, sends its state, or what its "
+        "sensors measure, as the autopilot asks, and takes rotor commands over MAVLink/UDP. In lockstep: it waits for "
+        "each answer, however long that takes. "
         "Start `python -m autopilot` in another terminal, before or after.",
         epilog="Example: python -m plant --duration 100 --out out/flight",
     )
@@ -26,7 +28,9 @@ def _parser() -> ArgumentParser:
         choices=("rk4", "adaptive"),
         help="rk4: fixed steps of 1 ms (default); adaptive: Dormand-Prince to 1e-9",
     )
-    add_world_arguments(parser, start="y=-1,z=2,psi=90,rotors=4740, all else 0")
+    add_world_arguments(parser, start="y=-1,z=2,psi=90,rotors=4740, all else 0; on sensors y=-1,psi=90")
+    add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
+    add("--home", type=home, default=DEFAULT_HOME, metavar="LAT,LON,ALT,YAW", help="the origin (default %(default)s)")
     add("--rate", type=positive, default=250.0, metavar="HZ", help="frames, if the autopilot asks for no other rate")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
+from mavlink.feedback import Feedback, feedback
 from mavlink.home import DEFAULT_HOME, home
 from mavlink.process import EXIT_INTERRUPTED, ArgumentParser, fail, natural, positive, speed, use_one_thread
 from plant.scenario import add_world_arguments
@@ -84,7 +85,8 @@ def _add_fly(parser: ArgumentParser) -> None:
         metavar="N",
         help="times real time, or max (default: max; 1 where a ground station is invited by --gcs)",
     )
-    add("--seed", type=int, default=0, metavar="N", help="seed of everything random (default %(default)s)")
+    add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
+    _add_feedback(add)
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
@@ -136,9 +138,21 @@ def _add_sitl(parser: ArgumentParser) -> None:
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
     add_world_arguments(parser, start="standing at home")
+    _add_feedback(add)
+    add("--seed", type=natural, default=0, metavar="N", help="of everything random; each vehicle adds its number")
     add("--speed", type=speed, default=1.0, metavar="N", help="times real time, or max (default 1)")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def _add_feedback(add: Callable[..., object]) -> None:
+    add(
+        "--feedback",
+        type=feedback,
+        default=Feedback.STATE,
+        metavar="state|sensors",
+        help="what the autopilot flies by: the true state (default), or what sensors measure",
+    )
 
 
 def _add_signing(add: Callable[..., object]) -> None:

@@ -69,7 +69,7 @@ def fly_processes(
 
 
 def _start(package: str, *options: str, stdout: int) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", package, "--json", "--with-parent", *options]
+    command = [sys.executable, "-m", package, "--json", "--parent", str(os.getpid()), *options]
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=stdout)
 
 
@@ -79,8 +79,9 @@ def _plant_options(plan: FlightPlan) -> list[str]:
         *("--vehicle", plan.plant_vehicle_name),
         *("--integrator", plan.integrator),
         *(f"--without={part}" for part in plan.without),
-        *("--wind", str(plan.wind)),
+        *plan.weather.options(),
         *("--start", str(plan.start)),
+        *("--seed", str(plan.seed)),
         *("--duration", repr(plan.duration_s)),
         *("--speed", repr(plan.speed) if isfinite(plan.speed) else "max"),
         *("--out", str(plan.out)),
@@ -93,6 +94,7 @@ def _autopilot_options(plan: FlightPlan) -> list[str]:
         *("--profile", plan.profile_name),
         *("--vehicle", plan.vehicle_name),
         *("--controller", plan.profile.controller),
+        *("--feedback", plan.feedback),
         *(("--solver", plan.solver) if plan.solver else ()),
         *(f"--gcs={url}" for url in plan.ground.links),
         *(("--signing-key", str(plan.ground.signing_key)) if plan.ground.signing_key else ()),

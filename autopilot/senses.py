@@ -1,0 +1,79 @@
+"""What the autopilot knows of its vehicle: the state that it is told, or the one that it estimates from sensors."""
+
+from collections.abc import Callable
+from typing import Protocol, TypeAlias
+
+from mavlink.feedback import Feedback
+from mavlink.geodesy import Geodetic
+from mavlink.hil import StateFrame
+from mavlink.sensors import Frame, SensorFrame
+from plant.vehicle import Vehicle, VehicleError
+
+
+class Estimated(Protocol):
+    """What an estimator makes of the frames so far."""
+
+    @property
+    def frame(self) -> StateFrame:
+        """The state at the last of them."""
+
+
+class Estimating(Protocol):
+    """An estimator of one flight."""
+
+    def step(self, frame: SensorFrame, /) -> Estimated | None:
+        """Take in the next frame; return None until the first estimate, and never after."""
+
+
+Estimator: TypeAlias = Callable[[int], Estimating]
+"""Makes an estimator for frames that are so many µs apart."""
+
+
+def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> Estimator | None:
+    """Return what estimates the state of `vehicle`, whose ENU frame begins at `origin`; None where it is told.
+
+    Raises:
+        VehicleError: Sensors are asked for that the vehicle has not.
+    """
+    if feedback is Feedback.STATE:
+        return None
+    sensors = vehicle.sensors
+    if sensors is None:
+        raise VehicleError(f"{vehicle.name} has no sensors: fly a vehicle with a table sensors, or --feedback state")
+    from autopilot import estimator  # only where there is something to estimate
+
+    gravity_m_s2 = vehicle.gravity_m_s2
+    return lambda interval_us: estimator.Estimator(sensors, gravity_m_s2, origin, interval_us)
+
+
+class Senses:
+    """Turns any frame into a state.
+
+    Attributes:
+        estimate: The last one; None before the first, and where the state is told.
+    """
+
+    def __init__(self, estimator: Estimator | None, interval_us: int) -> None:
+        """Estimate by `estimator` from frames `interval_us` apart; without one there are no frames of sensors.
+
+        What is compiled is loaded here, not at the first frame.
+        """
+        self._interval_us = interval_us
+        self._make = estimator
+        self._estimating = None if estimator is None else estimator(interval_us)
+        self._time_us: int | None = None
+        self.estimate: Estimated | None = None
+
+    def state(self, frame: Frame) -> StateFrame | None:
+        """Return the state at a frame; None until there is an estimate.
+
+        Time that goes back is another flight, of which nothing is known.
+        """
+        if isinstance(frame, StateFrame):
+            return frame
+        assert self._make is not None, "frames of sensors come to who asks for them"
+        if self._estimating is None or (self._time_us is not None and frame.time_us <= self._time_us):
+            self._estimating, self.estimate = self._make(self._interval_us), None
+        self._time_us = frame.time_us
+        self.estimate = self._estimating.step(frame)
+        return None if self.estimate is None else self.estimate.frame
