@@ -27,12 +27,9 @@ class Blending:
 
     def absorb(self, before: list[float], after: list[float], delay_s: float) -> None:
         """Take a correction of position and velocity (6,), made `delay_s` ago."""
-        dvx, dvy, dvz = (b - a for a, b in zip(before[3:6], after[3:6], strict=True))
-        moved = (
-            after[0] - before[0] + delay_s * dvx,
-            after[1] - before[1] + delay_s * dvy,
-            after[2] - before[2] + delay_s * dvz,
-        )
+        (x, y, z, vx, vy, vz), (x1, y1, z1, vx1, vy1, vz1) = before, after
+        dvx, dvy, dvz = vx1 - vx, vy1 - vy, vz1 - vz
+        moved = (x1 - x + delay_s * dvx, y1 - y + delay_s * dvy, z1 - z + delay_s * dvz)
         self.position_m = _less(self.position_m, _beyond(moved, _USUAL_M))
         self.velocity_m_s = _less(self.velocity_m_s, _beyond((dvx, dvy, dvz), _USUAL_M_S))
 

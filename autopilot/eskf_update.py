@@ -61,6 +61,27 @@ def fuse_velocity(x: Array, P: Array, velocity: Array, variance: float, gate: fl
 
 
 @compiled
+def fuse_fix(
+    x: Array, P: Array, fix: Array, after_s: float, variances: Array, gates: Array, y: Array, nis: Array
+) -> None:
+    """Correct by the velocity of a GPS fix, then by its place, then by its height, each if it is believable.
+
+    Args:
+        x: Nominal state, (23,).
+        P: Covariance, (22, 22).
+        fix: Place, m, and velocity, m/s, ENU, (6,).
+        after_s: How long after the state it was measured.
+        variances: Of velocity, place and height, (3,).
+        gates: Of their NIS, (3,).
+        y: Innovations, in the same order: 3, 2 and 1, (6,).
+        nis: Of the three, (3,).
+    """
+    nis[0] = fuse_velocity(x, P, fix[3:], variances[0], gates[0], y[:3])
+    nis[1] = fuse_horizontal(x, P, fix[:3], after_s, variances[1], gates[1], y[3:5])
+    nis[2] = fuse_height(x, P, fix[:3], after_s, variances[2], gates[2], y[5:])
+
+
+@compiled
 def fuse_pressure_height(x: Array, P: Array, height: float, variance: float, gate: float, y: Array) -> float:
     """Correct by a height that a barometer tells, m, up to its offset."""
     H = np.zeros((1, ERRORS))
