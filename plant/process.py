@@ -13,9 +13,11 @@ from plant.dynamics import STATE
 from plant.scenario import IntegrationError, Start
 from plant.sensors import Tell, served_by, tells
 from plant.vehicle import VehicleError, load_vehicle
+from plant.weather import weather_of
 from plant.world import Physics, World, starting_world
 
-TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah")
+WIND_COLUMNS = ("wind_east", "wind_north", "wind_up")
+TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah", *WIND_COLUMNS)
 
 DEFAULT_STARTS = {
     Feedback.STATE: Start(y=-1.0, z=2.0, psi=90.0, rotors=4740.0),
@@ -31,12 +33,13 @@ _CATCH_UP_S = 0.1
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
     """Serve one flight on `link` as the command line says; return the exit code."""
     try:
+        weather = weather_of(args)
         vehicle = load_vehicle(args.vehicle).without(args.without)
         serves = served_by(vehicle)
-        worlds = {it: starting_world(DEFAULT_STARTS[it]._replace(**args.start), vehicle) for it in serves}
+        worlds = {it: starting_world(DEFAULT_STARTS[it]._replace(**args.start), vehicle, weather) for it in serves}
     except VehicleError as error:
         fail(str(error))
-    physics = Physics(vehicle, args.integrator, args.wind.velocity_enu_m_s)
+    physics = Physics(vehicle, args.integrator, weather)
     logs = PlantLogs(args.out) if args.out else None
     end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
     server = Server(link, end, status, stop, logs)
@@ -65,9 +68,9 @@ class PlantLogs:
         self._tlog = TlogWriter(folder / "flight.tlog")
 
     def write_world(self, world: World) -> None:
-        """Append the state, the rotor speeds and the battery; `nan` volts where there is none."""
+        """Append the state, the rotor speeds, the battery (`nan` volts where there is none) and the wind."""
         battery = (world.voltage_v, world.charge_used_ah)
-        self._truth.write((world.time_us / 1e6, *world.state, *world.rotor_speeds, *battery))
+        self._truth.write((world.time_us / 1e6, *world.state, *world.rotor_speeds, *battery, *world.wind_enu_m_s))
 
     def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
         """Append what was received and sent at simulated time `time_us`."""

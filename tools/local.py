@@ -45,8 +45,8 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     estimator = estimator_for(plan.feedback, plan.vehicle, DEFAULT_ORIGIN)
     autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, perf_counter, estimator=estimator)
     integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
-    physics = Physics(plan.plant_vehicle, integrator, plan.wind.velocity_enu_m_s)
-    world = starting_world(plan.start, plan.plant_vehicle)
+    physics = Physics(plan.plant_vehicle, integrator, plan.weather)
+    world = starting_world(plan.start, plan.plant_vehicle, plan.weather)
     interval_us = autopilot.frame_interval_us
     plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out)
     tell = tells(plan.feedback, plan.plant_vehicle, physics, DEFAULT_ORIGIN, seed=plan.seed, interval_us=interval_us)

@@ -4,13 +4,15 @@ import argparse
 from dataclasses import dataclass
 from math import degrees, inf
 from pathlib import Path
+from typing import Any
 
 from autopilot.planner import start_yaw
 from autopilot.profile import Profile, load_profile
 from autopilot.tracks import DURATION_S, Track, track
 from mavlink.feedback import Feedback
-from plant.scenario import NO_WIND, Start, Wind, check_start
+from plant.scenario import Start, check_start
 from plant.vehicle import Vehicle, load_vehicle
+from plant.weather import NO_WIND, Weather, weather_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +44,7 @@ class FlightPlan:
         vehicle_name: Vehicle that the autopilot controls, name or file.
         plant_vehicle_name: Vehicle that the plant flies, name or file.
         without: Parts that the plant's vehicle is flown without.
-        wind: Wind in which the plant flies.
+        weather: In which the plant flies.
         start: How the plant begins.
         integrator: `rk4` or `adaptive`.
         link: `udp`, `memory` or `direct`.
@@ -64,7 +66,7 @@ class FlightPlan:
     vehicle_name: str
     plant_vehicle_name: str
     without: tuple[str, ...]
-    wind: Wind
+    weather: Weather
     start: Start
     integrator: str
     link: str
@@ -111,7 +113,7 @@ class FlightPlan:
             vehicle_name=vehicle_name,
             plant_vehicle_name=plant_vehicle_name,
             without=tuple(args.without),
-            wind=args.wind,
+            weather=weather_of(args),
             start=start,
             integrator=args.integrator or profile.simulation.integrator,
             link=args.link,
@@ -142,7 +144,7 @@ class FlightPlan:
         tells = {"feedback": Feedback.STATE, "seed": 0}
         unset = dict.fromkeys(("solver", "vehicle", "plant_vehicle", "integrator"))
         chosen = {"track": track_name, "profile": profile, "controller": controller, "link": link, "out": out}
-        world = {"wind": NO_WIND, "without": (), "start": {}}
+        world: dict[str, Any] = {"wind": NO_WIND, "gust": (), "turbulence": None, "without": (), "start": {}}
         ground = {"gcs": (), "signing_key": None, "insecure": False}
         return cls.from_arguments(
             argparse.Namespace(**chosen, **unset, **world, **ground, **tells, speed=inf, duration=DURATION_S)

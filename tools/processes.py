@@ -69,7 +69,7 @@ def fly_processes(
 
 
 def _start(package: str, *options: str, stdout: int) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", package, "--json", "--with-parent", *options]
+    command = [sys.executable, "-m", package, "--json", "--parent", str(os.getpid()), *options]
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=stdout)
 
 
@@ -79,7 +79,7 @@ def _plant_options(plan: FlightPlan) -> list[str]:
         *("--vehicle", plan.plant_vehicle_name),
         *("--integrator", plan.integrator),
         *(f"--without={part}" for part in plan.without),
-        *("--wind", str(plan.wind)),
+        *plan.weather.options(),
         *("--start", str(plan.start)),
         *("--seed", str(plan.seed)),
         *("--duration", repr(plan.duration_s)),

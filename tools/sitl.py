@@ -21,6 +21,7 @@ from mavlink.link import LinkError, beyond_loopback, open_link, unsigned_refusal
 from mavlink.process import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
 from plant.scenario import Start
 from plant.vehicle import VehicleError, load_vehicle
+from plant.weather import weather_of
 from tools.sitl_status import StatusLines
 
 PLANT_PORT = 14560
@@ -131,7 +132,7 @@ def _start_plant(member: Member, args: argparse.Namespace) -> None:
         *("--link", _plant_url(args, member.instance)),
         *("--vehicle", vehicle),
         *(f"--without={part}" for part in args.without),
-        *("--wind", str(args.wind)),
+        *weather_of(args).options(),
         *("--start", str(start)),
         *(("--duration", repr(args.duration)) if isfinite(args.duration) else ()),
         *("--speed", repr(args.speed) if isfinite(args.speed) else "max"),
@@ -162,7 +163,7 @@ def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -
 
 def _process(package: str, *options: str) -> subprocess.Popen[bytes]:
     """Start it out of reach of the terminal's Ctrl-C: that is for this process, which ends the others."""
-    command = [sys.executable, "-m", package, "--json", "--with-parent", *options]
+    command = [sys.executable, "-m", package, "--json", "--parent", str(os.getpid()), *options]
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, process_group=0)
 
 

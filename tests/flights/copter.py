@@ -24,9 +24,11 @@ from mavlink.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from mavlink.hil import ActuatorCommand
 from mavlink.parameters import Value
 from mavlink.services.command import NOT_GIVEN
+from plant.air import CALM
 from plant.scenario import Start
 from plant.vehicle import Vehicle, load_vehicle
-from plant.world import CALM, Physics, World, starting_world, state_frame
+from plant.world import Physics, World, starting_world, state_frame
+from tests.plant.flights import blowing
 
 SYSTEM, COMPONENT = 1, 1
 GCS_PORT, SDK_PORT = 14550, 14540
@@ -157,8 +159,9 @@ class CopterFlight:
         self._profile = profile or FLIGHT
         self._believed = load_vehicle(self._profile.simulation.vehicle)
         self._settings = StationSettings(system_id=SYSTEM, identity="px4", origin=origin, files=files)
-        self._physics = Physics(vehicle or self._believed, "rk4", wind_enu_m_s)
-        self.world: World = starting_world(start, self._believed)
+        self._weather = blowing(wind_enu_m_s)
+        self._physics = Physics(vehicle or self._believed, "rk4", self._weather)
+        self.world: World = starting_world(start, self._believed, self._weather)
         self.copter = self._copter(values, first)
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
         self.client = client or Client()
@@ -178,7 +181,7 @@ class CopterFlight:
 
     def put(self, start: Start) -> None:
         """Put the vehicle elsewhere, at this very time."""
-        self.world = replace(starting_world(start, self._believed), time_us=self.world.time_us)
+        self.world = replace(starting_world(start, self._believed, self._weather), time_us=self.world.time_us)
 
     def restart(self) -> None:
         """Start the autopilot anew, wherever the vehicle is."""

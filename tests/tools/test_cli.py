@@ -92,6 +92,19 @@ BAD_INPUT = {
         (plain("spiral"), plain("--wind"), plain("5@400")),
         "argument --wind: the speed must not be negative, the direction 0 to 360 degrees, not 5@400",
     ),
+    "wind file": (
+        (plain("spiral"), plain("--wind"), plain("/none/wind.csv")),
+        "argument --wind: /none/wind.csv: No such file or directory",
+    ),
+    "gust": (
+        (plain("spiral"), plain("--gust"), plain("6@270")),
+        "argument --gust: must be SPEED@FROM:start=S,duration=S, 6@270:start=10,duration=2 say, not 6@270",
+    ),
+    "turbulence": (
+        (plain("spiral"), plain("--turbulence"), plain("terrible")),
+        "argument --turbulence: invalid choice: 'terrible'",
+    ),
+    "seed": ((plain("spiral"), plain("--seed"), plain("-1")), "argument --seed: must not be below zero, not -1"),
     "part": ((plain("spiral"), plain("--without"), plain("gravity")), "argument --without: invalid choice: 'gravity'"),
     "start key": (
         (plain("spiral"), plain("--start"), plain("z=1,roll=3")),
@@ -235,6 +248,15 @@ def test_no_process_outlives_a_parent_that_was_killed(tmp_path: Path) -> None:
     flight.kill()
     flight.communicate()
     wait_for(lambda: not any(alive(child) for child in children), "both processes to end")
+
+
+@pytest.mark.parametrize("package", ["plant", "autopilot"])
+def test_a_process_whose_parent_was_gone_before_it_began_ends(package: str) -> None:
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    link = ("--link", "udpin:127.0.0.1:0") if package == "plant" else ("--plant", "udpout:127.0.0.1:9")
+    command = [sys.executable, "-m", package, "--json", "--parent", str(gone.pid), *link]
+    assert subprocess.run(command, capture_output=True, check=False, timeout=60.0).returncode == 130
 
 
 def alive(process: psutil.Process) -> bool:

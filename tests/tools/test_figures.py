@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from mavlink.feedback import Feedback
-from plant.scenario import NO_WIND
+from plant.weather import NO_WIND
 from tools.figures import (
     Curve,
     Panel,
@@ -54,7 +54,7 @@ def fly(out: Path, duration_s: float) -> Flight:
         "out": out,
     }
     files = {"controller": None, "solver": None, "vehicle": None, "plant_vehicle": None, "integrator": "rk4"}
-    world: dict[str, Any] = {"wind": NO_WIND, "without": (), "start": {}}
+    world: dict[str, Any] = {"wind": NO_WIND, "gust": (), "turbulence": None, "without": (), "start": {}}
     ground: dict[str, Any] = {"gcs": (), "signing_key": None, "insecure": False}
     plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files, **world, **ground))
     fly_locally(plan, lambda _sim_time_s: None)
