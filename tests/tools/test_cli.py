@@ -104,7 +104,6 @@ BAD_INPUT = {
         (plain("spiral"), plain("--turbulence"), plain("terrible")),
         "argument --turbulence: invalid choice: 'terrible'",
     ),
-    "seed": ((plain("spiral"), plain("--seed"), plain("-1")), "argument --seed: must not be below zero, not -1"),
     "part": ((plain("spiral"), plain("--without"), plain("gravity")), "argument --without: invalid choice: 'gravity'"),
     "start key": (
         (plain("spiral"), plain("--start"), plain("z=1,roll=3")),
