@@ -132,6 +132,21 @@ class Health(NamedTuple):
         return flags
 
 
+class Check(NamedTuple):
+    """The filter at its own time, with its covariance, so that anybody can check whether it errs as it says.
+
+    Attributes:
+        time_us: The filter's time, µs.
+        state: Position (m, ENU), velocity (m/s, ENU), attitude (wxyz), 10 numbers.
+        covariance: Of position, velocity, and attitude as a rotation vector in the body frame: the upper triangle, 45
+            numbers, row by row.
+    """
+
+    time_us: int
+    state: tuple[float, ...]
+    covariance: tuple[float, ...]
+
+
 class Estimate(NamedTuple):
     """The vehicle at one instant.
 
@@ -147,6 +162,7 @@ class Estimate(NamedTuple):
         rejected: How many values were rejected since the start, by sensor and reason.
         resets: How often position, velocity or a reference was taken anew, because measurements had long said so.
         blending_m: Part of the published position that is still to move to the filter's, east, north, up.
+        check: The filter with its covariance, ten times a second; None between.
     """
 
     frame: StateFrame
@@ -160,3 +176,4 @@ class Estimate(NamedTuple):
     rejected: Rejections
     resets: int
     blending_m: Vector
+    check: Check | None

@@ -17,7 +17,7 @@ from autopilot.alignment import Aligned, Alignment
 from autopilot.blending import Blending
 from autopilot.eskf import Filter
 from autopilot.eskf_predict import SAMPLE, look_ahead
-from autopilot.estimate import Estimate, Health, Reason, Source
+from autopilot.estimate import Check, Estimate, Health, Reason, Source
 from autopilot.inertial import Inertial, Reading, sample_between
 from autopilot.sensor_watch import GpsWatch, Rejected, Watch
 from autopilot.strays import LONGEST_GAP_US, Strays
@@ -46,6 +46,8 @@ _KNOWN_M_S = 1.0
 _KNOWN_M = 5.0
 _FASTEST_M_S = 500.0
 _TYPICAL_PA = 95e3
+_CHECK_EVERY_US = 100_000
+_UPPER = np.triu_indices(9)
 _NOTHING = Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
 
@@ -231,8 +233,15 @@ class Estimator:
             self._rejected.counts,
             filter_.resets,
             (-de, -dn, -du),
+            self._check(now_us),
         )
         return self._estimate
+
+    def _check(self, now_us: int) -> Check | None:
+        if now_us // _CHECK_EVERY_US == (now_us - self._interval_us) // _CHECK_EVERY_US:
+            return None
+        upper = self.filter.P[:9, :9][_UPPER]
+        return Check(self.filter_us, tuple(self.filter.x[:10].tolist()), tuple(upper.tolist()))
 
     def _health(self, now_us: int, sigma: list[float]) -> Health:
         filter_, reading = self.filter, self._reading

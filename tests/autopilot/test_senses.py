@@ -1,11 +1,11 @@
 """Where frames of sensors become states: when a flight begins, and when it begins anew."""
 
-from typing import NamedTuple
-
 import pytest
 
+from autopilot import estimate
 from autopilot.copter import Copter
 from autopilot.core import Autopilot
+from autopilot.estimate import Estimate, Health
 from autopilot.profile import load_profile
 from autopilot.senses import Senses, estimator_for
 from autopilot.stations import StationSettings
@@ -23,8 +23,12 @@ ALIGNED_US = 10 * FRAME_US
 ZERO = (0.0, 0.0, 0.0)
 
 
-class Estimate(NamedTuple):
-    frame: StateFrame
+UNTESTED = estimate.Test(-1, (), 0.0, 1.0)
+WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True)
+
+
+def known(frame: StateFrame) -> Estimate:
+    return Estimate(frame, ZERO, ZERO, ZERO, ZERO, ZERO, WELL, estimate.Tests(*[UNTESTED] * 5), {}, 0, ZERO, None)
 
 
 class Standing:
@@ -42,7 +46,7 @@ class Standing:
             self._began_us = frame.time_us
         if frame.time_us < self._began_us + ALIGNED_US:
             return None
-        return Estimate(StateFrame(frame.time_us, (0.0, -1.0, 0.0), ZERO, quaternion_from_euler(0.0, 0.0, 1.57), ZERO))
+        return known(StateFrame(frame.time_us, (0.0, -1.0, 0.0), ZERO, quaternion_from_euler(0.0, 0.0, 1.57), ZERO))
 
 
 def sensors(time_us: int) -> SensorFrame:
