@@ -26,7 +26,7 @@ def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
     estimated = not all(np.isnan(flown.values[2]) for flown in flights)
     panels = _PANELS if estimated else _PANELS[:1]
     rows = len(panels) + estimated
-    figure, grid = axes_grid(rows, 1, TOP_IN + 0.24 * (rows - 1), row_in=0.35 + 0.42 * len(cases))
+    figure, grid = axes_grid(rows, 1, TOP_IN + 0.24, row_in=0.35 + 0.42 * len(cases), share=False)
     figure.subplots_adjust(left=0.2, hspace=0.55)
     several = len({contender for contender, _ in cases}) > 1
     names = [shortened(f"{track}, {contender}" if several else track) for contender, track in cases]
