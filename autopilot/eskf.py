@@ -40,6 +40,7 @@ FIVE_SIGMA = (25.0, 28.74, 31.81)
 """χ² of one, two and three degrees of freedom that is exceeded as rarely as five standard deviations are."""
 
 _FIRST_POSITION_M, _FIRST_VELOCITY_M_S, _FIRST_ATTITUDE_RAD, _FIRST_OFFSET_M = 100.0, 0.02, 0.5, 1000.0
+_ITERATIONS = 4
 _LEAST_NOISE = 1e-6
 """Of anything, in its own unit: a perfect sensor would leave nothing to divide by."""
 _PLACE_STEP_M, _HEIGHT_STEP_M, _SPEED_STEP_M_S = 0.011, 0.001, 0.01
@@ -128,24 +129,18 @@ class Filter:
         self._kinds = (self.velocity, self.position, self.height, self.pressure, self.field)
 
     def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
-        """Begin at rest: each mean is fused as a measurement, so that the covariance knows what it took from where."""
-        sensors, x, P = self._sensors, self.x, self.P
-        gyro, accel = sensors.gyroscope, sensors.accelerometer
-        x[:], P[:] = 0.0, 0.0
-        x[:3], x[6:10] = place_enu_m, aligned.attitude
-        for first, count, sigma in (
-            (POSITION, 3, _FIRST_POSITION_M),
-            (VELOCITY, 3, _FIRST_VELOCITY_M_S),
-            (ATTITUDE, 3, _FIRST_ATTITUDE_RAD),
-            (GYRO_BIAS, 3, max(gyro.turn_on_bias_rad_s, _LEAST_NOISE)),
-            (ACCEL_BIAS, 3, max(accel.turn_on_bias_m_s2, _LEAST_NOISE)),
-            (BARO_OFFSET, 1, _FIRST_OFFSET_M),
-            (HARD_IRON, 3, max(sensors.magnetometer.hard_iron_gauss, _LEAST_NOISE)),
-        ):
-            update.doubt(P, first, count, sigma * sigma)
-        for i, variance in enumerate(self._noise.gps_drift):
-            P[GPS_DRIFT + i, GPS_DRIFT + i] = variance
-        self._rest(aligned)
+        """Begin at rest: each mean is fused as a measurement, so that the covariance knows what it took from where.
+
+        The attitude is found by iteration. A tilt seen by the accelerometer may be its bias, and the magnetic field
+        knows better: a covariance linearised where the first guess was would later be taken for knowledge.
+        """
+        x, P = self.x, self.P
+        attitude = aligned.attitude
+        for _ in range(_ITERATIONS):
+            self._know_nothing(place_enu_m)
+            x[6:10] = attitude
+            self._rest(aligned)
+            attitude = tuple(x[6:10].tolist())
         for kind in self._kinds:
             kind.accept(time_us)
         y1, y2, y3 = np.zeros(1), np.zeros(2), np.zeros(3)
@@ -155,16 +150,36 @@ class Filter:
         update.fuse_velocity(x, P, np.array(aligned.fix.velocity_enu_m_s), self._speed, inf, y3)
         if aligned.pressure_height_m is not None:
             x[19] = aligned.pressure_height_m - x[2]
-            variance = max(sensors.barometer.noise_pa * METRES_PER_PASCAL, _LEAST_NOISE) ** 2 / aligned.heights
+            sigma = self._sensors.barometer.noise_pa * METRES_PER_PASCAL
+            variance = max(sigma, _LEAST_NOISE) ** 2 / aligned.heights
             update.fuse_pressure_height(x, P, aligned.pressure_height_m, variance, inf, y1)
 
+    def _know_nothing(self, place_enu_m: Vector) -> None:
+        """Know of a vehicle at a place what can be known before anything is measured."""
+        sensors, P = self._sensors, self.P
+        self.x[:], P[:] = 0.0, 0.0
+        self.x[:3] = place_enu_m
+        for first, count, sigma in (
+            (POSITION, 3, _FIRST_POSITION_M),
+            (VELOCITY, 3, _FIRST_VELOCITY_M_S),
+            (ATTITUDE, 3, _FIRST_ATTITUDE_RAD),
+            (GYRO_BIAS, 3, max(sensors.gyroscope.turn_on_bias_rad_s, _LEAST_NOISE)),
+            (ACCEL_BIAS, 3, max(sensors.accelerometer.turn_on_bias_m_s2, _LEAST_NOISE)),
+            (BARO_OFFSET, 1, _FIRST_OFFSET_M),
+            (HARD_IRON, 3, max(sensors.magnetometer.hard_iron_gauss, _LEAST_NOISE)),
+        ):
+            update.doubt(P, first, count, sigma * sigma)
+        for i, variance in enumerate(self._noise.gps_drift):
+            P[GPS_DRIFT + i, GPS_DRIFT + i] = variance
+
     def _rest(self, aligned: Aligned) -> None:
+        """Fuse the means of specific force, field and rate."""
         x, P, sensors = self.x, self.P, self._sensors
-        y = np.zeros(3)
         force = max(sensors.accelerometer.noise_density_m_s2_rthz, _LEAST_NOISE) ** 2 / aligned.duration_s
         rate = max(sensors.gyroscope.noise_density_rad_s_rthz, _LEAST_NOISE) ** 2 / aligned.duration_s
-        update.fuse_rest(x, P, np.array(aligned.force), self._gravity, force, inf, y)
-        update.fuse_field(x, P, np.array(aligned.field), self._field, self._field_variance / aligned.fields, inf, y)
+        field, y = self._field_variance / aligned.fields, np.zeros(6)
+        mean_force, mean_field = np.array(aligned.force), np.array(aligned.field)
+        update.fuse_rest(x, P, mean_force, self._gravity, force, mean_field, self._field, field, y)
         for i in range(3):
             variance = P[GYRO_BIAS + i, GYRO_BIAS + i]
             gain = variance / (variance + rate)
