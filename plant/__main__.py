@@ -7,7 +7,7 @@ from mavlink.home import DEFAULT_HOME, home
 from mavlink.process import ArgumentParser, add_common_arguments, begin, natural, positive, speed
 from plant.scenario import add_world_arguments
 
-DEFAULT_LINK = "udpin:127.0.0.1:14560"
+DEFAULT_LINKS = {"colibri": "udpin:127.0.0.1:14560", "ardupilot-json": "udpin:127.0.0.1:9002"}
 
 
 def _parser() -> ArgumentParser:
@@ -20,7 +20,15 @@ def _parser() -> ArgumentParser:
         epilog="Example: python -m plant --duration 100 --out out/flight",
     )
     add = parser.add_argument
-    add("--link", default=DEFAULT_LINK, metavar="URL", help="where to wait for the autopilot (default %(default)s)")
+    add(
+        "--serve",
+        default="colibri",
+        choices=DEFAULT_LINKS,
+        help="colibri: python -m autopilot (default); ardupilot-json: ArduPilot's SITL, started with --model JSON, "
+        "which sets rate and speed itself",
+    )
+    links = ", ".join(f"{url} for {whom}" for whom, url in DEFAULT_LINKS.items())
+    add("--link", metavar="URL", help=f"where to wait for the autopilot (default {links})")
     add("--vehicle", default="hummingbird", metavar="NAME", help="vehicle name or .toml (default %(default)s)")
     add(
         "--integrator",
@@ -41,9 +49,12 @@ def _parser() -> ArgumentParser:
 def main() -> int:
     """Run the plant; return the exit code."""
     args = _parser().parse_args()
-    link, status, stop = begin("plant", args.link, args)
+    link, status, stop = begin("plant", args.link or DEFAULT_LINKS[args.serve], args)
     status.say("listening", f"waiting for an autopilot on {link.url}", url=link.url)
-    from plant.process import run
+    if args.serve == "ardupilot-json":
+        from plant.ardupilot_process import run
+    else:
+        from plant.process import run
 
     return run(args, link, status, stop)
 
