@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from mavlink.feedback import Feedback
+from mavlink.feedback import Feedback, feedback
 from mavlink.home import DEFAULT_HOME, home
 from mavlink.process import ArgumentParser, add_common_arguments, begin
 
@@ -26,9 +26,9 @@ def command_line() -> ArgumentParser:
     add("--vehicle", metavar="NAME", help="vehicle name or .toml to control (default: the profile's)")
     add(
         "--feedback",
-        type=Feedback,
+        type=feedback,
         default=Feedback.STATE,
-        choices=list(Feedback),
+        metavar="state|sensors",
         help="what to ask the plant for: the true state (default), or what sensors measure",
     )
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")

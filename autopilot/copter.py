@@ -151,7 +151,7 @@ class Copter:
             self._sample = (frame.time_us, state, guidance, decision)
         command = ActuatorCommand(frame.time_us, self._controls, armed=self.pilot.state.armed)
         self._step_time_s = self._clock() - started_s
-        return Step(command, decision, self._step_time_s)
+        return Step(command, decision, self._step_time_s, self._senses.estimate)
 
     def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
         """Hear ground stations, and return what to send them; after each `step`, while the plant integrates."""

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from autopilot.controller import Clock, Decision
+from autopilot.estimate import Estimate
 from autopilot.loop import ControlLoop
 from autopilot.planner import plan
 from autopilot.profile import Profile
@@ -19,12 +20,14 @@ STILL = (0.0, 0.0, 0.0, 0.0)
 class Step(NamedTuple):
     """The answer to a frame: the command to send, the decision behind it, and how long it took.
 
-    Between two control samples the last command is sent again, and there is no decision.
+    Between two control samples the last command is sent again, and there is no decision. Where the state is told, there
+    is no estimate.
     """
 
     command: ActuatorCommand
     decision: Decision | None
     duration_s: float
+    estimate: Estimate | None = None
 
 
 class Autopilot:
@@ -82,7 +85,7 @@ class Autopilot:
         if self._loop.is_due(frame.time_us):
             decision = self._loop.decide(frame.time_us, state, self._planner.horizon(frame.time_us))
         command = ActuatorCommand(frame.time_us, self._loop.controls, armed=True)
-        return Step(command, decision, self._clock() - started_s)
+        return Step(command, decision, self._clock() - started_s, self._senses.estimate)
 
     def _begin(self, frame: Frame) -> None:
         vehicle = self._loop.vehicle

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 from autopilot.controller import Active, ControllerError, DecisionError, Fallback
 from autopilot.core import Autopilot, Step
+from autopilot.estimate import Estimate
 from autopilot.profile import Profile, ProfileError, load_profile
 from autopilot.qp import QpStatus, SolverError
 from autopilot.senses import Estimator, estimator_for
 from autopilot.tracks import TrackError, track
 from mavlink.dialect import RESULT_UNSUPPORTED
+from mavlink.feedback import Feedback
 from mavlink.link import LinkError, UdpLink
 from mavlink.lockstep import AutopilotEnd
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Status, Stop, fail, undisturbed
@@ -25,6 +27,17 @@ DECISION_COLUMNS = (
     *("t", "phi_ref", "theta_ref", "psi_ref"),
     *("qp_status", "fallback", "solve_time_us", "control_step_us", "cost", "slack"),
     *(f"active_{kind}" for kind in Active._fields),
+)
+
+ESTIMATE_COLUMNS = (
+    *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r"),
+    *(f"sd_{name}" for name in ("x", "y", "z", "vx", "vy", "vz", "east", "north", "up")),
+    *("gyro_bias_x", "gyro_bias_y", "gyro_bias_z", "accel_bias_x", "accel_bias_y", "accel_bias_z"),
+    *("flags", "rejected", "resets"),
+)
+CHECK_COLUMNS = (
+    *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz"),
+    *(f"P{row}{column}" for row in range(9) for column in range(row, 9)),
 )
 
 STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, status in enumerate(QpStatus)}
@@ -45,16 +58,25 @@ def _refusal(result: int) -> str:
 
 
 class AutopilotLog:
-    """What the autopilot writes: one row a control sample."""
+    """What the autopilot writes: one row a control sample, and what it estimates then."""
 
-    def __init__(self, folder: Path) -> None:
-        """Create `autopilot.csv` in `folder`."""
+    def __init__(self, folder: Path, feedback: Feedback) -> None:
+        """Create `autopilot.csv` in `folder`; on sensors also `estimate.csv` and `filter.csv`."""
         self._decisions = CsvLog(folder / "autopilot.csv", DECISION_COLUMNS)
+        self._estimates = self._checks = None
+        if feedback is Feedback.SENSORS:
+            self._estimates = CsvLog(folder / "estimate.csv", ESTIMATE_COLUMNS)
+            self._checks = CsvLog(folder / "filter.csv", CHECK_COLUMNS)
 
     def write(self, step: Step) -> None:
-        """Append a control sample; a frame between two of them has nothing to tell."""
+        """Append a control sample; a frame between two of them has nothing to tell but how the filter stands."""
+        if self._checks is not None and step.estimate is not None and step.estimate.check is not None:
+            check = step.estimate.check
+            self._checks.write((check.time_us / 1e6, *check.state, *check.covariance))
         if step.decision is None:
             return
+        if self._estimates is not None and step.estimate is not None:
+            self._write_estimate(self._estimates, step.estimate)
         how = step.decision.diagnostics
         codes = (STATUS_CODES[how.qp_status], FALLBACK_CODES[how.fallback])
         times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
@@ -64,8 +86,18 @@ class AutopilotLog:
         )
 
     def close(self) -> None:
-        """Close the file."""
-        self._decisions.close()
+        """Close the files."""
+        for log in (self._decisions, self._estimates, self._checks):
+            if log is not None:
+                log.close()
+
+    def _write_estimate(self, log: CsvLog, estimate: Estimate) -> None:
+        frame = estimate.frame
+        state = (*frame.position_enu_m, *frame.velocity_enu_m_s, *frame.attitude, *frame.rate_flu_rad_s)
+        deviations = (*estimate.position_std_m, *estimate.velocity_std_m_s, *estimate.attitude_std_rad)
+        biases = (*estimate.gyro_bias_rad_s, *estimate.accel_bias_m_s2)
+        counts = (int(estimate.health.flags), sum(estimate.rejected.values()), estimate.resets)
+        log.write((frame.time_us / 1e6, *state, *deviations, *biases, *counts))
 
 
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
@@ -78,7 +110,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         autopilot = ground.copter if ground else _alone(args, profile, vehicle, estimator)
     except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
         fail(str(error))
-    log = AutopilotLog(args.out) if args.out else None
+    log = AutopilotLog(args.out, args.feedback) if args.out else None
     end = AutopilotEnd(
         system_id=args.system_id,
         frame_interval_us=autopilot.frame_interval_us,

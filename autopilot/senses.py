@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol, TypeAlias
 
+from autopilot.estimate import Estimate
 from mavlink.feedback import Feedback
 from mavlink.geodesy import Geodetic
 from mavlink.hil import StateFrame
@@ -10,18 +11,10 @@ from mavlink.sensors import Frame, SensorFrame
 from plant.vehicle import Vehicle, VehicleError
 
 
-class Estimated(Protocol):
-    """What an estimator makes of the frames so far."""
-
-    @property
-    def frame(self) -> StateFrame:
-        """The state at the last of them."""
-
-
 class Estimating(Protocol):
     """An estimator of one flight."""
 
-    def step(self, frame: SensorFrame, /) -> Estimated | None:
+    def step(self, frame: SensorFrame, /) -> Estimate | None:
         """Take in the next frame; return None until the first estimate, and never after."""
 
 
@@ -40,7 +33,7 @@ def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> Est
     sensors = vehicle.sensors
     if sensors is None:
         raise VehicleError(f"{vehicle.name} has no sensors: fly a vehicle with a table sensors, or --feedback state")
-    from autopilot import estimator  # type: ignore[attr-defined] # only where there is something to estimate
+    from autopilot import estimator  # only where there is something to estimate
 
     gravity_m_s2 = vehicle.gravity_m_s2
     return lambda interval_us: estimator.Estimator(sensors, gravity_m_s2, origin, interval_us)
@@ -62,7 +55,7 @@ class Senses:
         self._make = estimator
         self._estimating = None if estimator is None else estimator(interval_us)
         self._time_us: int | None = None
-        self.estimate: Estimated | None = None
+        self.estimate: Estimate | None = None
 
     def state(self, frame: Frame) -> StateFrame | None:
         """Return the state at a frame; None until there is an estimate.

@@ -110,14 +110,15 @@ def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
 class Stop:
     """Becomes true when the process shall end: SIGINT, SIGTERM, or (if asked for) the death of its parent."""
 
-    def __init__(self, *, with_parent: bool = False, starting: bool = False) -> None:
+    def __init__(self, *, parent: int | None = None, starting: bool = False) -> None:
         """Take over SIGINT and SIGTERM; `starting`: until first asked they end the process at once.
 
-        What is still loading has nothing to put in order, and may load for seconds before it asks.
+        What is still loading has nothing to put in order, and may load for seconds before it asks. The parent says who
+        it is: it may have died before this process could ask.
         """
         self._signalled = False
         self._starting = starting
-        self._parent = os.getppid() if with_parent else None
+        self._parent = parent
         signal.signal(signal.SIGINT, self._handle)
         signal.signal(signal.SIGTERM, self._handle)
 
@@ -156,13 +157,13 @@ def add_common_arguments(parser: ArgumentParser, log: str) -> None:
     add("--system-id", type=system_id, default=1, metavar="ID", help="MAVLink system (default 1)")
     add("--out", type=Path, metavar="DIR", help=f"write {log} there")
     add("--json", action="store_true", help="status as JSON lines on standard output")
-    add("--with-parent", action="store_true", help="end when the process that started this one ends")
+    add("--parent", type=natural, metavar="PID", help="end when that process, which started this one, ends")
 
 
 def begin(name: str, url: str, args: argparse.Namespace) -> tuple[UdpLink, Status, Stop]:
     """Open the link at `url` and take over signals, or end with one line. To be called before numpy is loaded."""
     use_one_thread()
-    stop = Stop(with_parent=args.with_parent, starting=True)
+    stop = Stop(parent=args.parent, starting=True)
     try:
         link = open_link(url)
     except LinkError as error:

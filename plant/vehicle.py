@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.sensor_parts import Sensors
+from plant.sensor_parts import Sensors as Sensors
 
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]

@@ -1,6 +1,7 @@
 """Flights for tests: one command line in, report and rows out."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -73,7 +74,7 @@ class Process:
         self._said = folder / f"{package}-{len(list(folder.iterdir()))}.jsonl"
         self._errors = self._said.with_suffix(".err")
         with self._said.open("wb") as said, self._errors.open("wb") as errors:
-            command = [sys.executable, "-m", package, "--json", "--with-parent", *options]
+            command = [sys.executable, "-m", package, "--json", "--parent", str(os.getpid()), *options]
             self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=said, stderr=errors)
 
     def events(self, name: str) -> list[dict[str, Any]]:

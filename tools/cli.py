@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
-from mavlink.feedback import Feedback
+from mavlink.feedback import Feedback, feedback
 from mavlink.home import DEFAULT_HOME, home
 from mavlink.process import EXIT_INTERRUPTED, ArgumentParser, fail, natural, positive, speed, use_one_thread
 from plant.scenario import add_world_arguments
@@ -148,9 +148,9 @@ def _add_sitl(parser: ArgumentParser) -> None:
 def _add_feedback(add: Callable[..., object]) -> None:
     add(
         "--feedback",
-        type=Feedback,
+        type=feedback,
         default=Feedback.STATE,
-        choices=list(Feedback),
+        metavar="state|sensors",
         help="what the autopilot flies by: the true state (default), or what sensors measure",
     )
 

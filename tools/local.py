@@ -48,7 +48,7 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     physics = Physics(plan.plant_vehicle, integrator, plan.weather)
     world = starting_world(plan.start, plan.plant_vehicle, plan.weather)
     interval_us = autopilot.frame_interval_us
-    plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out)
+    plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out, plan.feedback)
     tell = tells(plan.feedback, plan.plant_vehicle, physics, DEFAULT_ORIGIN, seed=plan.seed, interval_us=interval_us)
     exchange: Exchange = Direct(autopilot, tell)
     if plan.link == "memory":

@@ -69,7 +69,7 @@ def fly_processes(
 
 
 def _start(package: str, *options: str, stdout: int) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", package, "--json", "--with-parent", *options]
+    command = [sys.executable, "-m", package, "--json", "--parent", str(os.getpid()), *options]
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=stdout)
 
 

@@ -163,7 +163,7 @@ def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -
 
 def _process(package: str, *options: str) -> subprocess.Popen[bytes]:
     """Start it out of reach of the terminal's Ctrl-C: that is for this process, which ends the others."""
-    command = [sys.executable, "-m", package, "--json", "--with-parent", *options]
+    command = [sys.executable, "-m", package, "--json", "--parent", str(os.getpid()), *options]
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, process_group=0)
 
 

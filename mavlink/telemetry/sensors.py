@@ -1,7 +1,6 @@
 """Messages of the sensors, of which there are none while the state itself is fed back: what they would measure."""
 
-from math import exp, log
-
+from mavlink.atmosphere import pressure_pa, temperature_c
 from mavlink.dialect import mav
 from mavlink.frames import Vector, frd_from_flu
 from mavlink.services.service import Fields
@@ -11,13 +10,6 @@ from mavlink.telemetry.wire import MILLI_G, Constants, boot_ms, in_body_frd, tim
 EARTH_FIELD_NED_GAUSS: Vector = (0.2152, 0.0124, 0.4312)
 """The earth's field at Zurich: 0.482 gauss, dipping 63.4° below the horizon, 3.3° east of true north. Taken everywhere:
 nothing in here steers by it."""
-
-# The international standard atmosphere, below 11 km (ISO 2533).
-SEA_PRESSURE_HPA = 1013.25
-SEA_TEMPERATURE_K = 288.15
-LAPSE_K_M = 0.0065
-PRESSURE_EXPONENT = 5.2559
-ZERO_CELSIUS_K = 273.15
 
 UPDATED: int = (
     mav.HIGHRES_IMU_UPDATED_XACC
@@ -81,13 +73,7 @@ def altitude_amsl_m(s: Snapshot) -> float:
 
 def pressure_hpa(altitude_m: float) -> float:
     """Pressure of the standard atmosphere."""
-    ratio = 1.0 - LAPSE_K_M * altitude_m / SEA_TEMPERATURE_K
-    return SEA_PRESSURE_HPA * exp(PRESSURE_EXPONENT * log(ratio))
-
-
-def temperature_c(altitude_m: float) -> float:
-    """Temperature of the standard atmosphere."""
-    return SEA_TEMPERATURE_K - LAPSE_K_M * altitude_m - ZERO_CELSIUS_K
+    return pressure_pa(altitude_m) / 100.0
 
 
 def _thousandths(s: Snapshot, c: Constants) -> tuple[float, ...]:

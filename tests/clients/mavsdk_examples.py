@@ -79,7 +79,7 @@ def table(results: Sequence[Result]) -> str:
 
 
 def _shows(example: Example) -> str:
-    return (example.judge.__doc__ or "").strip().rstrip(".")
+    return (example.judge.__doc__ or "").partition("\n")[0].strip().rstrip(".")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -105,7 +105,7 @@ def _run(example: Example, folder: Path, python: Path) -> Result:
                     before = next(other for other in EXAMPLES if other.name == example.after)
                     _judge(before, folder, python, room / "before", flown)
                 _judge(example, folder, python, room / "client", flown)
-        except (AssertionError, ArithmeticError, LookupError, ValueError) as failure:
+        except (AssertionError, ArithmeticError, LookupError, OSError, ValueError) as failure:
             where = extract_tb(failure.__traceback__)[-1]
             return Result(example, f"{where.name}: {where.line}\n{failure}", monotonic() - began_s)
     return Result(example, "", monotonic() - began_s)

@@ -42,6 +42,19 @@ BAD_INPUT = {
     "vehicle": ((plain("spiral"), plain("--vehicle"), plain("dragonfly")), "unknown vehicle dragonfly: choose"),
     "solver": ((plain("spiral"), plain("--solver"), plain("simplex")), "unknown solver simplex: installed are"),
     "extra": ((plain("spiral"), plain("--solver"), plain("gurobi")), "gurobi is not installed: pip install"),
+    "feedback": (
+        (plain("spiral"), plain("--feedback"), plain("hope")),
+        "argument --feedback: must be state or sensors",
+    ),
+    "no sensors": (
+        (plain("spiral"), plain("--feedback"), plain("sensors"), plain("--vehicle"), plain("hummingbird-thesis")),
+        "--feedback sensors: vehicle hummingbird-thesis has no table sensors",
+    ),
+    "no ground to stand on": (
+        (plain("spiral"), plain("--feedback"), plain("sensors"), plain("--without"), plain("ground")),
+        "--feedback sensors: vehicle hummingbird has no ground to stand on",
+    ),
+    "seed": ((plain("spiral"), plain("--seed"), plain("-1")), "argument --seed: must not be below zero, not -1"),
     "missing key": (
         (plain("spiral"), plain("--vehicle"), edited(VEHICLE, "mass_kg = 0.698", "")),
         "hummingbird.toml: body: Object missing required field `mass_kg`",
@@ -91,7 +104,6 @@ BAD_INPUT = {
         (plain("spiral"), plain("--turbulence"), plain("terrible")),
         "argument --turbulence: invalid choice: 'terrible'",
     ),
-    "seed": ((plain("spiral"), plain("--seed"), plain("-1")), "argument --seed: must not be below zero, not -1"),
     "part": ((plain("spiral"), plain("--without"), plain("gravity")), "argument --without: invalid choice: 'gravity'"),
     "start key": (
         (plain("spiral"), plain("--start"), plain("z=1,roll=3")),
@@ -235,6 +247,15 @@ def test_no_process_outlives_a_parent_that_was_killed(tmp_path: Path) -> None:
     flight.kill()
     flight.communicate()
     wait_for(lambda: not any(alive(child) for child in children), "both processes to end")
+
+
+@pytest.mark.parametrize("package", ["plant", "autopilot"])
+def test_a_process_whose_parent_was_gone_before_it_began_ends(package: str) -> None:
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    link = ("--link", "udpin:127.0.0.1:0") if package == "plant" else ("--plant", "udpout:127.0.0.1:9")
+    command = [sys.executable, "-m", package, "--json", "--parent", str(gone.pid), *link]
+    assert subprocess.run(command, capture_output=True, check=False, timeout=60.0).returncode == 130
 
 
 def alive(process: psutil.Process) -> bool:
