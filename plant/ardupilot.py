@@ -6,7 +6,8 @@ silence it sends the same frame_count again. Source: ArduPilot, libraries/SITL/e
 - Each request advances the world by 1/frame_rate; its remainders in µs are carried, so that time keeps step with it.
 - A frame_count that comes again gets the remembered reply.
 - One that is smaller than the last is an ArduPilot that was started again: so is the world, at time 0.
-- A pulse of 1000 to 2000 µs is a rotor's speed from none to its top speed. Thrust is its square: MOT_THST_EXPO 1.
+- A pulse of 1000 to 2000 µs is a rotor's speed from none to its top speed, or its thrust, as the vehicle file has it.
+  Thrust is the square of the speed: MOT_THST_EXPO is then 1, otherwise 0.
 """
 
 from collections import Counter
@@ -18,6 +19,7 @@ import msgspec
 from mavlink.frames import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 from mavlink.hil import ActuatorCommand
 from plant.rotor_order import Numbering
+from plant.vehicle import Rotors
 from plant.world import Physics, World, state_frame
 
 Address: TypeAlias = tuple[str, int]
@@ -44,11 +46,12 @@ class ArduPilotEnd:
         dropped: What was received and not obeyed, by reason.
     """
 
-    def __init__(self, physics: Physics, start: World, motors: Numbering) -> None:
-        """Let `physics` go on from `start`; `motors` says which rotor is ArduPilot's first."""
+    def __init__(self, physics: Physics, start: World, motors: Numbering, rotors: Rotors) -> None:
+        """Let `physics` go on from `start`; `motors` says which of the `rotors` is ArduPilot's first."""
         self._physics = physics
         self._start = start
         self._motors = motors
+        self._rotors = rotors
         self.world = start
         self.peer: Address | None = None
         self.steps = 0
@@ -96,7 +99,8 @@ class ArduPilotEnd:
         duration_us, self._carried = divmod(_SECOND_US + self._carried, rate_hz)
         a, b, c, d = (min(max((pulse - _LEAST_PULSE_US) / _PULSE_RANGE_US, 0.0), 1.0) for pulse in pulses_us)
         turning = any((a, b, c, d))  # disarmed, ArduPilot sends the least pulse or none
-        command = ActuatorCommand(self.world.time_us, self._motors.to_vehicle((a, b, c, d)), turning)
+        speeds = self._rotors.speeds_of(self._motors.to_vehicle((a, b, c, d)))
+        command = ActuatorCommand(self.world.time_us, speeds, turning)
         self.world = self._physics.step(self.world, command, duration_us)
         self.steps += 1
 

@@ -27,9 +27,10 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     except VehicleError as error:
         fail(str(error))
     frame_type = motors.ardupilot_frame_type
-    text = f"{vehicle.name} is FRAME_CLASS 1, FRAME_TYPE {frame_type}, and its thrust is that of MOT_THST_EXPO 1"
-    status.say("frame", text, frame_class=1, frame_type=frame_type)
-    end = ArduPilotEnd(Physics(vehicle, args.integrator, weather), start, motors)
+    expo = 1 if vehicle.rotors.control == "speed" else 0
+    text = f"{vehicle.name} is FRAME_CLASS 1, FRAME_TYPE {frame_type}, MOT_THST_EXPO {expo}"
+    status.say("frame", text, frame_class=1, frame_type=frame_type, thrust_expo=expo)
+    end = ArduPilotEnd(Physics(vehicle, args.integrator, weather), start, motors, vehicle.rotors)
     log = CsvLog(args.out / "plant.csv", TRUTH_COLUMNS) if args.out else None
     try:
         with undisturbed():

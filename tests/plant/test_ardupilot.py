@@ -28,7 +28,7 @@ TARGET_NED_M = (2.0, 1.0, -3.0)
 
 
 def standing(start: Start = NORTH) -> ArduPilotEnd:
-    return ArduPilotEnd(PHYSICS, starting_world(start, VEHICLE), MOTORS)
+    return ArduPilotEnd(PHYSICS, starting_world(start, VEHICLE), MOTORS, VEHICLE.rotors)
 
 
 def answered(end: ArduPilotEnd, datagram: bytes, now_s: float = 0.0) -> bytes:
