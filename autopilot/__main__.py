@@ -5,6 +5,7 @@ from pathlib import Path
 
 from mavlink.feedback import Feedback, feedback
 from mavlink.home import DEFAULT_HOME, home
+from mavlink.link import open_link
 from mavlink.process import ArgumentParser, add_common_arguments, begin
 
 DEFAULT_PLANT = "udpout:127.0.0.1:14560"
@@ -45,7 +46,7 @@ def command_line() -> ArgumentParser:
 def main() -> int:
     """Run the autopilot; return the exit code."""
     args = command_line().parse_args()
-    link, status, stop = begin("autopilot", args.plant, args)
+    link, status, stop = begin("autopilot", args.plant, args, open_link)
     from autopilot.process import run
 
     return run(args, link, status, stop)

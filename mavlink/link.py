@@ -57,6 +57,10 @@ class GroundLink(Protocol):
         """Return what has come, as whole frames, and from where."""
         ...
 
+    def wait(self, timeout_s: float) -> None:
+        """Sleep until something has come, but no longer than `timeout_s`."""
+        ...
+
     def take_opened(self) -> list[Address]:
         """Return who is to be spoken to unasked since last asked: whom the link calls, who has connected."""
         ...
@@ -134,6 +138,10 @@ class UdpLink:
                 received.append((datagram, sender))
         return received
 
+    def wait(self, timeout_s: float) -> None:
+        """Sleep until a datagram has come, but no longer than `timeout_s`."""
+        select([self._socket], [], [], timeout_s)
+
     def take_opened(self) -> list[Address]:
         """Return the target, once."""
         opened, self._opened = self._opened, []
@@ -155,6 +163,20 @@ class UdpLink:
         if self.target is not None and sender != self.target:
             return None
         return datagram, sender
+
+
+def receive_soon(link: GroundLink, timeout_s: float) -> list[tuple[bytes, Address]]:
+    """Return what has come, as soon as anything has, or nothing after `timeout_s`; for `SPIN_S` without sleeping."""
+    began_s = perf_counter()
+    while not (received := link.receive_now()):
+        waited_s = perf_counter() - began_s
+        if waited_s >= timeout_s:
+            break
+        if waited_s < SPIN_S:
+            _give_way()
+        else:
+            link.wait(timeout_s - waited_s)
+    return received
 
 
 def open_link(url: str) -> UdpLink:

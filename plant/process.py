@@ -59,6 +59,12 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     return EXIT_INTERRUPTED if stop else 0
 
 
+def truth_row(world: World) -> tuple[float, ...]:
+    """Return what `TRUTH_COLUMNS` names; `nan` volts where there is no battery."""
+    battery = (world.voltage_v, world.charge_used_ah)
+    return (world.time_us / 1e6, *world.state, *world.rotor_speeds, *battery, *world.wind_enu_m_s)
+
+
 class PlantLogs:
     """What the plant writes: the truth at every frame, and every MAVLink frame."""
 
@@ -68,13 +74,15 @@ class PlantLogs:
         self._tlog = TlogWriter(folder / "flight.tlog")
 
     def write_world(self, world: World) -> None:
-        """Append the state, the rotor speeds, the battery (`nan` volts where there is none) and the wind."""
-        battery = (world.voltage_v, world.charge_used_ah)
-        self._truth.write((world.time_us / 1e6, *world.state, *world.rotor_speeds, *battery, *world.wind_enu_m_s))
+        """Append the truth."""
+        self._truth.write(truth_row(world))
 
     def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
         """Append what was received and sent at simulated time `time_us`."""
-        frames = [*received, *(frame for outgoing in sent for frame in outgoing.frames)]
+        self.write_frames(time_us, [*received, *(frame for outgoing in sent for frame in outgoing.frames)])
+
+    def write_frames(self, time_us: int, frames: list[bytes]) -> None:
+        """Append frames of simulated time `time_us`."""
         if frames:
             self._tlog.write(time_us, frames)
 

@@ -18,6 +18,7 @@ Efficiency: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
 TimeConstant: TypeAlias = Annotated[float, msgspec.Meta(ge=0.001)]
 """At least the plant's integration step."""
 PointInPlane: TypeAlias = tuple[float, float]
+FourOf: TypeAlias = tuple[float, float, float, float]
 Array: TypeAlias = NDArray[np.float64]
 T = TypeVar("T")
 
@@ -80,6 +81,8 @@ class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """What an armed rotor never falls below."""
     strength: tuple[Part, Part, Part, Part] = (1.0, 1.0, 1.0, 1.0)
     """Part of its thrust and torque that each rotor has: 0.85 is a rotor 15 % weak."""
+    control: Literal["speed", "thrust"] = "speed"
+    """What a control of 0 to 1 is a part of in the interfaces of other simulators and autopilots."""
     lag: RotorLag | None = None
     """Without it, rotors follow their commands at once."""
 
@@ -91,6 +94,13 @@ class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             raise ValueError("idle_speed: must lie below max_speed")
         if np.linalg.matrix_rank(_allocation(self)) < len(self.position_m):
             raise ValueError("position_m, direction: these rotors cannot turn the vehicle about every axis")
+
+    def speeds_of(self, controls: FourOf) -> FourOf:
+        """Return the parts of the top speed that the controls of another autopilot mean."""
+        if self.control == "speed":
+            return controls
+        a, b, c, d = map(sqrt, controls)
+        return (a, b, c, d)
 
 
 class Drag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
