@@ -7,7 +7,7 @@ from math import sqrt
 
 from mavlink.frames import Vector
 
-_USUAL_M, _USUAL_M_S = 0.15, 0.15
+_USUAL_M, _USUAL_M_S = 0.05, 0.05
 _GIVEN_IN_M_S, _GIVEN_IN_M_S2 = 0.5, 1.0
 _NONE: Vector = (0.0, 0.0, 0.0)
 

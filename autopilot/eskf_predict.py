@@ -112,12 +112,12 @@ def predict(x: Array, P: Array, samples: Array, row: int, noise: Noise, gravity:
             a, b, c = R[3 * i], R[3 * i + 1], R[3 * i + 2]
             push[i, 0], push[i, 1], push[i, 2] = c * fy - b * fz, a * fz - c * fx, b * fx - a * fy
             lever[i, 0], lever[i, 1], lever[i, 2] = a * dt, b * dt, c * dt
-    unturned = _matrix(_turned((1.0, 0.0, 0.0, 0.0), -turn[0], -turn[1], -turn[2]))
+    unturned = _matrix(_turned((1.0, 0.0, 0.0, 0.0), -0.5 * turn[0], -0.5 * turn[1], -0.5 * turn[2]))
     for i in range(9):
         back[i // 3, i % 3] = unturned[i]
-    bias = dt if sees_rate else 0.0
-    _carry(P, push, lever, back, bias, decay, dt)
-    _carry(P.T, push, lever, back, bias, decay, dt)
+    half_s = 0.5 * dt if sees_rate else 0.0
+    _carry(P, push, lever, back, half_s, decay, dt)
+    _carry(P.T, push, lever, back, half_s, decay, dt)
     force_noise = noise.force if sees_force else _BLIND_FORCE_DENSITY
     rate_noise = noise.rate if sees_rate else _BLIND_RATE_DENSITY
     for i in range(3):
@@ -170,10 +170,14 @@ def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravi
 
 
 @compiled
-def _carry(P: Array, push: Array, lever: Array, back: Array, bias: float, decay: float, dt: float) -> None:
-    """Multiply P by the transition matrix from the left, row by row."""
+def _carry(P: Array, push: Array, lever: Array, back: Array, half_s: float, decay: float, dt: float) -> None:
+    """Multiply P by the transition matrix from the left: half of the turn, the push, the other half."""
     for column in range(ERRORS):
-        a0, a1, a2 = P[6, column], P[7, column], P[8, column]
+        g0, g1, g2 = half_s * P[9, column], half_s * P[10, column], half_s * P[11, column]
+        t0, t1, t2 = P[6, column], P[7, column], P[8, column]
+        a0 = back[0, 0] * t0 + back[0, 1] * t1 + back[0, 2] * t2 - g0
+        a1 = back[1, 0] * t0 + back[1, 1] * t1 + back[1, 2] * t2 - g1
+        a2 = back[2, 0] * t0 + back[2, 1] * t1 + back[2, 2] * t2 - g2
         b0, b1, b2 = P[12, column], P[13, column], P[14, column]
         for i in range(3):
             v = P[3 + i, column]
@@ -181,9 +185,11 @@ def _carry(P: Array, push: Array, lever: Array, back: Array, bias: float, decay:
             after -= lever[i, 0] * b0 + lever[i, 1] * b1 + lever[i, 2] * b2
             P[i, column] += 0.5 * dt * (v + after)
             P[3 + i, column] = after
-        for i in range(3):
-            P[6 + i, column] = back[i, 0] * a0 + back[i, 1] * a1 + back[i, 2] * a2 - bias * P[9 + i, column]
             P[15 + i, column] *= decay
+        a0, a1, a2 = a0 - g0, a1 - g1, a2 - g2
+        P[6, column] = back[0, 0] * a0 + back[0, 1] * a1 + back[0, 2] * a2
+        P[7, column] = back[1, 0] * a0 + back[1, 1] * a1 + back[1, 2] * a2
+        P[8, column] = back[2, 0] * a0 + back[2, 1] * a1 + back[2, 2] * a2
 
 
 @compiled

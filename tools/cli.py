@@ -1,5 +1,6 @@
 """`colibri`: the one command. Loads only what the subcommand needs."""
 
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
@@ -8,7 +9,9 @@ from mavlink.feedback import Feedback, feedback
 from mavlink.home import DEFAULT_HOME, home
 from mavlink.process import EXIT_INTERRUPTED, ArgumentParser, fail, natural, positive, speed, use_one_thread
 from plant.scenario import add_world_arguments
+from plant.weather import NO_WIND, add_weather_arguments
 
+COMPARED_S = 100.0
 TRACK_HELP = (
     "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
     "hover[:x=0,y=0,height=2,yaw=0], lemniscate[:size=4,height=3,lap=6,yaw=path|fixed], "
@@ -29,6 +32,10 @@ def main(argv: list[str] | None = None) -> int:
             from tools.thesis_figures import figures
 
             return figures(args)
+        if args.command == "compare" and _in_another_world(args):
+            from tools.seeds import compare_seeds
+
+            return compare_seeds(args)
         if args.command == "compare":
             from tools.compare import compare
 
@@ -46,6 +53,13 @@ def main(argv: list[str] | None = None) -> int:
         return bench(args)
     except KeyboardInterrupt:
         fail("interrupted", EXIT_INTERRUPTED)
+
+
+def _in_another_world(args: Namespace) -> bool:
+    """Whether the comparison leaves the thesis's world: chance, sensors, weather, another vehicle, two processes."""
+    weather = args.wind is not NO_WIND or args.gust or args.turbulence
+    chance = args.seeds or args.feedback is Feedback.SENSORS
+    return bool(chance or weather or args.vehicle or args.link == "udp" or args.duration != COMPARED_S)
 
 
 def _parser() -> ArgumentParser:
@@ -145,6 +159,18 @@ def _add_sitl(parser: ArgumentParser) -> None:
     add("--quiet", action="store_true", help="say nothing but errors")
 
 
+def seeds(text: str) -> range:
+    """Read FIRST-LAST of the command line."""
+    first, _, last = text.partition("-")
+    try:
+        chosen = range(int(first), int(last or first) + 1)
+    except ValueError:
+        chosen = range(0)
+    if not chosen:
+        raise ArgumentTypeError(f"expected FIRST-LAST, 1-50 say, not {text}")
+    return chosen
+
+
 def _add_feedback(add: Callable[..., object]) -> None:
     add(
         "--feedback",
@@ -184,8 +210,16 @@ def _add_compare(parser: ArgumentParser) -> None:
     )
     add("--track", action="append", metavar="TRACK", help="a track; may be repeated (default: the thesis's five)")
     add(
-        "--link", default="memory", choices=("memory", "direct"), help="with or without the codec (default %(default)s)"
+        "--link",
+        default="memory",
+        choices=("memory", "direct", "udp"),
+        help="one process, with or without the codec; or two (default %(default)s)",
     )
+    add("--seeds", type=seeds, metavar="FIRST-LAST", help="fly each by all of these seeds, and show how errors spread")
+    _add_feedback(add)
+    add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
+    add("--duration", type=positive, default=COMPARED_S, metavar="S", help="simulated time (default %(default)s)")
+    add_weather_arguments(parser)
     add(
         "--out",
         type=Path,

@@ -141,14 +141,29 @@ class FlightPlan:
             VehicleError: Its vehicle cannot be read.
             TrackError: There is no such track, or its file cannot be flown.
         """
-        tells = {"feedback": Feedback.STATE, "seed": 0}
-        unset = dict.fromkeys(("solver", "vehicle", "plant_vehicle", "integrator"))
-        chosen = {"track": track_name, "profile": profile, "controller": controller, "link": link, "out": out}
-        world: dict[str, Any] = {"wind": NO_WIND, "gust": (), "turbulence": None, "without": (), "start": {}}
-        ground = {"gcs": (), "signing_key": None, "insecure": False}
-        return cls.from_arguments(
-            argparse.Namespace(**chosen, **unset, **world, **ground, **tells, speed=inf, duration=DURATION_S)
-        )
+        return cls.of_options(out, track=track_name, profile=profile, controller=controller, link=link)
+
+    @classmethod
+    def of_options(cls, out: Path, **options: Any) -> "FlightPlan":
+        """Return the plan of a flight flat out for 100 s with some options of `colibri fly`, by their names there.
+
+        Raises:
+            PlanError: They do not go together.
+            ProfileError: The profile cannot be read.
+            VehicleError: A vehicle cannot be read, or cannot start as the profile says.
+            TrackError: There is no such track, or its file cannot be flown.
+        """
+        unset = dict.fromkeys(("controller", "solver", "vehicle", "plant_vehicle", "integrator", "turbulence"))
+        none: dict[str, Any] = {
+            "gcs": (),
+            "gust": (),
+            "without": (),
+            "start": {},
+            "signing_key": None,
+            "insecure": False,
+        }
+        usual = {"wind": NO_WIND, "feedback": Feedback.STATE, "seed": 0, "speed": inf, "duration": DURATION_S}
+        return cls.from_arguments(argparse.Namespace(**(unset | none | usual | options), out=out))
 
     @property
     def start_yaw_rad(self) -> float:

@@ -52,6 +52,7 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
         "rmse_m": _rms(error),
         "max_error_m": float(error.max()),
         "rmse_after_20s_m": _rms(settled) if len(settled) else None,
+        "max_error_after_20s_m": float(settled.max()) if len(settled) else None,
         **_estimation_figures(plan, settled),
         "effort_n_m": _rms(np.linalg.norm(recording.columns(INPUT[1:]), axis=1)),
         "solve_time_us": _quantiles(recording.solve_time_us),

@@ -2,9 +2,10 @@
 
 import pytest
 
+from autopilot import estimate
 from autopilot.copter import Copter
 from autopilot.core import Autopilot
-from autopilot.estimate import Estimate, Health, Test, Tests
+from autopilot.estimate import Estimate, Health
 from autopilot.profile import load_profile
 from autopilot.senses import Senses, estimator_for
 from autopilot.stations import StationSettings
@@ -22,12 +23,12 @@ ALIGNED_US = 10 * FRAME_US
 ZERO = (0.0, 0.0, 0.0)
 
 
-UNTESTED = Test(-1, (), 0.0, 1.0)
-WELL = Health(*[True] * 6, False, None, False, *[True] * 4)  # type: ignore[arg-type]
+UNTESTED = estimate.Test(-1, (), 0.0, 1.0)
+WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True)
 
 
 def known(frame: StateFrame) -> Estimate:
-    return Estimate(frame, ZERO, ZERO, ZERO, ZERO, ZERO, WELL, Tests(*[UNTESTED] * 5), {}, 0, ZERO, None)
+    return Estimate(frame, ZERO, ZERO, ZERO, ZERO, ZERO, WELL, estimate.Tests(*[UNTESTED] * 5), {}, 0, ZERO, None)
 
 
 class Standing:

@@ -20,6 +20,7 @@ from plant.scenario import Start
 from plant.sensor_parts import Sensors
 from plant.sensors import Rate, SensorSuite
 from plant.vehicle import load_vehicle
+from plant.weather import NO_WEATHER
 from plant.world import Physics, World, starting_world
 from tests.plant.flights import OFF, command, flight, hover, hummingbird, rpm
 from tests.strategies import quaternions, reals
@@ -316,3 +317,15 @@ def test_the_rtk_vehicle_differs_by_its_receiver_alone() -> None:
     assert msgspec.structs.replace(rtk, sensors=parts(gps={})) == HUMMINGBIRD
     assert msgspec.structs.replace(rtk.sensors, gps=parts().gps) == parts()
     assert rtk.sensors.gps.horizontal_drift_m < 0.01
+
+
+def test_the_wind_of_the_moment_is_felt() -> None:
+    """Its drag, on a vehicle that stands still in the air."""
+    turbulent = Physics(HUMMINGBIRD, "rk4", NO_WEATHER._replace(turbulence="light"))
+    still = starting_world(Start(z=50.0), HUMMINGBIRD)
+    assert HUMMINGBIRD.drag is not None
+    drag_n_s_m = HUMMINGBIRD.drag.linear_n_s_m[0]
+    for wind_m_s in (4.0, -7.0):
+        x, y, z = turbulent.specific_force(replace(still, wind_enu_m_s=(wind_m_s, 0.0, 0.0)))
+        assert x == pytest.approx(drag_n_s_m * wind_m_s / HUMMINGBIRD.body.mass_kg)
+        assert (y, z) == (0.0, 0.0)
