@@ -40,6 +40,9 @@ def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> Est
     return lambda interval_us: estimator.Estimator(sensors, gravity_m_s2, origin, interval_us)
 
 
+_LATE_US = 1_000_000
+
+
 class Senses:
     """Turns any frame into a state.
 
@@ -67,12 +70,13 @@ class Senses:
     def state(self, frame: Frame) -> StateFrame | None:
         """Return the state at a frame; None until there is an estimate.
 
-        Time that goes back is another flight, of which nothing is known.
+        Time that begins again is another flight, of which nothing is known. A frame that is a little late is the
+        estimator's to judge.
         """
         if isinstance(frame, StateFrame):
             return frame
         assert self._make is not None, "frames of sensors come to who asks for them"
-        if self._estimating is None or (self._time_us is not None and frame.time_us <= self._time_us):
+        if self._estimating is None or self._begins_again(frame):
             self._estimating, self.estimate = self._make(self._interval_us), None
         self._time_us = frame.time_us
         if self.gps_off and frame.gps is not None:
@@ -80,3 +84,8 @@ class Senses:
         self.sensed, self.fix = frame, frame.gps or self.fix
         self.estimate = self._estimating.step(frame)
         return None if self.estimate is None else self.estimate.frame
+
+    def _begins_again(self, frame: SensorFrame) -> bool:
+        if self._time_us is None:
+            return False
+        return frame.time_us == 0 or frame.time_us < self._time_us - _LATE_US

@@ -2,7 +2,8 @@
 
 PX4 calls (over TCP it is the client), begins with a HEARTBEAT and, before or after, asks for HIL_STATE_QUATERNION.
 HIL_SENSOR sets its clock; its HIL_ACTUATOR_CONTROLS with bit 0 of `flags` answers it. Until the first such answer,
-while PX4 is starting, the simulator must go on by itself, at the pace of the wall clock; from then on it waits.
+while PX4 is starting, the simulator must go on by itself, at the pace of the wall clock. From then on it waits for
+each.
 
 An answer is known by its time, which must be another than that of the answer before: a frame that was lost and sent
 again is answered twice, and counts once. Source: PX4-Autopilot, simulator_mavlink/SimulatorMavlink.cpp, and
