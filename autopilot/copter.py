@@ -12,6 +12,7 @@ from autopilot.controller import Clock, Decision, VehicleState
 from autopilot.core import STILL, Step
 from autopilot.course import Course, Scene, Steered
 from autopilot.courses import Along, Climb, Stop, homeward, landing, to_track
+from autopilot.health_watch import HealthWatch, not_known
 from autopilot.instants import instants
 from autopilot.leader import Following
 from autopilot.leaning import AltitudeSticks, Stabilized
@@ -110,6 +111,7 @@ class Copter:
         self._clock = clock
         self.frame_interval_us = self._loop.frame_interval_us
         self._senses = Senses(estimator, self.frame_interval_us)
+        self._health = HealthWatch()
         self._interval_s = self._loop.control_interval_us * 1e-6
         flies_by = behaviour(self.parameters)
         self._attitude: AttitudeReference | None = None
@@ -204,7 +206,9 @@ class Copter:
         sticks = pilot.scene().steered.sticks
         thrust = sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None
         outside = self.stations.missions.breach(state.position_enu_m, self._time_us or 0)
-        pilot.take_stock(Facts(state, pilot.standing, self.power.left, thrust, outside))
+        estimate = self._senses.estimate
+        unknown = not_known(estimate.health) if estimate is not None else ""
+        pilot.take_stock(Facts(state, pilot.standing, self.power.left, thrust, outside, unknown))
 
     def _missing(self) -> list[Need]:
         """Return needs of modes that nothing meets now: the message before the one that asks may have met one."""
@@ -247,6 +251,10 @@ class Copter:
     def _report(self, now_us: int, state: VehicleState, guidance: Guidance, decision: Decision | None) -> None:
         pilot, stations = self.pilot, self.stations
         self._take_stock(state)
+        self._senses.gps_off = stations.failures.gps_off
+        if self._senses.estimate is not None:
+            for severity, line in self._health.lines(self._senses.estimate.health):
+                stations.say(severity, line)
         idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
         least = idle if pilot.state.armed else 0.0
         c1, c2, c3, c4 = (max(control, least) for control in self._controls)
@@ -263,6 +271,7 @@ class Copter:
                 (c1, c2, c3, c4),
                 self.power,
                 stations,
+                self._senses,
             )
         )
 

@@ -6,7 +6,7 @@ pressure it is the offset of the barometer, and height stays; for GPS it is posi
 """
 
 from collections.abc import Callable
-from math import inf, isfinite, radians
+from math import inf, isfinite, nan, radians
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,9 @@ Array = NDArray[np.float64]
 FIVE_SIGMA = (25.0, 28.74, 31.81)
 """χ² of one, two and three degrees of freedom that is exceeded as rarely as five standard deviations are."""
 
+_FIX_GATES = np.array([FIVE_SIGMA[2], FIVE_SIGMA[1], FIVE_SIGMA[0]])
 _FIRST_POSITION_M, _FIRST_VELOCITY_M_S, _FIRST_ATTITUDE_RAD, _FIRST_OFFSET_M = 100.0, 0.02, 0.5, 1000.0
+_ITERATIONS = 4
 _LEAST_NOISE = 1e-6
 """Of anything, in its own unit: a perfect sensor would leave nothing to divide by."""
 _PLACE_STEP_M, _HEIGHT_STEP_M, _SPEED_STEP_M_S = 0.011, 0.001, 0.01
@@ -75,18 +77,28 @@ class Kind:
     def fuse(self, filter_: "Filter", time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
         """Fuse a measurement; return whether it was believed."""
         nis = kernel(filter_.x, filter_.P, *arguments, self.gate, self._y)
-        self.test = Test(time_us, tuple(self._y.tolist()), nis, self.gate)
-        if nis <= self.gate:
-            self.accept(time_us)
+        if self.note(time_us, tuple(self._y.tolist()), nis):
             return True
-        if self.reject(time_us):
-            first, count, sigma = self._doubted
-            update.doubt(filter_.P, first, count, sigma * sigma)
-            kernel(filter_.x, filter_.P, *arguments, inf, self._y)
-            self.resets += 1
-            self.accept(time_us)
+        return self.insist(filter_, time_us, kernel, *arguments)
+
+    def note(self, time_us: int, innovation: tuple[float, ...], nis: float) -> bool:
+        """Note a test; return whether the measurement was believed."""
+        self.test = Test(time_us, innovation, nis, self.gate)
+        if nis <= self.gate:
+            self.accepted_us, self.rejected_us = time_us, None
             return True
         return False
+
+    def insist(self, filter_: "Filter", time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
+        """Reject a measurement, but believe it if this has lasted too long; return whether it was believed."""
+        if not self.reject(time_us):
+            return False
+        first, count, sigma = self._doubted
+        update.doubt(filter_.P, first, count, sigma * sigma)
+        kernel(filter_.x, filter_.P, *arguments, inf, self._y)
+        self.resets += 1
+        self.accept(time_us)
+        return True
 
     def accept(self, time_us: int) -> None:
         """Note that a measurement was believed."""
@@ -117,7 +129,10 @@ class Filter:
         gps = sensors.gps
         self._horizontal = gps.horizontal_noise_m**2 + _PLACE_STEP_M**2 / 12.0
         self._vertical = gps.vertical_noise_m**2 + _HEIGHT_STEP_M**2 / 12.0
-        self._speed = gps.velocity_noise_m_s**2 + _SPEED_STEP_M_S**2 / 12.0
+        speed = gps.velocity_noise_m_s**2 + _SPEED_STEP_M_S**2 / 12.0
+        self._fix, self._fix_y, self._fix_nis = np.zeros(6), np.zeros(6), np.zeros(3)
+        self._claims = (nan, nan)
+        self._fix_variances = np.array([speed, self._horizontal, self._vertical])
         self._field_variance = max(sensors.magnetometer.noise_gauss, _LEAST_NOISE) ** 2
         self.x, self.P = np.zeros(NOMINAL), np.zeros((ERRORS, ERRORS))
         self.velocity = Kind(3, 7_000_000, (VELOCITY, 3, _DOUBTED_M_S))
@@ -128,43 +143,57 @@ class Filter:
         self._kinds = (self.velocity, self.position, self.height, self.pressure, self.field)
 
     def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
-        """Begin at rest: each mean is fused as a measurement, so that the covariance knows what it took from where."""
-        sensors, x, P = self._sensors, self.x, self.P
-        gyro, accel = sensors.gyroscope, sensors.accelerometer
-        x[:], P[:] = 0.0, 0.0
-        x[:3], x[6:10] = place_enu_m, aligned.attitude
+        """Begin at rest: each mean is fused as a measurement, so that the covariance knows what it took from where.
+
+        The attitude is found by iteration. A tilt seen by the accelerometer may be its bias, and the magnetic field
+        knows better: a covariance linearised where the first guess was would later be taken for knowledge.
+        """
+        x, P = self.x, self.P
+        attitude = aligned.attitude
+        for _ in range(_ITERATIONS):
+            self._know_nothing(place_enu_m)
+            x[6:10] = attitude
+            self._rest(aligned)
+            attitude = tuple(x[6:10].tolist())
+        for kind in self._kinds:
+            kind.accept(time_us)
+        y1, y2, y3 = np.zeros(1), np.zeros(2), np.zeros(3)
+        place, horizontal, vertical = np.array(place_enu_m), *self._of_place(aligned.fix)
+        update.fuse_velocity(x, P, np.array(aligned.fix.velocity_enu_m_s), self._fix_variances[0], inf, y3)
+        update.fuse_horizontal(x, P, place, 0.0, horizontal, inf, y2)
+        update.fuse_height(x, P, place, 0.0, vertical, inf, y1)
+        if aligned.pressure_height_m is not None:
+            x[19] = aligned.pressure_height_m - x[2]
+            sigma = self._sensors.barometer.noise_pa * METRES_PER_PASCAL
+            variance = max(sigma, _LEAST_NOISE) ** 2 / aligned.heights
+            update.fuse_pressure_height(x, P, aligned.pressure_height_m, variance, inf, y1)
+
+    def _know_nothing(self, place_enu_m: Vector) -> None:
+        """Know of a vehicle at a place what can be known before anything is measured."""
+        sensors, P = self._sensors, self.P
+        self.x[:], P[:] = 0.0, 0.0
+        self.x[:3] = place_enu_m
         for first, count, sigma in (
             (POSITION, 3, _FIRST_POSITION_M),
             (VELOCITY, 3, _FIRST_VELOCITY_M_S),
             (ATTITUDE, 3, _FIRST_ATTITUDE_RAD),
-            (GYRO_BIAS, 3, max(gyro.turn_on_bias_rad_s, _LEAST_NOISE)),
-            (ACCEL_BIAS, 3, max(accel.turn_on_bias_m_s2, _LEAST_NOISE)),
+            (GYRO_BIAS, 3, max(sensors.gyroscope.turn_on_bias_rad_s, _LEAST_NOISE)),
+            (ACCEL_BIAS, 3, max(sensors.accelerometer.turn_on_bias_m_s2, _LEAST_NOISE)),
             (BARO_OFFSET, 1, _FIRST_OFFSET_M),
             (HARD_IRON, 3, max(sensors.magnetometer.hard_iron_gauss, _LEAST_NOISE)),
         ):
             update.doubt(P, first, count, sigma * sigma)
         for i, variance in enumerate(self._noise.gps_drift):
             P[GPS_DRIFT + i, GPS_DRIFT + i] = variance
-        self._rest(aligned)
-        for kind in self._kinds:
-            kind.accept(time_us)
-        y1, y2, y3 = np.zeros(1), np.zeros(2), np.zeros(3)
-        horizontal, vertical = self._of_place(aligned.fix)
-        update.fuse_horizontal(x, P, np.array(place_enu_m), 0.0, horizontal, inf, y2)
-        update.fuse_height(x, P, np.array(place_enu_m), 0.0, vertical, inf, y1)
-        update.fuse_velocity(x, P, np.array(aligned.fix.velocity_enu_m_s), self._speed, inf, y3)
-        if aligned.pressure_height_m is not None:
-            x[19] = aligned.pressure_height_m - x[2]
-            variance = max(sensors.barometer.noise_pa * METRES_PER_PASCAL, _LEAST_NOISE) ** 2 / aligned.heights
-            update.fuse_pressure_height(x, P, aligned.pressure_height_m, variance, inf, y1)
 
     def _rest(self, aligned: Aligned) -> None:
+        """Fuse the means of specific force, field and rate."""
         x, P, sensors = self.x, self.P, self._sensors
-        y = np.zeros(3)
         force = max(sensors.accelerometer.noise_density_m_s2_rthz, _LEAST_NOISE) ** 2 / aligned.duration_s
         rate = max(sensors.gyroscope.noise_density_rad_s_rthz, _LEAST_NOISE) ** 2 / aligned.duration_s
-        update.fuse_rest(x, P, np.array(aligned.force), self._gravity, force, inf, y)
-        update.fuse_field(x, P, np.array(aligned.field), self._field, self._field_variance / aligned.fields, inf, y)
+        field, y = self._field_variance / aligned.fields, np.zeros(6)
+        mean_force, mean_field = np.array(aligned.force), np.array(aligned.field)
+        update.fuse_rest(x, P, mean_force, self._gravity, force, mean_field, self._field, field, y)
         for i in range(3):
             variance = P[GYRO_BIAS + i, GYRO_BIAS + i]
             gain = variance / (variance + rate)
@@ -177,14 +206,23 @@ class Filter:
 
     def fuse_fix(self, fix: GpsFix, place_enu_m: Vector, after_s: float, time_us: int) -> Reason | None:
         """Fuse a fix measured `after_s` after the filter's time; return why a part of it was rejected, if one was."""
-        place = np.array(place_enu_m)
-        horizontal, vertical = self._of_place(fix)
-        believed = (
-            self.velocity.fuse(self, time_us, update.fuse_velocity, np.array(fix.velocity_enu_m_s), self._speed),
-            self.position.fuse(self, time_us, update.fuse_horizontal, place, after_s, horizontal),
-            self.height.fuse(self, time_us, update.fuse_height, place, after_s, vertical),
-        )
-        return None if all(believed) else Reason.INNOVATION
+        x, P, z, y, variances = self.x, self.P, self._fix, self._fix_y, self._fix_variances
+        z[:3], z[3:] = place_enu_m, fix.velocity_enu_m_s
+        claims = (fix.horizontal_accuracy_m, fix.vertical_accuracy_m)
+        if claims != self._claims:
+            self._claims = claims
+            variances[1:] = self._of_place(fix)
+        update.fuse_fix(x, P, z, after_s, variances, _FIX_GATES, y, self._fix_nis)
+        ve, vn, vu, e, n, u = y.tolist()
+        moves, lies, stands = self._fix_nis.tolist()
+        believed = True
+        if not self.velocity.note(time_us, (ve, vn, vu), moves):
+            believed &= self.velocity.insist(self, time_us, update.fuse_velocity, z[3:], variances[0])
+        if not self.position.note(time_us, (e, n), lies):
+            believed &= self.position.insist(self, time_us, update.fuse_horizontal, z[:3], after_s, variances[1])
+        if not self.height.note(time_us, (u,), stands):
+            believed &= self.height.insist(self, time_us, update.fuse_height, z[:3], after_s, variances[2])
+        return None if believed else Reason.INNOVATION
 
     def fuse_pressure(self, pressure_pa: float, time_us: int) -> Reason | None:
         """Fuse a pressure; return why it was rejected, if it was."""

@@ -61,6 +61,27 @@ def fuse_velocity(x: Array, P: Array, velocity: Array, variance: float, gate: fl
 
 
 @compiled
+def fuse_fix(
+    x: Array, P: Array, fix: Array, after_s: float, variances: Array, gates: Array, y: Array, nis: Array
+) -> None:
+    """Correct by the velocity of a GPS fix, then by its place, then by its height, each if it is believable.
+
+    Args:
+        x: Nominal state, (23,).
+        P: Covariance, (22, 22).
+        fix: Place, m, and velocity, m/s, ENU, (6,).
+        after_s: How long after the state it was measured.
+        variances: Of velocity, place and height, (3,).
+        gates: Of their NIS, (3,).
+        y: Innovations, in the same order: 3, 2 and 1, (6,).
+        nis: Of the three, (3,).
+    """
+    nis[0] = fuse_velocity(x, P, fix[3:], variances[0], gates[0], y[:3])
+    nis[1] = fuse_horizontal(x, P, fix[:3], after_s, variances[1], gates[1], y[3:5])
+    nis[2] = fuse_height(x, P, fix[:3], after_s, variances[2], gates[2], y[5:])
+
+
+@compiled
 def fuse_pressure_height(x: Array, P: Array, height: float, variance: float, gate: float, y: Array) -> float:
     """Correct by a height that a barometer tells, m, up to its offset."""
     H = np.zeros((1, ERRORS))
@@ -82,15 +103,33 @@ def fuse_field(x: Array, P: Array, measured: Array, field: Array, variance: floa
 
 
 @compiled
-def fuse_rest(x: Array, P: Array, force: Array, gravity: float, variance: float, gate: float, y: Array) -> float:
-    """Correct by the specific force of a vehicle that rests, m/s² FLU: it is that which carries it."""
-    H = np.zeros((3, ERRORS))
-    body = _in_body(x, np.array([0.0, 0.0, gravity]))
-    _put_cross(H, body)
+def fuse_rest(
+    x: Array,
+    P: Array,
+    force: Array,
+    gravity: float,
+    force_variance: float,
+    measured: Array,
+    field: Array,
+    field_variance: float,
+    y: Array,
+) -> float:
+    """Correct by specific force, m/s² FLU, and magnetic field, gauss FLU, of a vehicle that rests: both at once.
+
+    What force it feels is that which carries it. The innovation (6,) is in standard deviations of the two.
+    """
+    H = np.zeros((6, ERRORS))
+    up = _in_body(x, np.array([0.0, 0.0, gravity]))
+    body = _in_body(x, field)
+    _put_cross(H[:3], up)
+    _put_cross(H[3:], body)
     for i in range(3):
-        H[i, ACCEL_BIAS + i] = 1.0
-        y[i] = force[i] - (body[i] + x[13 + i])
-    return _fuse(x, P, H, y, variance, gate)
+        H[i, ACCEL_BIAS + i], H[3 + i, HARD_IRON + i] = 1.0, 1.0
+        y[i] = (force[i] - (up[i] + x[13 + i])) / sqrt(force_variance)
+        y[3 + i] = (measured[i] - (body[i] + x[20 + i])) / sqrt(field_variance)
+    H[:3] /= sqrt(force_variance)
+    H[3:] /= sqrt(field_variance)
+    return _fuse(x, P, H, y, 1.0, inf)
 
 
 @compiled

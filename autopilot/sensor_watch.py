@@ -73,20 +73,19 @@ class GpsWatch:
         if not _LEAST_FIX <= fix.fix_type <= _BEST_FIX:
             return Reason.NO_FIX
         numbers = (*fix.place, *fix.velocity_enu_m_s)
-        if not all(map(isfinite, numbers)):
-            return Reason.NOT_FINITE
-        if not _possible(fix):
-            return Reason.RANGE
+        if not _possible(*numbers):
+            return Reason.RANGE if all(map(isfinite, numbers)) else Reason.NOT_FINITE
         if fix.time_us > now_us or (self._time_us is not None and fix.time_us <= self._time_us):
             return Reason.TIME
         self._time_us = fix.time_us
         return self._alive.reason(numbers, fix.time_us)
 
 
-def _possible(fix: GpsFix) -> bool:
-    latitude_deg, longitude_deg, altitude_m = fix.place
+def _possible(latitude_deg: float, longitude_deg: float, altitude_m: float, ve: float, vn: float, vu: float) -> bool:
     return (
         is_on_earth(latitude_deg, longitude_deg)
         and _LOWEST_M <= altitude_m <= _HIGHEST_M
-        and all(abs(speed) <= _FASTEST_M_S for speed in fix.velocity_enu_m_s)
+        and -_FASTEST_M_S <= ve <= _FASTEST_M_S
+        and -_FASTEST_M_S <= vn <= _FASTEST_M_S
+        and -_FASTEST_M_S <= vu <= _FASTEST_M_S
     )

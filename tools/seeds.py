@@ -140,7 +140,7 @@ def _values(figures: dict[str, Any]) -> tuple[float, ...]:
 
 
 def _row(flights: Sequence[Flown]) -> tuple[str, ...]:
-    """Return medians, and the largest in brackets."""
+    """Return root mean squares over the flights, and the largest of one flight in brackets."""
     values = np.array([flown.values for flown in flights if not flown.lost]).reshape(-1, len(QUANTITIES))
     lost = sum(bool(flown.lost) for flown in flights)
     cells = [_cell(column) for column in values.T]
@@ -150,7 +150,7 @@ def _row(flights: Sequence[Flown]) -> tuple[str, ...]:
 def _cell(column: np.ndarray[Any, np.dtype[np.float64]]) -> str:
     if not len(column) or np.isnan(column).any():
         return "-"
-    return f"{np.median(column):.3g} ({column.max():.3g})"
+    return f"{np.sqrt(np.mean(column**2)):.3g} ({column.max():.3g})"
 
 
 def _write_flights(path: Path, flights: Sequence[Flown]) -> None:
@@ -164,7 +164,7 @@ def _print(rows: Sequence[tuple[str, ...]], out: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    title = f"after {SETTLED_AFTER_S:.0f} s, root mean squares: median over the seeds (largest); written to {out}"
+    title = f"after {SETTLED_AFTER_S:.0f} s, root mean squares over all flights (largest of one); written to {out}"
     table = Table(title=title, title_justify="left")
     for number, column in enumerate(HEADINGS):
         table.add_column(column, justify="left" if number < 2 else "right", no_wrap=True)
