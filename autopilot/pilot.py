@@ -141,6 +141,11 @@ class Pilot:
         """
         self._now_us, self._vehicle, self._steered = now_us, vehicle, steered
 
+    @property
+    def has_seen(self) -> bool:
+        """Whether it has ever known where the vehicle is: on sensors that takes a while."""
+        return self._vehicle is not None
+
     def take_stock(self, facts: Facts) -> None:
         """Take in what arming is judged by."""
         self._facts = facts
