@@ -5,7 +5,7 @@ from pathlib import Path
 
 from mavlink.feedback import Feedback, feedback
 from mavlink.home import DEFAULT_HOME, home
-from mavlink.link import open_link
+from mavlink.link import OneByOne, open_ground_link, open_link
 from mavlink.process import ArgumentParser, add_common_arguments, begin
 
 DEFAULT_PLANT = "udpout:127.0.0.1:14560"
@@ -21,6 +21,11 @@ def command_line() -> ArgumentParser:
     )
     add = parser.add_argument
     add("--plant", default=DEFAULT_PLANT, metavar="URL", help="the plant to call (default %(default)s)")
+    add(
+        "--simulator",
+        metavar="URL",
+        help="fly a simulator that speaks PX4's interface instead, jMAVSim say: tcp:127.0.0.1:4560; on its sensors",
+    )
     add("--track", metavar="TRACK", help="what to fly, as in `colibri fly` (default spiral; with --gcs: what is asked)")
     add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
     add("--controller", metavar="NAME", help="control law (default: the profile's)")
@@ -46,10 +51,16 @@ def command_line() -> ArgumentParser:
 def main() -> int:
     """Run the autopilot; return the exit code."""
     args = command_line().parse_args()
-    link, status, stop = begin("autopilot", args.plant, args, open_link)
+    if args.simulator is None:
+        link, status, stop = begin("autopilot", args.plant, args, open_link)
+        from autopilot.process import run
+
+        return run(args, link, status, stop)
+    args.feedback = Feedback.SENSORS
+    simulator, status, stop = begin("autopilot", args.simulator, args, open_ground_link)
     from autopilot.process import run
 
-    return run(args, link, status, stop)
+    return run(args, OneByOne(simulator), status, stop)
 
 
 if __name__ == "__main__":

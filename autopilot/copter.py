@@ -179,10 +179,11 @@ class Copter:
         if self._time_us is not None:  # another flight: nothing that any service remembers is of any use
             self.stations.restart = REBOOT
         speed = self._start_speed if frame.time_us == 0 else hover_speed
-        if self._senses.estimate is not None:  # it was at rest
+        rests = self._senses.estimate is not None  # or there would be no estimate
+        if rests:
             speed = loop.vehicle.rotors.idle_speed
         loop.begin(speed, self._first_yaw())
-        self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None)
+        self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None, rests=rests)
         self._controls = STILL if self.pilot.standing else loop.controls
         self.stations.say(INFO, self.stations.banner())
 

@@ -85,7 +85,7 @@ class Ground:
         self._links.send(self.copter.serve(self._links.receive(stations)))
         if stations.restart:
             self._restart(stations.restart)
-        if now_s >= self._told_s + _TELL_EVERY_S:
+        if now_s >= self._told_s + _TELL_EVERY_S and self.copter.pilot.has_seen:
             self._tell(now_s)
         if self.copter.parameters.revision != self._revision:
             self._save_parameters()

@@ -14,9 +14,10 @@ from autopilot.senses import Estimator, estimator_for
 from autopilot.tracks import TrackError, track
 from mavlink.dialect import RESULT_UNSUPPORTED
 from mavlink.feedback import Feedback
-from mavlink.link import LinkError, UdpLink
+from mavlink.link import LinkError, OneByOne, UdpLink
 from mavlink.lockstep import AutopilotEnd
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Status, Stop, fail, undisturbed
+from mavlink.px4_flier import FlierEnd
 from plant.vehicle import Vehicle, VehicleError, load_vehicle
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ class AutopilotLog:
         log.write((frame.time_us / 1e6, *state, *deviations, *biases, *counts))
 
 
-def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
+def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop: Stop) -> int:
     """Fly the plant at the other end of `link` as the command line says; return the exit code."""
     try:
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
@@ -108,15 +109,10 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         estimator = estimator_for(args.feedback, vehicle, args.home.origin)
         ground = _ground(args, profile, vehicle, estimator, status) if args.gcs else None
         autopilot = ground.copter if ground else _alone(args, profile, vehicle, estimator)
+        end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
     except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
         fail(str(error))
     log = AutopilotLog(args.out, args.feedback) if args.out else None
-    end = AutopilotEnd(
-        system_id=args.system_id,
-        frame_interval_us=autopilot.frame_interval_us,
-        now_s=perf_counter(),
-        feedback=args.feedback,
-    )
     try:
         with undisturbed():
             Client(link, end, status, stop, log, ground).fly(autopilot)
@@ -129,6 +125,26 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         if log:
             log.close()
     return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
+
+
+def _end(args: argparse.Namespace, frame_interval_us: int) -> AutopilotEnd:
+    return AutopilotEnd(
+        system_id=args.system_id, frame_interval_us=frame_interval_us, now_s=perf_counter(), feedback=args.feedback
+    )
+
+
+def _flier(args: argparse.Namespace, vehicle: Vehicle) -> FlierEnd:
+    """Return what flies a simulator that counts the rotors as PX4 does.
+
+    Raises:
+        VehicleError: PX4 cannot count them.
+    """
+    rotors, order = vehicle.rotors, vehicle.rotors.numbering()
+    return FlierEnd(
+        system_id=args.system_id,
+        now_s=perf_counter(),
+        to_motors=lambda speeds: rotors.controls_of(order.to_motors(speeds)),
+    )
 
 
 def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None) -> Autopilot:
@@ -149,8 +165,8 @@ class Client:
 
     def __init__(
         self,
-        link: UdpLink,
-        end: AutopilotEnd,
+        link: UdpLink | OneByOne,
+        end: AutopilotEnd | FlierEnd,
         status: Status,
         stop: Stop,
         log: AutopilotLog | None,
@@ -168,7 +184,7 @@ class Client:
 
     def fly(self, autopilot: "Autopilot | Copter") -> None:
         """Answer every frame until told to stop."""
-        self._status.say("calling", "waiting for the plant at " + self._link.url.removeprefix("udpout:"))
+        self._status.say("calling", "waiting for the plant at " + self._link.url.partition(":")[2])
         due_s = 0.0
         while not self._stop:
             received = self._link.receive(min(max(0.0, due_s - perf_counter()), _WAIT_AT_MOST_S))

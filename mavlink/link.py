@@ -6,6 +6,7 @@ clients, `tcp:HOST:PORT` calls a server. The link between plant and autopilot is
 
 import os
 import socket
+from collections import deque
 from ipaddress import ip_address
 from select import select
 from time import perf_counter
@@ -163,6 +164,34 @@ class UdpLink:
         if self.target is not None and sender != self.target:
             return None
         return datagram, sender
+
+
+class OneByOne:
+    """A link of any kind, used as `UdpLink` is: what has come is handed out one by one.
+
+    Attributes:
+        url: The URL of the endpoint.
+    """
+
+    def __init__(self, link: GroundLink) -> None:
+        """Use `link`."""
+        self._link = link
+        self._waiting: deque[tuple[bytes, Address]] = deque()
+        self.url = link.url
+
+    def send(self, datagram: bytes, address: Address | None = None) -> None:
+        """Send to `address`, or to whom it speaks with."""
+        self._link.send(datagram, address)
+
+    def receive(self, timeout_s: float) -> tuple[bytes, Address] | None:
+        """Return what has come next and from where, or None after `timeout_s`."""
+        if not self._waiting:
+            self._waiting.extend(receive_soon(self._link, timeout_s))
+        return self._waiting.popleft() if self._waiting else None
+
+    def close(self) -> None:
+        """Close the link."""
+        self._link.close()
 
 
 def receive_soon(link: GroundLink, timeout_s: float) -> list[tuple[bytes, Address]]:

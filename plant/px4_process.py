@@ -11,7 +11,6 @@ from mavlink.link import GroundLink, LinkError, receive_soon
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, Progress, Status, Stop, fail, undisturbed
 from mavlink.px4_simulator import SimulatorEnd, Truth
 from plant.process import Pace, PlantLogs
-from plant.rotor_order import numbering
 from plant.scenario import IntegrationError, Start
 from plant.sensors import SensorSuite
 from plant.vehicle import VehicleError, load_vehicle
@@ -53,7 +52,7 @@ class Simulator:
         if vehicle.sensors is None:
             raise VehicleError(f"{vehicle.name} has no sensors: PX4 flies a vehicle with a table sensors")
         self._sensors = vehicle.sensors
-        self._rotors, self._order = vehicle.rotors, numbering(vehicle.rotors)
+        self._rotors, self._order = vehicle.rotors, vehicle.rotors.numbering()
         self._gravity_m_s2 = vehicle.gravity_m_s2
         self._start = starting_world(Start(psi=args.home.yaw_enu_deg)._replace(**args.start), vehicle, weather)
         self._physics = Physics(vehicle, args.integrator, weather)

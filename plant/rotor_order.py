@@ -5,12 +5,12 @@ rear right. The first two turn counter-clockwise and the last two clockwise, or 
 Sources: PX4 Airframes Reference, Quadrotor x and +; ArduPilot, AP_MotorsMatrix.cpp, MOTOR_FRAME_QUAD.
 """
 
+from collections.abc import Sequence
 from math import atan2, degrees
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
-from plant.vehicle import Rotors, VehicleError
-
-Shape = Literal["+", "x"]
+FourOf: TypeAlias = tuple[float, float, float, float]
+Shape: TypeAlias = Literal["+", "x"]
 
 _BEARINGS_DEG: dict[Shape, tuple[float, ...]] = {"+": (90.0, -90.0, 0.0, 180.0), "x": (45.0, -135.0, -45.0, 135.0)}
 _NEAR_DEG = 20.0
@@ -33,10 +33,15 @@ class Numbering(NamedTuple):
     reverse: bool
     rotors: tuple[int, int, int, int]
 
-    def to_vehicle(self, motors: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    def to_vehicle(self, motors: FourOf) -> FourOf:
         """Return what is given for each motor in the order of the vehicle file."""
         a, b, c, d = (motors[self.rotors.index(rotor)] for rotor in range(4))
         return (a, b, c, d)
+
+    def to_motors(self, rotors: FourOf) -> FourOf:
+        """Return what is given for each rotor of the vehicle file in the order of their motors."""
+        a, b, c, d = self.rotors
+        return (rotors[a], rotors[b], rotors[c], rotors[d])
 
     @property
     def ardupilot_frame_type(self) -> int:
@@ -44,22 +49,23 @@ class Numbering(NamedTuple):
         return _FRAME_TYPES[self.shape, self.reverse]
 
 
-def numbering(rotors: Rotors) -> Numbering:
-    """Return how others number `rotors`.
+def numbering(position_m: Sequence[tuple[float, float]], direction: Sequence[str]) -> Numbering | None:
+    """Return how others number rotors; None if they are neither a '+' nor an 'x', or do not turn as in one.
 
-    Raises:
-        VehicleError: They are neither a '+' nor an 'x', or do not turn as in one.
+    Args:
+        position_m: x forward, y left of each.
+        direction: `ccw` or `cw` of each, seen from above.
     """
-    bearings_deg = [degrees(atan2(-y, x)) for x, y in rotors.position_m]
+    bearings_deg = [degrees(atan2(-y, x)) for x, y in position_m]
     for shape, wanted_deg in _BEARINGS_DEG.items():
         nearest = [[i for i in range(4) if _apart_deg(bearings_deg[i], want) < _NEAR_DEG] for want in wanted_deg]
         if not all(len(found) == 1 for found in nearest):
             continue
         a, b, c, d = (found[0] for found in nearest)
-        turning = tuple(rotors.direction[i] for i in (a, b, c, d))
+        turning = tuple(direction[i] for i in (a, b, c, d))
         if turning in (_USUAL, _REVERSED):
             return Numbering(shape, turning == _REVERSED, (a, b, c, d))
-    raise VehicleError("rotors: other autopilots know a '+' or an 'x' whose opposite rotors turn alike, not this frame")
+    return None
 
 
 def _apart_deg(a: float, b: float) -> float:

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.rotor_order import Numbering, numbering
 from plant.sensor_parts import Sensors as Sensors
 
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
@@ -101,6 +102,26 @@ class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             return controls
         a, b, c, d = map(sqrt, controls)
         return (a, b, c, d)
+
+    def controls_of(self, speeds: FourOf) -> FourOf:
+        """Return the controls by which another simulator turns the rotors at these parts of the top speed."""
+        if self.control == "speed":
+            return speeds
+        a, b, c, d = (speed * speed for speed in speeds)
+        return (a, b, c, d)
+
+    def numbering(self) -> Numbering:
+        """Return how PX4 and ArduPilot number the rotors.
+
+        Raises:
+            VehicleError: They number none that are where these are.
+        """
+        found = numbering(self.position_m, self.direction)
+        if found is None:
+            raise VehicleError(
+                "rotors: PX4 and ArduPilot know a '+' or an 'x' whose opposite rotors turn alike, not this frame"
+            )
+        return found
 
 
 class Drag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from mavlink.link import open_link
 from plant.ardupilot import ArduPilotEnd
-from plant.rotor_order import numbering
 from plant.scenario import Start
 from plant.vehicle import Rotors, VehicleError, load_vehicle
 from plant.world import Physics, starting_world
@@ -21,7 +20,7 @@ from tests.runs import GIVE_UP_AFTER_S, Process, running
 
 VEHICLE = load_vehicle("hummingbird")
 PHYSICS = Physics(VEHICLE, "rk4")
-MOTORS = numbering(VEHICLE.rotors)
+MOTORS = VEHICLE.rotors.numbering()
 SENDER, OTHER = ("127.0.0.1", 50000), ("127.0.0.1", 50001)
 NORTH = Start(psi=90.0)
 TARGET_NED_M = (2.0, 1.0, -3.0)
@@ -162,13 +161,13 @@ def test_the_hummingbird_is_a_reversed_plus() -> None:
 def test_rotors_are_numbered_by_where_they_are(
     bearings_deg: tuple[float, ...], directions: str, shape: str, rotors: tuple[int, ...], frame_type: int
 ) -> None:
-    found = numbering(turned(bearings_deg, directions))
+    found = turned(bearings_deg, directions).numbering()
     assert (found.shape, found.rotors, found.ardupilot_frame_type) == (shape, rotors, frame_type)
 
 
 def test_rotors_that_nobody_else_numbers_are_refused() -> None:
     with pytest.raises(VehicleError, match="not this frame"):
-        numbering(turned((22.5, 112.5, 202.5, 292.5), "tctc"))
+        turned((22.5, 112.5, 202.5, 292.5), "tctc").numbering()
 
 
 @pytest.fixture
@@ -215,4 +214,4 @@ def test_a_vehicle_that_ardupilot_cannot_fly_is_one_line(tmp_path: Path) -> None
     )
     with running(process):
         assert process.wait() == 2
-    assert "other autopilots know a '+' or an 'x'" in process.errors()
+    assert "PX4 and ArduPilot know a '+' or an 'x'" in process.errors()

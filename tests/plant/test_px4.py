@@ -16,7 +16,6 @@ from mavlink.hil import ActuatorCommand
 from mavlink.link import GroundLink, open_ground_link, receive_soon
 from mavlink.px4_simulator import RESEND_AFTER_S, Motors, SimulatorEnd, Truth
 from mavlink.sensors import SensorFrame, Updated
-from plant.rotor_order import numbering
 from plant.scenario import Start
 from plant.sensors import SensorSuite
 from plant.vehicle import load_vehicle
@@ -160,9 +159,9 @@ def test_nothing_that_comes_breaks_it(datagrams: list[bytes]) -> None:
 def test_the_controls_of_a_stranger_are_thrust_or_speed_in_the_order_of_the_vehicle_file() -> None:
     for name, wanted in {"jmavsim": (0.5, 0.6, 0.7, 0.8), "iris": (0.25, 0.36, 0.49, 0.64)}.items():
         rotors = load_vehicle(name).rotors
-        controls = numbering(rotors).to_vehicle((0.25, 0.36, 0.49, 0.64))
+        controls = rotors.numbering().to_vehicle((0.25, 0.36, 0.49, 0.64))
         assert rotors.speeds_of(controls) == pytest.approx(wanted)
-    plus = numbering(load_vehicle("hummingbird").rotors)
+    plus = load_vehicle("hummingbird").rotors.numbering()
     right, left, front, rear = 0.1, 0.2, 0.3, 0.4
     assert plus.to_vehicle((right, left, front, rear)) == (front, right, rear, left)
 
