@@ -49,7 +49,7 @@ def replayed(tlog: bytes) -> dict[int, tuple[float, ...]]:
     vehicle = load_vehicle("hummingbird")
     assert vehicle.sensors is not None
     estimator = Estimator(vehicle.sensors, vehicle.gravity_m_s2, DEFAULT_ORIGIN, FRAME_US)
-    states = {}
+    states: dict[int, tuple[float, ...]] = {}
     for frame in frames_of(tlog):
         estimate = estimator.step(frame)
         if estimate is not None:
