@@ -29,7 +29,7 @@ from mavlink.magnetic_field import field_enu_gauss
 from mavlink.sensors import GpsFix, SensorFrame, Updated
 from plant.vehicle import Sensors
 
-_FIELD, _PRESSURE = int(Updated.MAGNETOMETER), int(Updated.BAROMETER)
+_FIELD, _PRESSURE = Updated.MAGNETOMETER, Updated.BAROMETER
 """Plain numbers: flags of an enumeration cost a microsecond."""
 _LARGEST_GAUSS = 4.0
 _LEAST_PA, _MOST_PA = 20e3, 115e3

@@ -7,7 +7,7 @@ number that a broken sensor sends.
 """
 
 from dataclasses import dataclass
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 from math import atan2, degrees, hypot, nan
 from typing import TypeAlias
 
@@ -18,8 +18,11 @@ from mavlink.geodesy import Geodetic
 from mavlink.hil import StateFrame
 
 
-class Updated(IntFlag):
-    """The groups of HIL_SENSOR.fields_updated; a group is new when all its bits are set."""
+class Updated:
+    """The groups of HIL_SENSOR.fields_updated; a group is new when all its bits are set.
+
+    Plain numbers: flags of `enum` would cost more than all else that is done with a frame.
+    """
 
     ACCELEROMETER = 0x7
     GYROSCOPE = 0x38
@@ -86,7 +89,7 @@ class SensorFrame:
     temperature_c: float
     gps: GpsFix | None = None
 
-    def has(self, group: Updated) -> bool:
+    def has(self, group: int) -> bool:
         """Whether a group is new."""
         return self.updated & group == group
 

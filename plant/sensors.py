@@ -103,7 +103,7 @@ class SensorSuite:
     def _measured(self, world: World) -> SensorFrame:
         now_us = world.time_us
         u, v, w, p, q, r, x, y, z = world.state[:9]
-        updated = int(_INERTIAL)
+        updated = _INERTIAL
         if self._magnetometer_rate.is_due(now_us):
             updated |= Updated.MAGNETOMETER
             self._magnetic_gauss = self._magnetic_field(world)

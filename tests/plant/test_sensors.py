@@ -76,7 +76,7 @@ def fixes(frames: Sequence[SensorFrame]) -> Iterator[GpsFix]:
     return (frame.gps for frame in frames if frame.gps is not None)
 
 
-def told(frames: Sequence[SensorFrame], group: Updated, name: str) -> np.ndarray[Any, Any]:
+def told(frames: Sequence[SensorFrame], group: int, name: str) -> np.ndarray[Any, Any]:
     return np.array([getattr(frame, name) for frame in frames if frame.has(group)])
 
 
