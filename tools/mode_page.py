@@ -105,7 +105,7 @@ def draw(path: Path) -> None:
     axes.annotate(
         "", xy=(_DISARMED[0] - 0.65, 1.75), xytext=(8.65, 1.75), arrowprops={**arrow, "shrinkA": 0, "shrinkB": 0}
     )
-    axes.text(10.3, 1.85, "\n".join(rises), fontsize=8.5, color="#225588", ha="center", va="bottom")
+    axes.text(10.3, 1.85, "\n".join(dict.fromkeys(rises)), fontsize=8.5, color="#225588", ha="center", va="bottom")
     axes.annotate(
         "", xy=(8.65, 1.25), xytext=(_DISARMED[0] - 0.65, 1.25), arrowprops={**arrow, "shrinkA": 0, "shrinkB": 0}
     )
