@@ -136,24 +136,26 @@ class Copter:
             DecisionError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
-        known = self._senses.state(frame)
+        due = self._loop.is_due(frame.time_us)
+        follows = self._time_us is not None and frame.time_us == self._time_us + self.frame_interval_us
+        known = self._senses.state(frame, asked=due or not follows)
         if known is None:
             if self._time_us is not None:  # another flight, of which nothing is known yet
                 self.stations.restart = REBOOT
             return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
-        if self._time_us is None or frame.time_us != self._time_us + self.frame_interval_us:
+        if not follows:
             self._begin(known)
         self._time_us = frame.time_us
-        state = self._loop.state(known)
         decision = None
-        if self._loop.is_due(frame.time_us):
+        if due:
+            state = self._loop.state(known)
             self._sense(frame.time_us, state)
             guidance = self.pilot.step()
             decision = self._decide(frame.time_us, state, guidance)
             self._sample = (frame.time_us, state, guidance, decision)
         command = ActuatorCommand(frame.time_us, self._controls, armed=self.pilot.state.armed)
         self._step_time_s = self._clock() - started_s
-        return Step(command, decision, self._step_time_s, self._senses.estimate)
+        return Step(command, decision, self._step_time_s, self._senses.estimate if due else None)
 
     def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
         """Hear ground stations, and return what to send them; after each `step`, while the plant integrates."""

@@ -73,19 +73,20 @@ class Autopilot:
             DecisionError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
-        known = self._senses.state(frame)
+        due = self._loop.is_due(frame.time_us)
+        known = self._senses.state(frame, asked=due)
         if known is None:
             self._time_us = None
             return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
         if self._time_us is None or frame.time_us != self._time_us + self.frame_interval_us:
             self._begin(frame)
         self._time_us = frame.time_us
-        state = self._loop.state(known)
         decision = None
-        if self._loop.is_due(frame.time_us):
+        if due:
+            state = self._loop.state(known)
             decision = self._loop.decide(frame.time_us, state, self._planner.horizon(frame.time_us))
         command = ActuatorCommand(frame.time_us, self._loop.controls, armed=True)
-        return Step(command, decision, self._clock() - started_s, self._senses.estimate)
+        return Step(command, decision, self._clock() - started_s, self._senses.estimate if due else None)
 
     def _begin(self, frame: Frame) -> None:
         vehicle = self._loop.vehicle

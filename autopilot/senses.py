@@ -15,8 +15,8 @@ from plant.vehicle import Vehicle, VehicleError
 class Estimating(Protocol):
     """An estimator of one flight."""
 
-    def step(self, frame: SensorFrame, /) -> Estimate | None:
-        """Take in the next frame; return None until the first estimate, and never after."""
+    def step(self, frame: SensorFrame, /, *, asked: bool) -> Estimate | None:
+        """Take in the next frame; return None until the first estimate. Unless `asked`, an older one will do."""
 
 
 Estimator: TypeAlias = Callable[[int], Estimating]
@@ -67,8 +67,8 @@ class Senses:
         self.fix: GpsFix | None = None
         self.gps_off = False
 
-    def state(self, frame: Frame) -> StateFrame | None:
-        """Return the state at a frame; None until there is an estimate.
+    def state(self, frame: Frame, *, asked: bool = True) -> StateFrame | None:
+        """Return the state at a frame, or unless `asked` an older one; None until there is an estimate.
 
         Time that begins again is another flight, of which nothing is known. A frame that is a little late is the
         estimator's to judge.
@@ -82,7 +82,7 @@ class Senses:
         if self.gps_off and frame.gps is not None:
             frame = replace(frame, gps=None)
         self.sensed, self.fix = frame, frame.gps or self.fix
-        self.estimate = self._estimating.step(frame)
+        self.estimate = self._estimating.step(frame, asked=asked)
         return None if self.estimate is None else self.estimate.frame
 
     def _begins_again(self, frame: SensorFrame) -> bool:

@@ -41,7 +41,8 @@ class Standing:
         Standing.made += 1
         self._began_us: int | None = None
 
-    def step(self, frame: SensorFrame, /) -> Estimate | None:
+    def step(self, frame: SensorFrame, /, *, asked: bool) -> Estimate | None:
+        del asked
         if self._began_us is None:
             self._began_us = frame.time_us
         if frame.time_us < self._began_us + ALIGNED_US:

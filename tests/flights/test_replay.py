@@ -16,7 +16,7 @@ from plant.vehicle import load_vehicle
 from tests.runs import Array, fly
 
 GOLDEN = Path(__file__).parents[1] / "golden"
-FRAME_US = 4000
+FRAME_US, CONTROL_US = 4000, 8000
 STATE_COLUMNS = slice(1, 14)
 
 
@@ -51,8 +51,8 @@ def replayed(tlog: bytes) -> dict[int, tuple[float, ...]]:
     estimator = Estimator(vehicle.sensors, vehicle.gravity_m_s2, DEFAULT_ORIGIN, FRAME_US)
     states: dict[int, tuple[float, ...]] = {}
     for frame in frames_of(tlog):
-        estimate = estimator.step(frame)
-        if estimate is not None:
+        estimate = estimator.step(frame, asked=frame.time_us % CONTROL_US == 0)
+        if estimate is not None and estimate.frame.time_us == frame.time_us:
             f = estimate.frame
             states[f.time_us] = (*f.position_enu_m, *f.velocity_enu_m_s, *f.attitude, *f.rate_flu_rad_s)
     return states
