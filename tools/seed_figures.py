@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tools.consistency import NAVIGATION
 from tools.figures import TOP_IN, axes_grid, put_head, shortened, write_figure
@@ -13,6 +14,7 @@ from tools.report import SETTLED_AFTER_S
 from tools.seeds import QUANTITIES, Flown
 
 _GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
+_LABEL_IN = 0.55
 _PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
     ("RMS (m)", {"control": ("#000000", "reference from estimate"), "true": ("#D55E00", "reference from truth")}),
     ("RMS (m)", {"horizontal": ("#0072B2", "estimate, horizontal"), "vertical": ("#E69F00", "estimate, vertical")}),
@@ -26,8 +28,9 @@ def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
     estimated = not all(np.isnan(flown.values[2]) for flown in flights)
     panels = _PANELS if estimated else _PANELS[:1]
     rows = len(panels) + estimated
-    figure, grid = axes_grid(rows, 1, TOP_IN + 0.24, row_in=0.35 + 0.42 * len(cases), share=False)
-    figure.subplots_adjust(left=0.2, hspace=0.55)
+    row_in = 0.35 + 0.42 * len(cases)
+    figure, grid = axes_grid(rows, 1, TOP_IN + 0.24, row_in=row_in + _LABEL_IN, share=False)
+    figure.subplots_adjust(left=0.2, hspace=_LABEL_IN / row_in)
     several = len({contender for contender, _ in cases}) > 1
     names = [shortened(f"{track}, {contender}" if several else track) for contender, track in cases]
     for (axes,), (label, quantities) in zip(grid, panels, strict=False):
@@ -35,6 +38,9 @@ def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
             shift = 0.26 * (number - 0.5 * (len(quantities) - 1))
             _strips(axes, flights, cases, quantity, color, called, shift)
         axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel(label)
     if estimated:
         axes = grid[-1][0]
