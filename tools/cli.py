@@ -1,5 +1,7 @@
 """`colibri`: the one command. Loads only what the subcommand needs."""
 
+import signal
+import threading
 from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable
 from math import inf
@@ -23,6 +25,8 @@ def main(argv: list[str] | None = None) -> int:
     """Run a subcommand; return the exit code."""
     args = _parser().parse_args(argv)
     use_one_thread()
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that what was started is ended, too
     try:
         if args.command == "fly":
             from tools.fly import fly

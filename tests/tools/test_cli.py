@@ -207,7 +207,7 @@ def has_flown(out: Path) -> bool:
 
 @pytest.mark.parametrize("whom", ["group", "parent"])
 def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path, whom: str) -> None:
-    """A terminal interrupts the whole group; `kill` only the command itself."""
+    """A terminal interrupts the whole group; `kill` ends only the command itself."""
     flight = fly_slowly(tmp_path)
     wait_for(lambda: has_flown(tmp_path), "the flight to begin")
     children = psutil.Process(flight.pid).children(recursive=True)
@@ -215,7 +215,7 @@ def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path, whom: str) ->
     if whom == "group":
         os.killpg(flight.pid, signal.SIGINT)
     else:
-        flight.send_signal(signal.SIGINT)
+        flight.send_signal(signal.SIGTERM)
     _, said = flight.communicate(timeout=60.0)
     assert flight.returncode == 130
     assert said.splitlines()[-1] == f"colibri: error: interrupted; what was logged is in {tmp_path}"
