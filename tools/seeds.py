@@ -2,12 +2,13 @@
 
 import argparse
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from autopilot.controller import ControllerError, DecisionError, load_controller
 from autopilot.profile import ProfileError
@@ -22,6 +23,8 @@ from tools.recording import RecordingError
 from tools.report import SETTLED_AFTER_S
 from tools.side_by_side import side_by_side
 from tools.tables import write_table
+
+Array: TypeAlias = NDArray[np.float64]
 
 DEFAULT_PROFILE = "flight"
 LOST_M = 5.0
@@ -140,17 +143,22 @@ def _values(figures: dict[str, Any]) -> tuple[float, ...]:
 
 
 def _row(flights: Sequence[Flown]) -> tuple[str, ...]:
-    """Return root mean squares over the flights, and the largest of one flight in brackets."""
+    """Return root mean squares over the flights, of NEES the mean, and the largest of one flight in brackets."""
     values = np.array([flown.values for flown in flights if not flown.lost]).reshape(-1, len(QUANTITIES))
     lost = sum(bool(flown.lost) for flown in flights)
-    cells = [_cell(column) for column in values.T]
+    *errors, nees = values.T
+    cells = [*(_cell(column, _rms) for column in errors), _cell(nees, np.mean)]
     return (flights[0].contender, flights[0].track, str(len(flights)), str(lost), *cells)
 
 
-def _cell(column: np.ndarray[Any, np.dtype[np.float64]]) -> str:
+def _cell(column: Array, middle: Callable[[Array], Any]) -> str:
     if not len(column) or np.isnan(column).any():
         return "-"
-    return f"{np.sqrt(np.mean(column**2)):.3g} ({column.max():.3g})"
+    return f"{middle(column):.3g} ({column.max():.3g})"
+
+
+def _rms(column: Array) -> Any:
+    return np.sqrt(np.mean(column**2))
 
 
 def _write_flights(path: Path, flights: Sequence[Flown]) -> None:
