@@ -27,7 +27,7 @@ lint: setup
 	$(BIN)/lint-imports
 
 test: lint
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 # MAVSDK, MAVProxy and DroneKit fly the vehicle: minutes each. MAVSDK_EXAMPLES=FOLDER, a checkout of MAVSDK-Python, has
 # its examples flown too; they need the ports 14540 and 50051. TABLE=FILE keeps what came of them, as Markdown.

@@ -3,7 +3,9 @@
 import sys
 from pathlib import Path
 
+from mavlink.feedback import Feedback, feedback
 from mavlink.home import DEFAULT_HOME, home
+from mavlink.link import OneByOne, open_ground_link, open_link
 from mavlink.process import ArgumentParser, add_common_arguments, begin
 
 DEFAULT_PLANT = "udpout:127.0.0.1:14560"
@@ -13,16 +15,28 @@ def command_line() -> ArgumentParser:
     """Return what reads the command line."""
     parser = ArgumentParser(
         prog="python -m autopilot",
-        description="The autopilot: takes the vehicle's state from a plant and answers with rotor commands, "
-        "over MAVLink/UDP. Start `python -m plant` in another terminal, before or after.",
+        description="The autopilot: takes the vehicle's state, or what its sensors measure, from a plant and answers "
+        "with rotor commands, over MAVLink/UDP. Start `python -m plant` in another terminal, before or after.",
         epilog="Example: python -m autopilot --track spiral",
     )
     add = parser.add_argument
     add("--plant", default=DEFAULT_PLANT, metavar="URL", help="the plant to call (default %(default)s)")
+    add(
+        "--simulator",
+        metavar="URL",
+        help="fly a simulator that speaks PX4's interface instead, jMAVSim say: tcp:127.0.0.1:4560; on its sensors",
+    )
     add("--track", metavar="TRACK", help="what to fly, as in `colibri fly` (default spiral; with --gcs: what is asked)")
     add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
     add("--controller", metavar="NAME", help="control law (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml to control (default: the profile's)")
+    add(
+        "--feedback",
+        type=feedback,
+        default=Feedback.STATE,
+        metavar="state|sensors",
+        help="what to ask the plant for: the true state (default), or what sensors measure",
+    )
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--gcs", action="append", default=[], metavar="URL", help="a ground station: udpout:, udpin:, tcp: or tcpin:")
     add("--home", type=home, default=DEFAULT_HOME, metavar="LAT,LON,ALT,YAW", help="the origin (default %(default)s)")
@@ -37,10 +51,16 @@ def command_line() -> ArgumentParser:
 def main() -> int:
     """Run the autopilot; return the exit code."""
     args = command_line().parse_args()
-    link, status, stop = begin("autopilot", args.plant, args)
+    if args.simulator is None:
+        link, status, stop = begin("autopilot", args.plant, args, open_link)
+        from autopilot.process import run
+
+        return run(args, link, status, stop)
+    args.feedback = Feedback.SENSORS
+    simulator, status, stop = begin("autopilot", args.simulator, args, open_ground_link)
     from autopilot.process import run
 
-    return run(args, link, status, stop)
+    return run(args, OneByOne(simulator), status, stop)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ class Facts(NamedTuple):
         charge: Part of the battery's charge that is left; 1 without a battery.
         thrust_stick: Of the pilot, 0..1; None if the mode takes none, or no pilot is heard.
         outside_fence: Why the vehicle may not be where it is; empty if it may.
+        not_known: What the estimator does not know well enough; empty if nothing.
     """
 
     state: VehicleState | None
@@ -29,6 +30,7 @@ class Facts(NamedTuple):
     charge: float
     thrust_stick: float | None
     outside_fence: str = ""
+    not_known: str = ""
 
 
 def _tilt(facts: Facts) -> str:
@@ -60,7 +62,11 @@ def _fence(facts: Facts) -> str:
     return facts.outside_fence
 
 
-CHECKS: tuple[Callable[[Facts], str], ...] = (_tilt, _speed, _standing, _charge, _thrust_stick, _fence)
+def _knows(facts: Facts) -> str:
+    return facts.not_known
+
+
+CHECKS: tuple[Callable[[Facts], str], ...] = (_tilt, _speed, _standing, _charge, _thrust_stick, _fence, _knows)
 
 
 def refusals(facts: Facts) -> list[str]:

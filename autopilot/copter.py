@@ -9,9 +9,10 @@ from autopilot.attitude_reference import DEFAULT_LIMITS, AttitudeLimits, Attitud
 from autopilot.behaviour import Behaviour
 from autopilot.companion import Companion
 from autopilot.controller import Clock, Decision, VehicleState
-from autopilot.core import Step
+from autopilot.core import STILL, Step
 from autopilot.course import Course, Scene, Steered
 from autopilot.courses import Along, Climb, Stop, homeward, landing, to_track
+from autopilot.health_watch import HealthWatch, not_known
 from autopilot.instants import instants
 from autopilot.leader import Following
 from autopilot.leaning import AltitudeSticks, Stabilized
@@ -24,6 +25,7 @@ from autopilot.planner import Planner, plan, start_yaw
 from autopilot.power import PowerMeter
 from autopilot.profile import Profile
 from autopilot.reference import Reference, target_of
+from autopilot.senses import Estimator, Senses
 from autopilot.snapshots import Photographer
 from autopilot.stations import REBOOT, Stations, StationSettings
 from autopilot.sticks import PositionSticks
@@ -32,11 +34,11 @@ from autopilot.tuning import Tuning, builder
 from mavlink.hil import ActuatorCommand, StateFrame
 from mavlink.hub import Outgoing
 from mavlink.parameters import Parameters, Value
+from mavlink.sensors import Frame
 from mavlink.services.statustext import INFO
 from mavlink.setpoints import OffboardSetpoint, Sticks
 from plant.vehicle import Vehicle
 
-_STILL = (0.0, 0.0, 0.0, 0.0)
 _LEADER_LOST_US = 10_000_000
 
 
@@ -77,6 +79,7 @@ class Copter:
         *,
         values: dict[str, Value] | None = None,
         first: Track | None = None,
+        estimator: Estimator | None = None,
     ) -> None:
         """Fly `vehicle` by `profile`; `clock` only measures, it decides nothing.
 
@@ -88,6 +91,7 @@ class Copter:
             values: Of parameters that were changed before.
             first: A track that is flown from time 0 on, the vehicle being in the air; None: it stands, or is picked
                 up in hold.
+            estimator: Makes what turns frames of sensors into states; None: frames are states.
 
         Raises:
             ControllerError: The profile's control law cannot be used.
@@ -106,6 +110,8 @@ class Copter:
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock
         self.frame_interval_us = self._loop.frame_interval_us
+        self._senses = Senses(estimator, self.frame_interval_us)
+        self._health = HealthWatch()
         self._interval_s = self._loop.control_interval_us * 1e-6
         flies_by = behaviour(self.parameters)
         self._attitude: AttitudeReference | None = None
@@ -118,31 +124,38 @@ class Copter:
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
         self._time_us: int | None = None
-        self._controls = _STILL
+        self._controls = STILL
         self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
         self._step_time_s = 0.0
         self.solve_time_s = 0.0
 
-    def step(self, frame: StateFrame) -> Step:
-        """Answer a frame of the plant.
+    def step(self, frame: Frame) -> Step:
+        """Answer a frame of the plant; on sensors nothing is known, and nobody served, before the first estimate.
 
         Raises:
             DecisionError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
-        if self._time_us is None or frame.time_us != self._time_us + self.frame_interval_us:
-            self._begin(frame)
+        due = self._loop.is_due(frame.time_us)
+        follows = self._time_us is not None and frame.time_us == self._time_us + self.frame_interval_us
+        known = self._senses.state(frame, asked=due or not follows)
+        if known is None:
+            if self._time_us is not None:  # another flight, of which nothing is known yet
+                self.stations.restart = REBOOT
+            return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
+        if not follows:
+            self._begin(known)
         self._time_us = frame.time_us
-        state = self._loop.state(frame)
         decision = None
-        if self._loop.is_due(frame.time_us):
+        if due:
+            state = self._loop.state(known)
             self._sense(frame.time_us, state)
             guidance = self.pilot.step()
             decision = self._decide(frame.time_us, state, guidance)
             self._sample = (frame.time_us, state, guidance, decision)
         command = ActuatorCommand(frame.time_us, self._controls, armed=self.pilot.state.armed)
         self._step_time_s = self._clock() - started_s
-        return Step(command, decision, self._step_time_s)
+        return Step(command, decision, self._step_time_s, self._senses.estimate if due else None)
 
     def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
         """Hear ground stations, and return what to send them; after each `step`, while the plant integrates."""
@@ -167,9 +180,13 @@ class Copter:
             return
         if self._time_us is not None:  # another flight: nothing that any service remembers is of any use
             self.stations.restart = REBOOT
-        loop.begin(self._start_speed if frame.time_us == 0 else hover_speed, self._first_yaw())
-        self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None)
-        self._controls = _STILL if self.pilot.standing else loop.controls
+        speed = self._start_speed if frame.time_us == 0 else hover_speed
+        rests = self._senses.estimate is not None  # or there would be no estimate
+        if rests:
+            speed = loop.vehicle.rotors.idle_speed
+        loop.begin(speed, self._first_yaw())
+        self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None, rests=rests)
+        self._controls = STILL if self.pilot.standing else loop.controls
         self.stations.say(INFO, self.stations.banner())
 
     def _first_yaw(self) -> float:
@@ -192,7 +209,9 @@ class Copter:
         sticks = pilot.scene().steered.sticks
         thrust = sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None
         outside = self.stations.missions.breach(state.position_enu_m, self._time_us or 0)
-        pilot.take_stock(Facts(state, pilot.standing, self.power.left, thrust, outside))
+        estimate = self._senses.estimate
+        unknown = not_known(estimate.health) if estimate is not None else ""
+        pilot.take_stock(Facts(state, pilot.standing, self.power.left, thrust, outside, unknown))
 
     def _missing(self) -> list[Need]:
         """Return needs of modes that nothing meets now: the message before the one that asks may have met one."""
@@ -226,7 +245,7 @@ class Copter:
         elif guidance.attitude is not None:
             decision = loop.decide_attitude(now_us, state, guidance.attitude)
         else:
-            self._controls = _STILL
+            self._controls = STILL
             return None
         self._controls = loop.controls
         self.solve_time_s = decision.diagnostics.solve_time_s
@@ -235,6 +254,10 @@ class Copter:
     def _report(self, now_us: int, state: VehicleState, guidance: Guidance, decision: Decision | None) -> None:
         pilot, stations = self.pilot, self.stations
         self._take_stock(state)
+        self._senses.gps_off = stations.failures.gps_off
+        if self._senses.estimate is not None:
+            for severity, line in self._health.lines(self._senses.estimate.health):
+                stations.say(severity, line)
         idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
         least = idle if pilot.state.armed else 0.0
         c1, c2, c3, c4 = (max(control, least) for control in self._controls)
@@ -251,6 +274,7 @@ class Copter:
                 (c1, c2, c3, c4),
                 self.power,
                 stations,
+                self._senses,
             )
         )
 

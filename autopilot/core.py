@@ -1,25 +1,33 @@
-"""The autopilot as a pure composition: a frame of the vehicle's state in, the rotor command that answers it out."""
+"""The autopilot as a pure composition: a frame of the vehicle in, the rotor command that answers it out."""
 
 from typing import NamedTuple
 
 from autopilot.controller import Clock, Decision
+from autopilot.estimate import Estimate
 from autopilot.loop import ControlLoop
 from autopilot.planner import plan
 from autopilot.profile import Profile
+from autopilot.senses import Estimator, Senses
 from autopilot.tracks import Track
-from mavlink.hil import ActuatorCommand, StateFrame
+from mavlink.hil import ActuatorCommand
+from mavlink.sensors import Frame
 from plant.vehicle import Vehicle
+
+STILL = (0.0, 0.0, 0.0, 0.0)
+"""Rotors that stand."""
 
 
 class Step(NamedTuple):
     """The answer to a frame: the command to send, the decision behind it, and how long it took.
 
-    Between two control samples the last command is sent again, and there is no decision.
+    Between two control samples the last command is sent again, and there is no decision. Where the state is told, there
+    is no estimate.
     """
 
     command: ActuatorCommand
     decision: Decision | None
     duration_s: float
+    estimate: Estimate | None = None
 
 
 class Autopilot:
@@ -29,8 +37,17 @@ class Autopilot:
         frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
     """
 
-    def __init__(self, profile: Profile, vehicle: Vehicle, track: Track, clock: Clock) -> None:
+    def __init__(
+        self, profile: Profile, vehicle: Vehicle, track: Track, clock: Clock, *, estimator: Estimator | None = None
+    ) -> None:
         """Fly `vehicle` along `track`; `clock` only measures, it decides nothing.
+
+        Args:
+            profile: The control law and its numbers.
+            vehicle: That it controls.
+            track: What it flies, from time 0 on.
+            clock: Seconds.
+            estimator: Makes what turns frames of sensors into states; None: frames are states.
 
         Raises:
             ControllerError: The profile's control law cannot be used.
@@ -43,27 +60,37 @@ class Autopilot:
         self._clock = clock
         self._time_us: int | None = None
         self.frame_interval_us = self._loop.frame_interval_us
+        self._senses = Senses(estimator, self.frame_interval_us)
 
-    def step(self, frame: StateFrame) -> Step:
+    def step(self, frame: Frame) -> Step:
         """Answer a frame.
 
         Frames follow one another at the frame interval. One that does not begins a new flight: with the profile's
-        rotor speed at time 0, and with hover in mid-flight, where nothing is known of the rotors.
+        rotor speed at time 0, and with hover in mid-flight, where nothing is known of the rotors. On sensors a flight
+        begins with the first estimate, of a vehicle that stands; until then it is not armed.
 
         Raises:
             DecisionError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
+        due = self._loop.is_due(frame.time_us)
+        known = self._senses.state(frame, asked=due)
+        if known is None:
+            self._time_us = None
+            return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
         if self._time_us is None or frame.time_us != self._time_us + self.frame_interval_us:
             self._begin(frame)
         self._time_us = frame.time_us
-        state = self._loop.state(frame)
         decision = None
-        if self._loop.is_due(frame.time_us):
+        if due:
+            state = self._loop.state(known)
             decision = self._loop.decide(frame.time_us, state, self._planner.horizon(frame.time_us))
         command = ActuatorCommand(frame.time_us, self._loop.controls, armed=True)
-        return Step(command, decision, self._clock() - started_s)
+        return Step(command, decision, self._clock() - started_s, self._senses.estimate if due else None)
 
-    def _begin(self, frame: StateFrame) -> None:
-        speed = self._start_speed if frame.time_us == 0 else self._loop.vehicle.hover_speed
+    def _begin(self, frame: Frame) -> None:
+        vehicle = self._loop.vehicle
+        speed = self._start_speed if frame.time_us == 0 else vehicle.hover_speed
+        if self._time_us is None and self._senses.estimate is not None:
+            speed = vehicle.rotors.idle_speed
         self._loop.begin(speed, float(self._planner.horizon(frame.time_us).yaw_rad[0]))

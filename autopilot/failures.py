@@ -1,6 +1,7 @@
 """Injected failures, MAV_CMD_INJECT_FAILURE: obeyed only where parameter SYS_FAILURE_EN says so, and only what is real.
 
-With state feedback GPS is telemetry only: off, its messages say that there is no fix, and the vehicle flies on.
+With GPS off no fix reaches the estimator, and its messages say that there is none. Where the state is told nothing
+steers by GPS, and the vehicle flies on as before.
 """
 
 from mavlink.dialect import mav

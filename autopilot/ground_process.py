@@ -10,6 +10,7 @@ from autopilot.copter import Copter
 from autopilot.ground_links import GroundLinks, open_links
 from autopilot.parameters import ImpossibleError, definitions
 from autopilot.profile import Profile
+from autopilot.senses import Estimator
 from autopilot.stations import REBOOT, SHUT_DOWN, StationSettings
 from autopilot.tracks import track
 from mavlink.files import Quota
@@ -42,7 +43,9 @@ class Ground:
         shut_down: Whether a ground station has asked for the end.
     """
 
-    def __init__(self, args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status) -> None:
+    def __init__(
+        self, args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None, status: Status
+    ) -> None:
         """Open links and files as the command line says.
 
         Raises:
@@ -51,6 +54,7 @@ class Ground:
         self._args = args
         self._profile = profile
         self._vehicle = vehicle
+        self._estimator = estimator
         self._status = status
         self._state: Path | None = args.state
         self._signing = self._read_key()
@@ -81,7 +85,7 @@ class Ground:
         self._links.send(self.copter.serve(self._links.receive(stations)))
         if stations.restart:
             self._restart(stations.restart)
-        if now_s >= self._told_s + _TELL_EVERY_S:
+        if now_s >= self._told_s + _TELL_EVERY_S and self.copter.pilot.has_seen:
             self._tell(now_s)
         if self.copter.parameters.revision != self._revision:
             self._save_parameters()
@@ -120,7 +124,13 @@ class Ground:
         )
         try:
             copter = Copter(
-                self._profile, self._vehicle, settings, perf_counter, values=self._read_parameters(), first=self._first
+                self._profile,
+                self._vehicle,
+                settings,
+                perf_counter,
+                values=self._read_parameters(),
+                first=self._first,
+                estimator=self._estimator,
             )
         except ImpossibleError as error:
             raise GroundError(f"{self._parameter_path()}: {error}") from error
@@ -219,13 +229,15 @@ class Ground:
         }
 
 
-def open_ground(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status) -> Ground:
+def open_ground(
+    args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None, status: Status
+) -> Ground:
     """Return what serves ground stations as the command line says.
 
     Raises:
         GroundError: Something of it cannot be used.
     """
-    return Ground(args, profile, vehicle, status)
+    return Ground(args, profile, vehicle, estimator, status)
 
 
 def _invitation(url: str) -> str:

@@ -116,11 +116,14 @@ class Pilot:
         motionless = Reference(np.zeros((4, 3)), np.zeros(2))
         lead(motionless, still_target((1.0, 0.0, 0.0), 0.0, samples), self.behaviour.limits, interval_us * 1e-6)
 
-    def begin(self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None) -> None:
-        """See the vehicle for the first time: it stands, or it is picked up in flight, in `mode` or in hold."""
+    def begin(self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None, rests: bool = False) -> None:
+        """See the vehicle for the first time: it stands, or it is picked up in flight, in `mode` or in hold.
+
+        Where it is known that it `rests` it stands, however high it seems to be: an estimate of height is not exact.
+        """
         self._now_us, self._vehicle = now_us, vehicle
         self.armed_us = self.takeoff_us = self.landing_us = 0
-        self.standing = self._idles = mode is None and stands_at_first(vehicle, 0.0)
+        self.standing = self._idles = mode is None and (rests or stands_at_first(vehicle, 0.0))
         self.reference = moving_with(vehicle)
         if self.standing:
             if not self._home_is_chosen:
@@ -140,6 +143,11 @@ class Pilot:
             steered: What clients ask for.
         """
         self._now_us, self._vehicle, self._steered = now_us, vehicle, steered
+
+    @property
+    def has_seen(self) -> bool:
+        """Whether it has ever known where the vehicle is: on sensors that takes a while."""
+        return self._vehicle is not None
 
     def take_stock(self, facts: Facts) -> None:
         """Take in what arming is judged by."""

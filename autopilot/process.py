@@ -7,12 +7,17 @@ from typing import TYPE_CHECKING
 
 from autopilot.controller import Active, ControllerError, DecisionError, Fallback
 from autopilot.core import Autopilot, Step
+from autopilot.estimate import Estimate
 from autopilot.profile import Profile, ProfileError, load_profile
 from autopilot.qp import QpStatus, SolverError
+from autopilot.senses import Estimator, estimator_for
 from autopilot.tracks import TrackError, track
-from mavlink.link import LinkError, UdpLink
+from mavlink.dialect import RESULT_UNSUPPORTED
+from mavlink.feedback import Feedback
+from mavlink.link import LinkError, OneByOne, UdpLink
 from mavlink.lockstep import AutopilotEnd
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Status, Stop, fail, undisturbed
+from mavlink.px4_flier import FlierEnd
 from plant.vehicle import Vehicle, VehicleError, load_vehicle
 
 if TYPE_CHECKING:
@@ -23,6 +28,17 @@ DECISION_COLUMNS = (
     *("t", "phi_ref", "theta_ref", "psi_ref"),
     *("qp_status", "fallback", "solve_time_us", "control_step_us", "cost", "slack"),
     *(f"active_{kind}" for kind in Active._fields),
+)
+
+ESTIMATE_COLUMNS = (
+    *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r"),
+    *(f"sd_{name}" for name in ("x", "y", "z", "vx", "vy", "vz", "east", "north", "up")),
+    *("gyro_bias_x", "gyro_bias_y", "gyro_bias_z", "accel_bias_x", "accel_bias_y", "accel_bias_z"),
+    *("flags", "rejected", "resets"),
+)
+CHECK_COLUMNS = (
+    *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz"),
+    *(f"P{row}{column}" for row in range(9) for column in range(row, 9)),
 )
 
 STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, status in enumerate(QpStatus)}
@@ -36,17 +52,32 @@ _SILENCE_SAID_AFTER_S = 2.0
 _WAIT_AT_MOST_S = 0.1
 
 
-class AutopilotLog:
-    """What the autopilot writes: one row a control sample."""
+def _refusal(result: int) -> str:
+    if result == RESULT_UNSUPPORTED:
+        return "the plant's vehicle has no sensors"
+    return "the plant flies at another frame rate or feedback, and will not change it in mid-flight"
 
-    def __init__(self, folder: Path) -> None:
-        """Create `autopilot.csv` in `folder`."""
+
+class AutopilotLog:
+    """What the autopilot writes: one row a control sample, and what it estimates then."""
+
+    def __init__(self, folder: Path, feedback: Feedback) -> None:
+        """Create `autopilot.csv` in `folder`; on sensors also `estimate.csv` and `filter.csv`."""
         self._decisions = CsvLog(folder / "autopilot.csv", DECISION_COLUMNS)
+        self._estimates = self._checks = None
+        if feedback is Feedback.SENSORS:
+            self._estimates = CsvLog(folder / "estimate.csv", ESTIMATE_COLUMNS)
+            self._checks = CsvLog(folder / "filter.csv", CHECK_COLUMNS)
 
     def write(self, step: Step) -> None:
-        """Append a control sample; a frame between two of them has nothing to tell."""
+        """Append a control sample; a frame between two of them has nothing to tell but how the filter stands."""
+        if self._checks is not None and step.estimate is not None and step.estimate.check is not None:
+            check = step.estimate.check
+            self._checks.write((check.time_us / 1e6, *check.state, *check.covariance))
         if step.decision is None:
             return
+        if self._estimates is not None and step.estimate is not None:
+            self._write_estimate(self._estimates, step.estimate)
         how = step.decision.diagnostics
         codes = (STATUS_CODES[how.qp_status], FALLBACK_CODES[how.fallback])
         times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
@@ -56,21 +87,32 @@ class AutopilotLog:
         )
 
     def close(self) -> None:
-        """Close the file."""
-        self._decisions.close()
+        """Close the files."""
+        for log in (self._decisions, self._estimates, self._checks):
+            if log is not None:
+                log.close()
+
+    def _write_estimate(self, log: CsvLog, estimate: Estimate) -> None:
+        frame = estimate.frame
+        state = (*frame.position_enu_m, *frame.velocity_enu_m_s, *frame.attitude, *frame.rate_flu_rad_s)
+        deviations = (*estimate.position_std_m, *estimate.velocity_std_m_s, *estimate.attitude_std_rad)
+        biases = (*estimate.gyro_bias_rad_s, *estimate.accel_bias_m_s2)
+        counts = (int(estimate.health.flags), sum(estimate.rejected.values()), estimate.resets)
+        log.write((frame.time_us / 1e6, *state, *deviations, *biases, *counts))
 
 
-def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
+def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop: Stop) -> int:
     """Fly the plant at the other end of `link` as the command line says; return the exit code."""
     try:
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
-        ground = _ground(args, profile, vehicle, status) if args.gcs else None
-        autopilot = ground.copter if ground else Autopilot(profile, vehicle, track(args.track or TRACK), perf_counter)
+        estimator = estimator_for(args.feedback, vehicle, args.home.origin)
+        ground = _ground(args, profile, vehicle, estimator, status) if args.gcs else None
+        autopilot = ground.copter if ground else _alone(args, profile, vehicle, estimator)
+        end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
     except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
         fail(str(error))
-    log = AutopilotLog(args.out) if args.out else None
-    end = AutopilotEnd(system_id=args.system_id, frame_interval_us=autopilot.frame_interval_us, now_s=perf_counter())
+    log = AutopilotLog(args.out, args.feedback) if args.out else None
     try:
         with undisturbed():
             Client(link, end, status, stop, log, ground).fly(autopilot)
@@ -85,11 +127,37 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
 
 
-def _ground(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status) -> "Ground":
+def _end(args: argparse.Namespace, frame_interval_us: int) -> AutopilotEnd:
+    return AutopilotEnd(
+        system_id=args.system_id, frame_interval_us=frame_interval_us, now_s=perf_counter(), feedback=args.feedback
+    )
+
+
+def _flier(args: argparse.Namespace, vehicle: Vehicle) -> FlierEnd:
+    """Return what flies a simulator that counts the rotors as PX4 does.
+
+    Raises:
+        VehicleError: PX4 cannot count them.
+    """
+    rotors, order = vehicle.rotors, vehicle.rotors.numbering()
+    return FlierEnd(
+        system_id=args.system_id,
+        now_s=perf_counter(),
+        to_motors=lambda speeds: rotors.controls_of(order.to_motors(speeds)),
+    )
+
+
+def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None) -> Autopilot:
+    return Autopilot(profile, vehicle, track(args.track or TRACK), perf_counter, estimator=estimator)
+
+
+def _ground(
+    args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None, status: Status
+) -> "Ground":
     """Load what serves ground stations only where there are any: it is as much as all the rest."""
     from autopilot.ground_process import open_ground
 
-    return open_ground(args, profile, vehicle, status)
+    return open_ground(args, profile, vehicle, estimator, status)
 
 
 class Client:
@@ -97,8 +165,8 @@ class Client:
 
     def __init__(
         self,
-        link: UdpLink,
-        end: AutopilotEnd,
+        link: UdpLink | OneByOne,
+        end: AutopilotEnd | FlierEnd,
         status: Status,
         stop: Stop,
         log: AutopilotLog | None,
@@ -116,7 +184,7 @@ class Client:
 
     def fly(self, autopilot: "Autopilot | Copter") -> None:
         """Answer every frame until told to stop."""
-        self._status.say("calling", "waiting for the plant at " + self._link.url.removeprefix("udpout:"))
+        self._status.say("calling", "waiting for the plant at " + self._link.url.partition(":")[2])
         due_s = 0.0
         while not self._stop:
             received = self._link.receive(min(max(0.0, due_s - perf_counter()), _WAIT_AT_MOST_S))
@@ -152,4 +220,4 @@ class Client:
             self._status.say("silence", f"no frame for {_SILENCE_SAID_AFTER_S:.0f} s, waiting for a plant")
         if self._end.refused is not None and not self._refusal_said:
             self._refusal_said = True
-            self._status.say("refused", "the plant flies at another frame rate, and will not change it in mid-flight")
+            self._status.say("refused", _refusal(self._end.refused))

@@ -4,10 +4,12 @@ from math import nan
 
 from autopilot.controller import Array, AttitudeDemand, Decision, Fallback, Horizon, VehicleState
 from autopilot.forecast import Forecaster
+from autopilot.health_watch import told
 from autopilot.modes import ROWS, Mode, custom_mode
 from autopilot.pilot import Guidance, Pilot
 from autopilot.power import PowerMeter
 from autopilot.qp import QpStatus
+from autopilot.senses import Senses
 from autopilot.stations import Stations
 from mavlink.dialect import mav
 from mavlink.frames import Vector, quaternion_from_euler
@@ -47,6 +49,7 @@ class Photographer:
         controls: FourOf,
         power: PowerMeter,
         stations: Stations,
+        senses: Senses,
     ) -> Snapshot:
         """Return the vehicle as it is now.
 
@@ -60,6 +63,7 @@ class Photographer:
             controls: Rotor commands, parts of the largest speed.
             power: Its battery.
             stations: What ground stations say.
+            senses: How the state is known.
         """
         sticks = pilot.scene().steered.sticks
         mode, armed = pilot.state
@@ -98,6 +102,9 @@ class Photographer:
             flights=pilot.flights,
             ground_m=pilot.home_enu_m[2],
             load=min(duration_s / self._interval_s, 1.0),
+            sensed=senses.sensed,
+            fix=senses.fix,
+            estimator=None if senses.estimate is None else told(senses.estimate),
         )
 
     def _solver_state(

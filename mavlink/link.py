@@ -6,6 +6,7 @@ clients, `tcp:HOST:PORT` calls a server. The link between plant and autopilot is
 
 import os
 import socket
+from collections import deque
 from ipaddress import ip_address
 from select import select
 from time import perf_counter
@@ -55,6 +56,10 @@ class GroundLink(Protocol):
 
     def receive_now(self) -> list[tuple[bytes, Address]]:
         """Return what has come, as whole frames, and from where."""
+        ...
+
+    def wait(self, timeout_s: float) -> None:
+        """Sleep until something has come, but no longer than `timeout_s`."""
         ...
 
     def take_opened(self) -> list[Address]:
@@ -134,6 +139,10 @@ class UdpLink:
                 received.append((datagram, sender))
         return received
 
+    def wait(self, timeout_s: float) -> None:
+        """Sleep until a datagram has come, but no longer than `timeout_s`."""
+        select([self._socket], [], [], timeout_s)
+
     def take_opened(self) -> list[Address]:
         """Return the target, once."""
         opened, self._opened = self._opened, []
@@ -155,6 +164,48 @@ class UdpLink:
         if self.target is not None and sender != self.target:
             return None
         return datagram, sender
+
+
+class OneByOne:
+    """A link of any kind, used as `UdpLink` is: what has come is handed out one by one.
+
+    Attributes:
+        url: The URL of the endpoint.
+    """
+
+    def __init__(self, link: GroundLink) -> None:
+        """Use `link`."""
+        self._link = link
+        self._waiting: deque[tuple[bytes, Address]] = deque()
+        self.url = link.url
+
+    def send(self, datagram: bytes, address: Address | None = None) -> None:
+        """Send to `address`, or to whom it speaks with."""
+        self._link.send(datagram, address)
+
+    def receive(self, timeout_s: float) -> tuple[bytes, Address] | None:
+        """Return what has come next and from where, or None after `timeout_s`."""
+        if not self._waiting:
+            self._waiting.extend(receive_soon(self._link, timeout_s))
+        return self._waiting.popleft() if self._waiting else None
+
+    def close(self) -> None:
+        """Close the link."""
+        self._link.close()
+
+
+def receive_soon(link: GroundLink, timeout_s: float) -> list[tuple[bytes, Address]]:
+    """Return what has come, as soon as anything has, or nothing after `timeout_s`; for `SPIN_S` without sleeping."""
+    began_s = perf_counter()
+    while not (received := link.receive_now()):
+        waited_s = perf_counter() - began_s
+        if waited_s >= timeout_s:
+            break
+        if waited_s < SPIN_S:
+            _give_way()
+        else:
+            link.wait(timeout_s - waited_s)
+    return received
 
 
 def open_link(url: str) -> UdpLink:

@@ -7,16 +7,20 @@ with the command that names t, so nothing that a link does to datagrams can chan
 - a repeated frame gets the remembered answer, so each frame is computed once;
 - what names another time than the one awaited is dropped.
 
-The autopilot calls the plant with one datagram: SET_MESSAGE_INTERVAL (how often it wants frames) and a HEARTBEAT. The
-plant begins with the first such call, and answers an autopilot that was started again where the flight stands.
+The autopilot calls the plant with one datagram: SET_MESSAGE_INTERVAL (which message it wants, and how often:
+ATTITUDE_QUATERNION for frames of the state, HIL_SENSOR for frames of sensors) and a HEARTBEAT. The plant begins with
+the first such call, and answers an autopilot that was started again where the flight stands.
 """
 
 from collections import Counter
+from collections.abc import Collection
 from typing import NamedTuple, TypeAlias
 
 from mavlink import dialect
 from mavlink.dialect import Codec, Message
+from mavlink.feedback import Feedback
 from mavlink.hil import ActuatorCommand, StateFrame, decode_actuators, decode_state, encode_actuators, encode_state
+from mavlink.sensors import Frame, decode_sensors, encode_sensors
 
 Address: TypeAlias = tuple[str, int]
 
@@ -30,6 +34,14 @@ CALL_EVERY_S = 0.05
 HEARTBEAT_EVERY_US = 1_000_000
 MIN_FRAME_INTERVAL_US = 1_000
 MAX_FRAME_INTERVAL_US = 1_000_000
+
+_ASKED_BY = {Feedback.STATE: dialect.MSG_ATTITUDE_QUATERNION, Feedback.SENSORS: dialect.MSG_HIL_SENSOR}
+"""The message whose interval an autopilot sets."""
+_ASKS_FOR = {message_id: feedback for feedback, message_id in _ASKED_BY.items()}
+_MADE_OF = {
+    Feedback.STATE: ("ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"),
+    Feedback.SENSORS: ("HIL_SENSOR", "HIL_GPS"),
+}
 
 
 class Outgoing(NamedTuple):
@@ -50,17 +62,25 @@ class PlantEnd:
     Attributes:
         peer: Where the autopilot is, None until one has called.
         frame_interval_us: Time between frames; fixed once the first frame was offered.
+        feedback: Which frames the autopilot wants; fixed then, too.
         resent: How many times a frame was sent again.
         dropped: What was received and not used, by reason.
         received: Frames of the autopilot that were understood, in order; the owner may log and clear it.
     """
 
-    def __init__(self, *, system_id: int, frame_interval_us: int) -> None:
-        """Wait for the autopilot of `system_id`; `frame_interval_us` holds unless it asks for another."""
+    def __init__(
+        self, *, system_id: int, frame_interval_us: int, serves: Collection[Feedback] = (Feedback.STATE,)
+    ) -> None:
+        """Wait for the autopilot of `system_id`; `frame_interval_us` holds unless it asks for another.
+
+        It may ask for what the plant `serves`; the state, unless it does.
+        """
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self._autopilot = (system_id, dialect.AUTOPILOT_COMPONENT)
         self.peer: Address | None = None
         self.frame_interval_us = frame_interval_us
+        self.feedback = Feedback.STATE
+        self._serves = frozenset(serves)
         self.resent = 0
         self.dropped: Counter[str] = self._codec.dropped
         self.received: list[bytes] = []
@@ -71,9 +91,12 @@ class PlantEnd:
         self._resend_at_s = 0.0
         self._outbox: list[Outgoing] = []
 
-    def offer(self, frame: StateFrame, now_s: float) -> None:
-        """Send `frame` and await the command that answers it."""
-        frames = encode_state(self._codec, frame)
+    def offer(self, frame: Frame, now_s: float) -> None:
+        """Send `frame`, which is of the kind of `feedback`, and await the command that answers it."""
+        if isinstance(frame, StateFrame):
+            frames = encode_state(self._codec, frame)
+        else:
+            frames = encode_sensors(self._codec, frame)
         if frame.time_us % HEARTBEAT_EVERY_US == 0:
             frames.append(_heartbeat(self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False))
         self._frames = tuple(frames)
@@ -137,18 +160,19 @@ class PlantEnd:
             self.dropped["foreign"] += 1
             return
         result: int = dialect.RESULT_UNSUPPORTED
-        if fields.command == dialect.CMD_SET_MESSAGE_INTERVAL and fields.param1 == dialect.MSG_ATTITUDE_QUATERNION:
-            result = self._set_frame_interval(fields.param2)
+        feedback = _ASKS_FOR.get(fields.param1) if fields.command == dialect.CMD_SET_MESSAGE_INTERVAL else None
+        if feedback in self._serves:
+            result = self._set_frames(feedback, fields.param2)
         ack = self._codec.encode("COMMAND_ACK", fields.command, result, 0, 0, *message.source)
         self._outbox.append(Outgoing((ack,), sender))
 
-    def _set_frame_interval(self, interval_us: float) -> int:
+    def _set_frames(self, feedback: Feedback, interval_us: float) -> int:
         whole_ms = MIN_FRAME_INTERVAL_US <= interval_us <= MAX_FRAME_INTERVAL_US and interval_us % 1000 == 0
         if not whole_ms:
             return dialect.RESULT_DENIED
-        if self._begun and interval_us != self.frame_interval_us:
+        if self._begun and (feedback, interval_us) != (self.feedback, self.frame_interval_us):
             return dialect.RESULT_TEMPORARILY_REJECTED
-        self.frame_interval_us = int(interval_us)
+        self.feedback, self.frame_interval_us = feedback, int(interval_us)
         return dialect.RESULT_ACCEPTED
 
     def _accept(self, message: Message) -> ActuatorCommand | None:
@@ -167,16 +191,20 @@ class AutopilotEnd:
     """The autopilot's end: calls the plant, hands each new frame out once, remembers the last answer.
 
     Attributes:
-        refused: The plant's refusal of the frame interval asked for (a MAV_RESULT), None if there was none.
+        refused: The plant's refusal of the frames asked for (a MAV_RESULT), None if there was none.
         repeated: How many frames came again and got the remembered answer.
         dropped: What was received and not used, by reason.
     """
 
-    def __init__(self, *, system_id: int, frame_interval_us: int, now_s: float) -> None:
-        """Speak as the autopilot of `system_id` and ask the plant for a frame every `frame_interval_us`."""
+    def __init__(
+        self, *, system_id: int, frame_interval_us: int, now_s: float, feedback: Feedback = Feedback.STATE
+    ) -> None:
+        """Speak as the autopilot of `system_id`, ask the plant for a frame of `feedback` every `frame_interval_us`."""
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
         self._plant = (system_id, dialect.PLANT_COMPONENT)
         self._frame_interval_us = frame_interval_us
+        self._feedback = feedback
+        self._made_of = _MADE_OF[feedback]
         self.refused: int | None = None
         self.repeated = 0
         self.dropped: Counter[str] = self._codec.dropped
@@ -190,21 +218,21 @@ class AutopilotEnd:
         """How long the plant has been silent."""
         return now_s - self._heard_s
 
-    def receive(self, datagram: bytes, now_s: float) -> StateFrame | None:
+    def receive(self, datagram: bytes, now_s: float) -> Frame | None:
         """Take one datagram in; return its frame if that is the next one to compute."""
-        halves: dict[str, Message] = {}
+        parts: dict[str, Message] = {}
         for message in self._codec.decode(datagram):
             if message.source != self._plant:
                 self.dropped["foreign"] += 1
-            elif message.name in ("ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"):
-                halves[message.name] = message
+            elif message.name in self._made_of:
+                parts[message.name] = message
             elif message.name == "COMMAND_ACK":
                 self._hear_ack(message)
             elif message.name != "HEARTBEAT":
                 self.dropped["unexpected"] += 1
-        if not halves:
+        if not parts:
             return None
-        frame = decode_state(halves["ATTITUDE_QUATERNION"], halves["LOCAL_POSITION_NED"]) if len(halves) == 2 else None
+        frame = self._decoded(parts)
         if frame is None:
             self.dropped["invalid"] += 1
             return None
@@ -232,7 +260,15 @@ class AutopilotEnd:
         outbox, self._outbox = self._outbox, []
         return outbox
 
-    def _next(self, frame: StateFrame, now_s: float) -> StateFrame | None:
+    def _decoded(self, parts: dict[str, Message]) -> Frame | None:
+        first, second = (parts.get(name) for name in self._made_of)
+        if first is None:
+            return None
+        if self._feedback is Feedback.SENSORS:
+            return decode_sensors(first, second)
+        return None if second is None else decode_state(first, second)
+
+    def _next(self, frame: Frame, now_s: float) -> Frame | None:
         lost = self.silence_s(now_s) >= CALL_AFTER_S
         if frame.time_us == self._time_us:
             self._heard_s = now_s
@@ -259,7 +295,7 @@ class AutopilotEnd:
             *self._plant,
             dialect.CMD_SET_MESSAGE_INTERVAL,
             0,
-            dialect.MSG_ATTITUDE_QUATERNION,
+            _ASKED_BY[self._feedback],
             self._frame_interval_us,
             *[0.0] * 5,
         )

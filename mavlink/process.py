@@ -9,22 +9,24 @@ import signal
 import struct
 import sys
 from argparse import ArgumentTypeError
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import FileIO
 from math import inf, isfinite
 from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 import msgspec
 
-from mavlink.link import LinkError, UdpLink, open_link
+from mavlink.link import LinkError
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 LAST_SYSTEM_ID = 255
+
+Link = TypeVar("Link")
 
 _NUMBERS = msgspec.json.Encoder(enc_hook=float)
 """The shortest digits that keep every bit, as `str` has them, in a tenth of its time; but no word for nan and inf."""
@@ -160,12 +162,15 @@ def add_common_arguments(parser: ArgumentParser, log: str) -> None:
     add("--parent", type=natural, metavar="PID", help="end when that process, which started this one, ends")
 
 
-def begin(name: str, url: str, args: argparse.Namespace) -> tuple[UdpLink, Status, Stop]:
-    """Open the link at `url` and take over signals, or end with one line. To be called before numpy is loaded."""
+def begin(name: str, url: str, args: argparse.Namespace, opened: Callable[[str], Link]) -> tuple[Link, Status, Stop]:
+    """Open the link at `url` by `opened` and take over signals, or end with one line.
+
+    To be called before numpy is loaded.
+    """
     use_one_thread()
     stop = Stop(parent=args.parent, starting=True)
     try:
-        link = open_link(url)
+        link = opened(url)
     except LinkError as error:
         fail(str(error))
     return link, Status(name, as_json=args.json), stop

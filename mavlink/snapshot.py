@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from mavlink.frames import Quaternion, Vector
 from mavlink.geodesy import DEFAULT_ORIGIN, Geodetic
+from mavlink.sensors import GpsFix, SensorFrame
 
 NOWHERE: Vector = (nan, nan, nan)
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -118,6 +119,30 @@ class SolverState(NamedTuple):
     horizon: tuple[Forecast, ...] = ()
 
 
+class EstimatorState(NamedTuple):
+    """How well the vehicle knows its state.
+
+    Attributes:
+        flags: ESTIMATOR_STATUS_FLAGS.
+        velocity_ratio: Of the last test of a velocity: above 1 it was rejected.
+        position_ratio: Of a horizontal position.
+        height_ratio: Of a height.
+        field_ratio: Of the magnetic field.
+        horizontal_accuracy_m: Standard deviation.
+        vertical_accuracy_m: Standard deviation.
+        failed_sensors: MAV_SYS_STATUS_SENSOR bits of those that are not believed.
+    """
+
+    flags: int
+    velocity_ratio: float
+    position_ratio: float
+    height_ratio: float
+    field_ratio: float
+    horizontal_accuracy_m: float
+    vertical_accuracy_m: float
+    failed_sensors: int
+
+
 NO_SETPOINT = Setpoint()
 NOT_SOLVED = SolverState()
 
@@ -161,6 +186,9 @@ class Snapshot:
         fence_enabled: Whether the geofence is watched.
         fence_breached: Whether the vehicle is where it must not be.
         load: Part of the time between two frames that the autopilot computes, 0..1.
+        sensed: What was measured on board last; None where the state is told.
+        fix: The last of GPS; None before it.
+        estimator: How well the state is known; None where it is told.
     """
 
     time_us: int
@@ -197,3 +225,6 @@ class Snapshot:
     fence_enabled: bool = False
     fence_breached: bool = False
     load: float = 0.0
+    sensed: SensorFrame | None = None
+    fix: GpsFix | None = None
+    estimator: EstimatorState | None = None

@@ -49,6 +49,10 @@ class Connection:
         self._pending += datagram
         self.flush()
 
+    def fileno(self) -> int:
+        """Return what `select` knows the socket by."""
+        return self._socket.fileno()
+
     def flush(self) -> None:
         """Send what is waiting, as far as it will go now."""
         try:
@@ -117,6 +121,11 @@ class TcpServer:
         ]
         self._forget_dead()
         return received
+
+    def wait(self, timeout_s: float) -> None:
+        """Sleep until somebody has come, gone or sent something, but no longer than `timeout_s`."""
+        sockets = [self._socket.fileno(), *(connection.fileno() for connection in self._connections.values())]
+        select.select(sockets, [], [], timeout_s)
 
     def take_opened(self) -> list[Address]:
         """Return the clients that have come since last asked: some say nothing before they hear something."""
@@ -188,6 +197,13 @@ class TcpClient:
         received = [(frame, self.target) for frame in connection.receive_now()]
         self._notice_end(connection)
         return received
+
+    def wait(self, timeout_s: float) -> None:
+        """Sleep until the server has sent something, hung up or answered a call, but no longer than `timeout_s`."""
+        if self._connection is not None:
+            select.select([self._connection], [], [], timeout_s)
+        else:
+            select.select([], [] if self._socket is None else [self._socket], [], min(timeout_s, RECONNECT_AFTER_S))
 
     def take_opened(self) -> list[Address]:
         """Return the server if it has answered a call since last asked."""

@@ -3,22 +3,37 @@
 import sys
 from math import inf
 
-from mavlink.process import ArgumentParser, add_common_arguments, begin, positive, speed
+from mavlink.home import DEFAULT_HOME, home
+from mavlink.link import open_ground_link, open_link
+from mavlink.process import ArgumentParser, add_common_arguments, begin, natural, positive, speed
 from plant.scenario import add_world_arguments
 
-DEFAULT_LINK = "udpin:127.0.0.1:14560"
+DEFAULT_LINKS = {
+    "colibri": "udpin:127.0.0.1:14560",
+    "ardupilot-json": "udpin:127.0.0.1:9002",
+    "px4": "tcpin:127.0.0.1:4560",
+}
 
 
 def _parser() -> ArgumentParser:
     parser = ArgumentParser(
         prog="python -m plant",
-        description="The quadrotor and its world: integrates the nonlinear vehicle, sends its state and takes rotor "
-        "commands over MAVLink/UDP. In lockstep: it waits for each answer, however long that takes. "
+        description="The quadrotor and its world: integrates the nonlinear vehicle, sends its state, or what its "
+        "sensors measure, as the autopilot asks, and takes rotor commands over MAVLink/UDP. In lockstep: it waits for "
+        "each answer, however long that takes. "
         "Start `python -m autopilot` in another terminal, before or after.",
         epilog="Example: python -m plant --duration 100 --out out/flight",
     )
     add = parser.add_argument
-    add("--link", default=DEFAULT_LINK, metavar="URL", help="where to wait for the autopilot (default %(default)s)")
+    add(
+        "--serve",
+        default="colibri",
+        choices=DEFAULT_LINKS,
+        help="colibri: python -m autopilot (default); ardupilot-json: ArduPilot's SITL, started with --model JSON, "
+        "which sets rate and speed itself; px4: PX4's SITL, over TCP, or UDP where it waits to be called (udpout:)",
+    )
+    links = ", ".join(f"{url} for {whom}" for whom, url in DEFAULT_LINKS.items())
+    add("--link", metavar="URL", help=f"where to wait for the autopilot (default {links})")
     add("--vehicle", default="hummingbird", metavar="NAME", help="vehicle name or .toml (default %(default)s)")
     add(
         "--integrator",
@@ -26,7 +41,9 @@ def _parser() -> ArgumentParser:
         choices=("rk4", "adaptive"),
         help="rk4: fixed steps of 1 ms (default); adaptive: Dormand-Prince to 1e-9",
     )
-    add_world_arguments(parser, start="y=-1,z=2,psi=90,rotors=4740, all else 0")
+    add_world_arguments(parser, start="y=-1,z=2,psi=90,rotors=4740, all else 0; on sensors y=-1,psi=90")
+    add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
+    add("--home", type=home, default=DEFAULT_HOME, metavar="LAT,LON,ALT,YAW", help="the origin (default %(default)s)")
     add("--rate", type=positive, default=250.0, metavar="HZ", help="frames, if the autopilot asks for no other rate")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")
@@ -37,9 +54,19 @@ def _parser() -> ArgumentParser:
 def main() -> int:
     """Run the plant; return the exit code."""
     args = _parser().parse_args()
-    link, status, stop = begin("plant", args.link, args)
+    url = args.link or DEFAULT_LINKS[args.serve]
+    if args.serve == "px4":
+        link_to_px4, status, stop = begin("plant", url, args, open_ground_link)
+        status.say("listening", f"waiting for PX4 on {link_to_px4.url}", url=link_to_px4.url)
+        from plant.px4_process import run as serve_px4
+
+        return serve_px4(args, link_to_px4, status, stop)
+    link, status, stop = begin("plant", url, args, open_link)
     status.say("listening", f"waiting for an autopilot on {link.url}", url=link.url)
-    from plant.process import run
+    if args.serve == "ardupilot-json":
+        from plant.ardupilot_process import run
+    else:
+        from plant.process import run
 
     return run(args, link, status, stop)
 

@@ -242,6 +242,15 @@ def derivative(x: Array, target: FourOf, parameters: Packed) -> Array:
 
 
 @compiled
+def specific_force(x: Array, parameters: Packed) -> Vector:
+    """Return what an accelerometer at the centre of mass feels, m/s² in FLU: acceleration without gravity."""
+    numbers = parameters[0]
+    R = rotation_matrix((x[9], x[10], x[11], x[12]))
+    fx, fy, fz = _wrench(x, R, (x[13], x[14], x[15], x[16]), numbers).force_n
+    return (fx / numbers.mass_kg, fy / numbers.mass_kg, fz / numbers.mass_kg)
+
+
+@compiled
 def held(x: Array, target: FourOf, parameters: Packed) -> Array:
     """Return x as a command finds it, (18,): rotors without lag turn at once at what the battery can hold."""
     x = x.copy()

@@ -38,7 +38,7 @@ class _Battery(TypedDict):
 
 
 def parameters_of(vehicle: Vehicle, wind_enu_m_s: Vector) -> Parameters:
-    """Return the numbers of `vehicle` in a constant wind."""
+    """Return the numbers of `vehicle` in a wind."""
     thrust, _, _, yaw_moment = vehicle.allocation()
     east, north, up = wind_enu_m_s
     x_m, y_m = np.array(vehicle.rotors.position_m).T

@@ -4,19 +4,26 @@ import argparse
 from pathlib import Path
 from time import perf_counter, sleep
 
+from mavlink.feedback import Feedback
 from mavlink.hil import ActuatorCommand
 from mavlink.link import LinkError, UdpLink
 from mavlink.lockstep import Outgoing, PlantEnd
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Progress, Status, Stop, TlogWriter, fail, undisturbed
 from plant.dynamics import STATE
 from plant.scenario import IntegrationError, Start
+from plant.sensors import Tell, served_by, tells
 from plant.vehicle import VehicleError, load_vehicle
-from plant.world import Physics, World, starting_world, state_frame
+from plant.weather import weather_of
+from plant.world import Physics, World, starting_world
 
-TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah")
+WIND_COLUMNS = ("wind_east", "wind_north", "wind_up")
+TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah", *WIND_COLUMNS)
 
-DEFAULT_START = Start(y=-1.0, z=2.0, psi=90.0, rotors=4740.0)
-"""The thesis's spiral."""
+DEFAULT_STARTS = {
+    Feedback.STATE: Start(y=-1.0, z=2.0, psi=90.0, rotors=4740.0),
+    Feedback.SENSORS: Start(y=-1.0, psi=90.0),
+}
+"""The thesis's spiral; or below it on the ground, where an estimator finds its bearings."""
 
 _SILENCE_SAID_AFTER_S = 2.0
 _WAIT_AT_MOST_S = 0.1
@@ -26,17 +33,23 @@ _CATCH_UP_S = 0.1
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
     """Serve one flight on `link` as the command line says; return the exit code."""
     try:
+        weather = weather_of(args)
         vehicle = load_vehicle(args.vehicle).without(args.without)
-        world = starting_world(DEFAULT_START._replace(**args.start), vehicle)
+        serves = served_by(vehicle)
+        worlds = {it: starting_world(DEFAULT_STARTS[it]._replace(**args.start), vehicle, weather) for it in serves}
     except VehicleError as error:
         fail(str(error))
-    physics = Physics(vehicle, args.integrator, args.wind.velocity_enu_m_s)
+    physics = Physics(vehicle, args.integrator, weather)
     logs = PlantLogs(args.out) if args.out else None
-    end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000)
+    end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
     server = Server(link, end, status, stop, logs)
     try:
         with undisturbed():
-            server.fly(world, physics, duration_s=args.duration, speed=args.speed)
+            if server.wait():
+                interval_us = end.frame_interval_us
+                origin = args.home.origin
+                tell = tells(end.feedback, vehicle, physics, origin, seed=args.seed, interval_us=interval_us)
+                server.fly(worlds[end.feedback], physics, tell, duration_s=args.duration, speed=args.speed)
     except (IntegrationError, LinkError) as error:
         fail(str(error), EXIT_FAILED)
     finally:
@@ -44,6 +57,12 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         if logs:
             logs.close()
     return EXIT_INTERRUPTED if stop else 0
+
+
+def truth_row(world: World) -> tuple[float, ...]:
+    """Return what `TRUTH_COLUMNS` names; `nan` volts where there is no battery."""
+    battery = (world.voltage_v, world.charge_used_ah)
+    return (world.time_us / 1e6, *world.state, *world.rotor_speeds, *battery, *world.wind_enu_m_s)
 
 
 class PlantLogs:
@@ -55,13 +74,15 @@ class PlantLogs:
         self._tlog = TlogWriter(folder / "flight.tlog")
 
     def write_world(self, world: World) -> None:
-        """Append the state, the rotor speeds and the battery; `nan` volts where there is none."""
-        battery = (world.voltage_v, world.charge_used_ah)
-        self._truth.write((world.time_us / 1e6, *world.state, *world.rotor_speeds, *battery))
+        """Append the truth."""
+        self._truth.write(truth_row(world))
 
     def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
         """Append what was received and sent at simulated time `time_us`."""
-        frames = [*received, *(frame for outgoing in sent for frame in outgoing.frames)]
+        self.write_frames(time_us, [*received, *(frame for outgoing in sent for frame in outgoing.frames)])
+
+    def write_frames(self, time_us: int, frames: list[bytes]) -> None:
+        """Append frames of simulated time `time_us`."""
         if frames:
             self._tlog.write(time_us, frames)
 
@@ -103,10 +124,14 @@ class Server:
         self._time_us = 0
         self._logged: World | None = None
 
-    def fly(self, world: World, physics: Physics, *, duration_s: float, speed: float) -> None:
-        """Wait for an autopilot, then fly for `duration_s` at `speed` times real time, or until told to stop."""
+    def wait(self) -> bool:
+        """Wait for an autopilot; return False if told to stop first."""
         while not self._stop and self._end.peer is None:
             self._receive(_WAIT_AT_MOST_S)
+        return self._end.peer is not None
+
+    def fly(self, world: World, physics: Physics, tell: Tell, *, duration_s: float, speed: float) -> None:
+        """Fly for `duration_s` at `speed` times real time, or until told to stop; `tell` of each world."""
         began_s = perf_counter()
         pace = Pace(speed, began_s)
         progress = Progress(self._status)
@@ -114,7 +139,7 @@ class Server:
         frames = 0
         while not self._stop and world.time_us + interval_us <= duration_s * 1e6:
             self._wait_until(pace.due_s(world.time_us, perf_counter()))
-            command = self._exchange(world)
+            command = self._exchange(world, tell)
             if command is None:
                 break
             world = physics.step(world, command, interval_us)
@@ -131,11 +156,11 @@ class Server:
             dropped=dict(self._end.dropped),
         )
 
-    def _exchange(self, world: World) -> ActuatorCommand | None:
+    def _exchange(self, world: World, tell: Tell) -> ActuatorCommand | None:
         """Send a frame until its answer comes; None if the process is told to stop first."""
         self._time_us = world.time_us
         offered_s = perf_counter()
-        self._end.offer(state_frame(world), offered_s)
+        self._end.offer(tell(world), offered_s)
         self._send()
         self._log(world)  # while the autopilot computes
         silence_said = False

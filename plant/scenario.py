@@ -1,50 +1,25 @@
-"""The world that a flight begins in, as the command line says it: wind, parts left out of the model, start.
+"""The world that a flight begins in, as the command line says it: start, and parts left out of the model.
 
 Nothing here needs what is compiled: who only plans a flight, or starts the plant, does not wait for it.
 """
 
 from argparse import ArgumentTypeError
-from math import cos, radians, sin
+from math import radians
 from typing import NamedTuple
 
 from mavlink.frames import Quaternion, Vector, earth_from_body, quaternion_from_euler, rotation_matrix
 from mavlink.process import ArgumentParser, number
 from plant.vehicle import Vehicle, VehicleError
+from plant.weather import add_weather_arguments
 
 PARTS = ("rotor-lag", "drag", "ground", "battery")
 """What `Vehicle.without` can leave out."""
 
-_FULL_TURN_DEG = 360.0
 _DEEPEST_START_M = 0.01
 
 
 class IntegrationError(Exception):
     """The state cannot be integrated any further."""
-
-
-class Wind(NamedTuple):
-    """A constant wind, as meteorology says it.
-
-    Attributes:
-        speed_m_s: Speed.
-        from_deg: Where it blows from, degrees clockwise from north: 270 blows from west to east.
-    """
-
-    speed_m_s: float
-    from_deg: float
-
-    @property
-    def velocity_enu_m_s(self) -> Vector:
-        """Velocity of the air, ENU."""
-        direction = radians(self.from_deg)
-        return (-self.speed_m_s * sin(direction), -self.speed_m_s * cos(direction), 0.0)
-
-    def __str__(self) -> str:
-        """Return what `wind` reads back."""
-        return f"{self.speed_m_s!r}@{self.from_deg!r}"
-
-
-NO_WIND = Wind(0.0, 0.0)
 
 
 class Start(NamedTuple):
@@ -113,18 +88,6 @@ def check_start(start: Start, vehicle: Vehicle) -> None:
         raise VehicleError(f"{vehicle.name} would start {depth_m:.3g} m below the ground: start it higher")
 
 
-def wind(text: str) -> Wind:
-    """Read a wind of the command line, `SPEED@FROM`."""
-    speed, _, direction = text.partition("@")
-    try:
-        value = Wind(number(speed), number(direction))
-    except ValueError:
-        raise ArgumentTypeError(f"must be SPEED@FROM in m/s and degrees, 5@270 say, not {text}") from None
-    if value.speed_m_s < 0.0 or not 0.0 <= value.from_deg <= _FULL_TURN_DEG:
-        raise ArgumentTypeError(f"the speed must not be negative, the direction 0 to 360 degrees, not {text}")
-    return value
-
-
 def start_values(text: str) -> dict[str, float]:
     """Read values of a start of the command line, `KEY=VALUE[,KEY=VALUE...]`."""
     return dict(_start_value(pair) for pair in text.split(","))
@@ -141,21 +104,15 @@ def _start_value(pair: str) -> tuple[str, float]:
 
 
 def add_world_arguments(parser: ArgumentParser, *, start: str, of_whom: str = "") -> None:
-    """Add `--wind`, `--without` and `--start`.
+    """Add `--wind`, `--gust`, `--turbulence`, `--without` and `--start`.
 
     Args:
         parser: To add them to.
         start: What is overridden by `--start`, for its help.
         of_whom: Whose model `--without` concerns, for its help.
     """
+    add_weather_arguments(parser)
     add = parser.add_argument
-    add(
-        "--wind",
-        type=wind,
-        default=NO_WIND,
-        metavar="SPEED@FROM",
-        help="m/s, and degrees it blows from, clockwise from north: 5@270 blows from west to east (default: calm)",
-    )
     add(
         "--without",
         action="append",

@@ -9,6 +9,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from plant.rotor_order import Numbering, numbering
+from plant.sensor_parts import Sensors as Sensors
+
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
 Part: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
@@ -16,6 +19,7 @@ Efficiency: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
 TimeConstant: TypeAlias = Annotated[float, msgspec.Meta(ge=0.001)]
 """At least the plant's integration step."""
 PointInPlane: TypeAlias = tuple[float, float]
+FourOf: TypeAlias = tuple[float, float, float, float]
 Array: TypeAlias = NDArray[np.float64]
 T = TypeVar("T")
 
@@ -78,6 +82,8 @@ class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """What an armed rotor never falls below."""
     strength: tuple[Part, Part, Part, Part] = (1.0, 1.0, 1.0, 1.0)
     """Part of its thrust and torque that each rotor has: 0.85 is a rotor 15 % weak."""
+    control: Literal["speed", "thrust"] = "speed"
+    """What a control of 0 to 1 is a part of in the interfaces of other simulators and autopilots."""
     lag: RotorLag | None = None
     """Without it, rotors follow their commands at once."""
 
@@ -89,6 +95,33 @@ class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             raise ValueError("idle_speed: must lie below max_speed")
         if np.linalg.matrix_rank(_allocation(self)) < len(self.position_m):
             raise ValueError("position_m, direction: these rotors cannot turn the vehicle about every axis")
+
+    def speeds_of(self, controls: FourOf) -> FourOf:
+        """Return the parts of the top speed that the controls of another autopilot mean."""
+        if self.control == "speed":
+            return controls
+        a, b, c, d = map(sqrt, controls)
+        return (a, b, c, d)
+
+    def controls_of(self, speeds: FourOf) -> FourOf:
+        """Return the controls by which another simulator turns the rotors at these parts of the top speed."""
+        if self.control == "speed":
+            return speeds
+        a, b, c, d = (speed * speed for speed in speeds)
+        return (a, b, c, d)
+
+    def numbering(self) -> Numbering:
+        """Return how PX4 and ArduPilot number the rotors.
+
+        Raises:
+            VehicleError: They number none that are where these are.
+        """
+        found = numbering(self.position_m, self.direction)
+        if found is None:
+            raise VehicleError(
+                "rotors: PX4 and ArduPilot know a '+' or an 'x' whose opposite rotors turn alike, not this frame"
+            )
+        return found
 
 
 class Drag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -169,6 +202,7 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     drag: Drag | None = None
     ground: Ground | None = None
     battery: Battery | None = None
+    sensors: Sensors | None = None
 
     def __post_init__(self) -> None:
         """Check what a range cannot say."""

@@ -7,15 +7,17 @@ import numpy as np
 
 from mavlink.frames import Vector, earth_from_body, normalized
 from mavlink.hil import ActuatorCommand, StateFrame
-from plant.dynamics import CHARGE, ROTORS, FourOf, attitude_of, packed
+from plant.air import CALM, Air
+from plant.dynamics import CHARGE, ROTORS, Array, FourOf, attitude_of, packed, specific_force
 from plant.integrate import Integrator, solver
 from plant.parameters import parameters_of
 from plant.scenario import IntegrationError, Start, check_start
+from plant.turbulence import Eddies
 from plant.vehicle import Vehicle
+from plant.weather import NO_WEATHER, Weather
 
 State = tuple[float, ...]
 
-CALM: Vector = (0.0, 0.0, 0.0)
 _STANDING: FourOf = (0.0, 0.0, 0.0, 0.0)
 _LEVEL: State = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _MOMENT_S = 1e-3
@@ -31,6 +33,8 @@ class World:
         rotor_speeds: What the rotors turn at, in the vehicle's unit; without lag, what they turned at up to now.
         charge_used_ah: Charge taken from the battery, Ah.
         voltage_v: The battery's terminal voltage, V; nan before the first step, and without a battery.
+        wind_enu_m_s: Velocity of the air where the vehicle is, held until the next step ends.
+        eddies: What the turbulence remembers; None where there is none.
     """
 
     time_us: int
@@ -38,9 +42,11 @@ class World:
     rotor_speeds: FourOf
     charge_used_ah: float = 0.0
     voltage_v: float = nan
+    wind_enu_m_s: Vector = CALM
+    eddies: Eddies | None = None
 
 
-def starting_world(start: Start, vehicle: Vehicle) -> World:
+def starting_world(start: Start, vehicle: Vehicle, weather: Weather = NO_WEATHER) -> World:
     """Return a world at time 0, with a full battery.
 
     Raises:
@@ -49,18 +55,21 @@ def starting_world(start: Start, vehicle: Vehicle) -> World:
     check_start(start, vehicle)
     speed = vehicle.speed_from_rpm(start.rotors)
     state = (*start.velocity_flu_m_s, start.p, start.q, start.r, start.x, start.y, start.z, *start.attitude)
-    return World(0, state, (speed, speed, speed, speed))
+    wind, eddies = Air(weather).begin(start.z)
+    return World(0, state, (speed, speed, speed, speed), wind_enu_m_s=wind, eddies=eddies)
 
 
 class Physics:
-    """The laws of one vehicle in one wind: how its world goes on."""
+    """The laws of one vehicle in one weather: how its world goes on."""
 
-    def __init__(self, vehicle: Vehicle, integrator: Integrator, wind_enu_m_s: Vector = CALM) -> None:
-        """Fly `vehicle`, integrated by `integrator`, in air that moves at `wind_enu_m_s`.
+    def __init__(self, vehicle: Vehicle, integrator: Integrator, weather: Weather = NO_WEATHER) -> None:
+        """Fly `vehicle`, integrated by `integrator`, in `weather`.
 
         What is compiled is loaded here, not in the first step.
         """
-        self._parameters = packed(parameters_of(vehicle, wind_enu_m_s))
+        self._air = Air(weather)
+        self._parameters = packed(parameters_of(vehicle, self._air.steady or CALM))
+        self._wind = self._parameters["wind_enu_m_s"][0]
         self._integrate = solver(integrator)
         self._idle = vehicle.rotors.idle_speed
         self._top = vehicle.rotors.max_speed
@@ -73,14 +82,32 @@ class Physics:
         Raises:
             IntegrationError: The state cannot be integrated any further.
         """
-        x = np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
-        x, voltage_v = self._integrate(x, self._target(command), self._parameters, duration_us * 1e-6)
+        self._feel_wind(world)
+        x, voltage_v = self._integrate(_vector(world), self._target(command), self._parameters, duration_us * 1e-6)
         end = x.tolist()
         if not all(map(isfinite, end)):
             raise IntegrationError("the state has left what the model describes: it is no longer finite")
         state = (*end[:9], *normalized(attitude_of(end)))
         voltage_v = voltage_v if self._has_battery else nan
-        return World(world.time_us + duration_us, state, tuple(end[ROTORS]), end[CHARGE], voltage_v)
+        time_us = world.time_us + duration_us
+        wind, eddies = self._air.steady, None
+        if wind is None:
+            velocity = earth_from_body(attitude_of(state), (end[0], end[1], end[2]))
+            wind, eddies = self._air.go_on(world.eddies, time_us, end[8], velocity, duration_us)
+        return World(time_us, state, tuple(end[ROTORS]), end[CHARGE], voltage_v, wind, eddies)
+
+    def specific_force(self, world: World) -> Vector:
+        """Return what an ideal accelerometer at the centre of mass measures, m/s² in FLU: (0, 0, g) at rest and level.
+
+        Rotors without lag turn as they did up to now.
+        """
+        self._feel_wind(world)
+        force: Vector = specific_force(_vector(world), self._parameters)
+        return force
+
+    def _feel_wind(self, world: World) -> None:
+        if self._air.steady is None:
+            self._wind[:] = world.wind_enu_m_s
 
     def _target(self, command: ActuatorCommand) -> FourOf:
         """Return the rotor speeds that a command asks for: at least idle while armed, none while not."""
@@ -89,6 +116,10 @@ class Physics:
         c1, c2, c3, c4 = command.controls
         idle, top = self._idle, self._top
         return (max(c1 * top, idle), max(c2 * top, idle), max(c3 * top, idle), max(c4 * top, idle))
+
+
+def _vector(world: World) -> Array:
+    return np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
 
 
 def state_frame(world: World) -> StateFrame:

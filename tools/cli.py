@@ -1,13 +1,19 @@
 """`colibri`: the one command. Loads only what the subcommand needs."""
 
+import signal
+import threading
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
+from mavlink.feedback import Feedback, feedback
 from mavlink.home import DEFAULT_HOME, home
 from mavlink.process import EXIT_INTERRUPTED, ArgumentParser, fail, natural, positive, speed, use_one_thread
 from plant.scenario import add_world_arguments
+from plant.weather import NO_WIND, add_weather_arguments
 
+COMPARED_S = 100.0
 TRACK_HELP = (
     "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
     "hover[:x=0,y=0,height=2,yaw=0], lemniscate[:size=4,height=3,lap=6,yaw=path|fixed], "
@@ -19,6 +25,8 @@ def main(argv: list[str] | None = None) -> int:
     """Run a subcommand; return the exit code."""
     args = _parser().parse_args(argv)
     use_one_thread()
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that what was started is ended, too
     try:
         if args.command == "fly":
             from tools.fly import fly
@@ -28,6 +36,10 @@ def main(argv: list[str] | None = None) -> int:
             from tools.thesis_figures import figures
 
             return figures(args)
+        if args.command == "compare" and _in_another_world(args):
+            from tools.seeds import compare_seeds
+
+            return compare_seeds(args)
         if args.command == "compare":
             from tools.compare import compare
 
@@ -45,6 +57,13 @@ def main(argv: list[str] | None = None) -> int:
         return bench(args)
     except KeyboardInterrupt:
         fail("interrupted", EXIT_INTERRUPTED)
+
+
+def _in_another_world(args: Namespace) -> bool:
+    """Whether the comparison leaves the thesis's world: chance, sensors, weather, another vehicle, two processes."""
+    weather = args.wind is not NO_WIND or args.gust or args.turbulence
+    chance = args.seeds or args.feedback is Feedback.SENSORS
+    return bool(chance or weather or args.vehicle or args.link == "udp" or args.duration != COMPARED_S)
 
 
 def _parser() -> ArgumentParser:
@@ -84,7 +103,8 @@ def _add_fly(parser: ArgumentParser) -> None:
         metavar="N",
         help="times real time, or max (default: max; 1 where a ground station is invited by --gcs)",
     )
-    add("--seed", type=int, default=0, metavar="N", help="seed of everything random (default %(default)s)")
+    add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
+    _add_feedback(add)
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
@@ -136,9 +156,33 @@ def _add_sitl(parser: ArgumentParser) -> None:
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
     add_world_arguments(parser, start="standing at home")
+    _add_feedback(add)
+    add("--seed", type=natural, default=0, metavar="N", help="of everything random; each vehicle adds its number")
     add("--speed", type=speed, default=1.0, metavar="N", help="times real time, or max (default 1)")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def seeds(text: str) -> range:
+    """Read FIRST-LAST of the command line."""
+    first, _, last = text.partition("-")
+    try:
+        chosen = range(int(first), int(last or first) + 1)
+    except ValueError:
+        chosen = range(0)
+    if not chosen:
+        raise ArgumentTypeError(f"expected FIRST-LAST, 1-50 say, not {text}")
+    return chosen
+
+
+def _add_feedback(add: Callable[..., object]) -> None:
+    add(
+        "--feedback",
+        type=feedback,
+        default=Feedback.STATE,
+        metavar="state|sensors",
+        help="what the autopilot flies by: the true state (default), or what sensors measure",
+    )
 
 
 def _add_signing(add: Callable[..., object]) -> None:
@@ -170,8 +214,16 @@ def _add_compare(parser: ArgumentParser) -> None:
     )
     add("--track", action="append", metavar="TRACK", help="a track; may be repeated (default: the thesis's five)")
     add(
-        "--link", default="memory", choices=("memory", "direct"), help="with or without the codec (default %(default)s)"
+        "--link",
+        default="memory",
+        choices=("memory", "direct", "udp"),
+        help="one process, with or without the codec; or two (default %(default)s)",
     )
+    add("--seeds", type=seeds, metavar="FIRST-LAST", help="fly each by all of these seeds, and show how errors spread")
+    _add_feedback(add)
+    add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
+    add("--duration", type=positive, default=COMPARED_S, metavar="S", help="simulated time (default %(default)s)")
+    add_weather_arguments(parser)
     add(
         "--out",
         type=Path,

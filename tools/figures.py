@@ -211,15 +211,17 @@ def _error_panels(series: Series) -> list[Panel]:
     return [Panel("distance (m)", distance, from_zero=True), Panel("error (m)", axes)]
 
 
-def axes_grid(rows: int, columns: int, top_in: float, row_in: float = _ROW_IN) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure with axes that share the abscissa of their column.
+def axes_grid(
+    rows: int, columns: int, top_in: float, row_in: float = _ROW_IN, *, share: bool = True
+) -> tuple[Figure, list[list[Axes]]]:
+    """Return a figure with axes that `share` the abscissa of their column.
 
     Fixed margins draw twice as fast as a layout.
     """
     height_in = top_in + rows * row_in + (rows - 1) * _ROW_GAP_IN + _BOTTOM_IN
     figure = Figure(figsize=(_WIDTH_IN, height_in), dpi=_DPI)
     column_in = (_WIDTH_IN - _LEFT_IN - _RIGHT_IN - (columns - 1) * _COLUMN_GAP_IN) / columns
-    grid = figure.subplots(rows, columns, sharex="col", squeeze=False)
+    grid = figure.subplots(rows, columns, sharex="col" if share else "none", squeeze=False)
     figure.subplots_adjust(
         left=_LEFT_IN / _WIDTH_IN,
         right=1.0 - _RIGHT_IN / _WIDTH_IN,

@@ -7,12 +7,16 @@ from typing import Protocol
 
 from autopilot.core import Autopilot, Step
 from autopilot.process import AutopilotLog
+from autopilot.senses import estimator_for
+from mavlink.feedback import Feedback
+from mavlink.geodesy import DEFAULT_ORIGIN
 from mavlink.hil import ActuatorCommand
 from mavlink.lockstep import Address, AutopilotEnd, PlantEnd
 from mavlink.process import undisturbed
 from plant.integrate import Integrator
 from plant.process import PlantLogs
-from plant.world import Physics, World, starting_world, state_frame
+from plant.sensors import Tell, tells
+from plant.world import Physics, World, starting_world
 from tools.plan import FlightPlan
 from tools.recording import Summary
 
@@ -38,13 +42,17 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
         SolverError: The solver cannot be used.
         IntegrationError: The state cannot be integrated any further.
     """
-    autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, perf_counter)
+    estimator = estimator_for(plan.feedback, plan.vehicle, DEFAULT_ORIGIN)
+    autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, perf_counter, estimator=estimator)
     integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
-    physics = Physics(plan.plant_vehicle, integrator, plan.wind.velocity_enu_m_s)
-    world = starting_world(plan.start, plan.plant_vehicle)
+    physics = Physics(plan.plant_vehicle, integrator, plan.weather)
+    world = starting_world(plan.start, plan.plant_vehicle, plan.weather)
     interval_us = autopilot.frame_interval_us
-    plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out)
-    exchange: Exchange = InMemory(autopilot, interval_us, plant_logs) if plan.link == "memory" else Direct(autopilot)
+    plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out, plan.feedback)
+    tell = tells(plan.feedback, plan.plant_vehicle, physics, DEFAULT_ORIGIN, seed=plan.seed, interval_us=interval_us)
+    exchange: Exchange = Direct(autopilot, tell)
+    if plan.link == "memory":
+        exchange = InMemory(autopilot, interval_us, tell, plan.feedback, plant_logs)
     try:
         plant_logs.write_world(world)
         with undisturbed():
@@ -67,33 +75,37 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
 class Direct:
     """Hands frame and command over in double precision, without the codec."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
-        """Ask `autopilot`."""
+    def __init__(self, autopilot: Autopilot, tell: Tell) -> None:
+        """Ask `autopilot`; `tell` it of each world."""
         self._autopilot = autopilot
+        self._tell = tell
 
     def __call__(self, world: World) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and its command as it is."""
-        step = self._autopilot.step(state_frame(world))
+        step = self._autopilot.step(self._tell(world))
         return step, step.command
 
 
 class InMemory:
     """Carries the datagrams that the two processes would send, in the same conversation."""
 
-    def __init__(self, autopilot: Autopilot, frame_interval_us: int, logs: PlantLogs) -> None:
-        """Let `autopilot` call the plant."""
+    def __init__(
+        self, autopilot: Autopilot, frame_interval_us: int, tell: Tell, feedback: Feedback, logs: PlantLogs
+    ) -> None:
+        """Let `autopilot` call the plant and ask for `feedback`; `tell` it of each world."""
         self._autopilot = autopilot
+        self._tell = tell
         self._logs = logs
-        self._plant_end = PlantEnd(system_id=SYSTEM_ID, frame_interval_us=frame_interval_us)
+        self._plant_end = PlantEnd(system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, serves=[feedback])
         self._autopilot_end = AutopilotEnd(
-            system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, now_s=_NEVER_LATE_S
+            system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, now_s=_NEVER_LATE_S, feedback=feedback
         )
         self._autopilot_end.poll(_NEVER_LATE_S)
         self._to_plant(time_us=0)
 
     def __call__(self, world: World) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and the command as the plant decoded it."""
-        self._plant_end.offer(state_frame(world), _NEVER_LATE_S)
+        self._plant_end.offer(self._tell(world), _NEVER_LATE_S)
         step = self._to_autopilot(world)
         command = self._to_plant(world.time_us)
         assert step is not None, "the autopilot answers every new frame"

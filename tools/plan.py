@@ -4,12 +4,15 @@ import argparse
 from dataclasses import dataclass
 from math import degrees, inf
 from pathlib import Path
+from typing import Any
 
 from autopilot.planner import start_yaw
 from autopilot.profile import Profile, load_profile
 from autopilot.tracks import DURATION_S, Track, track
-from plant.scenario import NO_WIND, Start, Wind, check_start
+from mavlink.feedback import Feedback
+from plant.scenario import Start, check_start
 from plant.vehicle import Vehicle, load_vehicle
+from plant.weather import NO_WIND, Weather, weather_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +44,13 @@ class FlightPlan:
         vehicle_name: Vehicle that the autopilot controls, name or file.
         plant_vehicle_name: Vehicle that the plant flies, name or file.
         without: Parts that the plant's vehicle is flown without.
-        wind: Wind in which the plant flies.
+        weather: In which the plant flies.
         start: How the plant begins.
         integrator: `rk4` or `adaptive`.
         link: `udp`, `memory` or `direct`.
         speed: Times real time; infinite for flat out.
         seed: Seed of everything random.
+        feedback: What the plant tells the autopilot.
         duration_s: Simulated time to fly.
         out: Folder for all that the flight leaves.
         solver: QP solver asked for; None for the profile's.
@@ -62,12 +66,13 @@ class FlightPlan:
     vehicle_name: str
     plant_vehicle_name: str
     without: tuple[str, ...]
-    wind: Wind
+    weather: Weather
     start: Start
     integrator: str
     link: str
     speed: float
     seed: int
+    feedback: Feedback
     duration_s: float
     out: Path
     solver: str | None
@@ -82,7 +87,8 @@ class FlightPlan:
         """Resolve the command line.
 
         Raises:
-            PlanError: Ground stations are invited to a flight that has no links to them.
+            PlanError: Ground stations are invited to a flight that has no links to them; or sensors are to be flown by
+                that the vehicle has not, or without ground to stand on.
             ProfileError: The profile cannot be read.
             VehicleError: A vehicle cannot be read, or cannot start as the profile says.
             TrackError: There is no such track, or its file cannot be flown.
@@ -95,7 +101,11 @@ class FlightPlan:
         vehicle_name = args.vehicle or profile.simulation.vehicle
         plant_vehicle_name = args.plant_vehicle or vehicle_name
         plant_vehicle = load_vehicle(plant_vehicle_name).without(args.without)
-        start = _start_of(profile, to_fly)._replace(**args.start)
+        vehicle = load_vehicle(vehicle_name)
+        if args.feedback is Feedback.SENSORS:
+            _check_sensors(vehicle_name, vehicle)
+            _check_sensors(plant_vehicle_name, plant_vehicle)
+        start = _start_of(profile, to_fly, args.feedback)._replace(**args.start)
         check_start(start, plant_vehicle)
         return cls(
             track_name=args.track,
@@ -103,19 +113,20 @@ class FlightPlan:
             vehicle_name=vehicle_name,
             plant_vehicle_name=plant_vehicle_name,
             without=tuple(args.without),
-            wind=args.wind,
+            weather=weather_of(args),
             start=start,
             integrator=args.integrator or profile.simulation.integrator,
             link=args.link,
             speed=args.speed or (1.0 if ground.links else inf),
             seed=args.seed,
+            feedback=args.feedback,
             duration_s=args.duration,
             out=args.out,
             solver=args.solver,
             ground=ground,
             track=to_fly,
             profile=profile,
-            vehicle=load_vehicle(vehicle_name),
+            vehicle=vehicle,
             plant_vehicle=plant_vehicle,
         )
 
@@ -130,13 +141,29 @@ class FlightPlan:
             VehicleError: Its vehicle cannot be read.
             TrackError: There is no such track, or its file cannot be flown.
         """
-        unset = dict.fromkeys(("solver", "vehicle", "plant_vehicle", "integrator"))
-        chosen = {"track": track_name, "profile": profile, "controller": controller, "link": link, "out": out}
-        world = {"wind": NO_WIND, "without": (), "start": {}}
-        ground = {"gcs": (), "signing_key": None, "insecure": False}
-        return cls.from_arguments(
-            argparse.Namespace(**chosen, **unset, **world, **ground, speed=inf, seed=0, duration=DURATION_S)
-        )
+        return cls.of_options(out, track=track_name, profile=profile, controller=controller, link=link)
+
+    @classmethod
+    def of_options(cls, out: Path, **options: Any) -> "FlightPlan":
+        """Return the plan of a flight flat out for 100 s with some options of `colibri fly`, by their names there.
+
+        Raises:
+            PlanError: They do not go together.
+            ProfileError: The profile cannot be read.
+            VehicleError: A vehicle cannot be read, or cannot start as the profile says.
+            TrackError: There is no such track, or its file cannot be flown.
+        """
+        unset = dict.fromkeys(("controller", "solver", "vehicle", "plant_vehicle", "integrator", "turbulence"))
+        none: dict[str, Any] = {
+            "gcs": (),
+            "gust": (),
+            "without": (),
+            "start": {},
+            "signing_key": None,
+            "insecure": False,
+        }
+        usual = {"wind": NO_WIND, "feedback": Feedback.STATE, "seed": 0, "speed": inf, "duration": DURATION_S}
+        return cls.from_arguments(argparse.Namespace(**(unset | none | usual | options), out=out))
 
     @property
     def start_yaw_rad(self) -> float:
@@ -144,8 +171,22 @@ class FlightPlan:
         return start_yaw(self.track, self.profile.references)
 
 
-def _start_of(profile: Profile, flown: Track) -> Start:
-    """Return how the flights of a profile begin: at rest, with the first yaw of the track."""
+def _check_sensors(name: str, vehicle: Vehicle) -> None:
+    """Check that a flight on sensors can begin, at rest.
+
+    Raises:
+        PlanError: It cannot.
+    """
+    if vehicle.sensors is None:
+        raise PlanError(f"--feedback sensors: vehicle {name} has no table sensors")
+    if vehicle.ground is None:
+        raise PlanError(f"--feedback sensors: vehicle {name} has no ground to stand on while it finds its bearings")
+
+
+def _start_of(profile: Profile, flown: Track, feedback: Feedback) -> Start:
+    """Return how the flights of a profile begin: at rest, with the first yaw of the track; on sensors on the ground."""
     x, y, z = profile.simulation.position_enu_m
     yaw_deg = degrees(start_yaw(flown, profile.references))
+    if feedback is Feedback.SENSORS:
+        return Start(x=x, y=y, psi=yaw_deg)
     return Start(x=x, y=y, z=z, psi=yaw_deg, rotors=profile.simulation.rotor_speed_rpm)

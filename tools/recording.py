@@ -84,8 +84,8 @@ def read_recording(plan: FlightPlan) -> Recording:
     Raises:
         RecordingError: There is no complete control sample in them.
     """
-    plant = _read_csv(plan.out / "plant.csv")
-    autopilot = _read_csv(plan.out / "autopilot.csv")
+    plant = read_csv(plan.out / "plant.csv")
+    autopilot = read_csv(plan.out / "autopilot.csv")
     if not len(plant):
         raise RecordingError("the flight ended before it began")
     decisions = autopilot[: np.searchsorted(autopilot[:, 0], plant[-1, 0])]
@@ -144,7 +144,7 @@ def _euler(quaternions: Array, start_yaw_rad: float) -> Array:
     return np.array(angles)
 
 
-def _read_csv(path: Path) -> Array:
+def read_csv(path: Path) -> Array:
     """Return the complete rows of a log; a process that was killed may leave half of one."""
     header, *lines = path.read_text(encoding="utf-8").split("\n")
     complete = [line for line in lines[:-1] if line.count(",") == header.count(",")]

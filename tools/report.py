@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from autopilot.controller import Active, Fallback
 from autopilot.process import FALLBACK_CODES, STATUS_CODES
 from autopilot.qp import QpStatus
+from mavlink.feedback import Feedback
+from tools.estimation import FIGURES, read_estimation
 from tools.plan import FlightPlan
 from tools.recording import INPUT, Recording, Summary
 
@@ -34,11 +36,14 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
         "controller": plan.profile.controller,
         "link": plan.link,
         "seed": plan.seed,
+        "feedback": plan.feedback,
         "solver": plan.profile.table(plan.profile.controller).get("qp", {}).get("solver"),
         "vehicle": plan.vehicle_name,
         "plant_vehicle": plan.plant_vehicle_name,
         "integrator": plan.integrator,
-        "wind": str(plan.wind),
+        "wind": str(plan.weather.wind),
+        "gusts": [str(gust) for gust in plan.weather.gusts],
+        "turbulence": plan.weather.turbulence,
         "without": list(plan.without),
         "start": plan.start._asdict(),
         "sim_time_s": sim_time_s,
@@ -47,6 +52,8 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
         "rmse_m": _rms(error),
         "max_error_m": float(error.max()),
         "rmse_after_20s_m": _rms(settled) if len(settled) else None,
+        "max_error_after_20s_m": float(settled.max()) if len(settled) else None,
+        **_estimation_figures(plan, settled),
         "effort_n_m": _rms(np.linalg.norm(recording.columns(INPUT[1:]), axis=1)),
         "solve_time_us": _quantiles(recording.solve_time_us),
         "control_step_us": _quantiles(recording.control_step_us),
@@ -61,6 +68,13 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
         "max_slack": float(recording.slack.max()),
         "trajectory_sha256": recording.trajectory_sha256,
     }
+
+
+def _estimation_figures(plan: FlightPlan, settled: Array) -> Report:
+    """Return how far estimate and reference, estimate and truth are apart; a state that is told is the truth."""
+    if plan.feedback is Feedback.SENSORS:
+        return read_estimation(plan).after(SETTLED_AFTER_S).figures()
+    return dict.fromkeys(FIGURES) | {FIGURES[0]: _rms(settled) if len(settled) else None}
 
 
 def write_report(figures: Report, path: Path) -> None:
@@ -84,6 +98,7 @@ def print_report(figures: Report, out: Path) -> None:
     rows = {
         "position error, RMS": length(figures["rmse_m"]),
         f"position error, RMS after {SETTLED_AFTER_S:.0f} s": "-" if settled is None else length(settled),
+        **_estimation_rows(figures),
         "position error, maximum": length(figures["max_error_m"]),
         "QP solve time, p50 / p99": times("solve_time_us"),
         "control step, p50 / p99": times("control_step_us"),
@@ -98,6 +113,19 @@ def print_report(figures: Report, out: Path) -> None:
     for name, value in rows.items():
         table.add_row(name, value)
     Console().print(table)
+
+
+def _estimation_rows(figures: Report) -> dict[str, str]:
+    """Return the rows that only a flight on sensors has."""
+    if figures["estimation_rmse_m"] is None:
+        return {}
+    off, turned = figures["estimation_rmse_m"], figures["attitude_rmse_deg"]
+    return {
+        "estimate from reference, RMS": length(figures["control_rmse_m"]),
+        "estimate from truth, RMS": f"{length(off['horizontal'])} horizontal, {length(off['vertical'])} vertical",
+        "attitude, RMS": f"roll {turned['roll']:.2f}°, pitch {turned['pitch']:.2f}°, yaw {turned['yaw']:.2f}°",
+        "NEES, mean of 9 numbers": f"{figures['nees_mean']:.2f}",
+    }
 
 
 def length(metres: float) -> str:

@@ -15,11 +15,13 @@ from time import perf_counter
 from typing import IO, Any
 
 from autopilot.profile import ProfileError, load_profile
+from mavlink.feedback import Feedback
 from mavlink.home import HomePlace
 from mavlink.link import LinkError, beyond_loopback, open_link, unsigned_refusal
 from mavlink.process import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
 from plant.scenario import Start
 from plant.vehicle import VehicleError, load_vehicle
+from plant.weather import weather_of
 from tools.sitl_status import StatusLines
 
 PLANT_PORT = 14560
@@ -88,13 +90,15 @@ def _check(args: argparse.Namespace) -> None:
         profile = load_profile(args.profile).with_choices(args.controller, None)
         name = args.plant_vehicle or args.vehicle or profile.simulation.vehicle
         vehicle = load_vehicle(name).without(args.without)
-        load_vehicle(args.vehicle or profile.simulation.vehicle)
+        believed = load_vehicle(args.vehicle or profile.simulation.vehicle)
         urls = ground_links(args, args.instance)
         exposed = [url for url in urls if beyond_loopback(url)]
     except (ProfileError, VehicleError, LinkError) as error:
         fail(str(error))
     if exposed and not (args.signing_key or args.insecure):
         fail(unsigned_refusal(exposed[0]))
+    if args.feedback is Feedback.SENSORS and (vehicle.sensors is None or believed.sensors is None):
+        fail(f"--feedback sensors: vehicle {(believed if vehicle.sensors else vehicle).name} has no table sensors")
     if vehicle.ground is None and "z" not in args.start:
         fail(f"vehicle {name} has no ground to stand on: fly a vehicle with a table ground, or give --start z=...")
     if not 1 <= args.count <= LARGEST_FLEET - args.instance:
@@ -128,10 +132,12 @@ def _start_plant(member: Member, args: argparse.Namespace) -> None:
         *("--link", _plant_url(args, member.instance)),
         *("--vehicle", vehicle),
         *(f"--without={part}" for part in args.without),
-        *("--wind", str(args.wind)),
+        *weather_of(args).options(),
         *("--start", str(start)),
         *(("--duration", repr(args.duration)) if isfinite(args.duration) else ()),
         *("--speed", repr(args.speed) if isfinite(args.speed) else "max"),
+        *("--seed", str(args.seed + member.instance)),
+        *("--home", str(home)),
         *("--system-id", str(member.system_id)),
     )
 
@@ -145,6 +151,7 @@ def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -
         *("--profile", args.profile),
         *(("--vehicle", args.vehicle) if args.vehicle else ()),
         *(("--controller", args.controller) if args.controller else ()),
+        *("--feedback", args.feedback),
         *("--home", str(args.home)),
         *("--identity", args.identity),
         *("--state", str(folder)),

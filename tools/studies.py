@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from autopilot.controller import Fallback
 from autopilot.tracks import THESIS_TRACKS
 from mavlink.process import fail
-from plant.scenario import Wind
+from plant.weather import Weather, Wind
 from tools import study_figures
 from tools.figures import write_figure
 from tools.fly import make_folder
@@ -145,16 +145,16 @@ def _recovery() -> Iterable[Case]:
         yield Case((name, text), "", Flight("hover:height=20", start=start, duration_s=20.0))
 
 
-_WIND = Wind(5.0, 270.0)
+_WIND = Weather(Wind(5.0, 270.0))
 _UPSETS: dict[str, Flight] = {
     "nominal": Flight(""),
-    "wind 5 m/s": Flight("", wind=_WIND),
+    "wind 5 m/s": Flight("", weather=_WIND),
     "mass +20 %": Flight("", perturbation=Perturbation(mass=1.2)),
     "mass −20 %": Flight("", perturbation=Perturbation(mass=0.8)),
     "inertia +30 %": Flight("", perturbation=Perturbation(inertia=1.3)),
     "inertia −30 %": Flight("", perturbation=Perturbation(inertia=0.7)),
     "one rotor 15 % weak": Flight("", perturbation=Perturbation(front_rotor=0.85)),
-    "wind, mass +20 %, inertia +30 %, weak rotor": Flight("", perturbation=Perturbation(1.2, 1.3, 0.85), wind=_WIND),
+    "wind, mass +20 %, inertia +30 %, weak rotor": Flight("", perturbation=Perturbation(1.2, 1.3, 0.85), weather=_WIND),
 }
 
 

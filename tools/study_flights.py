@@ -16,8 +16,9 @@ from autopilot.profile import Profile
 from autopilot.qp import QpStatus
 from autopilot.tracks import DURATION_S
 from plant.process import TRUTH_COLUMNS
-from plant.scenario import NO_WIND, IntegrationError, Wind
+from plant.scenario import IntegrationError
 from plant.vehicle import Vehicle
+from plant.weather import NO_WEATHER, Weather
 from tools.local import fly_locally
 from tools.plan import FlightPlan
 from tools.recording import Recording, read_recording
@@ -70,7 +71,7 @@ class Flight(NamedTuple):
         perturbation: Of the plant's vehicle.
         without: Parts left out of the plant's vehicle, as in `Vehicle.without`.
         max_speed: Largest rotor speed of plant and autopilot, in the vehicle's unit; None for the vehicle's.
-        wind: Wind.
+        weather: Wind, gusts, turbulence.
         start: Keys and values as in `plant.scenario.Start`, in place of the profile's.
         duration_s: Simulated time.
     """
@@ -82,7 +83,7 @@ class Flight(NamedTuple):
     perturbation: Perturbation = Perturbation()
     without: tuple[str, ...] = ()
     max_speed: float | None = None
-    wind: Wind = NO_WIND
+    weather: Weather = NO_WEATHER
     start: tuple[tuple[str, float], ...] = ()
     duration_s: float = DURATION_S
 
@@ -96,7 +97,7 @@ class Flight(NamedTuple):
             vehicle=vehicle,
             plant_vehicle=self.perturbation.of(vehicle).without(self.without),
             without=self.without,
-            wind=self.wind,
+            weather=self.weather,
             start=plan.start._replace(**dict(self.start)),
             duration_s=self.duration_s,
         )

@@ -55,15 +55,18 @@ def gps_global_origin(s: Snapshot) -> Fields:
 
 
 def gps_raw_int(s: Snapshot) -> Fields:
-    """GPS_RAW_INT (24): what a good receiver would give, or none; course is unknown at rest."""
+    """GPS_RAW_INT (24): what the receiver told, or a good one would; or none. Course is unknown at rest."""
     if not s.gps_ok:
         nothing = (UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16)
         return (s.time_us, mav.GPS_FIX_TYPE_NO_GPS, 0, 0, 0, *nothing, 0)
-    place, (east, north, _) = place_of(s), s.velocity_enu_m_s
+    if s.fix is not None:
+        place, (east, north, _), kind, seen = s.fix.place, s.fix.velocity_enu_m_s, s.fix.fix_type, s.fix.satellites
+    else:
+        place, (east, north, _), kind, seen = place_of(s), s.velocity_enu_m_s, mav.GPS_FIX_TYPE_3D_FIX, SATELLITES
     speed = hypot(east, north)
     course = compass_cdeg(atan2(north, east)) if speed > 0.1 else UNKNOWN_U16
-    fix = (mav.GPS_FIX_TYPE_3D_FIX, *degrees_e7(place), 1e3 * place.altitude_m, DILUTION_E2, DILUTION_E2)
-    return (s.time_us, *fix, min(100.0 * speed, UNKNOWN_U16 - 1), course, SATELLITES)
+    fix = (kind, *degrees_e7(place), 1e3 * place.altitude_m, DILUTION_E2, DILUTION_E2)
+    return (s.time_us, *fix, min(100.0 * speed, UNKNOWN_U16 - 1), course, seen)
 
 
 def altitude(s: Snapshot) -> Fields:

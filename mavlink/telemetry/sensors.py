@@ -1,7 +1,6 @@
-"""Messages of the sensors, of which there are none while the state itself is fed back: what they would measure."""
+"""Messages of the sensors: what they measure; where the state is told and there are none, what they would measure."""
 
-from math import exp, log
-
+from mavlink.atmosphere import pressure_pa, temperature_c
 from mavlink.dialect import mav
 from mavlink.frames import Vector, frd_from_flu
 from mavlink.services.service import Fields
@@ -11,13 +10,6 @@ from mavlink.telemetry.wire import MILLI_G, Constants, boot_ms, in_body_frd, tim
 EARTH_FIELD_NED_GAUSS: Vector = (0.2152, 0.0124, 0.4312)
 """The earth's field at Zurich: 0.482 gauss, dipping 63.4° below the horizon, 3.3° east of true north. Taken everywhere:
 nothing in here steers by it."""
-
-# The international standard atmosphere, below 11 km (ISO 2533).
-SEA_PRESSURE_HPA = 1013.25
-SEA_TEMPERATURE_K = 288.15
-LAPSE_K_M = 0.0065
-PRESSURE_EXPONENT = 5.2559
-ZERO_CELSIUS_K = 273.15
 
 UPDATED: int = (
     mav.HIGHRES_IMU_UPDATED_XACC
@@ -38,8 +30,8 @@ UPDATED: int = (
 def highres_imu(s: Snapshot, c: Constants) -> Fields:
     """HIGHRES_IMU (105): m/s², rad/s, gauss, hPa, m, °C."""
     altitude_m = altitude_amsl_m(s)
-    air = (pressure_hpa(altitude_m), 0.0, altitude_m, temperature_c(altitude_m))
-    return (s.time_us, *specific_force_frd(s, c), *frd_from_flu(s.rate_flu_rad_s), *field_frd(s), *air, UPDATED, 0)
+    air = (static_hpa(s), 0.0, altitude_m, air_c(s))
+    return (s.time_us, *specific_force_frd(s, c), *measured_rate_frd(s), *field_frd(s), *air, UPDATED, 0)
 
 
 def scaled_imu(s: Snapshot, c: Constants) -> Fields:
@@ -54,7 +46,7 @@ def raw_imu(s: Snapshot, c: Constants) -> Fields:
 
 def scaled_pressure(s: Snapshot) -> Fields:
     """SCALED_PRESSURE (29): hPa, centidegrees Celsius."""
-    return (boot_ms(s), pressure_hpa(altitude_amsl_m(s)), 0.0, _temperature_cdeg(s), 0)
+    return (boot_ms(s), static_hpa(s), 0.0, _temperature_cdeg(s), 0)
 
 
 def vibration(s: Snapshot) -> Fields:
@@ -64,14 +56,33 @@ def vibration(s: Snapshot) -> Fields:
 
 def specific_force_frd(s: Snapshot, c: Constants) -> Vector:
     """What accelerometers measure: acceleration without gravity's, m/s², in the body's FRD."""
+    if s.sensed is not None:
+        return frd_from_flu(s.sensed.specific_force_flu_m_s2)
     east, north, up = s.acceleration_enu_m_s2
     return in_body_frd(s.attitude, (east, north, up + c.gravity_m_s2))
 
 
 def field_frd(s: Snapshot) -> Vector:
     """What magnetometers measure, gauss, in the body's FRD."""
+    if s.sensed is not None:
+        return frd_from_flu(s.sensed.magnetic_field_flu_gauss)
     north, east, down = EARTH_FIELD_NED_GAUSS
     return in_body_frd(s.attitude, (east, north, -down))
+
+
+def measured_rate_frd(s: Snapshot) -> Vector:
+    """What gyroscopes measure, rad/s, in the body's FRD."""
+    return frd_from_flu(s.rate_flu_rad_s if s.sensed is None else s.sensed.rate_flu_rad_s)
+
+
+def static_hpa(s: Snapshot) -> float:
+    """What a barometer measures."""
+    return pressure_hpa(altitude_amsl_m(s)) if s.sensed is None else s.sensed.pressure_pa / 100.0
+
+
+def air_c(s: Snapshot) -> float:
+    """Temperature of the air, degrees Celsius."""
+    return temperature_c(altitude_amsl_m(s)) if s.sensed is None else s.sensed.temperature_c
 
 
 def altitude_amsl_m(s: Snapshot) -> float:
@@ -81,20 +92,14 @@ def altitude_amsl_m(s: Snapshot) -> float:
 
 def pressure_hpa(altitude_m: float) -> float:
     """Pressure of the standard atmosphere."""
-    ratio = 1.0 - LAPSE_K_M * altitude_m / SEA_TEMPERATURE_K
-    return SEA_PRESSURE_HPA * exp(PRESSURE_EXPONENT * log(ratio))
-
-
-def temperature_c(altitude_m: float) -> float:
-    """Temperature of the standard atmosphere."""
-    return SEA_TEMPERATURE_K - LAPSE_K_M * altitude_m - ZERO_CELSIUS_K
+    return pressure_pa(altitude_m) / 100.0
 
 
 def _thousandths(s: Snapshot, c: Constants) -> tuple[float, ...]:
-    rate = times(1e3, frd_from_flu(s.rate_flu_rad_s))
+    rate = times(1e3, measured_rate_frd(s))
     return (*times(MILLI_G, specific_force_frd(s, c)), *rate, *times(1e3, field_frd(s)))
 
 
 def _temperature_cdeg(s: Snapshot) -> int:
     # Zero would mean that no temperature is known.
-    return round(100.0 * temperature_c(altitude_amsl_m(s))) or 1
+    return round(100.0 * air_c(s)) or 1

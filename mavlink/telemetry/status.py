@@ -52,6 +52,8 @@ def sys_status(s: Snapshot) -> Fields:
     health = parts | (0 if s.fence_breached else fence)
     if not s.gps_ok:
         health &= ~mav.MAV_SYS_STATUS_SENSOR_GPS
+    if s.estimator is not None:
+        health &= ~s.estimator.failed_sensors
     if not (s.armable or s.armed):  # "always healthy when armed"
         health &= ~mav.MAV_SYS_STATUS_PREARM_CHECK
     return (present, enabled, health, 1e3 * s.load, *_battery(s), 0, 0, 0, 0, 0, 0)
@@ -78,7 +80,10 @@ def flight_information(s: Snapshot) -> Fields:
 
 
 def estimator_status(s: Snapshot) -> Fields:
-    """ESTIMATOR_STATUS (230): the state is fed back, so that all of it is known and nothing contradicts it."""
+    """ESTIMATOR_STATUS (230). A state that is told is known, and nothing contradicts it."""
+    if s.estimator is not None:
+        flags, velocity, position, height, field, horizontal_m, vertical_m, _ = s.estimator
+        return (s.time_us, flags, velocity, position, height, field, 0.0, 0.0, horizontal_m, vertical_m)
     finite = all(map(isfinite, (*s.position_enu_m, *s.velocity_enu_m_s, *s.attitude)))
     return (s.time_us, ESTIMATED if finite else 0, *(0.0,) * 8)
 

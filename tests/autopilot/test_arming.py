@@ -58,5 +58,7 @@ def test_less_than_that_is_no_reason(facts: Facts) -> None:
 
 
 def test_every_reason_is_told_at_once() -> None:
-    facts = Facts(tilted(90.0)._replace(velocity_enu_m_s=(2.0, 0.0, 0.0)), False, 0.0, 1.0, "outside the geofence")
+    facts = Facts(
+        tilted(90.0)._replace(velocity_enu_m_s=(2.0, 0.0, 0.0)), False, 0.0, 1.0, "outside", "height not known"
+    )
     assert len(refusals(facts)) == len(CHECKS)

@@ -43,6 +43,9 @@ class FakeLink:
         self.waiting -= taken
         return [(HEARTBEAT, HERE)] * taken
 
+    def wait(self, timeout_s: float) -> None:
+        pass
+
     def take_opened(self) -> list[Address]:
         opened, self.opened = self.opened, []
         return opened

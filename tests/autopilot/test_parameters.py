@@ -54,9 +54,9 @@ def test_every_number_of_the_flight_profile_that_can_change_is_a_parameter() -> 
     assert there - known == NOT_IN_FLIGHT | {f"attitude.moves[{place}]" for place in range(6)}
 
 
-def test_every_number_of_the_vehicle_but_the_ground_under_it_is_a_parameter() -> None:
+def test_every_number_of_the_vehicle_but_the_ground_under_it_and_its_sensors_is_a_parameter() -> None:
     tree = msgspec.to_builtins(HUMMINGBIRD)
-    there = {described(path) for path in paths(tree) if path[0] != "ground"}
+    there = {described(path) for path in paths(tree) if path[0] not in ("ground", "sensors")}
     assert there == {described(number.path) for number in vehicle_numbers(tree)}
 
 

@@ -13,20 +13,26 @@ import pytest
 from msgspec import structs
 
 from autopilot.copter import Copter, Received
+from autopilot.estimate import Estimate
 from autopilot.modes import Mode, custom_mode, mode_of_custom
 from autopilot.profile import Profile, load_profile
+from autopilot.senses import estimator_for
 from autopilot.stations import StationSettings
 from autopilot.tracks import Track
 from mavlink.dialect import Codec, Message, mav
+from mavlink.feedback import Feedback
 from mavlink.files import Files
 from mavlink.frames import Vector, euler_from_quaternion, ned_from_enu
 from mavlink.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from mavlink.hil import ActuatorCommand
 from mavlink.parameters import Value
 from mavlink.services.command import NOT_GIVEN
+from plant.air import CALM
 from plant.scenario import Start
+from plant.sensors import tells
 from plant.vehicle import Vehicle, load_vehicle
-from plant.world import CALM, Physics, World, starting_world, state_frame
+from plant.world import Physics, World, starting_world, state_frame
+from tests.plant.flights import blowing
 
 SYSTEM, COMPONENT = 1, 1
 GCS_PORT, SDK_PORT = 14550, 14540
@@ -137,6 +143,7 @@ class CopterFlight:
         world: The plant.
         client: The first ground station.
         rotors: The last command to the plant.
+        estimate: What the autopilot makes of its sensors; None where the state is told.
         path: Positions, ENU, one a control sample, once `record` is set.
     """
 
@@ -152,23 +159,45 @@ class CopterFlight:
         origin: Geodetic = DEFAULT_ORIGIN,
         client: Client | None = None,
         files: Files | None = None,
+        feedback: Feedback = Feedback.STATE,
+        seed: int = 0,
     ) -> None:
-        """Begin at `start`, with parameters `values`; `vehicle` is the plant's, where it is not the autopilot's."""
+        """Begin at `start`, with parameters `values`; `vehicle` is the plant's, where it is not the autopilot's.
+
+        On sensors it stands until there is an estimate.
+        """
         self._profile = profile or FLIGHT
         self._believed = load_vehicle(self._profile.simulation.vehicle)
         self._settings = StationSettings(system_id=SYSTEM, identity="px4", origin=origin, files=files)
-        self._physics = Physics(vehicle or self._believed, "rk4", wind_enu_m_s)
-        self.world: World = starting_world(start, self._believed)
+        self._weather = blowing(wind_enu_m_s)
+        self._physics = Physics(vehicle or self._believed, "rk4", self._weather)
+        self.world: World = starting_world(start, self._believed, self._weather)
+        self._estimator = estimator_for(feedback, self._believed, origin)
         self.copter = self._copter(values, first)
+        interval_us = self.copter.frame_interval_us
+        self._tell = tells(
+            feedback, vehicle or self._believed, self._physics, origin, seed=seed, interval_us=interval_us
+        )
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
+        self.estimate: Estimate | None = None
         self.client = client or Client()
         self._clients: list[Client] = []
         self.add(self.client)
         self.step()
+        if feedback is Feedback.SENSORS:
+            self.until(lambda: self.estimate is not None, 10.0, "the first estimate")
         self.step()
 
     def _copter(self, values: dict[str, Value] | None, first: Track | None) -> Copter:
-        return Copter(self._profile, self._believed, self._settings, lambda: NO_CLOCK_S, values=values, first=first)
+        return Copter(
+            self._profile,
+            self._believed,
+            self._settings,
+            lambda: NO_CLOCK_S,
+            values=values,
+            first=first,
+            estimator=self._estimator,
+        )
 
     def add(self, client: Client) -> Client:
         """Connect another client."""
@@ -178,7 +207,7 @@ class CopterFlight:
 
     def put(self, start: Start) -> None:
         """Put the vehicle elsewhere, at this very time."""
-        self.world = replace(starting_world(start, self._believed), time_us=self.world.time_us)
+        self.world = replace(starting_world(start, self._believed, self._weather), time_us=self.world.time_us)
 
     def restart(self) -> None:
         """Start the autopilot anew, wherever the vehicle is."""
@@ -188,8 +217,8 @@ class CopterFlight:
 
     def step(self) -> None:
         """Fly one frame."""
-        frame = state_frame(self.world)
-        self.rotors = self.copter.step(frame).command
+        step = self.copter.step(self._tell(self.world))
+        self.rotors, self.estimate = step.command, step.estimate or self.estimate
         self.world = self._physics.step(self.world, self.rotors, self.copter.frame_interval_us)
         inbox = [received for client in self._clients for received in client.take_sent()]
         for link, address, datagram in self.copter.serve(inbox):

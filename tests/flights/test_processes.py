@@ -117,6 +117,13 @@ def test_an_autopilot_at_another_rate_is_told(tmp_path: Path, logs: Path) -> Non
             assert "another frame rate" in second.wait_for("refused")["text"]
 
 
+def test_an_autopilot_that_wants_sensors_of_a_vehicle_without_is_told(tmp_path: Path, logs: Path) -> None:
+    plant, url = start_plant(logs, tmp_path / "flight", "--speed", "1")
+    autopilot = start_autopilot(logs, url, "--vehicle", "hummingbird", "--feedback", "sensors")
+    with running(plant, autopilot):
+        assert "has no sensors" in autopilot.wait_for("refused")["text"]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_both_and_keeps_what_was_logged(tmp_path: Path, logs: Path, number: signal.Signals) -> None:
     out = tmp_path / "flight"

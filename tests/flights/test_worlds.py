@@ -79,11 +79,35 @@ def test_wind_carries_a_flight_away_and_comes_from_where_it_is_said_to(tmp_path:
     assert west["x"][-1] - calm["x"][-1] > 0.1
 
 
-def test_the_log_of_the_plant_ends_with_the_battery(tmp_path: Path) -> None:
-    fly(tmp_path, *REALISTIC, "3", "--link", "memory")
+def test_the_same_seed_is_the_same_weather_over_every_link(tmp_path: Path) -> None:
+    options = (
+        "hover",
+        "--duration",
+        "3",
+        "--wind",
+        "8@270",
+        "--turbulence",
+        "moderate",
+        "--gust=6@0:start=1,duration=1",
+    )
+    flights = {"udp": ("udp", "3"), "memory": ("memory", "3"), "other": ("memory", "4")}
+    reports = {
+        name: fly(tmp_path / name, *options, "--link", link, "--seed", seed) for name, (link, seed) in flights.items()
+    }
+    assert reports["udp"]["trajectory_sha256"] == reports["memory"]["trajectory_sha256"]
+    assert reports["other"]["trajectory_sha256"] != reports["memory"]["trajectory_sha256"]
+    assert (tmp_path / "udp" / "plant.csv").read_bytes() == (tmp_path / "memory" / "plant.csv").read_bytes()
+    told = [reports["udp"][key] for key in ("wind", "gusts", "turbulence")]
+    assert told == ["8.0@270.0", ["6.0@0.0:start=1.0,duration=1.0"], "moderate"]
+
+
+def test_the_log_of_the_plant_ends_with_battery_and_wind(tmp_path: Path) -> None:
+    fly(tmp_path, *REALISTIC, "3", "--link", "memory", "--wind", "4@270")
     flown = rows(tmp_path / "plant.csv")
     assert tuple(flown) == TRUTH_COLUMNS
-    assert tuple(flown)[-2:] == ("voltage_v", "charge_ah")
+    assert tuple(flown)[-5:] == ("voltage_v", "charge_ah", "wind_east", "wind_north", "wind_up")
     assert np.isnan(flown["voltage_v"][0])
     assert (flown["voltage_v"][1:] < 12.6).all()
     assert (np.diff(flown["charge_ah"]) > 0.0).all()
+    assert flown["wind_east"] == pytest.approx(4.0)
+    assert flown["wind_north"] == pytest.approx(0.0)

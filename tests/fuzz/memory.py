@@ -3,9 +3,10 @@
 from autopilot.core import Autopilot
 from autopilot.profile import load_profile
 from autopilot.tracks import track
+from mavlink.feedback import Feedback
 from mavlink.hil import ActuatorCommand
 from mavlink.lockstep import Address, AutopilotEnd, PlantEnd
-from plant.process import DEFAULT_START
+from plant.process import DEFAULT_STARTS
 from plant.vehicle import load_vehicle
 from plant.world import Physics, State, World, starting_world, state_frame
 from tests.fuzz.datagrams import FRAME_US, Fuzzer
@@ -29,7 +30,7 @@ class Flight:
         vehicle = load_vehicle(profile.simulation.vehicle)
         self._autopilot = Autopilot(profile, vehicle, track("spiral"), lambda: NOW_S)
         self._physics = Physics(vehicle, "rk4")
-        self._world = starting_world(DEFAULT_START, vehicle)
+        self._world = starting_world(DEFAULT_STARTS[Feedback.STATE], vehicle)
         self.plant_end = PlantEnd(system_id=SYSTEM_ID, frame_interval_us=FRAME_US)
         self.autopilot_end = AutopilotEnd(system_id=SYSTEM_ID, frame_interval_us=FRAME_US, now_s=NOW_S)
         self.autopilot_end.poll(NOW_S)

@@ -6,8 +6,11 @@ import pytest
 
 from mavlink import dialect, lockstep
 from mavlink.dialect import Codec
+from mavlink.feedback import Feedback
+from mavlink.geodesy import DEFAULT_ORIGIN
 from mavlink.hil import ActuatorCommand, StateFrame, encode_actuators
 from mavlink.lockstep import AutopilotEnd, PlantEnd
+from mavlink.sensors import Frame, GpsFix, SensorFrame, encode_sensors
 
 ADDRESS = ("autopilot", 1)
 STRANGER = ("stranger", 2)
@@ -153,16 +156,96 @@ def test_a_restarted_autopilot_gets_the_frame_awaited_at_once(plant: PlantEnd, a
     ],
 )
 def test_frame_interval_requests(plant: PlantEnd, interval_us: float, flying: bool, result: int) -> None:
-    codec = Codec(1, dialect.AUTOPILOT_COMPONENT)
     if flying:
         plant.offer(frame_at(0), 0.0)
+    assert asked_for(plant, dialect.MSG_ATTITUDE_QUATERNION, interval_us) == result
+
+
+def asked_for(plant: PlantEnd, message_id: int, interval_us: float) -> int:
+    codec = Codec(1, dialect.AUTOPILOT_COMPONENT)
     target = (1, dialect.PLANT_COMPONENT)
-    message_id = dialect.MSG_ATTITUDE_QUATERNION
     fields = (*target, dialect.CMD_SET_MESSAGE_INTERVAL, 0, message_id, interval_us, 0, 0, 0, 0, 0)
+    plant.take_outbox()
     plant.receive(codec.encode("COMMAND_LONG", *fields), ADDRESS, 0.0)
     (outgoing,) = plant.take_outbox()
     (ack,) = codec.decode(outgoing.datagram)
-    assert (ack.fields.command, ack.fields.result) == (dialect.CMD_SET_MESSAGE_INTERVAL, result)
+    assert ack.fields.command == dialect.CMD_SET_MESSAGE_INTERVAL
+    result: int = ack.fields.result
+    return result
+
+
+SENSORS, STATE = dialect.MSG_HIL_SENSOR, dialect.MSG_ATTITUDE_QUATERNION
+
+
+def sensors_at(time_us: int) -> SensorFrame:
+    """A frame of numbers that float32 holds, with a fix at every second one."""
+    fix = GpsFix(time_us, 3, DEFAULT_ORIGIN, (1.0, 0.5, 0.25), 0.5, 1.0, 9)
+    now = float(time_us % 1024)
+    vectors = ((now, 0.5, 9.75), (0.0, now, -0.5), (0.25, 0.0, now))
+    return SensorFrame(time_us, 0x3F, *vectors, 51_200.0, 15.0, fix if time_us // INTERVAL_US % 2 else None)
+
+
+def both_ends_on_sensors() -> tuple[PlantEnd, AutopilotEnd]:
+    plant = PlantEnd(system_id=1, frame_interval_us=4_000, serves=list(Feedback))
+    autopilot = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0, feedback=Feedback.SENSORS)
+    call(autopilot, plant)
+    return plant, autopilot
+
+
+def test_the_call_asks_for_sensors() -> None:
+    plant, autopilot = both_ends_on_sensors()
+    assert (plant.feedback, plant.frame_interval_us) == (Feedback.SENSORS, INTERVAL_US)
+    assert autopilot.refused is None
+
+
+def test_frames_of_sensors_are_answered_as_any_other() -> None:
+    plant, autopilot = both_ends_on_sensors()
+    for time_us in range(0, 4 * INTERVAL_US, INTERVAL_US):
+        plant.offer(sensors_at(time_us), 0.0)
+        (outgoing,) = plant.take_outbox()
+        assert autopilot.receive(outgoing.datagram, 0.0) == sensors_at(time_us)
+        assert autopilot.receive(outgoing.datagram, 0.0) is None
+        autopilot.answer(command_at(time_us))
+        (answer,) = autopilot.take_outbox()
+        assert plant.receive(answer, ADDRESS, 0.0) == command_at(time_us)
+
+
+def test_a_plant_without_sensors_refuses_them(plant: PlantEnd) -> None:
+    autopilot = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0, feedback=Feedback.SENSORS)
+    call(autopilot, plant)
+    assert autopilot.refused == dialect.RESULT_UNSUPPORTED
+    assert plant.feedback is Feedback.STATE
+
+
+def test_feedback_is_not_changed_in_mid_flight() -> None:
+    plant, _ = both_ends_on_sensors()
+    assert asked_for(plant, STATE, INTERVAL_US) == dialect.RESULT_ACCEPTED
+    assert asked_for(plant, SENSORS, INTERVAL_US) == dialect.RESULT_ACCEPTED
+    plant.offer(sensors_at(0), 0.0)
+    assert asked_for(plant, STATE, INTERVAL_US) == dialect.RESULT_TEMPORARILY_REJECTED
+    assert asked_for(plant, SENSORS, 2 * INTERVAL_US) == dialect.RESULT_TEMPORARILY_REJECTED
+    assert asked_for(plant, SENSORS, INTERVAL_US) == dialect.RESULT_ACCEPTED
+    assert plant.feedback is Feedback.SENSORS
+
+
+def test_frames_of_the_other_kind_are_not_flown_on(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    plant.offer(sensors_at(INTERVAL_US), 0.0)
+    (outgoing,) = plant.take_outbox()
+    assert autopilot.receive(outgoing.datagram, 0.0) is None
+    assert autopilot.dropped["unexpected"] == 2
+    plant, on_sensors = both_ends_on_sensors()
+    plant.offer(frame_at(0), 0.0)
+    (outgoing,) = plant.take_outbox()
+    assert on_sensors.receive(outgoing.datagram, 0.0) is None
+    assert on_sensors.dropped["unexpected"] == 2
+
+
+def test_a_fix_without_a_frame_is_dropped() -> None:
+    _, autopilot = both_ends_on_sensors()
+    _, fix = encode_sensors(Codec(1, dialect.PLANT_COMPONENT), sensors_at(INTERVAL_US))
+    assert autopilot.receive(fix, 0.0) is None
+    assert autopilot.dropped["invalid"] == 1
 
 
 def test_another_command_is_unsupported(plant: PlantEnd) -> None:
@@ -210,13 +293,17 @@ def test_heartbeats_count_in_simulated_time(plant: PlantEnd, autopilot: Autopilo
     assert beats == {"plant": 4, "autopilot": 4}
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_loss_duplication_and_reordering_change_nothing(plant: PlantEnd, autopilot: AutopilotEnd, seed: int) -> None:
-    """Whatever the link does, the plant obeys each command once, in order."""
+@pytest.mark.parametrize("feedback", Feedback)
+@pytest.mark.parametrize("seed", range(10))
+def test_loss_duplication_and_reordering_change_nothing(seed: int, feedback: Feedback) -> None:
+    """Whatever the link does, the plant obeys each command once, in order, and the autopilot sees each frame once."""
     chance = random.Random(seed)
+    tell = frame_at if feedback is Feedback.STATE else sensors_at
+    plant = PlantEnd(system_id=1, frame_interval_us=4_000, serves=list(Feedback))
+    autopilot = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0, feedback=feedback)
     call(autopilot, plant)
     obeyed: list[int] = []
-    computed: list[int] = []
+    computed: list[Frame] = []
     in_flight: list[tuple[str, bytes]] = []
 
     def post(to: str, datagram: bytes) -> None:
@@ -224,7 +311,7 @@ def test_loss_duplication_and_reordering_change_nothing(plant: PlantEnd, autopil
             in_flight.insert(chance.randint(0, len(in_flight)), (to, datagram))
 
     now_s = 0.0
-    plant.offer(frame_at(0), now_s)
+    plant.offer(tell(0), now_s)
     while len(obeyed) < 50:
         now_s += 0.001
         plant.poll(now_s)
@@ -236,13 +323,13 @@ def test_loss_duplication_and_reordering_change_nothing(plant: PlantEnd, autopil
                 command = plant.receive(datagram, ADDRESS, now_s)
                 if command:
                     obeyed.append(command.time_us)
-                    plant.offer(frame_at(command.time_us + INTERVAL_US), now_s)
+                    plant.offer(tell(command.time_us + INTERVAL_US), now_s)
             else:
                 frame = autopilot.receive(datagram, now_s)
                 if frame:
-                    computed.append(frame.time_us)
+                    computed.append(frame)
                     autopilot.answer(command_at(frame.time_us))
         for datagram in autopilot.take_outbox():
             post("plant", datagram)
     assert obeyed == [sample * INTERVAL_US for sample in range(50)]
-    assert computed[:50] == obeyed
+    assert computed[:50] == [tell(time_us) for time_us in obeyed]

@@ -1,16 +1,19 @@
 """Vehicles with some of their parts, and flights of them at a constant command."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from mavlink.frames import Vector
 from mavlink.hil import ActuatorCommand
+from plant.air import CALM
 from plant.dynamics import Array
 from plant.integrate import Integrator
 from plant.scenario import PARTS, Start
 from plant.vehicle import Vehicle, load_vehicle
-from plant.world import CALM, Physics, World, starting_world
+from plant.weather import RecordedWind, Weather
+from plant.world import Physics, World, starting_world
 
 OFF = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
 FRAME_US = 4000
@@ -48,11 +51,16 @@ def flight(
     frame_us: int = FRAME_US,
 ) -> list[World]:
     """Fly at a constant command; return the world at every frame, the start included."""
-    physics = Physics(vehicle, integrator, wind)
-    worlds = [start if isinstance(start, World) else starting_world(start, vehicle)]
+    physics = Physics(vehicle, integrator, blowing(wind))
+    worlds = [start if isinstance(start, World) else starting_world(start, vehicle, blowing(wind))]
     while worlds[-1].time_us < duration_s * 1e6:
         worlds.append(physics.step(worlds[-1], order, frame_us))
     return worlds
+
+
+def blowing(velocity_enu_m_s: Vector) -> Weather:
+    """Return the weather of air that always moves like that."""
+    return Weather(RecordedWind(Path("always.csv"), (0.0,), (velocity_enu_m_s,)))
 
 
 def states(worlds: Sequence[World]) -> Array:

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 
 from mavlink.frames import Vector
-from plant.scenario import Start, wind
+from plant.scenario import Start
+from plant.weather import wind
 from tests.plant.flights import OFF, command, flight, hover, hummingbird, rpm, states
 from tests.strategies import reals, vectors
 
@@ -48,15 +49,15 @@ def test_uneven_rotors_turn_a_glide() -> None:
 
 
 def test_the_wind_blows_from_where_it_is_said_to() -> None:
-    assert wind("5@270").velocity_enu_m_s == pytest.approx((5.0, 0.0, 0.0), abs=1e-12)
-    assert wind("5@0").velocity_enu_m_s == pytest.approx((0.0, -5.0, 0.0), abs=1e-12)
-    assert wind("5@45").velocity_enu_m_s == pytest.approx((-5.0 / 2**0.5, -5.0 / 2**0.5, 0.0))
+    assert wind("5@270").velocity_at(0.0) == pytest.approx((5.0, 0.0, 0.0), abs=1e-12)
+    assert wind("5@0").velocity_at(0.0) == pytest.approx((0.0, -5.0, 0.0), abs=1e-12)
+    assert wind("5@45").velocity_at(0.0) == pytest.approx((-5.0 / 2**0.5, -5.0 / 2**0.5, 0.0))
     assert wind(str(wind("3.7@123.4"))) == wind("3.7@123.4")
 
 
 def test_a_hovering_vehicle_drifts_off_with_the_wind() -> None:
     start = Start(z=9.0, rotors=rpm(VEHICLE, HOVER))
-    end = flight(VEHICLE, start, hover(VEHICLE), 2.0, wind=wind("5@270").velocity_enu_m_s)[-1]
+    end = flight(VEHICLE, start, hover(VEHICLE), 2.0, wind=wind("5@270").velocity_at(0.0))[-1]
     rate = (0.025 + 4.0 * ROTOR_DRAG * HOVER) / MASS_KG
     assert end.state[6] == pytest.approx(5.0 * (2.0 - (1.0 - exp(-2.0 * rate)) / rate), rel=1e-9)
 

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from mavlink.frames import Quaternion, Vector, earth_from_body
 from mavlink.hil import ActuatorCommand
+from plant.air import CALM
 from plant.dynamics import Array, Packed, angular_acceleration, attitude_of, derivative, packed
 from plant.integrate import dormand_prince
 from plant.parameters import parameters_of
 from plant.scenario import Start
 from plant.vehicle import load_vehicle
-from plant.world import CALM
 from tests.plant.flights import flight, hover, hummingbird, rpm
 from tests.strategies import quaternions, reals, vectors
 

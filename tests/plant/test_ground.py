@@ -6,12 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mavlink.frames import Quaternion, Vector, rotation_matrix
+from plant.air import CALM
 from plant.dynamics import contact_wrench, packed
 from plant.integrate import Integrator
 from plant.parameters import parameters_of
-from plant.scenario import Start, wind
+from plant.scenario import Start
 from plant.vehicle import VehicleError, load_vehicle
-from plant.world import CALM, starting_world
+from plant.weather import wind
+from plant.world import starting_world
 from tests.plant.flights import OFF, flight, hover, hummingbird, rpm, states
 from tests.strategies import quaternions, vectors
 
@@ -26,7 +28,7 @@ def test_it_rests_where_it_stands(integrator: Integrator) -> None:
 
 
 def test_a_breeze_hardly_moves_it() -> None:
-    rest = states(flight(VEHICLE, Start(), OFF, 10.0, wind=wind("5@270").velocity_enu_m_s))
+    rest = states(flight(VEHICLE, Start(), OFF, 10.0, wind=wind("5@270").velocity_at(0.0)))
     assert 0.0 < (rest[-1, 6] - rest[0, 6]) / 10.0 < 0.5e-3
     assert np.abs(rest[:, 8]).max() < 1e-4
     assert np.abs(rest[:, 10:13]).max() < 1e-3

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from mavlink.hil import ActuatorCommand
+from plant.air import CALM
 from plant.dynamics import Array, packed, runge_kutta_4
 from plant.integrate import Integrator, dormand_prince, fixed_step, solver
 from plant.parameters import parameters_of
 from plant.scenario import IntegrationError, Start
 from plant.vehicle import load_vehicle
-from plant.world import CALM, Physics, World
+from plant.world import Physics, World
 from tests.plant.flights import command, flight, hummingbird, states
 
 UNEVEN = (480.0, 500.0, 510.0, 495.0)

@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mavlink.hil import ActuatorCommand
+from plant.air import CALM
 from plant.dynamics import close, packed
 from plant.integrate import Integrator
 from plant.parameters import parameters_of
 from plant.scenario import Start
 from plant.vehicle import load_vehicle
-from plant.world import CALM, Physics, starting_world
+from plant.world import Physics, starting_world
 from tests.plant.flights import OFF, command, flight, hummingbird, rpm, speeds
 
 LAGGING = hummingbird("rotor-lag")

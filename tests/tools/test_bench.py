@@ -78,6 +78,7 @@ def test_a_missing_peer_is_said_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(peer, "installed", lambda: False)
+    monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 1.0)
     flights = figures_of(tmp_path / "flights.json", "--only", "flights")["flights"]
     assert all(set(rate) == {"memory", "udp"} for rate in flights["rates_hz"].values())
     assert capsys.readouterr().err == f"colibri: {peer.MISSING}\n"

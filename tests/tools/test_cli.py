@@ -42,6 +42,19 @@ BAD_INPUT = {
     "vehicle": ((plain("spiral"), plain("--vehicle"), plain("dragonfly")), "unknown vehicle dragonfly: choose"),
     "solver": ((plain("spiral"), plain("--solver"), plain("simplex")), "unknown solver simplex: installed are"),
     "extra": ((plain("spiral"), plain("--solver"), plain("gurobi")), "gurobi is not installed: pip install"),
+    "feedback": (
+        (plain("spiral"), plain("--feedback"), plain("hope")),
+        "argument --feedback: must be state or sensors",
+    ),
+    "no sensors": (
+        (plain("spiral"), plain("--feedback"), plain("sensors"), plain("--vehicle"), plain("hummingbird-thesis")),
+        "--feedback sensors: vehicle hummingbird-thesis has no table sensors",
+    ),
+    "no ground to stand on": (
+        (plain("spiral"), plain("--feedback"), plain("sensors"), plain("--without"), plain("ground")),
+        "--feedback sensors: vehicle hummingbird has no ground to stand on",
+    ),
+    "seed": ((plain("spiral"), plain("--seed"), plain("-1")), "argument --seed: must not be below zero, not -1"),
     "missing key": (
         (plain("spiral"), plain("--vehicle"), edited(VEHICLE, "mass_kg = 0.698", "")),
         "hummingbird.toml: body: Object missing required field `mass_kg`",
@@ -78,6 +91,18 @@ BAD_INPUT = {
     "wind direction": (
         (plain("spiral"), plain("--wind"), plain("5@400")),
         "argument --wind: the speed must not be negative, the direction 0 to 360 degrees, not 5@400",
+    ),
+    "wind file": (
+        (plain("spiral"), plain("--wind"), plain("/none/wind.csv")),
+        "argument --wind: /none/wind.csv: No such file or directory",
+    ),
+    "gust": (
+        (plain("spiral"), plain("--gust"), plain("6@270")),
+        "argument --gust: must be SPEED@FROM:start=S,duration=S, 6@270:start=10,duration=2 say, not 6@270",
+    ),
+    "turbulence": (
+        (plain("spiral"), plain("--turbulence"), plain("terrible")),
+        "argument --turbulence: invalid choice: 'terrible'",
     ),
     "part": ((plain("spiral"), plain("--without"), plain("gravity")), "argument --without: invalid choice: 'gravity'"),
     "start key": (
@@ -182,7 +207,7 @@ def has_flown(out: Path) -> bool:
 
 @pytest.mark.parametrize("whom", ["group", "parent"])
 def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path, whom: str) -> None:
-    """A terminal interrupts the whole group; `kill` only the command itself."""
+    """A terminal interrupts the whole group; `kill` ends only the command itself."""
     flight = fly_slowly(tmp_path)
     wait_for(lambda: has_flown(tmp_path), "the flight to begin")
     children = psutil.Process(flight.pid).children(recursive=True)
@@ -190,7 +215,7 @@ def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path, whom: str) ->
     if whom == "group":
         os.killpg(flight.pid, signal.SIGINT)
     else:
-        flight.send_signal(signal.SIGINT)
+        flight.send_signal(signal.SIGTERM)
     _, said = flight.communicate(timeout=60.0)
     assert flight.returncode == 130
     assert said.splitlines()[-1] == f"colibri: error: interrupted; what was logged is in {tmp_path}"

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from plant.scenario import NO_WIND
+from mavlink.feedback import Feedback
+from plant.weather import NO_WIND
 from tools.figures import (
     Curve,
     Panel,
@@ -43,9 +44,17 @@ class Flight(NamedTuple):
 
 
 def fly(out: Path, duration_s: float) -> Flight:
-    arguments = {"profile": "thesis", "link": "direct", "speed": np.inf, "seed": 0, "duration": duration_s, "out": out}
+    arguments = {
+        "profile": "thesis",
+        "link": "direct",
+        "speed": np.inf,
+        "seed": 0,
+        "feedback": Feedback.STATE,
+        "duration": duration_s,
+        "out": out,
+    }
     files = {"controller": None, "solver": None, "vehicle": None, "plant_vehicle": None, "integrator": "rk4"}
-    world: dict[str, Any] = {"wind": NO_WIND, "without": (), "start": {}}
+    world: dict[str, Any] = {"wind": NO_WIND, "gust": (), "turbulence": None, "without": (), "start": {}}
     ground: dict[str, Any] = {"gcs": (), "signing_key": None, "insecure": False}
     plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files, **world, **ground))
     fly_locally(plan, lambda _sim_time_s: None)

@@ -36,6 +36,10 @@ NOT_BEYOND = "reaches beyond this computer: give --signing-key FILE, or --insecu
         (("--vehicle", "dragonfly"), "unknown vehicle dragonfly: choose hummingbird"),
         (("--plant-vehicle", "dragonfly"), "unknown vehicle dragonfly: choose hummingbird"),
         (("--profile", "thesis"), "vehicle hummingbird-thesis has no ground to stand on"),
+        (
+            ("--profile", "thesis", "--feedback", "sensors"),
+            "--feedback sensors: vehicle AscTec Hummingbird (thesis) has",
+        ),
         (("--gcs", "14550"), "14550: expected udpin:HOST:PORT or udpout:HOST:PORT or tcpin:HOST:PORT"),
         (("--gcs", "udpin:0.0.0.0:14550"), f"udpin:0.0.0.0:14550 {NOT_BEYOND}"),
         (("--gcs", "udpout:192.0.2.1:14550"), f"udpout:192.0.2.1:14550 {NOT_BEYOND}"),

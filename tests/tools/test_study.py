@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plant.scenario import Wind
 from plant.vehicle import load_vehicle
+from plant.weather import Weather, Wind
 from tools.cli import main
 from tools.local import fly_locally
 from tools.recording import COLUMNS, read_recording
@@ -53,9 +53,10 @@ def test_every_case_has_a_cell_of_its_own_and_can_be_flown(name: str, tmp_path: 
 
 def test_a_flight_changes_what_it_says_and_nothing_else(tmp_path: Path) -> None:
     plain = Flight("spiral").plan(tmp_path)
-    wind = Wind(5.0, 270.0)
-    changed = Flight("spiral", wind=wind, start=(("phi", 170.0),), scheduling="frozen", duration_s=3.0).plan(tmp_path)
-    assert (changed.wind, changed.start, changed.duration_s) == (wind, plain.start._replace(phi=170.0), 3.0)
+    weather = Weather(Wind(5.0, 270.0), turbulence="light", seed=3)
+    flight = Flight("spiral", weather=weather, start=(("phi", 170.0),), scheduling="frozen", duration_s=3.0)
+    changed = flight.plan(tmp_path)
+    assert (changed.weather, changed.start, changed.duration_s) == (weather, plain.start._replace(phi=170.0), 3.0)
     assert changed.profile.table("lpv-mpc")["attitude"]["scheduling"] == "frozen"
     assert plain.profile.table("lpv-mpc")["attitude"]["scheduling"] == "along-plan"
     assert (changed.vehicle, changed.plant_vehicle) == (plain.vehicle, plain.plant_vehicle)

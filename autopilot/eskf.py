@@ -1,0 +1,282 @@
+"""The error-state Kalman filter: its state, what it believes of the sensors, and when it stops to.
+
+A kind of measurement that is rejected for long is believed again: the part of the state that it speaks of is doubted
+first, so that it is taken anew. For a magnetic field that is the field of the vehicle itself, and yaw stays; for
+pressure it is the offset of the barometer, and height stays; for GPS it is position or velocity.
+"""
+
+from collections.abc import Callable
+from math import inf, isfinite, nan, radians
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot import eskf_update as update
+from autopilot.alignment import Aligned
+from autopilot.eskf_predict import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    BARO_OFFSET,
+    ERRORS,
+    GPS_DRIFT,
+    GYRO_BIAS,
+    HARD_IRON,
+    NOMINAL,
+    POSITION,
+    VELOCITY,
+    Noise,
+    predict,
+)
+from autopilot.estimate import Reason, Test, Tests
+from mavlink.atmosphere import METRES_PER_PASCAL, altitude_m, altitude_slope_m_pa
+from mavlink.frames import Vector
+from mavlink.sensors import GpsFix
+from plant.vehicle import Sensors
+
+Array = NDArray[np.float64]
+
+FIVE_SIGMA = (25.0, 28.74, 31.81)
+"""χ² of one, two and three degrees of freedom that is exceeded as rarely as five standard deviations are."""
+
+_FIX_GATES = np.array([FIVE_SIGMA[2], FIVE_SIGMA[1], FIVE_SIGMA[0]])
+_FIRST_POSITION_M, _FIRST_VELOCITY_M_S, _FIRST_ATTITUDE_RAD, _FIRST_OFFSET_M = 100.0, 0.02, 0.5, 1000.0
+_ITERATIONS = 4
+_LEAST_NOISE = 1e-6
+"""Of anything, in its own unit: a perfect sensor would leave nothing to divide by."""
+_PLACE_STEP_M, _HEIGHT_STEP_M, _SPEED_STEP_M_S = 0.011, 0.001, 0.01
+"""HIL_GPS has degE7, mm and cm/s."""
+_CLAIM_STEP_M = 0.01
+_STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)
+"""By how much the field may differ from the earth's in strength and inclination."""
+_IRON_WALK_GAUSS = 1e-5
+_DOUBTED_M, _DOUBTED_M_S, _DOUBTED_GAUSS = 100.0, 10.0, 0.3
+
+
+class Kind:
+    """One kind of measurement: its last test, and for how long it has been rejected.
+
+    Attributes:
+        test: The last.
+        accepted_us: When it was last believed.
+        rejected_us: Since when it is not; None while it is.
+        resets: How often it had to be believed.
+    """
+
+    def __init__(self, numbers: int, patience_us: int, doubted: tuple[int, int, float]) -> None:
+        """Measure `numbers` at once; after `patience_us` of rejections, doubt (first state, count, σ) and believe."""
+        self.gate = FIVE_SIGMA[numbers - 1]
+        self.test = Test(-1, (0.0,) * numbers, 0.0, self.gate)
+        self.accepted_us = 0
+        self.rejected_us: int | None = None
+        self._patience_us = patience_us
+        self._doubted = doubted
+        self._y = np.zeros(numbers)
+        self.resets = 0
+
+    def fuse(self, filter_: "Filter", time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
+        """Fuse a measurement; return whether it was believed."""
+        nis = kernel(filter_.x, filter_.P, *arguments, self.gate, self._y)
+        if self.note(time_us, tuple(self._y.tolist()), nis):
+            return True
+        return self.insist(filter_, time_us, kernel, *arguments)
+
+    def note(self, time_us: int, innovation: tuple[float, ...], nis: float) -> bool:
+        """Note a test; return whether the measurement was believed."""
+        self.test = Test(time_us, innovation, nis, self.gate)
+        if nis <= self.gate:
+            self.accepted_us, self.rejected_us = time_us, None
+            return True
+        return False
+
+    def insist(self, filter_: "Filter", time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
+        """Reject a measurement, but believe it if this has lasted too long; return whether it was believed."""
+        if not self.reject(time_us):
+            return False
+        first, count, sigma = self._doubted
+        update.doubt(filter_.P, first, count, sigma * sigma)
+        kernel(filter_.x, filter_.P, *arguments, inf, self._y)
+        self.resets += 1
+        self.accept(time_us)
+        return True
+
+    def accept(self, time_us: int) -> None:
+        """Note that a measurement was believed."""
+        self.accepted_us = time_us
+        self.rejected_us = None
+
+    def reject(self, time_us: int) -> bool:
+        """Note that a measurement was not believed; return whether this has lasted too long."""
+        if self.rejected_us is None:
+            self.rejected_us = time_us
+        return time_us - self.rejected_us >= self._patience_us
+
+
+class Filter:
+    """State and covariance, at a time some way behind the vehicle's.
+
+    Attributes:
+        x: Nominal state, (23,).
+        P: Covariance of its error, (22, 22).
+        position, velocity, height, pressure, field: What is measured.
+    """
+
+    def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector) -> None:
+        """Believe what `sensors` say of themselves."""
+        self._sensors, self._gravity = sensors, gravity_m_s2
+        self._field = np.array(field_enu_gauss)
+        self._noise = noise_of(sensors)
+        gps = sensors.gps
+        self._horizontal = gps.horizontal_noise_m**2 + _PLACE_STEP_M**2 / 12.0
+        self._vertical = gps.vertical_noise_m**2 + _HEIGHT_STEP_M**2 / 12.0
+        speed = gps.velocity_noise_m_s**2 + _SPEED_STEP_M_S**2 / 12.0
+        self._fix, self._fix_y, self._fix_nis = np.zeros(6), np.zeros(6), np.zeros(3)
+        self._claims = (nan, nan)
+        self._fix_variances = np.array([speed, self._horizontal, self._vertical])
+        self._field_variance = max(sensors.magnetometer.noise_gauss, _LEAST_NOISE) ** 2
+        self.x, self.P = np.zeros(NOMINAL), np.zeros((ERRORS, ERRORS))
+        self.velocity = Kind(3, 7_000_000, (VELOCITY, 3, _DOUBTED_M_S))
+        self.position = Kind(2, 7_000_000, (POSITION, 2, _DOUBTED_M))
+        self.height = Kind(1, 7_000_000, (POSITION + 2, 1, _DOUBTED_M))
+        self.pressure = Kind(1, 7_000_000, (BARO_OFFSET, 1, _DOUBTED_M))
+        self.field = Kind(3, 10_000_000, (HARD_IRON, 3, _DOUBTED_GAUSS))
+        self._kinds = (self.velocity, self.position, self.height, self.pressure, self.field)
+
+    def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
+        """Begin at rest: each mean is fused as a measurement, so that the covariance knows what it took from where.
+
+        The attitude is found by iteration. A tilt seen by the accelerometer may be its bias, and the magnetic field
+        knows better: a covariance linearised where the first guess was would later be taken for knowledge.
+        """
+        x, P = self.x, self.P
+        attitude = aligned.attitude
+        for _ in range(_ITERATIONS):
+            self._know_nothing(place_enu_m)
+            x[6:10] = attitude
+            self._rest(aligned)
+            attitude = tuple(x[6:10].tolist())
+        for kind in self._kinds:
+            kind.accept(time_us)
+        y1, y2, y3 = np.zeros(1), np.zeros(2), np.zeros(3)
+        place, horizontal, vertical = np.array(place_enu_m), *self._of_place(aligned.fix)
+        update.fuse_velocity(x, P, np.array(aligned.fix.velocity_enu_m_s), self._fix_variances[0], inf, y3)
+        update.fuse_horizontal(x, P, place, 0.0, horizontal, inf, y2)
+        update.fuse_height(x, P, place, 0.0, vertical, inf, y1)
+        if aligned.pressure_height_m is not None:
+            x[19] = aligned.pressure_height_m - x[2]
+            sigma = self._sensors.barometer.noise_pa * METRES_PER_PASCAL
+            variance = max(sigma, _LEAST_NOISE) ** 2 / aligned.heights
+            update.fuse_pressure_height(x, P, aligned.pressure_height_m, variance, inf, y1)
+
+    def _know_nothing(self, place_enu_m: Vector) -> None:
+        """Know of a vehicle at a place what can be known before anything is measured."""
+        sensors, P = self._sensors, self.P
+        self.x[:], P[:] = 0.0, 0.0
+        self.x[:3] = place_enu_m
+        for first, count, sigma in (
+            (POSITION, 3, _FIRST_POSITION_M),
+            (VELOCITY, 3, _FIRST_VELOCITY_M_S),
+            (ATTITUDE, 3, _FIRST_ATTITUDE_RAD),
+            (GYRO_BIAS, 3, max(sensors.gyroscope.turn_on_bias_rad_s, _LEAST_NOISE)),
+            (ACCEL_BIAS, 3, max(sensors.accelerometer.turn_on_bias_m_s2, _LEAST_NOISE)),
+            (BARO_OFFSET, 1, _FIRST_OFFSET_M),
+            (HARD_IRON, 3, max(sensors.magnetometer.hard_iron_gauss, _LEAST_NOISE)),
+        ):
+            update.doubt(P, first, count, sigma * sigma)
+        for i, variance in enumerate(self._noise.gps_drift):
+            P[GPS_DRIFT + i, GPS_DRIFT + i] = variance
+
+    def _rest(self, aligned: Aligned) -> None:
+        """Fuse the means of specific force, field and rate."""
+        x, P, sensors = self.x, self.P, self._sensors
+        force = max(sensors.accelerometer.noise_density_m_s2_rthz, _LEAST_NOISE) ** 2 / aligned.duration_s
+        rate = max(sensors.gyroscope.noise_density_rad_s_rthz, _LEAST_NOISE) ** 2 / aligned.duration_s
+        field, y = self._field_variance / aligned.fields, np.zeros(6)
+        mean_force, mean_field = np.array(aligned.force), np.array(aligned.field)
+        update.fuse_rest(x, P, mean_force, self._gravity, force, mean_field, self._field, field, y)
+        for i in range(3):
+            variance = P[GYRO_BIAS + i, GYRO_BIAS + i]
+            gain = variance / (variance + rate)
+            x[10 + i] = gain * aligned.rate[i]
+            P[GYRO_BIAS + i, GYRO_BIAS + i] = gain * rate
+
+    def predict(self, samples: Array, row: int) -> None:
+        """Go on by one sample of many."""
+        predict(self.x, self.P, samples, row, self._noise, self._gravity)
+
+    def fuse_fix(self, fix: GpsFix, place_enu_m: Vector, after_s: float, time_us: int) -> Reason | None:
+        """Fuse a fix measured `after_s` after the filter's time; return why a part of it was rejected, if one was."""
+        x, P, z, y, variances = self.x, self.P, self._fix, self._fix_y, self._fix_variances
+        z[:3], z[3:] = place_enu_m, fix.velocity_enu_m_s
+        claims = (fix.horizontal_accuracy_m, fix.vertical_accuracy_m)
+        if claims != self._claims:
+            self._claims = claims
+            variances[1:] = self._of_place(fix)
+        update.fuse_fix(x, P, z, after_s, variances, _FIX_GATES, y, self._fix_nis)
+        ve, vn, vu, e, n, u = y.tolist()
+        moves, lies, stands = self._fix_nis.tolist()
+        believed = True
+        if not self.velocity.note(time_us, (ve, vn, vu), moves):
+            believed &= self.velocity.insist(self, time_us, update.fuse_velocity, z[3:], variances[0])
+        if not self.position.note(time_us, (e, n), lies):
+            believed &= self.position.insist(self, time_us, update.fuse_horizontal, z[:3], after_s, variances[1])
+        if not self.height.note(time_us, (u,), stands):
+            believed &= self.height.insist(self, time_us, update.fuse_height, z[:3], after_s, variances[2])
+        return None if believed else Reason.INNOVATION
+
+    def fuse_pressure(self, pressure_pa: float, time_us: int) -> Reason | None:
+        """Fuse a pressure; return why it was rejected, if it was."""
+        height = altitude_m(pressure_pa)
+        sigma = self._sensors.barometer.noise_pa * altitude_slope_m_pa(pressure_pa)
+        variance = max(-sigma, _LEAST_NOISE) ** 2
+        believed = self.pressure.fuse(self, time_us, update.fuse_pressure_height, height, variance)
+        return None if believed else Reason.INNOVATION
+
+    def fuse_field(self, field: Vector, time_us: int) -> Reason | None:
+        """Fuse a magnetic field; return why it was rejected, if it was."""
+        measured = np.array(field)
+        is_of_earth = update.is_of_earth(self.x, measured, self._field, _STRENGTH_PART, _DIP_RAD)
+        if not is_of_earth and not self.field.reject(time_us):
+            return Reason.FIELD
+        believed = self.field.fuse(self, time_us, update.fuse_field, measured, self._field, self._field_variance)
+        return None if believed else Reason.INNOVATION
+
+    @property
+    def tests(self) -> Tests:
+        """The last test of each kind."""
+        return Tests(self.velocity.test, self.position.test, self.height.test, self.pressure.test, self.field.test)
+
+    @property
+    def resets(self) -> int:
+        """How often something was taken anew."""
+        return sum(kind.resets for kind in self._kinds)
+
+    def _of_place(self, fix: GpsFix) -> tuple[float, float]:
+        """Return the variances of the white noise of a fix: as described, and more if it claims to be worse."""
+        drift = self._noise.gps_drift
+        return (
+            self._horizontal + _excess(fix.horizontal_accuracy_m, self._horizontal + drift[0]),
+            self._vertical + _excess(fix.vertical_accuracy_m, self._vertical + drift[2]),
+        )
+
+
+def noise_of(sensors: Sensors) -> Noise:
+    """Return what drives the errors of a vehicle with `sensors`."""
+    accel, gyro, gps, barometer = sensors.accelerometer, sensors.gyroscope, sensors.gps, sensors.barometer
+    horizontal, vertical = (max(sigma, _LEAST_NOISE) ** 2 for sigma in (gps.horizontal_drift_m, gps.vertical_drift_m))
+    drift_m = max(barometer.drift_pa * METRES_PER_PASCAL, _LEAST_NOISE)
+    return Noise(
+        force=max(accel.noise_density_m_s2_rthz, _LEAST_NOISE) ** 2,
+        rate=max(gyro.noise_density_rad_s_rthz, _LEAST_NOISE) ** 2,
+        gyro_bias=max(gyro.bias_walk_rad_s2_rthz, _LEAST_NOISE) ** 2,
+        accel_bias=max(accel.bias_walk_m_s3_rthz, _LEAST_NOISE) ** 2,
+        gps_drift=(horizontal, horizontal, vertical),
+        gps_drift_time_s=gps.drift_time_s,
+        baro_offset=2.0 * drift_m**2 / barometer.drift_time_s,
+        hard_iron=_IRON_WALK_GAUSS**2,
+    )
+
+
+def _excess(claimed_m: float, described: float) -> float:
+    """Return by how much the variance that a receiver claims, rounded to cm by the wire, is above what is described."""
+    return max(0.0, max(claimed_m - 0.5 * _CLAIM_STEP_M, 0.0) ** 2 - described) if isfinite(claimed_m) else 0.0

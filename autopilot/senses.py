@@ -1,0 +1,91 @@
+"""What the autopilot knows of its vehicle: the state that it is told, or the one that it estimates from sensors."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Protocol, TypeAlias
+
+from autopilot.estimate import Estimate
+from mavlink.feedback import Feedback
+from mavlink.geodesy import Geodetic
+from mavlink.hil import StateFrame
+from mavlink.sensors import Frame, GpsFix, SensorFrame
+from plant.vehicle import Vehicle, VehicleError
+
+
+class Estimating(Protocol):
+    """An estimator of one flight."""
+
+    def step(self, frame: SensorFrame, /, *, asked: bool) -> Estimate | None:
+        """Take in the next frame; return None until the first estimate. Unless `asked`, an older one will do."""
+
+
+Estimator: TypeAlias = Callable[[int], Estimating]
+"""Makes an estimator for frames that are so many µs apart."""
+
+
+def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> Estimator | None:
+    """Return what estimates the state of `vehicle`, whose ENU frame begins at `origin`; None where it is told.
+
+    Raises:
+        VehicleError: Sensors are asked for that the vehicle has not.
+    """
+    if feedback is Feedback.STATE:
+        return None
+    sensors = vehicle.sensors
+    if sensors is None:
+        raise VehicleError(f"{vehicle.name} has no sensors: fly a vehicle with a table sensors, or --feedback state")
+    from autopilot import estimator  # only where there is something to estimate
+
+    gravity_m_s2 = vehicle.gravity_m_s2
+    return lambda interval_us: estimator.Estimator(sensors, gravity_m_s2, origin, interval_us)
+
+
+_LATE_US = 1_000_000
+
+
+class Senses:
+    """Turns any frame into a state.
+
+    Attributes:
+        estimate: The last one; None before the first, and where the state is told.
+        sensed: What was measured on board last.
+        fix: The last of GPS.
+        gps_off: Whether GPS has failed: no fix gets through.
+    """
+
+    def __init__(self, estimator: Estimator | None, interval_us: int) -> None:
+        """Estimate by `estimator` from frames `interval_us` apart; without one there are no frames of sensors.
+
+        What is compiled is loaded here, not at the first frame.
+        """
+        self._interval_us = interval_us
+        self._make = estimator
+        self._estimating = None if estimator is None else estimator(interval_us)
+        self._time_us: int | None = None
+        self.estimate: Estimate | None = None
+        self.sensed: SensorFrame | None = None
+        self.fix: GpsFix | None = None
+        self.gps_off = False
+
+    def state(self, frame: Frame, *, asked: bool = True) -> StateFrame | None:
+        """Return the state at a frame, or unless `asked` an older one; None until there is an estimate.
+
+        Time that begins again is another flight, of which nothing is known. A frame that is a little late is the
+        estimator's to judge.
+        """
+        if isinstance(frame, StateFrame):
+            return frame
+        assert self._make is not None, "frames of sensors come to who asks for them"
+        if self._estimating is None or self._begins_again(frame):
+            self._estimating, self.estimate = self._make(self._interval_us), None
+        self._time_us = frame.time_us
+        if self.gps_off and frame.gps is not None:
+            frame = replace(frame, gps=None)
+        self.sensed, self.fix = frame, frame.gps or self.fix
+        self.estimate = self._estimating.step(frame, asked=asked)
+        return None if self.estimate is None else self.estimate.frame
+
+    def _begins_again(self, frame: SensorFrame) -> bool:
+        if self._time_us is None:
+            return False
+        return frame.time_us == 0 or frame.time_us < self._time_us - _LATE_US

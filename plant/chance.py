@@ -1,0 +1,26 @@
+"""Chance: one stream of random numbers for each thing that has any, so that none changes another's."""
+
+from collections.abc import Iterator
+from enum import IntEnum
+
+from numpy.random import SeedSequence, default_rng
+
+_BLOCK = 1024
+
+
+class Source(IntEnum):
+    """What has streams of its own, however many others there are."""
+
+    SENSORS = 0
+    WEATHER = 1
+
+
+def streams(seed: int, source: Source, count: int) -> list[Iterator[float]]:
+    """Return independent streams of standard normal numbers; the same for the same `seed` (not negative)."""
+    return [_normal(child) for child in SeedSequence(seed, spawn_key=(source,)).spawn(count)]
+
+
+def _normal(seed: SeedSequence) -> Iterator[float]:
+    generator = default_rng(seed)
+    while True:
+        yield from generator.standard_normal(_BLOCK).tolist()

@@ -1,0 +1,111 @@
+"""The sensors of a vehicle: numbers of named parts with units, as tables of the vehicle file.
+
+The plant measures by them; the autopilot's estimator believes them.
+"""
+
+from math import isfinite
+from typing import Annotated, TypeAlias
+
+import msgspec
+
+Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
+NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
+
+
+class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A part that can be bought."""
+
+    part: str
+    """What it is, with maker."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        for name in self.__struct_fields__:
+            value = getattr(self, name)
+            numbers = value if isinstance(value, tuple) else (value,) if isinstance(value, float) else ()
+            if not all(map(isfinite, numbers)):
+                raise ValueError(f"{name}: must be finite")
+
+
+class Accelerometer(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Measures specific force along the FLU axes, at every frame."""
+
+    noise_density_m_s2_rthz: NotNegative
+    """White noise, m/s² for each root of hertz."""
+    bias_walk_m_s3_rthz: NotNegative
+    """How the bias walks, m/s³ for each root of hertz."""
+    turn_on_bias_m_s2: NotNegative
+    """Standard deviation of the bias at the start, along each axis."""
+    range_m_s2: Positive
+    """What is larger is cut."""
+
+
+class Gyroscope(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Measures rates about the FLU axes, at every frame."""
+
+    noise_density_rad_s_rthz: NotNegative
+    """White noise, rad/s for each root of hertz."""
+    bias_walk_rad_s2_rthz: NotNegative
+    """How the bias walks, rad/s² for each root of hertz."""
+    turn_on_bias_rad_s: NotNegative
+    """Standard deviation of the bias at the start, about each axis."""
+    range_rad_s: Positive
+    """What is larger is cut."""
+
+
+class Magnetometer(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Measures the magnetic field along the FLU axes."""
+
+    rate_hz: Positive
+    noise_gauss: NotNegative
+    """Standard deviation of a sample."""
+    hard_iron_gauss: NotNegative
+    """Standard deviation, along each axis, of the field of the vehicle itself that calibration has left."""
+
+
+class Barometer(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Measures static pressure."""
+
+    rate_hz: Positive
+    noise_pa: NotNegative
+    """Standard deviation of a sample."""
+    drift_pa: NotNegative
+    """Standard deviation of the drift of sensor and weather, which is a first-order Gauss-Markov process."""
+    drift_time_s: Positive
+    """Its correlation time."""
+
+
+class Gps(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Measures position and velocity, some time ago.
+
+    Errors of position are the sum of white noise and a first-order Gauss-Markov process.
+    """
+
+    rate_hz: Positive
+    delay_s: NotNegative
+    """From the instant that it measures to that at which it tells."""
+    fix_type: Annotated[int, msgspec.Meta(ge=3, le=6)]
+    """Of GPS_FIX_TYPE: 3 on its own, 6 with carrier phase fixed (RTK)."""
+    horizontal_noise_m: NotNegative
+    """White, standard deviation along each axis."""
+    vertical_noise_m: NotNegative
+    """White, standard deviation."""
+    horizontal_drift_m: NotNegative
+    """Correlated, standard deviation along each axis."""
+    vertical_drift_m: NotNegative
+    """Correlated, standard deviation."""
+    drift_time_s: Positive
+    """Correlation time."""
+    velocity_noise_m_s: NotNegative
+    """White, standard deviation along each axis."""
+    satellites: Annotated[int, msgspec.Meta(ge=4, le=64)]
+
+
+class Sensors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """All sensors of a vehicle."""
+
+    accelerometer: Accelerometer
+    gyroscope: Gyroscope
+    magnetometer: Magnetometer
+    barometer: Barometer
+    gps: Gps

@@ -1,0 +1,67 @@
+"""`colibri compare --seeds`: the same flights by many seeds."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from tools.cli import main
+from tools.seeds import QUANTITIES
+
+
+def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = (
+        "--feedback",
+        "sensors",
+        "--seeds",
+        "1-2",
+        "--track",
+        "hover",
+        "--duration",
+        "22",
+        "--out",
+        str(tmp_path),
+    )
+    assert main(["compare", *options]) == 0
+    with (tmp_path / "seeds-flights.csv").open(encoding="utf-8", newline="") as file:
+        flights = list(csv.DictReader(file))
+    assert [flight["seed"] for flight in flights] == ["1", "2"]
+    assert len({flight["trajectory_sha256"] for flight in flights}) == 2
+    for flight in flights:
+        assert flight["lost"] == ""
+        assert all(0.0 < float(flight[quantity]) < 50.0 for quantity in QUANTITIES)
+        assert float(flight["control"]) < float(flight["true"])
+    table = (tmp_path / "seeds.md").read_text(encoding="utf-8")
+    assert "| flight | hover | 2 | 0 |" in table
+    assert (tmp_path / "seeds.png").stat().st_size > 10_000
+    assert "hover" in capsys.readouterr().out
+
+
+def test_a_vehicle_that_is_lost_is_counted_and_ends_in_exit_code_1(tmp_path: Path) -> None:
+    """The thesis's profile tips over on what is flown so briskly."""
+    options = (
+        "--seeds",
+        "1",
+        "--profile",
+        "thesis",
+        "--track",
+        "lemniscate",
+        "--duration",
+        "30",
+        "--out",
+        str(tmp_path),
+    )
+    assert main(["compare", "--quiet", *options]) == 1
+    with (tmp_path / "seeds-flights.csv").open(encoding="utf-8", newline="") as file:
+        (flight,) = csv.DictReader(file)
+    assert flight["lost"]
+
+
+@pytest.mark.parametrize("seeds", ["5-1", "one", "1-two", ""])
+def test_bad_seeds_are_one_line(seeds: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["compare", f"--seeds={seeds}"])
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert f"argument --seeds: expected FIRST-LAST, 1-50 say, not {seeds}" in said
+    assert said.count("\n") == 1

@@ -1,0 +1,83 @@
+"""The figure of many flights by chance: how their errors are distributed, track by track."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from tools.consistency import NAVIGATION
+from tools.figures import TOP_IN, axes_grid, put_head, shortened, write_figure
+from tools.report import SETTLED_AFTER_S
+from tools.seeds import QUANTITIES, Flown
+
+_GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
+_LABEL_IN = 0.55
+_PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
+    ("RMS (m)", {"control": ("#000000", "reference from estimate"), "true": ("#D55E00", "reference from truth")}),
+    ("RMS (m)", {"horizontal": ("#0072B2", "estimate, horizontal"), "vertical": ("#E69F00", "estimate, vertical")}),
+    ("RMS (°)", {"roll": ("#009E73", "roll"), "pitch": ("#56B4E9", "pitch"), "yaw": ("#CC79A7", "yaw")}),
+)
+
+
+def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
+    """Draw `seeds.png`: a dot a flight, a line at the median; the mean NEES, and that of an honest filter."""
+    cases = list(dict.fromkeys((flown.contender, flown.track) for flown in flights))
+    estimated = not all(np.isnan(flown.values[2]) for flown in flights)
+    panels = _PANELS if estimated else _PANELS[:1]
+    rows = len(panels) + estimated
+    row_in = 0.35 + 0.42 * len(cases)
+    figure, grid = axes_grid(rows, 1, TOP_IN + 0.24, row_in=row_in + _LABEL_IN, share=False)
+    figure.subplots_adjust(left=0.2, hspace=_LABEL_IN / row_in)
+    several = len({contender for contender, _ in cases}) > 1
+    names = [shortened(f"{track}, {contender}" if several else track) for contender, track in cases]
+    for (axes,), (label, quantities) in zip(grid, panels, strict=False):
+        for number, (quantity, (color, called)) in enumerate(quantities.items()):
+            shift = 0.26 * (number - 0.5 * (len(quantities) - 1))
+            _strips(axes, flights, cases, quantity, color, called, shift)
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.set_xlabel(label)
+    if estimated:
+        axes = grid[-1][0]
+        _strips(axes, flights, cases, "nees", "#000000", "", 0.0)
+        axes.axvline(NAVIGATION, color="#D55E00", linewidth=1.2, label=f"{NAVIGATION}, if it errs as it says")
+        axes.set_xlabel("NEES of position, velocity and attitude, mean of a flight")
+    for (axes,) in grid:
+        axes.set_yticks([-place for place in range(len(cases))], names)
+        axes.set_ylim(-len(cases) + 0.45, 0.55)
+        axes.tick_params(labelbottom=True)
+        axes.grid(axis="x", **_GRID)
+    put_head(figure, f"{len(flights)} flights, errors after {SETTLED_AFTER_S:.0f} s", columns=4)
+    return write_figure(figure, out / "seeds")
+
+
+def _strips(
+    axes: Axes,
+    flights: Sequence[Flown],
+    cases: Sequence[tuple[str, str]],
+    quantity: str,
+    color: str,
+    called: str,
+    shift: float,
+) -> None:
+    column = QUANTITIES.index(quantity)
+    for place, case in enumerate(cases):
+        of_case = [flown for flown in flights if (flown.contender, flown.track) == case]
+        values = np.array([flown.values[column] for flown in of_case if not flown.lost])
+        values = values[np.isfinite(values)]
+        if not len(values):
+            continue
+        at = np.full(len(values), -place - shift)
+        axes.plot(values, at, "o", color=color, markersize=3, alpha=0.45, markeredgewidth=0, label=called)
+        axes.plot([np.median(values)] * 2, [-place - shift - 0.12, -place - shift + 0.12], color=color, linewidth=2.2)
+        lost = len(of_case) - len(values)
+        if lost and quantity == "true":
+            text = f"{lost} lost"
+            axes.text(
+                0.99, -place, text, transform=axes.get_yaxis_transform(), ha="right", va="center", color="#D00000"
+            )

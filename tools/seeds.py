@@ -1,0 +1,182 @@
+"""`colibri compare --seeds`: the same flights by many seeds, and how their errors are distributed."""
+
+import argparse
+import csv
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.controller import ControllerError, DecisionError, load_controller
+from autopilot.profile import ProfileError
+from autopilot.tracks import THESIS_TRACKS, TrackError
+from mavlink.process import EXIT_FAILED, fail
+from plant.scenario import IntegrationError
+from plant.vehicle import VehicleError
+from tools.fly import keep_flight, make_folder
+from tools.plan import FlightPlan, PlanError
+from tools.processes import FlightError, fly_processes
+from tools.recording import RecordingError
+from tools.report import SETTLED_AFTER_S
+from tools.side_by_side import side_by_side
+from tools.tables import write_table
+
+Array: TypeAlias = NDArray[np.float64]
+
+DEFAULT_PROFILE = "flight"
+LOST_M = 5.0
+"""A vehicle further off its reference once settled is lost."""
+QUANTITIES = ("control", "true", "horizontal", "vertical", "roll", "pitch", "yaw", "nees")
+"""Root mean squares of one flight: estimate from reference, vehicle from reference, estimate from truth (m), attitude
+(degrees); and the mean NEES."""
+HEADINGS = (
+    *("profile", "track", "flights", "lost"),
+    *("control (m)", "true (m)", "est. horizontal (m)", "est. vertical (m)", "roll (°)", "pitch (°)", "yaw (°)"),
+    "NEES",
+)
+
+
+class Job(NamedTuple):
+    """One flight.
+
+    Attributes:
+        contender: Profile, or profile:controller.
+        track: What it flies.
+        seed: Of everything random.
+        args: The command line.
+    """
+
+    contender: str
+    track: str
+    seed: int
+    args: argparse.Namespace
+
+    def plan(self, out: Path) -> FlightPlan:
+        """Return the flight as a plan."""
+        profile, _, controller = self.contender.partition(":")
+        chosen = {"profile": profile, "controller": controller or None, "track": self.track, "seed": self.seed}
+        asked = {name: getattr(self.args, name) for name in ("vehicle", "feedback", "link", "duration", *_WEATHER)}
+        return FlightPlan.of_options(out, **chosen, **asked)
+
+
+_WIDEST = 400
+_WEATHER = ("wind", "gust", "turbulence")
+
+
+class Flown(NamedTuple):
+    """What came of one flight.
+
+    Attributes:
+        contender: Profile, or profile:controller.
+        track: What it flew.
+        seed: Of everything random.
+        lost: Why the vehicle was lost; empty if it was not.
+        values: `QUANTITIES` after 20 s; nan where it was lost.
+        sha256: Of its trajectory.
+    """
+
+    contender: str
+    track: str
+    seed: int
+    lost: str
+    values: tuple[float, ...]
+    sha256: str
+
+
+def compare_seeds(args: argparse.Namespace) -> int:
+    """Fly every contender along every track by every seed; return 1 if one was lost."""
+    contenders, tracks = args.profile or [DEFAULT_PROFILE], args.track or list(THESIS_TRACKS)
+    jobs = [
+        Job(contender, track, seed, args) for contender in contenders for track in tracks for seed in args.seeds or (0,)
+    ]
+    try:
+        for job in jobs:
+            load_controller(job.plan(args.out).profile.controller)
+    except (PlanError, ProfileError, VehicleError, TrackError, ControllerError) as error:
+        fail(str(error))
+    make_folder(args.out)
+    flights = side_by_side(fly_once, jobs, "flights", quiet=args.quiet, worth=lambda _job: 1)
+    _write_flights(args.out / "seeds-flights.csv", flights)
+    rows = [
+        _row([flown for flown in flights if (flown.contender, flown.track) == (contender, track)])
+        for contender in contenders
+        for track in tracks
+    ]
+    write_table(args.out / "seeds", HEADINGS, rows, names=2)
+    from tools.seed_figures import draw_seeds
+
+    draw_seeds(flights, args.out)
+    if not args.quiet:
+        _print(rows, args.out)
+    return EXIT_FAILED if any(flown.lost for flown in flights) else 0
+
+
+def fly_once(job: Job) -> Flown:
+    """Fly a job, keep its figures and forget its logs."""
+    with TemporaryDirectory() as folder:
+        plan = job.plan(Path(folder))
+        try:
+            _, figures = keep_flight(plan, _fly(plan))
+        except (IntegrationError, DecisionError, FlightError, RecordingError) as error:
+            return Flown(job.contender, job.track, job.seed, str(error), (np.nan,) * len(QUANTITIES), "")
+    values, sha256 = _values(figures), figures["trajectory_sha256"]
+    lost = f"{values[1]:.1f} m off" if values[1] > LOST_M or figures["max_error_after_20s_m"] > LOST_M else ""
+    return Flown(job.contender, job.track, job.seed, lost, values, sha256)
+
+
+def _fly(plan: FlightPlan) -> Any:
+    if plan.link == "udp":
+        return fly_processes(plan, lambda _sim_time_s: None, lambda _text: None)
+    from tools.local import fly_locally
+
+    return fly_locally(plan, lambda _sim_time_s: None)
+
+
+def _values(figures: dict[str, Any]) -> tuple[float, ...]:
+    off, turned = figures["estimation_rmse_m"], figures["attitude_rmse_deg"]
+    estimated = (np.nan,) * 5 if off is None else (*off.values(), *turned.values())
+    nees = figures["nees_mean"]
+    return (figures["control_rmse_m"], figures["rmse_after_20s_m"], *estimated, np.nan if nees is None else nees)
+
+
+def _row(flights: Sequence[Flown]) -> tuple[str, ...]:
+    """Return root mean squares over the flights, of NEES the mean, and the largest of one flight in brackets."""
+    values = np.array([flown.values for flown in flights if not flown.lost]).reshape(-1, len(QUANTITIES))
+    lost = sum(bool(flown.lost) for flown in flights)
+    *errors, nees = values.T
+    cells = [*(_cell(column, _rms) for column in errors), _cell(nees, np.mean)]
+    return (flights[0].contender, flights[0].track, str(len(flights)), str(lost), *cells)
+
+
+def _cell(column: Array, middle: Callable[[Array], Any]) -> str:
+    if not len(column) or np.isnan(column).any():
+        return "-"
+    return f"{middle(column):.3g} ({column.max():.3g})"
+
+
+def _rms(column: Array) -> Any:
+    return np.sqrt(np.mean(column**2))
+
+
+def _write_flights(path: Path, flights: Sequence[Flown]) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(("profile", "track", "seed", "lost", *QUANTITIES, "trajectory_sha256"))
+        table.writerows((*flown[:4], *map(repr, map(float, flown.values)), flown.sha256) for flown in flights)
+
+
+def _print(rows: Sequence[tuple[str, ...]], out: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    title = f"after {SETTLED_AFTER_S:.0f} s, root mean squares over all flights (largest of one); written to {out}"
+    table = Table(title=title, title_justify="left")
+    for number, column in enumerate(HEADINGS):
+        table.add_column(column, justify="left" if number < 2 else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    needed = Console(width=_WIDEST).measure(table).maximum
+    Console(width=max(Console().width, needed)).print(table)
