@@ -72,7 +72,7 @@ def test_lost_gps_is_said_and_survived() -> None:
         flight.run(0.1)
         fastest = max(fastest, hypot(*flight.velocity))
     assert flight.client.said("GPS is back")
-    assert fastest < 1.5
+    assert fastest < 1.0
     assert off_m(flight) < 1.0
     assert dist(flight.position, before) < 1.0
 
