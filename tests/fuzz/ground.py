@@ -24,8 +24,8 @@ class GroundOutcome(NamedTuple):
         accepted: How many commands were accepted.
         kinds: How many different commands those were.
         flown_s: Simulated time.
-        memory_mib: Resident memory after half of the messages and at the end: what is bounded, like files and logs, is
-            full by then, and what is not goes on growing.
+        memory_mib: Resident memory after half of the messages and at the end. Of a million it takes one step of 18 MiB,
+            not explained, before a quarter of them, and is flat from there on; a leak would go on.
         failures: What did not hold, in words.
     """
 
