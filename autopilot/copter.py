@@ -70,6 +70,7 @@ class Copter:
         power: The battery, as far as the autopilot knows.
         solve_time_s: Of the last QP.
         samples: How many control samples ground stations were told of.
+        resumed: What goes on of a flight in which an autopilot was killed, in words; empty where none does.
     """
 
     def __init__(
@@ -131,7 +132,7 @@ class Copter:
         self._past = past
         self._wakes = past is not None
         self._resumed_us: int | None = None
-        self.samples = 0
+        self.samples, self.resumed = 0, ""
         self._time_us: int | None = None
         self._controls = STILL
         self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
@@ -237,7 +238,8 @@ class Copter:
         stations.say(INFO, stations.banner())
         if pilot.state.armed:
             how = goes_on(pilot.state.mode, stations.missions.executor.progress.seq)
-            stations.say(WARNING, f"restarted in flight: {how}")
+            self.resumed = f"restarted in flight: {how}"
+            pilot.say(WARNING, self.resumed)
 
     def _begin(self, frame: StateFrame) -> None:
         """See the vehicle for the first time, or anew after frames were missed."""

@@ -81,7 +81,7 @@ class Ground:
         except LinkError as error:
             raise GroundError(str(error)) from error
         self._links = GroundLinks(links, perf_counter, thread_time)
-        self.shut_down = self._said_too_much = False
+        self.shut_down = self._said_too_much = self._resumed_said = False
         self._revision = self.copter.parameters.revision
         self._told_s = self._saved_s = perf_counter()
         self._told_us = 0
@@ -100,6 +100,9 @@ class Ground:
             self._tell(now_s)
         if self.copter.parameters.revision != self._revision:
             self._save_parameters()
+        if self.copter.resumed and not self._resumed_said:
+            self._resumed_said = True
+            self._status.say("said", self.copter.resumed)
         if self._flight is not None:
             self._keep(self._flight)
         return self.copter
