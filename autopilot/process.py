@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from autopilot.controller import Active, ControllerError, DecisionError, Fallback
 from autopilot.core import Autopilot, Step
-from autopilot.estimate import Estimate
+from autopilot.estimate import Estimate, Tests
 from autopilot.profile import Profile, ProfileError, load_profile
 from autopilot.qp import QpStatus, SolverError
 from autopilot.senses import Estimator, estimator_for
@@ -39,6 +39,8 @@ ESTIMATE_COLUMNS = (
 CHECK_COLUMNS = (
     *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz"),
     *(f"P{row}{column}" for row in range(9) for column in range(row, 9)),
+    *(f"nis_{kind}" for kind in Tests._fields),
+    *(f"believed_{kind}" for kind in Tests._fields),
 )
 
 STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, status in enumerate(QpStatus)}
@@ -73,7 +75,7 @@ class AutopilotLog:
         """Append a control sample; a frame between two of them has nothing to tell but how the filter stands."""
         if self._checks is not None and step.estimate is not None and step.estimate.check is not None:
             check = step.estimate.check
-            self._checks.write((check.time_us / 1e6, *check.state, *check.covariance))
+            self._checks.write((check.time_us / 1e6, *check.state, *check.covariance, *check.nis, *check.believed))
         if step.decision is None:
             return
         if self._estimates is not None and step.estimate is not None:
