@@ -1,12 +1,13 @@
 """Ground stations as the process sees them: links, key, parameter file, logs, and what the terminal is told."""
 
 import argparse
+from collections.abc import Iterable
 from math import hypot
 from pathlib import Path
 from time import perf_counter, thread_time, time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from autopilot.copter import Copter
+from autopilot.copter import Copter, Received
 from autopilot.ground_links import GroundLinks, open_links
 from autopilot.parameters import ImpossibleError, definitions
 from autopilot.profile import Profile
@@ -21,6 +22,9 @@ from mavlink.process import Status
 from mavlink.services.parameter_file import ParameterFileError, read, write
 from mavlink.signing import Signing, SigningError, parse_key, tick_at
 from plant.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from autopilot.process import AutopilotLog
 
 KEY = "signing.key"
 TIMESTAMP = "signing.timestamp"
@@ -64,6 +68,7 @@ class Ground:
         except OSError as error:
             raise GroundError(f"cannot write to --state {self._state}: {error.strerror}") from error
         self._first = track(args.track) if args.track else None
+        self._log: AutopilotLog | None = None
         self.copter = self._vehicle_anew()
         try:
             links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
@@ -79,10 +84,18 @@ class Ground:
         for link in links:
             self._status.say("ground", _invitation(link.url), url=link.url)
 
+    def record(self, log: "AutopilotLog") -> None:
+        """Note in `log` with what the vehicle begins, and what it hears."""
+        self._log = log
+        log.begin_again(self._values)
+
     def serve(self, now_s: float) -> Copter:
         """Hear and answer ground stations; return the vehicle that flies on."""
         stations = self.copter.stations
-        self._links.send(self.copter.serve(self._links.receive(stations)))
+        received: Iterable[Received] = self._links.receive(stations)
+        if self._log:
+            received = self._log.hear(received)
+        self._links.send(self.copter.serve(received))
         if stations.restart:
             self._restart(stations.restart)
         if now_s >= self._told_s + _TELL_EVERY_S and self.copter.pilot.has_seen:
@@ -108,11 +121,14 @@ class Ground:
             self.copter.stations.log.close()
             self.copter = self._vehicle_anew()
             self._links.introduce(self.copter.stations)
+            if self._log:
+                self._log.begin_again(self._values)
             self._revision = self.copter.parameters.revision
             self._status.say("said", "restarted by a ground station")
 
     def _vehicle_anew(self) -> Copter:
         args = self._args
+        self._values = self._read_parameters()
         settings = StationSettings(
             system_id=args.system_id,
             identity=args.identity,
@@ -128,7 +144,7 @@ class Ground:
                 self._vehicle,
                 settings,
                 perf_counter,
-                values=self._read_parameters(),
+                values=self._values,
                 first=self._first,
                 estimator=self._estimator,
             )
