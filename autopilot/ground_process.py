@@ -7,6 +7,7 @@ from pathlib import Path
 from time import perf_counter, thread_time, time
 from typing import TYPE_CHECKING, Any
 
+from autopilot.conducted import ConductedLinks, Conductor
 from autopilot.copter import Copter, Received
 from autopilot.ground_links import GroundLinks, open_links
 from autopilot.parameters import ImpossibleError, definitions
@@ -48,9 +49,15 @@ class Ground:
     """
 
     def __init__(
-        self, args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None, status: Status
+        self,
+        args: argparse.Namespace,
+        profile: Profile,
+        vehicle: Vehicle,
+        estimator: Estimator | None,
+        status: Status,
+        conductor: Conductor | None = None,
     ) -> None:
-        """Open links and files as the command line says.
+        """Open links and files as the command line says; a `conductor` speaks for all ground stations.
 
         Raises:
             GroundError: Something of it cannot be used.
@@ -74,7 +81,9 @@ class Ground:
             links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
         except LinkError as error:
             raise GroundError(str(error)) from error
-        self._links = GroundLinks(links, perf_counter, thread_time)
+        self._links: GroundLinks | ConductedLinks = GroundLinks(links, perf_counter, thread_time)
+        if conductor is not None:
+            self._links = ConductedLinks(conductor, lambda: self.copter.pilot.state)
         self.shut_down = False
         self._revision = self.copter.parameters.revision
         self._told_s = self._saved_s = perf_counter()
@@ -246,14 +255,19 @@ class Ground:
 
 
 def open_ground(
-    args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None, status: Status
+    args: argparse.Namespace,
+    profile: Profile,
+    vehicle: Vehicle,
+    estimator: Estimator | None,
+    status: Status,
+    conductor: Conductor | None = None,
 ) -> Ground:
-    """Return what serves ground stations as the command line says.
+    """Return what serves ground stations as the command line says; a `conductor` speaks for all of them.
 
     Raises:
         GroundError: Something of it cannot be used.
     """
-    return Ground(args, profile, vehicle, estimator, status)
+    return Ground(args, profile, vehicle, estimator, status, conductor)
 
 
 def _invitation(url: str) -> str:

@@ -18,7 +18,7 @@ from autopilot.senses import Estimator, estimator_for
 from autopilot.tracks import TrackError, track
 from mavlink.dialect import RESULT_UNSUPPORTED
 from mavlink.feedback import Feedback
-from mavlink.link import LinkError, OneByOne, UdpLink
+from mavlink.link import LinkError, OneByOne, UdpLink, open_link
 from mavlink.lockstep import AutopilotEnd
 from mavlink.parameters import Value
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, LineLog, Status, Stop, fail, undisturbed
@@ -138,7 +138,8 @@ def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
         estimator = estimator_for(args.feedback, vehicle, args.home.origin)
-        ground = _ground(args, profile, vehicle, estimator, status) if args.gcs else None
+        served = args.gcs or args.conducted
+        ground = _ground(args, profile, vehicle, estimator, status, stop) if served else None
         autopilot = ground.copter if ground else _alone(args, profile, vehicle, estimator)
         end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
     except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
@@ -200,12 +201,19 @@ def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimat
 
 
 def _ground(
-    args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None, status: Status
+    args: argparse.Namespace,
+    profile: Profile,
+    vehicle: Vehicle,
+    estimator: Estimator | None,
+    status: Status,
+    stop: Stop,
 ) -> "Ground":
     """Load what serves ground stations only where there are any: it is as much as all the rest."""
+    from autopilot.conducted import UdpConductor
     from autopilot.ground_process import open_ground
 
-    return open_ground(args, profile, vehicle, estimator, status)
+    conductor = UdpConductor(open_link(args.conducted), lambda: stop) if args.conducted else None
+    return open_ground(args, profile, vehicle, estimator, status, conductor)
 
 
 class Client:

@@ -76,6 +76,7 @@ class PlantEnd:
         It may ask for what the plant `serves`; the state, unless it does.
         """
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
+        self._truth_codec = Codec(system_id, dialect.TRUTH_COMPONENT)
         self._autopilot = (system_id, dialect.AUTOPILOT_COMPONENT)
         self.peer: Address | None = None
         self.frame_interval_us = frame_interval_us
@@ -91,14 +92,19 @@ class PlantEnd:
         self._resend_at_s = 0.0
         self._outbox: list[Outgoing] = []
 
-    def offer(self, frame: Frame, now_s: float) -> None:
-        """Send `frame`, which is of the kind of `feedback`, and await the command that answers it."""
+    def offer(self, frame: Frame, now_s: float, truth: StateFrame | None = None) -> None:
+        """Send `frame`, which is of the kind of `feedback`, and await the command that answers it.
+
+        The `truth` is appended, as another component's, for whoever stands in between: it is not the autopilot's.
+        """
         if isinstance(frame, StateFrame):
             frames = encode_state(self._codec, frame)
         else:
             frames = encode_sensors(self._codec, frame)
         if frame.time_us % HEARTBEAT_EVERY_US == 0:
             frames.append(_heartbeat(self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False))
+        if truth is not None:
+            frames += encode_state(self._truth_codec, truth)
         self._frames = tuple(frames)
         self._begun = True
         self._awaited_us = frame.time_us

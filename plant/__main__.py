@@ -15,7 +15,8 @@ DEFAULT_LINKS = {
 }
 
 
-def _parser() -> ArgumentParser:
+def command_line() -> ArgumentParser:
+    """Return what reads the command line."""
     parser = ArgumentParser(
         prog="python -m plant",
         description="The quadrotor and its world: integrates the nonlinear vehicle, sends its state, or what its "
@@ -47,13 +48,16 @@ def _parser() -> ArgumentParser:
     add("--rate", type=positive, default=250.0, metavar="HZ", help="frames, if the autopilot asks for no other rate")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")
+    add(
+        "--truth", action="store_true", help="append the true state to each frame, for a program in between (for tests)"
+    )
     add_common_arguments(parser, "plant.csv (truth at every frame) and flight.tlog")
     return parser
 
 
 def main() -> int:
     """Run the plant; return the exit code."""
-    args = _parser().parse_args()
+    args = command_line().parse_args()
     url = args.link or DEFAULT_LINKS[args.serve]
     if args.serve == "px4":
         link_to_px4, status, stop = begin("plant", url, args, open_ground_link)

@@ -14,7 +14,7 @@ from plant.scenario import IntegrationError, Start
 from plant.sensors import Tell, served_by, tells
 from plant.vehicle import VehicleError, load_vehicle
 from plant.weather import weather_of
-from plant.world import Physics, World, starting_world
+from plant.world import Physics, World, starting_world, state_frame
 
 WIND_COLUMNS = ("wind_east", "wind_north", "wind_up")
 TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah", *WIND_COLUMNS)
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     physics = Physics(vehicle, args.integrator, weather)
     logs = PlantLogs(args.out) if args.out else None
     end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
-    server = Server(link, end, status, stop, logs)
+    server = Server(link, end, status, stop, logs, tells_truth=args.truth)
     try:
         with undisturbed():
             if server.wait():
@@ -114,13 +114,23 @@ class Pace:
 class Server:
     """Drives the plant's end of the conversation over a link."""
 
-    def __init__(self, link: UdpLink, end: PlantEnd, status: Status, stop: Stop, logs: PlantLogs | None) -> None:
-        """Serve `end` on `link` until `stop`."""
+    def __init__(
+        self,
+        link: UdpLink,
+        end: PlantEnd,
+        status: Status,
+        stop: Stop,
+        logs: PlantLogs | None,
+        *,
+        tells_truth: bool = False,
+    ) -> None:
+        """Serve `end` on `link` until `stop`; where it `tells_truth`, each frame has the true state behind it."""
         self._link = link
         self._end = end
         self._status = status
         self._stop = stop
         self._logs = logs
+        self._tells_truth = tells_truth
         self._time_us = 0
         self._logged: World | None = None
 
@@ -160,7 +170,7 @@ class Server:
         """Send a frame until its answer comes; None if the process is told to stop first."""
         self._time_us = world.time_us
         offered_s = perf_counter()
-        self._end.offer(tell(world), offered_s)
+        self._end.offer(tell(world), offered_s, state_frame(world) if self._tells_truth else None)
         self._send()
         self._log(world)  # while the autopilot computes
         silence_said = False
