@@ -87,9 +87,6 @@ class MemoryPlant:
         except IntegrationError as error:
             raise StageError(str(error)) from error
 
-    def close(self) -> None:
-        """End it."""
-
 
 class MemoryAutopilot:
     """An autopilot in this process, with its ground side as the process has it."""
