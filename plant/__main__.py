@@ -6,7 +6,7 @@ from math import inf
 from mavlink.home import DEFAULT_HOME, home
 from mavlink.link import open_ground_link, open_link
 from mavlink.process import ArgumentParser, add_common_arguments, begin, natural, positive, speed
-from plant.scenario import add_world_arguments
+from plant.scenario import LATENCY_HELP, add_world_arguments, latency
 
 DEFAULT_LINKS = {
     "colibri": "udpin:127.0.0.1:14560",
@@ -45,6 +45,7 @@ def _parser() -> ArgumentParser:
     add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
     add("--home", type=home, default=DEFAULT_HOME, metavar="LAT,LON,ALT,YAW", help="the origin (default %(default)s)")
     add("--rate", type=positive, default=250.0, metavar="HZ", help="frames, if the autopilot asks for no other rate")
+    add("--latency", type=latency, default=0.0, metavar="MS", help=LATENCY_HELP)
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")
     add_common_arguments(parser, "plant.csv (truth at every frame) and flight.tlog")
