@@ -9,6 +9,8 @@ from autopilot.planner import plan
 from autopilot.profile import Profile
 from autopilot.senses import Estimator, Senses
 from autopilot.tracks import Track
+from mavlink.aside import Aside
+from mavlink.failures import Fault
 from mavlink.hil import ActuatorCommand
 from mavlink.sensors import Frame
 from plant.vehicle import Vehicle
@@ -21,13 +23,14 @@ class Step(NamedTuple):
     """The answer to a frame: the command to send, the decision behind it, and how long it took.
 
     Between two control samples the last command is sent again, and there is no decision. Where the state is told, there
-    is no estimate.
+    is no estimate. Faults are what the plant is asked to have happen with the command.
     """
 
     command: ActuatorCommand
     decision: Decision | None
     duration_s: float
     estimate: Estimate | None = None
+    faults: tuple[Fault, ...] = ()
 
 
 class Autopilot:
@@ -61,6 +64,11 @@ class Autopilot:
         self._time_us: int | None = None
         self.frame_interval_us = self._loop.frame_interval_us
         self._senses = Senses(estimator, self.frame_interval_us)
+
+    def hear(self, aside: Aside) -> None:
+        """Take in what the plant tells beside the frame of the next step."""
+        if aside.battery is not None:
+            self._loop.know_charge(aside.battery.used_ah)
 
     def step(self, frame: Frame) -> Step:
         """Answer a frame.
