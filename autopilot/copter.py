@@ -9,7 +9,7 @@ from autopilot.attitude_reference import DEFAULT_LIMITS, AttitudeLimits, Attitud
 from autopilot.behaviour import Behaviour
 from autopilot.companion import Companion
 from autopilot.controller import Clock, Decision, VehicleState
-from autopilot.core import STILL, Step
+from autopilot.core import STILL, Step, follows
 from autopilot.course import Course, Scene, Steered
 from autopilot.courses import Along, Climb, Stop, homeward, landing, to_track
 from autopilot.health_watch import HealthWatch, not_known
@@ -153,13 +153,13 @@ class Copter:
         """
         started_s = self._clock()
         due = self._loop.is_due(frame.time_us)
-        follows = self._time_us is not None and frame.time_us == self._time_us + self.frame_interval_us
-        known = self._senses.state(frame, asked=due or not follows)
+        goes_on = follows(frame.time_us, self._time_us, self.frame_interval_us)
+        known = self._senses.state(frame, asked=due or not goes_on)
         if known is None:
             if self._time_us is not None:  # another flight, of which nothing is known yet
                 self.stations.restart = REBOOT
             return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
-        if not follows:
+        if not goes_on:
             self._begin(known)
         self._time_us = frame.time_us
         decision = None

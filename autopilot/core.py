@@ -19,6 +19,15 @@ STILL = (0.0, 0.0, 0.0, 0.0)
 """Rotors that stand."""
 
 
+MISSED_US = 100_000
+"""Frames of so long a time may be missing: what is known of the rotors still holds, more or less."""
+
+
+def follows(time_us: int, before_us: int | None, interval_us: int) -> bool:
+    """Whether a frame goes on from the one before, where they come every `interval_us`."""
+    return before_us is not None and 0 < time_us - before_us <= max(interval_us, MISSED_US)
+
+
 class Step(NamedTuple):
     """The answer to a frame: the command to send, the decision behind it, and how long it took.
 
@@ -73,8 +82,9 @@ class Autopilot:
     def step(self, frame: Frame) -> Step:
         """Answer a frame.
 
-        Frames follow one another at the frame interval. One that does not begins a new flight: with the profile's
-        rotor speed at time 0, and with hover in mid-flight, where nothing is known of the rotors. On sensors a flight
+        Frames follow one another at the frame interval; a plant that runs freely may lose a few. One that comes much
+        later, or earlier, begins a new flight: with the profile's rotor speed at time 0, and with hover in mid-flight,
+        where nothing is known of the rotors. On sensors a flight
         begins with the first estimate, of a vehicle that stands; until then it is not armed.
 
         Raises:
@@ -86,7 +96,7 @@ class Autopilot:
         if known is None:
             self._time_us = None
             return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
-        if self._time_us is None or frame.time_us != self._time_us + self.frame_interval_us:
+        if not follows(frame.time_us, self._time_us, self.frame_interval_us):
             self._begin(frame)
         self._time_us = frame.time_us
         decision = None

@@ -42,8 +42,13 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         fail(str(error))
     physics = Physics(vehicle, args.integrator, weather)
     logs = PlantLogs(args.out) if args.out else None
-    end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
+    interval_us = round(1e3 / args.rate) * 1000
+    end = PlantEnd(system_id=args.system_id, frame_interval_us=interval_us, serves=serves, waits=not args.realtime)
     server = Server(link, end, status, stop, logs)
+    if args.realtime:
+        from plant.free_process import FreeServer
+
+        server = FreeServer(link, end, status, stop, logs, cut_after_s=args.cut_after)
     try:
         with undisturbed():
             if server.wait():
