@@ -146,6 +146,8 @@ class Ground:
             signing=self._signing,
             files=self._folder,
             logs=self._logs,
+            feedback=args.feedback,
+            relays_faults=args.simulator is None,
         )
         try:
             copter = Copter(
