@@ -9,7 +9,7 @@ from autopilot.attitude_reference import DEFAULT_LIMITS, AttitudeLimits, Attitud
 from autopilot.behaviour import Behaviour
 from autopilot.companion import Companion
 from autopilot.controller import Clock, Decision, VehicleState
-from autopilot.core import STILL, Step
+from autopilot.core import STILL, Step, follows
 from autopilot.course import Course, Scene, Steered
 from autopilot.courses import Along, Climb, Legs, Stop, homeward, landing, to_track
 from autopilot.health_watch import HealthWatch, not_known
@@ -21,17 +21,19 @@ from autopilot.loop import ControlLoop
 from autopilot.modes import MANUAL, Event, Mode, Need
 from autopilot.orders import Land
 from autopilot.parameters import Numbers, behaviour, definitions
-from autopilot.pilot import Guidance, Pilot
+from autopilot.pilot import RESTS, Guidance, Pilot
 from autopilot.planner import Planner, plan, start_yaw
 from autopilot.power import PowerMeter
 from autopilot.profile import Profile
 from autopilot.reference import Reference, target_of
 from autopilot.senses import Estimator, Senses
 from autopilot.snapshots import Photographer
+from autopilot.solve_time import SolveTime
 from autopilot.stations import REBOOT, Stations, StationSettings
 from autopilot.sticks import PositionSticks
 from autopilot.tracks import Track, track
 from autopilot.tuning import Tuning, builder
+from mavlink.aside import NOTHING, Aside
 from mavlink.hil import ActuatorCommand, StateFrame
 from mavlink.hub import Outgoing
 from mavlink.parameters import Parameters, Value
@@ -126,6 +128,8 @@ class Copter:
         self.pilot = Pilot(self._instants, flies_by, self._course, self._missing)
         self.stations = Stations(settings, self.pilot, self.parameters)
         self.power = PowerMeter(believed)
+        self._solving = SolveTime(self._loop.control_interval_us)
+        self._aside = NOTHING
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
         self._maker = maker_of(profile, vehicle)
@@ -134,10 +138,22 @@ class Copter:
         self._resumed_us: int | None = None
         self.samples, self.resumed = 0, ""
         self._time_us: int | None = None
-        self._controls = STILL
+        self._decision: Decision | None = None
         self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
         self._step_time_s = 0.0
         self.solve_time_s = 0.0
+
+    @property
+    def deadlines_missed(self) -> int:
+        """How many decisions have taken longer than a control interval, in simulated time."""
+        return self._solving.missed
+
+    def hear(self, aside: Aside) -> None:
+        """Take in what the plant tells beside the frame of the next step."""
+        self._aside = aside
+        if aside.battery is not None:
+            self._loop.know_charge(aside.battery.used_ah)
+            self.power.hear(aside.battery)
 
     def step(self, frame: Frame) -> Step:
         """Answer a frame of the plant; on sensors nothing is known, and nobody served, before the first estimate.
@@ -149,13 +165,13 @@ class Copter:
         if self._wakes:
             self._wake(frame.time_us)
         due = self._loop.is_due(frame.time_us)
-        follows = self._time_us is not None and frame.time_us == self._time_us + self.frame_interval_us
-        known = self._senses.state(frame, asked=due or not follows)
+        goes_on = follows(frame.time_us, self._time_us, self.frame_interval_us)
+        known = self._senses.state(frame, asked=due or not goes_on)
         if known is None:
             if self._time_us is not None:  # another flight, of which nothing is known yet
                 self.stations.restart = REBOOT
             return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
-        if not follows:
+        if not goes_on:
             self._begin(known)
         self._time_us = frame.time_us
         decision = None
@@ -164,10 +180,13 @@ class Copter:
             self._sense(frame.time_us, state)
             guidance = self.pilot.step()
             decision = self._decide(frame.time_us, state, guidance)
-            self._sample = (frame.time_us, state, guidance, decision)
-        command = ActuatorCommand(frame.time_us, self._controls, armed=self.pilot.state.armed)
+            if not self._solving.busy(frame.time_us) or decision is not None:
+                self._decision = decision
+            self._sample = (frame.time_us, state, guidance, self._decision)
+        command = ActuatorCommand(frame.time_us, self._solving.controls(frame.time_us), armed=self.pilot.state.armed)
         self._step_time_s = self._clock() - started_s
-        return Step(command, decision, self._step_time_s, self._senses.estimate if due else None)
+        estimate = self._senses.estimate if due else None
+        return Step(command, decision, self._step_time_s, estimate, self.stations.failures.take())
 
     def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
         """Hear ground stations, and return what to send them; after each `step`, while the plant integrates."""
@@ -177,6 +196,8 @@ class Copter:
         if self._sample is not None:
             sample, self._sample = self._sample, None
             self._report(*sample)
+        self.stations.hear_plant(self._aside, now_us)
+        self._aside = NOTHING
         hub = self.stations.hub
         for datagram, link, address, loopback in inbox:
             hub.receive(datagram, link, address, now_us, loopback=loopback)
@@ -259,7 +280,7 @@ class Copter:
             speed = loop.vehicle.rotors.idle_speed
         loop.begin(speed, self._first_yaw())
         self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None, rests=rests)
-        self._controls = STILL if self.pilot.standing else loop.controls
+        self._solving.at_once(STILL if self.pilot.standing else loop.controls)
         self.stations.say(INFO, self.stations.banner())
 
     def _first_yaw(self) -> float:
@@ -318,14 +339,16 @@ class Copter:
         loop = self._loop
         if guidance.begins:
             loop.begin(loop.vehicle.rotors.idle_speed, state.euler[2], afresh=False)
+        elif guidance is not RESTS and self._solving.busy(now_us):
+            return None
         if guidance.horizon is not None:
             decision = loop.decide(now_us, state, guidance.horizon)
         elif guidance.attitude is not None:
             decision = loop.decide_attitude(now_us, state, guidance.attitude)
         else:
-            self._controls = STILL
+            self._solving.at_once(STILL)
             return None
-        self._controls = loop.controls
+        self._solving.decided(loop.controls, now_us, round(self.pilot.behaviour.solve_time_s * 1e6))
         self.solve_time_s = decision.diagnostics.solve_time_s
         return decision
 
@@ -333,13 +356,12 @@ class Copter:
         pilot, stations = self.pilot, self.stations
         self.samples += 1
         self._take_stock(state)
-        self._senses.gps_off = stations.failures.gps_off
         if self._senses.estimate is not None:
             for severity, line in self._health.lines(self._senses.estimate.health):
                 stations.say(severity, line)
         idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
         least = idle if pilot.state.armed else 0.0
-        c1, c2, c3, c4 = (max(control, least) for control in self._controls)
+        c1, c2, c3, c4 = (max(control, least) for control in self._solving.controls(now_us))
         self.power.run((c1, c2, c3, c4), self._interval_s)
         stations.missions.watch_mode(pilot.state.mode)
         stations.update(

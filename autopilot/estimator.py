@@ -47,7 +47,8 @@ _KNOWN_M_S = 1.0
 _KNOWN_M = 5.0
 _FASTEST_M_S = 500.0
 _TYPICAL_PA = 95e3
-_CHECK_EVERY_US = 100_000
+_CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000
+"""Between two fixes: a frame with one has enough to do."""
 _UPPER = np.triu_indices(9)
 _NOTHING = Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
@@ -319,10 +320,18 @@ class Estimator:
         return self._estimate
 
     def _check(self, now_us: int, since_us: int) -> Check | None:
-        if now_us // _CHECK_EVERY_US == (now_us - since_us) // _CHECK_EVERY_US:
+        at_us = now_us - _CHECK_AT_US
+        if at_us // _CHECK_EVERY_US == (at_us - since_us) // _CHECK_EVERY_US:
             return None
         upper = self.filter.P[:9, :9][_UPPER]
-        return Check(self.filter_us, tuple(self.filter.x[:10].tolist()), tuple(upper.tolist()))
+        kinds = self.filter.kinds
+        return Check(
+            self.filter_us,
+            tuple(self.filter.x[:10].tolist()),
+            tuple(upper.tolist()),
+            tuple(kind.nis for kind in kinds),
+            tuple(kind.believed for kind in kinds),
+        )
 
     def _health(self, now_us: int, sigma: list[float]) -> Health:
         filter_, reading = self.filter, self._reading

@@ -1,12 +1,14 @@
 """Ground stations as the process sees them: links, key, parameter file, logs, and what the terminal is told."""
 
 import argparse
+from collections.abc import Iterable
 from math import hypot
 from pathlib import Path
 from time import perf_counter, thread_time, time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from autopilot.copter import Copter
+from autopilot.conducted import ConductedLinks, Conductor
+from autopilot.copter import Copter, Received
 from autopilot.ground_links import GroundLinks, open_links
 from autopilot.kept import Kept, Past
 from autopilot.parameters import ImpossibleError, definitions
@@ -25,6 +27,9 @@ from mavlink.services.parameter_file import ParameterFileError, read, write
 from mavlink.signing import Signing, SigningError, parse_key, tick_at
 from mavlink.slots import Slots
 from plant.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from autopilot.process import AutopilotLog
 
 KEY = "signing.key"
 TIMESTAMP = "signing.timestamp"
@@ -52,9 +57,15 @@ class Ground:
     """
 
     def __init__(
-        self, args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None, status: Status
+        self,
+        args: argparse.Namespace,
+        profile: Profile,
+        vehicle: Vehicle,
+        estimator: Estimator | None,
+        status: Status,
+        conductor: Conductor | None = None,
     ) -> None:
-        """Open links and files as the command line says.
+        """Open links and files as the command line says; a `conductor` speaks for all ground stations.
 
         Raises:
             GroundError: Something of it cannot be used.
@@ -73,6 +84,7 @@ class Ground:
         except OSError as error:
             raise GroundError(f"cannot write to --state {self._state}: {error.strerror}") from error
         self._first = track(args.track) if args.track else None
+        self._log: AutopilotLog | None = None
         self.copter = self._vehicle_anew(self._past())
         self._kept_samples = self._kept_plans = 0
         self._kept_armed = False
@@ -80,7 +92,9 @@ class Ground:
             links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
         except LinkError as error:
             raise GroundError(str(error)) from error
-        self._links = GroundLinks(links, perf_counter, thread_time)
+        self._links: GroundLinks | ConductedLinks = GroundLinks(links, perf_counter, thread_time)
+        if conductor is not None:
+            self._links = ConductedLinks(conductor, lambda: self.copter.pilot.state)
         self.shut_down = self._said_too_much = self._resumed_said = False
         self._revision = self.copter.parameters.revision
         self._told_s = self._saved_s = perf_counter()
@@ -90,10 +104,18 @@ class Ground:
         for link in links:
             self._status.say("ground", _invitation(link.url), url=link.url)
 
+    def record(self, log: "AutopilotLog") -> None:
+        """Note in `log` with what the vehicle begins, and what it hears."""
+        self._log = log
+        log.begin_again(self._values)
+
     def serve(self, now_s: float) -> Copter:
         """Hear and answer ground stations; return the vehicle that flies on."""
         stations = self.copter.stations
-        self._links.send(self.copter.serve(self._links.receive(stations)))
+        received: Iterable[Received] = self._links.receive(stations)
+        if self._log:
+            received = self._log.hear(received)
+        self._links.send(self.copter.serve(received))
         if stations.restart:
             self._restart(stations.restart)
         if now_s >= self._told_s + _TELL_EVERY_S and self.copter.pilot.has_seen:
@@ -159,11 +181,14 @@ class Ground:
             self.copter = self._vehicle_anew(None)
             self._kept_samples = self._kept_plans = 0
             self._links.introduce(self.copter.stations)
+            if self._log:
+                self._log.begin_again(self._values)
             self._revision = self.copter.parameters.revision
             self._status.say("said", "restarted by a ground station")
 
     def _vehicle_anew(self, past: Past | None) -> Copter:
         args = self._args
+        self._values = self._read_parameters()
         settings = StationSettings(
             system_id=args.system_id,
             identity=args.identity,
@@ -172,6 +197,8 @@ class Ground:
             signing=self._signing,
             files=self._folder,
             logs=self._logs,
+            feedback=args.feedback,
+            relays_faults=args.simulator is None,
         )
         try:
             copter = Copter(
@@ -179,7 +206,7 @@ class Ground:
                 self._vehicle,
                 settings,
                 perf_counter,
-                values=self._read_parameters(),
+                values=self._values,
                 first=self._first,
                 estimator=self._estimator,
                 past=past,
@@ -282,14 +309,19 @@ class Ground:
 
 
 def open_ground(
-    args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None, status: Status
+    args: argparse.Namespace,
+    profile: Profile,
+    vehicle: Vehicle,
+    estimator: Estimator | None,
+    status: Status,
+    conductor: Conductor | None = None,
 ) -> Ground:
-    """Return what serves ground stations as the command line says.
+    """Return what serves ground stations as the command line says; a `conductor` speaks for all of them.
 
     Raises:
         GroundError: Something of it cannot be used.
     """
-    return Ground(args, profile, vehicle, estimator, status)
+    return Ground(args, profile, vehicle, estimator, status, conductor)
 
 
 def _invitation(url: str) -> str:

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from autopilot.battery import believed
 from autopilot.controller import (
     Array,
     AttitudeController,
@@ -67,6 +68,7 @@ class ControlLoop:
         self.control_interval_us = self._controller.control_interval_us
         self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
         self._memory: Any = None
+        self._told_ah = 0.0
         self._is_plain = True
         self._yaw_rad = 0.0
         self.controls = (0.0, 0.0, 0.0, 0.0)
@@ -74,13 +76,23 @@ class ControlLoop:
     def begin(self, rotor_speed: float, yaw_rad: float, *, afresh: bool = True) -> None:
         """Begin with every rotor at `rotor_speed` (the vehicle's unit), yaw unwrapped near `yaw_rad`.
 
-        Unless all begins `afresh`, a law that remembers its battery goes on with the charge that is left.
+        Unless all begins `afresh`, a law that remembers its battery goes on with the charge that is left; else with
+        what the battery has told of it.
         """
         before, self._memory = self._memory, self._controller.initial(rotor_speed)
-        if not afresh and hasattr(before, "charge_ah"):
+        if hasattr(before, "charge_ah") and not afresh:
             self._memory = self._memory._replace(charge_ah=before.charge_ah)
+        elif hasattr(self._memory, "charge_ah"):
+            self._memory = self._memory._replace(charge_ah=self._told_ah)
         self._yaw_rad = yaw_rad
         self._command(np.full(4, rotor_speed))
+
+    def know_charge(self, used_ah: float) -> None:
+        """Take in the charge that the battery itself tells, Ah: a law that remembers another goes on with this."""
+        self._told_ah = used_ah
+        if hasattr(self._memory, "charge_ah"):
+            charge_ah = believed(self._memory.charge_ah, used_ah, self.vehicle)
+            self._memory = self._memory._replace(charge_ah=charge_ah)
 
     def record(self) -> LoopRecord:
         """Return what is remembered; a law of somebody else's may remember what cannot be kept."""
