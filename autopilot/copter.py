@@ -255,7 +255,7 @@ class Copter:
 
         pilot.resume(frame.time_us, self._loop.state(frame), kept.pilot, again, closely=closely)
         stations.missions.moved_origin()
-        self._controls = self._loop.controls if pilot.state.armed and not pilot.idles else STILL
+        self._solving.at_once(self._loop.controls if pilot.state.armed and not pilot.idles else STILL)
         stations.say(INFO, stations.banner())
         if pilot.state.armed:
             how = goes_on(pilot.state.mode, stations.missions.executor.progress.seq)

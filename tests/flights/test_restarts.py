@@ -7,6 +7,7 @@ import pytest
 
 from autopilot.kept import FOLLOWS_US
 from autopilot.modes import Mode, State
+from autopilot.profile import load_profile
 from mavlink.dialect import mav
 from mavlink.feedback import Feedback
 from mavlink.frames import Vector
@@ -103,6 +104,16 @@ def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int)
     assert largest_tilt_deg(flight, 4.0) < 45.0
     flight.until(lambda: flight.copter.pilot.state == HOLDING, 15.0, "the end of the mission")
     assert dist(flight.position, (0.0, 6.0, 4.0)) < (0.3 if feedback is Feedback.STATE else 3.0)
+
+
+def test_between_two_control_samples_the_rotors_keep_their_speed() -> None:
+    flight = in_the_air(3.0, profile=load_profile("flight"))
+    flight.run(1.0)
+    for _ in range(2):
+        flight.step()
+        past, before = flight.past(), flight.rotors
+        flight.restart(past)
+        assert flight.rotors.controls == pytest.approx(before.controls, abs=1e-3)
 
 
 def test_offboard_waits_for_setpoints_as_after_a_loss() -> None:
