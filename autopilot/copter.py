@@ -249,7 +249,7 @@ class Copter:
                 chosen = track(scene.behaviour.track)
                 return Along(plan(chosen, self._references, self._instants.preview), chosen.duration_s, began_us)
             if mode is Mode.MISSION:
-                return stations.missions.course(kept.course.turns, kept.course.legs)
+                return stations.missions.course_again(kept.course.turns, kept.course.legs)
             course = course_again(mode, kept.course, scene) or self._course(mode, scene)
             return course.skip(kept.course.legs) if isinstance(course, Legs) else course
 

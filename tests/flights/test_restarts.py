@@ -1,7 +1,7 @@
 """The autopilot is killed in flight and started again: with what was kept of the flight it goes on."""
 
 from collections.abc import Callable
-from math import degrees, dist, hypot
+from math import degrees, dist, hypot, nan
 
 import pytest
 
@@ -13,7 +13,7 @@ from mavlink.feedback import Feedback
 from mavlink.frames import Vector
 from mavlink.services.mission_items import FENCE, RALLY
 from tests.flights.copter import ACCEPTED, CopterFlight, in_the_air
-from tests.flights.test_vehicle_missions import EVERY_KIND, load, reached, waypoint
+from tests.flights.test_vehicle_missions import EVERY_KIND, do, load, reached, waypoint
 
 EVERY_S = 1.1
 HOLDING = State(Mode.HOLD, armed=True)
@@ -63,7 +63,7 @@ def test_every_mode_goes_on(mode: Mode) -> None:
     assert flight.go(8.0, 3.0, 3.0) == ACCEPTED
     flight.run(2.0)
     if mode is Mode.ORBIT:
-        assert flight.command(mav.MAV_CMD_DO_ORBIT, 4.0, 3.0, 0.0, 0.0, *[float("nan")] * 3) == ACCEPTED
+        assert flight.command(mav.MAV_CMD_DO_ORBIT, 4.0, 3.0, 0.0, 0.0, *[nan] * 3) == ACCEPTED
     elif mode is not Mode.HOLD:
         assert flight.select(mode) == ACCEPTED
     flight.run(6.0 if mode is Mode.ORBIT else 3.0)
@@ -165,6 +165,20 @@ def test_plans_and_home_are_kept_on_the_ground_too() -> None:
     assert flight.arm() == ACCEPTED
     flight.restart(flight.past())
     assert (flight.armed, flight.copter.pilot.standing) == (True, True)
+
+
+def test_a_mission_that_has_landed_does_not_begin_again() -> None:
+    """The rotors idle for a while after a landing, and the mode is still mission."""
+    flight = in_the_air(1.0)
+    load(flight, waypoint(1.0, 0.0, 1.0), do(mav.MAV_CMD_NAV_LAND, 0.0, 0.0, 0.0, nan))
+    assert flight.select(Mode.MISSION) == ACCEPTED
+    flight.until(lambda: flight.copter.pilot.standing, 10.0)
+    flight.run(0.5)
+    assert flight.copter.pilot.state == State(Mode.MISSION, armed=True)
+    flight.restart(flight.past())
+    path = flight.path_until(lambda: not flight.armed, 3.0)
+    assert max(z for _, _, z in path) < 0.01
+    assert flight.mode is Mode.HOLD
 
 
 @pytest.mark.parametrize("late_us", [-8_000, FOLLOWS_US + 8_000])
