@@ -5,11 +5,16 @@ import socket
 from collections.abc import Callable
 from enum import Enum
 from select import select
+from time import monotonic
 
 from mavlink import dialect
+from tests.restarts.station import Station
 
+GIVE_UP_AFTER_S = 60.0
+"""By the clock: a bound for what hangs, never a part of a verdict."""
 ADDRESS = ("127.0.0.1", 0)
 _LARGEST = 65536
+_LOOK_S = 0.02
 _HEAD = 10
 """Bytes of a frame of MAVLink 2 before its payload."""
 _TIMES = {dialect.MSG_ATTITUDE_QUATERNION: (4, 1000), dialect.MSG_HIL_SENSOR: (8, 1)}
@@ -25,6 +30,10 @@ class Phase(Enum):
     DURING = "while the answer is computed"
     AFTER = "when the answer is sent"
     LOST = "when the answer is sent, which is lost"
+
+
+class HangsError(Exception):
+    """Something was waited for in vain."""
 
 
 class Between:
@@ -61,17 +70,23 @@ class Between:
             sock.close()
         self._open()
 
-    def turn_to(self, plant: tuple[str, int]) -> None:
-        """Pass on to another plant."""
-        self._plant = plant
+    def fly_until(self, station: Station, condition: Callable[[], bool], what: str) -> None:
+        """Pass on, and have the ground station hear, until `condition()`.
 
-    def pump(self, others: list[socket.socket], wait_s: float) -> list[socket.socket]:
-        """Pass on what has come; return which of `others` have something."""
-        ready, _, _ = select([self._near, self._far, *others], [], [], wait_s)
-        for sock in (self._near, self._far):
-            if sock in ready and sock.fileno() >= 0:
-                self._pass_on(sock)
-        return [sock for sock in others if sock in ready]
+        Raises:
+            HangsError: It does not come about.
+        """
+        give_up_s = monotonic() + GIVE_UP_AFTER_S
+        while not condition():
+            ready, _, _ = select([self._near, self._far, station.socket], [], [], _LOOK_S)
+            for sock in (self._near, self._far):
+                if sock in ready and sock.fileno() >= 0:
+                    self._pass_on(sock)
+            if station.socket in ready:
+                station.hear()
+            if monotonic() > give_up_s:
+                said = f"{station.mode}, item {station.seq}, {station.texts[-3:]}"
+                raise HangsError(f"waited in vain for {what} at t = {self.time_us * 1e-6:.3f} s: {said}")
 
     def close(self) -> None:
         """End."""

@@ -1,19 +1,16 @@
 """Plants killed in flight: the autopilot says what it waits for, and flies the next plant as if it had just begun."""
 
 import random
-from collections.abc import Callable
 from pathlib import Path
-from time import monotonic
 from typing import NamedTuple
 
 from mavlink.feedback import Feedback
-from tests.restarts.autopilots import GIVE_UP_AFTER_S, HangsError, start
+from tests.restarts.autopilots import start
 from tests.restarts.between import Between, Phase
 from tests.restarts.station import Station, mission
 from tests.runs import Process
 
-_LATEST_S = 20.0
-_LOOK_S = 0.02
+_LATEST_S = 12.0
 
 
 class Kill(NamedTuple):
@@ -46,7 +43,7 @@ def fly(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple[list[K
         processes.append(autopilot)
         flights = _Flights(folder, url, autopilot, between, station, processes, chance)
         done = [flights.kill(seed) for _ in range(kills)]
-        flights.fly_to(lambda: station.armed is True, "the last plant's vehicle to be armed")
+        between.fly_until(station, lambda: station.armed is True, "the last plant's vehicle to be armed")
         between.close()
     finally:
         for process in processes:
@@ -75,33 +72,28 @@ class _Flights:
         self._chance = chance
 
     def kill(self, seed: int) -> Kill:
-        """Fly for a while, kill the plant, and start another: at once, or when the autopilot has said what it misses."""
+        """Fly for a while, kill the plant, start another: at once, or when the autopilot has said what it misses."""
         between, station, chance = self._between, self._station, self._chance
-        self.fly_to(lambda: station.armed is True, "the rotors to be armed")
+        between.fly_until(station, lambda: station.armed is True, "the rotors to be armed")
         phase = chance.choice(list(Phase))
         due_us = between.time_us + round(1e6 * chance.uniform(0.0, _LATEST_S))
         between.at(due_us, phase, self._plant.process.kill)
-        self.fly_to(lambda: not between.waits, "the instant of the kill")
+        between.fly_until(station, lambda: not between.waits, "the instant of the kill")
         self._plant.process.wait()
         died_us, silences = between.time_us, len(self._autopilot.events("silence"))
         if chance.random() < 0.5:
-            self.fly_to(lambda: len(self._autopilot.events("silence")) > silences, "the words that the plant is gone")
+            between.fly_until(
+                station, lambda: len(self._autopilot.events("silence")) > silences, "the words that the plant is gone"
+            )
         said = [event["text"] for event in self._autopilot.events("silence")[silences:]]
         station.begin_anew()
         station.drain()
         self._plant = _plant(self._folder, self._url, seed)
         self._processes.append(self._plant)
-        self.fly_to(lambda: station.armed is not None and between.time_us < died_us, "the next plant's flight")
+        between.fly_until(
+            station, lambda: station.armed is not None and between.time_us < died_us, "the next plant's flight"
+        )
         return Kill(died_us * 1e-6, phase, said[0] if said else "", station.armed is False)
-
-    def fly_to(self, condition: Callable[[], bool], what: str) -> None:
-        """Pass on until `condition()`."""
-        give_up_s = monotonic() + GIVE_UP_AFTER_S
-        while not condition():
-            if self._between.pump([self._station.socket], _LOOK_S):
-                self._station.hear()
-            if monotonic() > give_up_s:
-                raise HangsError(f"waited in vain for {what} at t = {self._between.time_us * 1e-6:.3f} s")
 
 
 def _plant(folder: Path, url: str, seed: int) -> Process:

@@ -98,7 +98,9 @@ class Station:
             case "MISSION_CURRENT":
                 self.seq = fields.seq
             case "MISSION_REQUEST_INT" | "MISSION_REQUEST":
-                self._send("MISSION_ITEM_INT", *item_fields(_VEHICLE, fields.seq, self._items[fields.seq], False, MISSION))
+                self._send(
+                    "MISSION_ITEM_INT", *item_fields(_VEHICLE, fields.seq, self._items[fields.seq], False, MISSION)
+                )
             case "MISSION_ACK":
                 self._has_mission = self._has_mission or fields.type == mav.MAV_MISSION_ACCEPTED
 
