@@ -42,6 +42,7 @@ from mavlink.services.statustext import INFO, WARNING
 from mavlink.setpoints import OffboardSetpoint, Sticks
 from plant.vehicle import Vehicle
 
+FALLS = "restarted in the air, knowing nothing: found falling"
 _LEADER_LOST_US = 10_000_000
 
 
@@ -170,7 +171,9 @@ class Copter:
         if known is None:
             if self._time_us is not None:  # another flight, of which nothing is known yet
                 self.stations.restart = REBOOT
-            return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
+            return Step(
+                ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s, known=False
+            )
         if not goes_on:
             self._begin(known)
         self._time_us = frame.time_us
@@ -258,6 +261,8 @@ class Copter:
         self._solving.at_once(self._loop.controls if pilot.state.armed and not pilot.idles else STILL)
         stations.say(INFO, stations.banner())
         if pilot.state.armed:
+            if self._senses.estimate is not None and not closely and not self._senses.rests:
+                pilot.say(WARNING, FALLS)
             how = goes_on(pilot.state.mode, stations.missions.executor.progress.seq)
             self.resumed = f"restarted in flight: {how}"
             pilot.say(WARNING, self.resumed)
@@ -275,12 +280,14 @@ class Copter:
         if self._time_us is not None:  # another flight: nothing that any service remembers is of any use
             self.stations.restart = REBOOT
         speed = self._start_speed if frame.time_us == 0 else hover_speed
-        rests = self._senses.estimate is not None  # or there would be no estimate
+        rests = self._senses.rests
         if rests:
             speed = loop.vehicle.rotors.idle_speed
         loop.begin(speed, self._first_yaw())
         self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None, rests=rests)
         self._solving.at_once(STILL if self.pilot.standing else loop.controls)
+        if self._senses.estimate is not None and not rests:
+            self.pilot.say(WARNING, FALLS)
         self.stations.say(INFO, self.stations.banner())
 
     def _first_yaw(self) -> float:

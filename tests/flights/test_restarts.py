@@ -106,6 +106,38 @@ def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int)
     assert dist(flight.position, (0.0, 6.0, 4.0)) < (0.3 if feedback is Feedback.STATE else 3.0)
 
 
+@pytest.mark.parametrize("flying_s", [0.0, 0.6, 4.0])
+def test_a_vehicle_on_sensors_is_caught_by_an_autopilot_that_knows_nothing(flying_s: float) -> None:
+    """Out of a hover, while it gains speed with 20 degrees of tilt, and at speed."""
+    flight = CopterFlight(feedback=Feedback.SENSORS)
+    flight.take_off(8.0)
+    if flying_s:
+        assert flight.go(60.0, 20.0, 8.0) == ACCEPTED
+        flight.run(flying_s)
+    height_m = flight.position[2]
+    flight.restart()
+    flight.until(lambda: flight.armed, 0.5)
+    assert largest_tilt_deg(flight, 4.0) < 45.0
+    assert min(z for _, _, z in path_of(flight, 2.0)) > height_m - 3.0
+    assert hypot(*flight.velocity) < 0.2
+    assert flight.copter.pilot.state == HOLDING
+    assert flight.client.said("restarted in the air, knowing nothing: found falling")
+
+
+def test_what_was_asked_for_goes_on_when_a_vehicle_is_caught() -> None:
+    flight = CopterFlight(feedback=Feedback.SENSORS)
+    flight.take_off(12.0)
+    load(flight, waypoint(5.0, 0.0, 12.0, stay_s=2.0), waypoint(0.0, 5.0, 12.0))
+    assert flight.select(Mode.MISSION) == ACCEPTED
+    flight.until(lambda: reached(flight) == [0], 10.0)
+    past = flight.past()
+    flight.restart(past._replace(kept=past.kept._replace(senses=b"")))
+    flight.until(lambda: flight.copter.pilot.state == HOLDING, 20.0, "the end of the mission")
+    assert flight.client.said("restarted in flight: mission goes on at item 0")
+    assert flight.client.said("found falling")
+    assert dist(flight.position, (0.0, 5.0, 12.0)) < 3.0
+
+
 def test_between_two_control_samples_the_rotors_keep_their_speed() -> None:
     flight = in_the_air(3.0, profile=load_profile("flight"))
     flight.run(1.0)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mavlink.feedback import Feedback
-from tests.restarts.between import Between, Phase
+from tests.restarts.between import COMPILES_S, Between, Phase
 from tests.restarts.station import HOVERS, Station, mission
 from tests.runs import Array, Process, rows
 
@@ -114,7 +114,8 @@ class _Killer:
     def begin(self) -> None:
         """Start the first, and have it armed."""
         self._start()
-        self._between.fly_until(self._station, lambda: self._station.armed is True, "the rotors to be armed")
+        station = self._station
+        self._between.fly_until(station, lambda: station.armed is True, "the rotors to be armed", COMPILES_S)
         self._died_us = self._between.time_us - round(_APART_S * 1e6)
 
     def kill(self) -> bool:
