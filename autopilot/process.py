@@ -104,9 +104,9 @@ class AutopilotLog:
             (time_s, *step.decision.attitude_reference, *codes, *times_us, how.cost, how.slack, *how.active)
         )
 
-    def begin_again(self, values: Mapping[str, Value]) -> None:
-        """Note that the next frame is answered by a vehicle that begins with `values` of its parameters."""
-        self._setup = msgspec.structs.replace(self._setup, values=dict(values))
+    def begin_again(self, values: Mapping[str, Value], past: bytes) -> None:
+        """Note that the next frame is answered by a vehicle that begins with these parameters, and with this past."""
+        self._setup = msgspec.structs.replace(self._setup, values=dict(values), past=past)
         self._begins = True
 
     def hear(self, datagrams: Iterable["Received"]) -> Iterator["Received"]:
