@@ -56,22 +56,28 @@ class MemoryPlant:
         self._physics = Physics(self._vehicle, args.integrator, weather)
         self._end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
         self._tell: Tell | None = None
+        self._now_s = 0.0
 
     def hear(self, datagram: bytes) -> None:
-        """Take in what an autopilot says that answers no frame: its call."""
-        self._end.receive(datagram, _ADDRESS, NEVER_LATE_S)
+        """Take in what an autopilot says, its call for one.
+
+        Raises:
+            StageError: The state cannot be integrated any further.
+        """
+        command = self._end.receive(datagram, _ADDRESS, self._now_s)
+        self._end.received.clear()
+        if command is None:
+            return
+        try:
+            self._world = self._physics.step(self._world, command, self._end.frame_interval_us)
+        except IntegrationError as error:
+            raise StageError(str(error)) from error
+        self._answered = True
 
     def frame(self) -> list[bytes]:
         """Return what the plant says up to its next frame, which comes last."""
-        end, args = self._end, self._args
-        if self._tell is None:
-            origin, interval_us = args.home.origin, end.frame_interval_us
-            self._world = self._worlds[end.feedback]
-            self._tell = tells(
-                end.feedback, self._vehicle, self._physics, origin, seed=args.seed, interval_us=interval_us
-            )
-        end.offer(self._tell(self._world), NEVER_LATE_S, state_frame(self._world))
-        return [outgoing.datagram for outgoing in end.take_outbox()]
+        self._offer()
+        return [outgoing.datagram for outgoing in self._end.take_outbox()]
 
     def take(self, answer: bytes) -> None:
         """Take in the answer to that frame, and go on.
@@ -79,13 +85,31 @@ class MemoryPlant:
         Raises:
             StageError: The state cannot be integrated any further.
         """
-        command = self._end.receive(answer, _ADDRESS, NEVER_LATE_S)
-        self._end.received.clear()
-        assert command is not None, "the answer names the frame awaited"
-        try:
-            self._world = self._physics.step(self._world, command, self._end.frame_interval_us)
-        except IntegrationError as error:
-            raise StageError(str(error)) from error
+        self.hear(answer)
+
+    def listen(self, timeout_s: float) -> list[bytes]:
+        """Return what it says up to `timeout_s` from now, the frame it waits with said again and again."""
+        if self._answered:
+            self._offer()
+        else:
+            self._now_s += timeout_s
+            self._end.poll(self._now_s)
+        return [outgoing.datagram for outgoing in self._end.take_outbox()]
+
+    def clock_s(self) -> float:
+        """Return the time that links are late by: it passes only while the plant waits."""
+        return self._now_s
+
+    def _offer(self) -> None:
+        end, args = self._end, self._args
+        if self._tell is None:
+            origin, interval_us = args.home.origin, end.frame_interval_us
+            self._world = self._worlds[end.feedback]
+            self._tell = tells(
+                end.feedback, self._vehicle, self._physics, origin, seed=args.seed, interval_us=interval_us
+            )
+        self._answered = False
+        end.offer(self._tell(self._world), self._now_s, state_frame(self._world))
 
 
 class MemoryAutopilot:
@@ -131,10 +155,22 @@ class MemoryAutopilot:
 
     def tell(self, frame: bytes, turn: Turn) -> None:
         """Tell it a frame of the plant, and what ground stations say then."""
+        self.expect(turn)
+        self.hear(frame)
+
+    def expect(self, turn: Turn) -> None:
+        """Tell it what ground stations say at the frame that comes next."""
         self._desk.heard = turn
-        known = self._end.receive(frame, NEVER_LATE_S)
-        assert known is not None, "each frame is new"
-        self._end.answer(self._copter.step(known).command)
+
+    def hear(self, datagram: bytes) -> None:
+        """Give it a datagram of the plant's, sound or not."""
+        frame = self._end.receive(datagram, NEVER_LATE_S)
+        if frame is not None:
+            self._end.answer(self._copter.step(frame).command)
+
+    def listen(self) -> list[bytes]:
+        """Return what it has said to the plant."""
+        return self._end.take_outbox()
 
     def answer(self) -> bytes:
         """Return its answer to the frame."""
