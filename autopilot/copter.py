@@ -72,6 +72,7 @@ class Copter:
         power: The battery, as far as the autopilot knows.
         solve_time_s: Of the last QP.
         samples: How many control samples ground stations were told of.
+        resumed: What goes on of a flight in which an autopilot was killed, in words; empty where none does.
     """
 
     def __init__(
@@ -135,7 +136,7 @@ class Copter:
         self._past = past
         self._wakes = past is not None
         self._resumed_us: int | None = None
-        self.samples = 0
+        self.samples, self.resumed = 0, ""
         self._time_us: int | None = None
         self._decision: Decision | None = None
         self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
@@ -248,17 +249,18 @@ class Copter:
                 chosen = track(scene.behaviour.track)
                 return Along(plan(chosen, self._references, self._instants.preview), chosen.duration_s, began_us)
             if mode is Mode.MISSION:
-                return stations.missions.course(kept.course.turns, kept.course.legs)
+                return stations.missions.course_again(kept.course.turns, kept.course.legs)
             course = course_again(mode, kept.course, scene) or self._course(mode, scene)
             return course.skip(kept.course.legs) if isinstance(course, Legs) else course
 
         pilot.resume(frame.time_us, self._loop.state(frame), kept.pilot, again, closely=closely)
         stations.missions.moved_origin()
-        self._controls = self._loop.controls if pilot.state.armed and not pilot.idles else STILL
+        self._solving.at_once(self._loop.controls if pilot.state.armed and not pilot.idles else STILL)
         stations.say(INFO, stations.banner())
         if pilot.state.armed:
             how = goes_on(pilot.state.mode, stations.missions.executor.progress.seq)
-            stations.say(WARNING, f"restarted in flight: {how}")
+            self.resumed = f"restarted in flight: {how}"
+            pilot.say(WARNING, self.resumed)
 
     def _begin(self, frame: StateFrame) -> None:
         """See the vehicle for the first time, or anew after frames were missed."""
