@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out/spiral
 
-.PHONY: setup fly test lint fuzz soak bench lock clean
+.PHONY: setup fly test lint fuzz soak kills bench lock clean
 
 setup: .venv/.ready
 
@@ -49,6 +49,12 @@ fuzz: setup
 # Two ground stations and a companion on one vehicle, for ten minutes by the clock.
 soak: setup
 	$(BIN)/python -m tests.clients.soak
+
+# Processes killed in flight and started again, over UDP: what the vehicle does meanwhile.
+kills: setup
+	$(BIN)/python -m tests.restarts --kills 200
+	$(BIN)/python -m tests.restarts --kills 100 --feedback sensors
+	$(BIN)/python -m tests.restarts --kills 200 --of plant
 
 bench: setup
 	$(BIN)/colibri bench

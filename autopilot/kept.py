@@ -13,6 +13,7 @@ from zlib import crc32
 import msgspec
 
 from autopilot.circling import Round
+from autopilot.controller import Array
 from autopilot.course import Course, Scene
 from autopilot.courses import Along, Climb, Legs, Stop, Way
 from autopilot.loop import LoopRecord
@@ -66,6 +67,8 @@ class Kept(NamedTuple):
         charge_ah: Taken from the battery.
         energy_wh: The same as energy.
         senses: Of the estimator; empty where the state is told.
+        rotor_lost: 0..3; None while all turn.
+        rotor_speeds: As their lag has them, parts of the largest, (4,).
     """
 
     maker: int
@@ -79,6 +82,8 @@ class Kept(NamedTuple):
     charge_ah: float
     energy_wh: float
     senses: bytes
+    rotor_lost: int | None
+    rotor_speeds: Array
 
     def is_followed_by(self, time_us: int) -> bool:
         """Whether a frame can be of the same flight."""

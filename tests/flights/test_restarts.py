@@ -1,7 +1,7 @@
 """The autopilot is killed in flight and started again: with what was kept of the flight it goes on."""
 
 from collections.abc import Callable
-from math import degrees, dist, hypot, nan
+from math import acos, degrees, dist, hypot, nan
 
 import pytest
 
@@ -9,10 +9,12 @@ from autopilot.kept import FOLLOWS_US
 from autopilot.modes import Mode, State
 from autopilot.profile import load_profile
 from mavlink.dialect import mav
+from mavlink.failures import MOTOR, WRONG
 from mavlink.feedback import Feedback
-from mavlink.frames import Vector
+from mavlink.frames import Vector, rotation_matrix
 from mavlink.services.mission_items import FENCE, RALLY
-from tests.flights.copter import ACCEPTED, CopterFlight, in_the_air
+from plant.world import state_frame
+from tests.flights.copter import ACCEPTED, DENIED, CopterFlight, in_the_air
 from tests.flights.test_vehicle_missions import EVERY_KIND, do, load, reached, waypoint
 
 EVERY_S = 1.1
@@ -136,6 +138,21 @@ def test_what_was_asked_for_goes_on_when_a_vehicle_is_caught() -> None:
     assert flight.client.said("restarted in flight: mission goes on at item 0")
     assert flight.client.said("found falling")
     assert dist(flight.position, (0.0, 5.0, 12.0)) < 3.0
+
+
+def test_a_landing_on_three_rotors_goes_on() -> None:
+    flight = in_the_air(8.0)
+    assert flight.inject(MOTOR, WRONG, 2, 0.001) == ACCEPTED
+    flight.run(1.5)
+    tilts: list[float] = []
+    while flight.armed:
+        flight.restart(flight.past())
+        assert flight.copter.rotor_loss.lost == 1
+        flight.run(0.3, lambda: tilts.append(degrees(acos(rotation_matrix(state_frame(flight.world).attitude)[2][2]))))
+    assert max(tilts) < 20.0
+    assert hypot(*flight.position[:2]) < 3.0
+    assert flight.client.said("rotor 2 failed: landing on three rotors")
+    assert flight.arm() == DENIED
 
 
 def test_between_two_control_samples_the_rotors_keep_their_speed() -> None:
