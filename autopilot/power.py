@@ -24,13 +24,14 @@ class PowerMeter:
 
     Attributes:
         charge_ah: Taken so far.
+        energy_wh: The same as energy.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
         """Begin with a full battery."""
         self._model = BatteryModel(vehicle)
         self._battery = vehicle.battery
-        self._energy_wh = 0.0
+        self.energy_wh = 0.0
         self._now = self._model.terminal(0.0, np.zeros(4))
         self._vehicle = vehicle
         self._told = False
@@ -46,11 +47,16 @@ class PowerMeter:
         sag_v = told.voltage_v - self._now[0]
         self._sag_v = sag_v if abs(sag_v) > _SAG * self._battery.full_voltage_v else 0.0
 
+    def resume(self, charge_ah: float, energy_wh: float) -> None:
+        """Go on with a battery that has given so much."""
+        self.charge_ah, self.energy_wh = charge_ah, energy_wh
+        self._now = self._model.terminal(charge_ah, np.zeros(4))
+
     def run(self, controls: FourOf, duration_s: float) -> None:
         """Turn the rotors at `controls`, parts of the largest speed, for `duration_s`."""
         voltage_v, current_a = self._now = self._model.terminal(self.charge_ah, np.array(controls))
         self.charge_ah += current_a * duration_s / _SECONDS_PER_HOUR
-        self._energy_wh += voltage_v * current_a * duration_s / _SECONDS_PER_HOUR
+        self.energy_wh += voltage_v * current_a * duration_s / _SECONDS_PER_HOUR
 
     @property
     def left(self) -> float:
@@ -68,4 +74,4 @@ class PowerMeter:
         left_s = left_ah / current_a * _SECONDS_PER_HOUR if current_a > _LEAST_CURRENT_A else nan
         cells = max(1, round(self._battery.full_voltage_v / _CELL_V))
         voltage_v = max(0.0, voltage_v + self._sag_v)
-        return BatteryState(cells, voltage_v, current_a, self.charge_ah, self.left, left_s, self._energy_wh)
+        return BatteryState(cells, voltage_v, current_a, self.charge_ah, self.left, left_s, self.energy_wh)

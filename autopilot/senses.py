@@ -17,6 +17,14 @@ class Estimating(Protocol):
     def step(self, frame: SensorFrame, /, *, asked: bool) -> Estimate | None:
         """Take in the next frame; return None until the first estimate. Unless `asked`, an older one will do."""
 
+    def record(self) -> bytes:
+        """Return what is needed to go on after a restart; empty before the first estimate."""
+        ...
+
+    def resume(self, record: bytes, time_us: int, /) -> bool:
+        """Go on from a record, the next frame being of `time_us`; return whether that can be."""
+        ...
+
 
 Estimator: TypeAlias = Callable[[int], Estimating]
 """Makes an estimator for frames that are so many µs apart."""
@@ -66,6 +74,14 @@ class Senses:
         self.sensed: SensorFrame | None = None
         self.fix: GpsFix | None = None
         self._fix_us = 0
+
+    def record(self) -> bytes:
+        """Return what the estimator needs to go on after a restart; empty where there is nothing to go on with."""
+        return b"" if self._estimating is None else self._estimating.record()
+
+    def resume(self, record: bytes, time_us: int) -> bool:
+        """Have the estimator go on from a record, the next frame being of `time_us`; return whether it does."""
+        return self._estimating is not None and self._estimating.resume(record, time_us)
 
     def state(self, frame: Frame, *, asked: bool = True) -> StateFrame | None:
         """Return the state at a frame, or unless `asked` an older one; None until there is an estimate.

@@ -96,6 +96,7 @@ class PlantEnd:
         """
         self.waits = waits
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
+        self._truth_codec = Codec(system_id, dialect.TRUTH_COMPONENT)
         self._autopilot = (system_id, dialect.AUTOPILOT_COMPONENT)
         self.peer: Address | None = None
         self.frame_interval_us = frame_interval_us
@@ -114,8 +115,11 @@ class PlantEnd:
         self._resend_at_s = 0.0
         self._outbox: list[Outgoing] = []
 
-    def offer(self, frame: Frame, now_s: float, aside: Aside = NOTHING) -> None:
-        """Send `frame`, of the kind of `feedback`, and what goes beside it; await the command that answers it."""
+    def offer(self, frame: Frame, now_s: float, aside: Aside = NOTHING, truth: StateFrame | None = None) -> None:
+        """Send `frame`, of the kind of `feedback`, and what goes beside it; await the command that answers it.
+
+        The `truth` is appended, as another component's, for whoever stands in between: it is not the autopilot's.
+        """
         if isinstance(frame, StateFrame):
             frames = encode_state(self._codec, frame)
         else:
@@ -127,6 +131,8 @@ class PlantEnd:
         self._battery = aside.battery
         if aside.battery is not None and frame.time_us % BATTERY_EVERY_US == 0:
             frames.append(encode_battery(self._codec, aside.battery))
+        if truth is not None:
+            frames += encode_state(self._truth_codec, truth)
         self._frames = tuple(frames)
         self._begun = True
         self._awaited_us = frame.time_us

@@ -15,7 +15,8 @@ DEFAULT_LINKS = {
 }
 
 
-def _parser() -> ArgumentParser:
+def command_line() -> ArgumentParser:
+    """Return what reads the command line."""
     parser = ArgumentParser(
         prog="python -m plant",
         description="The quadrotor and its world: integrates the nonlinear vehicle, sends its state, or what its "
@@ -60,13 +61,16 @@ def _parser() -> ArgumentParser:
     )
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--speed", type=speed, metavar="N", help="times real time, or max (default: max; with --realtime 1)")
+    add(
+        "--truth", action="store_true", help="append the true state to each frame, for a program in between (for tests)"
+    )
     add_common_arguments(parser, "plant.csv (truth at every frame) and flight.tlog")
     return parser
 
 
 def main() -> int:
     """Run the plant; return the exit code."""
-    args = _parser().parse_args()
+    args = command_line().parse_args()
     if args.realtime and (args.serve != "colibri" or args.speed == inf):
         fail("--realtime follows the wall clock for python -m autopilot: no --serve beside it, and no --speed max")
     args.speed = args.speed or (1.0 if args.realtime else inf)

@@ -15,7 +15,7 @@ from plant.scenario import IntegrationError, Start
 from plant.sensors import served_by
 from plant.vehicle import VehicleError, load_vehicle
 from plant.weather import weather_of
-from plant.world import Physics, World, starting_world
+from plant.world import Physics, World, starting_world, state_frame
 
 WIND_COLUMNS = ("wind_east", "wind_north", "wind_up")
 TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah", *WIND_COLUMNS)
@@ -41,10 +41,12 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     except VehicleError as error:
         fail(str(error))
     physics = Physics(vehicle, args.integrator, weather)
+    if args.truth:  # several flights share the cores: whoever waits gives way at once
+        link.spin_s = 0.0
     logs = PlantLogs(args.out) if args.out else None
     interval_us = round(1e3 / args.rate) * 1000
     end = PlantEnd(system_id=args.system_id, frame_interval_us=interval_us, serves=serves, waits=not args.realtime)
-    server = Server(link, end, status, stop, logs)
+    server = Server(link, end, status, stop, logs, tells_truth=args.truth)
     if args.realtime:
         from plant.free_process import FreeServer
 
@@ -127,13 +129,23 @@ class Pace:
 class Server:
     """Drives the plant's end of the conversation over a link."""
 
-    def __init__(self, link: UdpLink, end: PlantEnd, status: Status, stop: Stop, logs: PlantLogs | None) -> None:
-        """Serve `end` on `link` until `stop`."""
+    def __init__(
+        self,
+        link: UdpLink,
+        end: PlantEnd,
+        status: Status,
+        stop: Stop,
+        logs: PlantLogs | None,
+        *,
+        tells_truth: bool = False,
+    ) -> None:
+        """Serve `end` on `link` until `stop`; where it `tells_truth`, each frame has the true state behind it."""
         self._link = link
         self._end = end
         self._status = status
         self._stop = stop
         self._logs = logs
+        self._tells_truth = tells_truth
         self._time_us = 0
         self._logged: World | None = None
 
@@ -175,7 +187,7 @@ class Server:
         self._time_us = world.time_us
         offered_s = perf_counter()
         frame, aside = plant.tell()
-        self._end.offer(frame, offered_s, aside)
+        self._end.offer(frame, offered_s, aside, state_frame(world) if self._tells_truth else None)
         self._send()
         self._log(world)  # while the autopilot computes
         silence_said = False

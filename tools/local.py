@@ -6,6 +6,7 @@ from time import perf_counter, sleep
 from typing import Protocol
 
 from autopilot.core import Autopilot, Step
+from autopilot.inputs import Setup
 from autopilot.process import AutopilotLog
 from autopilot.senses import estimator_for
 from mavlink.feedback import Feedback
@@ -21,6 +22,7 @@ from tools.plan import FlightPlan
 from tools.recording import Summary
 
 SYSTEM_ID = 1
+DEFAULT_IDENTITY = "px4"
 _ADDRESS: Address = ("memory", 0)
 _NEVER_LATE_S = 0.0
 
@@ -47,7 +49,7 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
     physics = Physics(plan.plant_vehicle, integrator, plan.weather)
     interval_us = autopilot.frame_interval_us
-    plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out, plan.feedback)
+    plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out, _setup(plan))
     plant = Plant(
         starting_world(plan.start, plan.plant_vehicle, plan.weather),
         plan.plant_vehicle,
@@ -78,6 +80,21 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
         plant_logs.close()
         log.close()
     return Summary(wall_time_s, frames=plant.world.time_us // interval_us, resent=0)
+
+
+def _setup(plan: FlightPlan) -> Setup:
+    return Setup(
+        profile=plan.profile_name,
+        controller=plan.profile.controller,
+        solver=plan.solver,
+        vehicle=plan.vehicle_name,
+        feedback=plan.feedback,
+        track=plan.track_name,
+        origin=DEFAULT_ORIGIN,
+        system_id=SYSTEM_ID,
+        identity=DEFAULT_IDENTITY,
+        ground=False,
+    )
 
 
 class Direct:

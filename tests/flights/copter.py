@@ -14,6 +14,7 @@ from msgspec import structs
 
 from autopilot.copter import Copter, Received
 from autopilot.estimate import Estimate
+from autopilot.kept import Kept, Past
 from autopilot.modes import Mode, custom_mode, mode_of_custom
 from autopilot.profile import Profile, load_profile
 from autopilot.senses import estimator_for
@@ -27,6 +28,7 @@ from mavlink.frames import Vector, euler_from_quaternion, ned_from_enu
 from mavlink.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from mavlink.hil import ActuatorCommand
 from mavlink.parameters import Value
+from mavlink.plain import of_bytes, to_bytes
 from mavlink.services.command import NOT_GIVEN
 from plant.air import CALM
 from plant.core import Plant
@@ -197,7 +199,14 @@ class CopterFlight:
             self.until(lambda: self.estimate is not None, 10.0, "the first estimate")
         self.step()
 
-    def _copter(self, values: dict[str, Value] | None, first: Track | None) -> Copter:
+    def past(self) -> Past:
+        """Return what is kept of the flight, as it comes from a disk."""
+        kept = of_bytes(Kept, to_bytes(self.copter.record()))
+        assert kept is not None
+        plans = self.copter.stations.missions.service.plans
+        return Past(kept, {plan_type: plan.items for plan_type, plan in plans.items()})
+
+    def _copter(self, values: dict[str, Value] | None, first: Track | None, past: Past | None = None) -> Copter:
         return Copter(
             self._profile,
             self._believed,
@@ -206,6 +215,7 @@ class CopterFlight:
             values=values,
             first=first,
             estimator=self._estimator,
+            past=past,
         )
 
     def add(self, client: Client) -> Client:
@@ -218,11 +228,14 @@ class CopterFlight:
         """Put the vehicle elsewhere, at this very time."""
         self.world = replace(starting_world(start, self._believed, self._weather), time_us=self.world.time_us)
 
-    def restart(self) -> None:
-        """Start the autopilot anew, wherever the vehicle is."""
-        self.copter = self._copter(None, None)
+    def restart(self, past: Past | None = None) -> None:
+        """Start the autopilot anew, wherever the vehicle is; with what was kept of a flight it flies on at once."""
+        values = None if past is None else dict(self.copter.parameters.values)
+        self.copter = self._copter(values, None, past)
         for client in self._clients:
             self.copter.stations.hub.open(client.link, client.address)
+        if past is not None:
+            self.step()
 
     def step(self) -> None:
         """Fly one frame."""
