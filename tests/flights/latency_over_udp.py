@@ -1,7 +1,8 @@
-"""`python -m tests.flights.latency_over_udp [MS...]`: the flights of docs/latency.md with a plant that runs freely.
+"""`python -m tests.flights.latency_over_udp SPEED MS...`: flights of docs/latency.md with a plant that runs freely.
 
 Two processes over UDP beside the wall clock, and a relay between them that delays each datagram by half of the round
 trip. What the processes themselves take comes on top, and is measured: the time from a frame's being due to its answer.
+At a SPEED below 1 time is slow for the plant, and what else the computer does counts for less.
 """
 
 import sys
@@ -42,7 +43,7 @@ class DelayRelay(Relay):
             sleep(_LOOK_EVERY_S)
 
 
-def fly(case: Case, round_trip_ms: float) -> tuple[Merit | None, float]:
+def fly(case: Case, round_trip_ms: float, speed: float) -> tuple[Merit | None, float]:
     """Fly a case; return how it went, and the mean round trip that the plant has measured, ms."""
     with TemporaryDirectory() as temporary:
         logs, out = Path(temporary) / "logs", Path(temporary) / "flight"
@@ -50,10 +51,19 @@ def fly(case: Case, round_trip_ms: float) -> tuple[Merit | None, float]:
         plan = FlightPlan.of_options(
             out, track=case.track, profile="flight", link="udp", start=case.start, duration=case.duration_s
         )
-        options = ("--start", str(plan.start), "--duration", repr(case.duration_s), "--out", str(out))
+        options = (
+            "--start",
+            str(plan.start),
+            "--duration",
+            repr(case.duration_s),
+            "--speed",
+            repr(speed),
+            "--out",
+            str(out),
+        )
         plant = Process(logs, "plant", "--realtime", "--link", "udpin:127.0.0.1:0", *options)
         url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
-        with DelayRelay(url, 0.5e-3 * round_trip_ms) as relay:
+        with DelayRelay(url, 0.5e-3 * round_trip_ms / speed) as relay:
             autopilot = Process(logs, "autopilot", "--plant", relay.url, "--track", case.track, "--out", str(out))
             with running(plant, autopilot):
                 plant.process.wait()
@@ -63,10 +73,11 @@ def fly(case: Case, round_trip_ms: float) -> tuple[Merit | None, float]:
 
 
 def main() -> int:
-    """Fly at the round trips of the command line, ms."""
-    for round_trip_ms in map(float, sys.argv[1:] or ("0", "8", "16", "24")):
+    """Fly at the speed and the round trips of the command line."""
+    speed, *round_trips_ms = map(float, sys.argv[1:])
+    for round_trip_ms in round_trips_ms:
         for case in (STEP, LEMNISCATE):
-            went, measured_ms = fly(case, round_trip_ms)
+            went, measured_ms = fly(case, round_trip_ms, speed)
             sys.stdout.write(f"{round_trip_ms:g} ms, measured {measured_ms:.1f} ms, {case.name}: {went or 'lost'}\n")
             sys.stdout.flush()
     return 0
