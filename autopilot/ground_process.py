@@ -95,7 +95,7 @@ class Ground:
         self._links: GroundLinks | ConductedLinks = GroundLinks(links, perf_counter, thread_time)
         if conductor is not None:
             self._links = ConductedLinks(conductor, lambda: self.copter.pilot.state)
-        self.shut_down = self._said_too_much = False
+        self.shut_down = self._said_too_much = self._resumed_said = False
         self._revision = self.copter.parameters.revision
         self._told_s = self._saved_s = perf_counter()
         self._told_us = 0
@@ -122,6 +122,9 @@ class Ground:
             self._tell(now_s)
         if self.copter.parameters.revision != self._revision:
             self._save_parameters()
+        if self.copter.resumed and not self._resumed_said:
+            self._resumed_said = True
+            self._status.say("said", self.copter.resumed)
         if self._flight is not None:
             self._keep(self._flight)
         return self.copter
