@@ -35,6 +35,8 @@ _ADDRESS: Address = ("memory", 0)
 class MemoryPlant:
     """A plant in this process."""
 
+    process = None
+
     def __init__(self, options: Sequence[str]) -> None:
         """Begin as a command line says.
 
@@ -53,6 +55,8 @@ class MemoryPlant:
             raise SettingError(str(error)) from error
         self._args = args
         self._worlds = worlds
+        self._world = worlds[served_by(self._vehicle)[0]]
+        self._answered = False
         self._physics = Physics(self._vehicle, args.integrator, weather)
         self._end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
         self._tell: Tell | None = None
@@ -114,6 +118,8 @@ class MemoryPlant:
 
 class MemoryAutopilot:
     """An autopilot in this process, with its ground side as the process has it."""
+
+    process = None
 
     def __init__(self, options: Sequence[str]) -> None:
         """Begin as a command line says.

@@ -16,6 +16,7 @@ from mavlink.hil import ActuatorCommand
 from mavlink.parameters import Value
 from mavlink.services.mission_items import FENCE, MISSION, RALLY, MissionItem
 from mavlink.turns import Parcel, Turn
+from tools.scenarios import items
 from tools.scenarios.items import Item, on_wire
 from tools.scenarios.links import Trouble
 from tools.scenarios.record import Columns, Record
@@ -55,10 +56,17 @@ class Sitl:
 
     Attributes:
         setting: What the flight began with.
+        items: Items of missions and fences, `items.waypoint(3.0, 0.0, 5.0)` say.
+        Refused: What is raised where the vehicle refuses.
+        NotInTime: What is raised where something does not come about, an AssertionError.
         gcs: The first ground station; what `Sitl` does itself it does through it.
         link: What the links do.
         record: All that was flown.
     """
+
+    items = items
+    Refused = RefusedError
+    NotInTime = NotInTimeError
 
     def __init__(self, setting: Setting, stage: Stage, origin: Geodetic) -> None:
         """Begin a flight on a stage; `origin` is that of the ENU frame."""
@@ -262,29 +270,29 @@ class Sitl:
         if not self.armed:
             self.arm()
 
-    def upload_mission(self, items: Iterable[Item | MissionItem]) -> None:
+    def upload_mission(self, plan: Iterable[Item | MissionItem]) -> None:
         """Upload a mission.
 
         Raises:
             RefusedError: The vehicle does not take it.
         """
-        self.gcs.upload(on_wire(items, self.origin), MISSION)
+        self.gcs.upload(on_wire(plan, self.origin), MISSION)
 
-    def upload_fence(self, items: Iterable[Item | MissionItem]) -> None:
+    def upload_fence(self, plan: Iterable[Item | MissionItem]) -> None:
         """Upload a geofence, of `items.polygon` and `items.circle`.
 
         Raises:
             RefusedError: The vehicle does not take it.
         """
-        self.gcs.upload(on_wire(items, self.origin), FENCE, what="fence")
+        self.gcs.upload(on_wire(plan, self.origin), FENCE, what="fence")
 
-    def upload_rally(self, items: Iterable[Item | MissionItem]) -> None:
+    def upload_rally(self, plan: Iterable[Item | MissionItem]) -> None:
         """Upload rally points.
 
         Raises:
             RefusedError: The vehicle does not take them.
         """
-        self.gcs.upload(on_wire(items, self.origin), RALLY, what="rally points")
+        self.gcs.upload(on_wire(plan, self.origin), RALLY, what="rally points")
 
     def get_param(self, name: str) -> Value:
         """Ask for a parameter.
@@ -461,6 +469,11 @@ class Sitl:
         """Where it was at each frame, ENU, (n, 3)."""
         flown = self.flown()
         return np.stack([flown["x"], flown["y"], flown["z"]], axis=1)
+
+    @property
+    def processes(self) -> dict[str, int]:
+        """Numbers of the processes "plant" and "autopilot"; empty in memory."""
+        return self._stage.processes()
 
     @property
     def sha256(self) -> str:
