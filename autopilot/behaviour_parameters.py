@@ -113,9 +113,19 @@ ROWS = (
         values=((0, "Home"), (1, "Ground below"), (2, "Target")),
     ),
     Row(
+        *("CA_FAILURE_MODE", "land_on_three", "", 0, 1, "Failure of a rotor"),
+        *("Whether it is noticed. Set to 0 it also forgets one that has failed.",),
+        values=((0, "Ignore"), (1, "Land on three rotors")),
+    ),
+    Row(
         *("SYS_FAILURE_EN", "inject_failures", "", 0, 1, "Failure injection"),
         *("Whether MAV_CMD_INJECT_FAILURE is obeyed.",),
         values=_YES_OR_NO,
+    ),
+    Row(
+        *("SIM_SOLVE_MS", "solve_time_s", "ms", 0.0, 100.0, "Declared solve time"),
+        "Simulated: what the control law decides takes effect so much later; samples due meanwhile are skipped.",
+        *(1e-3, 1),
     ),
     Row(
         *("TRACK", "track", "", 0, len(TRACKS) - 1, "Track", "Which track mode Track flies."),
@@ -227,9 +237,11 @@ _GROUPS = {
     "RTL": "Return",
     "NAV": "Flight",
     "COM": "Safety",
+    "CA": "Safety",
     "ORBIT": "Flight",
     "FLW": "Follow",
     "SYS": "System",
+    "SIM": "System",
     "TRACK": "Flight",
     "CAL": "System",
     "MAV": "System",

@@ -19,9 +19,10 @@ from mavlink.lockstep import Address, AutopilotEnd, PlantEnd
 from mavlink.process import ArgumentParser, Status
 from mavlink.turns import Turn
 from plant.__main__ import command_line as plant_command_line
+from plant.core import Plant
 from plant.process import DEFAULT_STARTS
 from plant.scenario import IntegrationError
-from plant.sensors import Tell, served_by, tells
+from plant.sensors import served_by
 from plant.vehicle import VehicleError, load_vehicle
 from plant.weather import weather_of
 from plant.world import Physics, starting_world, state_frame
@@ -59,7 +60,7 @@ class MemoryPlant:
         self._answered = False
         self._physics = Physics(self._vehicle, args.integrator, weather)
         self._end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
-        self._tell: Tell | None = None
+        self._plant: Plant | None = None
         self._now_s = 0.0
 
     def hear(self, datagram: bytes) -> None:
@@ -72,8 +73,9 @@ class MemoryPlant:
         self._end.received.clear()
         if command is None:
             return
+        assert self._plant is not None, "it has told a frame"
         try:
-            self._world = self._physics.step(self._world, command, self._end.frame_interval_us)
+            self._plant.answer(command, self._end.take_faults())
         except IntegrationError as error:
             raise StageError(str(error)) from error
         self._answered = True
@@ -106,14 +108,20 @@ class MemoryPlant:
 
     def _offer(self) -> None:
         end, args = self._end, self._args
-        if self._tell is None:
-            origin, interval_us = args.home.origin, end.frame_interval_us
-            self._world = self._worlds[end.feedback]
-            self._tell = tells(
-                end.feedback, self._vehicle, self._physics, origin, seed=args.seed, interval_us=interval_us
+        if self._plant is None:
+            self._plant = Plant(
+                self._worlds[end.feedback],
+                self._vehicle,
+                self._physics,
+                end.feedback,
+                args.home.origin,
+                seed=args.seed,
+                interval_us=end.frame_interval_us,
+                latency_us=round(args.latency * 1e3),
             )
         self._answered = False
-        end.offer(self._tell(self._world), self._now_s, state_frame(self._world))
+        frame, aside = self._plant.tell()
+        end.offer(frame, self._now_s, aside, state_frame(self._plant.world))
 
 
 class MemoryAutopilot:
@@ -172,7 +180,9 @@ class MemoryAutopilot:
         """Give it a datagram of the plant's, sound or not."""
         frame = self._end.receive(datagram, NEVER_LATE_S)
         if frame is not None:
-            self._end.answer(self._copter.step(frame).command)
+            self._copter.hear(self._end.aside)
+            step = self._copter.step(frame)
+            self._end.answer(step.command, step.faults)
 
     def listen(self) -> list[bytes]:
         """Return what it has said to the plant."""
