@@ -4,20 +4,22 @@ from collections.abc import Iterable
 from math import radians
 from typing import NamedTuple
 
-from autopilot.arming import Facts
+from autopilot.arming import Facts, battery_fault
 from autopilot.attitude_reference import DEFAULT_LIMITS, AttitudeLimits, AttitudeReference
 from autopilot.behaviour import Behaviour
 from autopilot.companion import Companion
-from autopilot.controller import Clock, Decision, VehicleState
+from autopilot.conditions import Seen
+from autopilot.controller import Clock, Decision, Diagnostics, VehicleState
 from autopilot.core import STILL, Step
 from autopilot.course import Course, Scene, Steered
 from autopilot.courses import Along, Climb, Stop, homeward, landing, to_track
+from autopilot.failsafes import Action, Condition
 from autopilot.health_watch import HealthWatch, not_known
 from autopilot.instants import instants
 from autopilot.leader import Following
-from autopilot.leaning import AltitudeSticks, Stabilized
+from autopilot.leaning import AltitudeSticks, Descent, Stabilized
 from autopilot.loop import ControlLoop
-from autopilot.modes import MANUAL, Event, Mode, Need
+from autopilot.modes import MANUAL, Mode, Need
 from autopilot.orders import Land
 from autopilot.parameters import Numbers, behaviour, definitions
 from autopilot.pilot import Guidance, Pilot
@@ -29,6 +31,7 @@ from autopilot.senses import Estimator, Senses
 from autopilot.snapshots import Photographer
 from autopilot.stations import REBOOT, Stations, StationSettings
 from autopilot.sticks import PositionSticks
+from autopilot.supervisor import Supervisor
 from autopilot.tracks import Track, track
 from autopilot.tuning import Tuning, builder
 from mavlink.hil import ActuatorCommand, StateFrame
@@ -37,9 +40,11 @@ from mavlink.parameters import Parameters, Value
 from mavlink.sensors import Frame
 from mavlink.services.statustext import INFO
 from mavlink.setpoints import OffboardSetpoint, Sticks
+from mavlink.snapshot import BatteryState
 from plant.vehicle import Vehicle
 
 _LEADER_LOST_US = 10_000_000
+_EVER_US = 10**15
 
 
 class Received(NamedTuple):
@@ -68,6 +73,8 @@ class Copter:
         stations: What ground stations see and say.
         power: The battery, as far as the autopilot knows.
         solve_time_s: Of the last QP.
+        supervisor: Has the pilot do what the failsafes say.
+        rotor_lost: A rotor that makes no thrust, counted from 0; None while all do.
     """
 
     def __init__(
@@ -121,6 +128,10 @@ class Copter:
         self.pilot = Pilot(self._instants, flies_by, self._course, self._missing)
         self.stations = Stations(settings, self.pilot, self.parameters)
         self.power = PowerMeter(believed)
+        self.supervisor = Supervisor(self.pilot, self.parameters)
+        self.rotor_lost: int | None = None
+        self._decided: Diagnostics | None = None
+        self._missed_us: int | None = None
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
         self._time_us: int | None = None
@@ -144,6 +155,7 @@ class Copter:
                 self.stations.restart = REBOOT
             return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
         if not follows:
+            self._missed_us = self._time_us if self._missed_us is None else self._missed_us
             self._begin(known)
         self._time_us = frame.time_us
         decision = None
@@ -152,6 +164,7 @@ class Copter:
             self._sense(frame.time_us, state)
             guidance = self.pilot.step()
             decision = self._decide(frame.time_us, state, guidance)
+            self._decided = None if decision is None else decision.diagnostics
             self._sample = (frame.time_us, state, guidance, decision)
         command = ActuatorCommand(frame.time_us, self._controls, armed=self.pilot.state.armed)
         self._step_time_s = self._clock() - started_s
@@ -197,11 +210,30 @@ class Copter:
         pilot, stations = self.pilot, self.stations
         sticks, setpoint = self._heard(now_us)
         pilot.sense(now_us, state, Steered(sticks, setpoint, stations.follow.latest(now_us, _LEADER_LOST_US)))
-        if pilot.state.armed:
-            if pilot.state.mode is Mode.OFFBOARD and setpoint is None:
-                pilot.happened(Event.SETPOINTS_LOST)
-            elif pilot.state.mode in MANUAL and sticks is None:
-                pilot.happened(Event.STICKS_LOST)
+        self.supervisor.step(self._seen(now_us, state))
+        self._missed_us = None
+
+    def _seen(self, now_us: int, state: VehicleState) -> Seen:
+        """Return what the failsafes' conditions are judged by."""
+        pilot, stations = self.pilot, self.stations
+        sticks = stations.manual.latest(now_us, _EVER_US)
+        return Seen(
+            now_us=now_us,
+            missed_us=self._missed_us,
+            state=state,
+            mode=pilot.state.mode,
+            standing=pilot.standing,
+            estimate=self._senses.estimate,
+            setpoint=stations.offboard.latest(now_us, _EVER_US),
+            sticks_us=None if sticks is None else sticks.time_us,
+            station_us=stations.station_us,
+            battery=self.power.state(),
+            fence=stations.missions.margin_m if stations.missions.has_fence else None,
+            decided=self._decided,
+            late=self.supervisor.solve_us > self._loop.control_interval_us,
+            rotor_lost=self.rotor_lost,
+            pace=pilot.behaviour.limits,
+        )
 
     def _take_stock(self, state: VehicleState) -> None:
         """Take in what orders of ground stations are judged by."""
@@ -211,7 +243,17 @@ class Copter:
         outside = self.stations.missions.breach(state.position_enu_m, self._time_us or 0)
         estimate = self._senses.estimate
         unknown = not_known(estimate.health) if estimate is not None else ""
-        pilot.take_stock(Facts(state, pilot.standing, self.power.left, thrust, outside, unknown))
+        facts = Facts(state, pilot.standing, self.power.left, thrust, outside, unknown, self._battery_fault())
+        pilot.take_stock(facts)
+
+    def _battery_fault(self) -> str:
+        """Return why nobody may take off on the battery, apart from its charge; empty if one may."""
+        battery, model = self.power.state(), self._loop.vehicle.battery
+        if battery is None or model is None:
+            return ""
+        if any(map(self.supervisor.holds, (Condition.BATTERY_EMERGENCY, Condition.BATTERY_CRITICAL))):
+            return f"battery critical: {battery.voltage_v:.1f} V"
+        return battery_fault(battery.voltage_v, model.empty_voltage_v, model.full_voltage_v)
 
     def _missing(self) -> list[Need]:
         """Return needs of modes that nothing meets now: the message before the one that asks may have met one."""
@@ -225,6 +267,7 @@ class Copter:
             Need.INSIDE_FENCE: not missions.leaves_fence,
             Need.CIRCLE: False,
             Need.FLYING: not self.pilot.standing,
+            Need.POSITION: self.supervisor.knows_position,
         }
         return [need for need, there in met.items() if not there]
 
@@ -272,15 +315,21 @@ class Copter:
                 decision,
                 self._step_time_s,
                 (c1, c2, c3, c4),
-                self.power,
+                self._battery(),
                 stations,
                 self._senses,
             )
         )
 
+    def _battery(self) -> BatteryState | None:
+        """Return the battery as it is told."""
+        battery = self.power.state()
+        return None if battery is None else battery._replace(charge_state=self.supervisor.charge_state)
+
     def _adopt(self) -> None:
         """Fly by the parameters as they are now."""
         self.pilot.behaviour = behaviour(self.parameters)
+        self.supervisor.adopt(self.parameters)
         if self._attitude is not None:
             self._attitude.limits = attitude_limits(self.pilot.behaviour)
         tuned = self._tuning.take()
@@ -297,7 +346,7 @@ class Copter:
             high_m = self.pilot.ground_m + behaviour.takeoff_height_m
             return Climb(high_m, None, scene, behaviour.takeoff_speed_m_s)
         if mode is Mode.LAND:
-            return landing(Land())
+            return self._down()
         if mode is Mode.RETURN:
             return homeward(scene)
         if mode is Mode.MISSION:
@@ -315,6 +364,13 @@ class Copter:
         if mode is Mode.ALTITUDE and self._attitude is not None:
             return AltitudeSticks(self._attitude, self._loop.vehicle.gravity_m_s2)
         return Stop()
+
+    def _down(self) -> Course:
+        """Return how to land: level, where nobody knows the place; a law that takes no attitude sinks where it is."""
+        blind = self.pilot.saving is Action.DESCEND or not self.supervisor.knows_position
+        if blind and self._attitude is not None:
+            return Descent(self._attitude, self._loop.vehicle.gravity_m_s2)
+        return landing(Land())
 
     def _on_track(self, scene: Scene) -> Course:
         if self._first is not None:

@@ -140,6 +140,11 @@ class Stations:
         """Stream to `channel` what its kind gets by default."""
         self._streams.use(channel, kind)
 
+    @property
+    def station_us(self) -> int | None:
+        """When a ground station was heard last; None if there never was one."""
+        return self._heartbeat.station_us
+
     def update(self, snapshot: Snapshot) -> None:
         """Take in the vehicle as it is now. Called once a control sample."""
         self._heartbeat.update(snapshot)

@@ -62,7 +62,7 @@ class HeartbeatService:
         s = self._snapshot
         if s is None:
             return ()
-        news = (s.armed, s.custom_mode, s.base_mode, s.failsafe, s.terminated)
+        news = (s.armed, s.custom_mode, s.base_mode, s.failsafe, s.emergency, s.terminated)
         if news == self._told and 0 <= now_us - self._told_at_us < EVERY_US:
             return ()
         self._told, self._told_at_us = news, now_us
@@ -78,6 +78,12 @@ class HeartbeatService:
         """Return everybody who was ever heard, the last one last."""
         return list(self._heard.values())
 
+    @property
+    def station_us(self) -> int | None:
+        """When a ground station (MAV_TYPE_GCS) was heard last; None if there never was one."""
+        heard = (other.at_us for other in self._heard.values() if other.kind == mav.MAV_TYPE_GCS)
+        return max(heard, default=None)
+
     def ground_stations(self, now_us: int, within_us: int) -> list[Heard]:
         """Return the ground stations (MAV_TYPE_GCS) heard within the last `within_us`."""
         return [
@@ -88,10 +94,10 @@ class HeartbeatService:
 
 
 def _state(s: Snapshot) -> int:
-    """MAV_STATE: a flight that was ended for good, one that saves itself, motors that may turn, none of it."""
+    """MAV_STATE: a flight that was ended for good, one that comes down or saves itself, motors that may turn, none."""
     state: int = mav.MAV_STATE_ACTIVE if s.armed else mav.MAV_STATE_STANDBY
     if s.failsafe:
-        state = mav.MAV_STATE_CRITICAL
+        state = mav.MAV_STATE_EMERGENCY if s.emergency else mav.MAV_STATE_CRITICAL
     if s.terminated:
         state = mav.MAV_STATE_FLIGHT_TERMINATION
     return state
