@@ -132,6 +132,7 @@ class Copter:
         self.rotor_lost: int | None = None
         self._decided: Diagnostics | None = None
         self._missed_us: int | None = None
+        self._waiting_us: int | None = None
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
         self._time_us: int | None = None
@@ -141,7 +142,7 @@ class Copter:
         self.solve_time_s = 0.0
 
     def step(self, frame: Frame) -> Step:
-        """Answer a frame of the plant; on sensors nothing is known, and nobody served, before the first estimate.
+        """Answer a frame of the plant; on sensors nothing is known, and nobody obeyed, before the first estimate.
 
         Raises:
             DecisionError: The control law gave what no rotor can follow.
@@ -151,6 +152,7 @@ class Copter:
         follows = self._time_us is not None and frame.time_us == self._time_us + self.frame_interval_us
         known = self._senses.state(frame, asked=due or not follows)
         if known is None:
+            self._waiting_us = frame.time_us
             if self._time_us is not None:  # another flight, of which nothing is known yet
                 self.stations.restart = REBOOT
             return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
@@ -174,7 +176,7 @@ class Copter:
         """Hear ground stations, and return what to send them; after each `step`, while the plant integrates."""
         now_us = self._time_us
         if now_us is None:
-            return []
+            return self._put_off(inbox)
         if self._sample is not None:
             sample, self._sample = self._sample, None
             self._report(*sample)
@@ -184,6 +186,16 @@ class Copter:
         if self.parameters.take_changed():
             self._adopt()
         return self.stations.poll(now_us)
+
+    def _put_off(self, inbox: Iterable[Received]) -> list[Outgoing]:
+        """Deny what is commanded: nothing is known of the vehicle yet."""
+        if self._waiting_us is None:
+            return []
+        self.stations.wait("not ready: attitude and position are not known yet")
+        for datagram, link, address, loopback in inbox:
+            self.stations.hub.receive(datagram, link, address, self._waiting_us, loopback=loopback)
+        self.stations.wait("")
+        return self.stations.take_outbox()
 
     def _begin(self, frame: StateFrame) -> None:
         """See the vehicle for the first time, or anew after frames were missed."""

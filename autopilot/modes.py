@@ -52,7 +52,7 @@ class Event(StrEnum):
     RETURN_ITEM = "mission says return"
     SAVED_BY_HOLD = "failsafe: hold"
     SAVED_BY_RETURN = "failsafe: return"
-    SAVED_BY_LANDING = "failsafe: land or descend"
+    SAVED_BY_LANDING = "failsafe: land"
     TERMINATED = "failsafe: rotors stop"
     TOUCHED_DOWN = "landed"
     LEFT_STANDING = "no take-off"

@@ -49,6 +49,7 @@ LOGS = "logs"
 LOG_LINK = -1
 """The link on which the flight log is a listener like any other."""
 REBOOT, SHUT_DOWN = 1.0, 2.0
+_COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,9 +110,10 @@ class Stations:
         files = self._files(settings.files or Memory())
         self.log = FlightLog(files, (LOGS,))
         self._framer = Framer()
+        self._commanded = CommandService(self._handlers(), self._text)
         services = (
             self._heartbeat,
-            CommandService(self._handlers(), self._text),
+            self._commanded,
             self._streams,
             self._modes,
             TimeService(),
@@ -171,6 +173,15 @@ class Stations:
             if outgoing.link == LOG_LINK:
                 self.log.record(now_us, self._framer.take(outgoing.datagram))
         return [outgoing for outgoing in outbox if outgoing.link != LOG_LINK]
+
+    def wait(self, reason: str) -> None:
+        """Deny every command for a reason, and hear nothing else; without one, serve."""
+        self.hub.hears_only = _COMMANDS if reason else None
+        self._commanded.closed = reason
+
+    def take_outbox(self) -> list[Outgoing]:
+        """Return what to send now, while nothing is known of the vehicle that could be told, or logged."""
+        return [outgoing for outgoing in self.hub.take_outbox() if outgoing.link != LOG_LINK]
 
     def say(self, severity: int, text: str) -> None:
         """Tell everybody a line."""

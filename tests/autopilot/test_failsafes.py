@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -28,7 +29,9 @@ from autopilot.profile import load_profile
 from mavlink.parameters import Parameters
 from mavlink.services.statustext import CRITICAL, EMERGENCY, NOTICE, WARNING
 from plant.vehicle import load_vehicle
+from tools.failsafe_page import page
 
+PAGE = Path(__file__).parents[2] / "docs" / "failsafes.md"
 SECOND_US = 1_000_000
 NOW_US = 100 * SECOND_US
 IN_FLIGHT = Flight(armed=True, standing=False, mode=Mode.MISSION, saving=Action.NONE)
@@ -206,3 +209,7 @@ def test_rows_say_what_they_add_to_a_warning() -> None:
     assert begun({Condition.GPS_LOST: Action.WARN}).said == ((WARNING, "GPS lost: position by dead reckoning"),)
     assert ROWS[Condition.BATTERY_LOW].warns == ""
     assert begun({Condition.BATTERY_LOW: Action.WARN}).said == ((WARNING, "battery low"),)
+
+
+def test_the_page_is_current() -> None:
+    assert PAGE.read_text(encoding="utf-8") == page()

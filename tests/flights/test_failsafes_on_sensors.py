@@ -12,7 +12,7 @@ from mavlink.feedback import Feedback
 from mavlink.geodesy import Geodetic
 from mavlink.hil import StateFrame
 from mavlink.sensors import Frame, SensorFrame, Updated
-from tests.flights.copter import ACCEPTED, DENIED, CopterFlight, in_the_air
+from tests.flights.copter import ACCEPTED, DENIED, Client, CopterFlight, in_the_air
 
 GPS, OFF, OK = (float(number) for number in (mav.FAILURE_UNIT_SENSOR_GPS, mav.FAILURE_TYPE_OFF, mav.FAILURE_TYPE_OK))
 
@@ -117,3 +117,13 @@ def test_a_vehicle_at_rest_may_say_the_same_for_ever() -> None:
     flight.run(5.0)
     assert flight.armed
     assert not flight.client.said("lost")
+
+
+def test_before_anything_is_known_every_command_is_denied_and_why_is_said() -> None:
+    client = Client()
+    client.send("COMMAND_LONG", 1, 1, mav.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1.0, *(0.0,) * 6)
+    client.send("SET_MODE", 1, 1, 0)  # not heard yet
+    flight = CopterFlight(feedback=Feedback.SENSORS, client=client)
+    assert [(ack.command, ack.result) for ack in client.acks] == [(mav.MAV_CMD_COMPONENT_ARM_DISARM, DENIED)]
+    assert client.said("not ready: attitude and position are not known yet")
+    assert flight.arm() == ACCEPTED
