@@ -18,7 +18,7 @@ from mavlink.setpoints import AttitudeSetpoint, OffboardSetpoint
 from mavlink.snapshot import BatteryState
 
 NEVER_US = -(10**12)
-"""When something was heard that is not heard any more, if nobody knows when that was."""
+"""Since when everybody could be heard who is there, where nothing was restarted."""
 PLACELESS = (Mode.STABILIZED, Mode.ALTITUDE)
 """Modes that need no position."""
 _FROZEN_M, _FROZEN_RAD = 0.05, 0.05
@@ -39,6 +39,7 @@ class Seen(NamedTuple):
         estimate: What the state is worth; None where it is told.
         setpoint: The companion's last, however old; None if it has ended its stream.
         sticks_us: When the pilot's sticks were last heard; None if they were released.
+        listening_us: Since when anybody could be heard: since a restart in flight.
         station_us: When a ground station was last heard; None if there never was one.
         battery: None without one.
         fence: Says how far a place is inside of every fence, m; None without any.
@@ -56,6 +57,7 @@ class Seen(NamedTuple):
     estimate: Estimate | None
     setpoint: OffboardSetpoint | None
     sticks_us: int | None
+    listening_us: int
     station_us: int | None
     battery: BatteryState | None
     fence: Callable[[Vector], float] | None
@@ -223,13 +225,13 @@ def _station_silent_since(seen: Seen, held: bool) -> int | None:
 def _sticks_silent_since(seen: Seen, held: bool) -> int | None:
     if seen.mode not in MANUAL and not held:
         return None
-    return NEVER_US if seen.sticks_us is None else seen.sticks_us
+    return seen.listening_us if seen.sticks_us is None else seen.sticks_us
 
 
 def _setpoints_silent_since(seen: Seen, held: bool) -> int | None:
     if seen.mode is not Mode.OFFBOARD and not held:
         return None
-    return NEVER_US if seen.setpoint is None else seen.setpoint.time_us
+    return seen.listening_us if seen.setpoint is None else seen.setpoint.time_us
 
 
 _AGES: tuple[tuple[Condition, Callable[[Seen, bool], int | None]], ...] = (

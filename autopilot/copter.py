@@ -8,37 +8,40 @@ from autopilot.arming import Facts, battery_fault
 from autopilot.attitude_reference import DEFAULT_LIMITS, AttitudeLimits, AttitudeReference
 from autopilot.behaviour import Behaviour
 from autopilot.companion import Companion
-from autopilot.conditions import Seen
-from autopilot.controller import Clock, Decision, Diagnostics, VehicleState
-from autopilot.core import STILL, Step
+from autopilot.conditions import NEVER_US, Seen
+from autopilot.controller import Clock, Decision, VehicleState
+from autopilot.core import STILL, Step, follows
 from autopilot.course import Course, Scene, Steered
-from autopilot.courses import Along, Climb, Stop, homeward, landing, to_track
+from autopilot.courses import Along, Climb, Legs, Stop, homeward, landing, to_track
 from autopilot.failsafes import Action, Condition
 from autopilot.health_watch import HealthWatch, not_known
 from autopilot.instants import instants
+from autopilot.kept import Kept, Past, course_again, course_record, goes_on, maker_of
 from autopilot.leader import Following
 from autopilot.leaning import AltitudeSticks, Descent, Stabilized
 from autopilot.loop import ControlLoop
 from autopilot.modes import MANUAL, Mode, Need
 from autopilot.orders import Land
 from autopilot.parameters import Numbers, behaviour, definitions
-from autopilot.pilot import Guidance, Pilot
+from autopilot.pilot import RESTS, Guidance, Pilot
 from autopilot.planner import Planner, plan, start_yaw
 from autopilot.power import PowerMeter
 from autopilot.profile import Profile
 from autopilot.reference import Reference, target_of
 from autopilot.senses import Estimator, Senses
 from autopilot.snapshots import Photographer
+from autopilot.solve_time import SolveTime
 from autopilot.stations import REBOOT, Stations, StationSettings
 from autopilot.sticks import PositionSticks
 from autopilot.supervisor import Supervisor
 from autopilot.tracks import Track, track
 from autopilot.tuning import Tuning, builder
+from mavlink.aside import NOTHING, Aside
 from mavlink.hil import ActuatorCommand, StateFrame
 from mavlink.hub import Outgoing
 from mavlink.parameters import Parameters, Value
 from mavlink.sensors import Frame
-from mavlink.services.statustext import INFO
+from mavlink.services.statustext import INFO, WARNING
 from mavlink.setpoints import OffboardSetpoint, Sticks
 from mavlink.snapshot import BatteryState
 from plant.vehicle import Vehicle
@@ -75,6 +78,7 @@ class Copter:
         solve_time_s: Of the last QP.
         supervisor: Has the pilot do what the failsafes say.
         rotor_lost: A rotor that makes no thrust, counted from 0; None while all do.
+        samples: How many control samples ground stations were told of.
     """
 
     def __init__(
@@ -87,6 +91,7 @@ class Copter:
         values: dict[str, Value] | None = None,
         first: Track | None = None,
         estimator: Estimator | None = None,
+        past: Past | None = None,
     ) -> None:
         """Fly `vehicle` by `profile`; `clock` only measures, it decides nothing.
 
@@ -99,6 +104,7 @@ class Copter:
             first: A track that is flown from time 0 on, the vehicle being in the air; None: it stands, or is picked
                 up in hold.
             estimator: Makes what turns frames of sensors into states; None: frames are states.
+            past: Of a flight in which an autopilot was killed; it goes on if the first frame is of the same flight.
 
         Raises:
             ControllerError: The profile's control law cannot be used.
@@ -130,16 +136,34 @@ class Copter:
         self.power = PowerMeter(believed)
         self.supervisor = Supervisor(self.pilot, self.parameters)
         self.rotor_lost: int | None = None
-        self._decided: Diagnostics | None = None
         self._missed_us: int | None = None
         self._waiting_us: int | None = None
+        self._solving = SolveTime(self._loop.control_interval_us)
+        self._aside = NOTHING
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
+        self._maker = maker_of(profile, vehicle)
+        self._past = past
+        self._wakes = past is not None
+        self._resumed_us: int | None = None
+        self.samples = 0
         self._time_us: int | None = None
-        self._controls = STILL
+        self._decision: Decision | None = None
         self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
         self._step_time_s = 0.0
         self.solve_time_s = 0.0
+
+    @property
+    def deadlines_missed(self) -> int:
+        """How many decisions have taken longer than a control interval, in simulated time."""
+        return self._solving.missed
+
+    def hear(self, aside: Aside) -> None:
+        """Take in what the plant tells beside the frame of the next step."""
+        self._aside = aside
+        if aside.battery is not None:
+            self._loop.know_charge(aside.battery.used_ah)
+            self.power.hear(aside.battery)
 
     def step(self, frame: Frame) -> Step:
         """Answer a frame of the plant; on sensors nothing is known, and nobody obeyed, before the first estimate.
@@ -148,15 +172,17 @@ class Copter:
             DecisionError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
+        if self._wakes:
+            self._wake(frame.time_us)
         due = self._loop.is_due(frame.time_us)
-        follows = self._time_us is not None and frame.time_us == self._time_us + self.frame_interval_us
-        known = self._senses.state(frame, asked=due or not follows)
+        goes_on = follows(frame.time_us, self._time_us, self.frame_interval_us)
+        known = self._senses.state(frame, asked=due or not goes_on)
         if known is None:
             self._waiting_us = frame.time_us
             if self._time_us is not None:  # another flight, of which nothing is known yet
                 self.stations.restart = REBOOT
             return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
-        if not follows:
+        if not goes_on:
             self._missed_us = self._time_us if self._missed_us is None else self._missed_us
             self._begin(known)
         self._time_us = frame.time_us
@@ -166,11 +192,13 @@ class Copter:
             self._sense(frame.time_us, state)
             guidance = self.pilot.step()
             decision = self._decide(frame.time_us, state, guidance)
-            self._decided = None if decision is None else decision.diagnostics
-            self._sample = (frame.time_us, state, guidance, decision)
-        command = ActuatorCommand(frame.time_us, self._controls, armed=self.pilot.state.armed)
+            if not self._solving.busy(frame.time_us) or decision is not None:
+                self._decision = decision
+            self._sample = (frame.time_us, state, guidance, self._decision)
+        command = ActuatorCommand(frame.time_us, self._solving.controls(frame.time_us), armed=self.pilot.state.armed)
         self._step_time_s = self._clock() - started_s
-        return Step(command, decision, self._step_time_s, self._senses.estimate if due else None)
+        estimate = self._senses.estimate if due else None
+        return Step(command, decision, self._step_time_s, estimate, self.stations.failures.take())
 
     def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
         """Hear ground stations, and return what to send them; after each `step`, while the plant integrates."""
@@ -180,6 +208,8 @@ class Copter:
         if self._sample is not None:
             sample, self._sample = self._sample, None
             self._report(*sample)
+        self.stations.hear_plant(self._aside, now_us)
+        self._aside = NOTHING
         hub = self.stations.hub
         for datagram, link, address, loopback in inbox:
             hub.receive(datagram, link, address, now_us, loopback=loopback)
@@ -197,8 +227,68 @@ class Copter:
         self.stations.wait("")
         return self.stations.take_outbox()
 
+    def record(self) -> Kept | None:
+        """Return what the flight needs to go on after a restart; None as long as nothing is known of it."""
+        if self._time_us is None:
+            return None
+        missions, power = self.stations.missions, self.power
+        return Kept(
+            self._maker,
+            self._time_us,
+            self.stations.commands.origin,
+            missions.ids,
+            missions.executor.record(),
+            self.pilot.record(),
+            course_record(self.pilot.course),
+            self._loop.record(),
+            power.charge_ah,
+            power.energy_wh,
+            self._senses.record(),
+        )
+
+    def _wake(self, time_us: int) -> None:
+        """Have the estimator go on before it sees the first frame."""
+        self._wakes = False
+        if self._past is not None and self._past.kept.senses:
+            self._senses.resume(self._past.kept.senses, time_us)
+
+    def _resume(self, past: Past, frame: StateFrame) -> None:
+        """Go on with the flight in which the autopilot was killed."""
+        kept, plans = past
+        stations, pilot = self.stations, self.pilot
+        closely = kept.is_close_to(frame.time_us) and kept.maker == self._maker
+        self._loop.resume(kept.loop, closely=closely)
+        self.power.resume(kept.charge_ah, kept.energy_wh)
+        stations.commands.origin = kept.origin
+        stations.missions.resume(plans, kept.plan_ids, kept.mission)
+        if kept.pilot.mode is not Mode.TRACK or kept.course.began_us != 0:
+            self._first = None
+        self._resumed_us = frame.time_us
+
+        def again(mode: Mode, scene: Scene) -> Course:
+            began_us = kept.course.began_us
+            if mode is Mode.TRACK and self._first is None and began_us is not None:
+                chosen = track(scene.behaviour.track)
+                return Along(plan(chosen, self._references, self._instants.preview), chosen.duration_s, began_us)
+            if mode is Mode.MISSION:
+                return stations.missions.course(kept.course.turns, kept.course.legs)
+            course = course_again(mode, kept.course, scene) or self._course(mode, scene)
+            return course.skip(kept.course.legs) if isinstance(course, Legs) else course
+
+        pilot.resume(frame.time_us, self._loop.state(frame), kept.pilot, again, closely=closely)
+        stations.missions.moved_origin()
+        self._solving.at_once(self._loop.controls if pilot.state.armed and not pilot.idles else STILL)
+        stations.say(INFO, stations.banner())
+        if pilot.state.armed:
+            how = goes_on(pilot.state.mode, stations.missions.executor.progress.seq)
+            stations.say(WARNING, f"restarted in flight: {how}")
+
     def _begin(self, frame: StateFrame) -> None:
         """See the vehicle for the first time, or anew after frames were missed."""
+        past, self._past = self._past, None
+        if past is not None and past.kept.is_followed_by(frame.time_us):
+            self._resume(past, frame)
+            return
         loop, hover_speed = self._loop, self._loop.vehicle.hover_speed
         if self._time_us is not None and frame.time_us > self._time_us:
             loop.begin(hover_speed, loop.state(frame).euler[2])
@@ -211,7 +301,7 @@ class Copter:
             speed = loop.vehicle.rotors.idle_speed
         loop.begin(speed, self._first_yaw())
         self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None, rests=rests)
-        self._controls = STILL if self.pilot.standing else loop.controls
+        self._solving.at_once(STILL if self.pilot.standing else loop.controls)
         self.stations.say(INFO, self.stations.banner())
 
     def _first_yaw(self) -> float:
@@ -238,11 +328,12 @@ class Copter:
             estimate=self._senses.estimate,
             setpoint=stations.offboard.latest(now_us, _EVER_US),
             sticks_us=None if sticks is None else sticks.time_us,
+            listening_us=NEVER_US if self._resumed_us is None else self._resumed_us,
             station_us=stations.station_us,
             battery=self.power.state(),
             fence=stations.missions.margin_m if stations.missions.has_fence else None,
-            decided=self._decided,
-            late=self.supervisor.solve_us > self._loop.control_interval_us,
+            decided=None if self._decision is None else self._decision.diagnostics,
+            late=pilot.behaviour.solve_time_s * 1e6 > self._loop.control_interval_us,
             rotor_lost=self.rotor_lost,
             pace=pilot.behaviour.limits,
         )
@@ -295,27 +386,29 @@ class Copter:
         loop = self._loop
         if guidance.begins:
             loop.begin(loop.vehicle.rotors.idle_speed, state.euler[2], afresh=False)
+        elif guidance is not RESTS and self._solving.busy(now_us):
+            return None
         if guidance.horizon is not None:
             decision = loop.decide(now_us, state, guidance.horizon)
         elif guidance.attitude is not None:
             decision = loop.decide_attitude(now_us, state, guidance.attitude)
         else:
-            self._controls = STILL
+            self._solving.at_once(STILL)
             return None
-        self._controls = loop.controls
+        self._solving.decided(loop.controls, now_us, round(self.pilot.behaviour.solve_time_s * 1e6))
         self.solve_time_s = decision.diagnostics.solve_time_s
         return decision
 
     def _report(self, now_us: int, state: VehicleState, guidance: Guidance, decision: Decision | None) -> None:
         pilot, stations = self.pilot, self.stations
+        self.samples += 1
         self._take_stock(state)
-        self._senses.gps_off = stations.failures.gps_off
         if self._senses.estimate is not None:
             for severity, line in self._health.lines(self._senses.estimate.health):
                 stations.say(severity, line)
         idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
         least = idle if pilot.state.armed else 0.0
-        c1, c2, c3, c4 = (max(control, least) for control in self._controls)
+        c1, c2, c3, c4 = (max(control, least) for control in self._solving.controls(now_us))
         self.power.run((c1, c2, c3, c4), self._interval_s)
         stations.missions.watch_mode(pilot.state.mode)
         stations.update(

@@ -7,7 +7,7 @@ pressure it is the offset of the barometer, and height stays; for GPS it is posi
 
 from collections.abc import Callable
 from math import inf, isfinite, nan, radians
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,22 @@ _IRON_WALK_GAUSS = 1e-5
 _DOUBTED_M, _DOUBTED_M_S, _DOUBTED_GAUSS = 100.0, 10.0, 0.3
 
 
+class KindRecord(NamedTuple):
+    """When a kind of measurement was last believed, since when it is not, and how often it had to be."""
+
+    accepted_us: int
+    rejected_us: int | None
+    resets: int
+
+
+class FilterRecord(NamedTuple):
+    """A filter as plain data: state, covariance, and the kinds of what is measured."""
+
+    x: Array
+    P: Array
+    kinds: list[KindRecord]
+
+
 class Kind:
     """One kind of measurement: its last test, and for how long it has been rejected.
 
@@ -61,6 +77,8 @@ class Kind:
         accepted_us: When it was last believed.
         rejected_us: Since when it is not; None while it is.
         resets: How often it had to be believed.
+        nis: Sum of the normalised innovations squared that were believed at once.
+        believed: How many they are.
     """
 
     def __init__(self, numbers: int, patience_us: int, doubted: tuple[int, int, float]) -> None:
@@ -73,6 +91,8 @@ class Kind:
         self._doubted = doubted
         self._y = np.zeros(numbers)
         self.resets = 0
+        self.nis = 0.0
+        self.believed = 0
 
     def fuse(self, filter_: "Filter", time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
         """Fuse a measurement; return whether it was believed."""
@@ -86,6 +106,8 @@ class Kind:
         self.test = Test(time_us, innovation, nis, self.gate)
         if nis <= self.gate:
             self.accepted_us, self.rejected_us = time_us, None
+            self.nis += nis
+            self.believed += 1
             return True
         return False
 
@@ -119,6 +141,7 @@ class Filter:
         x: Nominal state, (23,).
         P: Covariance of its error, (22, 22).
         position, velocity, height, pressure, field: What is measured.
+        kinds: All of them, in the order of `Tests`.
     """
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector) -> None:
@@ -140,7 +163,7 @@ class Filter:
         self.height = Kind(1, 7_000_000, (POSITION + 2, 1, _DOUBTED_M))
         self.pressure = Kind(1, 7_000_000, (BARO_OFFSET, 1, _DOUBTED_M))
         self.field = Kind(3, 10_000_000, (HARD_IRON, 3, _DOUBTED_GAUSS))
-        self._kinds = (self.velocity, self.position, self.height, self.pressure, self.field)
+        self.kinds = (self.velocity, self.position, self.height, self.pressure, self.field)
 
     def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
         """Begin at rest: each mean is fused as a measurement, so that the covariance knows what it took from where.
@@ -155,7 +178,7 @@ class Filter:
             x[6:10] = attitude
             self._rest(aligned)
             attitude = tuple(x[6:10].tolist())
-        for kind in self._kinds:
+        for kind in self.kinds:
             kind.accept(time_us)
         y1, y2, y3 = np.zeros(1), np.zeros(2), np.zeros(3)
         place, horizontal, vertical = np.array(place_enu_m), *self._of_place(aligned.fix)
@@ -199,6 +222,20 @@ class Filter:
             gain = variance / (variance + rate)
             x[10 + i] = gain * aligned.rate[i]
             P[GYRO_BIAS + i, GYRO_BIAS + i] = gain * rate
+
+    def record(self) -> FilterRecord:
+        """Return state, covariance and what was believed."""
+        kinds = [KindRecord(kind.accepted_us, kind.rejected_us, kind.resets) for kind in self.kinds]
+        return FilterRecord(self.x, self.P, kinds)
+
+    def resume(self, record: FilterRecord) -> bool:
+        """Go on from a record; return whether it is one of such a filter."""
+        if (record.x.shape, record.P.shape, len(record.kinds)) != (self.x.shape, self.P.shape, len(self.kinds)):
+            return False
+        self.x[:], self.P[:] = record.x, record.P
+        for kind, (accepted_us, rejected_us, resets) in zip(self.kinds, record.kinds, strict=True):
+            kind.accepted_us, kind.rejected_us, kind.resets = accepted_us, rejected_us, resets
+        return True
 
     def predict(self, samples: Array, row: int) -> None:
         """Go on by one sample of many."""
@@ -249,7 +286,7 @@ class Filter:
     @property
     def resets(self) -> int:
         """How often something was taken anew."""
-        return sum(kind.resets for kind in self._kinds)
+        return sum(kind.resets for kind in self.kinds)
 
     def _of_place(self, fix: GpsFix) -> tuple[float, float]:
         """Return the variances of the white noise of a fix: as described, and more if it claims to be worse."""

@@ -154,11 +154,15 @@ class Check(NamedTuple):
         state: Position (m, ENU), velocity (m/s, ENU), attitude (wxyz), 10 numbers.
         covariance: Of position, velocity, and attitude as a rotation vector in the body frame: the upper triangle, 45
             numbers, row by row.
+        nis: Of each kind of `Tests`, the sum of the normalised innovations squared that were believed up to now.
+        believed: How many they are.
     """
 
     time_us: int
     state: tuple[float, ...]
     covariance: tuple[float, ...]
+    nis: tuple[float, ...]
+    believed: tuple[int, ...]
 
 
 class Estimate(NamedTuple):

@@ -1,27 +1,32 @@
 """The autopilot as a process: calls a plant over a link, answers its frames, logs what it decided."""
 
 import argparse
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from autopilot.controller import Active, ControllerError, DecisionError, Fallback
 from autopilot.core import Autopilot, Step
-from autopilot.estimate import Estimate
+from autopilot.estimate import Estimate, Tests
+from autopilot.inputs import Heard, Setup, line
 from autopilot.profile import Profile, ProfileError, load_profile
 from autopilot.qp import QpStatus, SolverError
 from autopilot.senses import Estimator, estimator_for
 from autopilot.tracks import TrackError, track
 from mavlink.dialect import RESULT_UNSUPPORTED
 from mavlink.feedback import Feedback
-from mavlink.link import LinkError, OneByOne, UdpLink
+from mavlink.link import LinkError, OneByOne, UdpLink, open_link
 from mavlink.lockstep import AutopilotEnd
-from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Status, Stop, fail, undisturbed
+from mavlink.parameters import Value
+from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, LineLog, Status, Stop, fail, undisturbed
 from mavlink.px4_flier import FlierEnd
 from plant.vehicle import Vehicle, VehicleError, load_vehicle
 
 if TYPE_CHECKING:
-    from autopilot.copter import Copter
+    from autopilot.copter import Copter, Received
     from autopilot.ground_process import Ground
 
 DECISION_COLUMNS = (
@@ -39,6 +44,8 @@ ESTIMATE_COLUMNS = (
 CHECK_COLUMNS = (
     *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz"),
     *(f"P{row}{column}" for row in range(9) for column in range(row, 9)),
+    *(f"nis_{kind}" for kind in Tests._fields),
+    *(f"believed_{kind}" for kind in Tests._fields),
 )
 
 STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, status in enumerate(QpStatus)}
@@ -59,21 +66,32 @@ def _refusal(result: int) -> str:
 
 
 class AutopilotLog:
-    """What the autopilot writes: one row a control sample, and what it estimates then."""
+    """What the autopilot writes: what it began with and heard, one row a control sample, and what it estimates then."""
 
-    def __init__(self, folder: Path, feedback: Feedback) -> None:
-        """Create `autopilot.csv` in `folder`; on sensors also `estimate.csv` and `filter.csv`."""
+    def __init__(self, folder: Path, setup: Setup) -> None:
+        """Create `autopilot.csv` and `inputs.jsonl` in `folder`; on sensors also `estimate.csv` and `filter.csv`.
+
+        What was heard goes to the end of what the process before heard: it may have died in mid-flight.
+        """
+        self._setup = setup
+        self._begins = True
+        self._time_us = 0
+        self._inputs = LineLog(folder / "inputs.jsonl")
         self._decisions = CsvLog(folder / "autopilot.csv", DECISION_COLUMNS)
         self._estimates = self._checks = None
-        if feedback is Feedback.SENSORS:
+        if setup.feedback is Feedback.SENSORS:
             self._estimates = CsvLog(folder / "estimate.csv", ESTIMATE_COLUMNS)
             self._checks = CsvLog(folder / "filter.csv", CHECK_COLUMNS)
 
     def write(self, step: Step) -> None:
         """Append a control sample; a frame between two of them has nothing to tell but how the filter stands."""
+        self._time_us = step.command.time_us
+        if self._begins:
+            self._begins = False
+            self._inputs.write(line(msgspec.structs.replace(self._setup, first_us=self._time_us)))
         if self._checks is not None and step.estimate is not None and step.estimate.check is not None:
             check = step.estimate.check
-            self._checks.write((check.time_us / 1e6, *check.state, *check.covariance))
+            self._checks.write((check.time_us / 1e6, *check.state, *check.covariance, *check.nis, *check.believed))
         if step.decision is None:
             return
         if self._estimates is not None and step.estimate is not None:
@@ -86,9 +104,22 @@ class AutopilotLog:
             (time_s, *step.decision.attitude_reference, *codes, *times_us, how.cost, how.slack, *how.active)
         )
 
+    def begin_again(self, values: Mapping[str, Value]) -> None:
+        """Note that the next frame is answered by a vehicle that begins with `values` of its parameters."""
+        self._setup = msgspec.structs.replace(self._setup, values=dict(values))
+        self._begins = True
+
+    def hear(self, datagrams: Iterable["Received"]) -> Iterator["Received"]:
+        """Pass on what ground stations sent, and note it."""
+        for received in datagrams:
+            datagram, link, address, loopback = received
+            heard = Heard(time_us=self._time_us, link=link, address=address, loopback=loopback, datagram=datagram)
+            self._inputs.write(line(heard))
+            yield received
+
     def close(self) -> None:
         """Close the files."""
-        for log in (self._decisions, self._estimates, self._checks):
+        for log in (self._inputs, self._decisions, self._estimates, self._checks):
             if log is not None:
                 log.close()
 
@@ -107,12 +138,15 @@ def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
         estimator = estimator_for(args.feedback, vehicle, args.home.origin)
-        ground = _ground(args, profile, vehicle, estimator, status) if args.gcs else None
+        served = args.gcs or args.conducted
+        ground = _ground(args, profile, vehicle, estimator, status, stop) if served else None
         autopilot = ground.copter if ground else _alone(args, profile, vehicle, estimator)
         end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
     except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
         fail(str(error))
-    log = AutopilotLog(args.out, args.feedback) if args.out else None
+    log = AutopilotLog(args.out, _setup(args, profile)) if args.out else None
+    if ground and log:
+        ground.record(log)
     try:
         with undisturbed():
             Client(link, end, status, stop, log, ground).fly(autopilot)
@@ -125,6 +159,21 @@ def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop
         if log:
             log.close()
     return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
+
+
+def _setup(args: argparse.Namespace, profile: Profile) -> Setup:
+    return Setup(
+        profile=args.profile,
+        controller=profile.controller,
+        solver=args.solver,
+        vehicle=args.vehicle or profile.simulation.vehicle,
+        feedback=args.feedback,
+        track=args.track if args.gcs else args.track or TRACK,
+        origin=args.home.origin,
+        system_id=args.system_id,
+        identity=args.identity,
+        ground=bool(args.gcs),
+    )
 
 
 def _end(args: argparse.Namespace, frame_interval_us: int) -> AutopilotEnd:
@@ -152,12 +201,19 @@ def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimat
 
 
 def _ground(
-    args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None, status: Status
+    args: argparse.Namespace,
+    profile: Profile,
+    vehicle: Vehicle,
+    estimator: Estimator | None,
+    status: Status,
+    stop: Stop,
 ) -> "Ground":
     """Load what serves ground stations only where there are any: it is as much as all the rest."""
+    from autopilot.conducted import UdpConductor
     from autopilot.ground_process import open_ground
 
-    return open_ground(args, profile, vehicle, estimator, status)
+    conductor = UdpConductor(open_link(args.conducted), lambda: stop) if args.conducted else None
+    return open_ground(args, profile, vehicle, estimator, status, conductor)
 
 
 class Client:
@@ -206,8 +262,9 @@ class Client:
         if frame is None:
             return None
         self._frame_came = True
+        autopilot.hear(self._end.aside)
         step = autopilot.step(frame)
-        self._end.answer(step.command)
+        self._end.answer(step.command, step.faults)
         return step
 
     def _say_what_changed(self) -> None:

@@ -12,8 +12,6 @@ _CHARGE_STATES: tuple[tuple[Condition, int], ...] = (
     (Condition.BATTERY_CRITICAL, mav.MAV_BATTERY_CHARGE_STATE_CRITICAL),
     (Condition.BATTERY_LOW, mav.MAV_BATTERY_CHARGE_STATE_LOW),
 )
-_SOLVE_MS = "SIM_SOLVE_MS"
-"""The parameter by which a slow control law is simulated, where there is one."""
 
 
 class Supervisor:
@@ -22,7 +20,6 @@ class Supervisor:
     Attributes:
         limits: What the parameters say of limits and delays.
         knows_position: Whether the vehicle knows where it is.
-        solve_us: How long the control law is declared to take; 0 if it is not.
     """
 
     def __init__(self, pilot: Pilot, parameters: Parameters) -> None:
@@ -31,14 +28,12 @@ class Supervisor:
         self._conditions = Conditions()
         self._memory = Memory()
         self.limits: Limits = {}
-        self.solve_us = 0.0
         self.knows_position = True
         self.adopt(parameters)
 
     def adopt(self, parameters: Parameters) -> None:
         """Go by the parameters as they are now."""
         self.limits, self._settings = limits(parameters), settings(parameters)
-        self.solve_us = 1e3 * parameters.values.get(_SOLVE_MS, 0.0)
 
     def step(self, seen: Seen) -> None:
         """Do what is to be done at this control sample, before the pilot's step."""

@@ -18,6 +18,8 @@ mav: Any = development
 
 AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
 PLANT_COMPONENT: int = mav.MAV_COMP_ID_USER1
+TRUTH_COMPONENT: int = mav.MAV_COMP_ID_USER2
+"""Tells whoever stands between plant and autopilot how the vehicle really is."""
 
 TYPE_QUADROTOR: int = mav.MAV_TYPE_QUADROTOR
 TYPE_GENERIC: int = mav.MAV_TYPE_GENERIC

@@ -5,6 +5,7 @@ import re
 from mavlink.dialect import MARKER, SIGNATURE_BYTES, SIGNED, intact
 
 _MARKERS = re.compile(b"[\xfd\xfe]")
+_MARKER_V1 = 0xFE
 _PREFIX_BYTES = 3
 """What tells how long a frame is: marker, payload length, incompatibility flags (of MAVLink 2)."""
 _OTHER_BYTES_V1 = 8
@@ -34,7 +35,7 @@ class Framer:
         while marker := _MARKERS.search(data, at):
             self.skipped += marker.start() - at
             at = marker.start()
-            length = _length(data, at)
+            length = frame_length(data, at)
             if length is None or at + length > len(data):
                 self._rest = data[at:]
                 return frames
@@ -49,13 +50,15 @@ class Framer:
         return frames
 
 
-def _length(data: bytes, at: int) -> int | None:
+def frame_length(data: bytes, at: int) -> int | None:
     """Return the length of the frame that may begin at `at`; 0 if none can, None where too little has come to tell."""
     if at + _PREFIX_BYTES > len(data):
         return None
     marker, payload_bytes, incompatible = data[at : at + _PREFIX_BYTES]
-    if marker != MARKER:
+    if marker == _MARKER_V1:
         return _OTHER_BYTES_V1 + payload_bytes
+    if marker != MARKER:
+        return 0
     if incompatible not in (0, SIGNED):
         return 0
     return _OTHER_BYTES + payload_bytes + (SIGNATURE_BYTES if incompatible else 0)

@@ -6,7 +6,6 @@ import json
 import os
 import re
 import signal
-import struct
 import sys
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -15,11 +14,12 @@ from io import FileIO
 from math import inf, isfinite
 from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn, TypeVar
+from typing import Any, Literal, NoReturn, TypeVar
 
 import msgspec
 
 from mavlink.link import LinkError
+from mavlink.tlog import STAMP
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
@@ -214,8 +214,24 @@ class CsvLog:
         self._file.close()
 
 
+class LineLog:
+    """A file of lines, each of which reaches the system before the next; what is there already stays."""
+
+    def __init__(self, path: Path) -> None:
+        """Create the file where there is none."""
+        self._file = _open_for_writing(path, "ab")
+
+    def write(self, line: bytes) -> None:
+        """Append a line, its end included."""
+        self._file.write(line)
+
+    def close(self) -> None:
+        """Close."""
+        self._file.close()
+
+
 class TlogWriter:
-    """A telemetry log as ground stations write it: each frame behind its time, µs, as a big-endian integer."""
+    """A telemetry log that is written frame by frame."""
 
     def __init__(self, path: Path) -> None:
         """Create the file."""
@@ -223,7 +239,7 @@ class TlogWriter:
 
     def write(self, time_us: int, frames: Iterable[bytes]) -> None:
         """Append frames, all of simulated time `time_us`."""
-        stamp = struct.pack(">Q", time_us)
+        stamp = STAMP.pack(time_us)
         self._file.write(b"".join([stamp + frame for frame in frames]))
 
     def close(self) -> None:
@@ -231,10 +247,10 @@ class TlogWriter:
         self._file.close()
 
 
-def _open_for_writing(path: Path) -> FileIO:
+def _open_for_writing(path: Path, how: Literal["wb", "ab"] = "wb") -> FileIO:
     """Open a file whose every write reaches the system, its folder made where it is missing, or end with one line."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        return path.open("wb", buffering=0)
+        return path.open(how, buffering=0)
     except OSError as error:
         fail(f"cannot write {path}: {error.strerror}")

@@ -10,7 +10,7 @@ from pathlib import Path
 from mavlink.feedback import Feedback, feedback
 from mavlink.home import DEFAULT_HOME, home
 from mavlink.process import EXIT_INTERRUPTED, ArgumentParser, fail, natural, positive, speed, use_one_thread
-from plant.scenario import add_world_arguments
+from plant.scenario import LATENCY_HELP, add_world_arguments, latency
 from plant.weather import NO_WIND, add_weather_arguments
 
 COMPARED_S = 100.0
@@ -52,6 +52,14 @@ def main(argv: list[str] | None = None) -> int:
             from tools.sitl import sitl
 
             return sitl(args)
+        if args.command == "replay":
+            from tools.replay import replay
+
+            return replay(args)
+        if args.command == "verify":
+            from tools.verify import verify
+
+            return verify(args)
         from tools.bench import bench
 
         return bench(args)
@@ -75,6 +83,10 @@ def _parser() -> ArgumentParser:
     _add_compare(commands.add_parser("compare", help="fly several controllers on several tracks, side by side"))
     _add_study(commands.add_parser("study", help="fly what shows how far profile flight reaches, and draw it"))
     _add_bench(commands.add_parser("bench", help="measure how fast it flies"))
+    _add_replay(
+        commands.add_parser("replay", help="feed a recorded flight to the autopilot: are its answers the same?")
+    )
+    _add_verify(commands.add_parser("verify", help="fly a fixed set of flights twice: is every bit the same?"))
     return parser
 
 
@@ -105,6 +117,7 @@ def _add_fly(parser: ArgumentParser) -> None:
     )
     add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
     _add_feedback(add)
+    add("--latency", type=latency, default=0.0, metavar="MS", help=f"between plant and autopilot, {LATENCY_HELP}")
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
@@ -150,6 +163,12 @@ def _add_sitl(parser: ArgumentParser) -> None:
         metavar="DIR",
         help="for parameters and logs (default %(default)s)",
     )
+    add(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="record in DIR/N what `colibri replay` flies again: both processes' logs (default: not)",
+    )
     add("--plant-port", type=int, metavar="PORT", help="the plant's (default: 14560 + N; 0: any that is free)")
     add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
     add("--controller", metavar="NAME", help="control law, also of another package (default: the profile's)")
@@ -160,6 +179,26 @@ def _add_sitl(parser: ArgumentParser) -> None:
     add("--seed", type=natural, default=0, metavar="N", help="of everything random; each vehicle adds its number")
     add("--speed", type=speed, default=1.0, metavar="N", help="times real time, or max (default 1)")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
+    add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def _add_replay(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add("tlog", type=Path, metavar="FLIGHT.TLOG", help="as `colibri fly` leaves it, with inputs.jsonl beside it")
+    add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def _add_verify(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--link", default="udp", choices=("udp", "memory"), help="of the two flights (default %(default)s)")
+    add(
+        "--duration",
+        type=positive,
+        default=20.0,
+        metavar="S",
+        help="simulated time of each flight (default %(default)s)",
+    )
+    add("--out", type=Path, default=Path("out/verify"), metavar="DIR", help="folder for the logs (default %(default)s)")
     add("--quiet", action="store_true", help="say nothing but errors")
 
 

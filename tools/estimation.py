@@ -13,8 +13,13 @@ from tools.recording import RecordingError, read_csv
 
 Array: TypeAlias = NDArray[np.float64]
 
-FIGURES = ("control_rmse_m", "estimation_rmse_m", "attitude_rmse_deg", "nees_mean")
+FIGURES = ("control_rmse_m", "estimation_rmse_m", "attitude_rmse_deg", "nees_mean", "nis_mean")
+MEASURED = {"velocity": 3, "position": 2, "height": 1, "pressure": 1, "field": 3}
+"""Each kind of measurement, and how many numbers it has."""
 _UPPER = np.triu_indices(NAVIGATION)
+_COVARIANCE = slice(11, 56)
+_NIS = slice(56, 61)
+_BELIEVED = slice(61, 66)
 
 
 class Estimation(NamedTuple):
@@ -28,6 +33,8 @@ class Estimation(NamedTuple):
         deviation: Standard deviations that the estimator claims: of position (m) and attitude (rad), (n, 6).
         checked_s: Times of the filter, (m,).
         nees: Its normalised estimation error squared at them: position, velocity and attitude together, (m,).
+        nis: Sums of the normalised innovations squared up to them, a column for each of `MEASURED`, (m, 5).
+        believed: How many innovations these are, (m, 5).
     """
 
     t: Array
@@ -37,6 +44,8 @@ class Estimation(NamedTuple):
     deviation: Array
     checked_s: Array
     nees: Array
+    nis: Array
+    believed: Array
 
     def after(self, start_s: float) -> "Estimation":
         """Return what there is from `start_s` on."""
@@ -49,10 +58,15 @@ class Estimation(NamedTuple):
             deviation=self.deviation[late],
             checked_s=self.checked_s[checked],
             nees=self.nees[checked],
+            nis=self.nis[checked],
+            believed=self.believed[checked],
         )
 
     def figures(self) -> dict[str, Any]:
-        """Return the root mean squares that a report has, and the mean NEES; None if it ended too early for them."""
+        """Return the root mean squares that a report has, and mean NEES and NIS; None if it ended too early for them.
+
+        NIS is given in parts of the number of numbers: 1 if the filter errs as it says.
+        """
         if not len(self.t):
             return dict.fromkeys(FIGURES)
         horizontal = np.hypot(self.position_m[:, 0], self.position_m[:, 1])
@@ -62,8 +76,17 @@ class Estimation(NamedTuple):
             {"horizontal": _rms(horizontal), "vertical": _rms(self.position_m[:, 2])},
             {name: _rms(angles[:, axis]) for axis, name in enumerate(("roll", "pitch", "yaw"))},
             float(self.nees.mean()),
+            self._mean_nis(),
         )
         return dict(zip(FIGURES, values, strict=True))
+
+    def _mean_nis(self) -> dict[str, dict[str, float | None]]:
+        sums, counts = self.nis[-1] - self.nis[0], self.believed[-1] - self.believed[0]
+        of_kinds = zip(MEASURED.items(), sums.tolist(), counts.tolist(), strict=True)
+        return {
+            kind: {"mean": total / count / numbers if count > 0 else None, "innovations": max(int(count), 0)}
+            for (kind, numbers), total, count in of_kinds
+        }
 
 
 def read_estimation(plan: FlightPlan) -> Estimation:
@@ -93,6 +116,8 @@ def read_estimation(plan: FlightPlan) -> Estimation:
         nees=np.array(
             [_errors(check, real).nees() for check, real in zip(checks, _at(truth, checks[:, 0]), strict=True)]
         ),
+        nis=checks[:, _NIS],
+        believed=checks[:, _BELIEVED],
     )
 
 
@@ -121,7 +146,7 @@ def _errors(check: Array, real: Array) -> Errors:
     small = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     velocity = np.array(earth_from_body((rw, rx, ry, rz), (u, v, w)))
     covariance = np.zeros((NAVIGATION, NAVIGATION))
-    covariance[_UPPER] = check[11:]
+    covariance[_UPPER] = check[_COVARIANCE]
     covariance = covariance + np.triu(covariance, 1).T
     return Errors(np.concatenate([place - check[1:4], velocity - check[4:7], small]), covariance)
 

@@ -65,8 +65,11 @@ stands still.
   as if nothing had been; one that begins at time 0 is another flight, for which the vehicle restarts.
 - **The plant, where the autopilot is silent,** says "no answer at t = 12.340 s, waiting for the autopilot", and
   sends its frame again every 20 ms. Time stands still, and the vehicle where it is, until an autopilot answers.
-- **Frames that were missed,** of a plant that did not wait, are the row `telemetry missed`, at the first that comes
-  again.
+- **With `--realtime`** the plant does not wait. Where no command comes for `--cut-after` it stops the rotors, and says
+  "no command for 0.5 s at t = 12.340 s: the rotors are stopped, waiting for the autopilot"; the next is obeyed.
+- **Frames that were missed** are the row `telemetry missed`, at the first that comes again.
+- **An autopilot that was killed** and started again in flight goes on with the failsafe that is flown; what still holds
+  begins anew beside it, and who streams has the whole delay to be heard.
 
 ## Where PX4's defaults are not these
 

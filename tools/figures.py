@@ -275,10 +275,8 @@ def put_head(figure: Figure, title: str, columns: int | None = None) -> None:
     """
     pairs = (axes.get_legend_handles_labels() for axes in figure.axes)
     labelled = {label: handle for handles, labels in pairs for label, handle in zip(labels, handles, strict=True)}
+    put_title(figure, title)
     height_in = figure.get_figheight()
-    figure.text(
-        0.2 / _WIDTH_IN, 1.0 - 0.1 / height_in, title, va="top", fontsize="large", fontweight="bold", parse_math=False
-    )
     figure.legend(
         labelled.values(),
         labelled.keys(),
@@ -288,6 +286,12 @@ def put_head(figure: Figure, title: str, columns: int | None = None) -> None:
         frameon=False,
         borderaxespad=0.0,
     )
+
+
+def put_title(figure: Figure, title: str) -> None:
+    """Put a title above the axes."""
+    top = 1.0 - 0.1 / figure.get_figheight()
+    figure.text(0.2 / _WIDTH_IN, top, title, va="top", fontsize="large", fontweight="bold", parse_math=False)
 
 
 def _scale(axes: Any) -> bool:

@@ -18,7 +18,10 @@ from tools.processes import FlightError, fly_processes
 from tools.recording import Recording, RecordingError, Summary, read_recording, write_recording
 from tools.report import Report, print_report, report, write_report
 
-LOGS = ("flight.csv", "flight.tlog", "plant.csv", "autopilot.csv", "estimate.csv", "filter.csv", "report.json")
+LOGS = (
+    *("flight.csv", "flight.tlog", "plant.csv", "autopilot.csv", "inputs.jsonl", "estimate.csv", "filter.csv"),
+    "report.json",
+)
 _UPDATES = 500
 FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "rotors.png", "error.png")
 

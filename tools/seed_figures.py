@@ -8,13 +8,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from tools.consistency import NAVIGATION
-from tools.figures import TOP_IN, axes_grid, put_head, shortened, write_figure
+from tools.consistency import NAVIGATION, bounds
+from tools.estimation import MEASURED
+from tools.figures import TOP_IN, axes_grid, put_title, shortened, write_figure
 from tools.report import SETTLED_AFTER_S
-from tools.seeds import QUANTITIES, Flown
+from tools.seeds import INNOVATIONS, QUANTITIES, Flown
 
 _GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
-_LABEL_IN = 0.55
+_LABEL_IN = 0.8
+_NIS_COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9")
 _PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
     ("RMS (m)", {"control": ("#000000", "reference from estimate"), "true": ("#D55E00", "reference from truth")}),
     ("RMS (m)", {"horizontal": ("#0072B2", "estimate, horizontal"), "vertical": ("#E69F00", "estimate, vertical")}),
@@ -27,33 +29,63 @@ def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
     cases = list(dict.fromkeys((flown.contender, flown.track) for flown in flights))
     estimated = not all(np.isnan(flown.values[2]) for flown in flights)
     panels = _PANELS if estimated else _PANELS[:1]
-    rows = len(panels) + estimated
+    rows = len(panels) + 2 * estimated
     row_in = 0.35 + 0.42 * len(cases)
-    figure, grid = axes_grid(rows, 1, TOP_IN + 0.24, row_in=row_in + _LABEL_IN, share=False)
+    figure, grid = axes_grid(rows, 1, TOP_IN, row_in=row_in + _LABEL_IN, share=False)
     figure.subplots_adjust(left=0.2, hspace=_LABEL_IN / row_in)
     several = len({contender for contender, _ in cases}) > 1
     names = [shortened(f"{track}, {contender}" if several else track) for contender, track in cases]
     for (axes,), (label, quantities) in zip(grid, panels, strict=False):
         for number, (quantity, (color, called)) in enumerate(quantities.items()):
-            shift = 0.26 * (number - 0.5 * (len(quantities) - 1))
-            _strips(axes, flights, cases, quantity, color, called, shift)
+            _strips(axes, flights, cases, quantity, color, called, _shift(number, len(quantities)))
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel(label)
     if estimated:
-        axes = grid[-1][0]
-        _strips(axes, flights, cases, "nees", "#000000", "", 0.0)
-        axes.axvline(NAVIGATION, color="#D55E00", linewidth=1.2, label=f"{NAVIGATION}, if it errs as it says")
-        axes.set_xlabel("NEES of position, velocity and attitude, mean of a flight")
+        _draw_nees(grid[-2][0], flights, cases)
+        _draw_nis(grid[-1][0], flights, cases)
     for (axes,) in grid:
         axes.set_yticks([-place for place in range(len(cases))], names)
         axes.set_ylim(-len(cases) + 0.45, 0.55)
         axes.tick_params(labelbottom=True)
         axes.grid(axis="x", **_GRID)
-    put_head(figure, f"{len(flights)} flights, errors after {SETTLED_AFTER_S:.0f} s", columns=4)
+        if axes.get_legend_handles_labels()[1]:
+            where: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+            axes.legend(**where, ncols=len(MEASURED), frameon=False)
+    put_title(figure, f"{len(flights)} flights, errors after {SETTLED_AFTER_S:.0f} s")
     return write_figure(figure, out / "seeds")
+
+
+def _shift(number: int, of: int) -> float:
+    """Return how far below its track a quantity is drawn, one of so many."""
+    return min(0.26, 0.85 / of) * (number - 0.5 * (of - 1))
+
+
+def _draw_nees(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, str]]) -> None:
+    """Draw the mean NEES of each flight, and where the mean of all belongs."""
+    _strips(axes, flights, cases, "nees", "#000000", "", 0.0)
+    within = bounds(NAVIGATION, max(1, len(flights) // len(cases)))
+    axes.axvspan(*within, color="#D55E00", alpha=0.15, linewidth=0)
+    axes.axvline(NAVIGATION, color="#D55E00", linewidth=1.2, label="right; shaded: 95 % of the means over flights")
+    axes.set_xlabel("NEES of position, velocity and attitude, mean of a flight")
+
+
+def _draw_nis(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, str]]) -> None:
+    """Draw the mean NIS of each flight in parts of how many numbers it has, and between which bounds 95 % belong."""
+    for number, (quantity, (kind, numbers)) in enumerate(zip(INNOVATIONS, MEASURED.items(), strict=True)):
+        shift = _shift(number, len(MEASURED))
+        _strips(axes, flights, cases, quantity, _NIS_COLORS[number], kind, shift)
+        for place, case in enumerate(cases):
+            of_case = [flown for flown in flights if (flown.contender, flown.track) == case and not flown.lost]
+            innovations = max((flown.innovations[number] for flown in of_case), default=0)
+            if innovations:
+                for bound in bounds(numbers * innovations, 1):
+                    at = [bound / (numbers * innovations)] * 2
+                    axes.plot(at, [-place - shift - 0.08, -place - shift + 0.08], color="#000000", linewidth=1.0)
+    axes.axvline(1.0, color="#D55E00", linewidth=1.2)
+    axes.set_xlabel("NIS in parts of its degrees of freedom, mean of a flight; black: bounds of 95 % of flights")
 
 
 def _strips(
@@ -74,6 +106,7 @@ def _strips(
             continue
         at = np.full(len(values), -place - shift)
         axes.plot(values, at, "o", color=color, markersize=3, alpha=0.45, markeredgewidth=0, label=called)
+        called = ""  # each label once
         axes.plot([np.median(values)] * 2, [-place - shift - 0.12, -place - shift + 0.12], color=color, linewidth=2.2)
         lost = len(of_case) - len(values)
         if lost and quantity == "true":

@@ -16,6 +16,7 @@ from autopilot.tracks import THESIS_TRACKS, TrackError
 from mavlink.process import EXIT_FAILED, fail
 from plant.scenario import IntegrationError
 from plant.vehicle import VehicleError
+from tools.estimation import MEASURED
 from tools.fly import keep_flight, make_folder
 from tools.plan import FlightPlan, PlanError
 from tools.processes import FlightError, fly_processes
@@ -29,9 +30,10 @@ Array: TypeAlias = NDArray[np.float64]
 DEFAULT_PROFILE = "flight"
 LOST_M = 5.0
 """A vehicle further off its reference once settled is lost."""
-QUANTITIES = ("control", "true", "horizontal", "vertical", "roll", "pitch", "yaw", "nees")
+INNOVATIONS = tuple(f"nis {kind}" for kind in MEASURED)
+QUANTITIES = ("control", "true", "horizontal", "vertical", "roll", "pitch", "yaw", "nees", *INNOVATIONS)
 """Root mean squares of one flight: estimate from reference, vehicle from reference, estimate from truth (m), attitude
-(degrees); and the mean NEES."""
+(degrees); the mean NEES, and the mean NIS of each kind of measurement in parts of how many numbers it has."""
 HEADINGS = (
     *("profile", "track", "flights", "lost"),
     *("control (m)", "true (m)", "est. horizontal (m)", "est. vertical (m)", "roll (°)", "pitch (°)", "yaw (°)"),
@@ -64,6 +66,7 @@ class Job(NamedTuple):
 
 _WIDEST = 400
 _WEATHER = ("wind", "gust", "turbulence")
+_NO_INNOVATIONS = (0,) * len(MEASURED)
 
 
 class Flown(NamedTuple):
@@ -75,6 +78,7 @@ class Flown(NamedTuple):
         seed: Of everything random.
         lost: Why the vehicle was lost; empty if it was not.
         values: `QUANTITIES` after 20 s; nan where it was lost.
+        innovations: How many innovations of each of `MEASURED` are in them.
         sha256: Of its trajectory.
     """
 
@@ -83,6 +87,7 @@ class Flown(NamedTuple):
     seed: int
     lost: str
     values: tuple[float, ...]
+    innovations: tuple[int, ...]
     sha256: str
 
 
@@ -121,10 +126,14 @@ def fly_once(job: Job) -> Flown:
         try:
             _, figures = keep_flight(plan, _fly(plan))
         except (IntegrationError, DecisionError, FlightError, RecordingError) as error:
-            return Flown(job.contender, job.track, job.seed, str(error), (np.nan,) * len(QUANTITIES), "")
+            return Flown(
+                job.contender, job.track, job.seed, str(error), (np.nan,) * len(QUANTITIES), _NO_INNOVATIONS, ""
+            )
     values, sha256 = _values(figures), figures["trajectory_sha256"]
     lost = f"{values[1]:.1f} m off" if values[1] > LOST_M or figures["max_error_after_20s_m"] > LOST_M else ""
-    return Flown(job.contender, job.track, job.seed, lost, values, sha256)
+    nis = figures["nis_mean"]
+    innovations = _NO_INNOVATIONS if nis is None else tuple(kind["innovations"] for kind in nis.values())
+    return Flown(job.contender, job.track, job.seed, lost, values, innovations, sha256)
 
 
 def _fly(plan: FlightPlan) -> Any:
@@ -138,15 +147,17 @@ def _fly(plan: FlightPlan) -> Any:
 def _values(figures: dict[str, Any]) -> tuple[float, ...]:
     off, turned = figures["estimation_rmse_m"], figures["attitude_rmse_deg"]
     estimated = (np.nan,) * 5 if off is None else (*off.values(), *turned.values())
-    nees = figures["nees_mean"]
-    return (figures["control_rmse_m"], figures["rmse_after_20s_m"], *estimated, np.nan if nees is None else nees)
+    nees, nis = figures["nees_mean"], figures["nis_mean"]
+    means = (None,) * len(MEASURED) if nis is None else (kind["mean"] for kind in nis.values())
+    normalised = (np.nan if value is None else value for value in (nees, *means))
+    return (figures["control_rmse_m"], figures["rmse_after_20s_m"], *estimated, *normalised)
 
 
 def _row(flights: Sequence[Flown]) -> tuple[str, ...]:
     """Return root mean squares over the flights, of NEES the mean, and the largest of one flight in brackets."""
     values = np.array([flown.values for flown in flights if not flown.lost]).reshape(-1, len(QUANTITIES))
     lost = sum(bool(flown.lost) for flown in flights)
-    *errors, nees = values.T
+    *errors, nees = values.T[: -len(INNOVATIONS)]
     cells = [*(_cell(column, _rms) for column in errors), _cell(nees, np.mean)]
     return (flights[0].contender, flights[0].track, str(len(flights)), str(lost), *cells)
 

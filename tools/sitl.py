@@ -72,6 +72,11 @@ def ground_links(args: argparse.Namespace, instance: int) -> list[str]:
 def sitl(args: argparse.Namespace) -> int:
     """Fly as the command line says, until told to stop; return the exit code."""
     _check(args)
+    if args.out:
+        from tools.fly import prepare
+
+        for instance in range(args.instance, args.instance + args.count):
+            prepare(args.out / str(instance))
     fleet = [Member(i, ground_links(args, i)) for i in range(args.instance, args.instance + args.count)]
     stop = Stop()
     lines = StatusLines(quiet=args.quiet)
@@ -139,6 +144,7 @@ def _start_plant(member: Member, args: argparse.Namespace) -> None:
         *("--seed", str(args.seed + member.instance)),
         *("--home", str(home)),
         *("--system-id", str(member.system_id)),
+        *_logs(member, args),
     )
 
 
@@ -158,7 +164,12 @@ def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -
         *(("--signing-key", str(args.signing_key)) if args.signing_key else ()),
         *(("--insecure",) if args.insecure else ()),
         *("--system-id", str(member.system_id)),
+        *_logs(member, args),
     )
+
+
+def _logs(member: Member, args: argparse.Namespace) -> tuple[str, ...]:
+    return ("--out", str(args.out / str(member.instance))) if args.out else ()
 
 
 def _process(package: str, *options: str) -> subprocess.Popen[bytes]:

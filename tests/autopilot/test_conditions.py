@@ -7,7 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot.conditions import Conditions, Seen, battery_below, needs_position, resting_place, stopping_m
+from autopilot.conditions import (
+    NEVER_US,
+    Conditions,
+    Seen,
+    battery_below,
+    needs_position,
+    resting_place,
+    stopping_m,
+)
 from autopilot.controller import Diagnostics, Fallback, VehicleState
 from autopilot.failsafe_parameters import NUMBERS
 from autopilot.failsafes import Condition
@@ -31,6 +39,7 @@ WELL = Seen(
     estimate=None,
     setpoint=None,
     sticks_us=None,
+    listening_us=NEVER_US,
     station_us=None,
     battery=FULL,
     fence=None,
@@ -98,6 +107,11 @@ def test_a_stream_that_no_mode_asks_for_is_missed_only_if_it_was_lost_before(con
 
 def test_one_that_was_ended_has_been_silent_for_ever() -> None:
     assert Conditions().look(WELL._replace(mode=Mode.POSITION), LIMITS, ())[Condition.STICKS_LOST] < -NOW_US
+
+
+def test_after_a_restart_there_is_time_to_be_heard() -> None:
+    seen = WELL._replace(mode=Mode.OFFBOARD, listening_us=NOW_US - 8000)
+    assert Conditions().look(seen, LIMITS, ())[Condition.SETPOINTS_LOST] == NOW_US - 8000
 
 
 def test_recovery_is_no_failure_of_the_plan() -> None:

@@ -269,3 +269,14 @@ def test_a_control_law_that_finds_no_plan_stops() -> None:
     assert flight.until(lambda: flight.mode is Mode.HOLD, 1.0) == pytest.approx(0.5, abs=0.05)
     flight.step()
     assert flight.client.said("control law finds no plan: hold")
+
+
+def test_a_failsafe_outlives_the_autopilot() -> None:
+    flight = in_the_air(8.0, values={"COM_LOW_BAT_ACT": 2, "BAT_LOW_T": 0.1})
+    flight.drain(0.95)
+    flight.run(0.5)
+    assert flies(flight, Mode.LAND)
+    flight.restart(flight.past())
+    flight.run(1.5)
+    assert flies(flight, Mode.LAND)
+    assert state_told(flight) == mav.MAV_STATE_EMERGENCY

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from autopilot import estimate
 from tools.cli import main
-from tools.seeds import QUANTITIES
+from tools.estimation import MEASURED
+from tools.seeds import INNOVATIONS, QUANTITIES
 
 
 def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -31,10 +33,15 @@ def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, capsys: py
         assert flight["lost"] == ""
         assert all(0.0 < float(flight[quantity]) < 50.0 for quantity in QUANTITIES)
         assert float(flight["control"]) < float(flight["true"])
+        assert all(0.4 < float(flight[quantity]) < 2.0 for quantity in INNOVATIONS)  # of 20 innovations and more
     table = (tmp_path / "seeds.md").read_text(encoding="utf-8")
     assert "| flight | hover | 2 | 0 |" in table
     assert (tmp_path / "seeds.png").stat().st_size > 10_000
     assert "hover" in capsys.readouterr().out
+
+
+def test_the_log_of_the_filter_has_the_kinds_of_its_tests() -> None:
+    assert tuple(MEASURED) == estimate.Tests._fields
 
 
 def test_a_vehicle_that_is_lost_is_counted_and_ends_in_exit_code_1(tmp_path: Path) -> None:

@@ -1,0 +1,99 @@
+"""Turns: what ground stations and a vehicle say to one another at one instant, as packets between two processes.
+
+Whoever conducts a flight holds simulated time still, and says with each frame of the plant all that ground stations say
+at that instant; the vehicle answers with all that it says. So every datagram is heard at a definite frame, however slow
+either process is.
+"""
+
+from collections.abc import Sequence
+from struct import Struct
+from typing import NamedTuple
+
+_HEAD = Struct("<QIBH")
+"""Simulated time in µs, custom mode, whether armed, number of parcels."""
+_PARCEL = Struct("<HH")
+"""Station, length."""
+_PIECE = Struct("<QBB")
+"""Simulated time in µs, number of the piece, how many there are."""
+_PIECE_BYTES = 4000
+"""Of a link's largest datagram."""
+LARGEST_PARCEL = 4096
+"""A longer datagram is cut, as a link cuts it."""
+
+
+class Parcel(NamedTuple):
+    """A datagram on its way.
+
+    Attributes:
+        station: Number of the ground station that sends or receives it.
+        datagram: The bytes.
+    """
+
+    station: int
+    datagram: bytes
+
+
+class Turn(NamedTuple):
+    """All that is said at an instant in one direction.
+
+    Attributes:
+        time_us: Simulated time.
+        parcels: In order.
+        custom_mode: The mode that the vehicle is in, as its HEARTBEAT has it; 0 from ground stations.
+        armed: Whether its rotors may turn; False from ground stations.
+    """
+
+    time_us: int
+    parcels: Sequence[Parcel]
+    custom_mode: int = 0
+    armed: bool = False
+
+
+def packets(turn: Turn) -> list[bytes]:
+    """Return a turn as packets, each of which fits a datagram.
+
+    Raises:
+        ValueError: It is more than 255 packets.
+    """
+    parts = [_HEAD.pack(turn.time_us, turn.custom_mode, turn.armed, len(turn.parcels))]
+    for station, whole in turn.parcels:
+        datagram = whole[:LARGEST_PARCEL]
+        parts += (_PARCEL.pack(station, len(datagram)), datagram)
+    content = b"".join(parts)
+    pieces = [content[at : at + _PIECE_BYTES] for at in range(0, len(content), _PIECE_BYTES)]
+    if len(pieces) > 255:
+        raise ValueError(f"{len(content)} bytes are too many to say at one instant")
+    return [_PIECE.pack(turn.time_us, number, len(pieces)) + piece for number, piece in enumerate(pieces)]
+
+
+class Gathering:
+    """Puts packets of one turn together, in whatever order they come."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._time_us = -1
+        self._pieces: dict[int, bytes] = {}
+
+    def take(self, packet: bytes) -> Turn | None:
+        """Take in a packet from the other process; return the turn if that makes it whole."""
+        time_us, number, count = _PIECE.unpack_from(packet)
+        if time_us != self._time_us:
+            self._time_us, self._pieces = time_us, {}
+        self._pieces[number] = packet[_PIECE.size :]
+        if len(self._pieces) < count:
+            return None
+        content = b"".join(self._pieces[number] for number in range(count))
+        self._pieces = {}
+        return _turn(content)
+
+
+def _turn(content: bytes) -> Turn:
+    time_us, custom_mode, armed, count = _HEAD.unpack_from(content)
+    at = _HEAD.size
+    parcels = []
+    for _ in range(count):
+        station, length = _PARCEL.unpack_from(content, at)
+        at += _PARCEL.size
+        parcels.append(Parcel(station, content[at : at + length]))
+        at += length
+    return Turn(time_us, parcels, custom_mode, bool(armed))

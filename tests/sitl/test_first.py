@@ -1,0 +1,35 @@
+"""The first flights of the fixture: up, there, back down; in wind; on sensors."""
+
+import pytest
+
+from autopilot.modes import Mode
+from tools.scenarios.sitl import Sitl
+from tools.scenarios.station import RefusedError
+
+
+def test_up_there_and_down(sitl: Sitl) -> None:
+    sitl.takeoff(3.0)
+    sitl.goto(2.0, 1.0, 4.0)
+    sitl.hold(lambda: sitl.is_at((2.0, 1.0, 4.0)), for_=2.0)
+    sitl.land()
+    assert sitl.position == pytest.approx((2.0, 1.0, 0.0), abs=0.1)
+
+
+@pytest.mark.sitl(airborne=3.0)
+@pytest.mark.seeds(1, 2)
+@pytest.mark.wind("4@270", turbulence="light")
+def test_holds_its_place_in_wind(sitl: Sitl) -> None:
+    assert sitl.mode is Mode.HOLD
+    sitl.run(2.0)
+    sitl.hold(lambda: sitl.is_at((0.0, 0.0, 3.0), near_m=0.5, slow_m_s=1.0), for_=3.0)
+
+
+def test_no_mission_is_refused(sitl: Sitl) -> None:
+    with pytest.raises(RefusedError, match="there is no mission"):
+        sitl.start_mission()
+
+
+@pytest.mark.feedback("sensors")
+def test_takes_off_on_sensors(sitl: Sitl) -> None:
+    sitl.takeoff(3.0)
+    assert sitl.position[2] == pytest.approx(3.0, abs=1.0)

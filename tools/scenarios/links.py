@@ -1,0 +1,89 @@
+"""What a link does to datagrams: loses, delays, repeats, overtakes, spoils them; by seed and by simulated time."""
+
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from random import Random
+
+_HELD_BACK_S = 0.05
+"""For so long, at most, a datagram is held back so that others overtake it."""
+
+
+@dataclass(slots=True)
+class Trouble:
+    """What a link does, to each datagram by itself. May be changed at any time.
+
+    Attributes:
+        loss: Part of the datagrams that never arrive.
+        delay_s: How long each takes.
+        jitter_s: How much longer at most.
+        duplicate: Part that arrives twice, the second time with a delay of its own.
+        reorder: Part that is held back, so that others overtake it.
+        corrupt: Part in which a bit is wrong.
+        down: Whether nothing arrives.
+    """
+
+    loss: float = 0.0
+    delay_s: float = 0.0
+    jitter_s: float = 0.0
+    duplicate: float = 0.0
+    reorder: float = 0.0
+    corrupt: float = 0.0
+    down: bool = False
+
+    @property
+    def any(self) -> bool:
+        """Whether it does anything at all."""
+        return self.down or any((self.loss, self.delay_s, self.jitter_s, self.duplicate, self.reorder, self.corrupt))
+
+
+class Pipe:
+    """One direction of a link."""
+
+    def __init__(self, trouble: Trouble, seed: str) -> None:
+        """Do to datagrams what `trouble` says; the same `seed` does it to the same datagrams."""
+        self._trouble = trouble
+        self._chance = Random(seed)
+        self._waiting: list[tuple[int, int, bytes]] = []
+        self._order = 0
+
+    def put(self, datagram: bytes, now_us: int) -> None:
+        """Send a datagram."""
+        trouble, chance = self._trouble, self._chance
+        if not trouble.any:
+            self._wait(now_us, datagram)
+            return
+        lost, twice, held, spoiled, first, second, late, place = (chance.random() for _ in range(8))
+        if trouble.down or lost < trouble.loss:
+            return
+        if spoiled < trouble.corrupt:
+            datagram = spoilt(datagram, place)
+        delay_s = trouble.delay_s + first * trouble.jitter_s + (late * _HELD_BACK_S if held < trouble.reorder else 0.0)
+        self._wait(now_us + round(delay_s * 1e6), datagram)
+        if twice < trouble.duplicate:
+            self._wait(now_us + round((trouble.delay_s + second * trouble.jitter_s) * 1e6), datagram)
+
+    def due(self, now_us: int) -> list[bytes]:
+        """Return what arrives up to `now_us`."""
+        arrived = []
+        while self._waiting and self._waiting[0][0] <= now_us:
+            arrived.append(heappop(self._waiting)[2])
+        return [] if self._trouble.down else arrived
+
+    @property
+    def due_us(self) -> int | None:
+        """When something arrives next; None where nothing is on its way."""
+        return self._waiting[0][0] if self._waiting else None
+
+    def _wait(self, due_us: int, datagram: bytes) -> None:
+        self._order += 1
+        heappush(self._waiting, (due_us, self._order, datagram))
+
+
+def spoilt(datagram: bytes, place: float) -> bytes:
+    """Return a datagram with one bit wrong, the one at `place` of 0..1."""
+    if not datagram:
+        return datagram
+    bit = int(place * len(datagram) * 8)
+    spoiled = bytearray(datagram)
+    spoiled[bit // 8] ^= 1 << bit % 8
+    return bytes(spoiled)

@@ -1,0 +1,208 @@
+"""Plant and autopilot in this process: what their processes do, without sockets and without a clock."""
+
+import io
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr
+from time import perf_counter
+from typing import Any
+
+from autopilot.__main__ import command_line as autopilot_command_line
+from autopilot.controller import ControllerError
+from autopilot.ground_process import open_ground
+from autopilot.profile import ProfileError, load_profile
+from autopilot.qp import SolverError
+from autopilot.senses import estimator_for
+from autopilot.tracks import TrackError
+from mavlink.link import LinkError
+from mavlink.lockstep import Address, AutopilotEnd, PlantEnd
+from mavlink.process import ArgumentParser, Status
+from mavlink.turns import Turn
+from plant.__main__ import command_line as plant_command_line
+from plant.core import Plant
+from plant.process import DEFAULT_STARTS
+from plant.scenario import IntegrationError
+from plant.sensors import served_by
+from plant.vehicle import VehicleError, load_vehicle
+from plant.weather import weather_of
+from plant.world import Physics, starting_world, state_frame
+from tools.scenarios.setting import SettingError
+from tools.scenarios.stage import StageError
+
+NEVER_LATE_S = 0.0
+_ADDRESS: Address = ("memory", 0)
+
+
+class MemoryPlant:
+    """A plant in this process."""
+
+    def __init__(self, options: Sequence[str]) -> None:
+        """Begin as a command line says.
+
+        Raises:
+            SettingError: It cannot begin so.
+        """
+        args = parsed(plant_command_line, options)
+        try:
+            weather = weather_of(args)
+            self._vehicle = load_vehicle(args.vehicle).without(args.without)
+            serves = served_by(self._vehicle)
+            worlds = {
+                it: starting_world(DEFAULT_STARTS[it]._replace(**args.start), self._vehicle, weather) for it in serves
+            }
+        except VehicleError as error:
+            raise SettingError(str(error)) from error
+        self._args = args
+        self._worlds = worlds
+        self._physics = Physics(self._vehicle, args.integrator, weather)
+        self._end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
+        self._plant: Plant | None = None
+
+    def hear(self, datagram: bytes) -> None:
+        """Take in what an autopilot says that answers no frame: its call."""
+        self._end.receive(datagram, _ADDRESS, NEVER_LATE_S)
+
+    def frame(self) -> list[bytes]:
+        """Return what the plant says up to its next frame, which comes last."""
+        end, args = self._end, self._args
+        if self._plant is None:
+            self._plant = Plant(
+                self._worlds[end.feedback],
+                self._vehicle,
+                self._physics,
+                end.feedback,
+                args.home.origin,
+                seed=args.seed,
+                interval_us=end.frame_interval_us,
+                latency_us=round(args.latency * 1e3),
+            )
+        frame, aside = self._plant.tell()
+        end.offer(frame, NEVER_LATE_S, aside, state_frame(self._plant.world))
+        return [outgoing.datagram for outgoing in end.take_outbox()]
+
+    def take(self, answer: bytes) -> None:
+        """Take in the answer to that frame, and go on.
+
+        Raises:
+            StageError: The state cannot be integrated any further.
+        """
+        command = self._end.receive(answer, _ADDRESS, NEVER_LATE_S)
+        self._end.received.clear()
+        assert command is not None, "the answer names the frame awaited"
+        assert self._plant is not None, "it has told a frame"
+        try:
+            self._plant.answer(command, self._end.take_faults())
+        except IntegrationError as error:
+            raise StageError(str(error)) from error
+
+
+class MemoryAutopilot:
+    """An autopilot in this process, with its ground side as the process has it."""
+
+    def __init__(self, options: Sequence[str]) -> None:
+        """Begin as a command line says.
+
+        Raises:
+            SettingError: It cannot begin so.
+        """
+        self._args = parsed(autopilot_command_line, options)
+        self.start()
+
+    def start(self) -> None:
+        """Start it anew.
+
+        Raises:
+            SettingError: It cannot start.
+        """
+        args = self._args
+        try:
+            profile = load_profile(args.profile).with_choices(args.controller, args.solver)
+            vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
+            estimator = estimator_for(args.feedback, vehicle, args.home.origin)
+            self._desk = _Desk()
+            self._ground = open_ground(args, profile, vehicle, estimator, _Silence(), self._desk)
+        except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
+            raise SettingError(str(error)) from error
+        self._copter = self._ground.copter
+        self._end = AutopilotEnd(
+            system_id=args.system_id,
+            frame_interval_us=self._copter.frame_interval_us,
+            now_s=NEVER_LATE_S,
+            feedback=args.feedback,
+        )
+
+    def call(self) -> bytes:
+        """Return how it calls a plant."""
+        self._end.poll(NEVER_LATE_S)
+        (call,) = self._end.take_outbox()
+        return call
+
+    def tell(self, frame: bytes, turn: Turn) -> None:
+        """Tell it a frame of the plant, and what ground stations say then."""
+        self._desk.heard = turn
+        known = self._end.receive(frame, NEVER_LATE_S)
+        assert known is not None, "each frame is new"
+        self._copter.hear(self._end.aside)
+        step = self._copter.step(known)
+        self._end.answer(step.command, step.faults)
+
+    def answer(self) -> bytes:
+        """Return its answer to the frame."""
+        (answer,) = self._end.take_outbox()
+        return answer
+
+    def said(self) -> Turn:
+        """Return what it says to ground stations at that frame."""
+        self._copter = self._ground.serve(perf_counter())
+        assert self._desk.said is not None, "it has served them"
+        return self._desk.said
+
+    def kill(self) -> None:
+        """End it as a power cut does: nothing is written that was not."""
+
+    def close(self) -> None:
+        """End it."""
+        self._ground.close()
+
+
+class _Desk:
+    """The autopilot's conductor, who is in this process."""
+
+    def __init__(self) -> None:
+        self.heard: Turn | None = None
+        self.said: Turn | None = None
+
+    def hear(self) -> Turn | None:
+        """Return what ground stations say at this instant."""
+        return self.heard
+
+    def tell(self, turn: Turn) -> None:
+        """Take in what the vehicle says."""
+        self.said = turn
+
+    def close(self) -> None:
+        """Let go."""
+
+
+class _Silence(Status):
+    """Says nothing."""
+
+    def __init__(self) -> None:
+        super().__init__("", as_json=False)
+
+    def say(self, event: str, text: str, **facts: Any) -> None:
+        """Say nothing."""
+
+
+def parsed(command_line: Callable[[], ArgumentParser], options: Sequence[str]) -> Namespace:
+    """Read a command line.
+
+    Raises:
+        SettingError: It says something impossible.
+    """
+    said = io.StringIO()
+    try:
+        with redirect_stderr(said):
+            return command_line().parse_args(options)
+    except SystemExit as error:
+        raise SettingError(said.getvalue().strip().removeprefix("colibri: error: ")) from error
