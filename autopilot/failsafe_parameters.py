@@ -85,7 +85,6 @@ ELSEWHERE = ("COM_OF_LOSS_T", "COM_RC_LOSS_T")
 _ACTIONS: Mapping[str, str] = {
     "COM_ATT_LOSS_ACT": "Attitude loss action",
     "CBRK_FLIGHTTERM": "Tilt action",
-    "COM_ACT_FAIL_ACT": "Rotor failure action",
     "COM_POS_FS_ACT": "Position loss action",
     "COM_EST_LOSS_ACT": "Estimate loss action",
     "COM_LOW_BAT_ACT": "Battery action",
@@ -149,6 +148,7 @@ def _actions() -> list[Parameter]:
             values=_BATTERY_ACTIONS if name == "COM_LOW_BAT_ACT" else _named(row.choices),
         )
         for name, row in rows.items()
+        if name in _ACTIONS
     ]
 
 

@@ -81,6 +81,7 @@ class Row(NamedTuple):
         grounded: Whether it is watched with the rotors standing, too.
         kept: Whether it holds, once it does, until the rotors stop.
         warns: What a mere warning adds.
+        said: Whether it is said here; not where who notices it says more.
     """
 
     condition: Condition
@@ -94,6 +95,7 @@ class Row(NamedTuple):
     grounded: bool = False
     kept: bool = False
     warns: str = ""
+    said: bool = True
 
 
 _NOTHING, _WARN = (0, Action.NONE), (0, Action.WARN)
@@ -128,14 +130,15 @@ TABLE: tuple[Row, ...] = (
     ),
     Row(
         Condition.ROTOR_FAILED,
-        "the vehicle moves as with one rotor missing",
+        "the vehicle moves as with one rotor missing; it then lands on the other three, whatever is chosen",
         (),
         "",
-        "COM_ACT_FAIL_ACT",
-        (_WARN, (2, Action.LAND), (4, Action.TERMINATE)),
-        2,
+        "CA_FAILURE_MODE",
+        (_NOTHING, (1, Action.LAND)),
+        1,
         _FULL_AGAIN,
         kept=True,
+        said=False,
     ),
     Row(
         Condition.POSITION_LOST,
@@ -410,8 +413,9 @@ def _begin(begun: list[tuple[Row, Action]], flight: Flight) -> tuple[Action, lis
             said.append((WARNING, f"{row.condition}: {row.warns}" if row.warns else str(row.condition)))
         elif action > max(begins, flight.rank):
             begins = action
-            said.append((_SEVERITIES[action], f"{row.condition}: {NAMES[action]}"))
-        else:
+            if row.said:
+                said.append((_SEVERITIES[action], f"{row.condition}: {NAMES[action]}"))
+        elif row.said:
             said.append((WARNING, f"{row.condition}: {NAMES[max(begins, flight.rank)]} goes on"))
     return begins, said
 

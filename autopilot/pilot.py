@@ -17,7 +17,7 @@ from autopilot.landing import Landing, is_below, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
 from autopilot.reference import Reference, at_rest, lead, lead_along, moving_with, still_target
 from mavlink.frames import Vector
-from mavlink.services.statustext import INFO, NOTICE
+from mavlink.services.statustext import EMERGENCY, INFO, NOTICE
 
 CourseMaker: TypeAlias = Callable[[Mode, Scene], Course]
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -107,6 +107,7 @@ class Pilot:
         flights: How often the rotors were armed.
         saving: The failsafe that is flown, until somebody chooses a mode or the rotors stop.
         terminated: Whether a failsafe stopped the rotors in the air.
+        rotor_failed: Which rotor has failed, in words; empty if none has. Nothing but landing is possible then.
     """
 
     def __init__(
@@ -138,6 +139,7 @@ class Pilot:
         self.flights = 0
         self.saving = Action.NONE
         self.terminated = False
+        self.rotor_failed = ""
         self.ground_m = 0.0
         self._home_is_chosen = False
         self._course_is_chosen = False
@@ -266,13 +268,14 @@ class Pilot:
 
     def refusals(self) -> list[str]:
         """Return why the rotors may not be armed; empty if they may."""
-        return refusals(self._facts)
+        return refusals(self._facts) + ([self.rotor_failed] if self.rotor_failed else [])
 
     def arm(self, *, force: bool = False) -> Refusal | None:
         """Let the rotors turn; return why not."""
         if self.state.armed:
             return None
-        reasons = [] if force and self._vehicle is not None else self.refusals()
+        forced = force and self._vehicle is not None and not self.rotor_failed
+        reasons = [] if forced else self.refusals()
         if reasons:
             return Refusal("not armed: " + "; ".join(reasons))
         refusal = self._follow(Event.ARM, "rotors armed", met=(Need.POSITION,))  # a check of its own, and by force
@@ -335,6 +338,16 @@ class Pilot:
         stays = event in (Event.ARRIVED, Event.FINISHED)  # where the course that ends has led
         if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode and not stays:
             self._engage(self.state.mode)
+
+    def lose_rotor(self, rotor: int) -> None:
+        """Choose nothing any more: rotor 0..3 has failed, and the failsafe of that lands."""
+        self.rotor_failed = f"rotor {rotor + 1} failed"
+        self.say(EMERGENCY, f"{self.rotor_failed}: landing on three rotors")
+
+    def touch_down(self) -> None:
+        """Stand, and stop the rotors: something else than the reference tells of the ground."""
+        self._stand()
+        self._stop_rotors(Event.TOUCHED_DOWN, f"{Event.TOUCHED_DOWN}, rotors stopped")
 
     def step(self) -> Guidance:
         """Return what to follow from now on. Called once a control sample."""
@@ -447,6 +460,8 @@ class Pilot:
     def _follow(
         self, event: Event, text: str, selected: Mode | None = None, met: Sequence[Need] = ()
     ) -> Refusal | None:
+        if event is Event.SELECT and self.state.armed and self.rotor_failed:
+            return Refusal(f"{selected} refused: {self.rotor_failed}")
         missing = [need for need in self._missing() if need not in met]
         after = following(self.state, event, selected, missing)
         if isinstance(after, Refusal):

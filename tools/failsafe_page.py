@@ -78,7 +78,7 @@ stands still.
 | `COM_OBL_RC_ACT` | 0 | 5 | PX4 falls back to the pilot's sticks; in simulation nobody holds any, as a rule |
 | `NAV_RCL_ACT` | 2 | 1 | sticks here are a joystick's; who lets go of it wants the vehicle to stay |
 | `FD_FAIL_R`, `FD_FAIL_P` | 60 | 80 | the control law leans by up to 75° on its own |
-| `COM_ACT_FAIL_ACT` | 0 | 2 | a quadrotor on three rotors can do nothing but come down |
+| `CA_FAILURE_MODE` | 0 | 1 | a quadrotor on three rotors can do nothing but come down |
 | `COM_LOW_BAT_ACT` | 0 | 0 | 1, which PX4 has given up, returns when low, lands when critical |
 | `COM_FAIL_ACT_T` | 5 | - | an action begins at once; who wants to wait makes the delay longer |
 

@@ -94,10 +94,12 @@ class HeartbeatService:
 
 
 def _state(s: Snapshot) -> int:
-    """MAV_STATE: a flight that was ended for good, one that comes down or saves itself, motors that may turn, none."""
+    """MAV_STATE: a flight ended for good, one in distress, one that saves itself, motors that may turn, none of it."""
     state: int = mav.MAV_STATE_ACTIVE if s.armed else mav.MAV_STATE_STANDBY
     if s.failsafe:
-        state = mav.MAV_STATE_EMERGENCY if s.emergency else mav.MAV_STATE_CRITICAL
+        state = mav.MAV_STATE_CRITICAL
+    if s.emergency:
+        state = mav.MAV_STATE_EMERGENCY
     if s.terminated:
         state = mav.MAV_STATE_FLIGHT_TERMINATION
     return state

@@ -97,7 +97,7 @@ def test_of_all_that_begin_the_highest_is_done_and_each_is_said(wanted: dict[Con
     _, done, said = begun(wanted)
     highest = max(wanted.values(), default=Action.NONE)
     assert done is (highest if highest > Action.WARN else Action.NONE)
-    heard = [condition for condition, action in wanted.items() if action is not Action.NONE]
+    heard = [each for each, action in wanted.items() if action is Action.WARN or (action and ROWS[each].said)]
     assert sorted(text.partition(":")[0] for _, text in said) == sorted(heard)
 
 
@@ -177,7 +177,7 @@ def test_a_pilot_who_chooses_is_obeyed_until_something_else_is_lost() -> None:
 def test_on_the_ground_the_rotors_stop(condition: Condition, action: Action) -> None:
     _, done, said = begun({condition: action}, IN_FLIGHT._replace(standing=True, mode=Mode.HOLD))
     assert done is Action.TERMINATE
-    assert said == ((EMERGENCY, f"{condition}: rotors stop"),)
+    assert said == (((EMERGENCY, f"{condition}: rotors stop"),) if ROWS[condition].said else ())
 
 
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.condition)
@@ -203,6 +203,11 @@ def test_the_flight_takes_with_it_what_is_watched_in_flight_alone() -> None:
     after = following(memory, NOW_US + 8000, dict.fromkeys(Condition, 0), everything(Action.LAND), lying)
     assert set(after.memory.held_us) == {row.condition for row in TABLE if row.grounded}
     assert not any("cleared" in text for _, text in after.said)
+
+
+def test_what_somebody_else_says_is_done_without_a_word() -> None:
+    _, done, said = begun({Condition.ROTOR_FAILED: Action.LAND})
+    assert (done, said) == (Action.LAND, ())
 
 
 def test_rows_say_what_they_add_to_a_warning() -> None:

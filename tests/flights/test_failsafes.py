@@ -8,6 +8,7 @@ from msgspec import structs
 from autopilot.failsafes import Condition
 from autopilot.modes import Mode
 from mavlink.dialect import mav
+from mavlink.failures import MOTOR, OFF
 from mavlink.services.mission_items import FENCE, MissionItem
 from tests.flights.copter import ACCEPTED, DENIED, FLIGHT, Client, CopterFlight, in_the_air
 
@@ -251,13 +252,13 @@ def test_frames_that_are_missed_lead_to_what_is_set() -> None:
 
 def test_a_rotor_that_failed_leads_down() -> None:
     flight = in_the_air(5.0)
-    flight.copter.rotor_lost = 2
-    flight.run(0.1)
-    assert flies(flight, Mode.LAND)
-    assert flight.client.said("rotor failed: land")
-    flight.copter.rotor_lost = None
+    flight.run(0.4)
+    assert flight.inject(MOTOR, OFF, 2) == ACCEPTED
     flight.run(1.5)
+    assert flies(flight, Mode.LAND)
+    assert flight.client.said("rotor 2 failed: landing on three rotors")
     assert flight.copter.supervisor.holds(Condition.ROTOR_FAILED)
+    assert state_told(flight) == mav.MAV_STATE_EMERGENCY
 
 
 def test_a_control_law_that_finds_no_plan_stops() -> None:
