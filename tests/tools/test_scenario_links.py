@@ -38,6 +38,10 @@ def up_and_on(sitl: Sitl) -> None:
     sitl.run(2.0)
     sitl.kill_autopilot()
     sitl.run(0.5)
+    sitl.inject("motor", "wrong", 1, 0.9)
+    with pytest.raises(sitl.Refused):
+        sitl.inject("system_avoidance", "off")
+    sitl.run(0.1)
 
 
 def flown(launcher: Launcher | None, fly: Callable[[Sitl], object], **setting: Any) -> tuple[str, list[str]]:

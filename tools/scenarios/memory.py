@@ -8,7 +8,7 @@ from time import perf_counter
 from typing import Any
 
 from autopilot.__main__ import command_line as autopilot_command_line
-from autopilot.controller import ControllerError
+from autopilot.controller import ControllerError, DecisionError
 from autopilot.ground_process import open_ground
 from autopilot.profile import ProfileError, load_profile
 from autopilot.qp import SolverError
@@ -181,7 +181,10 @@ class MemoryAutopilot:
         frame = self._end.receive(datagram, NEVER_LATE_S)
         if frame is not None:
             self._copter.hear(self._end.aside)
-            step = self._copter.step(frame)
+            try:
+                step = self._copter.step(frame)
+            except DecisionError as error:
+                raise StageError(f"the autopilot ended: {error}") from error
             self._end.answer(step.command, step.faults)
 
     def listen(self) -> list[bytes]:
@@ -189,7 +192,13 @@ class MemoryAutopilot:
         return self._end.take_outbox()
 
     def answer(self) -> bytes:
-        """Return its answer to the frame."""
+        """Return its answer to the frame.
+
+        Raises:
+            StageError: It was shut down.
+        """
+        if self._ground.shut_down:
+            raise StageError("the autopilot ended with exit code 0")
         (answer,) = self._end.take_outbox()
         return answer
 

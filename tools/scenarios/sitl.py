@@ -344,7 +344,7 @@ class Sitl:
         """Have the plant fail from the next frame on, as MAV_CMD_INJECT_FAILURE says it, whatever the autopilot thinks.
 
         Args:
-            unit: FAILURE_UNIT by number, or by name: "motor", "sensor_gps".
+            unit: FAILURE_UNIT by number, or by name: "motor", "gps", "battery".
             kind: FAILURE_TYPE by number, or by name: "off", "stuck", "ok".
             instance: Which one, from 1 on; 0 for all.
             values: Parameters 4 to 7.
@@ -492,8 +492,8 @@ class Sitl:
 def _number(kind: str, of: str | int) -> int:
     if isinstance(of, int):
         return of
-    name = f"{kind}_{of.upper()}"
-    number = getattr(mav, name, None)
-    if number is None:
-        raise ValueError(f"MAVLink has no {name}")
-    return int(number)
+    for part in ("", "SYSTEM_", "SENSOR_"):
+        number = getattr(mav, f"{kind}_{part}{of.upper()}", None)
+        if number is not None:
+            return int(number)
+    raise ValueError(f"MAVLink has no {kind}_{of.upper()}")

@@ -169,6 +169,8 @@ class Stage:
             said = self._autopilot.said()
             heard = self._plant.frame()
         self._frame, self.truth = self._taken_in(heard)
+        if injected:
+            self._hear(self._frame)
         return Instant(began, self._command(answer), said, frame, answer)
 
     def _struggle(self, frame: bytes, turn: Turn, injected: bytes) -> tuple[bytes, Turn, list[bytes]]:
@@ -266,12 +268,11 @@ def answers(datagram: bytes, time_us: int) -> bool:
 
 def parted(datagram: bytes) -> tuple[bytes, bytes]:
     """Return what of a plant's datagram is for the autopilot, and the truth behind it."""
-    at = 0
+    told: list[bytes] = []
+    truth: list[bytes] = []
     for frame in frames_of(datagram):
-        if frame[_COMPONENT_AT] == TRUTH_COMPONENT:
-            break
-        at += len(frame)
-    return datagram[:at], datagram[at:]
+        (truth if frame[_COMPONENT_AT] == TRUTH_COMPONENT else told).append(frame)
+    return b"".join(told), b"".join(truth)
 
 
 def _us(time_s: float) -> int:
