@@ -1,0 +1,15 @@
+"""Scenarios, by group."""
+
+from collections.abc import Mapping, Sequence
+
+from tests.sitl import arming, holding, missions, offboard, takeoff_land, tracking
+from tests.sitl.scenario import FleetScenario, Scenario
+
+GROUPS: Mapping[str, Sequence[Scenario | FleetScenario]] = {
+    "arming": arming.SCENARIOS,
+    "takeoff-land": takeoff_land.SCENARIOS,
+    "hold-wind": holding.SCENARIOS,
+    "tracking": tracking.SCENARIOS,
+    "mission": missions.SCENARIOS,
+    "offboard": offboard.SCENARIOS,
+}
