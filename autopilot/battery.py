@@ -1,6 +1,6 @@
 """The battery as the vehicle file has it: the charge that the rotors took, and how fast they can turn on the rest.
 
-Nothing in a frame tells the voltage, so it is followed as the rotors are: V = V0 - R I, V0 falling linearly with the
+No frame tells the voltage, so it is followed as the rotors are: V = V0 - R I, V0 falling linearly with the
 charge taken, and the rotors' top speed in proportion to V.
 """
 
@@ -12,6 +12,21 @@ from plant.vehicle import Battery, Vehicle
 _SECONDS_PER_HOUR = 3600.0
 _INTERVALS = 100
 _BISECTIONS = 40
+_APART = 0.02
+"""Model and battery may differ by this part of the charge; the model is the smoother of both."""
+
+
+def believed(model_ah: float, told_ah: float, vehicle: Vehicle) -> float:
+    """Return the charge taken, Ah, that is believed where a model and the battery itself say different things.
+
+    Args:
+        model_ah: What the model has counted.
+        told_ah: What the battery says.
+        vehicle: Whose battery it is.
+    """
+    if vehicle.battery is None:
+        return model_ah
+    return told_ah if abs(told_ah - model_ah) > _APART * vehicle.battery.capacity_ah else model_ah
 
 
 class BatteryModel:

@@ -36,6 +36,7 @@ class Behaviour:
         follow_angle_deg: Where from, clockwise from ahead of it: 180 is behind.
         follow_altitude_mode: Of PX4's FLW_TGT_ALT_M: 0 above home.
         inject_failures: Whether MAV_CMD_INJECT_FAILURE is obeyed.
+        solve_time_s: That the control law is declared to take; 0 none.
     """
 
     limits: Limits = _LIMITS
@@ -60,3 +61,4 @@ class Behaviour:
     follow_angle_deg: float = 180.0
     follow_altitude_mode: int = 0
     inject_failures: bool = False
+    solve_time_s: float = 0.0

@@ -118,6 +118,11 @@ ROWS = (
         values=_YES_OR_NO,
     ),
     Row(
+        *("SIM_SOLVE_MS", "solve_time_s", "ms", 0.0, 100.0, "Declared solve time"),
+        "Simulated: what the control law decides takes effect so much later; samples due meanwhile are skipped.",
+        *(1e-3, 1),
+    ),
+    Row(
         *("TRACK", "track", "", 0, len(TRACKS) - 1, "Track", "Which track mode Track flies."),
         values=tuple(enumerate(TRACKS)),
     ),
@@ -230,6 +235,7 @@ _GROUPS = {
     "ORBIT": "Flight",
     "FLW": "Follow",
     "SYS": "System",
+    "SIM": "System",
     "TRACK": "Flight",
     "CAL": "System",
     "MAV": "System",

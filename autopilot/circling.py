@@ -22,12 +22,13 @@ class Round(Endless):
     """Around a centre: to the nearest point of the circle, then along it. On the circle already, it goes on at once.
 
     Attributes:
+        order: What it flies: by this it can begin again.
         turns: How often it went around.
     """
 
     def __init__(self, order: Circle, scene: Scene) -> None:
         """Begin where the reference is."""
-        self._order = order
+        self.order = order
         self._radius_m = abs(order.radius_m)
         self._turn = -copysign(1.0, order.radius_m)
         self._first_yaw_rad = scene.yaw_rad
@@ -55,7 +56,7 @@ class Round(Endless):
 
     def _angle_of(self, place: Vector) -> float:
         """Return where a place is seen from the centre, counter-clockwise from east; its own place counts as east."""
-        return atan2(place[1] - self._order.center_enu_m[1], place[0] - self._order.center_enu_m[0])
+        return atan2(place[1] - self.order.center_enu_m[1], place[0] - self.order.center_enu_m[0])
 
     def _rate_of(self, scene: Scene) -> float:
         """Return how fast the reference goes around, rad/s, counter-clockwise."""
@@ -69,7 +70,7 @@ class Round(Endless):
 
     def _joins(self, scene: Scene) -> bool:
         """Whether the reference is on the circle, and not about to leave it but along it."""
-        east, north, above = (p - c for p, c in zip(scene.place, self._order.center_enu_m, strict=True))
+        east, north, above = (p - c for p, c in zip(scene.place, self.order.center_enu_m, strict=True))
         away = hypot(east, north)
         if abs(away - self._radius_m) > _ON_IT_M or abs(above) > _ON_IT_M:
             return False
@@ -77,7 +78,7 @@ class Round(Endless):
         return abs(vx * east + vy * north) < _ON_IT_M_S * away and abs(vz) < _ON_IT_M_S
 
     def _speed_m_s(self, scene: Scene) -> float:
-        behaviour, asked = scene.behaviour, self._order.speed_m_s
+        behaviour, asked = scene.behaviour, self.order.speed_m_s
         wanted = behaviour.limits.speed_m_s if asked is None else asked
         return min(wanted, behaviour.fastest_m_s, sqrt(_SHARE * behaviour.limits.acceleration_m_s2 * self._radius_m))
 
@@ -87,12 +88,12 @@ class Round(Endless):
         for order in range(5):
             motion[:, order, 0], motion[:, order, 1] = spoke.real, spoke.imag
             spoke = spoke * 1j * rate
-        motion[:, 0] += self._order.center_enu_m
+        motion[:, 0] += self.order.center_enu_m
         return motion
 
     def _heading(self, angles: Array, rate: float) -> Array:
         heading = np.zeros((len(angles), 3))
-        behaviour = self._order.yaw_behaviour
+        behaviour = self.order.yaw_behaviour
         if behaviour in (mav.ORBIT_YAW_BEHAVIOUR_HOLD_INITIAL_HEADING, mav.ORBIT_YAW_BEHAVIOUR_UNCHANGED):
             heading[:, 0] = self._first_yaw_rad
         elif behaviour == mav.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TANGENT_TO_CIRCLE:

@@ -36,10 +36,11 @@ class UdpConductor:
     """A conductor in another process."""
 
     def __init__(self, link: UdpLink, ended: Callable[[], object]) -> None:
-        """Speak with it on `link` until this process has `ended`."""
+        """Speak with it on `link`, which it learns from an empty packet, until this process has `ended`."""
         self._link = link
         self._ended = ended
         self._gathering = Gathering()
+        link.send(b"")
 
     def hear(self) -> Turn | None:
         """Wait for its turn."""

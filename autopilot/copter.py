@@ -9,33 +9,36 @@ from autopilot.attitude_reference import DEFAULT_LIMITS, AttitudeLimits, Attitud
 from autopilot.behaviour import Behaviour
 from autopilot.companion import Companion
 from autopilot.controller import Clock, Decision, VehicleState
-from autopilot.core import STILL, Step
+from autopilot.core import STILL, Step, follows
 from autopilot.course import Course, Scene, Steered
-from autopilot.courses import Along, Climb, Stop, homeward, landing, to_track
+from autopilot.courses import Along, Climb, Legs, Stop, homeward, landing, to_track
 from autopilot.health_watch import HealthWatch, not_known
 from autopilot.instants import instants
+from autopilot.kept import Kept, Past, course_again, course_record, goes_on, maker_of
 from autopilot.leader import Following
 from autopilot.leaning import AltitudeSticks, Stabilized
 from autopilot.loop import ControlLoop
 from autopilot.modes import MANUAL, Event, Mode, Need
 from autopilot.orders import Land
 from autopilot.parameters import Numbers, behaviour, definitions
-from autopilot.pilot import Guidance, Pilot
+from autopilot.pilot import RESTS, Guidance, Pilot
 from autopilot.planner import Planner, plan, start_yaw
 from autopilot.power import PowerMeter
 from autopilot.profile import Profile
 from autopilot.reference import Reference, target_of
 from autopilot.senses import Estimator, Senses
 from autopilot.snapshots import Photographer
+from autopilot.solve_time import SolveTime
 from autopilot.stations import REBOOT, Stations, StationSettings
 from autopilot.sticks import PositionSticks
 from autopilot.tracks import Track, track
 from autopilot.tuning import Tuning, builder
+from mavlink.aside import NOTHING, Aside
 from mavlink.hil import ActuatorCommand, StateFrame
 from mavlink.hub import Outgoing
 from mavlink.parameters import Parameters, Value
 from mavlink.sensors import Frame
-from mavlink.services.statustext import INFO
+from mavlink.services.statustext import INFO, WARNING
 from mavlink.setpoints import OffboardSetpoint, Sticks
 from plant.vehicle import Vehicle
 
@@ -68,6 +71,7 @@ class Copter:
         stations: What ground stations see and say.
         power: The battery, as far as the autopilot knows.
         solve_time_s: Of the last QP.
+        samples: How many control samples ground stations were told of.
     """
 
     def __init__(
@@ -80,6 +84,7 @@ class Copter:
         values: dict[str, Value] | None = None,
         first: Track | None = None,
         estimator: Estimator | None = None,
+        past: Past | None = None,
     ) -> None:
         """Fly `vehicle` by `profile`; `clock` only measures, it decides nothing.
 
@@ -92,6 +97,7 @@ class Copter:
             first: A track that is flown from time 0 on, the vehicle being in the air; None: it stands, or is picked
                 up in hold.
             estimator: Makes what turns frames of sensors into states; None: frames are states.
+            past: Of a flight in which an autopilot was killed; it goes on if the first frame is of the same flight.
 
         Raises:
             ControllerError: The profile's control law cannot be used.
@@ -121,13 +127,32 @@ class Copter:
         self.pilot = Pilot(self._instants, flies_by, self._course, self._missing)
         self.stations = Stations(settings, self.pilot, self.parameters)
         self.power = PowerMeter(believed)
+        self._solving = SolveTime(self._loop.control_interval_us)
+        self._aside = NOTHING
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
+        self._maker = maker_of(profile, vehicle)
+        self._past = past
+        self._wakes = past is not None
+        self._resumed_us: int | None = None
+        self.samples = 0
         self._time_us: int | None = None
-        self._controls = STILL
+        self._decision: Decision | None = None
         self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
         self._step_time_s = 0.0
         self.solve_time_s = 0.0
+
+    @property
+    def deadlines_missed(self) -> int:
+        """How many decisions have taken longer than a control interval, in simulated time."""
+        return self._solving.missed
+
+    def hear(self, aside: Aside) -> None:
+        """Take in what the plant tells beside the frame of the next step."""
+        self._aside = aside
+        if aside.battery is not None:
+            self._loop.know_charge(aside.battery.used_ah)
+            self.power.hear(aside.battery)
 
     def step(self, frame: Frame) -> Step:
         """Answer a frame of the plant; on sensors nothing is known, and nobody served, before the first estimate.
@@ -136,14 +161,16 @@ class Copter:
             DecisionError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
+        if self._wakes:
+            self._wake(frame.time_us)
         due = self._loop.is_due(frame.time_us)
-        follows = self._time_us is not None and frame.time_us == self._time_us + self.frame_interval_us
-        known = self._senses.state(frame, asked=due or not follows)
+        goes_on = follows(frame.time_us, self._time_us, self.frame_interval_us)
+        known = self._senses.state(frame, asked=due or not goes_on)
         if known is None:
             if self._time_us is not None:  # another flight, of which nothing is known yet
                 self.stations.restart = REBOOT
             return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
-        if not follows:
+        if not goes_on:
             self._begin(known)
         self._time_us = frame.time_us
         decision = None
@@ -152,10 +179,13 @@ class Copter:
             self._sense(frame.time_us, state)
             guidance = self.pilot.step()
             decision = self._decide(frame.time_us, state, guidance)
-            self._sample = (frame.time_us, state, guidance, decision)
-        command = ActuatorCommand(frame.time_us, self._controls, armed=self.pilot.state.armed)
+            if not self._solving.busy(frame.time_us) or decision is not None:
+                self._decision = decision
+            self._sample = (frame.time_us, state, guidance, self._decision)
+        command = ActuatorCommand(frame.time_us, self._solving.controls(frame.time_us), armed=self.pilot.state.armed)
         self._step_time_s = self._clock() - started_s
-        return Step(command, decision, self._step_time_s, self._senses.estimate if due else None)
+        estimate = self._senses.estimate if due else None
+        return Step(command, decision, self._step_time_s, estimate, self.stations.failures.take())
 
     def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
         """Hear ground stations, and return what to send them; after each `step`, while the plant integrates."""
@@ -165,6 +195,8 @@ class Copter:
         if self._sample is not None:
             sample, self._sample = self._sample, None
             self._report(*sample)
+        self.stations.hear_plant(self._aside, now_us)
+        self._aside = NOTHING
         hub = self.stations.hub
         for datagram, link, address, loopback in inbox:
             hub.receive(datagram, link, address, now_us, loopback=loopback)
@@ -172,8 +204,68 @@ class Copter:
             self._adopt()
         return self.stations.poll(now_us)
 
+    def record(self) -> Kept | None:
+        """Return what the flight needs to go on after a restart; None as long as nothing is known of it."""
+        if self._time_us is None:
+            return None
+        missions, power = self.stations.missions, self.power
+        return Kept(
+            self._maker,
+            self._time_us,
+            self.stations.commands.origin,
+            missions.ids,
+            missions.executor.record(),
+            self.pilot.record(),
+            course_record(self.pilot.course),
+            self._loop.record(),
+            power.charge_ah,
+            power.energy_wh,
+            self._senses.record(),
+        )
+
+    def _wake(self, time_us: int) -> None:
+        """Have the estimator go on before it sees the first frame."""
+        self._wakes = False
+        if self._past is not None and self._past.kept.senses:
+            self._senses.resume(self._past.kept.senses, time_us)
+
+    def _resume(self, past: Past, frame: StateFrame) -> None:
+        """Go on with the flight in which the autopilot was killed."""
+        kept, plans = past
+        stations, pilot = self.stations, self.pilot
+        closely = kept.is_close_to(frame.time_us) and kept.maker == self._maker
+        self._loop.resume(kept.loop, closely=closely)
+        self.power.resume(kept.charge_ah, kept.energy_wh)
+        stations.commands.origin = kept.origin
+        stations.missions.resume(plans, kept.plan_ids, kept.mission)
+        if kept.pilot.mode is not Mode.TRACK or kept.course.began_us != 0:
+            self._first = None
+        self._resumed_us = frame.time_us
+
+        def again(mode: Mode, scene: Scene) -> Course:
+            began_us = kept.course.began_us
+            if mode is Mode.TRACK and self._first is None and began_us is not None:
+                chosen = track(scene.behaviour.track)
+                return Along(plan(chosen, self._references, self._instants.preview), chosen.duration_s, began_us)
+            if mode is Mode.MISSION:
+                return stations.missions.course(kept.course.turns, kept.course.legs)
+            course = course_again(mode, kept.course, scene) or self._course(mode, scene)
+            return course.skip(kept.course.legs) if isinstance(course, Legs) else course
+
+        pilot.resume(frame.time_us, self._loop.state(frame), kept.pilot, again, closely=closely)
+        stations.missions.moved_origin()
+        self._controls = self._loop.controls if pilot.state.armed and not pilot.idles else STILL
+        stations.say(INFO, stations.banner())
+        if pilot.state.armed:
+            how = goes_on(pilot.state.mode, stations.missions.executor.progress.seq)
+            stations.say(WARNING, f"restarted in flight: {how}")
+
     def _begin(self, frame: StateFrame) -> None:
         """See the vehicle for the first time, or anew after frames were missed."""
+        past, self._past = self._past, None
+        if past is not None and past.kept.is_followed_by(frame.time_us):
+            self._resume(past, frame)
+            return
         loop, hover_speed = self._loop, self._loop.vehicle.hover_speed
         if self._time_us is not None and frame.time_us > self._time_us:
             loop.begin(hover_speed, loop.state(frame).euler[2])
@@ -186,7 +278,7 @@ class Copter:
             speed = loop.vehicle.rotors.idle_speed
         loop.begin(speed, self._first_yaw())
         self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None, rests=rests)
-        self._controls = STILL if self.pilot.standing else loop.controls
+        self._solving.at_once(STILL if self.pilot.standing else loop.controls)
         self.stations.say(INFO, self.stations.banner())
 
     def _first_yaw(self) -> float:
@@ -198,10 +290,15 @@ class Copter:
         sticks, setpoint = self._heard(now_us)
         pilot.sense(now_us, state, Steered(sticks, setpoint, stations.follow.latest(now_us, _LEADER_LOST_US)))
         if pilot.state.armed:
-            if pilot.state.mode is Mode.OFFBOARD and setpoint is None:
+            mode, behaviour = pilot.state.mode, pilot.behaviour
+            if mode is Mode.OFFBOARD and setpoint is None and self._listened(now_us, behaviour.setpoints_lost_s):
                 pilot.happened(Event.SETPOINTS_LOST)
-            elif pilot.state.mode in MANUAL and sticks is None:
+            elif mode in MANUAL and sticks is None and self._listened(now_us, behaviour.sticks_lost_s):
                 pilot.happened(Event.STICKS_LOST)
+
+    def _listened(self, now_us: int, seconds: float) -> bool:
+        """Whether it was listened for so long: not if the autopilot was restarted only now."""
+        return self._resumed_us is None or now_us - self._resumed_us > seconds * 1e6
 
     def _take_stock(self, state: VehicleState) -> None:
         """Take in what orders of ground stations are judged by."""
@@ -240,27 +337,29 @@ class Copter:
         loop = self._loop
         if guidance.begins:
             loop.begin(loop.vehicle.rotors.idle_speed, state.euler[2], afresh=False)
+        elif guidance is not RESTS and self._solving.busy(now_us):
+            return None
         if guidance.horizon is not None:
             decision = loop.decide(now_us, state, guidance.horizon)
         elif guidance.attitude is not None:
             decision = loop.decide_attitude(now_us, state, guidance.attitude)
         else:
-            self._controls = STILL
+            self._solving.at_once(STILL)
             return None
-        self._controls = loop.controls
+        self._solving.decided(loop.controls, now_us, round(self.pilot.behaviour.solve_time_s * 1e6))
         self.solve_time_s = decision.diagnostics.solve_time_s
         return decision
 
     def _report(self, now_us: int, state: VehicleState, guidance: Guidance, decision: Decision | None) -> None:
         pilot, stations = self.pilot, self.stations
+        self.samples += 1
         self._take_stock(state)
-        self._senses.gps_off = stations.failures.gps_off
         if self._senses.estimate is not None:
             for severity, line in self._health.lines(self._senses.estimate.health):
                 stations.say(severity, line)
         idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
         least = idle if pilot.state.armed else 0.0
-        c1, c2, c3, c4 = (max(control, least) for control in self._controls)
+        c1, c2, c3, c4 = (max(control, least) for control in self._solving.controls(now_us))
         self.power.run((c1, c2, c3, c4), self._interval_s)
         stations.missions.watch_mode(pilot.state.mode)
         stations.update(

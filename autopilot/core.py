@@ -9,6 +9,8 @@ from autopilot.planner import plan
 from autopilot.profile import Profile
 from autopilot.senses import Estimator, Senses
 from autopilot.tracks import Track
+from mavlink.aside import Aside
+from mavlink.failures import Fault
 from mavlink.hil import ActuatorCommand
 from mavlink.sensors import Frame
 from plant.vehicle import Vehicle
@@ -17,17 +19,27 @@ STILL = (0.0, 0.0, 0.0, 0.0)
 """Rotors that stand."""
 
 
+MISSED_US = 100_000
+"""Frames of so long a time may be missing: what is known of the rotors still holds, more or less."""
+
+
+def follows(time_us: int, before_us: int | None, interval_us: int) -> bool:
+    """Whether a frame goes on from the one before, where they come every `interval_us`."""
+    return before_us is not None and 0 < time_us - before_us <= max(interval_us, MISSED_US)
+
+
 class Step(NamedTuple):
     """The answer to a frame: the command to send, the decision behind it, and how long it took.
 
     Between two control samples the last command is sent again, and there is no decision. Where the state is told, there
-    is no estimate.
+    is no estimate. Faults are what the plant is asked to have happen with the command.
     """
 
     command: ActuatorCommand
     decision: Decision | None
     duration_s: float
     estimate: Estimate | None = None
+    faults: tuple[Fault, ...] = ()
 
 
 class Autopilot:
@@ -62,11 +74,17 @@ class Autopilot:
         self.frame_interval_us = self._loop.frame_interval_us
         self._senses = Senses(estimator, self.frame_interval_us)
 
+    def hear(self, aside: Aside) -> None:
+        """Take in what the plant tells beside the frame of the next step."""
+        if aside.battery is not None:
+            self._loop.know_charge(aside.battery.used_ah)
+
     def step(self, frame: Frame) -> Step:
         """Answer a frame.
 
-        Frames follow one another at the frame interval. One that does not begins a new flight: with the profile's
-        rotor speed at time 0, and with hover in mid-flight, where nothing is known of the rotors. On sensors a flight
+        Frames follow one another at the frame interval; a plant that runs freely may lose a few. One that comes much
+        later, or earlier, begins a new flight: with the profile's rotor speed at time 0, and with hover in mid-flight,
+        where nothing is known of the rotors. On sensors a flight
         begins with the first estimate, of a vehicle that stands; until then it is not armed.
 
         Raises:
@@ -78,7 +96,7 @@ class Autopilot:
         if known is None:
             self._time_us = None
             return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
-        if self._time_us is None or frame.time_us != self._time_us + self.frame_interval_us:
+        if not follows(frame.time_us, self._time_us, self.frame_interval_us):
             self._begin(frame)
         self._time_us = frame.time_us
         decision = None

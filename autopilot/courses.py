@@ -5,7 +5,7 @@ from math import atan2, dist, hypot
 from typing import TypeAlias
 
 from autopilot.course import Asked, Course, Endless, Motion, Planned, Scene
-from autopilot.orders import GoTo, Land
+from autopilot.orders import GoTo, Hold, Land, Order, TakeOff
 from autopilot.planner import Planner
 from autopilot.reference import Kind, still_target
 from mavlink.frames import Vector
@@ -34,6 +34,11 @@ class Way:
         along = atan2(north, east) if hypot(east, north) > _ALONG_BEYOND_M else scene.yaw_rad
         self._yaw_rad = along if order.yaw_rad is None else order.yaw_rad
 
+    @property
+    def order(self) -> GoTo:
+        """What it flies: by this it can begin again."""
+        return GoTo(self._place, self._yaw_rad, self._speed_m_s)
+
     def ask(self, scene: Scene) -> Motion:
         """Return the place."""
         limits = scene.behaviour.limits
@@ -53,6 +58,11 @@ class Stop:
         """Begin to brake."""
         self._place: Vector | None = None
         self._yaw_rad = 0.0
+
+    @property
+    def order(self) -> Order:
+        """What it flies: by this it can begin again."""
+        return Hold() if self._place is None else GoTo(self._place, self._yaw_rad)
 
     def ask(self, scene: Scene) -> Motion:
         """Return rest: of the velocity first, then of the place that it led to."""
@@ -81,6 +91,11 @@ class Climb:
         self._yaw_rad = scene.yaw_rad if yaw_rad is None else yaw_rad
         self._speed_m_s = speed_m_s
         self._way: Way | None = None
+
+    @property
+    def order(self) -> TakeOff:
+        """What it flies: by this it can begin again."""
+        return TakeOff(self._height_m, self._yaw_rad)
 
     def ask(self, scene: Scene) -> Motion:
         """Return the height, and rest in the plane until that is reached."""
@@ -120,26 +135,51 @@ class Sink(Endless):
 
 
 class Legs:
-    """Courses one after another, each from where the one before has led."""
+    """Courses one after another, each from where the one before has led.
+
+    Attributes:
+        course: The one that is flown; None before the first sample.
+    """
 
     def __init__(self, first: Leg, *others: Leg) -> None:
         """Begin with the first at the first sample."""
         self._ahead = [first, *others]
-        self._course: Course | None = None
+        self._inner: tuple[int, ...] = ()
+        self.course: Course | None = None
+
+    @property
+    def left(self) -> tuple[int, ...]:
+        """How many legs are left from the one that is flown on; then the same of that, where it has legs itself."""
+        inner = self.course.left if isinstance(self.course, Legs) else ()
+        return (len(self._ahead) + (self.course is not None), *inner)
+
+    def skip(self, left: tuple[int, ...]) -> "Legs":
+        """Begin with the leg after which so many are left, itself among them; return this."""
+        if left:
+            self._ahead = self._ahead[max(len(self._ahead) - left[0], 0) :]
+            self._inner = left[1:]
+        return self
 
     def ask(self, scene: Scene) -> Asked:
         """Return what the leg that is flown now asks for."""
-        if self._course is None or (self._ahead and self._course.arrived(scene)):
-            self._course = self._ahead.pop(0)(scene)
-        return self._course.ask(scene)
+        if self.course is None or (self._ahead and self.course.arrived(scene)):
+            self.course = self._ahead.pop(0)(scene)
+            if isinstance(self.course, Legs):
+                self.course.skip(self._inner)
+            self._inner = ()
+        return self.course.ask(scene)
 
     def arrived(self, scene: Scene) -> bool:
         """Whether the last leg is flown to its end."""
-        return not self._ahead and self._course is not None and self._course.arrived(scene)
+        return not self._ahead and self.course is not None and self.course.arrived(scene)
 
 
 class Along:
-    """A track, from a moment on; past its end, its last point."""
+    """A track, from a moment on; past its end, its last point.
+
+    Attributes:
+        began_us: That moment.
+    """
 
     def __init__(
         self, planner: Planner, duration_s: float, began_us: int, planner_for_law: Planner | None = None
@@ -151,20 +191,20 @@ class Along:
         self._planner = planner
         self._planner_for_law = planner_for_law
         self._duration_s = duration_s
-        self._began_us = began_us
+        self.began_us = began_us
 
     def ask(self, scene: Scene) -> Planned:
         """Return the track."""
-        since_us = scene.now_us - self._began_us
+        since_us = scene.now_us - self.began_us
         for_law = self._planner_for_law.horizon(since_us) if self._planner_for_law else None
         return Planned(self._planner.horizon(since_us), scene.behaviour.limits, for_law)
 
     def arrived(self, scene: Scene) -> bool:
         """Whether the track has ended."""
-        return scene.now_us - self._began_us > self._duration_s * 1e6
+        return scene.now_us - self.began_us > self._duration_s * 1e6
 
 
-def landing(order: Land) -> Course:
+def landing(order: Land) -> Legs:
     """Return how to land: above the place first, or at rest, then down."""
     place, yaw_rad = order
     if place is None:
@@ -176,7 +216,7 @@ def landing(order: Land) -> Course:
     )
 
 
-def homeward(scene: Scene) -> Course:
+def homeward(scene: Scene) -> Legs:
     """Return how to return: up where home is far, there, and down.
 
     Nothing holds a return back, neither the geofence nor how far it is: there is no better place to go.
@@ -189,7 +229,7 @@ def homeward(scene: Scene) -> Course:
     return Legs(lambda begin: Climb(high_m, None, begin), lambda _: down)
 
 
-def to_track(planner: Planner, duration_s: float) -> Course:
+def to_track(planner: Planner, duration_s: float) -> Legs:
     """Return how to fly a track from wherever the vehicle is: up to its first point's height, there, and along it."""
     first = planner.horizon(0)
     x, y, z = first.position_enu_m[0].tolist()

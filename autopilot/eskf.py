@@ -7,7 +7,7 @@ pressure it is the offset of the barometer, and height stays; for GPS it is posi
 
 from collections.abc import Callable
 from math import inf, isfinite, nan, radians
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,22 @@ _STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)
 """By how much the field may differ from the earth's in strength and inclination."""
 _IRON_WALK_GAUSS = 1e-5
 _DOUBTED_M, _DOUBTED_M_S, _DOUBTED_GAUSS = 100.0, 10.0, 0.3
+
+
+class KindRecord(NamedTuple):
+    """When a kind of measurement was last believed, since when it is not, and how often it had to be."""
+
+    accepted_us: int
+    rejected_us: int | None
+    resets: int
+
+
+class FilterRecord(NamedTuple):
+    """A filter as plain data: state, covariance, and the kinds of what is measured."""
+
+    x: Array
+    P: Array
+    kinds: list[KindRecord]
 
 
 class Kind:
@@ -206,6 +222,20 @@ class Filter:
             gain = variance / (variance + rate)
             x[10 + i] = gain * aligned.rate[i]
             P[GYRO_BIAS + i, GYRO_BIAS + i] = gain * rate
+
+    def record(self) -> FilterRecord:
+        """Return state, covariance and what was believed."""
+        kinds = [KindRecord(kind.accepted_us, kind.rejected_us, kind.resets) for kind in self.kinds]
+        return FilterRecord(self.x, self.P, kinds)
+
+    def resume(self, record: FilterRecord) -> bool:
+        """Go on from a record; return whether it is one of such a filter."""
+        if (record.x.shape, record.P.shape, len(record.kinds)) != (self.x.shape, self.P.shape, len(self.kinds)):
+            return False
+        self.x[:], self.P[:] = record.x, record.P
+        for kind, (accepted_us, rejected_us, resets) in zip(self.kinds, record.kinds, strict=True):
+            kind.accepted_us, kind.rejected_us, kind.resets = accepted_us, rejected_us, resets
+        return True
 
     def predict(self, samples: Array, row: int) -> None:
         """Go on by one sample of many."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from autopilot.alignment import Aligned, Alignment
 from autopilot.blending import Blending
-from autopilot.eskf import Filter
+from autopilot.eskf import Array, Filter, FilterRecord
 from autopilot.eskf_predict import SAMPLE, look_ahead
 from autopilot.estimate import Check, Estimate, Health, Reason, Source
 from autopilot.inertial import Inertial, Reading, sample_between
@@ -26,6 +26,7 @@ from mavlink.frames import Vector
 from mavlink.geodesy import Geodetic, enu_of
 from mavlink.hil import StateFrame
 from mavlink.magnetic_field import field_enu_gauss
+from mavlink.plain import of_bytes, to_bytes
 from mavlink.sensors import GpsFix, SensorFrame, Updated
 from plant.vehicle import Sensors
 
@@ -58,6 +59,32 @@ class _Waiting(NamedTuple):
     time_us: int
     field: Vector | None
     pressure_pa: float | None
+
+
+class EstimatorRecord(NamedTuple):
+    """What an estimator needs to go on after a restart, as plain data.
+
+    Attributes:
+        time_us: Of the last frame.
+        filter_us: The filter's time.
+        filter: The filter.
+        samples: The ring, whose first sample that waits is row `first`.
+        waiting: What was measured at the ends of the samples that wait.
+        reading: Of the last frame.
+        fix_us: Time of the last fix that was taken; None before the first.
+        position_m, velocity_m_s: What is still to be given in of the last corrections.
+    """
+
+    time_us: int
+    filter_us: int
+    filter: FilterRecord
+    samples: Array
+    first: int
+    waiting: list[_Waiting]
+    reading: Reading
+    fix_us: int | None
+    position_m: Vector
+    velocity_m_s: Vector
 
 
 class Estimator:
@@ -120,6 +147,52 @@ class Estimator:
         if not asked and self._estimate is not None:
             return self._estimate
         return self._publish(frame.time_us)
+
+    def record(self) -> bytes:
+        """Return what is needed to go on after a restart; empty before the first estimate."""
+        if self._estimate is None or self._time_us is None:
+            return b""
+        return to_bytes(
+            EstimatorRecord(
+                self._time_us,
+                self.filter_us,
+                self.filter.record(),
+                self._samples,
+                self._first,
+                list(self._waiting),
+                self._reading,
+                self._gps_watch.time_us,
+                self._blending.position_m,
+                self._blending.velocity_m_s,
+            )
+        )
+
+    def resume(self, record: bytes, time_us: int) -> bool:
+        """Go on from a record, the next frame being of `time_us`; return whether that can be.
+
+        A frame that came before, and whose answer was lost with the process, comes again.
+        """
+        kept = of_bytes(EstimatorRecord, record)
+        if (
+            kept is None
+            or not 0 <= time_us - kept.time_us <= LONGEST_GAP_US
+            or kept.samples.shape != self._samples.shape
+        ):
+            return False
+        if not self.filter.resume(kept.filter):
+            return False
+        self._samples[:], self._first = kept.samples, kept.first
+        self._waiting.clear()
+        self._waiting.extend(kept.waiting)
+        self.filter_us, self._reading, self._gps_watch.time_us = kept.filter_us, kept.reading, kept.fix_us
+        self._blending.position_m, self._blending.velocity_m_s = kept.position_m, kept.velocity_m_s
+        self._time_us = self._published_us = kept.time_us
+        if self._publish(kept.time_us) is None:
+            return False
+        if time_us == kept.time_us and self._waiting:
+            self._waiting.pop()
+            self._time_us -= self._interval_us
+        return True
 
     def _restart(self) -> None:
         """Forget everything but what was counted."""

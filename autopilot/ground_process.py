@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from autopilot.conducted import ConductedLinks, Conductor
 from autopilot.copter import Copter, Received
 from autopilot.ground_links import GroundLinks, open_links
+from autopilot.kept import Kept, Past
 from autopilot.parameters import ImpossibleError, definitions
 from autopilot.profile import Profile
 from autopilot.senses import Estimator
@@ -19,9 +20,12 @@ from mavlink.files import Quota
 from mavlink.folder import Folder
 from mavlink.link import LinkError
 from mavlink.parameters import Parameters, Value
+from mavlink.plain import of_bytes, to_bytes
 from mavlink.process import Status
+from mavlink.services.mission_items import MissionItem
 from mavlink.services.parameter_file import ParameterFileError, read, write
 from mavlink.signing import Signing, SigningError, parse_key, tick_at
+from mavlink.slots import Slots
 from plant.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -31,9 +35,13 @@ KEY = "signing.key"
 TIMESTAMP = "signing.timestamp"
 FILES = "files"
 LOGS = "logs"
+FLIGHT = "flight"
+PLANS = "plans"
 LOG_QUOTA = Quota(512 << 20, 200)
 _TELL_EVERY_S = 0.5
 _SAVE_EVERY_S = 10.0
+_STANDING_SAMPLES = 50
+"""A vehicle that is not armed loses nothing in that many control samples."""
 
 
 class GroundError(LinkError):
@@ -72,11 +80,14 @@ class Ground:
         try:
             self._folder = Folder(self._state / FILES) if self._state else None
             self._logs = Folder(self._state / LOGS, LOG_QUOTA) if self._state else None
+            self._flight = Slots(self._state / FLIGHT) if self._state else None
         except OSError as error:
             raise GroundError(f"cannot write to --state {self._state}: {error.strerror}") from error
         self._first = track(args.track) if args.track else None
         self._log: AutopilotLog | None = None
-        self.copter = self._vehicle_anew()
+        self.copter = self._vehicle_anew(self._past())
+        self._kept_samples = self._kept_plans = 0
+        self._kept_armed = False
         try:
             links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
         except LinkError as error:
@@ -84,7 +95,7 @@ class Ground:
         self._links: GroundLinks | ConductedLinks = GroundLinks(links, perf_counter, thread_time)
         if conductor is not None:
             self._links = ConductedLinks(conductor, lambda: self.copter.pilot.state)
-        self.shut_down = False
+        self.shut_down = self._said_too_much = False
         self._revision = self.copter.parameters.revision
         self._told_s = self._saved_s = perf_counter()
         self._told_us = 0
@@ -111,16 +122,52 @@ class Ground:
             self._tell(now_s)
         if self.copter.parameters.revision != self._revision:
             self._save_parameters()
+        if self._flight is not None:
+            self._keep(self._flight)
         return self.copter
+
+    def _past(self) -> Past | None:
+        """Return what was kept of the last flight: it goes on if this is the same one."""
+        content = self._flight.newest() if self._flight else None
+        kept = of_bytes(Kept, content) if content else None
+        return None if kept is None else Past(kept, self._read_plans())
+
+    def _keep(self, flight: Slots) -> None:
+        """Keep what the flight needs to go on, should this process be killed."""
+        copter = self.copter
+        changes, armed = copter.stations.missions.changes, copter.pilot.state.armed
+        changed = armed is not self._kept_armed or changes != self._kept_plans
+        if copter.samples - self._kept_samples < (1 if armed or changed else _STANDING_SAMPLES):
+            return
+        if changes != self._kept_plans:
+            self._save_plans()
+        record = copter.record()
+        if record is not None and not flight.write(to_bytes(record)) and not self._said_too_much:
+            self._said_too_much = True
+            self._status.say("said", "the flight is too much to keep: after a restart it would begin in hold")
+        self._kept_samples, self._kept_plans, self._kept_armed = copter.samples, changes, armed
+
+    def _save_plans(self) -> None:
+        assert self._state is not None, "asked for only where something is kept"
+        plans = self.copter.stations.missions.service.plans
+        _replace(self._state / PLANS, to_bytes({plan_type: plan.items for plan_type, plan in plans.items()}))
+
+    def _read_plans(self) -> dict[int, list[MissionItem]]:
+        assert self._state is not None, "asked for only where something is kept"
+        try:
+            content = (self._state / PLANS).read_bytes()
+        except OSError:
+            return {}
+        return of_bytes(dict[int, list[MissionItem]], content) or {}
 
     def close(self) -> None:
         """Write what is left to write, and let go of everything."""
         self.copter.stations.log.close()
         self._save_signing()
         self._links.close()
-        for folder in (self._folder, self._logs):
-            if folder:
-                folder.close()
+        for kept in (self._folder, self._logs, self._flight):
+            if kept:
+                kept.close()
 
     def _restart(self, kind: float) -> None:
         if kind == SHUT_DOWN:
@@ -128,14 +175,15 @@ class Ground:
             self._status.say("said", "shut down by a ground station")
         elif kind == REBOOT:
             self.copter.stations.log.close()
-            self.copter = self._vehicle_anew()
+            self.copter = self._vehicle_anew(None)
+            self._kept_samples = self._kept_plans = 0
             self._links.introduce(self.copter.stations)
             if self._log:
                 self._log.begin_again(self._values)
             self._revision = self.copter.parameters.revision
             self._status.say("said", "restarted by a ground station")
 
-    def _vehicle_anew(self) -> Copter:
+    def _vehicle_anew(self, past: Past | None) -> Copter:
         args = self._args
         self._values = self._read_parameters()
         settings = StationSettings(
@@ -146,6 +194,8 @@ class Ground:
             signing=self._signing,
             files=self._folder,
             logs=self._logs,
+            feedback=args.feedback,
+            relays_faults=args.simulator is None,
         )
         try:
             copter = Copter(
@@ -156,6 +206,7 @@ class Ground:
                 values=self._values,
                 first=self._first,
                 estimator=self._estimator,
+                past=past,
             )
         except ImpossibleError as error:
             raise GroundError(f"{self._parameter_path()}: {error}") from error

@@ -1,9 +1,10 @@
 """The control loop: what the state frames tell, one control law, and the rotor command between its samples."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from autopilot.battery import believed
 from autopilot.controller import (
     Array,
     AttitudeController,
@@ -21,7 +22,22 @@ from autopilot.profile import Profile, ProfileError
 from autopilot.settings import SettingsError
 from mavlink.frames import euler_from_quaternion, nearest_turn
 from mavlink.hil import StateFrame
+from mavlink.plain import of_bytes, to_bytes
 from plant.vehicle import Vehicle
+
+
+class LoopRecord(NamedTuple):
+    """What a control loop needs to go on after a restart, as plain data.
+
+    Attributes:
+        yaw_rad: Unwrapped.
+        controls: Rotor speeds commanded, in parts of the largest.
+        memory: Bytes of the control law's memory; empty where that is not plain data.
+    """
+
+    yaw_rad: float
+    controls: tuple[float, float, float, float]
+    memory: bytes
 
 
 class ControlLoop:
@@ -52,19 +68,52 @@ class ControlLoop:
         self.control_interval_us = self._controller.control_interval_us
         self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
         self._memory: Any = None
+        self._told_ah = 0.0
+        self._is_plain = True
         self._yaw_rad = 0.0
         self.controls = (0.0, 0.0, 0.0, 0.0)
 
     def begin(self, rotor_speed: float, yaw_rad: float, *, afresh: bool = True) -> None:
         """Begin with every rotor at `rotor_speed` (the vehicle's unit), yaw unwrapped near `yaw_rad`.
 
-        Unless all begins `afresh`, a law that remembers its battery goes on with the charge that is left.
+        Unless all begins `afresh`, a law that remembers its battery goes on with the charge that is left; else with
+        what the battery has told of it.
         """
         before, self._memory = self._memory, self._controller.initial(rotor_speed)
-        if not afresh and hasattr(before, "charge_ah"):
+        if hasattr(before, "charge_ah") and not afresh:
             self._memory = self._memory._replace(charge_ah=before.charge_ah)
+        elif hasattr(self._memory, "charge_ah"):
+            self._memory = self._memory._replace(charge_ah=self._told_ah)
         self._yaw_rad = yaw_rad
         self._command(np.full(4, rotor_speed))
+
+    def know_charge(self, used_ah: float) -> None:
+        """Take in the charge that the battery itself tells, Ah: a law that remembers another goes on with this."""
+        self._told_ah = used_ah
+        if hasattr(self._memory, "charge_ah"):
+            charge_ah = believed(self._memory.charge_ah, used_ah, self.vehicle)
+            self._memory = self._memory._replace(charge_ah=charge_ah)
+
+    def record(self) -> LoopRecord:
+        """Return what is remembered; a law of somebody else's may remember what cannot be kept."""
+        memory = b""
+        if self._is_plain:
+            try:
+                memory = to_bytes(self._memory)
+            except TypeError:
+                self._is_plain = False
+        return LoopRecord(self._yaw_rad, self.controls, memory)
+
+    def resume(self, record: LoopRecord, *, closely: bool) -> None:
+        """Go on with what was remembered: `closely`, or as one begins in mid-flight, with the charge that is left."""
+        hover_speed = self.vehicle.hover_speed
+        first = self._controller.initial(hover_speed)
+        kept = of_bytes(type(first), record.memory)
+        self._memory = first if kept is None else kept
+        if closely and kept is not None:
+            self._yaw_rad, self.controls = record.yaw_rad, record.controls
+        else:
+            self.begin(hover_speed, record.yaw_rad, afresh=False)
 
     def is_due(self, time_us: int) -> bool:
         """Whether a control sample is at `time_us`."""

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 
 from autopilot.mission_items import place_of
 from autopilot.mission_legs import Context, Defaults, Phase, Situation, phases_of
-from autopilot.orders import Hold, Order
+from autopilot.orders import Hold, Order, OrderRecord, order_of, record_of
 from mavlink.dialect import mav
 from mavlink.frames import Vector
 from mavlink.services.mission import Progress
@@ -68,6 +68,40 @@ class Step(NamedTuple):
     flying: bool
 
 
+class MissionRecord(NamedTuple):
+    """Where a mission stands, as plain data: what the executor needs to go on after a restart.
+
+    Attributes:
+        seq: The current item.
+        state: MISSION_STATE.
+        order: What it asks for now.
+        speed_m_s: That the mission asked for; None for the cruise speed.
+        jumps: How often each jump is still to be made.
+        situation: When the current item began; None where it has not.
+        defaults: Of then.
+        order_before: Of then.
+        phases: How many of the item's are left.
+        since_us: When the phase began.
+        fresh: Whether it has just begun.
+        jumped: Whether nothing was flown since the last jump.
+        rest_until_us: When a mission that goes in a circle goes on.
+    """
+
+    seq: int
+    state: int
+    order: OrderRecord
+    speed_m_s: float | None
+    jumps: dict[int, int]
+    situation: Situation | None
+    defaults: Defaults
+    order_before: OrderRecord
+    phases: int
+    since_us: int
+    fresh: bool
+    jumped: bool
+    rest_until_us: int
+
+
 class MissionExecutor:
     """Flies one plan.
 
@@ -85,6 +119,7 @@ class MissionExecutor:
         self._speed_m_s: float | None = None
         self._jumps: dict[int, int] = {}
         self._phases: list[Phase] | None = None
+        self._context: Context | None = None
         self._since_us = 0
         self._fresh = True
         self._jumped = False
@@ -158,13 +193,48 @@ class MissionExecutor:
             self._order = _HOLD
         return Step(self._order, tuple(events), self.active)
 
+    def record(self) -> MissionRecord:
+        """Return where the mission stands."""
+        context = self._context if self._phases else None
+        return MissionRecord(
+            self.progress.seq,
+            self.progress.state,
+            record_of(self._order),
+            self._speed_m_s,
+            self._jumps,
+            context.situation if context else None,
+            context.defaults if context else self.defaults,
+            record_of(context.order if context else self._order),
+            len(self._phases or ()),
+            self._since_us,
+            self._fresh,
+            self._jumped,
+            self._rest_until_us,
+        )
+
+    def resume(self, record: MissionRecord) -> None:
+        """Go on where a mission of the same items stood."""
+        if not 0 <= record.seq < len(self._items):
+            return
+        self._order, self._speed_m_s, self._jumps = order_of(record.order), record.speed_m_s, dict(record.jumps)
+        self._leave()
+        self._show(record.seq, record.state)
+        self._jumped, self._rest_until_us = record.jumped, record.rest_until_us
+        if record.situation is None:
+            return
+        order = order_of(record.order_before)
+        self._context = Context(record.situation, record.defaults, order, record.speed_m_s)
+        phases = list(phases_of(self._items[record.seq], self._context))
+        self._phases = phases[max(len(phases) - record.phases, 0) :]
+        self._since_us, self._fresh = record.since_us, record.fresh
+
     def _fly(self, situation: Situation, now_us: int, events: list[MissionEvent]) -> bool:
         """Fly the current item; return whether it is done and another is current."""
         seq = self.progress.seq
         item = self._items[seq]
         if self._phases is None:
-            context = Context(situation, self.defaults, self._order, self._speed_m_s)
-            self._phases = list(phases_of(item, context))
+            self._context = Context(situation, self.defaults, self._order, self._speed_m_s)
+            self._phases = list(phases_of(item, self._context))
             if not self._phases:
                 self._do(item, situation, now_us, events)
                 return True

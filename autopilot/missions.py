@@ -1,13 +1,13 @@
 """Missions, geofence and rally points in flight: the plans that were uploaded, and the course that flies a mission."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from autopilot.circling import Round
 from autopilot.commands import Commands
 from autopilot.course import Asked, Course, Scene
-from autopilot.courses import Climb, Stop, Way, homeward, landing
+from autopilot.courses import Climb, Legs, Stop, Way, homeward, landing
 from autopilot.geofence import Geofence, check_fence, check_fence_item
-from autopilot.mission import MissionExecutor, Reached, SetHome
+from autopilot.mission import MissionExecutor, MissionRecord, Reached, SetHome
 from autopilot.mission_items import check_item, check_mission, check_rally_item, places
 from autopilot.mission_legs import Defaults, Situation
 from autopilot.modes import Event, Mode
@@ -15,7 +15,7 @@ from autopilot.orders import Circle, GoTo, Hold, Land, Order, Return, TakeOff
 from autopilot.pilot import Pilot
 from mavlink.frames import Vector
 from mavlink.services.mission import MissionService, Vehicle
-from mavlink.services.mission_items import ACCEPTED, FENCE, MISSION, RALLY, MissionItem, Plan
+from mavlink.services.mission_items import ACCEPTED, FENCE, MISSION, RALLY, MissionItem, Plan, plan_of
 from mavlink.services.mission_upload import Rules
 from mavlink.services.statustext import INFO, WARNING, StatusText
 
@@ -28,6 +28,7 @@ class Missions:
     Attributes:
         service: Speaks the mission protocol.
         executor: Flies the mission.
+        changes: How often a plan was replaced.
     """
 
     def __init__(self, pilot: Pilot, commands: Commands, text: StatusText) -> None:
@@ -35,6 +36,7 @@ class Missions:
         self._pilot = pilot
         self._commands = commands
         self.executor = MissionExecutor()
+        self.changes = 0
         self._fence = Geofence((), commands.origin)
         self._outside = self._breach = ""
         self._breach_due_us = 0
@@ -76,14 +78,32 @@ class Missions:
         """See the geofence from another origin."""
         self._fence_in(self.service.plans[FENCE].items)
 
-    def course(self) -> Course:
-        """Return the course of the mission, from its current item on."""
+    def course(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionCourse":
+        """Return the course of the mission, from its current item on.
+
+        Args:
+            turns: How many turns of that were flown before.
+            legs: How many legs of it are left; empty before it began.
+        """
         behaviour = self._pilot.behaviour
         self.executor.defaults = Defaults(
             max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m
         )
         self.executor.start()
-        return MissionCourse(self.executor, self)
+        return MissionCourse(self.executor, self, turns, legs)
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Opaque ids of the plans."""
+        return tuple(plan.id for plan in self.service.plans.values())
+
+    def resume(self, plans: Mapping[int, Sequence[MissionItem]], ids: tuple[int, ...], record: MissionRecord) -> None:
+        """Have the plans that were kept, and go on where the mission stood; from its first item if it is another."""
+        for plan_type in (RALLY, FENCE, MISSION):
+            self.service.plans[plan_type] = plan_of(plans.get(plan_type, ()))
+        self.executor.load(self.service.plans[MISSION].items)
+        if self.ids == ids:
+            self.executor.resume(record)
 
     def watch_mode(self, mode: Mode) -> None:
         """Pause the mission once another mode flies."""
@@ -119,6 +139,7 @@ class Missions:
         )
 
     def _load(self, plan_type: int, plan: Plan) -> None:
+        self.changes += 1
         items: Sequence[MissionItem] = plan.items
         if plan_type == MISSION:
             self.executor.load(items)
@@ -149,30 +170,48 @@ class Missions:
 class MissionCourse:
     """Flies what the executor orders, one course after another."""
 
-    def __init__(self, executor: MissionExecutor, missions: Missions) -> None:
-        """Begin with the current item."""
+    def __init__(
+        self, executor: MissionExecutor, missions: Missions, turns: float = 0.0, legs: tuple[int, ...] = ()
+    ) -> None:
+        """Begin with the current item, of which `turns` around a centre were flown before, and `legs` are left."""
         self._executor = executor
         self._missions = missions
-        self._order: Order = Hold()
+        self._order: Order | None = None
+        self._turns_before, self._legs_left = turns, legs
         self._course: Course = Stop()
         self._done = False
 
     def ask(self, scene: Scene) -> Asked:
         """Return what the order of now asks for."""
         arrived = self._course.arrived(scene)
-        turns = self._course.turns if isinstance(self._course, Round) else 0.0
-        step = self._executor.step(self._missions.situation(scene, arrived=arrived, turns=turns), scene.now_us)
+        situation = self._missions.situation(scene, arrived=arrived, turns=self.turns)
+        step = self._executor.step(situation, scene.now_us)
         for event in step.events:
             self._missions.flown(event)
         if step.order is not self._order:
+            if self._order is not None:
+                self._turns_before = 0.0
             self._order = step.order
             self._course = course_of(step.order, scene)
+            if isinstance(self._course, Legs):
+                self._course.skip(self._legs_left)
+            self._legs_left = ()
         self._done = not step.flying
         if self._done and isinstance(self._course, Round):
             self._course = Stop()
         if isinstance(step.order, Return) and step.flying:
             self._missions.says_return()
         return self._course.ask(scene)
+
+    @property
+    def turns(self) -> float:
+        """How often it went around the centre of the order that is flown."""
+        return self._turns_before + (self._course.turns if isinstance(self._course, Round) else 0.0)
+
+    @property
+    def legs(self) -> tuple[int, ...]:
+        """How many legs are left of the order that is flown."""
+        return self._course.left if isinstance(self._course, Legs) else ()
 
     def arrived(self, scene: Scene) -> bool:
         """Whether the mission is flown to its end."""

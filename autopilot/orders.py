@@ -1,6 +1,9 @@
 """What the vehicle can be told to do next: by a mission's item, a command, or a mode."""
 
-from typing import NamedTuple, TypeAlias
+from collections.abc import Mapping
+from typing import Any, NamedTuple, TypeAlias
+
+import msgspec
 
 from mavlink.frames import Vector
 
@@ -68,3 +71,29 @@ class Hold(NamedTuple):
 
 
 Order: TypeAlias = GoTo | Circle | TakeOff | Land | Return | Hold
+_KINDS: Mapping[str, type[Order]] = {kind.__name__: kind for kind in (GoTo, Circle, TakeOff, Land, Return, Hold)}
+
+
+class OrderRecord(NamedTuple):
+    """An order as plain data.
+
+    Attributes:
+        kind: Name of its class.
+        fields: Its fields.
+    """
+
+    kind: str
+    fields: tuple[Any, ...]
+
+
+def record_of(order: Order) -> OrderRecord:
+    """Return an order as plain data."""
+    return OrderRecord(type(order).__name__, tuple(order))
+
+
+def order_of(record: OrderRecord) -> Order:
+    """Return the order of which this is the record; Hold where there is none such."""
+    try:
+        return msgspec.convert(record.fields, _KINDS[record.kind])
+    except (KeyError, msgspec.ValidationError):
+        return Hold()

@@ -8,7 +8,7 @@ import numpy as np
 
 from autopilot.arming import Facts, refusals
 from autopilot.behaviour import Behaviour
-from autopilot.controller import AttitudeDemand, Horizon, VehicleState
+from autopilot.controller import Array, AttitudeDemand, Horizon, VehicleState
 from autopilot.course import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
 from autopilot.courses import Stop
 from autopilot.instants import Instants
@@ -51,6 +51,33 @@ class Guidance(NamedTuple):
 RESTS = Guidance()
 
 
+class PilotRecord(NamedTuple):
+    """What a pilot needs to go on after a restart, as plain data; but for the course, what `Pilot` says of each.
+
+    Attributes:
+        idles: Whether the rotors stand or idle.
+        home_is_chosen: Whether a take-off leaves home where it is.
+        motion: Of the reference, (4, 3).
+        heading: Of the reference, (2,).
+    """
+
+    mode: Mode
+    armed: bool
+    standing: bool
+    idles: bool
+    home_enu_m: Vector
+    home_yaw_rad: float
+    home_is_chosen: bool
+    speed_m_s: float | None
+    armed_us: int
+    takeoff_us: int
+    landing_us: int
+    flights: int
+    ground_m: float
+    motion: Array
+    heading: Array
+
+
 class Pilot:
     """Flies courses, one mode after another.
 
@@ -60,6 +87,7 @@ class Pilot:
         home_enu_m: Where it took off, or was told to return to.
         home_yaw_rad: Its heading there.
         standing: Whether it stands on the ground.
+        idles: Whether the rotors stand or idle.
         course: What is flown.
         reference: Where the reference stands.
         speed_m_s: Cruise speed that was asked for; None for the parameters'.
@@ -100,7 +128,7 @@ class Pilot:
         self.ground_m = 0.0
         self._home_is_chosen = False
         self._course_is_chosen = False
-        self._idles = True
+        self.idles = True
         self._landing = Landing()
         self._now_us = 0
         self._vehicle: VehicleState | None = None
@@ -123,7 +151,7 @@ class Pilot:
         """
         self._now_us, self._vehicle = now_us, vehicle
         self.armed_us = self.takeoff_us = self.landing_us = 0
-        self.standing = self._idles = mode is None and (rests or stands_at_first(vehicle, 0.0))
+        self.standing = self.idles = mode is None and (rests or stands_at_first(vehicle, 0.0))
         self.reference = moving_with(vehicle)
         if self.standing:
             if not self._home_is_chosen:
@@ -133,6 +161,52 @@ class Pilot:
             self.state = State(mode or Mode.HOLD, armed=True)
             self._begin_flight()
         self._engage(self.state.mode)
+
+    def record(self) -> PilotRecord:
+        """Return what is needed to go on after a restart, but for the course."""
+        assert self.reference is not None, "the pilot has seen the vehicle"
+        return PilotRecord(
+            *self.state,
+            self.standing,
+            self.idles,
+            self.home_enu_m,
+            self.home_yaw_rad,
+            self._home_is_chosen,
+            self.speed_m_s,
+            self.armed_us,
+            self.takeoff_us,
+            self.landing_us,
+            self.flights,
+            self.ground_m,
+            *self.reference,
+        )
+
+    def resume(
+        self,
+        now_us: int,
+        vehicle: VehicleState,
+        record: PilotRecord,
+        again: CourseMaker,
+        *,
+        closely: bool,
+    ) -> None:
+        """See the vehicle for the first time since a restart: it goes on as it was.
+
+        The reference goes on where it was if the restart took no time, that is `closely`, and else from where the
+        vehicle is. One that has come down meanwhile stays there. `again` says how a mode goes on.
+        """
+        self._now_us, self._vehicle = now_us, vehicle
+        self.home_enu_m, self.home_yaw_rad = record.home_enu_m, record.home_yaw_rad
+        self._home_is_chosen, self.speed_m_s = record.home_is_chosen, record.speed_m_s
+        self.armed_us, self.takeoff_us, self.landing_us = record.armed_us, record.takeoff_us, record.landing_us
+        self.flights, self.ground_m = record.flights, record.ground_m
+        came_down = not closely and not record.standing and stands_at_first(vehicle, record.ground_m)
+        self.standing = record.standing or came_down
+        self.state = FIRST if came_down else State(record.mode, record.armed)
+        self.idles = record.idles or came_down
+        self.reference = Reference(record.motion, record.heading) if closely else moving_with(vehicle)
+        self.course = (self._make_course if came_down else again)(self.state.mode, self.scene())
+        self._course_is_chosen = not came_down
 
     def sense(self, now_us: int, vehicle: VehicleState, steered: Steered = NOT_STEERED) -> None:
         """Take in what a control sample needs.
@@ -244,7 +318,7 @@ class Pilot:
                 self._idle()
                 return RESTS
             self._begin_flight()
-        begins, self._idles = self._idles, False
+        begins, self.idles = self.idles, False
         guidance = self._lean(asked, begins) if isinstance(asked, Lean) else self._move(scene, asked, begins)
         if self.course.arrived(scene):
             self._arrive()
@@ -286,7 +360,7 @@ class Pilot:
         """Lie, or fall, with the rotors standing still or idle."""
         vehicle = self._vehicle
         assert vehicle is not None, "the pilot has seen the vehicle"
-        self._idles = True
+        self.idles = True
         self.reference = at_rest(vehicle)
         self._landing, lies = watch(self._landing, self._now_us, vehicle, sinks=True)
         self.standing = self.standing or lies

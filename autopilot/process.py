@@ -262,8 +262,9 @@ class Client:
         if frame is None:
             return None
         self._frame_came = True
+        autopilot.hear(self._end.aside)
         step = autopilot.step(frame)
-        self._end.answer(step.command)
+        self._end.answer(step.command, step.faults)
         return step
 
     def _say_what_changed(self) -> None:

@@ -1,14 +1,13 @@
 """What the autopilot knows of its vehicle: the state that it is told, or the one that it estimates from sensors."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Protocol, TypeAlias
 
 from autopilot.estimate import Estimate
 from mavlink.feedback import Feedback
 from mavlink.geodesy import Geodetic
 from mavlink.hil import StateFrame
-from mavlink.sensors import Frame, GpsFix, SensorFrame
+from mavlink.sensors import FixType, Frame, GpsFix, SensorFrame
 from plant.vehicle import Vehicle, VehicleError
 
 
@@ -17,6 +16,14 @@ class Estimating(Protocol):
 
     def step(self, frame: SensorFrame, /, *, asked: bool) -> Estimate | None:
         """Take in the next frame; return None until the first estimate. Unless `asked`, an older one will do."""
+
+    def record(self) -> bytes:
+        """Return what is needed to go on after a restart; empty before the first estimate."""
+        ...
+
+    def resume(self, record: bytes, time_us: int, /) -> bool:
+        """Go on from a record, the next frame being of `time_us`; return whether that can be."""
+        ...
 
 
 Estimator: TypeAlias = Callable[[int], Estimating]
@@ -41,6 +48,8 @@ def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> Est
 
 
 _LATE_US = 1_000_000
+_NO_FIX_AFTER_US = 500_000
+"""Receivers of a few hertz are sometimes late, too."""
 
 
 class Senses:
@@ -50,7 +59,6 @@ class Senses:
         estimate: The last one; None before the first, and where the state is told.
         sensed: What was measured on board last.
         fix: The last of GPS.
-        gps_off: Whether GPS has failed: no fix gets through.
     """
 
     def __init__(self, estimator: Estimator | None, interval_us: int) -> None:
@@ -65,7 +73,15 @@ class Senses:
         self.estimate: Estimate | None = None
         self.sensed: SensorFrame | None = None
         self.fix: GpsFix | None = None
-        self.gps_off = False
+        self._fix_us = 0
+
+    def record(self) -> bytes:
+        """Return what the estimator needs to go on after a restart; empty where there is nothing to go on with."""
+        return b"" if self._estimating is None else self._estimating.record()
+
+    def resume(self, record: bytes, time_us: int) -> bool:
+        """Have the estimator go on from a record, the next frame being of `time_us`; return whether it does."""
+        return self._estimating is not None and self._estimating.resume(record, time_us)
 
     def state(self, frame: Frame, *, asked: bool = True) -> StateFrame | None:
         """Return the state at a frame, or unless `asked` an older one; None until there is an estimate.
@@ -79,11 +95,17 @@ class Senses:
         if self._estimating is None or self._begins_again(frame):
             self._estimating, self.estimate = self._make(self._interval_us), None
         self._time_us = frame.time_us
-        if self.gps_off and frame.gps is not None:
-            frame = replace(frame, gps=None)
-        self.sensed, self.fix = frame, frame.gps or self.fix
+        self.sensed = frame
+        if frame.gps is not None:
+            self.fix, self._fix_us = frame.gps, frame.time_us
         self.estimate = self._estimating.step(frame, asked=asked)
         return None if self.estimate is None else self.estimate.frame
+
+    def has_gps(self, now_us: int) -> bool:
+        """Whether there is GPS; where the state is told there is what it would tell."""
+        if self._make is None:
+            return True
+        return self.fix is not None and self.fix.fix_type >= FixType.FIX_3D and now_us < self._fix_us + _NO_FIX_AFTER_US
 
     def _begins_again(self, frame: SensorFrame) -> bool:
         if self._time_us is None:

@@ -61,11 +61,15 @@ class Watch:
 
 
 class GpsWatch:
-    """Watches a GPS receiver."""
+    """Watches a GPS receiver.
+
+    Attributes:
+        time_us: Of the last fix that can be; None before the first.
+    """
 
     def __init__(self) -> None:
         """Begin before the first fix."""
-        self._time_us: int | None = None
+        self.time_us: int | None = None
         self._alive = Watch(-inf, inf, _GPS_PATIENCE_US)
 
     def reason(self, fix: GpsFix, now_us: int) -> Reason | None:
@@ -75,9 +79,9 @@ class GpsWatch:
         numbers = (*fix.place, *fix.velocity_enu_m_s)
         if not _possible(*numbers):
             return Reason.RANGE if all(map(isfinite, numbers)) else Reason.NOT_FINITE
-        if fix.time_us > now_us or (self._time_us is not None and fix.time_us <= self._time_us):
+        if fix.time_us > now_us or (self.time_us is not None and fix.time_us <= self.time_us):
             return Reason.TIME
-        self._time_us = fix.time_us
+        self.time_us = fix.time_us
         return self._alive.reason(numbers, fix.time_us)
 
 

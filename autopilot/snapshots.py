@@ -86,7 +86,7 @@ class Photographer:
             attitude=state.attitude,
             rate_flu_rad_s=state.rate_flu_rad_s,
             origin=stations.commands.origin,
-            gps_ok=not stations.failures.gps_off,
+            gps_ok=senses.has_gps(now_us),
             fence_enabled=stations.missions.has_fence,
             fence_breached=bool(stations.missions.breach(state.position_enu_m, now_us)),
             home=Home(pilot.home_enu_m, pilot.home_yaw_rad),

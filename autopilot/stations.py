@@ -11,7 +11,9 @@ from autopilot.failures import Failures
 from autopilot.missions import Missions
 from autopilot.modes import MODES, custom_mode, mode_of_custom
 from autopilot.pilot import Pilot
+from mavlink.aside import Aside
 from mavlink.dialect import AUTOPILOT_COMPONENT, mav
+from mavlink.feedback import Feedback
 from mavlink.files import Files, Tree
 from mavlink.flight_log import FlightLog
 from mavlink.framing import Framer
@@ -63,6 +65,8 @@ class StationSettings:
         signing: Judges and signs frames.
         files: What can be read and written by file transfer.
         logs: Where the logs of flights go; None: into folder `logs` of the files.
+        feedback: What is flown by.
+        relays_faults: Whether the plant is one that takes faults.
     """
 
     system_id: int
@@ -72,6 +76,8 @@ class StationSettings:
     signing: Signing | None = None
     files: Files | None = None
     logs: Files | None = None
+    feedback: Feedback = Feedback.STATE
+    relays_faults: bool = True
 
 
 class Stations:
@@ -97,7 +103,7 @@ class Stations:
         self._parameters = parameters
         self._text = StatusText()
         self._calibration = Calibration()
-        self.failures = Failures()
+        self.failures = Failures(settings.feedback, relays=settings.relays_faults)
         self.restart = 0.0
         self.offboard, self.manual, self.follow = Offboard(), Manual(settings.system_id), Follow()
         self.commands = Commands(pilot, settings.origin, lambda place: self.missions.fence_refusal(place))
@@ -109,9 +115,10 @@ class Stations:
         files = self._files(settings.files or Memory())
         self.log = FlightLog(files, (LOGS,))
         self._framer = Framer()
+        self._obeys = CommandService(self._handlers(), self._text)
         services = (
             self._heartbeat,
-            CommandService(self._handlers(), self._text),
+            self._obeys,
             self._streams,
             self._modes,
             TimeService(),
@@ -150,6 +157,13 @@ class Stations:
         if snapshot.armed is not self._logs_stream:
             self._logs_stream = snapshot.armed
             self._streams.use(self._log_channel, SDK if snapshot.armed else SILENT)
+
+    def hear_plant(self, aside: Aside, now_us: int) -> None:
+        """Take in what the plant says of faults that were asked for."""
+        ended = self.failures.poll(aside.results, now_us)
+        if ended is not None:
+            command, outcome = ended
+            self.hub.send(self._obeys.finish(command.id, command.peer, outcome))
 
     def poll(self, now_us: int) -> list[Outgoing]:
         """Do what is due; return what to send. Called once a frame."""

@@ -10,14 +10,24 @@ with the command that names t, so nothing that a link does to datagrams can chan
 The autopilot calls the plant with one datagram: SET_MESSAGE_INTERVAL (which message it wants, and how often:
 ATTITUDE_QUATERNION for frames of the state, HIL_SENSOR for frames of sensors) and a HEARTBEAT. The plant begins with
 the first such call, and answers an autopilot that was started again where the flight stands.
+
+Beside its frame the plant tells of its battery twice a second, and to whoever has just called. The autopilot may append
+faults, COMMAND_LONG with MAV_CMD_INJECT_FAILURE, to the datagram that answers a frame: they are taken with that answer
+and with no other datagram, so each happens once, at that time; the next frame brings their COMMAND_ACK.
+
+A plant that runs freely waits for nobody: it says so in its HEARTBEAT, sends each frame once, and takes any answer that
+is newer than the last. The autopilot then goes on from whatever newer frame it gets.
 """
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import NamedTuple, TypeAlias
 
 from mavlink import dialect
+from mavlink.aside import NOTHING, Aside, PlantBattery, decode_battery, decode_result, encode_battery, encode_results
 from mavlink.dialect import Codec, Message
+from mavlink.failures import COMMAND as INJECT_FAILURE
+from mavlink.failures import Fault, decode_fault, encode_fault
 from mavlink.feedback import Feedback
 from mavlink.hil import ActuatorCommand, StateFrame, decode_actuators, decode_state, encode_actuators, encode_state
 from mavlink.sensors import Frame, decode_sensors, encode_sensors
@@ -32,6 +42,9 @@ CALL_AFTER_S = 1.0
 """Wall-clock silence after which the autopilot calls the plant again, and would begin a new flight."""
 CALL_EVERY_S = 0.05
 HEARTBEAT_EVERY_US = 1_000_000
+BATTERY_EVERY_US = 500_000
+FREE_RUNNING = 1
+"""HEARTBEAT.custom_mode of a plant that does not wait for answers."""
 MIN_FRAME_INTERVAL_US = 1_000
 MAX_FRAME_INTERVAL_US = 1_000_000
 
@@ -66,15 +79,22 @@ class PlantEnd:
         resent: How many times a frame was sent again.
         dropped: What was received and not used, by reason.
         received: Frames of the autopilot that were understood, in order; the owner may log and clear it.
+        waits: Whether a frame is sent again until it is answered; else the plant runs freely.
     """
 
     def __init__(
-        self, *, system_id: int, frame_interval_us: int, serves: Collection[Feedback] = (Feedback.STATE,)
+        self,
+        *,
+        system_id: int,
+        frame_interval_us: int,
+        serves: Collection[Feedback] = (Feedback.STATE,),
+        waits: bool = True,
     ) -> None:
         """Wait for the autopilot of `system_id`; `frame_interval_us` holds unless it asks for another.
 
         It may ask for what the plant `serves`; the state, unless it does.
         """
+        self.waits = waits
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self._truth_codec = Codec(system_id, dialect.TRUTH_COMPONENT)
         self._autopilot = (system_id, dialect.AUTOPILOT_COMPONENT)
@@ -89,11 +109,14 @@ class PlantEnd:
         self._frames: tuple[bytes, ...] = ()
         self._begun = False
         self._awaited_us: int | None = None
+        self._answered_us: int | None = None
+        self._battery: PlantBattery | None = None
+        self._faults: list[Fault] = []
         self._resend_at_s = 0.0
         self._outbox: list[Outgoing] = []
 
-    def offer(self, frame: Frame, now_s: float, truth: StateFrame | None = None) -> None:
-        """Send `frame`, which is of the kind of `feedback`, and await the command that answers it.
+    def offer(self, frame: Frame, now_s: float, aside: Aside = NOTHING, truth: StateFrame | None = None) -> None:
+        """Send `frame`, of the kind of `feedback`, and what goes beside it; await the command that answers it.
 
         The `truth` is appended, as another component's, for whoever stands in between: it is not the autopilot's.
         """
@@ -102,7 +125,12 @@ class PlantEnd:
         else:
             frames = encode_sensors(self._codec, frame)
         if frame.time_us % HEARTBEAT_EVERY_US == 0:
-            frames.append(_heartbeat(self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False))
+            frames.append(self._heartbeat())
+        if aside.results:
+            frames += encode_results(self._codec, aside.results, self._autopilot)
+        self._battery = aside.battery
+        if aside.battery is not None and frame.time_us % BATTERY_EVERY_US == 0:
+            frames.append(encode_battery(self._codec, aside.battery))
         if truth is not None:
             frames += encode_state(self._truth_codec, truth)
         self._frames = tuple(frames)
@@ -113,12 +141,15 @@ class PlantEnd:
     def receive(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
         """Take one datagram in; return the command that answers the frame awaited, if it holds that."""
         command = None
+        asked: list[Message] = []
         for message in self._codec.decode(datagram):
             if message.source != self._autopilot:
                 self.dropped["foreign"] += 1
                 continue
             if message.name == "HEARTBEAT":
                 self._hear_heartbeat(sender, now_s)
+            elif message.name == "COMMAND_LONG" and message.fields.command == INJECT_FAILURE:
+                asked.append(message)
             elif message.name == "COMMAND_LONG":
                 self._obey(message, sender)
             elif message.name == "HIL_ACTUATOR_CONTROLS" and sender == self.peer:
@@ -129,11 +160,18 @@ class PlantEnd:
             if sender == self.peer:
                 self._peer_heard_s = now_s
                 self.received.append(message.frame)
+        for message in asked:
+            self._hear_fault(message, answered=command is not None)
         return command
+
+    def take_faults(self) -> list[Fault]:
+        """Return the faults that came with the last answer, and forget them; nobody has judged them yet."""
+        faults, self._faults = self._faults, []
+        return faults
 
     def poll(self, now_s: float) -> float:
         """Do what is due at `now_s`; return the time at which something will be due again."""
-        if self._awaited_us is None:
+        if self._awaited_us is None or not self.waits:
             return now_s + RESEND_AFTER_S
         if now_s >= self._resend_at_s:
             self.resent += 1
@@ -158,7 +196,26 @@ class PlantEnd:
             return
         self.peer = sender
         if self._awaited_us is not None:
+            if self._battery is not None:
+                self._frames += (encode_battery(self._codec, self._battery),)
+            if not self.waits:
+                self._frames += (self._heartbeat(),)
             self._send_frame(now_s)
+
+    def _heartbeat(self) -> bytes:
+        mode = 0 if self.waits else FREE_RUNNING
+        return _heartbeat(self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False, custom_mode=mode)
+
+    def _hear_fault(self, message: Message, *, answered: bool) -> None:
+        fields = message.fields
+        if (fields.target_system, fields.target_component) != self._codec.source:
+            self.dropped["foreign"] += 1
+        elif not answered:
+            self.dropped["repeated"] += 1
+        elif (fault := decode_fault(fields)) is None:
+            self.dropped["invalid"] += 1
+        else:
+            self._faults.append(fault)
 
     def _obey(self, message: Message, sender: Address) -> None:
         fields = message.fields
@@ -185,12 +242,19 @@ class PlantEnd:
         command = decode_actuators(message)
         if command is None:
             self.dropped["invalid"] += 1
-        elif command.time_us != self._awaited_us:
+        elif not self._is_awaited(command.time_us):
             self.dropped["repeated"] += 1
             command = None
-        else:
+        elif self.waits:
             self._awaited_us = None
+        else:
+            self._answered_us = command.time_us
         return command
+
+    def _is_awaited(self, time_us: int) -> bool:
+        if self.waits or self._awaited_us is None:
+            return time_us == self._awaited_us
+        return time_us <= self._awaited_us and (self._answered_us is None or time_us > self._answered_us)
 
 
 class AutopilotEnd:
@@ -200,6 +264,7 @@ class AutopilotEnd:
         refused: The plant's refusal of the frames asked for (a MAV_RESULT), None if there was none.
         repeated: How many frames came again and got the remembered answer.
         dropped: What was received and not used, by reason.
+        aside: What the plant told beside the frame that was handed out last.
     """
 
     def __init__(
@@ -211,6 +276,8 @@ class AutopilotEnd:
         self._frame_interval_us = frame_interval_us
         self._feedback = feedback
         self._made_of = _MADE_OF[feedback]
+        self.aside = NOTHING
+        self._runs_freely = False
         self.refused: int | None = None
         self.repeated = 0
         self.dropped: Counter[str] = self._codec.dropped
@@ -227,14 +294,21 @@ class AutopilotEnd:
     def receive(self, datagram: bytes, now_s: float) -> Frame | None:
         """Take one datagram in; return its frame if that is the next one to compute."""
         parts: dict[str, Message] = {}
+        battery, results = None, []
         for message in self._codec.decode(datagram):
             if message.source != self._plant:
                 self.dropped["foreign"] += 1
             elif message.name in self._made_of:
                 parts[message.name] = message
+            elif message.name == "COMMAND_ACK" and message.fields.command == INJECT_FAILURE:
+                results.append(decode_result(message))
             elif message.name == "COMMAND_ACK":
                 self._hear_ack(message)
-            elif message.name != "HEARTBEAT":
+            elif message.name == "BATTERY_STATUS":
+                battery = decode_battery(message)
+            elif message.name == "HEARTBEAT":
+                self._runs_freely = message.fields.custom_mode == FREE_RUNNING
+            else:
                 self.dropped["unexpected"] += 1
         if not parts:
             return None
@@ -242,11 +316,16 @@ class AutopilotEnd:
         if frame is None:
             self.dropped["invalid"] += 1
             return None
-        return self._next(frame, now_s)
+        following = self._next(frame, now_s)
+        if following is not None:
+            self.aside = Aside(battery, tuple(results))
+        return following
 
-    def answer(self, command: ActuatorCommand) -> None:
-        """Send the command that answers the frame handed out last, and remember it."""
+    def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
+        """Send the command that answers the frame handed out last, with faults to happen then, and remember it."""
         answer = encode_actuators(self._codec, command)
+        for fault in faults:
+            answer += encode_fault(self._codec, fault, self._plant)
         if command.time_us % HEARTBEAT_EVERY_US == 0:
             answer += self._heartbeat(command.armed)
         self._answer = answer
@@ -282,13 +361,16 @@ class AutopilotEnd:
             if self._answer is not None:
                 self._outbox.append(self._answer)
             return None
-        if self._time_us is not None and not lost and frame.time_us != self._time_us + self._frame_interval_us:
+        if self._time_us is not None and not lost and not self._follows(frame.time_us, self._time_us):
             self.dropped["out of step"] += 1
             return None
         self._heard_s = now_s
         self._time_us = frame.time_us
         self._answer = None
         return frame
+
+    def _follows(self, time_us: int, before_us: int) -> bool:
+        return time_us > before_us if self._runs_freely else time_us == before_us + self._frame_interval_us
 
     def _hear_ack(self, message: Message) -> None:
         fields = message.fields
@@ -311,6 +393,6 @@ class AutopilotEnd:
         return _heartbeat(self._codec, dialect.TYPE_QUADROTOR, dialect.AUTOPILOT_GENERIC, armed)
 
 
-def _heartbeat(codec: Codec, kind: int, autopilot: int, armed: bool) -> bytes:
+def _heartbeat(codec: Codec, kind: int, autopilot: int, armed: bool, custom_mode: int = 0) -> bytes:
     mode = dialect.MODE_ARMED if armed else 0
-    return codec.encode("HEARTBEAT", kind, autopilot, mode, 0, dialect.STATE_ACTIVE, 3)
+    return codec.encode("HEARTBEAT", kind, autopilot, mode, custom_mode, dialect.STATE_ACTIVE, 3)

@@ -9,12 +9,14 @@ ones leave `fields_updated` empty, and mean that everything is new.
 """
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
 from mavlink import dialect
+from mavlink.aside import NOTHING
 from mavlink.dialect import Codec
+from mavlink.failures import Fault
 from mavlink.hil import ActuatorCommand, encode_actuators
 from mavlink.sensors import Frame, GpsFix, SensorFrame, Updated, decode_gps, decode_sensors
 
@@ -35,6 +37,7 @@ class FlierEnd:
         refused: None: a simulator is not asked for anything.
         repeated: How many frames came again and got the remembered answer.
         dropped: What was received and not used, by reason.
+        aside: Nothing: a simulator tells nothing beside its frames.
     """
 
     def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[FourOf], FourOf]) -> None:
@@ -47,6 +50,7 @@ class FlierEnd:
         """
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
         self._to_motors = to_motors
+        self.aside = NOTHING
         self.refused: int | None = None
         self.repeated = 0
         self.dropped: Counter[str] = self._codec.dropped
@@ -75,8 +79,9 @@ class FlierEnd:
                 self.dropped["unexpected"] += 1
         return frame
 
-    def answer(self, command: ActuatorCommand) -> None:
-        """Send the command that answers the frame handed out last, and remember it."""
+    def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
+        """Send the command that answers the frame handed out last, and remember it; a simulator takes no faults."""
+        assert not faults, "whoever flies a simulator refuses them"
         assert self._zero_us is not None, "what is answered has come"
         self._armed = command.armed
         controls = self._to_motors(command.controls)

@@ -5,8 +5,8 @@ from math import inf
 
 from mavlink.home import DEFAULT_HOME, home
 from mavlink.link import open_ground_link, open_link
-from mavlink.process import ArgumentParser, add_common_arguments, begin, natural, positive, speed
-from plant.scenario import add_world_arguments
+from mavlink.process import ArgumentParser, add_common_arguments, begin, fail, natural, positive, speed
+from plant.scenario import LATENCY_HELP, add_world_arguments, latency
 
 DEFAULT_LINKS = {
     "colibri": "udpin:127.0.0.1:14560",
@@ -20,8 +20,8 @@ def command_line() -> ArgumentParser:
     parser = ArgumentParser(
         prog="python -m plant",
         description="The quadrotor and its world: integrates the nonlinear vehicle, sends its state, or what its "
-        "sensors measure, as the autopilot asks, and takes rotor commands over MAVLink/UDP. In lockstep: it waits for "
-        "each answer, however long that takes. "
+        "sensors measure, as the autopilot asks, and takes rotor commands over MAVLink/UDP. In lockstep, unless "
+        "--realtime: it waits for each answer, however long that takes. "
         "Start `python -m autopilot` in another terminal, before or after.",
         epilog="Example: python -m plant --duration 100 --out out/flight",
     )
@@ -46,8 +46,21 @@ def command_line() -> ArgumentParser:
     add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
     add("--home", type=home, default=DEFAULT_HOME, metavar="LAT,LON,ALT,YAW", help="the origin (default %(default)s)")
     add("--rate", type=positive, default=250.0, metavar="HZ", help="frames, if the autopilot asks for no other rate")
+    add("--latency", type=latency, default=0.0, metavar="MS", help=LATENCY_HELP)
+    add(
+        "--realtime",
+        action="store_true",
+        help="run freely, as hardware would: follow the wall clock, wait for no answer, hold the last command",
+    )
+    add(
+        "--cut-after",
+        type=positive,
+        default=0.5,
+        metavar="S",
+        help="with --realtime: stop the rotors where no command comes for so long (default %(default)s)",
+    )
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
-    add("--speed", type=speed, default=inf, metavar="N", help="times real time, or max (default)")
+    add("--speed", type=speed, metavar="N", help="times real time, or max (default: max; with --realtime 1)")
     add(
         "--truth", action="store_true", help="append the true state to each frame, for a program in between (for tests)"
     )
@@ -58,6 +71,9 @@ def command_line() -> ArgumentParser:
 def main() -> int:
     """Run the plant; return the exit code."""
     args = command_line().parse_args()
+    if args.realtime and (args.serve != "colibri" or args.speed == inf):
+        fail("--realtime follows the wall clock for python -m autopilot: no --serve beside it, and no --speed max")
+    args.speed = args.speed or (1.0 if args.realtime else inf)
     url = args.link or DEFAULT_LINKS[args.serve]
     if args.serve == "px4":
         link_to_px4, status, stop = begin("plant", url, args, open_ground_link)

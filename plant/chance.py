@@ -13,6 +13,7 @@ class Source(IntEnum):
 
     SENSORS = 0
     WEATHER = 1
+    FAULTS = 2
 
 
 def streams(seed: int, source: Source, count: int) -> list[Iterator[float]]:

@@ -9,9 +9,10 @@ from mavlink.hil import ActuatorCommand
 from mavlink.link import LinkError, UdpLink
 from mavlink.lockstep import Outgoing, PlantEnd
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Progress, Status, Stop, TlogWriter, fail, undisturbed
+from plant.core import Plant
 from plant.dynamics import STATE
 from plant.scenario import IntegrationError, Start
-from plant.sensors import Tell, served_by, tells
+from plant.sensors import served_by
 from plant.vehicle import VehicleError, load_vehicle
 from plant.weather import weather_of
 from plant.world import Physics, World, starting_world, state_frame
@@ -41,15 +42,27 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         fail(str(error))
     physics = Physics(vehicle, args.integrator, weather)
     logs = PlantLogs(args.out) if args.out else None
-    end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
+    interval_us = round(1e3 / args.rate) * 1000
+    end = PlantEnd(system_id=args.system_id, frame_interval_us=interval_us, serves=serves, waits=not args.realtime)
     server = Server(link, end, status, stop, logs, tells_truth=args.truth)
+    if args.realtime:
+        from plant.free_process import FreeServer
+
+        server = FreeServer(link, end, status, stop, logs, cut_after_s=args.cut_after)
     try:
         with undisturbed():
             if server.wait():
-                interval_us = end.frame_interval_us
-                origin = args.home.origin
-                tell = tells(end.feedback, vehicle, physics, origin, seed=args.seed, interval_us=interval_us)
-                server.fly(worlds[end.feedback], physics, tell, duration_s=args.duration, speed=args.speed)
+                plant = Plant(
+                    worlds[end.feedback],
+                    vehicle,
+                    physics,
+                    end.feedback,
+                    args.home.origin,
+                    seed=args.seed,
+                    interval_us=end.frame_interval_us,
+                    latency_us=round(args.latency * 1e3),
+                )
+                server.fly(plant, duration_s=args.duration, speed=args.speed)
     except (IntegrationError, LinkError) as error:
         fail(str(error), EXIT_FAILED)
     finally:
@@ -140,37 +153,39 @@ class Server:
             self._receive(_WAIT_AT_MOST_S)
         return self._end.peer is not None
 
-    def fly(self, world: World, physics: Physics, tell: Tell, *, duration_s: float, speed: float) -> None:
-        """Fly for `duration_s` at `speed` times real time, or until told to stop; `tell` of each world."""
+    def fly(self, plant: Plant, *, duration_s: float, speed: float) -> None:
+        """Fly for `duration_s` at `speed` times real time, or until told to stop."""
         began_s = perf_counter()
         pace = Pace(speed, began_s)
         progress = Progress(self._status)
-        interval_us = self._end.frame_interval_us
         frames = 0
-        while not self._stop and world.time_us + interval_us <= duration_s * 1e6:
-            self._wait_until(pace.due_s(world.time_us, perf_counter()))
-            command = self._exchange(world, tell)
+        while not self._stop and plant.world.time_us + plant.interval_us <= duration_s * 1e6:
+            self._wait_until(pace.due_s(plant.world.time_us, perf_counter()))
+            command = self._exchange(plant)
             if command is None:
                 break
-            world = physics.step(world, command, interval_us)
+            plant.answer(command, self._end.take_faults())
             frames += 1
-            progress.report(world.time_us / 1e6, perf_counter() - began_s)
-        self._log(world)
+            progress.report(plant.world.time_us / 1e6, perf_counter() - began_s)
+        self._log(plant.world)
+        time_s = plant.world.time_us / 1e6
         self._status.say(
             "ended",
-            f"ended at t = {world.time_us / 1e6:.3f} s after {frames} frames",
-            sim_time_s=world.time_us / 1e6,
+            f"ended at t = {time_s:.3f} s after {frames} frames",
+            sim_time_s=time_s,
             wall_time_s=perf_counter() - began_s,
             frames=frames,
             resent=self._end.resent,
             dropped=dict(self._end.dropped),
         )
 
-    def _exchange(self, world: World, tell: Tell) -> ActuatorCommand | None:
+    def _exchange(self, plant: Plant) -> ActuatorCommand | None:
         """Send a frame until its answer comes; None if the process is told to stop first."""
+        world = plant.world
         self._time_us = world.time_us
         offered_s = perf_counter()
-        self._end.offer(tell(world), offered_s, state_frame(world) if self._tells_truth else None)
+        frame, aside = plant.tell()
+        self._end.offer(frame, offered_s, aside, state_frame(world) if self._tells_truth else None)
         self._send()
         self._log(world)  # while the autopilot computes
         silence_said = False

@@ -15,6 +15,12 @@ from plant.weather import add_weather_arguments
 PARTS = ("rotor-lag", "drag", "ground", "battery")
 """What `Vehicle.without` can leave out."""
 
+LARGEST_LATENCY_MS = 1000.0
+LATENCY_HELP = (
+    "one way, simulated: the command that answers a frame acts twice that later, and the one before it is held until "
+    "then (default 0)"
+)
+
 _DEEPEST_START_M = 0.01
 
 
@@ -101,6 +107,14 @@ def _start_value(pair: str) -> tuple[str, float]:
         return key, number(value)
     except ValueError:
         raise ArgumentTypeError(f"{key}: must be a number, not {value}") from None
+
+
+def latency(text: str) -> float:
+    """Read a latency of the command line, ms: none is negative, and a second is more than anything could fly with."""
+    value = number(text)
+    if not 0.0 <= value <= LARGEST_LATENCY_MS:
+        raise ArgumentTypeError(f"must be 0 to {LARGEST_LATENCY_MS:g} ms, not {text}")
+    return value
 
 
 def add_world_arguments(parser: ArgumentParser, *, start: str, of_whom: str = "") -> None:

@@ -17,6 +17,7 @@ from plant.chance import Source, streams
 from plant.dynamics import attitude_of
 from plant.gps import GpsReceiver
 from plant.sensor_errors import GaussMarkov, accelerometer, gyroscope
+from plant.sensor_faults import SensorFaults
 from plant.sensor_parts import Barometer, Magnetometer, Sensors
 from plant.vehicle import Vehicle
 from plant.world import Physics, World, state_frame
@@ -29,13 +30,20 @@ _INERTIAL = Updated.ACCELEROMETER | Updated.GYROSCOPE
 
 
 def tells(
-    feedback: Feedback, vehicle: Vehicle, physics: Physics, origin: Geodetic, *, seed: int, interval_us: int
+    feedback: Feedback,
+    vehicle: Vehicle,
+    physics: Physics,
+    origin: Geodetic,
+    *,
+    seed: int,
+    interval_us: int,
+    faults: SensorFaults | None = None,
 ) -> Tell:
-    """Return what makes of each world, in order, the frame that the autopilot is told."""
+    """Return what makes of each world, in order, the frame that the autopilot is told; `faults` may change it."""
     if feedback is Feedback.STATE:
         return state_frame
     assert vehicle.sensors is not None, "only what has sensors serves them"
-    return SensorSuite(vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us).measure
+    return SensorSuite(vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults).measure
 
 
 def served_by(vehicle: Vehicle) -> list[Feedback]:
@@ -62,7 +70,16 @@ class Rate:
 class SensorSuite:
     """All sensors of one vehicle."""
 
-    def __init__(self, parts: Sensors, physics: Physics, origin: Geodetic, *, seed: int, interval_us: int) -> None:
+    def __init__(
+        self,
+        parts: Sensors,
+        physics: Physics,
+        origin: Geodetic,
+        *,
+        seed: int,
+        interval_us: int,
+        faults: SensorFaults | None = None,
+    ) -> None:
         """Switch them on.
 
         Args:
@@ -71,7 +88,9 @@ class SensorSuite:
             origin: Of the ENU frame.
             seed: Of their chance, not negative.
             interval_us: Between two frames.
+            faults: What frames go through; None where nothing can fail.
         """
+        self._faults = faults
         accelerating, turning, magnetic, pressing, placing = streams(seed, Source.SENSORS, 5)
         self._specific_force = physics.specific_force
         self._origin = origin
@@ -97,7 +116,8 @@ class SensorSuite:
     def measure(self, world: World) -> SensorFrame:
         """Return what they tell of `world`; each frame is the next one, or the one before again."""
         if self._frame is None or self._frame.time_us != world.time_us:
-            self._frame = self._measured(world)
+            frame = self._measured(world)
+            self._frame = frame if self._faults is None else self._faults.through(frame)
         return self._frame
 
     def _measured(self, world: World) -> SensorFrame:

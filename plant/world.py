@@ -5,6 +5,7 @@ from math import isfinite, nan
 
 import numpy as np
 
+from mavlink.aside import PlantBattery
 from mavlink.frames import Vector, earth_from_body, normalized
 from mavlink.hil import ActuatorCommand, StateFrame
 from plant.air import CALM, Air
@@ -73,7 +74,9 @@ class Physics:
         self._integrate = solver(integrator)
         self._idle = vehicle.rotors.idle_speed
         self._top = vehicle.rotors.max_speed
-        self._has_battery = vehicle.battery is not None
+        self._battery = vehicle.battery
+        self._as_built = self._parameters.copy()
+        self._held: list[float | None] | None = None
         self._integrate(np.array((*_LEVEL, *_STANDING, 0.0)), _STANDING, self._parameters, _MOMENT_S)
 
     def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
@@ -88,7 +91,7 @@ class Physics:
         if not all(map(isfinite, end)):
             raise IntegrationError("the state has left what the model describes: it is no longer finite")
         state = (*end[:9], *normalized(attitude_of(end)))
-        voltage_v = voltage_v if self._has_battery else nan
+        voltage_v = nan if self._battery is None else voltage_v
         time_us = world.time_us + duration_us
         wind, eddies = self._air.steady, None
         if wind is None:
@@ -105,17 +108,49 @@ class Physics:
         force: Vector = specific_force(_vector(world), self._parameters)
         return force
 
+    def battery(self, world: World) -> PlantBattery | None:
+        """Return what the battery gives; None without one."""
+        if self._battery is None:
+            return None
+        numbers = self._parameters[0]
+        power_w = sum(w * speed**3 for w, speed in zip(numbers["power"].tolist(), world.rotor_speeds, strict=True))
+        voltage_v = world.voltage_v if isfinite(world.voltage_v) else self._battery.full_voltage_v
+        left = max(0.0, 1.0 - world.charge_used_ah / self._battery.capacity_ah)
+        return PlantBattery(voltage_v, power_w / voltage_v, world.charge_used_ah, left)
+
+    def hold_rotor(self, rotor: int, speed: float | None) -> None:
+        """Have a rotor turn at a speed (the vehicle's unit) whatever is commanded; None: it follows commands again."""
+        held = self._held or [None] * len(_STANDING)
+        held[rotor] = speed
+        self._held = held if any(it is not None for it in held) else None
+
+    def weaken_rotor(self, rotor: int, part: float) -> None:
+        """Have a rotor make a part of the thrust and torque that it was built for, and take that part of the power."""
+        for name in ("thrust", "yaw_moment", "power"):
+            self._parameters[name][0, rotor] = part * self._as_built[name][0, rotor]
+
+    def resist(self, times: float) -> None:
+        """Have the battery resist so many times as much as it was built to."""
+        self._parameters["resistance_ohm"] = times * self._as_built["resistance_ohm"]
+
     def _feel_wind(self, world: World) -> None:
         if self._air.steady is None:
             self._wind[:] = world.wind_enu_m_s
 
     def _target(self, command: ActuatorCommand) -> FourOf:
-        """Return the rotor speeds that a command asks for: at least idle while armed, none while not."""
-        if not command.armed:
-            return _STANDING
-        c1, c2, c3, c4 = command.controls
-        idle, top = self._idle, self._top
-        return (max(c1 * top, idle), max(c2 * top, idle), max(c3 * top, idle), max(c4 * top, idle))
+        """Return the rotor speeds that a command asks for: at least idle while armed, none while not.
+
+        A rotor that is held does as it does.
+        """
+        target = _STANDING
+        if command.armed:
+            c1, c2, c3, c4 = command.controls
+            idle, top = self._idle, self._top
+            target = (max(c1 * top, idle), max(c2 * top, idle), max(c3 * top, idle), max(c4 * top, idle))
+        if self._held is None:
+            return target
+        a, b, c, d = (free if held is None else held for free, held in zip(target, self._held, strict=True))
+        return (a, b, c, d)
 
 
 def _vector(world: World) -> Array:

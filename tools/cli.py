@@ -10,7 +10,7 @@ from pathlib import Path
 from mavlink.feedback import Feedback, feedback
 from mavlink.home import DEFAULT_HOME, home
 from mavlink.process import EXIT_INTERRUPTED, ArgumentParser, fail, natural, positive, speed, use_one_thread
-from plant.scenario import add_world_arguments
+from plant.scenario import LATENCY_HELP, add_world_arguments, latency
 from plant.weather import NO_WIND, add_weather_arguments
 
 COMPARED_S = 100.0
@@ -117,6 +117,7 @@ def _add_fly(parser: ArgumentParser) -> None:
     )
     add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
     _add_feedback(add)
+    add("--latency", type=latency, default=0.0, metavar="MS", help=f"between plant and autopilot, {LATENCY_HELP}")
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")

@@ -14,10 +14,10 @@ from mavlink.geodesy import DEFAULT_ORIGIN
 from mavlink.hil import ActuatorCommand
 from mavlink.lockstep import Address, AutopilotEnd, PlantEnd
 from mavlink.process import undisturbed
+from plant.core import Plant
 from plant.integrate import Integrator
 from plant.process import PlantLogs
-from plant.sensors import Tell, tells
-from plant.world import Physics, World, starting_world
+from plant.world import Physics, starting_world
 from tools.plan import FlightPlan
 from tools.recording import Summary
 
@@ -28,9 +28,9 @@ _NEVER_LATE_S = 0.0
 
 
 class Exchange(Protocol):
-    """How a world's state gets to the autopilot, and its command back."""
+    """How what the plant tells gets to the autopilot, and its command back."""
 
-    def __call__(self, world: World) -> tuple[Step, ActuatorCommand]:
+    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and the command that reached the plant."""
 
 
@@ -48,30 +48,38 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, perf_counter, estimator=estimator)
     integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
     physics = Physics(plan.plant_vehicle, integrator, plan.weather)
-    world = starting_world(plan.start, plan.plant_vehicle, plan.weather)
     interval_us = autopilot.frame_interval_us
     plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out, _setup(plan))
-    tell = tells(plan.feedback, plan.plant_vehicle, physics, DEFAULT_ORIGIN, seed=plan.seed, interval_us=interval_us)
-    exchange: Exchange = Direct(autopilot, tell)
+    plant = Plant(
+        starting_world(plan.start, plan.plant_vehicle, plan.weather),
+        plan.plant_vehicle,
+        physics,
+        plan.feedback,
+        DEFAULT_ORIGIN,
+        seed=plan.seed,
+        interval_us=interval_us,
+        latency_us=plan.latency_us,
+    )
+    exchange: Exchange = Direct(autopilot)
     if plan.link == "memory":
-        exchange = InMemory(autopilot, interval_us, tell, plan.feedback, plant_logs)
+        exchange = InMemory(autopilot, interval_us, plan.feedback, plant_logs)
     try:
-        plant_logs.write_world(world)
+        plant_logs.write_world(plant.world)
         with undisturbed():
             began_s = perf_counter()
-            while world.time_us + interval_us <= plan.duration_s * 1e6:
+            while plant.world.time_us + interval_us <= plan.duration_s * 1e6:
                 if isfinite(plan.speed):
-                    sleep(max(0.0, began_s + world.time_us / 1e6 / plan.speed - perf_counter()))
-                step, command = exchange(world)
-                world = physics.step(world, command, interval_us)
+                    sleep(max(0.0, began_s + plant.world.time_us / 1e6 / plan.speed - perf_counter()))
+                step, command = exchange(plant)
+                plant.answer(command)
                 log.write(step)
-                plant_logs.write_world(world)
-                progress(world.time_us / 1e6)
+                plant_logs.write_world(plant.world)
+                progress(plant.world.time_us / 1e6)
             wall_time_s = perf_counter() - began_s
     finally:
         plant_logs.close()
         log.close()
-    return Summary(wall_time_s, frames=world.time_us // interval_us, resent=0)
+    return Summary(wall_time_s, frames=plant.world.time_us // interval_us, resent=0)
 
 
 def _setup(plan: FlightPlan) -> Setup:
@@ -92,26 +100,24 @@ def _setup(plan: FlightPlan) -> Setup:
 class Direct:
     """Hands frame and command over in double precision, without the codec."""
 
-    def __init__(self, autopilot: Autopilot, tell: Tell) -> None:
-        """Ask `autopilot`; `tell` it of each world."""
+    def __init__(self, autopilot: Autopilot) -> None:
+        """Ask `autopilot`."""
         self._autopilot = autopilot
-        self._tell = tell
 
-    def __call__(self, world: World) -> tuple[Step, ActuatorCommand]:
+    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and its command as it is."""
-        step = self._autopilot.step(self._tell(world))
+        frame, aside = plant.tell()
+        self._autopilot.hear(aside)
+        step = self._autopilot.step(frame)
         return step, step.command
 
 
 class InMemory:
     """Carries the datagrams that the two processes would send, in the same conversation."""
 
-    def __init__(
-        self, autopilot: Autopilot, frame_interval_us: int, tell: Tell, feedback: Feedback, logs: PlantLogs
-    ) -> None:
-        """Let `autopilot` call the plant and ask for `feedback`; `tell` it of each world."""
+    def __init__(self, autopilot: Autopilot, frame_interval_us: int, feedback: Feedback, logs: PlantLogs) -> None:
+        """Let `autopilot` call the plant and ask for `feedback`."""
         self._autopilot = autopilot
-        self._tell = tell
         self._logs = logs
         self._plant_end = PlantEnd(system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, serves=[feedback])
         self._autopilot_end = AutopilotEnd(
@@ -120,22 +126,24 @@ class InMemory:
         self._autopilot_end.poll(_NEVER_LATE_S)
         self._to_plant(time_us=0)
 
-    def __call__(self, world: World) -> tuple[Step, ActuatorCommand]:
+    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and the command as the plant decoded it."""
-        self._plant_end.offer(self._tell(world), _NEVER_LATE_S)
-        step = self._to_autopilot(world)
-        command = self._to_plant(world.time_us)
+        frame, aside = plant.tell()
+        self._plant_end.offer(frame, _NEVER_LATE_S, aside)
+        step = self._to_autopilot(frame.time_us)
+        command = self._to_plant(frame.time_us)
         assert step is not None, "the autopilot answers every new frame"
         assert command is not None, "the answer names the frame awaited"
         return step, command
 
-    def _to_autopilot(self, world: World) -> Step | None:
+    def _to_autopilot(self, time_us: int) -> Step | None:
         step = None
         sent = self._plant_end.take_outbox()
-        self._logs.write_traffic(world.time_us, [], sent)
+        self._logs.write_traffic(time_us, [], sent)
         for outgoing in sent:
             frame = self._autopilot_end.receive(outgoing.datagram, _NEVER_LATE_S)
             if frame is not None:
+                self._autopilot.hear(self._autopilot_end.aside)
                 step = self._autopilot.step(frame)
                 self._autopilot_end.answer(step.command)
         return step

@@ -51,6 +51,7 @@ class FlightPlan:
         speed: Times real time; infinite for flat out.
         seed: Seed of everything random.
         feedback: What the plant tells the autopilot.
+        latency_us: Between plant and autopilot, one way, simulated.
         duration_s: Simulated time to fly.
         out: Folder for all that the flight leaves.
         solver: QP solver asked for; None for the profile's.
@@ -73,6 +74,7 @@ class FlightPlan:
     speed: float
     seed: int
     feedback: Feedback
+    latency_us: int
     duration_s: float
     out: Path
     solver: str | None
@@ -120,6 +122,7 @@ class FlightPlan:
             speed=args.speed or (1.0 if ground.links else inf),
             seed=args.seed,
             feedback=args.feedback,
+            latency_us=round(args.latency * 1e3),
             duration_s=args.duration,
             out=args.out,
             solver=args.solver,
@@ -162,7 +165,14 @@ class FlightPlan:
             "signing_key": None,
             "insecure": False,
         }
-        usual = {"wind": NO_WIND, "feedback": Feedback.STATE, "seed": 0, "speed": inf, "duration": DURATION_S}
+        usual = {
+            "wind": NO_WIND,
+            "feedback": Feedback.STATE,
+            "seed": 0,
+            "latency": 0.0,
+            "speed": inf,
+            "duration": DURATION_S,
+        }
         return cls.from_arguments(argparse.Namespace(**(unset | none | usual | options), out=out))
 
     @property

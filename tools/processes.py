@@ -82,6 +82,7 @@ def _plant_options(plan: FlightPlan) -> list[str]:
         *plan.weather.options(),
         *("--start", str(plan.start)),
         *("--seed", str(plan.seed)),
+        *("--latency", repr(plan.latency_us / 1e3)),
         *("--duration", repr(plan.duration_s)),
         *("--speed", repr(plan.speed) if isfinite(plan.speed) else "max"),
         *("--out", str(plan.out)),

@@ -17,33 +17,31 @@ from autopilot.senses import estimator_for
 from autopilot.stations import StationSettings
 from autopilot.tracks import TrackError, track
 from mavlink import dialect
-from mavlink.dialect import Codec, Message
-from mavlink.feedback import Feedback
+from mavlink.dialect import Codec
 from mavlink.frames import euler_from_quaternion
-from mavlink.hil import ActuatorCommand, StateFrame, decode_actuators, decode_state, encode_actuators
+from mavlink.hil import ActuatorCommand, StateFrame, decode_actuators, encode_actuators
+from mavlink.lockstep import AutopilotEnd
 from mavlink.process import EXIT_FAILED, fail
-from mavlink.sensors import Frame, decode_sensors
+from mavlink.sensors import Frame
 from mavlink.tlog import Logged, TlogError, decode
 from plant.vehicle import VehicleError, load_vehicle
 
 INPUTS = "inputs.jsonl"
 _NO_CLOCK_S = 0.0
 """What is decided must not depend on it."""
-_MADE_OF = {
-    Feedback.STATE: ("ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"),
-    Feedback.SENSORS: ("HIL_SENSOR", "HIL_GPS"),
-}
 
 
 class Recorded(NamedTuple):
     """A frame of the plant, and the command that answered it.
 
     Attributes:
-        frame: What the autopilot was told.
+        time_us: Simulated time.
+        datagram: What the autopilot was told.
         command: What it answered; None where nothing of it was recorded.
     """
 
-    frame: Frame
+    time_us: int
+    datagram: bytes
     command: ActuatorCommand | None
 
 
@@ -130,27 +128,18 @@ def recorded_frames(log: Iterable[Logged], setup: Setup) -> Iterator[Recorded]:
     """Yield each frame of the plant once, in order, with the command that answered it."""
     codec = Codec(setup.system_id, dialect.AUTOPILOT_COMPONENT)
     plant = (setup.system_id, dialect.PLANT_COMPONENT)
-    parts: dict[int, dict[str, Message]] = {}
+    told: dict[int, dict[bytes, None]] = {}
     commands: dict[int, ActuatorCommand] = {}
     for time_us, frame in log:
         for message in codec.decode(frame):
-            if message.source == plant and message.name in _MADE_OF[setup.feedback]:
-                parts.setdefault(time_us, {}).setdefault(message.name, message)
+            if message.source == plant:
+                told.setdefault(time_us, {})[frame] = None  # once, however often it was sent
             elif message.source == codec.source and message.name == "HIL_ACTUATOR_CONTROLS":
                 command = decode_actuators(message)
                 if command is not None:
                     commands.setdefault(command.time_us, command)
-    for time_us in sorted(parts):
-        first, second = (parts[time_us].get(name) for name in _MADE_OF[setup.feedback])
-        told = None if first is None else _decoded(setup.feedback, first, second)
-        if told is not None:
-            yield Recorded(told, commands.get(time_us))
-
-
-def _decoded(feedback: Feedback, first: Message, second: Message | None) -> Frame | None:
-    if feedback is Feedback.SENSORS:
-        return decode_sensors(first, second)
-    return None if second is None else decode_state(first, second)
+    for time_us in sorted(told):
+        yield Recorded(time_us, b"".join(told[time_us]), commands.get(time_us))
 
 
 def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
@@ -164,11 +153,16 @@ def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
     wire = Wire(next(iter(setups.values())).system_id)
     known: StateFrame | None = None
     commands = last_us = 0
-    for frame, command in recorded:
-        if frame.time_us in setups:
-            pilot = _begun(setups[frame.time_us])
+    for time_us, datagram, command in recorded:
+        if time_us in setups:
+            pilot = _begun(setups[time_us])
+            end = _end(setups[time_us], pilot)
         if pilot is None:
             continue
+        frame = end.receive(datagram, _NO_CLOCK_S)
+        if frame is None:
+            continue
+        pilot.hear(end.aside)
         try:
             step = pilot.step(frame)
         except DecisionError as error:
@@ -208,8 +202,19 @@ def _begun(setup: Setup) -> Autopilot | Copter:
     if not setup.ground:
         assert flown is not None, "who serves no ground station flies a track"
         return Autopilot(profile, vehicle, flown, _clock, estimator=estimator)
-    settings = StationSettings(system_id=setup.system_id, identity=setup.identity, origin=setup.origin)
+    settings = StationSettings(
+        system_id=setup.system_id, identity=setup.identity, origin=setup.origin, feedback=setup.feedback
+    )
     return Copter(profile, vehicle, settings, _clock, values=setup.values, first=flown, estimator=estimator)
+
+
+def _end(setup: Setup, pilot: Autopilot | Copter) -> AutopilotEnd:
+    return AutopilotEnd(
+        system_id=setup.system_id,
+        frame_interval_us=pilot.frame_interval_us,
+        now_s=_NO_CLOCK_S,
+        feedback=setup.feedback,
+    )
 
 
 def _clock() -> float:

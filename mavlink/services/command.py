@@ -23,6 +23,9 @@ COMMAND_INT_ONLY: int = mav.MAV_RESULT_COMMAND_INT_ONLY
 UNSUPPORTED_MAV_FRAME = 9
 """MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; pymavlink's dialects leave it out, and MAV_RESULT_CANCELLED."""
 
+LATER = -1
+"""The result of a command that is obeyed within a few frames: whoever asked hears nothing before `finish`."""
+
 PROGRESS_UNKNOWN = 0xFF
 NOT_GIVEN = 2**31 - 1
 """What x and y of a COMMAND_INT hold where a COMMAND_LONG would hold nan."""
@@ -212,16 +215,18 @@ class CommandService:
             return [_ack(command.id, command.peer, before.outcome)]
         outcome = entry.handler(command)
         sends = self._interrupt(running, command, outcome) if running is not None else []
-        if outcome.result == IN_PROGRESS:
+        if outcome.result in (IN_PROGRESS, LATER):
             self._running[command.id] = _Running(command, outcome.progress, command.now_us + PROGRESS_EVERY_US)
             self._schedule()
         else:
             self._remember(command, confirmation, outcome, command.now_us)
+        if outcome.result == LATER:
+            return sends
         return [*sends, _ack(command.id, command.peer, outcome), *self._reason(outcome, command.now_us)]
 
     def _interrupt(self, running: _Running, command: Command, outcome: Outcome) -> list[Send]:
         """Forget the command in progress that another has replaced or ended; tell its sender if that is another."""
-        if outcome.result not in (ACCEPTED, IN_PROGRESS, CANCELLED) or command.id not in self._running:
+        if outcome.result not in (ACCEPTED, IN_PROGRESS, LATER, CANCELLED) or command.id not in self._running:
             return []
         self._forget(command.id)
         peer = running.command.peer

@@ -49,6 +49,13 @@ class Standing:
             return None
         return known(StateFrame(frame.time_us, (0.0, -1.0, 0.0), ZERO, quaternion_from_euler(0.0, 0.0, 1.57), ZERO))
 
+    def record(self) -> bytes:
+        return b""
+
+    def resume(self, record: bytes, time_us: int, /) -> bool:
+        del record, time_us
+        return False
+
 
 def sensors(time_us: int) -> SensorFrame:
     return SensorFrame(time_us, 0x3F, (0.0, 0.0, 9.81), ZERO, ZERO, 1e5, 15.0)

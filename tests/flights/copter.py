@@ -14,22 +14,25 @@ from msgspec import structs
 
 from autopilot.copter import Copter, Received
 from autopilot.estimate import Estimate
+from autopilot.kept import Kept, Past
 from autopilot.modes import Mode, custom_mode, mode_of_custom
 from autopilot.profile import Profile, load_profile
 from autopilot.senses import estimator_for
 from autopilot.stations import StationSettings
 from autopilot.tracks import Track
 from mavlink.dialect import Codec, Message, mav
+from mavlink.failures import Fault
 from mavlink.feedback import Feedback
 from mavlink.files import Files
 from mavlink.frames import Vector, euler_from_quaternion, ned_from_enu
 from mavlink.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from mavlink.hil import ActuatorCommand
 from mavlink.parameters import Value
+from mavlink.plain import of_bytes, to_bytes
 from mavlink.services.command import NOT_GIVEN
 from plant.air import CALM
+from plant.core import Plant
 from plant.scenario import Start
-from plant.sensors import tells
 from plant.vehicle import Vehicle, load_vehicle
 from plant.world import Physics, World, starting_world, state_frame
 from tests.plant.flights import blowing
@@ -140,7 +143,7 @@ class CopterFlight:
 
     Attributes:
         copter: The autopilot.
-        world: The plant.
+        plant: The plant.
         client: The first ground station.
         rotors: The last command to the plant.
         estimate: What the autopilot makes of its sensors; None where the state is told.
@@ -161,6 +164,7 @@ class CopterFlight:
         files: Files | None = None,
         feedback: Feedback = Feedback.STATE,
         seed: int = 0,
+        latency_us: int = 0,
     ) -> None:
         """Begin at `start`, with parameters `values`; `vehicle` is the plant's, where it is not the autopilot's.
 
@@ -168,15 +172,22 @@ class CopterFlight:
         """
         self._profile = profile or FLIGHT
         self._believed = load_vehicle(self._profile.simulation.vehicle)
-        self._settings = StationSettings(system_id=SYSTEM, identity="px4", origin=origin, files=files)
+        self._settings = StationSettings(
+            system_id=SYSTEM, identity="px4", origin=origin, files=files, feedback=feedback
+        )
         self._weather = blowing(wind_enu_m_s)
         self._physics = Physics(vehicle or self._believed, "rk4", self._weather)
-        self.world: World = starting_world(start, self._believed, self._weather)
         self._estimator = estimator_for(feedback, self._believed, origin)
         self.copter = self._copter(values, first)
-        interval_us = self.copter.frame_interval_us
-        self._tell = tells(
-            feedback, vehicle or self._believed, self._physics, origin, seed=seed, interval_us=interval_us
+        self.plant = Plant(
+            starting_world(start, self._believed, self._weather),
+            vehicle or self._believed,
+            self._physics,
+            feedback,
+            origin,
+            seed=seed,
+            interval_us=self.copter.frame_interval_us,
+            latency_us=latency_us,
         )
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
         self.estimate: Estimate | None = None
@@ -188,7 +199,14 @@ class CopterFlight:
             self.until(lambda: self.estimate is not None, 10.0, "the first estimate")
         self.step()
 
-    def _copter(self, values: dict[str, Value] | None, first: Track | None) -> Copter:
+    def past(self) -> Past:
+        """Return what is kept of the flight, as it comes from a disk."""
+        kept = of_bytes(Kept, to_bytes(self.copter.record()))
+        assert kept is not None
+        plans = self.copter.stations.missions.service.plans
+        return Past(kept, {plan_type: plan.items for plan_type, plan in plans.items()})
+
+    def _copter(self, values: dict[str, Value] | None, first: Track | None, past: Past | None = None) -> Copter:
         return Copter(
             self._profile,
             self._believed,
@@ -197,6 +215,7 @@ class CopterFlight:
             values=values,
             first=first,
             estimator=self._estimator,
+            past=past,
         )
 
     def add(self, client: Client) -> Client:
@@ -209,17 +228,22 @@ class CopterFlight:
         """Put the vehicle elsewhere, at this very time."""
         self.world = replace(starting_world(start, self._believed, self._weather), time_us=self.world.time_us)
 
-    def restart(self) -> None:
-        """Start the autopilot anew, wherever the vehicle is."""
-        self.copter = self._copter(None, None)
+    def restart(self, past: Past | None = None) -> None:
+        """Start the autopilot anew, wherever the vehicle is; with what was kept of a flight it flies on at once."""
+        values = None if past is None else dict(self.copter.parameters.values)
+        self.copter = self._copter(values, None, past)
         for client in self._clients:
             self.copter.stations.hub.open(client.link, client.address)
+        if past is not None:
+            self.step()
 
     def step(self) -> None:
         """Fly one frame."""
-        step = self.copter.step(self._tell(self.world))
+        frame, aside = self.plant.tell()
+        self.copter.hear(aside)
+        step = self.copter.step(frame)
         self.rotors, self.estimate = step.command, step.estimate or self.estimate
-        self.world = self._physics.step(self.world, self.rotors, self.copter.frame_interval_us)
+        self.plant.answer(step.command, step.faults)
         inbox = [received for client in self._clients for received in client.take_sent()]
         for link, address, datagram in self.copter.serve(inbox):
             for client in self._clients:
@@ -229,7 +253,7 @@ class CopterFlight:
     def skip(self, frames: int) -> None:
         """Have the plant go on by itself for some frames, with the last command."""
         for _ in range(frames):
-            self.world = self._physics.step(self.world, self.rotors, self.copter.frame_interval_us)
+            self.plant.go_on()
 
     def run(self, seconds: float, each_frame: Callable[[], None] | None = None) -> None:
         """Fly for so long; call `each_frame` before each frame."""
@@ -330,9 +354,17 @@ class CopterFlight:
         self.send("SET_POSITION_TARGET_LOCAL_NED", 0, SYSTEM, COMPONENT, *fields)
 
     def drain(self, part: float) -> None:
-        """Have the autopilot believe that so much of the battery's charge is gone."""
+        """Have so much of the full battery's charge gone at once, and the autopilot know."""
         assert self._believed.battery is not None
-        self.copter.power.charge_ah += part * self._believed.battery.capacity_ah
+        gone_ah = part * self._believed.battery.capacity_ah
+        self.world = replace(self.world, charge_used_ah=self.world.charge_used_ah + gone_ah)
+        self.step()
+
+    def inject(self, unit: int, kind: int, instance: int = 0, *values: float) -> int:
+        """Have a fault happen in the plant, which nobody has asked for; return the MAV_RESULT."""
+        a, b, c, d = (*values, 0.0, 0.0, 0.0, 0.0)[:4]
+        self.world, told = self.plant.faults.inject(Fault(unit, kind, instance, (a, b, c, d)), self.world)
+        return told.result
 
     def set(self, name: str, value: Value) -> None:
         """Set a parameter as a ground station does, and see that it was taken."""
@@ -359,6 +391,15 @@ class CopterFlight:
         params = (speed_m_s, 1.0, 0.0, yaw_rad)
         frame = mav.MAV_FRAME_GLOBAL
         return self.command_int(mav.MAV_CMD_DO_REPOSITION, *params, frame=frame, x=x, y=y, z=there.altitude_m)
+
+    @property
+    def world(self) -> World:
+        """The plant's world."""
+        return self.plant.world
+
+    @world.setter
+    def world(self, world: World) -> None:
+        self.plant.world = world
 
     @property
     def now_s(self) -> float:

@@ -3,6 +3,7 @@
 import json
 from argparse import ArgumentTypeError
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Self
@@ -14,12 +15,12 @@ from mavlink.home import DEFAULT_HOME, home
 from mavlink.parameters import Parameters
 from mavlink.services.parameter_file import write
 from plant.vehicle import VehicleError, load_vehicle
+from tools.scenarios.launch import Launcher
 from tools.scenarios.memory import MemoryAutopilot, MemoryPlant
 from tools.scenarios.setting import Setting, SettingError
 from tools.scenarios.sitl import Sitl
-from tools.scenarios.stage import Stage
-
-MEMORY, UDP = "memory", "udp"
+from tools.scenarios.stage import Autopilot, Plant, Stage
+from tools.scenarios.udp import UdpAutopilot, UdpPlant
 
 
 class Flights:
@@ -29,11 +30,12 @@ class Flights:
         flown: The flights, in the order in which they were begun.
     """
 
-    def __init__(self, setting: Setting, link: str) -> None:
-        """Fly by `setting` on a link of this kind."""
+    def __init__(self, setting: Setting, launcher: Launcher | None) -> None:
+        """Fly by `setting`, in processes of a `launcher`, or in this one."""
         self._setting = setting
-        self._link = link
-        self._folder = TemporaryDirectory(prefix="sitl-")
+        self._launcher = launcher
+        self._ends = ExitStack()
+        self._folder = Path(self._ends.enter_context(TemporaryDirectory(prefix="sitl-")))
         self.flown: list[Sitl] = []
 
     def begin(self, **changes: Any) -> Sitl:
@@ -44,16 +46,25 @@ class Flights:
         """
         values = {name: getattr(self._setting, name) for name in Setting.__dataclass_fields__}
         setting = Setting(**(values | changes))
-        state = Path(self._folder.name) / f"vehicle-{len(self.flown)}"
+        state = self._folder / f"vehicle-{len(self.flown)}"
         sitl = Sitl(setting, self._stage(setting, state), origin_of(setting))
         self.flown.append(sitl)
         sitl.begin()
         return sitl
 
     def _stage(self, setting: Setting, state: Path) -> Stage:
+        state.mkdir()
         _write_parameters(setting, state)
         plant, autopilot = setting.plant_options(_hover_rpm(setting)), setting.autopilot_options(state)
-        return Stage(MemoryPlant(plant), MemoryAutopilot(autopilot), setting.system)
+        if self._launcher is None:
+            return self._met(MemoryPlant(plant), MemoryAutopilot(autopilot), setting)
+        begun = UdpPlant(self._launcher, plant, state)
+        self._ends.callback(begun.close)
+        return self._met(begun, UdpAutopilot(self._launcher, autopilot, state), setting)
+
+    def _met(self, plant: Plant, autopilot: Autopilot, setting: Setting) -> Stage:
+        self._ends.callback(autopilot.close)
+        return Stage(plant, autopilot, setting.system)
 
     def keep(self, folder: Path) -> list[Path]:
         """Write all that is known of the flights below `folder`; return where each is."""
@@ -80,11 +91,7 @@ class Flights:
 
     def __exit__(self, *_: object) -> None:
         """End every flight."""
-        try:
-            for sitl in self.flown:
-                sitl.close()
-        finally:
-            self._folder.cleanup()
+        self._ends.close()
 
 
 def origin_of(setting: Setting) -> Geodetic:
@@ -119,7 +126,6 @@ def _write_parameters(setting: Setting, state: Path) -> None:
     vehicle = load_vehicle(setting.believed or setting.vehicle)
     parameters = Parameters(definitions(profile, vehicle, setting.system))
     _set(parameters, setting.params)
-    state.mkdir(parents=True)
     name = f"{profile.controller}-{vehicle.name.lower().replace(' ', '-')}.params"
     (state / name).write_text(write(parameters, setting.system), encoding="utf-8")
 

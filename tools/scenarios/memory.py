@@ -19,9 +19,10 @@ from mavlink.lockstep import Address, AutopilotEnd, PlantEnd
 from mavlink.process import ArgumentParser, Status
 from mavlink.turns import Turn
 from plant.__main__ import command_line as plant_command_line
+from plant.core import Plant
 from plant.process import DEFAULT_STARTS
 from plant.scenario import IntegrationError
-from plant.sensors import Tell, served_by, tells
+from plant.sensors import served_by
 from plant.vehicle import VehicleError, load_vehicle
 from plant.weather import weather_of
 from plant.world import Physics, starting_world, state_frame
@@ -55,7 +56,7 @@ class MemoryPlant:
         self._worlds = worlds
         self._physics = Physics(self._vehicle, args.integrator, weather)
         self._end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
-        self._tell: Tell | None = None
+        self._plant: Plant | None = None
 
     def hear(self, datagram: bytes) -> None:
         """Take in what an autopilot says that answers no frame: its call."""
@@ -64,13 +65,19 @@ class MemoryPlant:
     def frame(self) -> list[bytes]:
         """Return what the plant says up to its next frame, which comes last."""
         end, args = self._end, self._args
-        if self._tell is None:
-            origin, interval_us = args.home.origin, end.frame_interval_us
-            self._world = self._worlds[end.feedback]
-            self._tell = tells(
-                end.feedback, self._vehicle, self._physics, origin, seed=args.seed, interval_us=interval_us
+        if self._plant is None:
+            self._plant = Plant(
+                self._worlds[end.feedback],
+                self._vehicle,
+                self._physics,
+                end.feedback,
+                args.home.origin,
+                seed=args.seed,
+                interval_us=end.frame_interval_us,
+                latency_us=round(args.latency * 1e3),
             )
-        end.offer(self._tell(self._world), NEVER_LATE_S, state_frame(self._world))
+        frame, aside = self._plant.tell()
+        end.offer(frame, NEVER_LATE_S, aside, state_frame(self._plant.world))
         return [outgoing.datagram for outgoing in end.take_outbox()]
 
     def take(self, answer: bytes) -> None:
@@ -82,13 +89,11 @@ class MemoryPlant:
         command = self._end.receive(answer, _ADDRESS, NEVER_LATE_S)
         self._end.received.clear()
         assert command is not None, "the answer names the frame awaited"
+        assert self._plant is not None, "it has told a frame"
         try:
-            self._world = self._physics.step(self._world, command, self._end.frame_interval_us)
+            self._plant.answer(command, self._end.take_faults())
         except IntegrationError as error:
             raise StageError(str(error)) from error
-
-    def close(self) -> None:
-        """End it."""
 
 
 class MemoryAutopilot:
@@ -137,7 +142,9 @@ class MemoryAutopilot:
         self._desk.heard = turn
         known = self._end.receive(frame, NEVER_LATE_S)
         assert known is not None, "each frame is new"
-        self._end.answer(self._copter.step(known).command)
+        self._copter.hear(self._end.aside)
+        step = self._copter.step(known)
+        self._end.answer(step.command, step.faults)
 
     def answer(self) -> bytes:
         """Return its answer to the frame."""

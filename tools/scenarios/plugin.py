@@ -19,6 +19,7 @@ from tools.scenarios.summary import FLOWN, Summary
 
 if TYPE_CHECKING:
     from tools.scenarios.flights import Flights
+    from tools.scenarios.launch import Launcher
     from tools.scenarios.sitl import Sitl
 
 LINKS = ("memory", "udp")
@@ -31,6 +32,7 @@ MARKS = {
     "seeds": "seeds(first, last): one flight for each seed",
 }
 _FLIGHTS = pytest.StashKey["Flights"]()
+_LAUNCHER = pytest.StashKey["Launcher"]()
 _SUMMARY = pytest.StashKey[Summary]()
 
 
@@ -43,6 +45,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         choices=LINKS,
         default="memory",
         help="memory: plant and autopilot in this process (default); udp: each in a process of its own",
+    )
+    add(
+        "--sitl-from-scratch",
+        action="store_true",
+        help="with udp: start each process as a user does, rather than by a fork of one that has loaded everything",
     )
     add(
         "--sitl-keep",
@@ -126,6 +133,12 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         Path(path).write_text("".join(line + "\n" for line in session.config.stash[_SUMMARY].lines()), encoding="utf-8")
 
 
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """End what starts processes."""
+    if _LAUNCHER in config.stash:
+        config.stash[_LAUNCHER].close()
+
+
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Say how much was flown, how fast, and with which verdict."""
     summary = config.stash[_SUMMARY]
@@ -154,10 +167,21 @@ def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack)
     try:
         setting = setting_of(_said(request.node, seed))
     except SettingError as error:
-        raise pytest.UsageError(f"{request.node.nodeid}: {error}") from error
-    flights = stack.enter_context(Flights(setting, request.config.getoption("--sitl-link")))
+        pytest.fail(str(error), pytrace=False)
+    flights = stack.enter_context(Flights(setting, _launcher(request.config)))
     request.node.stash[_FLIGHTS] = flights
     return flights
+
+
+def _launcher(config: pytest.Config) -> Launcher | None:
+    """Return what starts the processes of this run, or of this worker; None where flights need none."""
+    if config.getoption("--sitl-link") == "memory":
+        return None
+    from tools.scenarios.launch import launcher
+
+    if _LAUNCHER not in config.stash:
+        config.stash[_LAUNCHER] = launcher(from_scratch=config.getoption("--sitl-from-scratch"))
+    return config.stash[_LAUNCHER]
 
 
 def _said(node: pytest.Item, seed: int | None) -> list[Mapping[str, Any]]:

@@ -476,10 +476,6 @@ class Sitl:
         last = f"; last said: {'; '.join(self.texts[-3:])}" if self.texts else ""
         return f"{words}, {where}{last}"
 
-    def close(self) -> None:
-        """End the flight."""
-        self._stage.close()
-
 
 def _number(kind: str, of: str | int) -> int:
     if isinstance(of, int):

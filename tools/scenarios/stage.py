@@ -3,7 +3,7 @@
 The two may be in this process or in others: see `memory` and `udp`. Either way the same bytes pass.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple, Protocol
 
 from mavlink.dialect import (
@@ -37,10 +37,6 @@ class Plant(Protocol):
 
     def take(self, answer: bytes) -> None:
         """Take in the answer to that frame, and go on."""
-        ...
-
-    def close(self) -> None:
-        """End it."""
         ...
 
 
@@ -140,11 +136,6 @@ class Stage:
         self._autopilot.start()
         self._autopilot.call()
 
-    def close(self) -> None:
-        """End both."""
-        self._autopilot.close()
-        self._plant.close()
-
     def _next(self) -> tuple[bytes, StateFrame]:
         *others, datagram = self._plant.frame()
         for other in others:
@@ -173,9 +164,25 @@ class Stage:
         raise StageError("the autopilot answered with what no rotor can follow")
 
 
+def frames_of(datagram: bytes) -> Iterator[bytes]:
+    """Yield the frames of a datagram of whole MAVLink 2 frames that nobody has signed."""
+    at = 0
+    while at < len(datagram):
+        end = at + _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES
+        yield datagram[at:end]
+        at = end
+
+
+def message_id(frame: bytes) -> int:
+    """Return the number of the message in a frame of MAVLink 2."""
+    return int.from_bytes(frame[7:_HEADER_BYTES], "little")
+
+
 def parted(datagram: bytes) -> tuple[bytes, bytes]:
     """Return what of a plant's datagram is for the autopilot, and the truth behind it."""
     at = 0
-    while at < len(datagram) and datagram[at + _COMPONENT_AT] != TRUTH_COMPONENT:
-        at += _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES
+    for frame in frames_of(datagram):
+        if frame[_COMPONENT_AT] == TRUTH_COMPONENT:
+            break
+        at += len(frame)
     return datagram[:at], datagram[at:]
