@@ -23,6 +23,17 @@ from tests.sitl.steps import (
 PLACE = (0.0, 0.0, 5.0)
 KICKED = {"airborne": 5.0, "start": {"p": radians(400.0)}}
 
+
+def kicked(deg: float) -> None:
+    """See that there was a kick."""
+    assert deg > 1.0
+
+
+def is_tilted(deg: float) -> None:
+    """See that the tilt is the one asked for."""
+    assert abs(deg - 20.0) < 0.5
+
+
 SCENARIOS = (
     Scenario(
         name="altitude-hold",
@@ -140,13 +151,3 @@ SCENARIOS = (
         setting={"airborne": 20.0, "start": {"phi": 180.0}},
     ),
 )
-
-
-def kicked(deg: float) -> None:
-    """See that there was a kick."""
-    assert deg > 1.0
-
-
-def is_tilted(deg: float) -> None:
-    """See that the tilt is the one asked for."""
-    assert abs(deg - 20.0) < 0.5

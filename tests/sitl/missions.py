@@ -1,11 +1,10 @@
 """Missions: flown as uploaded, refused where they cannot be."""
 
 from autopilot.modes import Mode
-from tests.sitl.conditions import ARMED, DISARMED, away, every, height, mode, near, over, says, slower
-from tests.sitl.scenario import Scenario
+from tests.sitl.conditions import DISARMED, away, every, mode, near, over, slower
+from tests.sitl.scenario import Scenario, Step
 from tests.sitl.steps import (
     check,
-    goto,
     hold,
     measured,
     places,
@@ -13,7 +12,6 @@ from tests.sitl.steps import (
     run,
     select,
     start_mission,
-    takeoff,
     trouble,
     until,
     upload,
@@ -43,7 +41,7 @@ def off_the_square(columns: Columns) -> float:
     return float((nearest * inside + outside * ~inside).max())
 
 
-def reads_back(count: int) -> "Step":
+def reads_back(count: int) -> Step:
     """See that the vehicle has so many items."""
 
     def step(sitl: Sitl) -> None:
@@ -66,7 +64,11 @@ def changes_mode_while_it_uploads(sitl: Sitl) -> None:
     assert sitl.mode is Mode.LAND
 
 
-from tests.sitl.scenario import Step  # noqa: E402
+def is_fast(sitl: Sitl, m_s: float) -> None:
+    """See that it has flown so fast, and no faster."""
+    fastest = float(abs(sitl.flown()["vy"]).max())
+    assert abs(fastest - m_s) < 0.1
+
 
 SCENARIOS = (
     Scenario(
@@ -198,12 +200,3 @@ SCENARIOS = (
         ),
     ),
 )
-
-
-def is_fast(sitl: Sitl, m_s: float) -> None:
-    """See that it has flown so fast, and no faster."""
-    fastest = float(abs(sitl.flown()["vy"]).max())
-    assert abs(fastest - m_s) < 0.1
-
-
-_ = (ARMED, height, says, goto, takeoff)

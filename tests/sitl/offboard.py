@@ -6,7 +6,7 @@ from autopilot.modes import Mode
 from mavlink.dialect import mav
 from tests.sitl.conditions import ARMED, climbs, every, ground_speed, mode, near, says, slower
 from tests.sitl.scenario import Scenario
-from tests.sitl.steps import check, command, hold, refused, run, select, setpoint, until
+from tests.sitl.steps import check, command, hold, refused, select, setpoint, until
 from tools.scenarios.sitl import Sitl
 
 PLACE = (0.0, 0.0, 5.0)
@@ -122,4 +122,3 @@ SCENARIOS = (
         setting={"airborne": 5.0},
     ),
 )
-_ = run
