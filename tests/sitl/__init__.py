@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from tests.sitl import arming, fleet, holding, links, malformed, missions, offboard, takeoff_land, tracking
+from tests.sitl import arming, failsafes, fleet, holding, links, malformed, missions, offboard, takeoff_land, tracking
 from tests.sitl.scenario import FleetScenario, Scenario
 
 GROUPS: Mapping[str, Sequence[Scenario | FleetScenario]] = {
@@ -12,6 +12,7 @@ GROUPS: Mapping[str, Sequence[Scenario | FleetScenario]] = {
     "tracking": tracking.SCENARIOS,
     "mission": missions.SCENARIOS,
     "offboard": offboard.SCENARIOS,
+    "failsafes": failsafes.SCENARIOS,
     "link-process": links.SCENARIOS,
     "malformed": malformed.SCENARIOS,
     "fleet": fleet.SCENARIOS,

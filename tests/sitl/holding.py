@@ -6,6 +6,7 @@ from autopilot.modes import Mode
 from tests.sitl.conditions import ARMED, above, every, height, mode, near, slower, tilted_less
 from tests.sitl.scenario import Scenario
 from tests.sitl.steps import (
+    by_hand,
     check,
     farthest_from,
     goto,
@@ -40,8 +41,7 @@ SCENARIOS = (
         peer="AP ModeAltHold: ± 1 m for 5 s",
         holds="± 0.05 m for 5 s",
         steps=(
-            sticks(),
-            run(0.1),
+            by_hand(0.3),
             select(Mode.ALTITUDE),
             hold(every(mode(Mode.ALTITUDE), height(5.0, 0.05)), for_=5.0, meanwhile=sticks()),
         ),
@@ -99,10 +99,9 @@ SCENARIOS = (
         holds="error below 0.5° after 1 s",
         steps=(
             put("MPC_MAN_TILT_MAX", 20.0),
-            sticks(),
-            run(0.1),
+            by_hand(0.3),
             select(Mode.STABILIZED),
-            lambda sitl: sitl.run(1.0, lambda: sticks(pitch=1.0, thrust=0.45)(sitl)),
+            by_hand(1.0, pitch=1.0, thrust=0.45),
             lambda sitl: is_tilted(sitl.tilt_deg),
         ),
         setting={"airborne": 20.0},
@@ -119,10 +118,9 @@ SCENARIOS = (
         peer="ours",
         holds="5 m/s by sticks, then stands within 4 s, and stays within 0.05 m",
         steps=(
-            sticks(),
-            run(0.1),
+            by_hand(0.3),
             select(Mode.POSITION),
-            lambda sitl: sitl.run(4.0, lambda: sticks(pitch=1.0)(sitl)),
+            by_hand(4.0, pitch=1.0),
             until(slower(0.05), within=4.0, meanwhile=sticks()),
             hold(every(slower(0.1), height(5.0, 0.1)), for_=2.0, meanwhile=sticks()),
         ),

@@ -150,6 +150,16 @@ def sticks(pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: floa
     return at_every(0.1, lambda sitl: sitl.stick(pitch, roll, thrust, yaw))
 
 
+def by_hand(seconds: float, **axes: float) -> Step:
+    """Fly by sticks for so long: see `sticks`."""
+
+    def step(sitl: Sitl) -> None:
+        moved = sticks(**axes)
+        sitl.run(seconds, lambda: moved(sitl))
+
+    return step
+
+
 def setpoint(**what: Any) -> Step:
     """Send a setpoint, twenty times a second."""
     return at_every(0.02, lambda sitl: sitl.setpoint(**what))

@@ -7,9 +7,10 @@ import numpy as np
 
 from autopilot.planner import start_yaw
 from autopilot.tracks import position, track
+from mavlink.dialect import mav
 from tests.sitl.conditions import ARMED, above, every, tilted_less
 from tests.sitl.scenario import Scenario, Step
-from tests.sitl.steps import hold, measured, places, run
+from tests.sitl.steps import command, hold, measured, places, run
 from tools.scenarios.record import Columns
 from tools.scenarios.sitl import Sitl
 
@@ -74,6 +75,8 @@ def yaw_turns_through(least_deg: float) -> Step:
 FAST = "lemniscate:size=4,height=3,lap=2"
 CIRCLE = "circle:radius=5,speed=4"
 
+INTERVAL: int = mav.MAV_CMD_SET_MESSAGE_INTERVAL
+
 SCENARIOS = (
     *(
         Scenario(
@@ -137,6 +140,7 @@ SCENARIOS = (
         peer="PX4 on jMAVSim 0.032 m, ArduCopter 0.047 m, by their own estimates",
         holds="by its own estimate at most 0.02 m; from the truth 1.2 m",
         steps=(
+            *(command(INTERVAL, float(number), 100_000.0, result=mav.MAV_RESULT_ACCEPTED) for number in (32, 85)),
             lambda sitl: sitl.fly_track("spiral"),
             run(30.0),
             lambda sitl: follows_by_its_estimate(sitl, 0.05),
