@@ -35,6 +35,7 @@ class Behaviour:
         follow_distance_m: From the target.
         follow_angle_deg: Where from, clockwise from ahead of it: 180 is behind.
         follow_altitude_mode: Of PX4's FLW_TGT_ALT_M: 0 above home.
+        land_on_three: Whether a rotor that is lost is noticed, and the vehicle landed on the others.
         inject_failures: Whether MAV_CMD_INJECT_FAILURE is obeyed.
         solve_time_s: That the control law is declared to take; 0 none.
     """
@@ -60,5 +61,6 @@ class Behaviour:
     follow_distance_m: float = 8.0
     follow_angle_deg: float = 180.0
     follow_altitude_mode: int = 0
+    land_on_three: bool = True
     inject_failures: bool = False
     solve_time_s: float = 0.0

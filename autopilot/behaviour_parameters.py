@@ -113,6 +113,11 @@ ROWS = (
         values=((0, "Home"), (1, "Ground below"), (2, "Target")),
     ),
     Row(
+        *("CA_FAILURE_MODE", "land_on_three", "", 0, 1, "Failure of a rotor"),
+        *("Whether it is noticed. Set to 0 it also forgets one that has failed.",),
+        values=((0, "Ignore"), (1, "Land on three rotors")),
+    ),
+    Row(
         *("SYS_FAILURE_EN", "inject_failures", "", 0, 1, "Failure injection"),
         *("Whether MAV_CMD_INJECT_FAILURE is obeyed.",),
         values=_YES_OR_NO,
@@ -232,6 +237,7 @@ _GROUPS = {
     "RTL": "Return",
     "NAV": "Flight",
     "COM": "Safety",
+    "CA": "Safety",
     "ORBIT": "Flight",
     "FLW": "Follow",
     "SYS": "System",

@@ -109,6 +109,7 @@ class Fallback(StrEnum):
     LQR = "LQR"
     DESCENT = "level and descend"
     RECOVERY = "recovery"
+    THREE_ROTORS = "three rotors"
 
 
 class Active(NamedTuple):

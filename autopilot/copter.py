@@ -26,6 +26,7 @@ from autopilot.planner import Planner, plan, start_yaw
 from autopilot.power import PowerMeter
 from autopilot.profile import Profile
 from autopilot.reference import Reference, target_of
+from autopilot.rotor_loss import RotorLoss
 from autopilot.senses import Estimator, Senses
 from autopilot.snapshots import Photographer
 from autopilot.solve_time import SolveTime
@@ -70,8 +71,10 @@ class Copter:
         parameters: All numbers that can be changed.
         stations: What ground stations see and say.
         power: The battery, as far as the autopilot knows.
+        rotor_loss: Notices when a rotor is lost, and lands on the others.
         solve_time_s: Of the last QP.
         samples: How many control samples ground stations were told of.
+        resumed: What goes on of a flight in which an autopilot was killed, in words; empty where none does.
     """
 
     def __init__(
@@ -129,13 +132,16 @@ class Copter:
         self.power = PowerMeter(believed)
         self._solving = SolveTime(self._loop.control_interval_us)
         self._aside = NOTHING
+        self._sent = STILL
+        self.rotor_loss = RotorLoss(believed, self._loop.control_interval_us)
+        self.rotor_loss.enabled = flies_by.land_on_three
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
         self._maker = maker_of(profile, vehicle)
         self._past = past
         self._wakes = past is not None
         self._resumed_us: int | None = None
-        self.samples = 0
+        self.samples, self.resumed = 0, ""
         self._time_us: int | None = None
         self._decision: Decision | None = None
         self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
@@ -177,12 +183,14 @@ class Copter:
         if due:
             state = self._loop.state(known)
             self._sense(frame.time_us, state)
+            self._watch_rotors(state)
             guidance = self.pilot.step()
             decision = self._decide(frame.time_us, state, guidance)
             if not self._solving.busy(frame.time_us) or decision is not None:
                 self._decision = decision
             self._sample = (frame.time_us, state, guidance, self._decision)
-        command = ActuatorCommand(frame.time_us, self._solving.controls(frame.time_us), armed=self.pilot.state.armed)
+        self._sent = self._solving.controls(frame.time_us)
+        command = ActuatorCommand(frame.time_us, self._sent, armed=self.pilot.state.armed)
         self._step_time_s = self._clock() - started_s
         estimate = self._senses.estimate if due else None
         return Step(command, decision, self._step_time_s, estimate, self.stations.failures.take())
@@ -248,17 +256,18 @@ class Copter:
                 chosen = track(scene.behaviour.track)
                 return Along(plan(chosen, self._references, self._instants.preview), chosen.duration_s, began_us)
             if mode is Mode.MISSION:
-                return stations.missions.course(kept.course.turns, kept.course.legs)
+                return stations.missions.course_again(kept.course.turns, kept.course.legs)
             course = course_again(mode, kept.course, scene) or self._course(mode, scene)
             return course.skip(kept.course.legs) if isinstance(course, Legs) else course
 
         pilot.resume(frame.time_us, self._loop.state(frame), kept.pilot, again, closely=closely)
         stations.missions.moved_origin()
-        self._controls = self._loop.controls if pilot.state.armed and not pilot.idles else STILL
+        self._solving.at_once(self._loop.controls if pilot.state.armed and not pilot.idles else STILL)
         stations.say(INFO, stations.banner())
         if pilot.state.armed:
             how = goes_on(pilot.state.mode, stations.missions.executor.progress.seq)
-            stations.say(WARNING, f"restarted in flight: {how}")
+            self.resumed = f"restarted in flight: {how}"
+            pilot.say(WARNING, self.resumed)
 
     def _begin(self, frame: StateFrame) -> None:
         """See the vehicle for the first time, or anew after frames were missed."""
@@ -269,6 +278,7 @@ class Copter:
         loop, hover_speed = self._loop, self._loop.vehicle.hover_speed
         if self._time_us is not None and frame.time_us > self._time_us:
             loop.begin(hover_speed, loop.state(frame).euler[2])
+            self.rotor_loss.begin(loop.controls)
             return
         if self._time_us is not None:  # another flight: nothing that any service remembers is of any use
             self.stations.restart = REBOOT
@@ -278,7 +288,11 @@ class Copter:
             speed = loop.vehicle.rotors.idle_speed
         loop.begin(speed, self._first_yaw())
         self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None, rests=rests)
-        self._solving.at_once(STILL if self.pilot.standing else loop.controls)
+        self._sent = STILL if self.pilot.standing else loop.controls
+        self._solving.at_once(self._sent)
+        self.rotor_loss.forget()
+        self.rotor_loss.begin(self._sent)
+        self.pilot.rotor_failed = ""
         self.stations.say(INFO, self.stations.banner())
 
     def _first_yaw(self) -> float:
@@ -299,6 +313,18 @@ class Copter:
     def _listened(self, now_us: int, seconds: float) -> bool:
         """Whether it was listened for so long: not if the autopilot was restarted only now."""
         return self._resumed_us is None or now_us - self._resumed_us > seconds * 1e6
+
+    def _watch_rotors(self, state: VehicleState) -> None:
+        """Notice whether a rotor is lost: then there is but one way to fly."""
+        pilot, estimate = self.pilot, self._senses.estimate
+        if not pilot.state.armed:
+            self.rotor_loss.end()
+        feels = estimate is None or (estimate.health.gyroscope and estimate.health.accelerometer)
+        airborne = feels and pilot.state.armed and not pilot.standing
+        charge_ah = self.power.charge_ah
+        if self.rotor_loss.look(state, self._sent, charge_ah, airborne=airborne, ground_m=pilot.ground_m):
+            assert self.rotor_loss.lost is not None, "what is lost has a number"
+            pilot.lose_rotor(self.rotor_loss.lost)
 
     def _take_stock(self, state: VehicleState) -> None:
         """Take in what orders of ground stations are judged by."""
@@ -335,6 +361,12 @@ class Copter:
 
     def _decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         loop = self._loop
+        if self.rotor_loss.flies:
+            controls, decision = self.rotor_loss.decide(state, self.power.charge_ah)
+            self._solving.at_once(controls)
+            if self.rotor_loss.landed:
+                self.pilot.touch_down()
+            return decision
         if guidance.begins:
             loop.begin(loop.vehicle.rotors.idle_speed, state.euler[2], afresh=False)
         elif guidance is not RESTS and self._solving.busy(now_us):
@@ -380,11 +412,16 @@ class Copter:
     def _adopt(self) -> None:
         """Fly by the parameters as they are now."""
         self.pilot.behaviour = behaviour(self.parameters)
+        self.rotor_loss.enabled = self.pilot.behaviour.land_on_three
+        if not self.rotor_loss.enabled:
+            self.rotor_loss.forget()
+            self.pilot.rotor_failed = ""
         if self._attitude is not None:
             self._attitude.limits = attitude_limits(self.pilot.behaviour)
         tuned = self._tuning.take()
         if tuned is not None:
             self._loop.adopt(tuned.controller, tuned.vehicle)
+            self.rotor_loss.adopt(tuned.vehicle)
             self._photographer = Photographer(tuned.vehicle, self._interval_s)
             if self._attitude is not None:
                 self._attitude.adopt(tuned.vehicle)

@@ -95,7 +95,7 @@ class Ground:
         self._links: GroundLinks | ConductedLinks = GroundLinks(links, perf_counter, thread_time)
         if conductor is not None:
             self._links = ConductedLinks(conductor, lambda: self.copter.pilot.state)
-        self.shut_down = self._said_too_much = False
+        self.shut_down = self._said_too_much = self._resumed_said = False
         self._revision = self.copter.parameters.revision
         self._told_s = self._saved_s = perf_counter()
         self._told_us = 0
@@ -107,7 +107,7 @@ class Ground:
     def record(self, log: "AutopilotLog") -> None:
         """Note in `log` with what the vehicle begins, and what it hears."""
         self._log = log
-        log.begin_again(self._values)
+        log.begin_again(self._values, self._past_bytes)
 
     def serve(self, now_s: float) -> Copter:
         """Hear and answer ground stations; return the vehicle that flies on."""
@@ -122,6 +122,9 @@ class Ground:
             self._tell(now_s)
         if self.copter.parameters.revision != self._revision:
             self._save_parameters()
+        if self.copter.resumed and not self._resumed_said:
+            self._resumed_said = True
+            self._status.say("said", self.copter.resumed)
         if self._flight is not None:
             self._keep(self._flight)
         return self.copter
@@ -179,13 +182,14 @@ class Ground:
             self._kept_samples = self._kept_plans = 0
             self._links.introduce(self.copter.stations)
             if self._log:
-                self._log.begin_again(self._values)
+                self._log.begin_again(self._values, self._past_bytes)
             self._revision = self.copter.parameters.revision
             self._status.say("said", "restarted by a ground station")
 
     def _vehicle_anew(self, past: Past | None) -> Copter:
         args = self._args
         self._values = self._read_parameters()
+        self._past_bytes = b"" if past is None else to_bytes(past)
         settings = StationSettings(
             system_id=args.system_id,
             identity=args.identity,

@@ -33,6 +33,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         identity: Towards ground stations.
         ground: Whether it served ground stations.
         values: Of parameters that were changed before.
+        past: What had been kept of the same flight, where it was killed in it; else empty.
         first_us: The first frame that it answered.
     """
 
@@ -47,6 +48,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     identity: str
     ground: bool
     values: dict[str, Value] = {}
+    past: bytes = b""
     first_us: int = 0
 
 

@@ -78,18 +78,22 @@ class Missions:
         """See the geofence from another origin."""
         self._fence_in(self.service.plans[FENCE].items)
 
-    def course(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionCourse":
-        """Return the course of the mission, from its current item on.
+    def course(self) -> "MissionCourse":
+        """Start the mission, and return its course, from the current item on."""
+        self.executor.start()
+        return self.course_again()
+
+    def course_again(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionCourse":
+        """Return the course of a mission that is flown already, or that is over while the rotors still turn.
 
         Args:
-            turns: How many turns of that were flown before.
+            turns: How many turns of the current item were flown before.
             legs: How many legs of it are left; empty before it began.
         """
         behaviour = self._pilot.behaviour
         self.executor.defaults = Defaults(
             max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m
         )
-        self.executor.start()
         return MissionCourse(self.executor, self, turns, legs)
 
     @property

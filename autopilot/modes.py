@@ -51,6 +51,7 @@ class Event(StrEnum):
     RETURN_ITEM = "mission says return"
     SETPOINTS_LOST = "setpoints lost"
     STICKS_LOST = "sticks lost"
+    ROTOR_LOST = "rotor failed"
     TOUCHED_DOWN = "landed"
     LEFT_STANDING = "no take-off"
 
@@ -167,6 +168,7 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition((Mode.MISSION,), Event.RETURN_ITEM, armed=True, target=Mode.RETURN),
     Transition((Mode.OFFBOARD,), Event.SETPOINTS_LOST, armed=True, target=Mode.HOLD),
     Transition(MANUAL, Event.STICKS_LOST, armed=True, target=Mode.HOLD),
+    Transition((), Event.ROTOR_LOST, armed=True, target=Mode.LAND),
 )
 
 

@@ -16,7 +16,7 @@ from autopilot.landing import Landing, is_below, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
 from autopilot.reference import Reference, at_rest, lead, lead_along, moving_with, still_target
 from mavlink.frames import Vector
-from mavlink.services.statustext import INFO, NOTICE, WARNING
+from mavlink.services.statustext import EMERGENCY, INFO, NOTICE, WARNING
 
 CourseMaker: TypeAlias = Callable[[Mode, Scene], Course]
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -96,6 +96,7 @@ class Pilot:
         landing_us: When it last stood again; 0 before.
         ground_m: Height of where it last stood, z of ENU.
         flights: How often the rotors were armed.
+        rotor_failed: Which rotor has failed, in words; empty if none has. Nothing but landing is possible then.
     """
 
     def __init__(
@@ -125,6 +126,7 @@ class Pilot:
         self.speed_m_s: float | None = None
         self.armed_us = self.takeoff_us = self.landing_us = 0
         self.flights = 0
+        self.rotor_failed = ""
         self.ground_m = 0.0
         self._home_is_chosen = False
         self._course_is_chosen = False
@@ -251,13 +253,14 @@ class Pilot:
 
     def refusals(self) -> list[str]:
         """Return why the rotors may not be armed; empty if they may."""
-        return refusals(self._facts)
+        return refusals(self._facts) + ([self.rotor_failed] if self.rotor_failed else [])
 
     def arm(self, *, force: bool = False) -> Refusal | None:
         """Let the rotors turn; return why not."""
         if self.state.armed:
             return None
-        reasons = [] if force and self._vehicle is not None else self.refusals()
+        forced = force and self._vehicle is not None and not self.rotor_failed
+        reasons = [] if forced else self.refusals()
         if reasons:
             return Refusal("not armed: " + "; ".join(reasons))
         refusal = self._follow(Event.ARM, "rotors armed")
@@ -305,6 +308,18 @@ class Pilot:
         stays = event in (Event.ARRIVED, Event.FINISHED)  # where the course that ends has led
         if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode and not stays:
             self._engage(self.state.mode)
+
+    def lose_rotor(self, rotor: int) -> None:
+        """Land, and do nothing else any more: rotor 0..3 has failed."""
+        self.rotor_failed = f"rotor {rotor + 1} failed"
+        self.say(EMERGENCY, f"{self.rotor_failed}: landing on three rotors")
+        self._follow(Event.ROTOR_LOST, "")
+        self._engage(self.state.mode)
+
+    def touch_down(self) -> None:
+        """Stand, and stop the rotors: something else than the reference tells of the ground."""
+        self._stand()
+        self._stop_rotors(Event.TOUCHED_DOWN, f"{Event.TOUCHED_DOWN}, rotors stopped")
 
     def step(self) -> Guidance:
         """Return what to follow from now on. Called once a control sample."""
@@ -416,6 +431,8 @@ class Pilot:
     def _follow(
         self, event: Event, text: str, selected: Mode | None = None, met: Sequence[Need] = ()
     ) -> Refusal | None:
+        if event is Event.SELECT and self.state.armed and self.rotor_failed:
+            return Refusal(f"{selected} refused: {self.rotor_failed}")
         missing = [need for need in self._missing() if need not in met]
         after = following(self.state, event, selected, missing)
         if isinstance(after, Refusal):

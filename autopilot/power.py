@@ -48,8 +48,11 @@ class PowerMeter:
         self._sag_v = sag_v if abs(sag_v) > _SAG * self._battery.full_voltage_v else 0.0
 
     def resume(self, charge_ah: float, energy_wh: float) -> None:
-        """Go on with a battery that has given so much."""
-        self.charge_ah, self.energy_wh = charge_ah, energy_wh
+        """Go on with a battery that has given so much, unless it says itself how much."""
+        self.energy_wh = energy_wh
+        if self._told:
+            return
+        self.charge_ah = charge_ah
         self._now = self._model.terminal(charge_ah, np.zeros(4))
 
     def run(self, controls: FourOf, duration_s: float) -> None:

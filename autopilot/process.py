@@ -104,9 +104,9 @@ class AutopilotLog:
             (time_s, *step.decision.attitude_reference, *codes, *times_us, how.cost, how.slack, *how.active)
         )
 
-    def begin_again(self, values: Mapping[str, Value]) -> None:
-        """Note that the next frame is answered by a vehicle that begins with `values` of its parameters."""
-        self._setup = msgspec.structs.replace(self._setup, values=dict(values))
+    def begin_again(self, values: Mapping[str, Value], past: bytes) -> None:
+        """Note that the next frame is answered by a vehicle that begins with these parameters, and with this past."""
+        self._setup = msgspec.structs.replace(self._setup, values=dict(values), past=past)
         self._begins = True
 
     def hear(self, datagrams: Iterable["Received"]) -> Iterator["Received"]:
@@ -147,6 +147,8 @@ def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop
     log = AutopilotLog(args.out, _setup(args, profile)) if args.out else None
     if ground and log:
         ground.record(log)
+    if args.conducted and isinstance(link, UdpLink):  # several flights share the cores: who waits gives way at once
+        link.spin_s = 0.0
     try:
         with undisturbed():
             Client(link, end, status, stop, log, ground).fly(autopilot)
@@ -212,7 +214,11 @@ def _ground(
     from autopilot.conducted import UdpConductor
     from autopilot.ground_process import open_ground
 
-    conductor = UdpConductor(open_link(args.conducted), lambda: stop) if args.conducted else None
+    conductor = None
+    if args.conducted:
+        link = open_link(args.conducted)
+        link.spin_s = 0.0
+        conductor = UdpConductor(link, lambda: stop)
     return open_ground(args, profile, vehicle, estimator, status, conductor)
 
 

@@ -79,6 +79,7 @@ class Photographer:
             intended_custom_mode=custom_mode(mode),
             standard_mode=ROWS[mode].standard,
             landed_state=landed_state(pilot, state),
+            emergency=armed and bool(pilot.rotor_failed),
             armable=not pilot.refusals(),
             position_enu_m=state.position_enu_m,
             velocity_enu_m_s=state.velocity_enu_m_s,

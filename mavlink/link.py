@@ -81,6 +81,7 @@ class UdpLink:
     Attributes:
         url: The URL of the endpoint, with the port that it really has.
         target: Whom it speaks with; None for whoever sends.
+        spin_s: How long to look for a datagram before going to sleep.
     """
 
     def __init__(self, sock: socket.socket, url: str, target: Address | None) -> None:
@@ -88,6 +89,7 @@ class UdpLink:
         sock.setblocking(False)
         self._socket = sock
         self.target = target
+        self.spin_s = SPIN_S
         self._waited_s = 0.0
         self._opened = [] if target is None else [target]
         self.url = url
@@ -113,7 +115,7 @@ class UdpLink:
         """Return the next datagram and its sender, or None after `timeout_s`."""
         began_s = perf_counter()
         give_up_s = began_s + timeout_s
-        spin_until_s = began_s + (SPIN_S if self._waited_s <= SPIN_S else 0.0)
+        spin_until_s = began_s + (self.spin_s if self._waited_s <= self.spin_s else 0.0)
         while (received := self._receive_now()) is None:
             now_s = perf_counter()
             if now_s >= give_up_s:

@@ -160,6 +160,7 @@ class Snapshot:
         standard_mode: MAV_STANDARD_MODE of the mode, 0 where it is none.
         landed_state: MAV_LANDED_STATE.
         failsafe: Whether the vehicle acts on its own to save itself.
+        emergency: Whether it can do nothing but come down.
         armable: Whether every check before arming passes.
         position_enu_m: From the origin, m.
         velocity_enu_m_s: m/s.
@@ -199,6 +200,7 @@ class Snapshot:
     standard_mode: int = 0
     landed_state: int = 1
     failsafe: bool = False
+    emergency: bool = False
     armable: bool = True
     position_enu_m: Vector = (0.0, 0.0, 0.0)
     velocity_enu_m_s: Vector = (0.0, 0.0, 0.0)

@@ -10,6 +10,7 @@ from autopilot.controller import ControllerError, DecisionError
 from autopilot.copter import Copter, Received
 from autopilot.core import Autopilot, Step
 from autopilot.inputs import Heard, Input, InputsError, Setup, read
+from autopilot.kept import Past
 from autopilot.parameters import ImpossibleError
 from autopilot.profile import ProfileError, load_profile
 from autopilot.qp import SolverError
@@ -21,6 +22,7 @@ from mavlink.dialect import Codec
 from mavlink.frames import euler_from_quaternion
 from mavlink.hil import ActuatorCommand, StateFrame, decode_actuators, encode_actuators
 from mavlink.lockstep import AutopilotEnd
+from mavlink.plain import of_bytes
 from mavlink.process import EXIT_FAILED, fail
 from mavlink.sensors import Frame
 from mavlink.tlog import Logged, TlogError, decode
@@ -205,7 +207,8 @@ def _begun(setup: Setup) -> Autopilot | Copter:
     settings = StationSettings(
         system_id=setup.system_id, identity=setup.identity, origin=setup.origin, feedback=setup.feedback
     )
-    return Copter(profile, vehicle, settings, _clock, values=setup.values, first=flown, estimator=estimator)
+    past = of_bytes(Past, setup.past) if setup.past else None
+    return Copter(profile, vehicle, settings, _clock, values=setup.values, first=flown, estimator=estimator, past=past)
 
 
 def _end(setup: Setup, pilot: Autopilot | Copter) -> AutopilotEnd:

@@ -62,7 +62,7 @@ class HeartbeatService:
         s = self._snapshot
         if s is None:
             return ()
-        news = (s.armed, s.custom_mode, s.base_mode, s.failsafe, s.terminated)
+        news = (s.armed, s.custom_mode, s.base_mode, s.failsafe, s.emergency, s.terminated)
         if news == self._told and 0 <= now_us - self._told_at_us < EVERY_US:
             return ()
         self._told, self._told_at_us = news, now_us
@@ -88,10 +88,12 @@ class HeartbeatService:
 
 
 def _state(s: Snapshot) -> int:
-    """MAV_STATE: a flight that was ended for good, one that saves itself, motors that may turn, none of it."""
+    """MAV_STATE: a flight ended for good, one in distress, one that saves itself, motors that may turn, none of it."""
     state: int = mav.MAV_STATE_ACTIVE if s.armed else mav.MAV_STATE_STANDBY
     if s.failsafe:
         state = mav.MAV_STATE_CRITICAL
+    if s.emergency:
+        state = mav.MAV_STATE_EMERGENCY
     if s.terminated:
         state = mav.MAV_STATE_FLIGHT_TERMINATION
     return state

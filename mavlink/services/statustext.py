@@ -10,6 +10,7 @@ from mavlink.services.service import Send, to_all
 CHUNK_BYTES = 50
 LONGEST_BYTES = 254
 
+EMERGENCY: int = mav.MAV_SEVERITY_EMERGENCY
 ERROR: int = mav.MAV_SEVERITY_ERROR
 CRITICAL: int = mav.MAV_SEVERITY_CRITICAL
 WARNING: int = mav.MAV_SEVERITY_WARNING

@@ -1,18 +1,19 @@
 """The autopilot is killed in flight and started again: with what was kept of the flight it goes on."""
 
 from collections.abc import Callable
-from math import degrees, dist, hypot
+from math import degrees, dist, hypot, nan
 
 import pytest
 
 from autopilot.kept import FOLLOWS_US
 from autopilot.modes import Mode, State
+from autopilot.profile import load_profile
 from mavlink.dialect import mav
 from mavlink.feedback import Feedback
 from mavlink.frames import Vector
 from mavlink.services.mission_items import FENCE, RALLY
 from tests.flights.copter import ACCEPTED, CopterFlight, in_the_air
-from tests.flights.test_vehicle_missions import EVERY_KIND, load, reached, waypoint
+from tests.flights.test_vehicle_missions import EVERY_KIND, do, load, reached, waypoint
 
 EVERY_S = 1.1
 HOLDING = State(Mode.HOLD, armed=True)
@@ -62,7 +63,7 @@ def test_every_mode_goes_on(mode: Mode) -> None:
     assert flight.go(8.0, 3.0, 3.0) == ACCEPTED
     flight.run(2.0)
     if mode is Mode.ORBIT:
-        assert flight.command(mav.MAV_CMD_DO_ORBIT, 4.0, 3.0, 0.0, 0.0, *[float("nan")] * 3) == ACCEPTED
+        assert flight.command(mav.MAV_CMD_DO_ORBIT, 4.0, 3.0, 0.0, 0.0, *[nan] * 3) == ACCEPTED
     elif mode is not Mode.HOLD:
         assert flight.select(mode) == ACCEPTED
     flight.run(6.0 if mode is Mode.ORBIT else 3.0)
@@ -103,6 +104,16 @@ def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int)
     assert largest_tilt_deg(flight, 4.0) < 45.0
     flight.until(lambda: flight.copter.pilot.state == HOLDING, 15.0, "the end of the mission")
     assert dist(flight.position, (0.0, 6.0, 4.0)) < (0.3 if feedback is Feedback.STATE else 3.0)
+
+
+def test_between_two_control_samples_the_rotors_keep_their_speed() -> None:
+    flight = in_the_air(3.0, profile=load_profile("flight"))
+    flight.run(1.0)
+    for _ in range(2):
+        flight.step()
+        past, before = flight.past(), flight.rotors
+        flight.restart(past)
+        assert flight.rotors.controls == pytest.approx(before.controls, abs=1e-3)
 
 
 def test_offboard_waits_for_setpoints_as_after_a_loss() -> None:
@@ -154,6 +165,20 @@ def test_plans_and_home_are_kept_on_the_ground_too() -> None:
     assert flight.arm() == ACCEPTED
     flight.restart(flight.past())
     assert (flight.armed, flight.copter.pilot.standing) == (True, True)
+
+
+def test_a_mission_that_has_landed_does_not_begin_again() -> None:
+    """The rotors idle for a while after a landing, and the mode is still mission."""
+    flight = in_the_air(1.0)
+    load(flight, waypoint(1.0, 0.0, 1.0), do(mav.MAV_CMD_NAV_LAND, 0.0, 0.0, 0.0, nan))
+    assert flight.select(Mode.MISSION) == ACCEPTED
+    flight.until(lambda: flight.copter.pilot.standing, 10.0)
+    flight.run(0.5)
+    assert flight.copter.pilot.state == State(Mode.MISSION, armed=True)
+    flight.restart(flight.past())
+    path = flight.path_until(lambda: not flight.armed, 3.0)
+    assert max(z for _, _, z in path) < 0.01
+    assert flight.mode is Mode.HOLD
 
 
 @pytest.mark.parametrize("late_us", [-8_000, FOLLOWS_US + 8_000])

@@ -1,5 +1,7 @@
 """The first flights of the fixture: up, there, back down; in wind; on sensors."""
 
+from collections.abc import Callable
+
 import pytest
 
 from autopilot.modes import Mode
@@ -33,3 +35,13 @@ def test_no_mission_is_refused(sitl: Sitl) -> None:
 def test_takes_off_on_sensors(sitl: Sitl) -> None:
     sitl.takeoff(3.0)
     assert sitl.position[2] == pytest.approx(3.0, abs=1.0)
+
+
+@pytest.mark.sitl(airborne=3.0)
+def test_a_bad_link_to_the_plant_changes_nothing(sitl: Sitl, sitl_fleet: Callable[..., list[Sitl]]) -> None:
+    (other,) = sitl_fleet(1, system=1)
+    bad = other.link.plant
+    bad.loss, bad.duplicate, bad.reorder, bad.corrupt, bad.jitter_s = 0.2, 0.1, 0.1, 0.1, 0.004
+    for flight in (sitl, other):
+        flight.goto(1.0, 0.0, 3.0)
+    assert other.sha256 == sitl.sha256

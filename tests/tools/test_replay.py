@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from autopilot.inputs import Setup, read
 from mavlink.dialect import AUTOPILOT_COMPONENT, Codec, mav
 from mavlink.hil import ActuatorCommand, decode_actuators, encode_actuators
 from mavlink.tlog import STAMP, decode
@@ -125,22 +126,31 @@ def test_what_cannot_be_replayed_is_one_line(
 
 
 def test_what_ground_stations_ordered_is_replayed(tmp_path: Path) -> None:
-    """Over UDP, in the air: go, then land."""
+    """Over UDP, in the air: the autopilot is killed and started again; then the vehicle lands."""
     out, logs = tmp_path / "out", tmp_path / "logs"
     logs.mkdir()
-    start = ("--vehicle", "hummingbird", "--start", "z=3,psi=90,rotors=4740", "--speed", "max", "--out", str(out))
+    start = ("--vehicle", "hummingbird", "--start", "z=3,psi=90,rotors=4740", "--speed", "4", "--out", str(out))
     plant = Process(logs, "plant", "--link", "udpin:127.0.0.1:0", *start)
     with Observer() as seen, running(plant):
         url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
-        autopilot = Process(logs, "autopilot", "--plant", url, f"--gcs={seen.url}", "--out", str(out))
-        with running(autopilot):
-            seen.wait(lambda sight: sight.armed, "the vehicle")
+        options = ("--plant", url, f"--gcs={seen.url}", "--out", str(out), "--state", str(tmp_path / "state"))
+        first = Process(logs, "autopilot", *options)
+        with running(first):
+            seen.wait(lambda sight: sight.time_s > 1.0, "the vehicle")
+            first.process.send_signal(signal.SIGKILL)
+            first.wait()
+        killed_s = seen.now.time_s
+        second = Process(logs, "autopilot", *options)
+        with running(second):
+            seen.wait(lambda sight: sight.time_s > killed_s + 0.5, "the vehicle again")
             ack = seen.ask("COMMAND_ACK", "COMMAND_LONG", mav.MAV_CMD_NAV_LAND, 0, *[0.0] * 7)
             assert (ack.command, ack.result) == (mav.MAV_CMD_NAV_LAND, mav.MAV_RESULT_ACCEPTED)
             seen.wait(lambda sight: not sight.armed, "the landing")
             plant.process.send_signal(signal.SIGINT)
             plant.wait()
+    setups = [what for what in read((out / "inputs.jsonl").read_bytes()) if isinstance(what, Setup)]
+    assert [bool(setup.past) for setup in setups] == [False, True]
     commands, last_us, difference = replay_flight(out / "flight.tlog")
     assert difference is None
     assert commands > 500
-    assert last_us > 4_000_000
+    assert last_us > setups[1].first_us + 2_000_000

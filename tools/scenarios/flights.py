@@ -64,7 +64,7 @@ class Flights:
 
     def _met(self, plant: Plant, autopilot: Autopilot, setting: Setting) -> Stage:
         self._ends.callback(autopilot.close)
-        return Stage(plant, autopilot, setting.system)
+        return Stage(plant, autopilot, setting.system, setting.seed)
 
     def keep(self, folder: Path) -> list[Path]:
         """Write all that is known of the flights below `folder`; return where each is."""

@@ -57,13 +57,52 @@ class MemoryPlant:
         self._physics = Physics(self._vehicle, args.integrator, weather)
         self._end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
         self._plant: Plant | None = None
+        self._now_s = 0.0
 
     def hear(self, datagram: bytes) -> None:
-        """Take in what an autopilot says that answers no frame: its call."""
-        self._end.receive(datagram, _ADDRESS, NEVER_LATE_S)
+        """Take in what an autopilot says, its call for one.
+
+        Raises:
+            StageError: The state cannot be integrated any further.
+        """
+        command = self._end.receive(datagram, _ADDRESS, self._now_s)
+        self._end.received.clear()
+        if command is None:
+            return
+        assert self._plant is not None, "it has told a frame"
+        try:
+            self._plant.answer(command, self._end.take_faults())
+        except IntegrationError as error:
+            raise StageError(str(error)) from error
+        self._answered = True
 
     def frame(self) -> list[bytes]:
         """Return what the plant says up to its next frame, which comes last."""
+        self._offer()
+        return [outgoing.datagram for outgoing in self._end.take_outbox()]
+
+    def take(self, answer: bytes) -> None:
+        """Take in the answer to that frame, and go on.
+
+        Raises:
+            StageError: The state cannot be integrated any further.
+        """
+        self.hear(answer)
+
+    def listen(self, timeout_s: float) -> list[bytes]:
+        """Return what it says up to `timeout_s` from now, the frame it waits with said again and again."""
+        if self._answered:
+            self._offer()
+        else:
+            self._now_s += timeout_s
+            self._end.poll(self._now_s)
+        return [outgoing.datagram for outgoing in self._end.take_outbox()]
+
+    def clock_s(self) -> float:
+        """Return the time that links are late by: it passes only while the plant waits."""
+        return self._now_s
+
+    def _offer(self) -> None:
         end, args = self._end, self._args
         if self._plant is None:
             self._plant = Plant(
@@ -76,24 +115,9 @@ class MemoryPlant:
                 interval_us=end.frame_interval_us,
                 latency_us=round(args.latency * 1e3),
             )
+        self._answered = False
         frame, aside = self._plant.tell()
-        end.offer(frame, NEVER_LATE_S, aside, state_frame(self._plant.world))
-        return [outgoing.datagram for outgoing in end.take_outbox()]
-
-    def take(self, answer: bytes) -> None:
-        """Take in the answer to that frame, and go on.
-
-        Raises:
-            StageError: The state cannot be integrated any further.
-        """
-        command = self._end.receive(answer, _ADDRESS, NEVER_LATE_S)
-        self._end.received.clear()
-        assert command is not None, "the answer names the frame awaited"
-        assert self._plant is not None, "it has told a frame"
-        try:
-            self._plant.answer(command, self._end.take_faults())
-        except IntegrationError as error:
-            raise StageError(str(error)) from error
+        end.offer(frame, self._now_s, aside, state_frame(self._plant.world))
 
 
 class MemoryAutopilot:
@@ -139,12 +163,24 @@ class MemoryAutopilot:
 
     def tell(self, frame: bytes, turn: Turn) -> None:
         """Tell it a frame of the plant, and what ground stations say then."""
+        self.expect(turn)
+        self.hear(frame)
+
+    def expect(self, turn: Turn) -> None:
+        """Tell it what ground stations say at the frame that comes next."""
         self._desk.heard = turn
-        known = self._end.receive(frame, NEVER_LATE_S)
-        assert known is not None, "each frame is new"
-        self._copter.hear(self._end.aside)
-        step = self._copter.step(known)
-        self._end.answer(step.command, step.faults)
+
+    def hear(self, datagram: bytes) -> None:
+        """Give it a datagram of the plant's, sound or not."""
+        frame = self._end.receive(datagram, NEVER_LATE_S)
+        if frame is not None:
+            self._copter.hear(self._end.aside)
+            step = self._copter.step(frame)
+            self._end.answer(step.command, step.faults)
+
+    def listen(self) -> list[bytes]:
+        """Return what it has said to the plant."""
+        return self._end.take_outbox()
 
     def answer(self) -> bytes:
         """Return its answer to the frame."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from math import acos, degrees, dist, hypot, nan, pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,18 +35,17 @@ class NotInTimeError(AssertionError):
     """What was waited for has not come about."""
 
 
-class Links:
+class Links(NamedTuple):
     """What the links do.
 
     Attributes:
         ground: Between the vehicle and every ground station, by simulated time.
-        plant: Between plant and autopilot: in lockstep nothing that it does may change a flight.
+        plant: Between plant and autopilot, while simulated time stands still: in lockstep the plant says its frame
+            again until it has heard the answer, and nothing of it changes a flight.
     """
 
-    def __init__(self) -> None:
-        """Begin with perfect ones."""
-        self.ground = Trouble()
-        self.plant = Trouble()
+    ground: Trouble
+    plant: Trouble
 
 
 class Sitl:
@@ -65,7 +64,7 @@ class Sitl:
         """Begin a flight on a stage; `origin` is that of the ENU frame."""
         self.setting = setting
         self.origin = origin
-        self.link = Links()
+        self.link = Links(Trouble(), stage.trouble)
         self.record = Record()
         self._stage = stage
         self._said = Turn(0, ())

@@ -13,11 +13,19 @@ from mavlink.dialect import (
     RESULT_ACCEPTED,
     TRUTH_COMPONENT,
     Codec,
+    mav,
 )
 from mavlink.hil import ActuatorCommand, StateFrame, decode_actuators, decode_state
 from mavlink.turns import Parcel, Turn
+from tools.scenarios.links import Pipe, Trouble
 
 _HEADER_BYTES, _CRC_BYTES, _COMPONENT_AT = 10, 2, 6
+
+
+_ANSWER: int = mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
+_GLANCE_S = 0.002
+_GIVE_UP_S = 20.0
+"""Of the clock that a link is late by. No flight depends on it."""
 
 
 class StageError(Exception):
@@ -28,7 +36,7 @@ class Plant(Protocol):
     """The plant's side."""
 
     def hear(self, datagram: bytes) -> None:
-        """Take in what an autopilot says that answers no frame: its call."""
+        """Take in a datagram of an autopilot's, sound or not."""
         ...
 
     def frame(self) -> list[bytes]:
@@ -37,6 +45,14 @@ class Plant(Protocol):
 
     def take(self, answer: bytes) -> None:
         """Take in the answer to that frame, and go on."""
+        ...
+
+    def listen(self, timeout_s: float) -> list[bytes]:
+        """Return what it says up to `timeout_s` from now, the frame it waits with said again and again."""
+        ...
+
+    def clock_s(self) -> float:
+        """Return the time that links are late by."""
         ...
 
 
@@ -49,6 +65,18 @@ class Autopilot(Protocol):
 
     def tell(self, frame: bytes, turn: Turn) -> None:
         """Tell it a frame of the plant, and what ground stations say then."""
+        ...
+
+    def expect(self, turn: Turn) -> None:
+        """Tell it what ground stations say at the frame that comes next."""
+        ...
+
+    def hear(self, datagram: bytes) -> None:
+        """Give it a datagram of the plant's, sound or not."""
+        ...
+
+    def listen(self) -> list[bytes]:
+        """Return what it has said to the plant."""
         ...
 
     def answer(self) -> bytes:
@@ -96,16 +124,19 @@ class Stage:
     Attributes:
         truth: How the vehicle is now.
         acks: Answers of the plant to commands: number and MAV_RESULT.
+        trouble: What the link between plant and autopilot does.
     """
 
-    def __init__(self, plant: Plant, autopilot: Autopilot, system: int) -> None:
-        """Bring the two together; the vehicle is system `system`."""
+    def __init__(self, plant: Plant, autopilot: Autopilot, system: int, seed: int = 0) -> None:
+        """Bring the two together; the vehicle is system `system`, and `seed` that of what goes wrong between them."""
         self._plant = plant
         self._autopilot = autopilot
         self._codec = Codec(system, AUTOPILOT_COMPONENT)
         self.acks: list[tuple[int, int]] = []
+        self.trouble = Trouble()
+        self._up, self._down = (Pipe(self.trouble, f"{seed} plant {way}") for way in ("up", "down"))
         plant.hear(autopilot.call())
-        self._frame, self.truth = self._next()
+        self._frame, self.truth = self._taken_in(plant.frame())
 
     def advance(self, parcels: Sequence[Parcel], injected: bytes = b"") -> Instant:
         """Fly one frame.
@@ -118,12 +149,48 @@ class Stage:
             StageError: The flight cannot go on.
         """
         frame, began = self._frame, self.truth
-        self._autopilot.tell(frame, Turn(began.time_us, parcels))
-        answer = self._autopilot.answer()
-        self._plant.take(answer + injected)
-        said = self._autopilot.said()
-        self._frame, self.truth = self._next()
+        turn = Turn(began.time_us, parcels)
+        if self.trouble.any:
+            answer, said, heard = self._struggle(frame, turn, injected)
+        else:
+            self._autopilot.tell(frame, turn)
+            answer = self._autopilot.answer()
+            self._plant.take(answer + injected)
+            said = self._autopilot.said()
+            heard = self._plant.frame()
+        self._frame, self.truth = self._taken_in(heard)
         return Instant(began, self._command(answer), said, frame, answer)
+
+    def _struggle(self, frame: bytes, turn: Turn, injected: bytes) -> tuple[bytes, Turn, list[bytes]]:
+        """Carry a frame and its answer over a bad link, until the plant has gone on.
+
+        Returns the answer, what is said to ground stations, and what the plant said up to its next frame.
+        """
+        plant, autopilot, up, down = self._plant, self._autopilot, self._up, self._down
+        began_s = plant.clock_s()
+        autopilot.expect(turn)
+        up.put(frame, _us(began_s))
+        answer, said, heard = b"", None, list[bytes]()
+        while True:
+            now_us = _us(plant.clock_s())
+            for datagram in up.due(now_us):
+                autopilot.hear(datagram)
+            for datagram in autopilot.listen():
+                if not answer and answers(datagram, turn.time_us):
+                    answer, said = datagram, autopilot.said()
+                down.put(datagram + injected, now_us)
+            for datagram in down.due(now_us):
+                plant.hear(datagram)
+            for datagram in plant.listen(_GLANCE_S):
+                is_frame = bool(parted(datagram)[1])
+                if is_frame and parted(datagram)[0] == frame:
+                    up.put(frame, now_us)
+                    continue
+                heard.append(datagram)
+                if is_frame and said is not None:
+                    return answer, said, heard
+            if plant.clock_s() > began_s + _GIVE_UP_S:
+                raise StageError(f"nothing has passed between plant and autopilot for {_GIVE_UP_S:.0f} s")
 
     def command_to_plant(self, number: int, *params: float) -> bytes:
         """Return a COMMAND_LONG as the autopilot would send it to the plant."""
@@ -136,8 +203,8 @@ class Stage:
         self._autopilot.start()
         self._autopilot.call()
 
-    def _next(self) -> tuple[bytes, StateFrame]:
-        *others, datagram = self._plant.frame()
+    def _taken_in(self, said: list[bytes]) -> tuple[bytes, StateFrame]:
+        *others, datagram = said
         for other in others:
             self._hear(other)
         frame, told = parted(datagram)
@@ -173,9 +240,13 @@ def frames_of(datagram: bytes) -> Iterator[bytes]:
         at = end
 
 
-def message_id(frame: bytes) -> int:
-    """Return the number of the message in a frame of MAVLink 2."""
-    return int.from_bytes(frame[7:_HEADER_BYTES], "little")
+def answers(datagram: bytes, time_us: int) -> bool:
+    """Whether a datagram holds the answer to the frame of a time."""
+    return any(
+        int.from_bytes(frame[7:_HEADER_BYTES], "little") == _ANSWER
+        and int.from_bytes(frame[10:18], "little") == time_us
+        for frame in frames_of(datagram)
+    )
 
 
 def parted(datagram: bytes) -> tuple[bytes, bytes]:
@@ -186,3 +257,7 @@ def parted(datagram: bytes) -> tuple[bytes, bytes]:
             break
         at += len(frame)
     return datagram[:at], datagram[at:]
+
+
+def _us(time_s: float) -> int:
+    return round(time_s * 1e6)

@@ -5,18 +5,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter, sleep
 
-from mavlink.dialect import mav
 from mavlink.link import UdpLink, open_link
 from mavlink.lockstep import Address
 from mavlink.turns import Gathering, Turn, packets
 from tools.scenarios.launch import Child, Launcher
-from tools.scenarios.stage import StageError, frames_of, message_id, parted
+from tools.scenarios.stage import StageError, answers, parted
 
 SILENCE_S = 60.0
 """Of the wall clock: whoever says nothing for so long will say nothing more. No flight depends on it."""
 _LOOK_EVERY_S = 0.1
 _HERE = "udpin:127.0.0.1:0"
-_ANSWER: int = mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
 
 
 class UdpPlant:
@@ -31,7 +29,7 @@ class UdpPlant:
     def hear(self, datagram: bytes) -> None:
         """Take in what an autopilot says that answers no frame: its call."""
         if self._link is None:
-            self._link = open_link(self._url().replace("udpin", "udpout"))
+            self._link = opened(self._url().replace("udpin", "udpout"))
         self._link.send(datagram)
 
     def frame(self) -> list[bytes]:
@@ -54,6 +52,20 @@ class UdpPlant:
         assert self._link is not None, "it was called"
         self._answer = answer
         self._link.send(answer)
+
+    def listen(self, timeout_s: float) -> list[bytes]:
+        """Return what it says up to `timeout_s` from now, the frame it waits with said again and again."""
+        assert self._link is not None, "it was called"
+        self._link.wait(timeout_s)
+        said = [datagram for datagram, _ in self._link.receive_now()]
+        if not said:
+            self._child.check()
+        self._last = next((datagram for datagram in reversed(said) if parted(datagram)[1]), self._last)
+        return said
+
+    def clock_s(self) -> float:
+        """Return the time that links are late by."""
+        return perf_counter()
 
     def close(self) -> None:
         """End it."""
@@ -81,7 +93,7 @@ class UdpAutopilot:
         """Start it; `folder` takes what it says."""
         self._launcher = launcher
         self._folder = folder
-        self._link, self._desk = open_link(_HERE), open_link(_HERE)
+        self._link, self._desk = opened(_HERE), opened(_HERE)
         plant, desk = (link.url.replace("udpin", "udpout") for link in (self._link, self._desk))
         self._options = ["--plant", plant, "--conducted", desk, *options]
         self._starts = 0
@@ -105,10 +117,25 @@ class UdpAutopilot:
 
     def tell(self, frame: bytes, turn: Turn) -> None:
         """Tell it a frame of the plant, and what ground stations say then."""
+        self.expect(turn)
+        self.hear(frame)
+
+    def expect(self, turn: Turn) -> None:
+        """Tell it what ground stations say at the frame that comes next."""
         self._time_us = turn.time_us
-        self._link.send(frame, self._address)
         for packet in packets(turn):
             self._desk.send(packet, self._desk_address)
+
+    def hear(self, datagram: bytes) -> None:
+        """Give it a datagram of the plant's, sound or not."""
+        self._link.send(datagram, self._address)
+
+    def listen(self) -> list[bytes]:
+        """Return what it has said to the plant."""
+        said = [datagram for datagram, _ in self._link.receive_now()]
+        if not said:
+            self._child.check()
+        return said
 
     def answer(self) -> bytes:
         """Return its answer to the frame; what else it says is for a plant that it misses."""
@@ -139,12 +166,11 @@ class UdpAutopilot:
         self._desk.close()
 
 
-def answers(datagram: bytes, time_us: int) -> bool:
-    """Whether a datagram holds the answer to the frame of a time."""
-    return any(
-        message_id(frame) == _ANSWER and int.from_bytes(frame[10:18], "little") == time_us
-        for frame in frames_of(datagram)
-    )
+def opened(url: str) -> UdpLink:
+    """Open a link on which nobody looks without a pause: flights share the cores."""
+    link = open_link(url)
+    link.spin_s = 0.0
+    return link
 
 
 def received(
