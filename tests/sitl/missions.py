@@ -59,7 +59,7 @@ def changes_mode_while_it_uploads(sitl: Sitl) -> None:
     sitl.run(0.05)
     assert upload.result is None
     sitl.select(Mode.LAND)
-    sitl.wait_until(lambda: upload.result is not None, within=5.0, what="the upload")
+    sitl.wait_until(lambda: upload.result is not None, within=20.0, what="the upload")
     assert upload.result == 0
     assert sitl.mode is Mode.LAND
 

@@ -140,9 +140,10 @@ SCENARIOS = (
         peer="PX4 on jMAVSim 0.032 m, ArduCopter 0.047 m, by their own estimates",
         holds="by its own estimate at most 0.02 m; from the truth 1.2 m",
         steps=(
-            *(command(INTERVAL, float(number), 100_000.0, result=mav.MAV_RESULT_ACCEPTED) for number in (32, 85)),
             lambda sitl: sitl.fly_track("spiral"),
-            run(30.0),
+            run(28.0),
+            *(command(INTERVAL, float(number), 8_000.0, result=mav.MAV_RESULT_ACCEPTED) for number in (32, 85)),
+            run(2.0),
             lambda sitl: follows_by_its_estimate(sitl, 0.05),
         ),
         setting={"feedback": "sensors"},
