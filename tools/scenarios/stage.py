@@ -268,7 +268,8 @@ def answers(datagram: bytes, time_us: int) -> bool:
 
 def parted(datagram: bytes) -> tuple[bytes, bytes]:
     """Return what of a plant's datagram is for the autopilot, and the truth behind it."""
-    told, truth = [], []
+    told: list[bytes] = []
+    truth: list[bytes] = []
     for frame in frames_of(datagram):
         (truth if frame[_COMPONENT_AT] == TRUTH_COMPONENT else told).append(frame)
     return b"".join(told), b"".join(truth)
