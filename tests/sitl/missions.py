@@ -4,6 +4,7 @@ from autopilot.modes import Mode
 from tests.sitl.conditions import DISARMED, away, every, mode, near, over, slower
 from tests.sitl.scenario import Scenario, Step
 from tests.sitl.steps import (
+    at_every,
     check,
     hold,
     measured,
@@ -46,8 +47,8 @@ def reads_back(count: int) -> Step:
 
     def step(sitl: Sitl) -> None:
         sitl.gcs.forget()
-        sitl.send("MISSION_REQUEST_LIST", sitl.system, 1, 0)
-        sitl.wait_until(lambda: sitl.heard("MISSION_COUNT"), within=5.0, what="MISSION_COUNT")
+        ask = at_every(0.5, lambda sitl: sitl.send("MISSION_REQUEST_LIST", sitl.system, 1, 0))
+        sitl.wait_until(lambda: ask(sitl) or sitl.heard("MISSION_COUNT"), within=10.0, what="MISSION_COUNT")
         assert sitl.gcs.latest("MISSION_COUNT").count == count
 
     return step
