@@ -52,7 +52,7 @@ SCENARIOS = (
     Scenario(
         name="holds-ten-metres-on-sensors",
         peer="PX4: 10 m ± 0.25 m for 60 s",
-        holds="by what its own estimate says, ± 0.1 m for 60 s",
+        holds="± 1 m for 60 s from the truth, ± 0.05 m by its own estimate",
         steps=(takeoff(10.0), run(2.0), hold(height(10.0, 1.0), for_=60.0), believed_height_stays),
         setting={"feedback": "sensors"},
     ),

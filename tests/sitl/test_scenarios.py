@@ -8,6 +8,8 @@ from tests.sitl import GROUPS
 from tests.sitl.scenario import FleetScenario, Scenario
 from tools.scenarios.sitl import Sitl
 
+pytestmark = pytest.mark.scenarios
+
 ALONE = [
     pytest.param(
         scenario,
@@ -36,8 +38,3 @@ def test_scenario(sitl: Sitl, scenario: Scenario) -> None:
 @pytest.mark.parametrize("scenario", TOGETHER)
 def test_fleet(sitl_fleet: Callable[[int], list[Sitl]], scenario: FleetScenario) -> None:
     scenario.fly(sitl_fleet(scenario.count))
-
-
-def test_there_are_sixty() -> None:
-    named = [scenario.name for scenarios in GROUPS.values() for scenario in scenarios]
-    assert len(set(named)) == len(named) >= 60
