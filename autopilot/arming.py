@@ -10,6 +10,9 @@ from mavlink.frames import rotation_matrix
 LARGEST_TILT_DEG = 45.0
 LARGEST_SPEED_M_S = 0.5
 LEAST_CHARGE = 0.1
+"""Part of the battery's charge."""
+VOLTAGE_OF = (0.5, 1.2)
+"""Of the voltages empty and full: outside of these bounds a battery is not what tells its voltage."""
 LARGEST_THRUST_STICK = 0.6
 
 
@@ -23,6 +26,7 @@ class Facts(NamedTuple):
         thrust_stick: Of the pilot, 0..1; None if the mode takes none, or no pilot is heard.
         outside_fence: Why the vehicle may not be where it is; empty if it may.
         not_known: What the estimator does not know well enough; empty if nothing.
+        battery: Why the battery is not to be flown on, apart from its charge; empty if it is.
     """
 
     state: VehicleState | None
@@ -31,6 +35,7 @@ class Facts(NamedTuple):
     thrust_stick: float | None
     outside_fence: str = ""
     not_known: str = ""
+    battery: str = ""
 
 
 def _tilt(facts: Facts) -> str:
@@ -53,6 +58,10 @@ def _charge(facts: Facts) -> str:
     return f"battery at {facts.charge:.0%}" if facts.charge < LEAST_CHARGE else ""
 
 
+def _battery(facts: Facts) -> str:
+    return facts.battery
+
+
 def _thrust_stick(facts: Facts) -> str:
     high = facts.thrust_stick is not None and facts.thrust_stick > LARGEST_THRUST_STICK
     return "thrust stick is up" if high else ""
@@ -66,7 +75,22 @@ def _knows(facts: Facts) -> str:
     return facts.not_known
 
 
-CHECKS: tuple[Callable[[Facts], str], ...] = (_tilt, _speed, _standing, _charge, _thrust_stick, _fence, _knows)
+CHECKS: tuple[Callable[[Facts], str], ...] = (
+    _tilt,
+    _speed,
+    _standing,
+    _charge,
+    _battery,
+    _thrust_stick,
+    _fence,
+    _knows,
+)
+
+
+def battery_fault(voltage_v: float, empty_v: float, full_v: float) -> str:
+    """Return why a battery of these voltages is not healthy; empty if it is."""
+    least, most = (part * bound for part, bound in zip(VOLTAGE_OF, (empty_v, full_v), strict=True))
+    return "" if least <= voltage_v <= most else f"battery not healthy: {voltage_v:.1f} V"
 
 
 def refusals(facts: Facts) -> list[str]:

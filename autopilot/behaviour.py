@@ -26,6 +26,8 @@ class Behaviour:
         disarm_on_ground_s: They stop if it does not take off for so long; 0 never.
         setpoints_lost_s: An offboard companion may be silent for so long.
         sticks_lost_s: A pilot may be silent for so long.
+        farthest_m: No farther from home than this, horizontally; 0: no limit.
+        highest_m: No higher above home than this; 0: no limit.
         largest_tilt_deg: Of full sticks.
         stick_yaw_rate_rad_s: Of full sticks.
         stick_speed_m_s: Horizontally, of full sticks.
@@ -52,6 +54,8 @@ class Behaviour:
     disarm_on_ground_s: float = 10.0
     setpoints_lost_s: float = 1.0
     sticks_lost_s: float = 0.5
+    farthest_m: float = 0.0
+    highest_m: float = 0.0
     largest_tilt_deg: float = 35.0
     stick_yaw_rate_rad_s: float = _STICK_YAW_RATE_RAD_S
     stick_speed_m_s: float = 5.0

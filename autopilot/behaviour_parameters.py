@@ -101,6 +101,8 @@ ROWS = (
         "A companion may be silent so long.",
     ),
     Row("COM_RC_LOSS_T", "sticks_lost_s", "s", 0.1, 35.0, "Pilot loss timeout", "Sticks may be silent so long."),
+    Row("GF_MAX_HOR_DIST", "farthest_m", "m", 0.0, 100e3, "Fence around home", "Horizontal distance; 0: none."),
+    Row("GF_MAX_VER_DIST", "highest_m", "m", 0.0, 10e3, "Fence above home", "Height; 0: none."),
     Row("ORBIT_RADIUS", "orbit_radius_m", "m", 1.0, 1000.0, "Radius of an orbit", "Where the command does not say."),
     Row("FLW_TGT_HT", "follow_height_m", "m", 1.0, 1000.0, "Follow: height", "Above home."),
     Row("FLW_TGT_DST", "follow_distance_m", "m", 1.0, 1000.0, "Follow: distance to the target"),
@@ -244,5 +246,6 @@ _GROUPS = {
     "SIM": "System",
     "TRACK": "Flight",
     "CAL": "System",
+    "GF": "Failsafes",
     "MAV": "System",
 }

@@ -4,21 +4,23 @@ from collections.abc import Iterable
 from math import radians
 from typing import NamedTuple
 
-from autopilot.arming import Facts
+from autopilot.arming import Facts, battery_fault
 from autopilot.attitude_reference import DEFAULT_LIMITS, AttitudeLimits, AttitudeReference
 from autopilot.behaviour import Behaviour
 from autopilot.companion import Companion
+from autopilot.conditions import NEVER_US, Seen
 from autopilot.controller import Clock, Decision, VehicleState
 from autopilot.core import STILL, Step, follows
 from autopilot.course import Course, Scene, Steered
 from autopilot.courses import Along, Climb, Legs, Stop, homeward, landing, to_track
+from autopilot.failsafes import Action, Condition
 from autopilot.health_watch import HealthWatch, not_known
 from autopilot.instants import instants
 from autopilot.kept import Kept, Past, course_again, course_record, goes_on, maker_of
 from autopilot.leader import Following
-from autopilot.leaning import AltitudeSticks, Stabilized
+from autopilot.leaning import AltitudeSticks, Descent, Stabilized
 from autopilot.loop import ControlLoop
-from autopilot.modes import MANUAL, Event, Mode, Need
+from autopilot.modes import MANUAL, Mode, Need
 from autopilot.orders import Land
 from autopilot.parameters import Numbers, behaviour, definitions
 from autopilot.pilot import RESTS, Guidance, Pilot
@@ -32,6 +34,7 @@ from autopilot.snapshots import Photographer
 from autopilot.solve_time import SolveTime
 from autopilot.stations import REBOOT, Stations, StationSettings
 from autopilot.sticks import PositionSticks
+from autopilot.supervisor import Supervisor
 from autopilot.tracks import Track, track
 from autopilot.tuning import Tuning, builder
 from mavlink.aside import NOTHING, Aside
@@ -41,10 +44,12 @@ from mavlink.parameters import Parameters, Value
 from mavlink.sensors import Frame
 from mavlink.services.statustext import INFO, WARNING
 from mavlink.setpoints import OffboardSetpoint, Sticks
+from mavlink.snapshot import BatteryState
 from plant.vehicle import Vehicle
 
 FALLS = "restarted in the air, knowing nothing: found falling"
 _LEADER_LOST_US = 10_000_000
+_EVER_US = 10**15
 
 
 class Received(NamedTuple):
@@ -74,6 +79,7 @@ class Copter:
         power: The battery, as far as the autopilot knows.
         rotor_loss: Notices when a rotor is lost, and lands on the others.
         solve_time_s: Of the last QP.
+        supervisor: Has the pilot do what the failsafes say.
         samples: How many control samples ground stations were told of.
         resumed: What goes on of a flight in which an autopilot was killed, in words; empty where none does.
     """
@@ -131,6 +137,9 @@ class Copter:
         self.pilot = Pilot(self._instants, flies_by, self._course, self._missing)
         self.stations = Stations(settings, self.pilot, self.parameters)
         self.power = PowerMeter(believed)
+        self.supervisor = Supervisor(self.pilot, self.parameters)
+        self._missed_us: int | None = None
+        self._waiting_us: int | None = None
         self._solving = SolveTime(self._loop.control_interval_us)
         self._aside = NOTHING
         self._sent = STILL
@@ -162,7 +171,7 @@ class Copter:
             self.power.hear(aside.battery)
 
     def step(self, frame: Frame) -> Step:
-        """Answer a frame of the plant; on sensors nothing is known, and nobody served, before the first estimate.
+        """Answer a frame of the plant; on sensors nothing is known, and nobody obeyed, before the first estimate.
 
         Raises:
             DecisionError: The control law gave what no rotor can follow.
@@ -174,19 +183,21 @@ class Copter:
         goes_on = follows(frame.time_us, self._time_us, self.frame_interval_us)
         known = self._senses.state(frame, asked=due or not goes_on)
         if known is None:
+            self._waiting_us = frame.time_us
             if self._time_us is not None:  # another flight, of which nothing is known yet
                 self.stations.restart = REBOOT
             return Step(
                 ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s, known=False
             )
         if not goes_on:
+            self._missed_us = self._time_us if self._missed_us is None else self._missed_us
             self._begin(known)
         self._time_us = frame.time_us
         decision = None
         if due:
             state = self._loop.state(known)
-            self._sense(frame.time_us, state)
             self._watch_rotors(state)
+            self._sense(frame.time_us, state)
             guidance = self.pilot.step()
             decision = self._decide(frame.time_us, state, guidance)
             if not self._solving.busy(frame.time_us) or decision is not None:
@@ -202,7 +213,7 @@ class Copter:
         """Hear ground stations, and return what to send them; after each `step`, while the plant integrates."""
         now_us = self._time_us
         if now_us is None:
-            return []
+            return self._put_off(inbox)
         if self._sample is not None:
             sample, self._sample = self._sample, None
             self._report(*sample)
@@ -214,6 +225,16 @@ class Copter:
         if self.parameters.take_changed():
             self._adopt()
         return self.stations.poll(now_us)
+
+    def _put_off(self, inbox: Iterable[Received]) -> list[Outgoing]:
+        """Deny what is commanded: nothing is known of the vehicle yet."""
+        if self._waiting_us is None:
+            return []
+        self.stations.wait("not ready: attitude and position are not known yet")
+        for datagram, link, address, loopback in inbox:
+            self.stations.hub.receive(datagram, link, address, self._waiting_us, loopback=loopback)
+        self.stations.wait("")
+        return self.stations.take_outbox()
 
     def record(self) -> Kept | None:
         """Return what the flight needs to go on after a restart; None as long as nothing is known of it."""
@@ -319,16 +340,31 @@ class Copter:
         pilot, stations = self.pilot, self.stations
         sticks, setpoint = self._heard(now_us)
         pilot.sense(now_us, state, Steered(sticks, setpoint, stations.follow.latest(now_us, _LEADER_LOST_US)))
-        if pilot.state.armed:
-            mode, behaviour = pilot.state.mode, pilot.behaviour
-            if mode is Mode.OFFBOARD and setpoint is None and self._listened(now_us, behaviour.setpoints_lost_s):
-                pilot.happened(Event.SETPOINTS_LOST)
-            elif mode in MANUAL and sticks is None and self._listened(now_us, behaviour.sticks_lost_s):
-                pilot.happened(Event.STICKS_LOST)
+        self.supervisor.step(self._seen(now_us, state))
+        self._missed_us = None
 
-    def _listened(self, now_us: int, seconds: float) -> bool:
-        """Whether it was listened for so long: not if the autopilot was restarted only now."""
-        return self._resumed_us is None or now_us - self._resumed_us > seconds * 1e6
+    def _seen(self, now_us: int, state: VehicleState) -> Seen:
+        """Return what the failsafes' conditions are judged by."""
+        pilot, stations = self.pilot, self.stations
+        sticks = stations.manual.latest(now_us, _EVER_US)
+        return Seen(
+            now_us=now_us,
+            missed_us=self._missed_us,
+            state=state,
+            mode=pilot.state.mode,
+            standing=pilot.standing,
+            estimate=self._senses.estimate,
+            setpoint=stations.offboard.latest(now_us, _EVER_US),
+            sticks_us=None if sticks is None else sticks.time_us,
+            listening_us=NEVER_US if self._resumed_us is None else self._resumed_us,
+            station_us=stations.station_us,
+            battery=self.power.state(),
+            fence=stations.missions.margin_m if stations.missions.has_fence else None,
+            decided=None if self._decision is None else self._decision.diagnostics,
+            late=pilot.behaviour.solve_time_s * 1e6 > self._loop.control_interval_us,
+            rotor_lost=self.rotor_loss.lost,
+            pace=pilot.behaviour.limits,
+        )
 
     def _watch_rotors(self, state: VehicleState) -> None:
         """Notice whether a rotor is lost: then there is but one way to fly."""
@@ -350,7 +386,17 @@ class Copter:
         outside = self.stations.missions.breach(state.position_enu_m, self._time_us or 0)
         estimate = self._senses.estimate
         unknown = not_known(estimate.health) if estimate is not None else ""
-        pilot.take_stock(Facts(state, pilot.standing, self.power.left, thrust, outside, unknown))
+        facts = Facts(state, pilot.standing, self.power.left, thrust, outside, unknown, self._battery_fault())
+        pilot.take_stock(facts)
+
+    def _battery_fault(self) -> str:
+        """Return why nobody may take off on the battery, apart from its charge; empty if one may."""
+        battery, model = self.power.state(), self._loop.vehicle.battery
+        if battery is None or model is None:
+            return ""
+        if any(map(self.supervisor.holds, (Condition.BATTERY_EMERGENCY, Condition.BATTERY_CRITICAL))):
+            return f"battery critical: {battery.voltage_v:.1f} V"
+        return battery_fault(battery.voltage_v, model.empty_voltage_v, model.full_voltage_v)
 
     def _missing(self) -> list[Need]:
         """Return needs of modes that nothing meets now: the message before the one that asks may have met one."""
@@ -364,6 +410,7 @@ class Copter:
             Need.INSIDE_FENCE: not missions.leaves_fence,
             Need.CIRCLE: False,
             Need.FLYING: not self.pilot.standing,
+            Need.POSITION: self.supervisor.knows_position,
         }
         return [need for need, there in met.items() if not there]
 
@@ -419,15 +466,21 @@ class Copter:
                 decision,
                 self._step_time_s,
                 (c1, c2, c3, c4),
-                self.power,
+                self._battery(),
                 stations,
                 self._senses,
             )
         )
 
+    def _battery(self) -> BatteryState | None:
+        """Return the battery as it is told."""
+        battery = self.power.state()
+        return None if battery is None else battery._replace(charge_state=self.supervisor.charge_state)
+
     def _adopt(self) -> None:
         """Fly by the parameters as they are now."""
         self.pilot.behaviour = behaviour(self.parameters)
+        self.supervisor.adopt(self.parameters)
         self.rotor_loss.enabled = self.pilot.behaviour.land_on_three
         if not self.rotor_loss.enabled:
             self.rotor_loss.forget()
@@ -449,7 +502,7 @@ class Copter:
             high_m = self.pilot.ground_m + behaviour.takeoff_height_m
             return Climb(high_m, None, scene, behaviour.takeoff_speed_m_s)
         if mode is Mode.LAND:
-            return landing(Land())
+            return self._down()
         if mode is Mode.RETURN:
             return homeward(scene)
         if mode is Mode.MISSION:
@@ -467,6 +520,13 @@ class Copter:
         if mode is Mode.ALTITUDE and self._attitude is not None:
             return AltitudeSticks(self._attitude, self._loop.vehicle.gravity_m_s2)
         return Stop()
+
+    def _down(self) -> Course:
+        """Return how to land: level, where nobody knows the place; a law that takes no attitude sinks where it is."""
+        blind = self.pilot.saving is Action.DESCEND or not self.supervisor.knows_position
+        if blind and self._attitude is not None:
+            return Descent(self._attitude, self._loop.vehicle.gravity_m_s2)
+        return landing(Land())
 
     def _on_track(self, scene: Scene) -> Course:
         if self._first is not None:

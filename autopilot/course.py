@@ -109,12 +109,14 @@ class Lean(NamedTuple):
         reference: Where the reference stands meanwhile.
         lifts: Whether a vehicle that stands must leave the ground for it.
         sinks: Whether a vehicle in the air must sink.
+        drifts: Whether the velocity is not to be believed: see `landing.watch`.
     """
 
     demand: AttitudeDemand
     reference: Reference
     lifts: bool
     sinks: bool
+    drifts: bool = False
 
 
 Asked: TypeAlias = Motion | Planned | Lean

@@ -129,9 +129,14 @@ class Sink(Endless):
         yaw = scene.yaw_rad if self._yaw_rad is None else self._yaw_rad
         kinds = (Kind.POSITION, Kind.POSITION, Kind.VELOCITY)
         target = still_target((*self._xy, scene.place[2]), yaw, scene.samples, kinds)
-        flare = _FLARE_1_S * (scene.place[2] - scene.home_enu_m[2] - _FLARE_ABOVE_M)
-        target.motion[:, 1, 2] = -min(max(flare, behaviour.land_speed_m_s), behaviour.limits.sink_m_s)
+        target.motion[:, 1, 2] = -sinking_m_s(scene)
         return Motion(target._replace(turns=self._yaw_rad is not None), behaviour.limits)
+
+
+def sinking_m_s(scene: Scene) -> float:
+    """Return how fast to sink at this height, m/s."""
+    flare = _FLARE_1_S * (scene.place[2] - scene.home_enu_m[2] - _FLARE_ABOVE_M)
+    return min(max(flare, scene.behaviour.land_speed_m_s), scene.behaviour.limits.sink_m_s)
 
 
 class Legs:

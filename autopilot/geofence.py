@@ -170,6 +170,42 @@ class Geofence:
         return "" if self.inside(position_enu_m) else "outside the geofence"
 
 
+class AroundHome(NamedTuple):
+    """The fence that needs no upload: a circle around home, and a height above it.
+
+    Attributes:
+        home_enu_m: Where home is, m.
+        farthest_m: Radius of the circle; 0: none.
+        highest_m: Above home; 0: no limit.
+    """
+
+    home_enu_m: Vector
+    farthest_m: float
+    highest_m: float
+
+    @property
+    def exists(self) -> bool:
+        """Whether there is any."""
+        return self.farthest_m > 0.0 or self.highest_m > 0.0
+
+    def margin_m(self, position_enu_m: Vector) -> float:
+        """Return how far a position is inside, m; negative outside."""
+        east, north, up = (place - home for place, home in zip(position_enu_m, self.home_enu_m, strict=True))
+        if not (isfinite(east) and isfinite(north) and isfinite(up)):
+            return -inf
+        away_m = self.farthest_m - hypot(east, north) if self.farthest_m > 0.0 else inf
+        return min(away_m, self.highest_m - up) if self.highest_m > 0.0 else away_m
+
+    def refusal(self, position_enu_m: Vector) -> str:
+        """Return why the vehicle may not fly to a position; empty if it may."""
+        if self.margin_m(position_enu_m) >= -EDGE_M:
+            return ""
+        too_high = 0.0 < self.highest_m < position_enu_m[2] - self.home_enu_m[2]
+        return (
+            f"more than {self.highest_m:g} m above home" if too_high else f"more than {self.farthest_m:g} m from home"
+        )
+
+
 def _group(item: MissionItem) -> float:
     return 0.0 if isnan(item.p2) else item.p2
 

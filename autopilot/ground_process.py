@@ -110,12 +110,15 @@ class Ground:
         log.begin_again(self._values, self._past_bytes)
 
     def serve(self, now_s: float) -> Copter:
-        """Hear and answer ground stations; return the vehicle that flies on."""
+        """Hear and answer ground stations; return the vehicle that flies on.
+
+        They are answered last: what an answer says is kept by then, whenever this process is killed.
+        """
         stations = self.copter.stations
         received: Iterable[Received] = self._links.receive(stations)
         if self._log:
             received = self._log.hear(received)
-        self._links.send(self.copter.serve(received))
+        outbox = self.copter.serve(received)
         if stations.restart:
             self._restart(stations.restart)
         if now_s >= self._told_s + _TELL_EVERY_S and self.copter.pilot.has_seen:
@@ -127,6 +130,7 @@ class Ground:
             self._status.say("said", self.copter.resumed)
         if self._flight is not None:
             self._keep(self._flight)
+        self._links.send(outbox)
         return self.copter
 
     def _past(self) -> Past | None:

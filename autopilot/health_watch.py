@@ -24,7 +24,6 @@ class _Matter(NamedTuple):
 
 
 _MATTERS = (
-    _Matter(lambda health: health.gps_lost_since_us is None, "GPS lost: position by dead reckoning", "GPS is back"),
     _Matter(lambda health: health.accelerometer, "accelerometer failed", "accelerometer is back"),
     _Matter(lambda health: health.gyroscope, "gyroscope failed", "gyroscope is back"),
     _Matter(lambda health: health.magnetometer, "magnetometer not believed", "magnetometer believed again"),

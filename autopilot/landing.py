@@ -9,6 +9,9 @@ _BELOW_M = 0.15
 _STILL_M_S = 0.15
 _LEVEL_RAD_S = 0.5
 _FOR_US = 400_000
+_DRIFTING_FOR_US = 600_000
+CARRIED = 0.5
+"""Thrust in parts of the weight, below which a vehicle whose velocity nobody knows must be falling, or stand."""
 
 STANDING_BELOW_M = 0.5
 STANDING_SLOWER_M_S = 0.3
@@ -19,21 +22,34 @@ class Landing(NamedTuple):
 
     Attributes:
         since_us: Since when all signs have said that the vehicle stands; None if they do not.
+        climb_m_s: Its climb then.
     """
 
     since_us: int | None = None
+    climb_m_s: float = 0.0
 
 
-def watch(landing: Landing, now_us: int, state: VehicleState, sinks: bool) -> tuple[Landing, bool]:
+def watch(
+    landing: Landing, now_us: int, state: VehicleState, sinks: bool, *, drifts: bool = False
+) -> tuple[Landing, bool]:
     """Return what to remember, and whether the vehicle stands: its signs have lasted.
 
     Only the ground can hold a vehicle that `sinks`: that is told to, or whose rotors do not turn, and yet is still.
+
+    Where the estimate of the velocity `drifts`, as without GPS, it says nothing, and less after the blow of the ground;
+    but it still follows the accelerometer. Such a vehicle sinks where its thrust carries half of it, and would fall
+    faster and faster: the ground holds one whose climb does not change.
     """
-    still = max(map(abs, state.velocity_enu_m_s)) < _STILL_M_S and max(map(abs, state.rate_flu_rad_s)) < _LEVEL_RAD_S
-    if not (sinks and still):
+    climb_m_s = state.velocity_enu_m_s[2]
+    if drifts:
+        still, for_us = abs(climb_m_s - landing.climb_m_s) < _STILL_M_S, _DRIFTING_FOR_US
+    else:
+        still, for_us = max(map(abs, state.velocity_enu_m_s)) < _STILL_M_S, _FOR_US
+    if not sinks or max(map(abs, state.rate_flu_rad_s)) >= _LEVEL_RAD_S:
         return Landing(), False
-    since_us = now_us if landing.since_us is None else landing.since_us
-    return Landing(since_us), now_us - since_us >= _FOR_US
+    if landing.since_us is None or not still:
+        return (Landing(now_us, climb_m_s) if still or drifts else Landing()), False
+    return landing, now_us - landing.since_us >= for_us
 
 
 def is_below(reference: Reference, state: VehicleState) -> bool:

@@ -4,11 +4,11 @@ from math import cos
 
 import numpy as np
 
-from autopilot.attitude_reference import AttitudeReference, ReferenceMemory, Wish
+from autopilot.attitude_reference import AttitudeReference, ReferenceMemory, Wish, lean
 from autopilot.course import Endless, Lean, Motion, Scene, lifts
-from autopilot.courses import Stop
-from autopilot.landing import is_below
-from autopilot.reference import Kind, Reference, lead, moving_with, still_target
+from autopilot.courses import Stop, sinking_m_s
+from autopilot.landing import CARRIED, is_below
+from autopilot.reference import Kind, Reference, Target, lead, moving_with, still_target
 from autopilot.sticks import stick_climb, without_play
 from mavlink.setpoints import AttitudeSetpoint, Sticks
 
@@ -71,10 +71,9 @@ class AltitudeSticks(Endless):
         """Begin with the attitude and height that the vehicle has."""
         self._leaning = Leaning(generator)
         self._generator = generator
-        self._gravity_m_s2 = gravity_m_s2
         self._stop = Stop()
+        self._loop = HeightLoop(generator.weight_n, gravity_m_s2)
         self._height_m: float | None = None
-        self._offset_m_s2 = 0.0
 
     def ask(self, scene: Scene) -> Motion | Lean:
         """Return what the sticks ask for; without sticks, stop."""
@@ -82,21 +81,11 @@ class AltitudeSticks(Endless):
         if sticks is None:
             return self._stop.ask(scene)
         reference, lifting = self._climb(sticks, scene)
-        wish = self._generator.from_sticks(without_play(sticks))._replace(thrust_n=self._thrust_n(reference, scene))
+        wish = self._generator.from_sticks(without_play(sticks))._replace(
+            thrust_n=self._loop.thrust_n(reference, scene)
+        )
         leaning = self._leaning.by_wish(wish, scene)
         return leaning._replace(reference=reference, lifts=lifting, sinks=is_below(reference, scene.state))
-
-    def _thrust_n(self, reference: Reference, scene: Scene) -> float:
-        """Return the thrust that brings the vehicle to the height of the reference, whatever it leans."""
-        height_m, climb_m_s, lift_m_s2 = (float(order) for order in reference.motion[:3, 2])
-        state = scene.state
-        height_error, climb_error = height_m - state.position_enu_m[2], climb_m_s - state.velocity_enu_m_s[2]
-        self._offset_m_s2 += _INTEGRAL_1_S3 * height_error * scene.interval_s
-        self._offset_m_s2 = min(max(self._offset_m_s2, -_MOST_OFFSET_M_S2), _MOST_OFFSET_M_S2)
-        wanted = lift_m_s2 + _HEIGHT_1_S2 * height_error + _CLIMB_1_S * climb_error + self._offset_m_s2
-        lift = min(max(wanted, -_MOST_LIFT_M_S2), _MOST_LIFT_M_S2)
-        upright = max(cos(state.euler[0]) * cos(state.euler[1]), _LEAST_UPRIGHT)
-        return self._generator.weight_n * (1.0 + lift / self._gravity_m_s2) / upright
 
     def _climb(self, sticks: Sticks, scene: Scene) -> tuple[Reference, bool]:
         """Return the height's reference, where the vehicle is otherwise, and whether it is to leave the ground."""
@@ -105,13 +94,59 @@ class AltitudeSticks(Endless):
             self._height_m = None
         elif self._height_m is None and abs(scene.velocity[2]) < _RESTS_M_S:
             self._height_m = scene.place[2]
-        kind = Kind.VELOCITY if self._height_m is None else Kind.POSITION
-        height_m = scene.place[2] if self._height_m is None else self._height_m
-        target = still_target(
-            (*scene.place[:2], height_m), scene.yaw_rad, scene.samples, (Kind.VELOCITY, Kind.VELOCITY, kind)
-        )
-        target.motion[:, 1, 2] = climb_m_s
-        _, after = lead(scene.reference, target, scene.behaviour.limits, scene.interval_s)
-        moved = moving_with(scene.state).motion
-        moved[:, 2] = after.motion[:, 2]
-        return Reference(moved, np.array([scene.state.euler[2], 0.0])), lifts(target, scene.state)
+        reference, target = vertically(scene, climb_m_s, self._height_m)
+        return reference, lifts(target, scene.state)
+
+
+class Descent(Endless):
+    """Level, and down at the speed of landings: for a vehicle that does not know where it is, or which way it looks."""
+
+    def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
+        """Begin with the attitude and climb that the vehicle has."""
+        self._leaning = Leaning(generator)
+        self._weight_n = generator.weight_n
+        self._loop = HeightLoop(self._weight_n, gravity_m_s2)
+
+    def ask(self, scene: Scene) -> Lean:
+        """Return a level attitude, and the thrust that sinks."""
+        reference, _ = vertically(scene, -sinking_m_s(scene), None)
+        thrust_n = self._loop.thrust_n(reference, scene)
+        leaning = self._leaning.by_wish(lean(0.0, 0.0, 0.0, thrust_n), scene)
+        sinks = thrust_n < CARRIED * self._weight_n
+        return leaning._replace(reference=reference, lifts=False, sinks=sinks, drifts=True)
+
+
+class HeightLoop:
+    """The thrust that follows the height of a reference, whatever the vehicle leans."""
+
+    def __init__(self, weight_n: float, gravity_m_s2: float) -> None:
+        """Begin with nothing to make up for."""
+        self._weight_n, self._gravity_m_s2 = weight_n, gravity_m_s2
+        self._offset_m_s2 = 0.0
+
+    def thrust_n(self, reference: Reference, scene: Scene) -> float:
+        """Return the thrust, N, that brings the vehicle to the height of `reference`."""
+        height_m, climb_m_s, lift_m_s2 = (float(order) for order in reference.motion[:3, 2])
+        state = scene.state
+        height_error, climb_error = height_m - state.position_enu_m[2], climb_m_s - state.velocity_enu_m_s[2]
+        self._offset_m_s2 += _INTEGRAL_1_S3 * height_error * scene.interval_s
+        self._offset_m_s2 = min(max(self._offset_m_s2, -_MOST_OFFSET_M_S2), _MOST_OFFSET_M_S2)
+        wanted = lift_m_s2 + _HEIGHT_1_S2 * height_error + _CLIMB_1_S * climb_error + self._offset_m_s2
+        lift = min(max(wanted, -_MOST_LIFT_M_S2), _MOST_LIFT_M_S2)
+        upright = max(cos(state.euler[0]) * cos(state.euler[1]), _LEAST_UPRIGHT)
+        return self._weight_n * (1.0 + lift / self._gravity_m_s2) / upright
+
+
+def vertically(scene: Scene, climb_m_s: float, height_m: float | None) -> tuple[Reference, Target]:
+    """Return a reference that climbs, or goes to a height where one is given, and where it leads.
+
+    Horizontally it is where the vehicle is.
+    """
+    kind = Kind.VELOCITY if height_m is None else Kind.POSITION
+    place = (*scene.place[:2], scene.place[2] if height_m is None else height_m)
+    target = still_target(place, scene.yaw_rad, scene.samples, (Kind.VELOCITY, Kind.VELOCITY, kind))
+    target.motion[:, 1, 2] = climb_m_s
+    _, after = lead(scene.reference, target, scene.behaviour.limits, scene.interval_s)
+    moved = moving_with(scene.state).motion
+    moved[:, 2] = after.motion[:, 2]
+    return Reference(moved, np.array([scene.state.euler[2], 0.0])), target

@@ -6,7 +6,7 @@ from autopilot.circling import Round
 from autopilot.commands import Commands
 from autopilot.course import Asked, Course, Scene
 from autopilot.courses import Climb, Legs, Stop, Way, homeward, landing
-from autopilot.geofence import Geofence, check_fence, check_fence_item
+from autopilot.geofence import AroundHome, Geofence, check_fence, check_fence_item
 from autopilot.mission import MissionExecutor, MissionRecord, Reached, SetHome
 from autopilot.mission_items import check_item, check_mission, check_rally_item, places
 from autopilot.mission_legs import Defaults, Situation
@@ -60,18 +60,29 @@ class Missions:
 
     @property
     def has_fence(self) -> bool:
-        """Whether there is a geofence."""
-        return bool(self.service.plans[FENCE].items)
+        """Whether there is a geofence, uploaded or around home."""
+        return bool(self.service.plans[FENCE].items) or self._around_home.exists
+
+    @property
+    def _around_home(self) -> AroundHome:
+        behaviour = self._pilot.behaviour
+        return AroundHome(self._pilot.home_enu_m, behaviour.farthest_m, behaviour.highest_m)
 
     def fence_refusal(self, place: Vector) -> str:
         """Return why the vehicle may not fly to a place; empty if it may."""
-        return self._fence.refusal(place)
+        return self._fence.refusal(place) or self._around_home.refusal(place)
+
+    def margin_m(self, place: Vector) -> float:
+        """Return how far a place is inside of every fence, m; negative outside."""
+        return min(self._fence.margin_m(place), self._around_home.margin_m(place))
 
     def breach(self, place: Vector, now_us: int) -> str:
         """Return why the vehicle may not be where it is; looked at ten times a second, fences take time."""
-        if self.has_fence and now_us >= self._breach_due_us:
+        if not self.has_fence:
+            self._breach = ""
+        elif now_us >= self._breach_due_us:
             self._breach_due_us = now_us + _LOOK_EVERY_US
-            self._breach = self._fence.refusal(place)
+            self._breach = self.fence_refusal(place)
         return self._breach
 
     def moved_origin(self) -> None:

@@ -37,6 +37,7 @@ class Need(Enum):
     MISSION = "there is no mission"
     INSIDE_FENCE = "the mission leads outside the geofence"
     CIRCLE = "command DO_ORBIT says where"
+    POSITION = "the position is not known"
     FLYING = "the vehicle is not flying"
 
 
@@ -49,9 +50,10 @@ class Event(StrEnum):
     ARRIVED = "height reached"
     FINISHED = "finished"
     RETURN_ITEM = "mission says return"
-    SETPOINTS_LOST = "setpoints lost"
-    STICKS_LOST = "sticks lost"
-    ROTOR_LOST = "rotor failed"
+    SAVED_BY_HOLD = "failsafe: hold"
+    SAVED_BY_RETURN = "failsafe: return"
+    SAVED_BY_LANDING = "failsafe: land"
+    TERMINATED = "failsafe: rotors stop"
     TOUCHED_DOWN = "landed"
     LEFT_STANDING = "no take-off"
 
@@ -108,31 +110,83 @@ MODES: tuple[ModeRow, ...] = (
         3,
         0,
         mav.MAV_STANDARD_MODE_POSITION_HOLD,
-        (Need.STICKS,),
+        (Need.STICKS, Need.POSITION),
         True,
         True,
         "sticks to velocity; place and height are held",
     ),
-    ModeRow(Mode.HOLD, AUTO, 3, 0, (), True, True, "stops and stays; flies where a reposition command says"),
-    ModeRow(Mode.TAKEOFF, AUTO, 2, mav.MAV_STANDARD_MODE_TAKEOFF, (), True, True, "climbs to the take-off height"),
-    ModeRow(Mode.LAND, AUTO, 6, mav.MAV_STANDARD_MODE_LAND, (), False, True, "sinks here, then disarms"),
-    ModeRow(Mode.RETURN, AUTO, 5, mav.MAV_STANDARD_MODE_SAFE_RECOVERY, (), False, True, "climbs, flies home and lands"),
+    ModeRow(
+        Mode.HOLD,
+        AUTO,
+        3,
+        0,
+        (Need.POSITION,),
+        True,
+        True,
+        "stops and stays; flies where a reposition command says",
+    ),
+    ModeRow(
+        Mode.TAKEOFF,
+        AUTO,
+        2,
+        mav.MAV_STANDARD_MODE_TAKEOFF,
+        (Need.POSITION,),
+        True,
+        True,
+        "climbs to the take-off height",
+    ),
+    ModeRow(
+        Mode.LAND,
+        AUTO,
+        6,
+        mav.MAV_STANDARD_MODE_LAND,
+        (),
+        False,
+        True,
+        "sinks here, then disarms; level, where the position is not known",
+    ),
+    ModeRow(
+        Mode.RETURN,
+        AUTO,
+        5,
+        mav.MAV_STANDARD_MODE_SAFE_RECOVERY,
+        (Need.POSITION,),
+        False,
+        True,
+        "climbs, flies home and lands",
+    ),
     ModeRow(
         Mode.MISSION,
         AUTO,
         4,
         mav.MAV_STANDARD_MODE_MISSION,
-        (Need.MISSION, Need.INSIDE_FENCE),
+        (Need.MISSION, Need.INSIDE_FENCE, Need.POSITION),
         True,
         True,
         "flies the uploaded mission",
     ),
     ModeRow(Mode.OFFBOARD, 6, 0, 0, (Need.SETPOINTS,), True, True, "follows the setpoints of a companion"),
     ModeRow(
-        Mode.ORBIT, 3, 1, mav.MAV_STANDARD_MODE_ORBIT, (Need.FLYING, Need.CIRCLE), False, False, "flies around a centre"
+        Mode.ORBIT,
+        3,
+        1,
+        mav.MAV_STANDARD_MODE_ORBIT,
+        (Need.FLYING, Need.CIRCLE, Need.POSITION),
+        False,
+        False,
+        "flies around a centre",
     ),
-    ModeRow(Mode.FOLLOW, AUTO, 8, 0, (Need.FLYING,), False, True, "follows the target that FOLLOW_TARGET tells"),
-    ModeRow(Mode.TRACK, AUTO, 11, 0, (), True, True, "flies the track that parameter TRACK picks"),
+    ModeRow(
+        Mode.FOLLOW,
+        AUTO,
+        8,
+        0,
+        (Need.FLYING, Need.POSITION),
+        False,
+        True,
+        "follows the target that FOLLOW_TARGET tells",
+    ),
+    ModeRow(Mode.TRACK, AUTO, 11, 0, (Need.POSITION,), True, True, "flies the track that parameter TRACK picks"),
 )
 ROWS = {row.mode: row for row in MODES}
 
@@ -166,9 +220,10 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition((Mode.TAKEOFF,), Event.ARRIVED, armed=True, target=Mode.HOLD),
     Transition((Mode.MISSION, Mode.TRACK), Event.FINISHED, armed=True, target=Mode.HOLD),
     Transition((Mode.MISSION,), Event.RETURN_ITEM, armed=True, target=Mode.RETURN),
-    Transition((Mode.OFFBOARD,), Event.SETPOINTS_LOST, armed=True, target=Mode.HOLD),
-    Transition(MANUAL, Event.STICKS_LOST, armed=True, target=Mode.HOLD),
-    Transition((), Event.ROTOR_LOST, armed=True, target=Mode.LAND),
+    Transition((), Event.SAVED_BY_HOLD, armed=True, target=Mode.HOLD),
+    Transition((), Event.SAVED_BY_RETURN, armed=True, target=Mode.RETURN),
+    Transition((), Event.SAVED_BY_LANDING, armed=True, target=Mode.LAND),
+    Transition((), Event.TERMINATED, armed=True, target=Mode.HOLD, disarms=True),
 )
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import msgspec
 
 from autopilot.behaviour_parameters import behaviour, behaviour_parameters
+from autopilot.failsafe_parameters import failsafe_parameters
 from autopilot.law_numbers import law_numbers
 from autopilot.numbers import changed, described
 from autopilot.profile import Profile
@@ -75,7 +76,7 @@ class Numbers:
 
 def definitions(profile: Profile, vehicle: Vehicle, system_id: int = 1) -> list[Parameter]:
     """Return all parameters of an autopilot that flies `vehicle` by `profile`: their defaults are the files'."""
-    return [*Numbers(profile, vehicle).definitions, *behaviour_parameters(system_id)]
+    return [*Numbers(profile, vehicle).definitions, *behaviour_parameters(system_id), *failsafe_parameters()]
 
 
 def applied(profile: Profile, vehicle: Vehicle, values: Mapping[str, Value]) -> tuple[Profile, Vehicle]:

@@ -11,15 +11,23 @@ from autopilot.behaviour import Behaviour
 from autopilot.controller import Array, AttitudeDemand, Horizon, VehicleState
 from autopilot.course import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
 from autopilot.courses import Stop
+from autopilot.failsafes import Action
 from autopilot.instants import Instants
 from autopilot.landing import Landing, is_below, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following
 from autopilot.reference import Reference, at_rest, lead, lead_along, moving_with, still_target
 from mavlink.frames import Vector
-from mavlink.services.statustext import EMERGENCY, INFO, NOTICE, WARNING
+from mavlink.services.statustext import EMERGENCY, INFO, NOTICE
 
 CourseMaker: TypeAlias = Callable[[Mode, Scene], Course]
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
+_SAVED_BY = {
+    Action.HOLD: Event.SAVED_BY_HOLD,
+    Action.RETURN: Event.SAVED_BY_RETURN,
+    Action.LAND: Event.SAVED_BY_LANDING,
+    Action.DESCEND: Event.SAVED_BY_LANDING,
+    Action.TERMINATE: Event.TERMINATED,
+}
 
 
 class Said(NamedTuple):
@@ -74,6 +82,7 @@ class PilotRecord(NamedTuple):
     landing_us: int
     flights: int
     ground_m: float
+    saving: Action
     motion: Array
     heading: Array
 
@@ -96,6 +105,8 @@ class Pilot:
         landing_us: When it last stood again; 0 before.
         ground_m: Height of where it last stood, z of ENU.
         flights: How often the rotors were armed.
+        saving: The failsafe that is flown, until somebody chooses a mode or the rotors stop.
+        terminated: Whether a failsafe stopped the rotors in the air.
         rotor_failed: Which rotor has failed, in words; empty if none has. Nothing but landing is possible then.
     """
 
@@ -126,6 +137,8 @@ class Pilot:
         self.speed_m_s: float | None = None
         self.armed_us = self.takeoff_us = self.landing_us = 0
         self.flights = 0
+        self.saving = Action.NONE
+        self.terminated = False
         self.rotor_failed = ""
         self.ground_m = 0.0
         self._home_is_chosen = False
@@ -180,6 +193,7 @@ class Pilot:
             self.landing_us,
             self.flights,
             self.ground_m,
+            self.saving,
             *self.reference,
         )
 
@@ -205,6 +219,7 @@ class Pilot:
         came_down = not closely and not record.standing and stands_at_first(vehicle, record.ground_m)
         self.standing = record.standing or came_down
         self.state = FIRST if came_down else State(record.mode, record.armed)
+        self.saving = Action.NONE if came_down else record.saving
         self.idles = record.idles or came_down
         self.reference = Reference(record.motion, record.heading) if closely else moving_with(vehicle)
         self.course = (self._make_course if came_down else again)(self.state.mode, self.scene())
@@ -263,10 +278,11 @@ class Pilot:
         reasons = [] if forced else self.refusals()
         if reasons:
             return Refusal("not armed: " + "; ".join(reasons))
-        refusal = self._follow(Event.ARM, "rotors armed")
+        refusal = self._follow(Event.ARM, "rotors armed", met=(Need.POSITION,))  # a check of its own, and by force
         if refusal is None:
             self.armed_us = self._now_us
             self.flights += 1
+            self.terminated = False
             if not self._home_is_chosen and self._vehicle is not None:
                 self.set_home(self._vehicle.position_enu_m, self._vehicle.euler[2], chosen=False)
             if not self._course_is_chosen:
@@ -287,6 +303,7 @@ class Pilot:
             return None
         refusal = self._follow(Event.SELECT, "", mode)
         if refusal is None:
+            self.saving = Action.NONE
             self._engage(mode)
         return refusal
 
@@ -294,8 +311,21 @@ class Pilot:
         """Change to `mode` and fly `course` in it, now or once the rotors are armed; return why not."""
         refusal = self._follow(Event.SELECT, "", mode, met=(Need.CIRCLE,))
         if refusal is None:
+            self.saving = Action.NONE
             self.course, self._course_is_chosen = course, True
         return refusal
+
+    def save(self, action: Action) -> None:
+        """Do what a failsafe says, whatever is flown: it has been weighed against that, and been said."""
+        if not self.state.armed:
+            return
+        if action is Action.TERMINATE:
+            self.terminated = not self.standing
+            self._stop_rotors(Event.TERMINATED, "")
+            return
+        self.saving = action
+        self._follow(_SAVED_BY[action], "")
+        self._engage(self.state.mode)
 
     def set_home(self, position_enu_m: Vector, yaw_rad: float, *, chosen: bool = True) -> None:
         """Say where home is; where somebody chose it, a take-off does not move it."""
@@ -303,18 +333,16 @@ class Pilot:
         self._home_is_chosen = self._home_is_chosen or chosen
 
     def happened(self, event: Event) -> None:
-        """Tell of an event that may change the mode: what is lost, what is finished."""
+        """Tell of an event that may change the mode: what is finished."""
         before = self.state
         stays = event in (Event.ARRIVED, Event.FINISHED)  # where the course that ends has led
         if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode and not stays:
             self._engage(self.state.mode)
 
     def lose_rotor(self, rotor: int) -> None:
-        """Land, and do nothing else any more: rotor 0..3 has failed."""
+        """Choose nothing any more: rotor 0..3 has failed, and the failsafe of that lands."""
         self.rotor_failed = f"rotor {rotor + 1} failed"
         self.say(EMERGENCY, f"{self.rotor_failed}: landing on three rotors")
-        self._follow(Event.ROTOR_LOST, "")
-        self._engage(self.state.mode)
 
     def touch_down(self) -> None:
         """Stand, and stop the rotors: something else than the reference tells of the ground."""
@@ -368,7 +396,7 @@ class Pilot:
     def _lean(self, asked: Lean, begins: bool) -> Guidance:
         assert self._vehicle is not None, "the pilot has seen the vehicle"
         self.reference = asked.reference
-        self._watch_ground(self._vehicle, sinks=asked.sinks)
+        self._watch_ground(self._vehicle, sinks=asked.sinks, drifts=asked.drifts)
         return Guidance(attitude=asked.demand, begins=begins)
 
     def _rest(self) -> None:
@@ -398,6 +426,7 @@ class Pilot:
         refusal = self._follow(event, text)
         if refusal is None:
             self.speed_m_s = None
+            self.saving = Action.NONE
             self._landing = Landing()
             self._engage(self.state.mode)
         return refusal
@@ -408,8 +437,8 @@ class Pilot:
         self.takeoff_us = self._now_us
         self.say(INFO, "take-off")
 
-    def _watch_ground(self, vehicle: VehicleState, *, sinks: bool) -> None:
-        self._landing, stands = watch(self._landing, self._now_us, vehicle, sinks)
+    def _watch_ground(self, vehicle: VehicleState, *, sinks: bool, drifts: bool = False) -> None:
+        self._landing, stands = watch(self._landing, self._now_us, vehicle, sinks, drifts=drifts)
         if stands:
             self._stand()
 
@@ -438,6 +467,6 @@ class Pilot:
         if isinstance(after, Refusal):
             return after
         if after != self.state and text:
-            self.say(WARNING if "lost" in event else INFO, text.format(mode=after.mode))
+            self.say(INFO, text.format(mode=after.mode))
         self.state = after
         return None

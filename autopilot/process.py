@@ -167,17 +167,18 @@ def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop
 
 
 def _setup(args: argparse.Namespace, profile: Profile) -> Setup:
+    served = bool(args.gcs or args.conducted)
     return Setup(
         profile=args.profile,
         controller=profile.controller,
         solver=args.solver,
         vehicle=args.vehicle or profile.simulation.vehicle,
         feedback=args.feedback,
-        track=args.track if args.gcs else args.track or TRACK,
+        track=args.track if served else args.track or TRACK,
         origin=args.home.origin,
         system_id=args.system_id,
         identity=args.identity,
-        ground=bool(args.gcs),
+        ground=served,
     )
 
 

@@ -11,6 +11,8 @@ _FASTEST_M_S = 100.0
 _LOWEST_M, _HIGHEST_M = -1000.0, 30e3
 _LEAST_FIX, _BEST_FIX = 3, 6
 _GPS_PATIENCE_US = 2_000_000
+_NOWHERE = (0.0, 0.0)
+"""Latitude and longitude of who does not know them, in the Gulf of Guinea."""
 
 
 class Rejected:
@@ -74,7 +76,7 @@ class GpsWatch:
 
     def reason(self, fix: GpsFix, now_us: int) -> Reason | None:
         """Return why a fix, told by `now_us`, must be rejected; None if it need not."""
-        if not _LEAST_FIX <= fix.fix_type <= _BEST_FIX:
+        if not _LEAST_FIX <= fix.fix_type <= _BEST_FIX or fix.place[:2] == _NOWHERE:
             return Reason.NO_FIX
         numbers = (*fix.place, *fix.velocity_enu_m_s)
         if not _possible(*numbers):

@@ -3,17 +3,17 @@
 from math import nan
 
 from autopilot.controller import Array, AttitudeDemand, Decision, Fallback, Horizon, VehicleState
+from autopilot.failsafes import Action
 from autopilot.forecast import Forecaster
 from autopilot.health_watch import told
 from autopilot.modes import ROWS, Mode, custom_mode
 from autopilot.pilot import Guidance, Pilot
-from autopilot.power import PowerMeter
 from autopilot.qp import QpStatus
 from autopilot.senses import Senses
 from autopilot.stations import Stations
 from mavlink.dialect import mav
 from mavlink.frames import Vector, quaternion_from_euler
-from mavlink.snapshot import NO_SETPOINT, NOT_SOLVED, FourOf, Home, Setpoint, Snapshot, SolverState
+from mavlink.snapshot import NO_SETPOINT, NOT_SOLVED, BatteryState, FourOf, Home, Setpoint, Snapshot, SolverState
 from plant.vehicle import Vehicle
 
 FORECAST_EVERY_US = 200_000
@@ -47,7 +47,7 @@ class Photographer:
         decision: Decision | None,
         duration_s: float,
         controls: FourOf,
-        power: PowerMeter,
+        battery: BatteryState | None,
         stations: Stations,
         senses: Senses,
     ) -> Snapshot:
@@ -61,7 +61,7 @@ class Photographer:
             decision: What it made of that; None while the rotors stand or idle.
             duration_s: How long it took.
             controls: Rotor commands, parts of the largest speed.
-            power: Its battery.
+            battery: Its battery; None without one.
             stations: What ground stations say.
             senses: How the state is known.
         """
@@ -79,7 +79,9 @@ class Photographer:
             intended_custom_mode=custom_mode(mode),
             standard_mode=ROWS[mode].standard,
             landed_state=landed_state(pilot, state),
-            emergency=armed and bool(pilot.rotor_failed),
+            failsafe=pilot.saving is not Action.NONE,
+            emergency=pilot.saving >= Action.LAND,
+            terminated=pilot.terminated,
             armable=not pilot.refusals(),
             position_enu_m=state.position_enu_m,
             velocity_enu_m_s=state.velocity_enu_m_s,
@@ -93,7 +95,7 @@ class Photographer:
             home=Home(pilot.home_enu_m, pilot.home_yaw_rad),
             rotor_speeds_rad_s=(c1 * speed, c2 * speed, c3 * speed, c4 * speed),
             controls=controls,
-            battery=power.state(),
+            battery=battery,
             setpoint=setpoint(guidance, decision, controls),
             solver=self._solver_state(now_us, state, guidance.horizon, decision, duration_s),
             sticks=None if sticks is None else (sticks.pitch, sticks.roll, sticks.thrust, sticks.yaw),

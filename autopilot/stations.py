@@ -51,6 +51,7 @@ LOGS = "logs"
 LOG_LINK = -1
 """The link on which the flight log is a listener like any other."""
 REBOOT, SHUT_DOWN = 1.0, 2.0
+_COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +148,11 @@ class Stations:
         """Stream to `channel` what its kind gets by default."""
         self._streams.use(channel, kind)
 
+    @property
+    def station_us(self) -> int | None:
+        """When a ground station was heard last; None if there never was one."""
+        return self._heartbeat.station_us
+
     def update(self, snapshot: Snapshot) -> None:
         """Take in the vehicle as it is now. Called once a control sample."""
         self._heartbeat.update(snapshot)
@@ -180,6 +186,15 @@ class Stations:
             if outgoing.link == LOG_LINK:
                 self.log.record(now_us, self._framer.take(outgoing.datagram))
         return [outgoing for outgoing in outbox if outgoing.link != LOG_LINK]
+
+    def wait(self, reason: str) -> None:
+        """Deny every command for a reason, and hear nothing else; without one, serve."""
+        self.hub.hears_only = _COMMANDS if reason else None
+        self._obeys.closed = reason
+
+    def take_outbox(self) -> list[Outgoing]:
+        """Return what to send now, while nothing is known of the vehicle that could be told, or logged."""
+        return [outgoing for outgoing in self.hub.take_outbox() if outgoing.link != LOG_LINK]
 
     def say(self, severity: int, text: str) -> None:
         """Tell everybody a line."""

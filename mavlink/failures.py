@@ -133,7 +133,7 @@ def _sensor(unit: int, wrong: tuple[Value, ...], drift: tuple[Value, ...], noise
         Row(unit, STUCK, part, "tells what it told last, again and again, as if it were new"),
         Row(unit, GARBAGE, part, "has more noise: white, normal", (noise,)),
         Row(unit, WRONG, part, f"is off by {what}", wrong),
-        Row(unit, SLOW, part, f"drifts away: {what} that grows from now on", drift),
+        Row(unit, SLOW, part, "drifts away: is off as by WRONG, and more from now on", drift),
         Row(unit, DELAYED, part, "tells later", (late,)),
     )
 
@@ -165,7 +165,7 @@ ROWS: tuple[Row, ...] = (
         (_scalar("bias", "Pa", -20000.0, 20000.0, 100.0),),
         (_scalar("drift", "Pa/s", -1000.0, 1000.0, 5.0),),
         _scalar("standard deviation", "Pa", 0.1, 20000.0, 200.0),
-        "a bias; 12 Pa are a metre",
+        "a bias, of which 12 Pa are a metre",
     ),
     *_sensor(
         GPS,

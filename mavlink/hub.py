@@ -49,6 +49,9 @@ class Hub:
     """A component on any number of links.
 
     A channel is one remote address on one link. It opens with the first valid message from there.
+
+    Attributes:
+        hears_only: The messages that services hear for the time being; None for all.
     """
 
     def __init__(
@@ -72,6 +75,7 @@ class Hub:
         self._channels: dict[int, Channel] = {}
         self._numbers: dict[tuple[int, Address | None], int] = {}
         self._next_number = 0
+        self.hears_only: frozenset[str] | None = None
         self._now_us = 0
         self._tidy_at_us = 0
         self._dropped_before: Counter[str] = Counter()
@@ -171,7 +175,7 @@ class Hub:
             self._set_up_signing(message, target, channel, loopback)
             return
         self._forward(message, target, channel)
-        if self._router.concerns_us(target):
+        if self._router.concerns_us(target) and (self.hears_only is None or message.name in self.hears_only):
             peer = Peer(channel.number, *message.source)
             for service in self._hearing.get(message.name, ()):
                 self.send(service.receive(message, peer, self._now_us))

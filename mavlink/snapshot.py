@@ -10,6 +10,8 @@ from mavlink.sensors import GpsFix, SensorFrame
 
 NOWHERE: Vector = (nan, nan, nan)
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
+CHARGE_OK = 1
+"""MAV_BATTERY_CHARGE_STATE_OK."""
 FourOf = tuple[float, float, float, float]
 
 
@@ -36,6 +38,7 @@ class BatteryState(NamedTuple):
         remaining: Part of the charge that is left, 0..1.
         remaining_s: Time until it is empty at this current; nan while none flows.
         used_wh: Energy taken.
+        charge_state: MAV_BATTERY_CHARGE_STATE.
     """
 
     cells: int
@@ -45,6 +48,7 @@ class BatteryState(NamedTuple):
     remaining: float
     remaining_s: float
     used_wh: float
+    charge_state: int = CHARGE_OK
 
 
 class Setpoint(NamedTuple):
@@ -160,7 +164,7 @@ class Snapshot:
         standard_mode: MAV_STANDARD_MODE of the mode, 0 where it is none.
         landed_state: MAV_LANDED_STATE.
         failsafe: Whether the vehicle acts on its own to save itself.
-        emergency: Whether it can do nothing but come down.
+        emergency: Whether it comes down for that.
         armable: Whether every check before arming passes.
         position_enu_m: From the origin, m.
         velocity_enu_m_s: m/s.

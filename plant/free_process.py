@@ -29,6 +29,7 @@ class FreeServer(Server):
         pace, progress = Pace(speed, began_s), Progress(self._status)
         silence = Silence(self._cut_after_s)
         frames = answers = 0
+        waited_s = 0.0
         while not self._stop and plant.world.time_us + plant.interval_us <= duration_s * 1e6:
             begin_us = plant.world.time_us
             sent_s = self._tell(plant)
@@ -37,6 +38,7 @@ class FreeServer(Server):
             while (command := self._hear(due_s)) is not None:
                 since_us = round((perf_counter() - due_s) * 1e6 * speed) + plant.interval_us
                 now_us = begin_us + max(0, min(since_us, plant.interval_us))
+                waited_s += (now_us - command.time_us) * 1e-6
                 plant.arrive(now_us, command)
                 faults += self._end.take_faults()
                 answers += 1
@@ -59,6 +61,7 @@ class FreeServer(Server):
             wall_time_s=perf_counter() - began_s,
             frames=frames,
             answers=answers,
+            round_trip_ms=1e3 * waited_s / max(answers, 1),
             resent=0,
             dropped=dict(self._end.dropped),
         )

@@ -19,6 +19,7 @@ from autopilot.profile import load_profile
 from autopilot.qp import installed_solvers
 from mavlink.process import fail
 from tools import peer
+from tools.sensing import FLIGHTS_A_RUN, sensing_figures
 from tools.serving import ALONE, CHANNELS, WATCHED, serving_figures
 from tools.speed import CONTROL_S, LINKS, THESIS_LINKS, Tell, rate_figures, thesis_figures
 from tools.stages import MOVES, STAGES, stage_figures
@@ -30,7 +31,7 @@ _SERVED = ("p50 µs", "p99 µs", "messages a second")
 
 def bench(args: argparse.Namespace) -> int:
     """Measure what the command line says, print tables, write JSON; return the exit code."""
-    wanted = args.only or ["stages", "flights", "ground", "thesis"]
+    wanted = args.only or ["stages", "flights", "sensors", "ground", "thesis"]
     if not SHORTEST_S <= args.duration <= LONGEST_S:
         fail(f"--duration: {SHORTEST_S:g} to {LONGEST_S:g} s, not {args.duration:g}")
     if args.out:
@@ -45,6 +46,8 @@ def bench(args: argparse.Namespace) -> int:
             figures["stages"] = stage_figures(profile, Path(folder), args.duration, tell)
         if "flights" in wanted:
             figures["flights"] = rate_figures(profile, Path(folder), args.duration, args.runs, tell, beside=beside)
+        if "sensors" in wanted:
+            figures["sensors"] = sensing_figures(profile, Path(folder), args.duration, args.runs, tell)
         if "ground" in wanted:
             figures["ground"] = serving_figures(profile, Path(folder), args.duration, args.runs, tell)
         if "thesis" in wanted:
@@ -65,7 +68,9 @@ def parts(wanted: list[str], runs: int, *, beside: bool) -> int:
     stages = 1 + len(MOVES) * (1 + len(installed_solvers()))
     flights = 1 + runs * len(CONTROL_S) * (len(LINKS) + beside)
     ground = len(CHANNELS) + 2 * runs
-    parts = {"stages": stages, "flights": flights, "ground": ground, "thesis": runs * len(THESIS_LINKS)}
+    sensors = 1 + runs * FLIGHTS_A_RUN
+    thesis = runs * len(THESIS_LINKS)
+    parts = {"stages": stages, "flights": flights, "sensors": sensors, "ground": ground, "thesis": thesis}
     return sum(parts[section] for section in set(wanted))
 
 
@@ -97,6 +102,9 @@ def _print(figures: Mapping[str, Any]) -> None:
             for name, figure in rate.items()
         }
         console.print(_spread(f"{title}, {settings['runs']} runs", rows))
+    if "sensors" in figures:
+        for table in _sensor_tables(figures["sensors"], settings["runs"]):
+            console.print(table)
     if "ground" in figures:
         for table in _ground_tables(figures["ground"]):
             console.print(table)
@@ -115,6 +123,15 @@ def _stage_tables(stages: Mapping[str, Any]) -> Iterator[Table]:
     for name, figure in stages["link"].items():
         link.add_row(name, _number(figure["p50"]), _number(figure["p99"]))
     yield link
+
+
+def _sensor_tables(sensors: Mapping[str, Any], runs: int) -> Iterator[Table]:
+    steps = _table("step of the estimator, µs", ("p50", "p99"))
+    for name, figure in sensors["estimator_us"].items():
+        steps.add_row(name, _number(figure["p50"]), _number(figure["p99"]))
+    yield steps
+    title = f"{sensors['track']}, profile {PROFILE}, frames at 250 Hz, times real time, {runs} runs"
+    yield _spread(title, sensors["real_time_factor"])
 
 
 def _ground_tables(ground: Mapping[str, Any]) -> Iterator[Table]:

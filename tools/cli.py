@@ -296,10 +296,11 @@ def _add_bench(parser: ArgumentParser) -> None:
     add(
         "--only",
         action="append",
-        choices=("stages", "flights", "ground", "thesis"),
+        choices=("stages", "flights", "sensors", "ground", "thesis"),
         help="stages: each stage of a control step; flights: times real time at several rates, beside RotorPy if it is "
-        "installed; ground: serving ground stations, and the control step beside it; thesis: its spiral "
-        "through the whole command; may be repeated (default: all)",
+        "installed; sensors: the estimator, and flights on sensors beside those on the state; ground: serving ground "
+        "stations, and the control step beside it; thesis: its spiral through the whole command; may be repeated "
+        "(default: all)",
     )
     add("--runs", type=int, default=3, choices=range(1, 101), metavar="N", help="flights of each kind (default 3)")
     add(

@@ -21,6 +21,7 @@ _PLACES = {
     Mode.LAND: (8.4, 1.0),
 }
 _DISARMED = (11.9, 1.5)
+_ANY = (5.2, 1.0)
 _HEAD = """# Flight modes
 
 This page and its picture are written from the tables in `autopilot/modes.py` by `python -m tools.mode_page docs`;
@@ -30,6 +31,7 @@ a test holds that they agree.
 
 Any mode can be selected at any time if what it needs is there; on the ground, disarmed, it need not be yet. A refusal
 says why, in the COMMAND_ACK's company by a STATUSTEXT. Arming asks for more, see [Arming](ground-stations.md#arming).
+What leads to a failsafe, and which of them wins, has [a table of its own](failsafes.md).
 
 """
 
@@ -85,6 +87,8 @@ def draw(path: Path) -> None:
         needs = ROWS[mode].needs
         axes.text(*place, mode + ("*" if needs else ""), ha="center", va="center", fontsize=11, bbox=style, zorder=3)
     axes.text(*_DISARMED, "disarmed", ha="center", va="center", fontsize=11, bbox=style, zorder=3)
+    dashed = {**style, "linestyle": "--", "facecolor": "#f4f7fa"}
+    axes.text(*_ANY, "any mode", ha="center", va="center", fontsize=11, bbox=dashed, zorder=3)
     axes.text(9.2, -0.95, "* needs something, see the table", fontsize=10, color="#445566", ha="right")
     arrow = {"arrowstyle": "-|>", "color": "#225588", "shrinkA": 22, "shrinkB": 24, "linewidth": 1.2}
     for row in TRANSITIONS:
@@ -117,8 +121,8 @@ def draw(path: Path) -> None:
 def _edges(row: Transition) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
     if row.target is None or row.disarms:
         return
-    for mode in row.sources:
-        yield _PLACES[mode], _PLACES[row.target]
+    for source in [_PLACES[mode] for mode in row.sources] or [_ANY]:
+        yield source, _PLACES[row.target]
 
 
 def main() -> int:

@@ -137,7 +137,11 @@ class _Answered(NamedTuple):
 
 
 class CommandService:
-    """Hands commands to their handlers and acknowledges each to whoever sent it."""
+    """Hands commands to their handlers and acknowledges each to whoever sent it.
+
+    Attributes:
+        closed: Why every command is denied for the time being; empty if they are obeyed.
+    """
 
     hears = frozenset({"COMMAND_LONG", "COMMAND_INT", "COMMAND_CANCEL"})
 
@@ -149,6 +153,7 @@ class CommandService:
         """
         self._entries = {number: _entry(number, handler) for number, handler in handlers.items()}
         self._text = text
+        self.closed = ""
         self._running: dict[int, _Running] = {}
         self._tell_at_us: int | None = None
         self._answered: dict[tuple[Peer, int], _Answered] = {}
@@ -159,6 +164,8 @@ class CommandService:
         fields = message.fields
         if message.name == "COMMAND_CANCEL":
             return self._cancel(fields.command, peer, now_us)
+        if self.closed:
+            return [_ack(fields.command, peer, Outcome(DENIED)), *self._reason(Outcome(DENIED, self.closed), now_us)]
         entry = self._entries.get(fields.command)
         if entry is None:
             return [_ack(fields.command, peer, Outcome(UNSUPPORTED))]

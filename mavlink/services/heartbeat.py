@@ -78,6 +78,12 @@ class HeartbeatService:
         """Return everybody who was ever heard, the last one last."""
         return list(self._heard.values())
 
+    @property
+    def station_us(self) -> int | None:
+        """When a ground station (MAV_TYPE_GCS) was heard last; None if there never was one."""
+        heard = (other.at_us for other in self._heard.values() if other.kind == mav.MAV_TYPE_GCS)
+        return max(heard, default=None)
+
     def ground_stations(self, now_us: int, within_us: int) -> list[Heard]:
         """Return the ground stations (MAV_TYPE_GCS) heard within the last `within_us`."""
         return [

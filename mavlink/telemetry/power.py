@@ -5,7 +5,7 @@ from math import isfinite, pi
 from mavlink.dialect import mav
 from mavlink.services.service import Fields
 from mavlink.snapshot import BatteryState, FourOf, Snapshot
-from mavlink.telemetry.wire import UNKNOWN_I16, UNKNOWN_U8, UNKNOWN_U16, Constants
+from mavlink.telemetry.wire import UNKNOWN_I16, UNKNOWN_U8, UNKNOWN_U16
 
 CELLS = 10
 """That BATTERY_STATUS holds; four more go into its extension."""
@@ -20,7 +20,7 @@ ESC_CONNECTION_TYPE_DSHOT = 5
 MIXED_GROUP = 0
 
 
-def battery_status(s: Snapshot, c: Constants) -> Fields | None:
+def battery_status(s: Snapshot) -> Fields | None:
     """BATTERY_STATUS (147): mV a cell, cA, mAh, hJ, percent, s."""
     battery = s.battery
     if battery is None:
@@ -29,20 +29,8 @@ def battery_status(s: Snapshot, c: Constants) -> Fields | None:
     cells, more = _cells_mv(battery)
     used = (1e3 * battery.used_ah, HECTOJOULES_PER_WH * battery.used_wh)
     left_s = battery.remaining_s if isfinite(battery.remaining_s) else 0.0
-    left = (100.0 * battery.remaining, left_s, charge_state(battery.remaining, c))
+    left = (100.0 * battery.remaining, left_s, battery.charge_state)
     return (*kind, cells, 100.0 * battery.current_a, *used, *left, more, 0, 0)
-
-
-def charge_state(remaining: float, c: Constants) -> int:
-    """MAV_BATTERY_CHARGE_STATE of the part of the charge that is left."""
-    state: int = mav.MAV_BATTERY_CHARGE_STATE_OK
-    if remaining < c.emergency:
-        state = mav.MAV_BATTERY_CHARGE_STATE_EMERGENCY
-    elif remaining < c.critical:
-        state = mav.MAV_BATTERY_CHARGE_STATE_CRITICAL
-    elif remaining < c.low:
-        state = mav.MAV_BATTERY_CHARGE_STATE_LOW
-    return state
 
 
 def esc_status(s: Snapshot) -> Fields:

@@ -46,6 +46,7 @@ _STATUS: dict[str, Encoder] = {
     "VIBRATION": sensors.vibration,
 }
 _POWER: dict[str, Encoder] = {
+    "BATTERY_STATUS": power.battery_status,
     "ESC_STATUS": power.esc_status,
     "ESC_INFO": power.esc_info,
     "SERVO_OUTPUT_RAW": power.servo_output_raw,
@@ -65,7 +66,6 @@ _CONTROLLER: dict[str, Encoder] = {
 _PLAIN = (_POSITION, _ATTITUDE, _STATUS, _POWER, _CONTROLLER)
 _WITH_CONSTANTS: dict[str, Callable[..., Fields | None]] = {
     "SYSTEM_TIME": status.system_time,
-    "BATTERY_STATUS": power.battery_status,
     "HIGHRES_IMU": sensors.highres_imu,
     "SCALED_IMU": sensors.scaled_imu,
     "RAW_IMU": sensors.raw_imu,

@@ -30,16 +30,10 @@ class Constants:
     Attributes:
         boot_unix_us: Unix time at the start, µs; 0 where nobody knows it.
         gravity_m_s2: Of the place.
-        low: Part of the battery's charge below which it counts as low.
-        critical: As critical.
-        emergency: As an emergency.
     """
 
     boot_unix_us: int = 0
     gravity_m_s2: float = 9.81
-    low: float = 0.15
-    critical: float = 0.07
-    emergency: float = 0.05
 
 
 def fitted(name: str, encoder: Encoder) -> Encoder:

@@ -34,6 +34,7 @@ FAILING = [
     (FACTS._replace(standing=False), "not standing on the ground"),
     (FACTS._replace(charge=0.09), "battery at 9%"),
     (FACTS._replace(thrust_stick=0.7), "thrust stick is up"),
+    (FACTS._replace(battery="battery not healthy: 0.0 V"), "battery not healthy: 0.0 V"),
     (FACTS._replace(outside_fence="outside the geofence"), "outside the geofence"),
 ]
 
@@ -59,6 +60,12 @@ def test_less_than_that_is_no_reason(facts: Facts) -> None:
 
 def test_every_reason_is_told_at_once() -> None:
     facts = Facts(
-        tilted(90.0)._replace(velocity_enu_m_s=(2.0, 0.0, 0.0)), False, 0.0, 1.0, "outside", "height not known"
+        tilted(90.0)._replace(velocity_enu_m_s=(2.0, 0.0, 0.0)),
+        False,
+        0.0,
+        1.0,
+        "outside",
+        "height not known",
+        "battery critical",
     )
     assert len(refusals(facts)) == len(CHECKS)

@@ -13,11 +13,11 @@ def test_nothing_is_said_while_all_is_well() -> None:
 
 def test_each_change_is_said_once() -> None:
     watch = HealthWatch()
-    lost = WELL._replace(gps_lost_since_us=5_000_000, dead_reckoning=True)
-    assert watch.lines(lost) == [(WARNING, "GPS lost: position by dead reckoning")]
+    lost = WELL._replace(magnetometer=False)
+    assert watch.lines(lost) == [(WARNING, "magnetometer not believed")]
     assert watch.lines(lost) == []
     assert watch.lines(lost._replace(barometer=False)) == [(WARNING, "barometer not believed")]
-    assert watch.lines(WELL) == [(INFO, "GPS is back"), (INFO, "barometer believed again")]
+    assert watch.lines(WELL) == [(INFO, "magnetometer believed again"), (INFO, "barometer believed again")]
 
 
 def test_what_is_not_known_is_named() -> None:

@@ -30,6 +30,7 @@ class Example:
         files: Files beside it that it reads.
         after: An example that is run before it, with the same vehicle.
         written: Files that it reads and that are written for it: name and text.
+        options: Of the vehicle that it flies.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Example:
     files: tuple[str, ...] = ()
     after: str = ""
     written: dict[str, str] = field(default_factory=dict)
+    options: tuple[str, ...] = ()
 
 
 def _streams(name: str, pattern: str, times: int, shows: str) -> Example:
@@ -61,7 +63,7 @@ EXAMPLES: tuple[Example, ...] = (
     Example("offboard_attitude", flights.offboard_attitude),
     Example("manual_control", flights.manual_control, endless=True),
     Example("follow_me_example", flights.follow_me, within_s=90.0),
-    Example("failure_injection", flights.failure_injection, within_s=90.0),
+    Example("failure_injection", flights.failure_injection, within_s=90.0, options=("--feedback", "sensors")),
     Example("calibration", services.calibration),
     Example("all_params", services.all_params),
     Example("firmware_version", PrintJudge(r"flight_sw_major: \d+", 1, "A version is printed")),

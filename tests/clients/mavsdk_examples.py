@@ -100,7 +100,7 @@ def _run(example: Example, folder: Path, python: Path) -> Result:
     with TemporaryDirectory() as temporary:
         room = Path(temporary)
         try:
-            with vehicle(room, links=(SDK_LINK,)) as flown:
+            with vehicle(room, *example.options, links=(SDK_LINK,)) as flown:
                 if example.after:
                     before = next(other for other in EXAMPLES if other.name == example.after)
                     _judge(before, folder, python, room / "before", flown)

@@ -66,7 +66,7 @@ def lands(seen: Observer, where: Vector) -> None:
 def test_services(tmp_path: Path) -> None:
     """What needs no flight, one script after another, with one vehicle."""
     with vehicle(tmp_path, speed=SPEED) as flown:
-        for name in ("params", "telemetry", "geofence", "ftp", "calibration", "failure"):
+        for name in ("params", "telemetry", "geofence", "ftp", "calibration"):
             run(name, flown, tmp_path)
         seen = flown.seen
         assert seen.parameter("MIS_TAKEOFF_ALT") == 3.5
@@ -76,6 +76,13 @@ def test_services(tmp_path: Path) -> None:
         assert not list((flown.state / "0" / "files").glob("notes*"))
         assert seen.now.mode is Mode.HOLD
         assert not any(sight.armed or sight.flying for sight in seen.sights)
+
+
+def test_failure(tmp_path: Path) -> None:
+    """On sensors, as only they can fail."""
+    with vehicle(tmp_path, "--feedback", "sensors", speed=SPEED) as flown:
+        run("failure", flown, tmp_path)
+        assert flown.seen.parameter("SYS_FAILURE_EN") == 0.0
 
 
 def test_takeoff_and_land(tmp_path: Path) -> None:

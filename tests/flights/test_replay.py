@@ -1,47 +1,19 @@
 """What the sensors told in a flight, fed to an estimator again: the same states."""
 
 import gzip
-import struct
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from autopilot.estimator import Estimator
-from mavlink import dialect
-from mavlink.dialect import Codec, Message
 from mavlink.geodesy import DEFAULT_ORIGIN
-from mavlink.sensors import SensorFrame, decode_sensors
 from plant.vehicle import load_vehicle
 from tests.runs import Array, fly
+from tools.sensing import sensor_frames
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 FRAME_US, CONTROL_US = 4000, 8000
 STATE_COLUMNS = slice(1, 14)
-
-
-def frames_of(tlog: bytes) -> Iterator[SensorFrame]:
-    """Read the sensors' frames of a telemetry log, in order."""
-    codec = Codec(1, dialect.AUTOPILOT_COMPONENT)
-    sensor: Message | None = None
-    for message in _messages(codec, tlog):
-        if message.name == "HIL_SENSOR":
-            if sensor is not None:
-                yield decode_sensors(sensor)
-            sensor = message
-        elif message.name == "HIL_GPS" and sensor is not None:
-            yield decode_sensors(sensor, message)
-            sensor = None
-    if sensor is not None:
-        yield decode_sensors(sensor)
-
-
-def _messages(codec: Codec, tlog: bytes) -> Iterator[Message]:
-    at, stamp = 0, struct.calcsize(">Q")
-    while at < len(tlog):
-        end = at + stamp + 12 + tlog[at + stamp + 1]
-        yield from codec.decode(tlog[at + stamp : end])
-        at = end
 
 
 def replayed(tlog: bytes) -> dict[int, tuple[float, ...]]:
@@ -50,7 +22,7 @@ def replayed(tlog: bytes) -> dict[int, tuple[float, ...]]:
     assert vehicle.sensors is not None
     estimator = Estimator(vehicle.sensors, vehicle.gravity_m_s2, DEFAULT_ORIGIN, FRAME_US)
     states: dict[int, tuple[float, ...]] = {}
-    for frame in frames_of(tlog):
+    for frame in sensor_frames(tlog):
         estimate = estimator.step(frame, asked=frame.time_us % CONTROL_US == 0)
         if estimate is not None and estimate.frame.time_us == frame.time_us:
             f = estimate.frame

@@ -71,7 +71,7 @@ def test_lost_gps_is_said_and_survived() -> None:
     for _ in range(150):
         flight.run(0.1)
         fastest = max(fastest, hypot(*flight.velocity))
-    assert flight.client.said("GPS is back")
+    assert flight.client.said("GPS lost: cleared")
     assert fastest < 1.0
     assert off_m(flight) < 1.0
     assert dist(flight.position, before) < 1.0

@@ -10,7 +10,7 @@ import pytest
 
 from autopilot.profile import load_profile
 from autopilot.qp import installed_solvers
-from tools import bench, peer, serving, speed, stages
+from tools import bench, peer, sensing, serving, speed, stages
 from tools.cli import main
 from tools.variants import plan_of, toml_lines, with_intervals, with_moves
 
@@ -106,6 +106,14 @@ def test_serving_ground_stations_is_measured_and_what_it_does_to_the_control_ste
     steps = ground["control_step_us"]
     assert set(steps) == {serving.ALONE, serving.WATCHED}
     assert {figure["samples"] for figure in steps.values()} == {24}
+
+
+def test_the_estimator_is_timed_and_flights_on_sensors_beside_those_on_the_state(tmp_path: Path) -> None:
+    sensors = figures_of(tmp_path / "sensors.json", "--only", "sensors")["sensors"]
+    assert set(sensors["estimator_us"]) == {sensing.ALWAYS, sensing.IN_FLIGHT}
+    assert all(0.0 < figure["p50"] <= figure["p99"] for figure in sensors["estimator_us"].values())
+    assert {figure["samples"] for figure in sensors["estimator_us"].values()} == {500}
+    assert set(sensors["real_time_factor"]) == {"memory, state", "memory, sensors", "udp, state", "udp, sensors"}
 
 
 def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,13 @@ _LAST_WORDS_BYTES = 2000
 
 
 class Running(Protocol):
-    """A process that was started."""
+    """A process that was started.
+
+    Attributes:
+        number: Of the process.
+    """
+
+    number: int
 
     def code(self) -> int | None:
         """Return its exit code, negative for a signal; None while it runs."""
@@ -39,13 +45,20 @@ class Launcher(Protocol):
 
 
 class Child:
-    """A flying process, by name and with what it has said."""
+    """A flying process, with what it has said.
+
+    Attributes:
+        name: What it is.
+        number: Of the process.
+        said: The file of what it says.
+    """
 
     def __init__(self, launcher: Launcher, package: str, options: Sequence[str], said: Path) -> None:
         """Start it."""
         self.name = package
         self.said = said
         self._running = launcher.start(package, options, said)
+        self.number = self._running.number
 
     def check(self) -> None:
         """See that it lives.
@@ -87,6 +100,7 @@ class FromScratch:
 class _Popened:
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
         self._process = process
+        self.number = process.pid
 
     def code(self) -> int | None:
         return self._process.poll()
@@ -134,18 +148,18 @@ class Forked:
 
 class _Nursling:
     def __init__(self, pid: int, ask: Callable[..., int | None]) -> None:
-        self._pid = pid
+        self.number = pid
         self._ask = ask
         self._code: int | None = None
 
     def code(self) -> int | None:
         if self._code is None:
-            self._code = self._ask("code", str(self._pid))
+            self._code = self._ask("code", str(self.number))
         return self._code
 
     def kill(self) -> None:
         if self._code is None:
-            self._code = self._ask("kill", str(self._pid))
+            self._code = self._ask("kill", str(self.number))
 
 
 def launcher(*, from_scratch: bool) -> Launcher:

@@ -8,7 +8,7 @@ from time import perf_counter
 from typing import Any
 
 from autopilot.__main__ import command_line as autopilot_command_line
-from autopilot.controller import ControllerError
+from autopilot.controller import ControllerError, DecisionError
 from autopilot.ground_process import open_ground
 from autopilot.profile import ProfileError, load_profile
 from autopilot.qp import SolverError
@@ -36,6 +36,8 @@ _ADDRESS: Address = ("memory", 0)
 class MemoryPlant:
     """A plant in this process."""
 
+    process = None
+
     def __init__(self, options: Sequence[str]) -> None:
         """Begin as a command line says.
 
@@ -54,6 +56,8 @@ class MemoryPlant:
             raise SettingError(str(error)) from error
         self._args = args
         self._worlds = worlds
+        self._world = worlds[served_by(self._vehicle)[0]]
+        self._answered = False
         self._physics = Physics(self._vehicle, args.integrator, weather)
         self._end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
         self._plant: Plant | None = None
@@ -123,6 +127,8 @@ class MemoryPlant:
 class MemoryAutopilot:
     """An autopilot in this process, with its ground side as the process has it."""
 
+    process = None
+
     def __init__(self, options: Sequence[str]) -> None:
         """Begin as a command line says.
 
@@ -175,7 +181,10 @@ class MemoryAutopilot:
         frame = self._end.receive(datagram, NEVER_LATE_S)
         if frame is not None:
             self._copter.hear(self._end.aside)
-            step = self._copter.step(frame)
+            try:
+                step = self._copter.step(frame)
+            except DecisionError as error:
+                raise StageError(f"the autopilot ended: {error}") from error
             self._end.answer(step.command, step.faults)
 
     def listen(self) -> list[bytes]:
@@ -183,7 +192,13 @@ class MemoryAutopilot:
         return self._end.take_outbox()
 
     def answer(self) -> bytes:
-        """Return its answer to the frame."""
+        """Return its answer to the frame.
+
+        Raises:
+            StageError: It was shut down.
+        """
+        if self._ground.shut_down:
+            raise StageError("the autopilot ended with exit code 0")
         (answer,) = self._end.take_outbox()
         return answer
 

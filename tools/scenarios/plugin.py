@@ -18,6 +18,7 @@ from tools.scenarios.setting import SettingError, setting_of
 from tools.scenarios.summary import FLOWN, Summary
 
 if TYPE_CHECKING:
+    from tools.scenarios.fleet import Fleet
     from tools.scenarios.flights import Flights
     from tools.scenarios.launch import Launcher
     from tools.scenarios.sitl import Sitl
@@ -84,23 +85,25 @@ def sitl_seed(request: pytest.FixtureRequest) -> int | None:
 
 
 @pytest.fixture
-def sitl_fleet(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Callable[..., list[Sitl]]]:
+def sitl_fleet(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Callable[..., Fleet]]:
     """Return what begins any number of flights: each with the marks of the test and a system id of its own."""
+    from tools.scenarios.fleet import Fleet
+
     with ExitStack() as stack:
         flights = _flights(request, sitl_seed, stack)
 
-        def fleet(count: int, **changes: Any) -> list[Sitl]:
+        def begin(count: int, **changes: Any) -> Fleet:
             begun = len(flights.flown)
-            return [flights.begin(**{"system": begun + number + 1, **changes}) for number in range(count)]
+            return Fleet(_begun(flights, **{"system": begun + number + 1, **changes}) for number in range(count))
 
-        yield fleet
+        yield begin
 
 
 @pytest.fixture
 def sitl(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Sitl]:
     """Return a vehicle that waits for orders, as the marks of the test describe it."""
     with ExitStack() as stack:
-        yield _flights(request, sitl_seed, stack).begin()
+        yield _begun(_flights(request, sitl_seed, stack))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -171,6 +174,16 @@ def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack)
     flights = stack.enter_context(Flights(setting, _launcher(request.config)))
     request.node.stash[_FLIGHTS] = flights
     return flights
+
+
+def _begun(flights: Flights, **changes: Any) -> Sitl:
+    """Begin a flight, or fail in one line."""
+    from tools.scenarios.stage import StageError
+
+    try:
+        return flights.begin(**changes)
+    except (SettingError, StageError) as error:
+        pytest.fail(str(error), pytrace=False)
 
 
 def _launcher(config: pytest.Config) -> Launcher | None:

@@ -37,6 +37,7 @@ class Setting:
         params: Parameters that were changed before.
         track: Flown from time 0 on; the vehicle must be in the air.
         home: "LAT,LON,ALT,YAW": the origin of the ENU frame.
+        latency: One way between plant and autopilot, ms: commands act so much later, twice.
         without: Parts that are left out of the vehicle: "drag", "ground", "battery", "rotor-lag".
         identity: Towards ground stations: "px4" or "generic".
         system: MAVLink system id.
@@ -57,6 +58,7 @@ class Setting:
     params: Mapping[str, float] = field(default_factory=dict)
     track: str | None = None
     home: str | None = None
+    latency: float = 0.0
     without: tuple[str, ...] = ()
     identity: str = "px4"
     system: int = 1
@@ -73,6 +75,7 @@ class Setting:
             *("--start", ",".join(f"{key}={value!r}" for key, value in start.items())),
             *("--seed", str(self.seed)),
             *("--system-id", str(self.system)),
+            *(("--latency", repr(self.latency)) if self.latency else ()),
             *_given("--wind", self.wind),
             *_given("--turbulence", self.turbulence),
             *_given("--home", self.home),

@@ -16,6 +16,7 @@ from mavlink.hil import ActuatorCommand
 from mavlink.parameters import Value
 from mavlink.services.mission_items import FENCE, MISSION, RALLY, MissionItem
 from mavlink.turns import Parcel, Turn
+from tools.scenarios import items
 from tools.scenarios.items import Item, on_wire
 from tools.scenarios.links import Trouble
 from tools.scenarios.record import Columns, Record
@@ -55,10 +56,17 @@ class Sitl:
 
     Attributes:
         setting: What the flight began with.
+        items: Items of missions and fences, `items.waypoint(3.0, 0.0, 5.0)` say.
+        Refused: What is raised where the vehicle refuses.
+        NotInTime: What is raised where something does not come about, an AssertionError.
         gcs: The first ground station; what `Sitl` does itself it does through it.
         link: What the links do.
         record: All that was flown.
     """
+
+    items = items
+    Refused = RefusedError
+    NotInTime = NotInTimeError
 
     def __init__(self, setting: Setting, stage: Stage, origin: Geodetic) -> None:
         """Begin a flight on a stage; `origin` is that of the ENU frame."""
@@ -262,29 +270,29 @@ class Sitl:
         if not self.armed:
             self.arm()
 
-    def upload_mission(self, items: Iterable[Item | MissionItem]) -> None:
+    def upload_mission(self, plan: Iterable[Item | MissionItem]) -> None:
         """Upload a mission.
 
         Raises:
             RefusedError: The vehicle does not take it.
         """
-        self.gcs.upload(on_wire(items, self.origin), MISSION)
+        self.gcs.upload(on_wire(plan, self.origin), MISSION)
 
-    def upload_fence(self, items: Iterable[Item | MissionItem]) -> None:
+    def upload_fence(self, plan: Iterable[Item | MissionItem]) -> None:
         """Upload a geofence, of `items.polygon` and `items.circle`.
 
         Raises:
             RefusedError: The vehicle does not take it.
         """
-        self.gcs.upload(on_wire(items, self.origin), FENCE, what="fence")
+        self.gcs.upload(on_wire(plan, self.origin), FENCE, what="fence")
 
-    def upload_rally(self, items: Iterable[Item | MissionItem]) -> None:
+    def upload_rally(self, plan: Iterable[Item | MissionItem]) -> None:
         """Upload rally points.
 
         Raises:
             RefusedError: The vehicle does not take them.
         """
-        self.gcs.upload(on_wire(items, self.origin), RALLY, what="rally points")
+        self.gcs.upload(on_wire(plan, self.origin), RALLY, what="rally points")
 
     def get_param(self, name: str) -> Value:
         """Ask for a parameter.
@@ -336,7 +344,7 @@ class Sitl:
         """Have the plant fail from the next frame on, as MAV_CMD_INJECT_FAILURE says it, whatever the autopilot thinks.
 
         Args:
-            unit: FAILURE_UNIT by number, or by name: "motor", "sensor_gps".
+            unit: FAILURE_UNIT by number, or by name: "motor", "gps", "battery".
             kind: FAILURE_TYPE by number, or by name: "off", "stuck", "ok".
             instance: Which one, from 1 on; 0 for all.
             values: Parameters 4 to 7.
@@ -463,6 +471,11 @@ class Sitl:
         return np.stack([flown["x"], flown["y"], flown["z"]], axis=1)
 
     @property
+    def processes(self) -> dict[str, int]:
+        """Numbers of the processes "plant" and "autopilot"; empty in memory."""
+        return self._stage.processes()
+
+    @property
     def sha256(self) -> str:
         """Of the whole flight: truth and command at each frame. The same on every machine of a kind, on every link."""
         return self.record.sha256
@@ -479,8 +492,8 @@ class Sitl:
 def _number(kind: str, of: str | int) -> int:
     if isinstance(of, int):
         return of
-    name = f"{kind}_{of.upper()}"
-    number = getattr(mav, name, None)
-    if number is None:
-        raise ValueError(f"MAVLink has no {name}")
-    return int(number)
+    for part in ("", "SYSTEM_", "SENSOR_"):
+        number = getattr(mav, f"{kind}_{part}{of.upper()}", None)
+        if number is not None:
+            return int(number)
+    raise ValueError(f"MAVLink has no {kind}_{of.upper()}")

@@ -35,6 +35,11 @@ class StageError(Exception):
 class Plant(Protocol):
     """The plant's side."""
 
+    @property
+    def process(self) -> int | None:
+        """The number of its process; None where it has none of its own."""
+        ...
+
     def hear(self, datagram: bytes) -> None:
         """Take in a datagram of an autopilot's, sound or not."""
         ...
@@ -58,6 +63,11 @@ class Plant(Protocol):
 
 class Autopilot(Protocol):
     """The autopilot's side."""
+
+    @property
+    def process(self) -> int | None:
+        """The number of its process; None where it has none of its own."""
+        ...
 
     def call(self) -> bytes:
         """Return how it calls a plant."""
@@ -159,6 +169,8 @@ class Stage:
             said = self._autopilot.said()
             heard = self._plant.frame()
         self._frame, self.truth = self._taken_in(heard)
+        if injected:
+            self._hear(self._frame)
         return Instant(began, self._command(answer), said, frame, answer)
 
     def _struggle(self, frame: bytes, turn: Turn, injected: bytes) -> tuple[bytes, Turn, list[bytes]]:
@@ -196,6 +208,11 @@ class Stage:
         """Return a COMMAND_LONG as the autopilot would send it to the plant."""
         values = (*params, *(0.0,) * (7 - len(params)))
         return self._codec.encode("COMMAND_LONG", self._codec.source[0], PLANT_COMPONENT, number, 0, *values)
+
+    def processes(self) -> dict[str, int]:
+        """Return the number of each process that flies."""
+        sides = {"plant": self._plant.process, "autopilot": self._autopilot.process}
+        return {name: number for name, number in sides.items() if number is not None}
 
     def kill_autopilot(self) -> None:
         """End the autopilot as a power cut does, and start it anew: the plant has waited."""
@@ -251,12 +268,11 @@ def answers(datagram: bytes, time_us: int) -> bool:
 
 def parted(datagram: bytes) -> tuple[bytes, bytes]:
     """Return what of a plant's datagram is for the autopilot, and the truth behind it."""
-    at = 0
+    told: list[bytes] = []
+    truth: list[bytes] = []
     for frame in frames_of(datagram):
-        if frame[_COMPONENT_AT] == TRUTH_COMPONENT:
-            break
-        at += len(frame)
-    return datagram[:at], datagram[at:]
+        (truth if frame[_COMPONENT_AT] == TRUTH_COMPONENT else told).append(frame)
+    return b"".join(told), b"".join(truth)
 
 
 def _us(time_s: float) -> int:

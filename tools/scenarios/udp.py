@@ -26,6 +26,11 @@ class UdpPlant:
         self._link: UdpLink | None = None
         self._last = self._answer = b""
 
+    @property
+    def process(self) -> int:
+        """The number of its process."""
+        return self._child.number
+
     def hear(self, datagram: bytes) -> None:
         """Take in what an autopilot says that answers no frame: its call."""
         if self._link is None:
@@ -98,6 +103,11 @@ class UdpAutopilot:
         self._options = ["--plant", plant, "--conducted", desk, *options]
         self._starts = 0
         self.start()
+
+    @property
+    def process(self) -> int:
+        """The number of its process."""
+        return self._child.number
 
     def start(self) -> None:
         """Start it anew."""
