@@ -29,8 +29,8 @@ class Kill(NamedTuple):
         still: Whether it was still in the same item at the next kill.
         tilt_deg: The largest before the next kill.
         tilt_before_deg: The largest in the second before.
-        lost_m: Height lost, of a vehicle that hovered.
-        moved_m: How far it moved from its place, of a vehicle that was still there at the next kill.
+        lost_m: Height lost within two seconds, of a vehicle that was still there at the next kill.
+        moved_m: How far it moved from its place then.
         went_on: Whether the autopilot said that it goes on.
     """
 
@@ -173,7 +173,7 @@ def judged(truth: dict[str, Array], kills: list[_Killed]) -> list[Kill]:
                 still,
                 float(tilt[after].max()),
                 float(tilt[before].max()),
-                float(place[now, 2] - place[near, 2].min()) if hovered else 0.0,
+                float(place[now, 2] - place[near, 2].min()) if still else 0.0,
                 float(away.max()) if still else 0.0,
                 kill.went_on,
             )
