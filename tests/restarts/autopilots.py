@@ -9,7 +9,7 @@ import numpy as np
 
 from mavlink.feedback import Feedback
 from tests.restarts.between import COMPILES_S, Between, Phase
-from tests.restarts.station import HOVERS, Station, mission
+from tests.restarts.station import HOVERS, LEGS, Station, mission
 from tests.runs import Array, Process, rows
 
 _APART_S, _SPREAD_S = 1.8, 1.6
@@ -62,10 +62,10 @@ class Flight(NamedTuple):
     words: str
 
 
-def fly(folder: Path, feedback: Feedback, seed: int, most_kills: int) -> Flight:
-    """Fly the mission once, the autopilot killed at random instants and started again at once."""
+def fly(folder: Path, feedback: Feedback, seed: int, most_kills: int, legs: int = LEGS) -> Flight:
+    """Fly a mission of so many legs once, the autopilot killed at random instants and started again at once."""
     folder.mkdir()
-    station = Station(mission())
+    station = Station(mission(legs))
     plant = Process(folder, "plant", "--link", "udpin:127.0.0.1:0", "--out", str(folder), *_plant(seed))
     processes = [plant]
     try:
