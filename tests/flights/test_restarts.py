@@ -200,6 +200,30 @@ def test_sticks_that_are_not_heard_again_are_lost() -> None:
     assert flight.client.said("sticks lost: hold")
 
 
+def test_a_ground_station_that_is_not_heard_again_is_lost() -> None:
+    flight = CopterFlight(values={"NAV_DLL_ACT": 3, "COM_DL_LOSS_T": 1.0})
+    flight.take_off(3.0)
+    flight.send("HEARTBEAT", mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE, 3)
+    flight.run(0.5)
+    flight.restart(flight.past())
+    flight.run(0.8)
+    assert flight.mode is Mode.HOLD
+    flight.run(0.4)
+    assert flight.client.said("ground station lost: land")
+
+
+def test_a_failsafe_that_the_pilot_has_overridden_does_not_begin_again() -> None:
+    flight = CopterFlight(values={"COM_LOW_BAT_ACT": 1})
+    flight.take_off(3.0)
+    flight.drain(0.9)
+    flight.until(lambda: flight.mode in (Mode.RETURN, Mode.LAND), 3.0, "the failsafe")
+    assert flight.select(Mode.HOLD) == ACCEPTED
+    flight.run(0.5)
+    flight.restart(flight.past())
+    flight.run(2.0)
+    assert flight.copter.pilot.state == HOLDING
+
+
 def test_plans_and_home_are_kept_on_the_ground_too() -> None:
     flight = CopterFlight()
     load(flight, waypoint(5.0, 0.0), waypoint(0.0, 5.0))

@@ -52,7 +52,6 @@ class Between:
         self.time_us = 0
         self._due: tuple[int, Phase, Callable[[], None]] | None = None
         self._chance = random.Random(0)
-        self._near = self._far = _bound()
         self._open()
 
     def at(self, time_us: int, phase: Phase, do: Callable[[], None]) -> None:
@@ -66,8 +65,7 @@ class Between:
 
     def cut(self) -> None:
         """Let go of the autopilot that called, and wait for the next."""
-        for sock in {self._near, self._far}:
-            sock.close()
+        self.close()
         self._open()
 
     def fly_until(
@@ -91,7 +89,7 @@ class Between:
                 raise HangsError(f"waited in vain for {what} at t = {self.time_us * 1e-6:.3f} s: {said}")
 
     def close(self) -> None:
-        """End."""
+        """Let go of everybody."""
         self._near.close()
         self._far.close()
 
