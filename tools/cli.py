@@ -71,7 +71,7 @@ def _in_another_world(args: Namespace) -> bool:
     """Whether the comparison leaves the thesis's world: chance, sensors, weather, another vehicle, two processes."""
     weather = args.wind is not NO_WIND or args.gust or args.turbulence
     chance = args.seeds or args.feedback is Feedback.SENSORS
-    return bool(chance or weather or args.vehicle or args.link == "udp" or args.duration != COMPARED_S)
+    return bool(args.resume or chance or weather or args.vehicle or args.link == "udp" or args.duration != COMPARED_S)
 
 
 def _parser() -> ArgumentParser:
@@ -259,6 +259,7 @@ def _add_compare(parser: ArgumentParser) -> None:
         help="one process, with or without the codec; or two (default %(default)s)",
     )
     add("--seeds", type=seeds, metavar="FIRST-LAST", help="fly each by all of these seeds, and show how errors spread")
+    add("--resume", action="store_true", help="with --seeds: do not fly again what --out has already")
     _add_feedback(add)
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--duration", type=positive, default=COMPARED_S, metavar="S", help="simulated time (default %(default)s)")

@@ -12,7 +12,7 @@ from tools.consistency import NAVIGATION, bounds
 from tools.estimation import MEASURED
 from tools.figures import TOP_IN, axes_grid, put_title, shortened, write_figure
 from tools.report import SETTLED_AFTER_S
-from tools.seeds import INNOVATIONS, QUANTITIES, Flown
+from tools.seed_log import INNOVATIONS, QUANTITIES, Flown
 
 _GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
 _LABEL_IN = 0.8

@@ -1,7 +1,6 @@
 """`colibri compare --seeds`: the same flights by many seeds, and how their errors are distributed."""
 
 import argparse
-import csv
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,6 +21,7 @@ from tools.plan import FlightPlan, PlanError
 from tools.processes import FlightError, fly_processes
 from tools.recording import RecordingError
 from tools.report import SETTLED_AFTER_S
+from tools.seed_log import INNOVATIONS, QUANTITIES, FlightsLog, Flown, KeptError, kept_flights
 from tools.side_by_side import side_by_side
 from tools.tables import write_table
 
@@ -30,10 +30,6 @@ Array: TypeAlias = NDArray[np.float64]
 DEFAULT_PROFILE = "flight"
 LOST_M = 5.0
 """A vehicle further off its reference once settled is lost."""
-INNOVATIONS = tuple(f"nis {kind}" for kind in MEASURED)
-QUANTITIES = ("control", "true", "horizontal", "vertical", "roll", "pitch", "yaw", "nees", *INNOVATIONS)
-"""Root mean squares of one flight: estimate from reference, vehicle from reference, estimate from truth (m), attitude
-(degrees); the mean NEES, and the mean NIS of each kind of measurement in parts of how many numbers it has."""
 HEADINGS = (
     *("profile", "track", "flights", "lost"),
     *("control (m)", "true (m)", "est. horizontal (m)", "est. vertical (m)", "roll (°)", "pitch (°)", "yaw (°)"),
@@ -60,35 +56,14 @@ class Job(NamedTuple):
         """Return the flight as a plan."""
         profile, _, controller = self.contender.partition(":")
         chosen = {"profile": profile, "controller": controller or None, "track": self.track, "seed": self.seed}
-        asked = {name: getattr(self.args, name) for name in ("vehicle", "feedback", "link", "duration", *_WEATHER)}
+        asked = {name: getattr(self.args, name) for name in (*_COMMON, *_WEATHER)}
         return FlightPlan.of_options(out, **chosen, **asked)
 
 
 _WIDEST = 400
+_COMMON = ("vehicle", "feedback", "link", "duration")
 _WEATHER = ("wind", "gust", "turbulence")
 _NO_INNOVATIONS = (0,) * len(MEASURED)
-
-
-class Flown(NamedTuple):
-    """What came of one flight.
-
-    Attributes:
-        contender: Profile, or profile:controller.
-        track: What it flew.
-        seed: Of everything random.
-        lost: Why the vehicle was lost; empty if it was not.
-        values: `QUANTITIES` after 20 s; nan where it was lost.
-        innovations: How many innovations of each of `MEASURED` are in them.
-        sha256: Of its trajectory.
-    """
-
-    contender: str
-    track: str
-    seed: int
-    lost: str
-    values: tuple[float, ...]
-    innovations: tuple[int, ...]
-    sha256: str
 
 
 def compare_seeds(args: argparse.Namespace) -> int:
@@ -103,8 +78,17 @@ def compare_seeds(args: argparse.Namespace) -> int:
     except (PlanError, ProfileError, VehicleError, TrackError, ControllerError) as error:
         fail(str(error))
     make_folder(args.out)
-    flights = side_by_side(fly_once, jobs, "flights", quiet=args.quiet, worth=lambda _job: 1)
-    _write_flights(args.out / "seeds-flights.csv", flights)
+    try:
+        flown = kept_flights(args.out, _settings(args)) if args.resume else {}
+    except KeptError as error:
+        fail(str(error))
+    left = [job for job in jobs if (job.contender, job.track, job.seed) not in flown]
+    with FlightsLog(args.out, _settings(args), flown.values()) as log:
+        for each in side_by_side(fly_once, left, "flights", quiet=args.quiet, worth=lambda _job: 1, keep=log.add):
+            flown[each.contender, each.track, each.seed] = each
+    flights = [flown[job.contender, job.track, job.seed] for job in jobs]
+    with FlightsLog(args.out, _settings(args), flights):
+        pass  # once more, in their order
     rows = [
         _row([flown for flown in flights if (flown.contender, flown.track) == (contender, track)])
         for contender in contenders
@@ -172,11 +156,9 @@ def _rms(column: Array) -> Any:
     return np.sqrt(np.mean(column**2))
 
 
-def _write_flights(path: Path, flights: Sequence[Flown]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(("profile", "track", "seed", "lost", *QUANTITIES, "trajectory_sha256"))
-        table.writerows((*flown[:4], *map(repr, map(float, flown.values)), flown.sha256) for flown in flights)
+def _settings(args: argparse.Namespace) -> str:
+    """Return what every flight of a comparison has in common."""
+    return " ".join(f"{name}={getattr(args, name)}" for name in (*_COMMON, *_WEATHER))
 
 
 def _print(rows: Sequence[tuple[str, ...]], out: Path) -> None:

@@ -11,7 +11,13 @@ Result = TypeVar("Result")
 
 
 def side_by_side(
-    work: Callable[[Job], Result], jobs: Sequence[Job], title: str, *, quiet: bool, worth: Callable[[Job], int]
+    work: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    title: str,
+    *,
+    quiet: bool,
+    worth: Callable[[Job], int],
+    keep: Callable[[Result], object] = lambda _result: None,
 ) -> list[Result]:
     """Do every job in a pool of processes; return the results in the order of the jobs.
 
@@ -21,12 +27,13 @@ def side_by_side(
         title: What the bar says.
         quiet: Show no bar.
         worth: How far a job moves the bar.
+        keep: Is given each result as soon as it is there.
     """
     from rich.console import Console
     from rich.progress import Progress
 
     console = Console(stderr=True)
-    workers = min(os.cpu_count() or 1, len(jobs))
+    workers = max(1, min(os.cpu_count() or 1, len(jobs)))
     with (
         Progress(console=console, disable=quiet or not console.is_terminal) as bar,
         ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool,
@@ -35,7 +42,7 @@ def side_by_side(
         futures = {pool.submit(work, job): job for job in jobs}
         try:
             for done in as_completed(futures):
-                done.result()
+                keep(done.result())
                 bar.advance(task, worth(futures[done]))
         except BaseException:
             pool.shutdown(cancel_futures=True)

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from autopilot import estimate
+from tools import seeds
 from tools.cli import main
 from tools.estimation import MEASURED
-from tools.seeds import INNOVATIONS, QUANTITIES
+from tools.seed_log import INNOVATIONS, QUANTITIES, Flown, kept_flights
 
 
 def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -42,6 +43,28 @@ def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, capsys: py
 
 def test_the_log_of_the_filter_has_the_kinds_of_its_tests() -> None:
     assert tuple(MEASURED) == estimate.Tests._fields
+
+
+def test_what_is_there_is_not_flown_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    values = tuple(0.1 * number for number in range(len(QUANTITIES)))
+    kept = [Flown("flight", "hover", seed, "", values, (1, 2, 3, 4, 5), f"hash {seed}") for seed in (1, 2)]
+    options = ["compare", "--quiet", "--track", "hover", "--seeds", "1-2", "--duration", "22", "--out", str(tmp_path)]
+
+    def fly_none(_work: object, jobs: list[object], *_: object, **__: object) -> list[object]:
+        assert not jobs
+        return []
+
+    monkeypatch.setattr(seeds, "side_by_side", lambda *args, **_: [kept[job.seed - 1] for job in args[1]])
+    assert main(options) == 0
+    monkeypatch.setattr(seeds, "side_by_side", fly_none)
+    assert main([*options, "--resume"]) == 0
+    assert list(kept_flights(tmp_path, (tmp_path / "seeds-settings.txt").read_text().strip()).values()) == kept
+    with pytest.raises(SystemExit) as end:
+        main([*options, "--resume", "--wind", "5@270"])
+    assert end.value.code == 2
+    assert "has flights by other settings" in capsys.readouterr().err
 
 
 def test_a_vehicle_that_is_lost_is_counted_and_ends_in_exit_code_1(tmp_path: Path) -> None:
