@@ -53,6 +53,10 @@ _CLAIM_STEP_M = 0.01
 _STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)
 """By how much the field may differ from the earth's in strength and inclination."""
 _IRON_WALK_GAUSS = 1e-5
+_UNSURE_PART = 0.3
+"""Of what position lacked by a bias, as well as that is known."""
+_UNSURE_TIMES = 3.0
+"""The variance of that bias: what velocity lacked errs with it."""
 _DOUBTED_M, _DOUBTED_M_S, _DOUBTED_GAUSS = 100.0, 10.0, 0.3
 
 
@@ -65,11 +69,12 @@ class KindRecord(NamedTuple):
 
 
 class FilterRecord(NamedTuple):
-    """A filter as plain data: state, covariance, and the kinds of what is measured."""
+    """A filter as plain data: state, covariance, the kinds of what is measured, and `Filter.bias_us`."""
 
     x: Array
     P: Array
     kinds: list[KindRecord]
+    bias_us: int | None
 
 
 class Kind:
@@ -145,6 +150,7 @@ class Filter:
         P: Covariance of its error, (22, 22).
         position, velocity, height, pressure, field: What is measured.
         kinds: All of them, in the order of `Tests`.
+        bias_us: When the accelerometer's bias was last taken anew; None if never.
     """
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector) -> None:
@@ -166,6 +172,7 @@ class Filter:
         self.height = Kind(1, 7_000_000, (POSITION + 2, 1, _DOUBTED_M))
         self.pressure = Kind(1, 7_000_000, (BARO_OFFSET, 1, _DOUBTED_M))
         self.field = Kind(3, 10_000_000, (HARD_IRON, 3, _DOUBTED_GAUSS))
+        self.bias_us: int | None = None
         self.kinds = (self.velocity, self.position, self.height, self.pressure, self.field)
 
     def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
@@ -242,13 +249,13 @@ class Filter:
     def record(self) -> FilterRecord:
         """Return state, covariance and what was believed."""
         kinds = [KindRecord(kind.accepted_us, kind.rejected_us, kind.resets) for kind in self.kinds]
-        return FilterRecord(self.x, self.P, kinds)
+        return FilterRecord(self.x, self.P, kinds, self.bias_us)
 
     def resume(self, record: FilterRecord) -> bool:
         """Go on from a record; return whether it is one of such a filter."""
         if (record.x.shape, record.P.shape, len(record.kinds)) != (self.x.shape, self.P.shape, len(self.kinds)):
             return False
-        self.x[:], self.P[:] = record.x, record.P
+        self.x[:], self.P[:], self.bias_us = record.x, record.P, record.bias_us
         for kind, (accepted_us, rejected_us, resets) in zip(self.kinds, record.kinds, strict=True):
             kind.accepted_us, kind.rejected_us, kind.resets = accepted_us, rejected_us, resets
         return True
@@ -293,6 +300,30 @@ class Filter:
             return Reason.FIELD
         believed = self.field.fuse(self, time_us, update.fuse_field, measured, self._field, self._field_variance)
         return None if believed else Reason.INNOVATION
+
+    def take_bias_anew(
+        self, change_m_s2: Array, variance: float, velocity_m_s: Array, position_m: Array, time_us: int
+    ) -> None:
+        """Believe that the accelerometer's bias has changed, and undo what that has done since.
+
+        Args:
+            change_m_s2: Of the bias, FLU.
+            variance: Of the change, along each axis, (m/s²)².
+            velocity_m_s: What the velocity lacks by it, ENU.
+            position_m: What the position lacks, ENU.
+            time_us: Now.
+        """
+        x, P = self.x, self.P
+        x[:3] += position_m
+        x[3:6] += velocity_m_s
+        x[13:16] += change_m_s2
+        moved_m = _UNSURE_PART * float(np.abs(position_m).max())
+        update.doubt(P, POSITION, 3, moved_m * moved_m)
+        update.doubt(P, VELOCITY, 3, self._fix_variances[0])
+        update.doubt(P, ACCEL_BIAS, 3, _UNSURE_TIMES * variance)
+        self.velocity.resets += 1
+        self.velocity.accept(time_us)
+        self.bias_us = time_us
 
     @property
     def tests(self) -> Tests:

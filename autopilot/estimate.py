@@ -97,6 +97,7 @@ class Health(NamedTuple):
         gyroscope: Its values can be used.
         magnetometer: It is believed.
         barometer: It is believed.
+        bias: The accelerometer's bias was not taken anew lately.
     """
 
     attitude: bool
@@ -112,6 +113,7 @@ class Health(NamedTuple):
     gyroscope: bool
     magnetometer: bool
     barometer: bool
+    bias: bool
 
     @property
     def flags(self) -> StatusFlags:
@@ -127,7 +129,7 @@ class Health(NamedTuple):
             self.horizontal_position,
             self.height,
             self.gps_glitch,
-            not self.accelerometer,
+            not (self.accelerometer and self.bias),
         )
 
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from autopilot.accelerometer_watch import AccelerometerWatch
 from autopilot.alignment import Aligned, Alignment
 from autopilot.blending import Blending
 from autopilot.eskf import Array, Filter, FilterRecord
@@ -41,6 +42,8 @@ _BRIDGED_S = 0.1
 _SPARE_SAMPLES = 8
 _LATE_US = 1_000_000
 """Since when nothing was believed that comes several times a second: its source is lost."""
+_LEARNING_US = 5_000_000
+"""How long a bias taken anew is doubted."""
 _OLDEST_FIX_S = 0.5
 """How far from the filter's time a fix may have been measured."""
 _KNOWN_TILT_RAD, _KNOWN_YAW_RAD = 0.17, 0.26
@@ -211,6 +214,7 @@ class Estimator:
         self.caught = False
         self._alignment = Alignment(sensors, self._gravity, self._field, self._interval_us * 1e-6)
         self.filter = Filter(sensors, self._gravity, self._field)
+        self._accelerometer_watch = AccelerometerWatch(sensors, self._gravity)
         self._blending = Blending()
         self._strays = Strays()
         self._waiting: deque[_Waiting] = deque()
@@ -291,11 +295,14 @@ class Estimator:
         if abs(after_s) > _OLDEST_FIX_S:
             self._rejected.add(Source.GPS, Reason.TIME)
             return
-        before = self.filter.x[:6].tolist()
+        before = self.filter.x[:10].tolist()
         reason = self.filter.fuse_fix(fix, enu_of(fix.place, self._origin), after_s, now_us)
         if reason is not None:
             self._rejected.add(Source.GPS, reason)
-        self._blending.absorb(before, self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
+        self._blending.absorb(before[:6], self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
+        found = self._accelerometer_watch.look(fix.time_us, before, self.filter.velocity, self.filter.pressure)
+        if found is not None:
+            self.filter.take_bias_anew(*found, now_us)
 
     def _publish(self, now_us: int) -> Estimate | None:
         """Return the estimate now; None, and all anew, if it is of no vehicle."""
@@ -370,6 +377,7 @@ class Estimator:
             reading.rate_good,
             field_good,
             pressure_good,
+            filter_.bias_us is None or now_us - filter_.bias_us > _LEARNING_US,
         )
 
     def _warm_up(self) -> None:

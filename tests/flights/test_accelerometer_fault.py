@@ -1,0 +1,43 @@
+"""An accelerometer that is suddenly off, in flight on sensors: the vehicle stays, and says why it twitched."""
+
+from math import dist
+
+import pytest
+
+from autopilot.modes import Mode
+from mavlink.failures import ACCELEROMETER, OK, WRONG
+from mavlink.feedback import Feedback
+from mavlink.frames import Vector
+from tests.flights.copter import ACCEPTED, CopterFlight
+
+OFF, WELL = "accelerometer off: bias learned anew", "accelerometer believed again"
+
+
+def stays(flight: CopterFlight, seconds: float, most_m: Vector) -> None:
+    """Fly for so long, never farther from here than `most_m` up, down and sideways."""
+    x, y, z = flight.position
+    up_m, down_m, away_m = most_m
+    path = flight.path(seconds)
+    assert max(place[2] for place in path) - z < up_m
+    assert z - min(place[2] for place in path) < down_m
+    assert max(dist(place[:2], (x, y)) for place in path) < away_m
+
+
+@pytest.mark.parametrize(("bias", "seed"), [((0.0, 0.0, 2.0), 1), ((1.0, 0.0, 0.0), 3)])
+def test_a_sudden_bias_is_learned_and_its_end_too(bias: Vector, seed: int) -> None:
+    flight = CopterFlight(feedback=Feedback.SENSORS, seed=seed)
+    flight.take_off(10.0)
+    flight.run(2.0)
+    assert not flight.client.said(OFF)
+    assert flight.inject(ACCELEROMETER, WRONG, 0, *bias) == ACCEPTED
+    stays(flight, 7.0, (1.0, 1.0, 1.0))
+    assert flight.client.texts[-2:] == [OFF, WELL]
+    assert flight.estimate is not None
+    assert flight.estimate.resets == 1
+    assert flight.estimate.accel_bias_m_s2 == pytest.approx(bias, abs=0.3)
+    assert flight.inject(ACCELEROMETER, OK) == ACCEPTED
+    stays(flight, 7.0, (1.0, 1.0, 1.0))
+    assert flight.client.texts[-2:] == [OFF, WELL]
+    assert flight.estimate.resets == 2
+    assert flight.mode is Mode.HOLD
+    assert not flight.client.said("lost")
