@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out/spiral
 
-.PHONY: setup fly test lint fuzz soak bench lock clean
+.PHONY: setup fly test lint test-clients fuzz scenarios soak soak-clients kills bench lock clean
 
 setup: .venv/.ready
 
@@ -46,9 +46,24 @@ test-clients: setup .venv-clients/.ready
 fuzz: setup
 	$(BIN)/python -m tests.fuzz
 
-# Two ground stations and a companion on one vehicle, for ten minutes by the clock.
+# Every scenario of tests/sitl, over UDP: SITL_LINK=memory flies them in one process each.
+SITL_LINK ?= udp
+scenarios: setup
+	$(BIN)/python -m pytest -m scenarios tests/sitl -n 2 --dist worksteal --sitl-link $(SITL_LINK)
+
+# All of them 100 times, in memory and over UDP in turn: no verdict and no hash may differ. SOAK="--runs 10 --load" ...
 soak: setup
+	$(BIN)/python -m tests.sitl.soak $(SOAK)
+
+# Two ground stations and a companion on one vehicle, for ten minutes by the clock.
+soak-clients: setup
 	$(BIN)/python -m tests.clients.soak
+
+# Processes killed in flight and started again, over UDP: what the vehicle does meanwhile.
+kills: setup
+	$(BIN)/python -m tests.restarts --kills 200
+	$(BIN)/python -m tests.restarts --kills 100 --feedback sensors
+	$(BIN)/python -m tests.restarts --kills 200 --of plant
 
 bench: setup
 	$(BIN)/colibri bench

@@ -16,7 +16,8 @@ from autopilot.courses import Along, Climb, Legs, Stop, homeward, landing, to_tr
 from autopilot.failsafes import Action, Condition
 from autopilot.health_watch import HealthWatch, not_known
 from autopilot.instants import instants
-from autopilot.kept import Kept, Past, course_again, course_record, goes_on, maker_of
+from autopilot.keeper import Keeper
+from autopilot.kept import CourseRecord, Kept, Past, course_again, goes_on, maker_of
 from autopilot.leader import Following
 from autopilot.leaning import AltitudeSticks, Descent, Stabilized
 from autopilot.loop import ControlLoop
@@ -47,6 +48,7 @@ from mavlink.setpoints import OffboardSetpoint, Sticks
 from mavlink.snapshot import BatteryState
 from plant.vehicle import Vehicle
 
+FALLS = "restarted in the air, knowing nothing: found falling"
 _LEADER_LOST_US = 10_000_000
 _EVER_US = 10**15
 
@@ -146,7 +148,8 @@ class Copter:
         self.rotor_loss.enabled = flies_by.land_on_three
         self._photographer = Photographer(believed, self._interval_s)
         self._first = first
-        self._maker = maker_of(profile, vehicle)
+        parts = (self._loop, self._senses, self.pilot, self.stations, self.power, self.rotor_loss, self.supervisor)
+        self._keeper = Keeper(maker_of(profile, vehicle), *parts)
         self._past = past
         self._wakes = past is not None
         self._resumed_us: int | None = None
@@ -185,7 +188,9 @@ class Copter:
             self._waiting_us = frame.time_us
             if self._time_us is not None:  # another flight, of which nothing is known yet
                 self.stations.restart = REBOOT
-            return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
+            return Step(
+                ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s, known=False
+            )
         if not goes_on:
             self._missed_us = self._time_us if self._missed_us is None else self._missed_us
             self._begin(known)
@@ -235,22 +240,7 @@ class Copter:
 
     def record(self) -> Kept | None:
         """Return what the flight needs to go on after a restart; None as long as nothing is known of it."""
-        if self._time_us is None:
-            return None
-        missions, power = self.stations.missions, self.power
-        return Kept(
-            self._maker,
-            self._time_us,
-            self.stations.commands.origin,
-            missions.ids,
-            missions.executor.record(),
-            self.pilot.record(),
-            course_record(self.pilot.course),
-            self._loop.record(),
-            power.charge_ah,
-            power.energy_wh,
-            self._senses.record(),
-        )
+        return None if self._time_us is None else self._keeper.record(self._time_us)
 
     def _wake(self, time_us: int) -> None:
         """Have the estimator go on before it sees the first frame."""
@@ -260,35 +250,31 @@ class Copter:
 
     def _resume(self, past: Past, frame: StateFrame) -> None:
         """Go on with the flight in which the autopilot was killed."""
-        kept, plans = past
-        stations, pilot = self.stations, self.pilot
-        closely = kept.is_close_to(frame.time_us) and kept.maker == self._maker
-        self._loop.resume(kept.loop, closely=closely)
-        self.power.resume(kept.charge_ah, kept.energy_wh)
-        stations.commands.origin = kept.origin
-        stations.missions.resume(plans, kept.plan_ids, kept.mission)
+        pilot, kept = self.pilot, past.kept
         if kept.pilot.mode is not Mode.TRACK or kept.course.began_us != 0:
             self._first = None
         self._resumed_us = frame.time_us
+        self._keeper.resume(past, frame, self._course_again)
+        self._sent = self._loop.controls if pilot.state.armed and not pilot.idles else STILL
+        self._solving.at_once(self._sent)
+        self.rotor_loss.begin(self._sent)
+        self.stations.say(INFO, self.stations.banner())
+        if not pilot.state.armed:
+            return
+        if self._senses.estimate is not None and not self._senses.rests:
+            pilot.say(WARNING, FALLS)
+        self.resumed = goes_on(pilot.state.mode, self.stations.missions.executor.progress.seq)
+        pilot.say(WARNING, self.resumed)
 
-        def again(mode: Mode, scene: Scene) -> Course:
-            began_us = kept.course.began_us
-            if mode is Mode.TRACK and self._first is None and began_us is not None:
-                chosen = track(scene.behaviour.track)
-                return Along(plan(chosen, self._references, self._instants.preview), chosen.duration_s, began_us)
-            if mode is Mode.MISSION:
-                return stations.missions.course_again(kept.course.turns, kept.course.legs)
-            course = course_again(mode, kept.course, scene) or self._course(mode, scene)
-            return course.skip(kept.course.legs) if isinstance(course, Legs) else course
-
-        pilot.resume(frame.time_us, self._loop.state(frame), kept.pilot, again, closely=closely)
-        stations.missions.moved_origin()
-        self._solving.at_once(self._loop.controls if pilot.state.armed and not pilot.idles else STILL)
-        stations.say(INFO, stations.banner())
-        if pilot.state.armed:
-            how = goes_on(pilot.state.mode, stations.missions.executor.progress.seq)
-            self.resumed = f"restarted in flight: {how}"
-            pilot.say(WARNING, self.resumed)
+    def _course_again(self, record: CourseRecord, mode: Mode, scene: Scene) -> Course:
+        """Return how a mode goes on after a restart."""
+        if mode is Mode.TRACK and self._first is None and record.began_us is not None:
+            chosen = track(scene.behaviour.track)
+            return Along(plan(chosen, self._references, self._instants.preview), chosen.duration_s, record.began_us)
+        if mode is Mode.MISSION:
+            return self.stations.missions.course_again(record.turns, record.legs)
+        course = course_again(mode, record, scene) or self._course(mode, scene)
+        return course.skip(record.legs) if isinstance(course, Legs) else course
 
     def _begin(self, frame: StateFrame) -> None:
         """See the vehicle for the first time, or anew after frames were missed."""
@@ -304,7 +290,7 @@ class Copter:
         if self._time_us is not None:  # another flight: nothing that any service remembers is of any use
             self.stations.restart = REBOOT
         speed = self._start_speed if frame.time_us == 0 else hover_speed
-        rests = self._senses.estimate is not None  # or there would be no estimate
+        rests = self._senses.rests
         if rests:
             speed = loop.vehicle.rotors.idle_speed
         loop.begin(speed, self._first_yaw())
@@ -314,6 +300,8 @@ class Copter:
         self.rotor_loss.forget()
         self.rotor_loss.begin(self._sent)
         self.pilot.rotor_failed = ""
+        if self._senses.estimate is not None and not rests:
+            self.pilot.say(WARNING, FALLS)
         self.stations.say(INFO, self.stations.banner())
 
     def _first_yaw(self) -> float:

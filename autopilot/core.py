@@ -32,7 +32,8 @@ class Step(NamedTuple):
     """The answer to a frame: the command to send, the decision behind it, and how long it took.
 
     Between two control samples the last command is sent again, and there is no decision. Where the state is told, there
-    is no estimate. Faults are what the plant is asked to have happen with the command.
+    is no estimate. Faults are what the plant is asked to have happen with the command. As long as nothing is `known` of
+    the vehicle, its rotors stand.
     """
 
     command: ActuatorCommand
@@ -40,6 +41,7 @@ class Step(NamedTuple):
     duration_s: float
     estimate: Estimate | None = None
     faults: tuple[Fault, ...] = ()
+    known: bool = True
 
 
 class Autopilot:
@@ -85,7 +87,7 @@ class Autopilot:
         Frames follow one another at the frame interval; a plant that runs freely may lose a few. One that comes much
         later, or earlier, begins a new flight: with the profile's rotor speed at time 0, and with hover in mid-flight,
         where nothing is known of the rotors. On sensors a flight
-        begins with the first estimate, of a vehicle that stands; until then it is not armed.
+        begins with the first estimate, of a vehicle that stands, or falls; until then it is not armed.
 
         Raises:
             DecisionError: The control law gave what no rotor can follow.
@@ -95,7 +97,9 @@ class Autopilot:
         known = self._senses.state(frame, asked=due)
         if known is None:
             self._time_us = None
-            return Step(ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s)
+            return Step(
+                ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s, known=False
+            )
         if not follows(frame.time_us, self._time_us, self.frame_interval_us):
             self._begin(frame)
         self._time_us = frame.time_us
@@ -109,6 +113,6 @@ class Autopilot:
     def _begin(self, frame: Frame) -> None:
         vehicle = self._loop.vehicle
         speed = self._start_speed if frame.time_us == 0 else vehicle.hover_speed
-        if self._time_us is None and self._senses.estimate is not None:
+        if self._time_us is None and self._senses.rests:
             speed = vehicle.rotors.idle_speed
         self._loop.begin(speed, float(self._planner.horizon(frame.time_us).yaw_rad[0]))

@@ -29,6 +29,7 @@ from autopilot.eskf_predict import (
     predict,
 )
 from autopilot.estimate import Reason, Test, Tests
+from autopilot.falling import Caught
 from mavlink.atmosphere import METRES_PER_PASCAL, altitude_m, altitude_slope_m_pa
 from mavlink.frames import Vector
 from mavlink.sensors import GpsFix
@@ -41,6 +42,8 @@ FIVE_SIGMA = (25.0, 28.74, 31.81)
 
 _FIX_GATES = np.array([FIVE_SIGMA[2], FIVE_SIGMA[1], FIVE_SIGMA[0]])
 _FIRST_POSITION_M, _FIRST_VELOCITY_M_S, _FIRST_ATTITUDE_RAD, _FIRST_OFFSET_M = 100.0, 0.02, 0.5, 1000.0
+_CAUGHT_M, _CAUGHT_M_S, _CAUGHT_RAD = 3.0, 1.0, 0.4
+"""How well a vehicle that falls is known: it need not have been level."""
 _ITERATIONS = 4
 _LEAST_NOISE = 1e-6
 """Of anything, in its own unit: a perfect sensor would leave nothing to divide by."""
@@ -199,6 +202,19 @@ class Filter:
             sigma = self._sensors.barometer.noise_pa * METRES_PER_PASCAL
             variance = max(sigma, _LEAST_NOISE) ** 2 / aligned.heights
             update.fuse_pressure_height(x, P, aligned.pressure_height_m, variance, inf, y1)
+
+    def start_in_air(self, caught: Caught, place_enu_m: Vector, time_us: int) -> None:
+        """Begin with a vehicle that falls, at a place."""
+        x, P = self.x, self.P
+        self._know_nothing(place_enu_m)
+        x[3:6], x[6:10] = caught.velocity_enu_m_s, caught.attitude
+        for first, sigma in ((POSITION, _CAUGHT_M), (VELOCITY, _CAUGHT_M_S), (ATTITUDE, _CAUGHT_RAD)):
+            for i in range(first, first + 3):
+                P[i, i] = sigma * sigma
+        if caught.pressure_height_m is not None:
+            x[19] = caught.pressure_height_m - x[2]
+        for kind in self.kinds:
+            kind.accept(time_us)
 
     def _know_nothing(self, place_enu_m: Vector) -> None:
         """Know of a vehicle at a place what can be known before anything is measured."""

@@ -19,6 +19,7 @@ from autopilot.blending import Blending
 from autopilot.eskf import Array, Filter, FilterRecord
 from autopilot.eskf_predict import SAMPLE, look_ahead
 from autopilot.estimate import Check, Estimate, Health, Reason, Source
+from autopilot.falling import Caught, Falling
 from autopilot.inertial import Inertial, Reading, sample_between
 from autopilot.sensor_watch import GpsWatch, Rejected, Watch
 from autopilot.strays import LONGEST_GAP_US, Strays
@@ -96,6 +97,7 @@ class Estimator:
     Attributes:
         filter: The filter, as far behind as GPS is.
         filter_us: Its time, µs.
+        caught: Whether it began with a vehicle that fell, not with one that rested.
     """
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, origin: Geodetic, interval_us: int) -> None:
@@ -139,9 +141,13 @@ class Estimator:
         if self._estimate is None or last_us is None:
             height = None if pressure_pa is None else altitude_m(pressure_pa)
             aligned = self._alignment.feed(frame.time_us, self._reading, field, height, fix)
-            if aligned is None:
+            caught = self._falling.feed(frame.time_us, self._reading, field, height, fix)
+            if aligned is not None:
+                self._start(aligned, frame.time_us)
+            elif caught is not None:
+                self._start_in_air(caught, frame.time_us)
+            else:
                 return None
-            self._start(aligned, frame.time_us)
         else:
             self._wait(before, (frame.time_us - last_us) * 1e-6, _Waiting(frame.time_us, field, pressure_pa))
             self._catch_up(frame.time_us)
@@ -204,6 +210,8 @@ class Estimator:
         self._field_watch = Watch(-_LARGEST_GAUSS, _LARGEST_GAUSS, _PATIENCE_US)
         self._pressure_watch = Watch(_LEAST_PA, _MOST_PA, _PATIENCE_US)
         self._gps_watch = GpsWatch()
+        self._falling = Falling(self._gravity, self._field, sensors.gps.delay_s)
+        self.caught = False
         self._alignment = Alignment(sensors, self._gravity, self._field, self._interval_us * 1e-6)
         self.filter = Filter(sensors, self._gravity, self._field)
         self._accelerometer_watch = AccelerometerWatch(sensors, self._gravity)
@@ -247,6 +255,13 @@ class Estimator:
     def _start(self, aligned: Aligned, time_us: int) -> None:
         self._published_us = time_us
         self.filter.start(aligned, enu_of(aligned.fix.place, self._origin), time_us)
+        self.filter_us = time_us
+
+    def _start_in_air(self, caught: Caught, time_us: int) -> None:
+        self.caught = True
+        self._published_us = time_us
+        (e, n, u), (de, dn, du) = enu_of(caught.fix.place, self._origin), caught.moved_m
+        self.filter.start_in_air(caught, (e + de, n + dn, u + du), time_us)
         self.filter_us = time_us
 
     def _wait(self, before: Reading, interval_s: float, measured: _Waiting) -> None:

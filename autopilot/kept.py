@@ -13,8 +13,10 @@ from zlib import crc32
 import msgspec
 
 from autopilot.circling import Round
+from autopilot.controller import Array
 from autopilot.course import Course, Scene
 from autopilot.courses import Along, Climb, Legs, Stop, Way
+from autopilot.failsafes import Memory
 from autopilot.loop import LoopRecord
 from autopilot.mission import MissionRecord
 from autopilot.missions import MissionCourse
@@ -66,6 +68,10 @@ class Kept(NamedTuple):
         charge_ah: Taken from the battery.
         energy_wh: The same as energy.
         senses: Of the estimator; empty where the state is told.
+        rotor_lost: 0..3; None while all turn.
+        rotor_speeds: As their lag has them, parts of the largest, (4,).
+        failsafes: What they remember.
+        had_station: Whether a ground station was ever heard: its loss counts from the restart.
     """
 
     maker: int
@@ -79,6 +85,10 @@ class Kept(NamedTuple):
     charge_ah: float
     energy_wh: float
     senses: bytes
+    rotor_lost: int | None
+    rotor_speeds: Array
+    failsafes: Memory
+    had_station: bool
 
     def is_followed_by(self, time_us: int) -> bool:
         """Whether a frame can be of the same flight."""
@@ -133,4 +143,5 @@ def course_again(mode: Mode, record: CourseRecord, scene: Scene) -> Course | Non
 
 def goes_on(mode: Mode, seq: int) -> str:
     """Say what goes on."""
-    return f"mission goes on at item {seq}" if mode is Mode.MISSION else f"{mode} goes on"
+    what = f"mission goes on at item {seq}" if mode is Mode.MISSION else f"{mode} goes on"
+    return f"restarted in flight: {what}"

@@ -57,6 +57,9 @@ TRACK = "spiral"
 """What flies where nothing else is said."""
 _SILENCE_SAID_AFTER_S = 2.0
 _WAIT_AT_MOST_S = 0.1
+_UNKNOWN_SAID_AFTER_US = 3_000_000
+"""Of simulated time: who rests is known after a second."""
+_UNKNOWN = "no estimate yet: the vehicle must rest for a second, with a GPS fix; until then the rotors stand"
 
 
 def _refusal(result: int) -> str:
@@ -243,7 +246,8 @@ class Client:
         self._log = log
         self._ground = ground
         self._frame_came = self._heard = False
-        self._refusal_said = False
+        self._refusal_said = self._unknown_said = False
+        self._unknown_since_us: int | None = None
 
     def fly(self, autopilot: "Autopilot | Copter") -> None:
         """Answer every frame until told to stop."""
@@ -272,7 +276,19 @@ class Client:
         autopilot.hear(self._end.aside)
         step = autopilot.step(frame)
         self._end.answer(step.command, step.faults)
+        self._say_if_unknown(step)
         return step
+
+    def _say_if_unknown(self, step: Step) -> None:
+        """Say, once, why a vehicle lies there disarmed, or falls."""
+        now_us = step.command.time_us
+        if step.known:
+            self._unknown_since_us = None
+        elif self._unknown_since_us is None or now_us < self._unknown_since_us:
+            self._unknown_since_us, self._unknown_said = now_us, False
+        elif now_us - self._unknown_since_us >= _UNKNOWN_SAID_AFTER_US and not self._unknown_said:
+            self._unknown_said = True
+            self._status.say("unknown", _UNKNOWN)
 
     def _say_what_changed(self) -> None:
         silent = self._end.silence_s(perf_counter()) > _SILENCE_SAID_AFTER_S

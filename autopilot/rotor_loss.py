@@ -1,6 +1,6 @@
 """A rotor is lost: noticed, and flown down on the other three, whatever control law flew before."""
 
-from autopilot.controller import Decision, VehicleState
+from autopilot.controller import Array, Decision, VehicleState
 from autopilot.rotor_watch import RotorWatch
 from autopilot.three_rotors import ThreeRotors
 from plant.vehicle import Vehicle
@@ -52,6 +52,12 @@ class RotorLoss:
     def begin(self, controls: FourOf) -> None:
         """Begin after frames that were missed, the rotors turning at `controls`."""
         self.watch.begin(controls)
+
+    def resume(self, lost: int, speeds: Array, state: VehicleState, ground_m: float, *, flying: bool) -> None:
+        """Go on after a restart without a rotor that was lost before, the others turning at `speeds`."""
+        self.watch.lost, self.watch.speeds = lost, speeds
+        if flying and self._possible:
+            self._three = ThreeRotors(self._vehicle, lost, self._interval_s, speeds, state, ground_m)
 
     def forget(self) -> None:
         """Take all rotors for whole again."""

@@ -32,6 +32,8 @@ _WEAK = 0.25
 """Part of its thrust that a weak rotor lacks. Half way from here to all of it lies what is told apart."""
 _INERT, _AGILE = -0.4, 1.0
 """A vehicle may turn by so much less or more than it is expected to: moments of inertia that are 1.67 or 0.5 times."""
+_NOISE_PART = 1.0 / 64.0
+"""Of what one sample says of the noise: sensors that fail are to be doubted, and not the rotors."""
 _FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
 """Standard deviations of the residual, in parts of what one rotor makes in hover: far above what sensors add, because
 it is the model that errs (mass, drag, gusts, weak rotors), and drag hardly turns the vehicle but about z."""
@@ -45,7 +47,7 @@ class Signature(NamedTuple):
         effect: Force along z, moments about x, y, z of each newton, (4, 4), column i that of rotor i.
         momentum: Angular momentum of each rotor at the largest speed, N m s, (4,).
         inertia: Ix, Iy, Iz, kg m², (3,).
-        weights: One over the variances of the residual, (4,).
+        variances: Of the residual, N² and N² m², (4,).
         mass_kg: Mass.
         gravity_m_s2: Gravity.
     """
@@ -54,7 +56,7 @@ class Signature(NamedTuple):
     effect: Array
     momentum: Array
     inertia: Array
-    weights: Array
+    variances: Array
     mass_kg: float
     gravity_m_s2: float
 
@@ -72,7 +74,7 @@ def signature_of(vehicle: Vehicle) -> Signature:
         effect,
         vehicle.rotor_momentum() * vehicle.rotors.max_speed,
         np.array(vehicle.body.inertia_kg_m2),
-        deviations**-2,
+        deviations**2,
         vehicle.body.mass_kg,
         vehicle.gravity_m_s2,
     )
@@ -96,9 +98,11 @@ class RotorWatch:
         self.speeds = np.zeros(4)
         self.largest = 0.0
         self._before: Array | None = None
+        self._residual, self._noise = np.zeros(4), np.zeros(4)
         self.adopt(vehicle)
         still = np.zeros(9)
-        _evidence(still, still, self.speeds, self.speeds, interval_s, self._signature)
+        _evidence(still, still, self.speeds, self.speeds, interval_s, self._signature, self._residual, self._noise)
+        self.begin((0.0, 0.0, 0.0, 0.0))
 
     def adopt(self, vehicle: Vehicle) -> None:
         """Go on with other numbers of the vehicle."""
@@ -109,7 +113,7 @@ class RotorWatch:
     def begin(self, controls: tuple[float, float, float, float]) -> None:
         """Begin anew with the rotors at `controls`, parts of the largest speed: no sample was before."""
         self.speeds = np.array(controls)
-        self.evidence[:] = 0.0
+        self.evidence[:] = self._residual[:] = self._noise[:] = 0.0
         self._before = None
 
     def step(
@@ -132,7 +136,9 @@ class RotorWatch:
         if last is None or not airborne:
             self.evidence[:] = 0.0
             return self.lost
-        self.evidence += _evidence(last, now, before, self.speeds, self._interval_s, self._signature)
+        self.evidence += _evidence(
+            last, now, before, self.speeds, self._interval_s, self._signature, self._residual, self._noise
+        )
         np.maximum(self.evidence, 0.0, out=self.evidence)
         most = int(np.argmax(self.evidence))
         self.largest = max(self.largest, float(self.evidence[most]))
@@ -143,7 +149,14 @@ class RotorWatch:
 
 @compiled
 def _evidence(
-    before: Array, now: Array, speeds_before: Array, speeds: Array, interval_s: float, signature: Signature
+    before: Array,
+    now: Array,
+    speeds_before: Array,
+    speeds: Array,
+    interval_s: float,
+    signature: Signature,
+    last: Array,
+    noise: Array,
 ) -> Array:
     """Return how much more likely it is of each rotor that it makes nothing than that it is weak, as logarithms.
 
@@ -154,6 +167,8 @@ def _evidence(
         speeds: The same now.
         interval_s: Between the two.
         signature: Of the vehicle.
+        last: Residual of the sample before, (4,); that of this one afterwards.
+        noise: Variances of what changes in it from sample to sample, (4,); carried on in place.
     """
     thrust_n = np.empty(4)
     h, h_rate = 0.0, 0.0
@@ -175,6 +190,9 @@ def _evidence(
         for i in range(4):
             expected[row] += signature.effect[row, i] * thrust_n[i]
         residual[row] -= expected[row]
+        change = residual[row] - last[row]
+        noise[row] += _NOISE_PART * (0.5 * change * change - noise[row])
+        last[row] = residual[row]
     evidence = np.zeros(4)
     for i in range(4):
         for row in range(4):
@@ -185,6 +203,6 @@ def _evidence(
                 if least > most:
                     least, most = most, least
                 weak -= min(max(weak, least), most)
-            evidence[i] += 0.5 * signature.weights[row] * (weak * weak - none * none)
+            evidence[i] += 0.5 * (weak * weak - none * none) / (signature.variances[row] + noise[row])
         evidence[i] = min(evidence[i], MOST_EVIDENCE)
     return evidence

@@ -12,7 +12,13 @@ from plant.vehicle import Vehicle, VehicleError
 
 
 class Estimating(Protocol):
-    """An estimator of one flight."""
+    """An estimator of one flight.
+
+    Attributes:
+        caught: Whether it began with a vehicle that fell, not with one that rested.
+    """
+
+    caught: bool
 
     def step(self, frame: SensorFrame, /, *, asked: bool) -> Estimate | None:
         """Take in the next frame; return None until the first estimate. Unless `asked`, an older one will do."""
@@ -74,6 +80,11 @@ class Senses:
         self.sensed: SensorFrame | None = None
         self.fix: GpsFix | None = None
         self._fix_us = 0
+
+    @property
+    def rests(self) -> bool:
+        """Whether the estimate began with a vehicle that rested."""
+        return self.estimate is not None and self._estimating is not None and not self._estimating.caught
 
     def record(self) -> bytes:
         """Return what the estimator needs to go on after a restart; empty where there is nothing to go on with."""

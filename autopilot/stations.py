@@ -153,6 +153,10 @@ class Stations:
         """When a ground station was heard last; None if there never was one."""
         return self._heartbeat.station_us
 
+    def expect_station(self, now_us: int) -> None:
+        """Take a ground station for heard now: one that was heard before a restart is to be heard again."""
+        self._heartbeat.expected_us = now_us
+
     def update(self, snapshot: Snapshot) -> None:
         """Take in the vehicle as it is now. Called once a control sample."""
         self._heartbeat.update(snapshot)

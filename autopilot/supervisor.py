@@ -20,13 +20,14 @@ class Supervisor:
     Attributes:
         limits: What the parameters say of limits and delays.
         knows_position: Whether the vehicle knows where it is.
+        memory: What is lost already; after a restart in flight it is what was kept.
     """
 
     def __init__(self, pilot: Pilot, parameters: Parameters) -> None:
         """Begin with nothing lost."""
         self._pilot = pilot
         self._conditions = Conditions()
-        self._memory = Memory()
+        self.memory = Memory()
         self.limits: Limits = {}
         self.knows_position = True
         self.adopt(parameters)
@@ -40,8 +41,8 @@ class Supervisor:
         pilot = self._pilot
         self.knows_position = knows_position(seen.estimate, self.limits)
         flight = Flight(pilot.state.armed, pilot.standing, pilot.state.mode, pilot.saving)
-        since_us = self._conditions.look(seen, self.limits, self._memory.held_us)
-        self._memory, action, said = following(self._memory, seen.now_us, since_us, self._settings, flight)
+        since_us = self._conditions.look(seen, self.limits, self.memory.held_us)
+        self.memory, action, said = following(self.memory, seen.now_us, since_us, self._settings, flight)
         for severity, text in said:
             pilot.say(severity, text)
         if action is not Action.NONE:
@@ -49,7 +50,7 @@ class Supervisor:
 
     def holds(self, condition: Condition) -> bool:
         """Whether a condition holds, beyond its delay."""
-        return condition in self._memory.held_us
+        return condition in self.memory.held_us
 
     @property
     def charge_state(self) -> int:

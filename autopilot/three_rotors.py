@@ -31,6 +31,10 @@ class Descent(NamedTuple):
         climb_1_s: Gain on the vertical speed.
         lift_m_s2: Largest vertical acceleration asked for.
         lean_deg: Largest tilt of the mean thrust for the sake of place.
+        most_lean_deg: The same for place and wind together; the cone comes on top.
+        farther_deg_m: More of it for each metre that the vehicle is too far from its place.
+        far_m: How far that is.
+        blown_lean_deg: Largest tilt of the mean thrust at all.
         wind_rad_s: Frequency at which what the model does not explain is observed: wind, most of all.
         most_wind_m_s2: Largest of that believed.
         settle_s: So long it stays at its height.
@@ -43,7 +47,11 @@ class Descent(NamedTuple):
     climb_1_s: float = 3.0
     lift_m_s2: float = 4.0
     lean_deg: float = 6.0
-    wind_rad_s: float = 2.5
+    most_lean_deg: float = 8.0
+    farther_deg_m: float = 2.0
+    far_m: float = 1.5
+    blown_lean_deg: float = 16.0
+    wind_rad_s: float = 1.5
     most_wind_m_s2: float = 2.0
     settle_s: float = 1.5
     sink_m_s: float = 1.0
@@ -55,16 +63,14 @@ class Contact(NamedTuple):
     """When the ground holds a vehicle that is told to sink: it knocks, or the vehicle stays. Rates do not count.
 
     Attributes:
-        knock: Upward acceleration of one sample that nothing else makes, in parts of gravity.
-        slower_m_s: Vertical speed of one that stays.
-        for_s: For so long, where the ground is expected.
-        elsewhere_s: And anywhere else.
+        knock: Upward acceleration of one sample that nothing else makes, in parts of gravity, where the ground is near.
+        slower_m_s: Speed of a vehicle that stays.
+        for_s: For so long.
     """
 
     knock: float = 0.5
-    slower_m_s: float = 0.15
-    for_s: float = 0.3
-    elsewhere_s: float = 1.5
+    slower_m_s: float = 0.2
+    for_s: float = 1.5
 
 
 DESCENT, CONTACT, WEIGHTS = Descent(), Contact(), Weights()
@@ -121,7 +127,8 @@ class ThreeRotors:
         self._gains = observer.gains(descent.wind_rad_s, interval_s)
         self._velocity, self._wind = np.array(state.velocity_enu_m_s), np.zeros(3)
         self._explained = np.zeros(3)
-        self._elapsed_s = self._held_s = self._missed_m_s = 0.0
+        self._elapsed_s = self._held_s = self._knock_m_s = 0.0
+        self._climbed_m_s = state.velocity_enu_m_s[2]
         self.landed = False
         self.controls = (0.0, 0.0, 0.0, 0.0)
 
@@ -173,7 +180,8 @@ class ThreeRotors:
         """Observe the acceleration that the rotors do not explain."""
         expected = self._velocity + self._interval_s * (self._explained + self._wind)
         missed = np.array(state.velocity_enu_m_s) - expected
-        self._missed_m_s = float(missed[2])
+        self._knock_m_s = state.velocity_enu_m_s[2] - self._climbed_m_s - self._interval_s * float(self._explained[2])
+        self._climbed_m_s = state.velocity_enu_m_s[2]
         most = self._descent.most_wind_m_s2
         self._velocity = expected + self._gains[0] * missed
         self._wind = np.clip(self._wind + self._gains[1] * missed, -most, most)
@@ -182,14 +190,20 @@ class ThreeRotors:
         """Return the acceleration to ask for, m/s², ENU, (3,)."""
         how, w = self._descent, self._descent.place_rad_s
         velocity = np.array(state.velocity_enu_m_s)
-        wanted: Array = w * w * (self._place - np.array(state.position_enu_m)) - 2.0 * w * velocity
-        flat = hypot(wanted[0], wanted[1])
-        if flat > self._lean_m_s2:
-            wanted *= self._lean_m_s2 / flat
+        error = self._place - np.array(state.position_enu_m)
+        wanted: Array = w * w * error - 2.0 * w * velocity
+        _limit(wanted, self._lean_m_s2)
         wanted[2] = how.climb_1_s * (self._climb_m_s(state) - velocity[2])
         wanted -= self._wind
+        _limit(wanted, self._most_lean_m_s2(hypot(error[0], error[1])))
         wanted[2] = min(max(wanted[2], -how.lift_m_s2), how.lift_m_s2)
         return wanted
+
+    def _most_lean_m_s2(self, off_m: float) -> float:
+        """Return the largest horizontal acceleration so far from the place: upright first, unless it is blown away."""
+        how = self._descent
+        lean_deg = how.most_lean_deg + how.farther_deg_m * max(off_m - how.far_m, 0.0)
+        return self._gravity * tan(radians(min(lean_deg, how.blown_lean_deg)))
 
     def _climb_m_s(self, state: VehicleState) -> float:
         how = self._descent
@@ -201,11 +215,11 @@ class ThreeRotors:
         """Land where the ground knocks at a vehicle that is low, or holds one that is told to sink."""
         how = self._contact
         sinks = self._climb_m_s(state) < 0.0
-        slow = abs(state.velocity_enu_m_s[2]) < how.slower_m_s
+        slow = hypot(*state.velocity_enu_m_s) < how.slower_m_s
         self._held_s = self._held_s + self._interval_s if sinks and slow else 0.0
         low = state.position_enu_m[2] - self._ground_m < self._descent.land_above_m
-        knocked = low and sinks and self._missed_m_s > how.knock * self._gravity * self._interval_s
-        self.landed = self.landed or knocked or self._held_s >= (how.for_s if low else how.elsewhere_s)
+        knocked = low and sinks and self._knock_m_s > how.knock * self._gravity * self._interval_s
+        self.landed = self.landed or knocked or self._held_s >= how.for_s
 
 
 def shared(
@@ -239,6 +253,13 @@ def stopping_place(state: VehicleState, braking_m_s2: float) -> Array:
     vx, vy, _ = state.velocity_enu_m_s
     time_s = hypot(vx, vy) / (2.0 * braking_m_s2)
     return np.array([x + vx * time_s, y + vy * time_s, z])
+
+
+def _limit(acceleration: Array, most_m_s2: float) -> None:
+    """Shorten the horizontal part of an acceleration, (3,), in place."""
+    flat = hypot(acceleration[0], acceleration[1])
+    if flat > most_m_s2:
+        acceleration[:2] *= most_m_s2 / flat
 
 
 def _angles(direction: Array, psi: float) -> Vector:

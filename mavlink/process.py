@@ -59,6 +59,7 @@ def undisturbed() -> Iterator[None]:
     """Keep the garbage collector from all that exists already: to look at it again and again costs a flight time."""
     gc.collect()
     gc.freeze()
+    gc.enable()
     try:
         yield
     finally:
@@ -168,6 +169,7 @@ def begin(name: str, url: str, args: argparse.Namespace, opened: Callable[[str],
     To be called before numpy is loaded.
     """
     use_one_thread()
+    gc.disable()  # until all is loaded, see `undisturbed`: what is loaded stays
     stop = Stop(parent=args.parent, starting=True)
     try:
         link = opened(url)

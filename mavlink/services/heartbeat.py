@@ -32,7 +32,11 @@ class Heard(NamedTuple):
 
 
 class HeartbeatService:
-    """Sends the vehicle's HEARTBEAT, at once when its mode changes; remembers those of others."""
+    """Sends the vehicle's HEARTBEAT, at once when its mode changes; remembers those of others.
+
+    Attributes:
+        expected_us: When a ground station began to be waited for that was heard before a restart; None for none.
+    """
 
     hears = frozenset({"HEARTBEAT"})
 
@@ -43,6 +47,7 @@ class HeartbeatService:
         self._told: tuple[object, ...] | None = None
         self._told_at_us = -EVERY_US
         self._heard: dict[tuple[int, int], Heard] = {}
+        self.expected_us: int | None = None
 
     def update(self, snapshot: Snapshot) -> None:
         """Take in how the vehicle is."""
@@ -80,9 +85,9 @@ class HeartbeatService:
 
     @property
     def station_us(self) -> int | None:
-        """When a ground station (MAV_TYPE_GCS) was heard last; None if there never was one."""
+        """When a ground station (MAV_TYPE_GCS) was heard last, or expected; None if there never was one."""
         heard = (other.at_us for other in self._heard.values() if other.kind == mav.MAV_TYPE_GCS)
-        return max(heard, default=None)
+        return max(heard, default=self.expected_us)
 
     def ground_stations(self, now_us: int, within_us: int) -> list[Heard]:
         """Return the ground stations (MAV_TYPE_GCS) heard within the last `within_us`."""

@@ -114,6 +114,20 @@ def test_one_jump_is_no_rotor(jump: tuple[float, ...], after: int) -> None:
     assert flight.watch.largest <= MOST_EVIDENCE
 
 
+@pytest.mark.parametrize("noise_rad_s", [0.05, 0.3, 2.0])
+def test_a_noisy_gyroscope_is_no_rotor(noise_rad_s: float) -> None:
+    """For eight seconds in which the vehicle rests, so to speak, in the air: all that is measured is the noise."""
+    random = np.random.default_rng(7)
+    hover = HUMMINGBIRD.hover_speed / HUMMINGBIRD.rotors.max_speed
+    watch = RotorWatch(HUMMINGBIRD, SAMPLE_US * 1e-6)
+    watch.begin((hover, hover, hover, hover))
+    still = told(starting_world(LEVEL, HUMMINGBIRD))
+    for _ in range(1000):
+        p, q, r = (noise_rad_s * random.standard_normal(3)).tolist()
+        watch.step(still._replace(rate_flu_rad_s=(p, q, r)), (hover, hover, hover, hover), 0.0, airborne=True)
+    assert watch.lost is None
+
+
 def test_on_the_ground_nothing_is_lost() -> None:
     flight = Watched((0.6, 0.6, 0.6, 0.6))
     for _ in range(10):

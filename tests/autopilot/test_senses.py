@@ -35,6 +35,7 @@ class Standing:
     """Knows after a while that the vehicle stands under the spiral's start."""
 
     made: int = 0
+    caught = False
 
     def __init__(self, interval_us: int) -> None:
         assert interval_us == FRAME_US

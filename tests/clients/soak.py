@@ -1,4 +1,4 @@
-"""Two ground stations and an offboard companion on one vehicle, for as long as is asked for: `make soak`."""
+"""Two ground stations and an offboard companion on one vehicle, for as long as is asked for: `make soak-clients`."""
 
 import argparse
 import json

@@ -1,7 +1,7 @@
 """The autopilot is killed in flight and started again: with what was kept of the flight it goes on."""
 
 from collections.abc import Callable
-from math import degrees, dist, hypot, nan
+from math import acos, degrees, dist, hypot, nan
 
 import pytest
 
@@ -9,10 +9,12 @@ from autopilot.kept import FOLLOWS_US
 from autopilot.modes import Mode, State
 from autopilot.profile import load_profile
 from mavlink.dialect import mav
+from mavlink.failures import MOTOR, WRONG
 from mavlink.feedback import Feedback
-from mavlink.frames import Vector
+from mavlink.frames import Vector, rotation_matrix
 from mavlink.services.mission_items import FENCE, RALLY
-from tests.flights.copter import ACCEPTED, CopterFlight, in_the_air
+from plant.world import state_frame
+from tests.flights.copter import ACCEPTED, DENIED, CopterFlight, in_the_air
 from tests.flights.test_vehicle_missions import EVERY_KIND, do, load, reached, waypoint
 
 EVERY_S = 1.1
@@ -106,6 +108,57 @@ def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int)
     assert dist(flight.position, (0.0, 6.0, 4.0)) < (0.3 if feedback is Feedback.STATE else 3.0)
 
 
+@pytest.mark.parametrize("flying_s", [0.0, 0.6, 4.0])
+def test_a_vehicle_on_sensors_is_caught_by_an_autopilot_that_knows_nothing(flying_s: float) -> None:
+    """Out of a hover, while it gains speed with 20 degrees of tilt, and at speed."""
+    flight = CopterFlight(feedback=Feedback.SENSORS)
+    flight.take_off(8.0)
+    if flying_s:
+        assert flight.go(60.0, 20.0, 8.0) == ACCEPTED
+        flight.run(flying_s)
+    height_m = flight.position[2]
+    flight.restart()
+    flight.until(lambda: flight.armed, 0.5)
+    assert largest_tilt_deg(flight, 4.0) < 45.0
+    assert min(z for _, _, z in path_of(flight, 2.0)) > height_m - 3.0
+    assert hypot(*flight.velocity) < 0.2
+    assert flight.copter.pilot.state == HOLDING
+    assert flight.client.said("restarted in the air, knowing nothing: found falling")
+
+
+def test_what_was_asked_for_goes_on_when_a_vehicle_is_caught() -> None:
+    flight = CopterFlight(feedback=Feedback.SENSORS)
+    flight.take_off(12.0)
+    load(flight, waypoint(5.0, 0.0, 12.0, stay_s=2.0), waypoint(0.0, 5.0, 12.0))
+    assert flight.select(Mode.MISSION) == ACCEPTED
+    flight.until(lambda: reached(flight) == [0], 10.0)
+    past = flight.past()
+    flight.restart(past._replace(kept=past.kept._replace(senses=b"")))
+    flight.until(lambda: flight.copter.pilot.state == HOLDING, 20.0, "the end of the mission")
+    assert flight.client.said("restarted in flight: mission goes on at item 0")
+    assert flight.client.said("found falling")
+    assert dist(flight.position, (0.0, 5.0, 12.0)) < 3.0
+
+
+def test_a_landing_on_three_rotors_goes_on() -> None:
+    flight = in_the_air(8.0)
+    assert flight.inject(MOTOR, WRONG, 2, 0.001) == ACCEPTED
+    flight.run(1.5)
+    flight.restart(flight.past())
+    assert flight.copter.rotor_loss.lost == 1
+    tilts: list[float] = []
+
+    def landed() -> bool:
+        tilts.append(degrees(acos(rotation_matrix(state_frame(flight.world).attitude)[2][2])))
+        return not flight.armed
+
+    flight.until(landed, 20.0)
+    assert max(tilts) < 20.0
+    assert hypot(*flight.position[:2]) < 3.0
+    assert flight.client.said("rotor 2 failed: landing on three rotors")
+    assert flight.arm() == DENIED
+
+
 def test_between_two_control_samples_the_rotors_keep_their_speed() -> None:
     flight = in_the_air(3.0, profile=load_profile("flight"))
     flight.run(1.0)
@@ -145,6 +198,30 @@ def test_sticks_that_are_not_heard_again_are_lost() -> None:
     assert flight.mode is Mode.POSITION
     flight.run(0.2)
     assert flight.client.said("sticks lost: hold")
+
+
+def test_a_ground_station_that_is_not_heard_again_is_lost() -> None:
+    flight = CopterFlight(values={"NAV_DLL_ACT": 3, "COM_DL_LOSS_T": 1.0})
+    flight.take_off(3.0)
+    flight.send("HEARTBEAT", mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE, 3)
+    flight.run(0.5)
+    flight.restart(flight.past())
+    flight.run(0.8)
+    assert flight.mode is Mode.HOLD
+    flight.run(0.4)
+    assert flight.client.said("ground station lost: land")
+
+
+def test_a_failsafe_that_the_pilot_has_overridden_does_not_begin_again() -> None:
+    flight = CopterFlight(values={"COM_LOW_BAT_ACT": 1})
+    flight.take_off(3.0)
+    flight.drain(0.9)
+    flight.until(lambda: flight.mode in (Mode.RETURN, Mode.LAND), 3.0, "the failsafe")
+    assert flight.select(Mode.HOLD) == ACCEPTED
+    flight.run(0.5)
+    flight.restart(flight.past())
+    flight.run(2.0)
+    assert flight.copter.pilot.state == HOLDING
 
 
 def test_plans_and_home_are_kept_on_the_ground_too() -> None:

@@ -129,6 +129,22 @@ def test_it_is_lost_at_speed_and_stops() -> None:
     assert fallen.sank_m_s < 1.2
 
 
+def test_an_autopilot_that_is_restarted_in_the_spin_notices_anew() -> None:
+    flight = in_the_air(6.0)
+    flight.run(0.4)
+    assert flight.inject(MOTOR, OFF, 4) == ACCEPTED
+    flight.run(2.5)
+    flight.restart()
+    flight.run(0.1)
+    assert flight.copter.rotor_loss.lost == 3
+    steepest_deg = 0.0
+    while flight.armed:
+        flight.step()
+        steepest_deg = max(steepest_deg, tilt_deg(flight))
+    assert steepest_deg < 20.0
+    assert abs(flight.position[2]) < 0.05
+
+
 def test_a_weak_rotor_is_flown_on_and_a_parameter_turns_all_off() -> None:
     flight = in_the_air(HEIGHT_M)
     assert flight.inject(MOTOR, WRONG, 1, 0.65) == ACCEPTED

@@ -1,4 +1,4 @@
-"""Two ground stations and an offboard companion at once, in memory: what `make soak` does for long."""
+"""Two ground stations and an offboard companion at once, in memory: what `make soak-clients` does for long."""
 
 import gc
 

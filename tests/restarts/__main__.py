@@ -69,17 +69,17 @@ def _autopilots(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], l
         done += flight.kills
         failures += failures_of(flights, flight)
         _say(f"mission {flights}: {len(flight.kills)} kills in {flight.duration_s:.0f} s, {len(done)} in all")
-    hovers, others = [kill for kill in done if kill.hovered], [kill for kill in done if not kill.hovered]
+    hovers, others = [kill for kill in done if kill.still], [kill for kill in done if not kill.hovered]
     phases = Counter(kill.phase for kill in done)
     lines = [
         f"{len(done)} kills in {flights} missions: " + ", ".join(f"{n} {phase.value}" for phase, n in phases.items()),
         f"largest tilt after a kill {_most(kill.tilt_deg for kill in done):.1f} degrees, "
         f"and in the second before one {_most(kill.tilt_before_deg for kill in done):.1f}",
         f"hovering, {len(hovers)} kills: "
-        f"largest tilt {_most(kill.tilt_deg for kill in hovers if kill.still):.2f} degrees, "
+        f"largest tilt {_most(kill.tilt_deg for kill in hovers):.2f} degrees, "
         f"height lost {_most(kill.lost_m for kill in hovers):.3f} m, "
         f"moved {_most(kill.moved_m for kill in hovers):.3f} m",
-        f"elsewhere, {len(others)} kills",
+        f"on the way, {len(others)} kills",
     ]
     return lines, failures
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mavlink.feedback import Feedback
-from tests.restarts.between import Between, Phase
-from tests.restarts.station import HOVERS, Station, mission
+from tests.restarts.between import COMPILES_S, Between, Phase
+from tests.restarts.station import HOVERS, LEGS, Station, mission
 from tests.runs import Array, Process, rows
 
 _APART_S, _SPREAD_S = 1.8, 1.6
@@ -29,8 +29,8 @@ class Kill(NamedTuple):
         still: Whether it was still in the same item at the next kill.
         tilt_deg: The largest before the next kill.
         tilt_before_deg: The largest in the second before.
-        lost_m: Height lost, of a vehicle that hovered.
-        moved_m: How far it moved from its place, of a vehicle that was still there at the next kill.
+        lost_m: Height lost within two seconds, of a vehicle that was still there at the next kill.
+        moved_m: How far it moved from its place then.
         went_on: Whether the autopilot said that it goes on.
     """
 
@@ -62,10 +62,10 @@ class Flight(NamedTuple):
     words: str
 
 
-def fly(folder: Path, feedback: Feedback, seed: int, most_kills: int) -> Flight:
-    """Fly the mission once, the autopilot killed at random instants and started again at once."""
+def fly(folder: Path, feedback: Feedback, seed: int, most_kills: int, legs: int = LEGS) -> Flight:
+    """Fly a mission of so many legs once, the autopilot killed at random instants and started again at once."""
     folder.mkdir()
-    station = Station(mission())
+    station = Station(mission(legs))
     plant = Process(folder, "plant", "--link", "udpin:127.0.0.1:0", "--out", str(folder), *_plant(seed))
     processes = [plant]
     try:
@@ -114,7 +114,8 @@ class _Killer:
     def begin(self) -> None:
         """Start the first, and have it armed."""
         self._start()
-        self._between.fly_until(self._station, lambda: self._station.armed is True, "the rotors to be armed")
+        station = self._station
+        self._between.fly_until(station, lambda: station.armed is True, "the rotors to be armed", COMPILES_S)
         self._died_us = self._between.time_us - round(_APART_S * 1e6)
 
     def kill(self) -> bool:
@@ -172,7 +173,7 @@ def judged(truth: dict[str, Array], kills: list[_Killed]) -> list[Kill]:
                 still,
                 float(tilt[after].max()),
                 float(tilt[before].max()),
-                float(place[now, 2] - place[near, 2].min()) if hovered else 0.0,
+                float(place[now, 2] - place[near, 2].min()) if still else 0.0,
                 float(away.max()) if still else 0.0,
                 kill.went_on,
             )

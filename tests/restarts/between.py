@@ -10,8 +10,8 @@ from time import monotonic
 from mavlink import dialect
 from tests.restarts.station import Station
 
-GIVE_UP_AFTER_S = 60.0
-"""By the clock: a bound for what hangs, never a part of a verdict."""
+GIVE_UP_AFTER_S, COMPILES_S = 60.0, 900.0
+"""By the clock: bounds for what hangs, never a part of a verdict; the first autopilot may have to compile."""
 ADDRESS = ("127.0.0.1", 0)
 _LARGEST = 65536
 _LOOK_S = 0.02
@@ -52,7 +52,6 @@ class Between:
         self.time_us = 0
         self._due: tuple[int, Phase, Callable[[], None]] | None = None
         self._chance = random.Random(0)
-        self._near = self._far = _bound()
         self._open()
 
     def at(self, time_us: int, phase: Phase, do: Callable[[], None]) -> None:
@@ -66,17 +65,18 @@ class Between:
 
     def cut(self) -> None:
         """Let go of the autopilot that called, and wait for the next."""
-        for sock in {self._near, self._far}:
-            sock.close()
+        self.close()
         self._open()
 
-    def fly_until(self, station: Station, condition: Callable[[], bool], what: str) -> None:
+    def fly_until(
+        self, station: Station, condition: Callable[[], bool], what: str, give_up_after_s: float = GIVE_UP_AFTER_S
+    ) -> None:
         """Pass on, and have the ground station hear, until `condition()`.
 
         Raises:
             HangsError: It does not come about.
         """
-        give_up_s = monotonic() + GIVE_UP_AFTER_S
+        give_up_s = monotonic() + give_up_after_s
         while not condition():
             ready, _, _ = select([self._near, self._far, station.socket], [], [], _LOOK_S)
             for sock in (self._near, self._far):
@@ -89,7 +89,7 @@ class Between:
                 raise HangsError(f"waited in vain for {what} at t = {self.time_us * 1e-6:.3f} s: {said}")
 
     def close(self) -> None:
-        """End."""
+        """Let go of everybody."""
         self._near.close()
         self._far.close()
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from mavlink.feedback import Feedback
 from tests.restarts.autopilots import start
-from tests.restarts.between import Between, Phase
+from tests.restarts.between import COMPILES_S, Between, Phase
 from tests.restarts.station import Station, mission
 from tests.runs import Process
 
@@ -74,7 +74,7 @@ class _Flights:
     def kill(self, seed: int) -> Kill:
         """Fly for a while, kill the plant, start another: at once, or when the autopilot has said what it misses."""
         between, station, chance = self._between, self._station, self._chance
-        between.fly_until(station, lambda: station.armed is True, "the rotors to be armed")
+        between.fly_until(station, lambda: station.armed is True, "the rotors to be armed", COMPILES_S)
         phase = chance.choice(list(Phase))
         due_us = between.time_us + round(1e6 * chance.uniform(0.0, _LATEST_S))
         between.at(due_us, phase, self._plant.process.kill)

@@ -18,13 +18,16 @@ HEIGHT_M = 6.0
 _PLACES = ((22.0, 0.0), (22.0, 18.0), (0.0, 18.0), (0.0, 0.0))
 
 
-def mission() -> list[MissionItem]:
-    """Return a take-off, four legs with a hover at the end of each, and a landing."""
+LEGS = len(_PLACES)
+
+
+def mission(legs: int = LEGS) -> list[MissionItem]:
+    """Return a take-off, up to four legs with a hover at the end of each, and a landing where the last ends."""
     items = [_item(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0)]
-    for east, north in _PLACES:
+    for east, north in _PLACES[:legs]:
         items.append(_item(mav.MAV_CMD_NAV_WAYPOINT, east, north))
         items.append(_item(mav.MAV_CMD_NAV_LOITER_TIME, east, north, HOVER_S))
-    return [*items, _item(mav.MAV_CMD_NAV_LAND, 0.0, 0.0)]
+    return [*items, _item(mav.MAV_CMD_NAV_LAND, *_PLACES[legs - 1])]
 
 
 HOVERS = frozenset(range(2, 2 * len(_PLACES) + 1, 2))

@@ -50,6 +50,7 @@ def fly(out: Path, duration_s: float) -> Flight:
         "speed": np.inf,
         "seed": 0,
         "feedback": Feedback.STATE,
+        "latency": 0.0,
         "duration": duration_s,
         "out": out,
     }

@@ -17,7 +17,7 @@ pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs" / "scenarios.md"
-MODULE = "tools.scenarios.plugin"
+MODULE = "pytest_colibri"
 HOVER = """
     import pytest
 
@@ -182,3 +182,23 @@ def keep_compiled(site: Path) -> None:
             for kernel in (here.parent / "__pycache__").glob(f"{here.stem}.*.nb?"):
                 (source.parent / "__pycache__").mkdir(exist_ok=True)
                 shutil.copy2(kernel, source.parent / "__pycache__")
+
+
+def test_a_stranger_who_has_a_package_of_the_same_name_tests_as_ever(tmp_path: Path) -> None:
+    """Only who asks for a vehicle is told why there is none."""
+    (tmp_path / "tools").mkdir()
+    (tmp_path / "tools" / "__init__.py").write_text("MINE = 1\n")
+    tests = (
+        "from tools import MINE",
+        "def test_mine():",
+        "    assert MINE == 1",
+        "def test_flight(sitl):",
+        "    sitl.arm()",
+    )
+    (tmp_path / "test_mine.py").write_text("\n".join(tests) + "\n")
+    command = [sys.executable, "-m", "pytest", *options(), "-p", "no:cacheprovider", "-q", "test_mine.py"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "1 passed, 1 error" in done.stdout
+    assert "another one of that name is in front of it" in done.stdout

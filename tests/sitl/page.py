@@ -1,0 +1,43 @@
+"""Writes `docs/scenarios-flown.md` from the scenarios themselves: `python -m tests.sitl.page docs`."""
+
+import sys
+from pathlib import Path
+
+from tests.sitl import GROUPS
+from tests.sitl.scenario import FleetScenario, Scenario
+
+PAGE = "scenarios-flown.md"
+
+
+def page() -> str:
+    """Return the page."""
+    count = sum(len(group) for group in GROUPS.values())
+    flights = sum(len(each.seeds) if isinstance(each, Scenario) else 1 for group in GROUPS.values() for each in group)
+    lines = [
+        "# The scenarios",
+        "",
+        f"{count} scenarios, {flights} tests with their seeds, in `tests/sitl/`: `make scenarios` flies them over UDP,",
+        "`make soak` again and again. This page is written from them by `python -m tests.sitl.page docs`; a test holds",
+        "that they agree.",
+        "",
+        "AP is ArduPilot's autotest, PX4 its mavsdk_tests, MAVSDK its system tests: the numbers of trusted suites, and",
+        "beside each what is asked for here. Times are simulated, places are true.",
+    ]
+    for name, group in GROUPS.items():
+        lines += ["", f"## {name.capitalize()}", "", "| scenario | a peer asks for | here |", "|---|---|---|"]
+        lines += [f"| {each.name} | {each.peer} | {each.holds}{_seeds(each)} |" for each in group]
+    return "\n".join(lines) + "\n"
+
+
+def _seeds(each: Scenario | FleetScenario) -> str:
+    return f"; {len(each.seeds)} seeds" if isinstance(each, Scenario) and len(each.seeds) > 1 else ""
+
+
+def main() -> int:
+    """Write the page into the folder that the command line names."""
+    (Path(sys.argv[1]) / PAGE).write_text(page(), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
