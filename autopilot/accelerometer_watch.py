@@ -6,7 +6,8 @@ a receiver that lies or is late makes ramps, too. So another sensor must say the
 
 - across the body, the accelerometer itself. A multirotor's thrust is along its z axis; what it feels sideways is drag,
   and a bias. If it is the latter, that has changed by b, however the vehicle was flown since;
-- along body z, the barometer, whose innovations must follow the integral of the ramp rather than stay at zero.
+- along body z, the barometer: what its height differs by from the integral of the filter's velocity must follow the
+  integral of the ramp.
 
 PX4's EKF2 checks for bad vertical acceleration likewise, by innovations of the same sign. The test of one against
 the other is by likelihood: A. Willsky, H. Jones, A generalized likelihood ratio approach to the detection and
@@ -14,39 +15,43 @@ estimation of jumps in linear systems, IEEE TAC 21 (1976).
 """
 
 from collections import deque
-from math import ceil, sqrt
+from itertools import pairwise
+from math import ceil, nan, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.eskf import FIVE_SIGMA, Kind
-from autopilot.estimate import Test
+from autopilot.eskf import Filter
 from mavlink.atmosphere import METRES_PER_PASCAL
 from mavlink.compiled import compiled, rotation_matrix
 from plant.vehicle import Sensors
 
 Array: TypeAlias = NDArray[np.float64]
-_Fix: TypeAlias = tuple[int, list[float], Test, Test]
-"""Its time, µs; the filter's nominal state (10,) that it met; the tests of velocity and of pressure."""
+_Fix: TypeAlias = tuple[int, list[float], tuple[float, ...], int, float]
+"""Its time, µs; the nominal state (10,) that it met; the innovation of velocity, m/s ENU; when pressure was last
+tested, µs; which height that was, m."""
 
-TIME, VELOCITY, ATTITUDE, INNOVATION, HEIGHT = 0, 4, 7, 11, 14
+TIME, POSITION, VELOCITY, ATTITUDE, INNOVATION, HEIGHT = 0, 1, 4, 7, 11, 14
 ROW = 15
-"""A fix as a row of numbers: s, the state (10,), innovations of velocity, m/s ENU, and of the barometer's height, m."""
+"""A fix as a row of numbers: s, the state (10,), innovation of velocity, m/s ENU, and the barometer's height, m."""
 
 _FEWEST_FIXES = 3
-_LONGEST_US = 1_500_000
+_LONGEST_US = 2_500_000
 """Since the first rejected fix: what is not seen by then is no sudden bias, and left to the filter's patience."""
-_KEPT_S = 4.0
+_KEPT_S = 6.0
 _BEFORE_S, _FEWEST_BEFORE = 1.0, 4
 """What is felt in flight is compared with that of so long before the fault, of so many fixes at least."""
 _ONSET_S = 0.05
 _LONGEST_GAP_S = 0.35
-_ALONG_PART, _ACROSS_PART = 0.5, 0.5
-"""Parts of the bias: along body z, from which on the barometer is asked; across, by which what is felt may differ."""
+_ALONG_PART = 0.5
+"""The part of the bias along body z from which on the barometer is asked."""
+_ALIKE_PART = 0.5
+"""By how much of the larger may differ what two sensors say, that yet agree."""
 _CLEAR = 9.0
 """How much two hypotheses must differ, σ², before a test can choose between them."""
-_RAMP_GATE = FIVE_SIGMA[2]
+_FOUR_SIGMA = 22.06
+"""χ² of three degrees of freedom: a bias beyond that is one. The velocity was rejected at five already."""
 _LEAST_SIGMA = 1e-3
 _STEPS = 4
 """Of the least squares: the rest falls by the square of the angle turned, and a few find it to what noise leaves."""
@@ -80,17 +85,20 @@ class AccelerometerWatch:
         self._rejected = 0
         self._first_us = 0
         self._resets = 0
-        find_bias(np.zeros((0, ROW)), 0, 1.0, 1.0, gravity_m_s2, np.zeros((3, 3)))
+        find_bias(np.zeros((_FEWEST_FIXES, ROW)), 0, 1.0, 1.0, gravity_m_s2, np.zeros((3, 3)))
 
-    def look(self, time_us: int, state: list[float], velocity: Kind, pressure: Kind) -> Found | None:
-        """Look at a fix of `time_us`, which met the filter's nominal `state` (10,); return what it tells, if it does.
+    def look(self, time_us: int, state: list[float], filter_: Filter) -> Found | None:
+        """Look at a fix of `time_us` which the filter has tested; return what it tells, if it does.
 
-        `velocity` and `pressure` are the kinds of measurement, after their tests.
+        `state` (10,) is the filter's nominal state before that.
         """
+        velocity = filter_.velocity
         if velocity.resets != self._resets:
             self._resets = velocity.resets
             self._fixes.clear()
-        self._fixes.append((time_us, state, velocity.test, pressure.test))
+        self._fixes.append(
+            (time_us, state, velocity.test.innovation, filter_.pressure.test.time_us, filter_.pressure_height_m)
+        )
         if velocity.rejected_us is None:
             self._rejected = 0
             return None
@@ -99,16 +107,18 @@ class AccelerometerWatch:
         self._rejected += 1
         if self._rejected < _FEWEST_FIXES or time_us - self._first_us > _LONGEST_US:
             return None
-        return self._judge(len(self._fixes) - self._rejected)
+        return self._judge(len(self._fixes) - 1 - self._rejected)
 
     def _judge(self, first: int) -> Found | None:
         rows = np.array(
             [
-                (time_us * 1e-6, *state, *velocity.innovation, *pressure.innovation)
-                for time_us, state, velocity, pressure in self._fixes
+                (time_us * 1e-6, *state, *innovation, height if tested_us != before_us else nan)
+                for (time_us, state, innovation, tested_us, height), (_, _, _, before_us, _) in pairwise(self._fixes)
             ]
         )
         found = np.empty((3, 3))
+        if first < _FEWEST_BEFORE:
+            return None
         variance = find_bias(rows, first, self._velocity_variance, self._height_variance, self._gravity, found)
         return Found(found[0], variance, found[1], found[2]) if variance > 0.0 else None
 
@@ -120,7 +130,7 @@ def find_bias(
     """Return the variance of a bias that is found, along each axis; 0 if none is.
 
     Args:
-        rows: Fixes, (n, 15).
+        rows: Fixes, (n, 15); the height is nan where the barometer told nothing new.
         first: The first of them whose velocity was rejected, as were those behind it.
         velocity_variance: Of the noise of GPS velocity, (m/s)².
         height_variance: Of the barometer's, m².
@@ -128,8 +138,6 @@ def find_bias(
         found: The bias, m/s² FLU; what the last row's velocity lacks, m/s ENU; and its position, m ENU.
     """
     n = len(rows) - first
-    if first < _FEWEST_BEFORE or n < _FEWEST_FIXES:
-        return 0.0
     for k in range(1, len(rows)):
         if rows[k, TIME] - rows[k - 1, TIME] > _LONGEST_GAP_S:
             return 0.0
@@ -139,7 +147,7 @@ def find_bias(
         _centred(A[:, i, :])
     bias, spread = _fitted(A, d)
     size = sqrt(bias[0] ** 2 + bias[1] ** 2 + bias[2] ** 2)
-    if not size * size * spread > _RAMP_GATE * velocity_variance:
+    if not size * size * spread > _FOUR_SIGMA * velocity_variance:
         return 0.0
     lacks, rest = np.empty((n, 3)), 0.0
     for k in range(n):
@@ -151,41 +159,70 @@ def find_bias(
     if rest > (freedom + 5.0 * sqrt(2.0 * freedom)) * velocity_variance:
         return 0.0
     began_s = sqrt(lacks[0, 0] ** 2 + lacks[0, 1] ** 2 + lacks[0, 2] ** 2) / size
-    moved = _moved(rows, first, lacks, began_s)
-    if abs(bias[2]) > _ALONG_PART * size and not _is_seen(rows, first, moved, height_variance):
+    moved, last = _moved(rows, first, lacks, began_s), first
+    while last >= 0 and rows[last, TIME] > rows[first, TIME] - began_s - _ONSET_S:
+        last -= 1
+    begin = last
+    while begin > 0 and rows[begin - 1, TIME] >= rows[last, TIME] - _BEFORE_S:
+        begin -= 1
+    if last - begin < _FEWEST_BEFORE - 1:
         return 0.0
-    if not _is_felt(rows, first, began_s, gravity, bias, _ACROSS_PART * size):
+    drifted = _drifted(rows, begin)
+    if abs(bias[2]) > _ALONG_PART * size and not _is_seen(rows, first, begin, last, moved, drifted, height_variance):
+        return 0.0
+    if not _is_felt(rows, first, begin, last, gravity, bias):
         return 0.0
     found[0], found[1], found[2] = bias, lacks[-1], moved[-1]
+    found[2] -= (
+        rows[-1, POSITION : POSITION + 3] - rows[last, POSITION : POSITION + 3] - (drifted[-1] - drifted[last - begin])
+    )
     return velocity_variance / spread
 
 
 @compiled
-def _is_seen(rows: Array, first: int, moved: Array, variance: float) -> bool:
-    """Whether the barometer follows what position lacks (n, 3), rather than stay."""
-    differ, follows = 0.0, 0.0
-    for k in range(len(moved)):
-        up = moved[k, 2]
-        differ += up * up
-        follows += up * (2.0 * rows[first + k, HEIGHT] - up)
-    return differ >= _CLEAR * variance and follows > 0.0
+def _drifted(rows: Array, begin: int) -> Array:
+    """Return the integral of the filter's velocity from a fix to each one after it, m ENU."""
+    drifted = np.zeros((len(rows) - begin, 3))
+    for k in range(1, len(drifted)):
+        row = begin + k
+        dt = rows[row, TIME] - rows[row - 1, TIME]
+        drifted[k] = drifted[k - 1]
+        for i in range(3):
+            drifted[k, i] += 0.5 * dt * (rows[row - 1, VELOCITY + i] + rows[row, VELOCITY + i])
+    return drifted
 
 
 @compiled
-def _is_felt(rows: Array, first: int, began_s: float, gravity: float, bias: Array, most: float) -> bool:
-    """Whether what is felt across the body has changed by the bias, but for `most`."""
-    onset_s = rows[first, TIME] - began_s - _ONSET_S
-    now, before, count = np.zeros(2), np.zeros(2), 0
-    for k in range(1, len(rows)):
-        if k > first:
-            now += _felt(rows, k, gravity)
-        elif rows[k, TIME] <= onset_s and rows[k - 1, TIME] >= onset_s - _BEFORE_S:
-            before += _felt(rows, k, gravity)
-            count += 1
-    if count < _FEWEST_BEFORE - 1:
-        return False
-    change = now / (len(rows) - 1 - first) - before / count
-    return sqrt((change[0] - bias[0]) ** 2 + (change[1] - bias[1]) ** 2) <= most
+def _is_seen(
+    rows: Array, first: int, begin: int, last: int, moved: Array, drifted: Array, height_variance: float
+) -> bool:
+    """Whether the barometer contradicts the filter's velocity as what position lacks (n, 3) does.
+
+    Rows from `begin` to `last` are of before; `drifted` is from `begin` on.
+    """
+    rest = 0.0
+    for k in range(begin, last + 1):
+        rest += (rows[k, HEIGHT] - drifted[k - begin, 2]) / (last + 1 - begin)
+    clear, follows = 0.0, 0.0
+    for k in range(len(moved)):
+        up, row = moved[k, 2], first + k
+        clear += up * up
+        follows += up * (rows[row, HEIGHT] - drifted[row - begin, 2] - rest)
+    return clear >= _CLEAR * height_variance and abs(follows - clear) <= _ALIKE_PART * max(follows, clear)
+
+
+@compiled
+def _is_felt(rows: Array, first: int, begin: int, last: int, gravity: float, bias: Array) -> bool:
+    """Whether what is felt across the body has changed by the bias since the rows from `begin` to `last`."""
+    now, before = np.zeros(2), np.zeros(2)
+    for k in range(first + 1, len(rows)):
+        now += _felt(rows, k, gravity)
+    for k in range(begin + 1, last + 1):
+        before += _felt(rows, k, gravity)
+    change = now / (len(rows) - 1 - first) - before / (last - begin)
+    felt = sqrt(change[0] ** 2 + change[1] ** 2)
+    size = sqrt(bias[0] ** 2 + bias[1] ** 2 + bias[2] ** 2)
+    return sqrt((change[0] - bias[0]) ** 2 + (change[1] - bias[1]) ** 2) <= _ALIKE_PART * max(felt, size)
 
 
 @compiled

@@ -150,6 +150,7 @@ class Filter:
         P: Covariance of its error, (22, 22).
         position, velocity, height, pressure, field: What is measured.
         kinds: All of them, in the order of `Tests`.
+        pressure_height_m: What pressure told last.
         bias_us: When the accelerometer's bias was last taken anew; None if never.
     """
 
@@ -172,6 +173,7 @@ class Filter:
         self.height = Kind(1, 7_000_000, (POSITION + 2, 1, _DOUBTED_M))
         self.pressure = Kind(1, 7_000_000, (BARO_OFFSET, 1, _DOUBTED_M))
         self.field = Kind(3, 10_000_000, (HARD_IRON, 3, _DOUBTED_GAUSS))
+        self.pressure_height_m = 0.0
         self.bias_us: int | None = None
         self.kinds = (self.velocity, self.position, self.height, self.pressure, self.field)
 
@@ -286,7 +288,7 @@ class Filter:
 
     def fuse_pressure(self, pressure_pa: float, time_us: int) -> Reason | None:
         """Fuse a pressure; return why it was rejected, if it was."""
-        height = altitude_m(pressure_pa)
+        height = self.pressure_height_m = altitude_m(pressure_pa)
         sigma = self._sensors.barometer.noise_pa * altitude_slope_m_pa(pressure_pa)
         variance = max(-sigma, _LEAST_NOISE) ** 2
         believed = self.pressure.fuse(self, time_us, update.fuse_pressure_height, height, variance)

@@ -300,7 +300,7 @@ class Estimator:
         if reason is not None:
             self._rejected.add(Source.GPS, reason)
         self._blending.absorb(before[:6], self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
-        found = self._accelerometer_watch.look(fix.time_us, before, self.filter.velocity, self.filter.pressure)
+        found = self._accelerometer_watch.look(fix.time_us, before, self.filter)
         if found is not None:
             self.filter.take_bias_anew(*found, now_us)
 
