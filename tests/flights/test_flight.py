@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import plant
+from autopilot.controller import Fallback
 from autopilot.process import FALLBACK_CODES
 from tests.runs import fly, rows
 
@@ -130,7 +131,7 @@ def test_any_start_is_recovered_from(tmp_path: Path, start: str) -> None:
     assert largest_error_m(flown, 8.0) < 0.01
     if "170" in start:
         fallback = rows(tmp_path / "autopilot.csv")["fallback"]
-        recovering = fallback == max(FALLBACK_CODES.values())
+        recovering = fallback == FALLBACK_CODES[Fallback.RECOVERY]
         assert recovering[0]
         assert not recovering[flown["t"][1:] > 1.0].any()
 
