@@ -182,7 +182,7 @@ SCENARIOS = (
             check(says("GPS lost")),
             inject("sensor_gps", "ok"),
             run(10.0),
-            check(every(over(0.0, 0.0, 1.5), says("GPS is back"))),
+            check(every(over(0.0, 0.0, 1.5), says("GPS lost: cleared"))),
         ),
         setting=ON_SENSORS,
         seeds=(1, 2),
