@@ -6,7 +6,7 @@ pressure it is the offset of the barometer, and height stays; for GPS it is posi
 """
 
 from collections.abc import Callable
-from math import inf, isfinite, nan, radians
+from math import hypot, inf, isfinite, nan, radians
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,6 +57,10 @@ _UNSURE_PART = 0.3
 """Of what position lacked by a bias, as well as that is known."""
 _UNSURE_TIMES = 3.0
 """The variance of that bias: what velocity lacked errs with it."""
+_UNSURE_TURN = 2.0
+"""The field does not see a turn about itself: it may be larger than what it sees."""
+_UNSURE_S = 0.5
+"""For how long a velocity that has grown wrong was, in the mean."""
 _DOUBTED_M, _DOUBTED_M_S, _DOUBTED_GAUSS = 100.0, 10.0, 0.3
 
 
@@ -69,12 +73,13 @@ class KindRecord(NamedTuple):
 
 
 class FilterRecord(NamedTuple):
-    """A filter as plain data: state, covariance, the kinds of what is measured, and `Filter.bias_us`."""
+    """A filter as plain data: state, covariance, the kinds of what is measured, and when biases were taken anew."""
 
     x: Array
     P: Array
     kinds: list[KindRecord]
-    bias_us: int | None
+    accel_bias_us: int | None
+    gyro_bias_us: int | None
 
 
 class Kind:
@@ -151,13 +156,16 @@ class Filter:
         position, velocity, height, pressure, field: What is measured.
         kinds: All of them, in the order of `Tests`.
         pressure_height_m: What pressure told last.
-        bias_us: When the accelerometer's bias was last taken anew; None if never.
+        field_gauss: Strength of the earth's field.
+        accel_bias_us: When the accelerometer's bias was last taken anew; None if never.
+        gyro_bias_us: When the gyroscope's was.
     """
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector) -> None:
         """Believe what `sensors` say of themselves."""
         self._sensors, self._gravity = sensors, gravity_m_s2
         self._field = np.array(field_enu_gauss)
+        self.field_gauss = hypot(*field_enu_gauss)
         self._noise = noise_of(sensors)
         gps = sensors.gps
         self._horizontal = gps.horizontal_noise_m**2 + _PLACE_STEP_M**2 / 12.0
@@ -174,7 +182,8 @@ class Filter:
         self.pressure = Kind(1, 7_000_000, (BARO_OFFSET, 1, _DOUBTED_M))
         self.field = Kind(3, 10_000_000, (HARD_IRON, 3, _DOUBTED_GAUSS))
         self.pressure_height_m = 0.0
-        self.bias_us: int | None = None
+        self.accel_bias_us: int | None = None
+        self.gyro_bias_us: int | None = None
         self.kinds = (self.velocity, self.position, self.height, self.pressure, self.field)
 
     def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
@@ -251,13 +260,14 @@ class Filter:
     def record(self) -> FilterRecord:
         """Return state, covariance and what was believed."""
         kinds = [KindRecord(kind.accepted_us, kind.rejected_us, kind.resets) for kind in self.kinds]
-        return FilterRecord(self.x, self.P, kinds, self.bias_us)
+        return FilterRecord(self.x, self.P, kinds, self.accel_bias_us, self.gyro_bias_us)
 
     def resume(self, record: FilterRecord) -> bool:
         """Go on from a record; return whether it is one of such a filter."""
         if (record.x.shape, record.P.shape, len(record.kinds)) != (self.x.shape, self.P.shape, len(self.kinds)):
             return False
-        self.x[:], self.P[:], self.bias_us = record.x, record.P, record.bias_us
+        self.x[:], self.P[:] = record.x, record.P
+        self.accel_bias_us, self.gyro_bias_us = record.accel_bias_us, record.gyro_bias_us
         for kind, (accepted_us, rejected_us, resets) in zip(self.kinds, record.kinds, strict=True):
             kind.accepted_us, kind.rejected_us, kind.resets = accepted_us, rejected_us, resets
         return True
@@ -303,7 +313,7 @@ class Filter:
         believed = self.field.fuse(self, time_us, update.fuse_field, measured, self._field, self._field_variance)
         return None if believed else Reason.INNOVATION
 
-    def take_bias_anew(
+    def take_accel_bias_anew(
         self, change_m_s2: Array, variance: float, velocity_m_s: Array, position_m: Array, time_us: int
     ) -> None:
         """Believe that the accelerometer's bias has changed, and undo what that has done since.
@@ -325,7 +335,26 @@ class Filter:
         update.doubt(P, ACCEL_BIAS, 3, _UNSURE_TIMES * variance)
         self.velocity.resets += 1
         self.velocity.accept(time_us)
-        self.bias_us = time_us
+        self.accel_bias_us = time_us
+
+    def take_gyro_bias_anew(self, turned_rad: float, since_s: float, time_us: int) -> None:
+        """Doubt what a gyroscope that is off has spoilt: attitude and bias, and the velocity that is contradicted.
+
+        Args:
+            turned_rad: By how much the magnetic field has turned.
+            since_s: For how long it has.
+            time_us: Now.
+        """
+        P, angle_rad = self.P, _UNSURE_TURN * turned_rad
+        update.doubt(P, ATTITUDE, 3, angle_rad * angle_rad)
+        update.doubt(P, GYRO_BIAS, 3, (angle_rad / since_s) ** 2)
+        speed_m_s = hypot(*self.velocity.test.innovation)
+        update.doubt(P, POSITION, 3, (_UNSURE_S * speed_m_s) ** 2)
+        update.doubt(P, VELOCITY, 3, speed_m_s * speed_m_s)
+        self.velocity.resets += 1
+        self.velocity.accept(time_us)
+        self.field.accept(self.field.test.time_us)
+        self.gyro_bias_us = time_us
 
     @property
     def tests(self) -> Tests:

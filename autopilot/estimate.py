@@ -97,7 +97,8 @@ class Health(NamedTuple):
         gyroscope: Its values can be used.
         magnetometer: It is believed.
         barometer: It is believed.
-        bias: The accelerometer's bias was not taken anew lately.
+        accel_bias: The accelerometer's bias was not taken anew lately.
+        gyro_bias: Nor the gyroscope's.
     """
 
     attitude: bool
@@ -113,7 +114,8 @@ class Health(NamedTuple):
     gyroscope: bool
     magnetometer: bool
     barometer: bool
-    bias: bool
+    accel_bias: bool
+    gyro_bias: bool
 
     @property
     def flags(self) -> StatusFlags:
@@ -129,7 +131,7 @@ class Health(NamedTuple):
             self.horizontal_position,
             self.height,
             self.gps_glitch,
-            not (self.accelerometer and self.bias),
+            not (self.accelerometer and self.accel_bias),
         )
 
 

@@ -20,6 +20,7 @@ from autopilot.eskf import Array, Filter, FilterRecord
 from autopilot.eskf_predict import SAMPLE, look_ahead
 from autopilot.estimate import Check, Estimate, Health, Reason, Source
 from autopilot.falling import Caught, Falling
+from autopilot.gyroscope_watch import turned_since
 from autopilot.inertial import Inertial, Reading, sample_between
 from autopilot.sensor_watch import GpsWatch, Rejected, Watch
 from autopilot.strays import LONGEST_GAP_US, Strays
@@ -302,7 +303,10 @@ class Estimator:
         self._blending.absorb(before[:6], self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
         found = self._accelerometer_watch.look(fix.time_us, before, self.filter)
         if found is not None:
-            self.filter.take_bias_anew(*found, now_us)
+            self.filter.take_accel_bias_anew(*found, now_us)
+        turned = turned_since(self.filter, now_us)
+        if turned is not None:
+            self.filter.take_gyro_bias_anew(*turned, now_us)
 
     def _publish(self, now_us: int) -> Estimate | None:
         """Return the estimate now; None, and all anew, if it is of no vehicle."""
@@ -377,7 +381,8 @@ class Estimator:
             reading.rate_good,
             field_good,
             pressure_good,
-            filter_.bias_us is None or now_us - filter_.bias_us > _LEARNING_US,
+            filter_.accel_bias_us is None or now_us - filter_.accel_bias_us > _LEARNING_US,
+            filter_.gyro_bias_us is None or now_us - filter_.gyro_bias_us > _LEARNING_US,
         )
 
     def _warm_up(self) -> None:

@@ -25,8 +25,9 @@ class _Matter(NamedTuple):
 
 _MATTERS = (
     _Matter(lambda health: health.accelerometer, "accelerometer failed", "accelerometer is back"),
-    _Matter(lambda health: health.bias, "accelerometer off: bias learned anew", "accelerometer believed again"),
+    _Matter(lambda health: health.accel_bias, "accelerometer off: bias learned anew", "accelerometer believed again"),
     _Matter(lambda health: health.gyroscope, "gyroscope failed", "gyroscope is back"),
+    _Matter(lambda health: health.gyro_bias, "gyroscope off: bias learned anew", "gyroscope believed again"),
     _Matter(lambda health: health.magnetometer, "magnetometer not believed", "magnetometer believed again"),
     _Matter(lambda health: health.barometer, "barometer not believed", "barometer believed again"),
 )

@@ -1,6 +1,6 @@
 """The figure of many flights by chance: how their errors are distributed, track by track."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ _PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
 
 
 def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
-    """Draw `seeds.png`: a dot a flight, a line at the median; the mean NEES, and that of an honest filter."""
+    """Draw `seeds.png`: a dot a flight, a bar at the median; the mean NEES, and that of an honest filter."""
     cases = list(dict.fromkeys((flown.contender, flown.track) for flown in flights))
     estimated = not all(np.isnan(flown.values[2]) for flown in flights)
     panels = _PANELS if estimated else _PANELS[:1]
@@ -54,7 +54,7 @@ def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
         if axes.get_legend_handles_labels()[1]:
             where: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
             axes.legend(**where, ncols=len(MEASURED), frameon=False)
-    put_title(figure, f"{len(flights)} flights, errors after {SETTLED_AFTER_S:.0f} s")
+    put_title(figure, f"{len(flights)} flights, errors after {SETTLED_AFTER_S:.0f} s; bars: medians")
     return write_figure(figure, out / "seeds")
 
 
@@ -65,11 +65,11 @@ def _shift(number: int, of: int) -> float:
 
 def _draw_nees(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, str]]) -> None:
     """Draw the mean NEES of each flight, and where the mean of all belongs."""
-    _strips(axes, flights, cases, "nees", "#000000", "", 0.0)
+    _strips(axes, flights, cases, "nees", "#000000", "", 0.0, np.mean)
     within = bounds(NAVIGATION, max(1, len(flights) // len(cases)))
     axes.axvspan(*within, color="#D55E00", alpha=0.15, linewidth=0)
     axes.axvline(NAVIGATION, color="#D55E00", linewidth=1.2, label="right; shaded: 95 % of the means over flights")
-    axes.set_xlabel("NEES of position, velocity and attitude, mean of a flight")
+    axes.set_xlabel("NEES of position, velocity and attitude, mean of a flight; bar: mean of all")
 
 
 def _draw_nis(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, str]]) -> None:
@@ -96,6 +96,7 @@ def _strips(
     color: str,
     called: str,
     shift: float,
+    middle: Callable[[Any], Any] = np.median,
 ) -> None:
     column = QUANTITIES.index(quantity)
     for place, case in enumerate(cases):
@@ -107,7 +108,7 @@ def _strips(
         at = np.full(len(values), -place - shift)
         axes.plot(values, at, "o", color=color, markersize=3, alpha=0.45, markeredgewidth=0, label=called)
         called = ""  # each label once
-        axes.plot([np.median(values)] * 2, [-place - shift - 0.12, -place - shift + 0.12], color=color, linewidth=2.2)
+        axes.plot([middle(values)] * 2, [-place - shift - 0.12, -place - shift + 0.12], color=color, linewidth=2.2)
         lost = len(of_case) - len(values)
         if lost and quantity == "true":
             text = f"{lost} lost"

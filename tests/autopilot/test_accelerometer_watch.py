@@ -43,10 +43,10 @@ def test_a_sudden_bias_is_found_before_it_is_far(path: source.Path, bias: Vector
     flight = recorded(path, 3, 22.5)
     of = estimates(flight.frames, felt(bias))
     last = known(of)[-1]
-    learning = [one for one in known(of) if not one.health.bias]
+    learning = [one for one in known(of) if not one.health.accel_bias]
     assert (learning[0].frame.time_us * 1e-6 - BEGAN_S) < 1.2
     assert last.resets == 1
-    assert last.health.bias
+    assert last.health.accel_bias
     assert np.allclose(last.accel_bias_m_s2, flight.accel_bias[-1] + bias, atol=0.25)
     assert max(error_m(flight, of, t) for t in np.arange(BEGAN_S, 21.9, 0.1)) < 1.5
     assert not any(one.health.gps_lost_since_us for one in known(of))
@@ -98,7 +98,7 @@ def test_nor_is_one_that_is_late(late_s: float) -> None:
 
     of = known(estimates(flight.frames, late))
     assert of[-1].health.gps_glitch
-    assert all(one.health.bias for one in of)
+    assert all(one.health.accel_bias for one in of)
 
 
 def test_nor_is_a_gyroscope_that_errs() -> None:
@@ -107,7 +107,7 @@ def test_nor_is_a_gyroscope_that_errs() -> None:
 
     of = known(estimates(recorded(source.hover, 6, 22.0).frames, fails(turning)))
     assert any(one.health.gps_glitch for one in of)
-    assert all(one.health.bias for one in of)
+    assert all(one.health.accel_bias for one in of)
 
 
 @pytest.mark.parametrize("knock", [(0.0, 0.0, 200.0), (90.0, -60.0, 100.0), (-30.0, 20.0, -10.0)])
@@ -121,4 +121,4 @@ def test_nor_is_a_knock(knock: Vector) -> None:
 
     of = known(estimates(recorded(source.hover, 7, 19.0).frames, fails(knocked)))
     assert any(one.health.gps_glitch for one in of)
-    assert all(one.health.bias for one in of)
+    assert all(one.health.accel_bias for one in of)

@@ -4,7 +4,7 @@ from autopilot.estimate import Health
 from autopilot.health_watch import HealthWatch, not_known
 from mavlink.services.statustext import INFO, WARNING
 
-WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True, True)
+WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True, True, True)
 
 
 def test_nothing_is_said_while_all_is_well() -> None:

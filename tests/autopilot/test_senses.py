@@ -24,7 +24,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 UNTESTED = estimate.Test(-1, (), 0.0, 1.0)
-WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True, True)
+WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True, True, True)
 
 
 def known(frame: StateFrame) -> Estimate:

@@ -216,6 +216,18 @@ SCENARIOS = (
         setting=ON_SENSORS,
     ),
     Scenario(
+        name="gyroscope-bias",
+        peer="ours: a bias is learned in flight",
+        holds="0.1 rad/s: at most 1 m in 30 s, and says so",
+        steps=(
+            takeoff(10.0),
+            inject("sensor_gyro", "wrong", 0, 0.1, 0.0, 0.0),
+            moves_less(1.0, 30.0),
+            check(says("gyroscope off: bias learned anew")),
+        ),
+        setting=ON_SENSORS,
+    ),
+    Scenario(
         name="stuck-barometer-on-a-mission",
         peer="PX4: a stuck sensor, the mission ends within 90 s",
         holds="ends, and lands within 3 m",

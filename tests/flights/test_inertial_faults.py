@@ -1,16 +1,17 @@
-"""An accelerometer that is suddenly off, in flight on sensors: the vehicle stays, and says why it twitched."""
+"""Accelerometer or gyroscope suddenly off, in flight on sensors: the vehicle stays, and says why it twitched."""
 
 from math import dist
 
 import pytest
 
 from autopilot.modes import Mode
-from mavlink.failures import ACCELEROMETER, OK, WRONG
+from mavlink.failures import ACCELEROMETER, GYROSCOPE, OK, SLOW, WRONG
 from mavlink.feedback import Feedback
 from mavlink.frames import Vector
 from tests.flights.copter import ACCEPTED, CopterFlight
 
 OFF, WELL = "accelerometer off: bias learned anew", "accelerometer believed again"
+TURNS = "gyroscope off: bias learned anew"
 
 
 def stays(flight: CopterFlight, seconds: float, most_m: Vector) -> None:
@@ -40,4 +41,32 @@ def test_a_sudden_bias_is_learned_and_its_end_too(bias: Vector, seed: int) -> No
     assert flight.client.texts[-2:] == [OFF, WELL]
     assert flight.estimate.resets == 2
     assert flight.mode is Mode.HOLD
+    assert not flight.client.said("lost")
+
+
+@pytest.mark.parametrize("bias", [(0.02, 0.0, 0.0), (0.0, -0.1, 0.0), (0.2, 0.2, 0.1)])
+def test_a_gyroscope_that_is_suddenly_off_is_learned_and_its_end_too(bias: Vector) -> None:
+    flight = CopterFlight(feedback=Feedback.SENSORS, seed=3)
+    flight.take_off(10.0)
+    flight.run(2.0)
+    assert not flight.client.said(TURNS)
+    assert flight.estimate is not None
+    own = flight.estimate.gyro_bias_rad_s
+    assert flight.inject(GYROSCOPE, WRONG, 0, *bias) == ACCEPTED
+    stays(flight, 9.0, (1.0, 1.0, 1.0))
+    assert flight.client.said(TURNS)
+    assert flight.estimate.gyro_bias_rad_s == pytest.approx([a + b for a, b in zip(own, bias, strict=True)], abs=2e-3)
+    assert flight.inject(GYROSCOPE, OK) == ACCEPTED
+    stays(flight, 9.0, (1.0, 1.0, 1.0))
+    assert flight.estimate.gyro_bias_rad_s == pytest.approx(own, abs=2e-3)
+    assert flight.mode is Mode.HOLD
+    assert not flight.client.said("lost")
+
+
+def test_a_gyroscope_that_drifts_is_followed() -> None:
+    flight = CopterFlight(feedback=Feedback.SENSORS, seed=3)
+    flight.take_off(10.0)
+    assert flight.inject(GYROSCOPE, SLOW, 0, 0.01) == ACCEPTED
+    stays(flight, 20.0, (1.0, 1.0, 1.0))
+    assert flight.client.said(TURNS)
     assert not flight.client.said("lost")
