@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri  # scipy.stats has it too, and takes a second to load
 
 from mavlink.frames import Vector
 
@@ -71,7 +71,7 @@ class Bounds(NamedTuple):
 
 def bounds(numbers: int, flights: int, level: float = 0.95) -> Bounds:
     """Return where the mean of χ² of `numbers` degrees of freedom over `flights` lies, with probability `level`."""
-    lower, upper = (float(chi2.ppf(part, numbers * flights)) for part in (0.5 - 0.5 * level, 0.5 + 0.5 * level))
+    lower, upper = (float(chdtri(numbers * flights, above)) for above in (0.5 + 0.5 * level, 0.5 - 0.5 * level))
     return Bounds(lower / flights, upper / flights)
 
 

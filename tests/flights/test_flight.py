@@ -33,7 +33,7 @@ def vehicle_file(folder: Path, **changes: str) -> str:
     ("track", "duration_s", "reach_m"),
     [
         ("spiral", 30, 0.001),
-        ("expanding-spiral", 100, 0.005),
+        ("expanding-spiral", 50, 0.005),
         ("line", 30, 0.001),
         ("wave", 30, 0.002),
         ("crown", 30, 0.003),

@@ -33,15 +33,14 @@ def test_direct_equals_the_reference(tmp_path: Path, track: str, integrator: str
 @pytest.mark.parametrize("track", TRACKS)
 def test_udp_equals_the_reference_and_memory_bit_for_bit(tmp_path: Path, track: str) -> None:
     flights = [
-        fly_thesis(tmp_path / "first", track, "--link", "udp"),
-        fly_thesis(tmp_path / "second", track, "--link", "udp"),
+        fly_thesis(tmp_path / "udp", track, "--link", "udp"),
         fly_thesis(tmp_path / "memory", track, "--link", "memory"),
     ]
     assert len({figures["trajectory_sha256"] for figures in flights}) == 1
-    flown = rows(tmp_path / "first" / "flight.csv")
+    flown = rows(tmp_path / "udp" / "flight.csv")
     assert largest_difference(flown, reference(track), STATE) < 1e-4
-    same = [(tmp_path / name / "flight.csv").read_bytes() for name in ("first", "second", "memory")]
-    assert same[0] == same[1] == same[2]
+    same = [(tmp_path / name / "flight.csv").read_bytes() for name in ("udp", "memory")]
+    assert same[0] == same[1]
 
 
 def test_the_reference_columns_are_of_the_same_instant(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from tests.runs import Process, rows, running, wait_for
 def test_it_hovers_on_sensors_in_a_simulator_of_px4(tmp_path: Path, vehicle: str) -> None:
     out, said = tmp_path / "out", tmp_path / "said"
     said.mkdir()
-    serve = ("--serve", "px4", "--link", "tcpin:127.0.0.1:0", "--duration", "30", "--out", str(out))
+    serve = ("--serve", "px4", "--link", "tcpin:127.0.0.1:0", "--duration", "20", "--out", str(out))
     plant = Process(said, "plant", *serve, "--vehicle", vehicle)
     with running(plant):
         url = plant.wait_for("listening")["url"].replace("tcpin", "tcp")
@@ -22,7 +22,7 @@ def test_it_hovers_on_sensors_in_a_simulator_of_px4(tmp_path: Path, vehicle: str
         with running(autopilot):
             assert plant.wait() == 0
     flown = rows(out / "plant.csv")
-    settled = flown["t"] > 20.0
+    settled = flown["t"] > 12.0
     assert np.abs(flown["z"][settled] - 3.0).max() < 1.5
     assert np.hypot(flown["x"], flown["y"])[settled].max() < 1.5
     for axis in "xyz":

@@ -66,6 +66,7 @@ def test_flies_beside_the_peer_in_every_run(
 ) -> None:
     monkeypatch.setattr(peer, "installed", lambda: True)
     monkeypatch.setattr(peer, "real_time_factor", lambda _frames_hz, _duration_s: 2.0)
+    monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 8.0)
     flights = figures_of(tmp_path / "flights.json", "--only", "flights")["flights"]
     assert {int(frames_hz) for frames_hz in flights["rates_hz"]} == set(speed.CONTROL_S)
     for rate in flights["rates_hz"].values():
