@@ -51,7 +51,8 @@ SITL_LINK ?= udp
 scenarios: setup
 	$(BIN)/python -m pytest -m scenarios tests/sitl -n 2 --dist worksteal --sitl-link $(SITL_LINK)
 
-# All of them 100 times, in memory and over UDP in turn: no verdict and no hash may differ. SOAK="--runs 10 --load" ...
+# All of them 100 times, in memory and over UDP in turn: no verdict and no hash may differ. SOAK="--runs 10 --load", or
+# --keep DIR to go on where it was interrupted.
 soak: setup
 	$(BIN)/python -m tests.sitl.soak $(SOAK)
 

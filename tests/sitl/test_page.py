@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.sitl import GROUPS
+from tests.sitl import GROUPS, soak
 from tests.sitl.page import PAGE, page
 from tests.sitl.soak import DiffersError, compare
 
@@ -28,3 +28,26 @@ def test_a_run_that_differs_is_named(again: dict[str, str]) -> None:
     compare(first, dict(first))
     with pytest.raises(DiffersError, match=r"[ab]: "):
         compare(first, again)
+
+
+def test_runs_that_were_kept_are_compared_and_not_run_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ran: list[str] = []
+
+    def run(link: str, kept: Path, _only: str) -> str:
+        ran.append(link)
+        kept.write_text("a passed 1\n", encoding="utf-8")
+        return "flown"
+
+    monkeypatch.setattr(soak, "_run", run)
+    soaked = ["--keep", str(tmp_path), "--runs"]
+    assert soak.main([*soaked, "2"]) == 0
+    assert soak.main([*soaked, "3"]) == 0
+    assert ran == ["memory", "udp", "memory"]
+    (tmp_path / "0003-memory").write_text("a failed 1\n", encoding="utf-8")
+    assert soak.main([*soaked, "3"]) == 1
+    assert "a: passed 1 at first, failed 1 now" in capsys.readouterr().out
+    for kept in tmp_path.iterdir():
+        kept.write_text("a failed 1\n", encoding="utf-8")
+    assert soak.main([*soaked, "3"]) == 1
