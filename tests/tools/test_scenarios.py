@@ -136,6 +136,24 @@ def test_what_a_mark_says_wrongly_is_said_in_one_line(pytester: pytest.Pytester)
     )
 
 
+def test_a_ground_link_is_bad_where_the_command_line_or_a_mark_says_so(pytester: pytest.Pytester) -> None:
+    source = """
+        import pytest
+
+        def test_as_the_command_line_says(sitl):
+            assert (sitl.link.ground.loss, sitl.link.ground.jitter_s) == (0.3, 0.05)
+            sitl.set_param("RTL_RETURN_ALT", 7.0)
+
+        @pytest.mark.sitl(ground="loss=0.1")
+        def test_as_a_mark_says(sitl):
+            assert (sitl.link.ground.loss, sitl.link.ground.jitter_s) == (0.1, 0.0)
+        """
+    run(pytester, source, "--sitl-ground", "loss=0.3,jitter_s=0.05").assert_outcomes(passed=2)
+    result = run(pytester, source, "--sitl-ground", "lost=0.3")
+    result.assert_outcomes(errors=1, passed=1)
+    result.stdout.fnmatch_lines(["a link does no lost: choose corrupt, delay_s, *"])
+
+
 def test_who_does_not_fly_does_not_load_what_flies(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         "import sys\n\ndef test():\n    assert not {'numpy', 'numba', 'pymavlink'} & set(sys.modules)\n"

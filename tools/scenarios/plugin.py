@@ -58,6 +58,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default="sitl-failures",
         help="where a failed test leaves its flights (default %(default)s)",
     )
+    add(
+        "--sitl-ground",
+        metavar="KEY=VALUE,...",
+        help="what links to ground stations do where a test says nothing of them: loss=0.3,jitter_s=0.05",
+    )
     add("--sitl-hashes", metavar="FILE", help="write each test's outcome and the hash of its flights there")
 
 
@@ -117,9 +122,11 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     if report.failed:
         folder = Path(item.config.getoption("--sitl-keep")) / _file_name(item.nodeid)
         places = flights.keep(folder)
-        link = item.config.getoption("--sitl-link")
+        link, ground = item.config.getoption("--sitl-link"), item.config.getoption("--sitl-ground")
         lines = [f"flight kept in {place}" for place in places]
-        lines.append(f"replay: pytest '{item.nodeid}' --sitl-link {link}")
+        lines.append(
+            f"replay: pytest '{item.nodeid}' --sitl-link {link}" + (f" --sitl-ground {ground}" if ground else "")
+        )
         report.sections.append(("sitl", "\n".join(lines)))
     return report
 
@@ -168,7 +175,8 @@ def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack)
     if known is not None:
         return known
     try:
-        setting = setting_of(_said(request.node, seed))
+        ground = request.config.getoption("--sitl-ground")
+        setting = setting_of([*([{"ground": ground}] if ground else []), *_said(request.node, seed)])
     except SettingError as error:
         pytest.fail(str(error), pytrace=False)
     flights = stack.enter_context(Flights(setting, _launcher(request.config)))

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from tools.scenarios.links import Trouble
+
 _STANDING = {"x": 0.0, "y": 0.0, "z": 0.0, "psi": 90.0, "rotors": 0.0}
 """On its feet at the origin, its nose to the north."""
 
@@ -37,6 +39,7 @@ class Setting:
         params: Parameters that were changed before.
         track: Flown from time 0 on; the vehicle must be in the air.
         home: "LAT,LON,ALT,YAW": the origin of the ENU frame.
+        ground: What links to ground stations do: loss, delay_s, jitter_s, duplicate, reorder, corrupt, as in `Trouble`.
         latency: One way between plant and autopilot, ms: commands act so much later, twice.
         without: Parts that are left out of the vehicle: "drag", "ground", "battery", "rotor-lag".
         identity: Towards ground stations: "px4" or "generic".
@@ -58,6 +61,7 @@ class Setting:
     params: Mapping[str, float] = field(default_factory=dict)
     track: str | None = None
     home: str | None = None
+    ground: Mapping[str, float] = field(default_factory=dict)
     latency: float = 0.0
     without: tuple[str, ...] = ()
     identity: str = "px4"
@@ -100,6 +104,7 @@ class Setting:
 
 
 KEYS = frozenset(each.name for each in fields(Setting))
+DOES = frozenset(each.name for each in fields(Trouble)) - {"down"}
 
 
 def setting_of(said: Iterable[Mapping[str, Any]]) -> Setting:
@@ -119,16 +124,20 @@ def setting_of(said: Iterable[Mapping[str, Any]]) -> Setting:
     for name in ("gusts", "without"):
         if isinstance(values.get(name), str):
             values[name] = (values[name],)
-    if isinstance(values.get("start"), str):
-        values["start"] = _start(values["start"])
+    for name in ("start", "ground"):
+        if isinstance(values.get(name), str):
+            values[name] = _numbers(name, values[name])
+    unknown = sorted(set(values.get("ground", ())) - DOES)
+    if unknown:
+        raise SettingError(f"a link does no {unknown[0]}: choose {', '.join(sorted(DOES))}")
     return Setting(**{**values, "params": params})
 
 
-def _start(text: str) -> dict[str, float]:
+def _numbers(name: str, text: str) -> dict[str, float]:
     try:
         return {key: float(value) for key, value in (pair.split("=", 1) for pair in text.split(","))}
     except ValueError:
-        raise SettingError(f"a start is KEY=VALUE,..., not {text!r}") from None
+        raise SettingError(f"{name} is KEY=VALUE,..., not {text!r}") from None
 
 
 def _given(option: str, value: str | None) -> tuple[str, ...]:

@@ -72,7 +72,7 @@ class Sitl:
         """Begin a flight on a stage; `origin` is that of the ENU frame."""
         self.setting = setting
         self.origin = origin
-        self.link = Links(Trouble(), stage.trouble)
+        self.link = Links(Trouble(**dict[str, Any](setting.ground)), stage.trouble)
         self.record = Record()
         self._stage = stage
         self._said = Turn(0, ())
