@@ -1,6 +1,7 @@
 """A plant that waits for nobody: it flies by the wall clock, stops its rotors in silence, and is picked up again."""
 
 import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,17 @@ def autopilot_for(logs: Path, url: str) -> Process:
     return Process(logs, "autopilot", "--plant", url, "--track", "hover:height=500")
 
 
+def flown_on(plant: Process, seconds: float) -> Callable[[], bool]:
+    """Return what tells whether it has been answered without a break for so long, simulated."""
+    since: dict[int, float] = {}
+
+    def has() -> bool:
+        silences, now_s = len(plant.events("silence")), plant.events("progress")[-1]["sim_time_s"]
+        return bool(now_s - since.setdefault(silences, now_s) > seconds)
+
+    return has
+
+
 def test_rotors_stop_when_the_autopilot_dies_and_turn_for_the_next(tmp_path: Path) -> None:
     logs, out = tmp_path / "logs", tmp_path / "flight"
     logs.mkdir()
@@ -41,6 +53,7 @@ def test_rotors_stop_when_the_autopilot_dies_and_turn_for_the_next(tmp_path: Pat
         with running(second):
             answered = len(plant.events("answered"))
             wait_for(lambda: len(plant.events("answered")) > answered, "an answer")
+            wait_for(flown_on(plant, 0.5), "half a second without another silence")
             plant.process.send_signal(signal.SIGINT)
             assert plant.wait() == 130
     truth = np.genfromtxt(out / "plant.csv", delimiter=",", skip_header=1)
