@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out/spiral
 
-.PHONY: setup fly test lint test-clients fuzz scenarios scenarios-rough soak soak-clients kills bench lock clean
+.PHONY: setup fly test test-long lint test-clients fuzz scenarios scenarios-rough soak soak-clients kills bench lock clean
 
 setup: .venv/.ready
 
@@ -28,6 +28,10 @@ lint: setup
 
 test: lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+# What takes long and shows more of the same: whole commands timed, kills in missions, 500 items over a bad link.
+test-long: setup
+	$(BIN)/python -m pytest -m long -n 2 --dist worksteal
 
 # MAVSDK, MAVProxy and DroneKit fly the vehicle: minutes each. MAVSDK_EXAMPLES=FOLDER, a checkout of MAVSDK-Python, has
 # its examples flown too; they need the ports 14540 and 50051. TABLE=FILE keeps what came of them, as Markdown.

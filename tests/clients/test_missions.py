@@ -20,6 +20,7 @@ def bits(items: list[Item]) -> list[bytes]:
     return [struct.pack("<BHB4fiif", *item) for item in items]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1])
 def test_500_items_over_a_link_that_loses_a_fifth_each_way(tmp_path: Path, seed: int) -> None:
     with vehicle(tmp_path, speed=SPEED) as flown, BadLink(f"udpout:127.0.0.1:{flown.port}", seed) as relay:

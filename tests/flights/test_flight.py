@@ -32,13 +32,13 @@ def vehicle_file(folder: Path, **changes: str) -> str:
 @pytest.mark.parametrize(
     ("track", "duration_s", "reach_m"),
     [
-        ("spiral", 30, 0.001),
-        ("expanding-spiral", 50, 0.005),
-        ("line", 30, 0.001),
-        ("wave", 30, 0.002),
-        ("crown", 30, 0.003),
+        ("spiral", 25, 0.001),
+        ("expanding-spiral", 40, 0.005),
+        ("line", 25, 0.001),
+        ("wave", 25, 0.002),
+        ("crown", 25, 0.003),
         ("lemniscate", 32, 0.005),
-        ("lemniscate:yaw=fixed", 32, 0.002),
+        ("lemniscate:yaw=fixed", 26, 0.002),
     ],
 )
 def test_every_track_is_tracked(tmp_path: Path, track: str, duration_s: int, reach_m: float) -> None:

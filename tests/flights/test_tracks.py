@@ -39,7 +39,9 @@ def flown_directly(name: str, profile: str = "thesis") -> tuple[dict[str, Any], 
         return figures, rows(Path(folder) / "flight.csv")
 
 
-@pytest.mark.parametrize("name", ["expanding-spiral", "wave", "crown"])
+@pytest.mark.parametrize(
+    "name", ["expanding-spiral", *(pytest.param(name, marks=pytest.mark.long) for name in ("wave", "crown"))]
+)
 def test_a_track_over_udp_is_the_one_flown_directly(tmp_path: Path, name: str) -> None:
     """But for float32 on the wire, which costs 2e-5 where a track stays near the origin, more at 200 m from it."""
     over_udp, (direct, wanted) = fly_thesis(tmp_path, name, "--link", "udp", "--duration", "40"), flown_directly(name)

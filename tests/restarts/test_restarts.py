@@ -9,6 +9,7 @@ from tests.restarts import autopilots, plants
 from tests.restarts.__main__ import failures_of
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("feedback", list(Feedback))
 def test_autopilots_killed_in_a_mission(tmp_path: Path, feedback: Feedback) -> None:
     flight = autopilots.fly(tmp_path / "flight", feedback, seed=4, most_kills=2, legs=1)

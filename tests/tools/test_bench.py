@@ -91,12 +91,14 @@ def test_the_peer_flies() -> None:
     assert peer.real_time_factor(100, 0.2) > 0.0
 
 
+@pytest.mark.long
 def test_the_spiral_flies_through_the_whole_command(tmp_path: Path) -> None:
     thesis = figures_of(tmp_path / "thesis.json", "--only", "thesis")["thesis"]
     assert {name.partition(":")[0] for name in thesis} == set(speed.THESIS_LINKS)
     assert all(0.0 < figure["min"] <= figure["median"] <= figure["max"] for figure in thesis.values())
 
 
+@pytest.mark.long
 def test_serving_ground_stations_is_measured_and_what_it_does_to_the_control_step(tmp_path: Path) -> None:
     ground = figures_of(tmp_path / "ground.json", "--only", "ground")["ground"]
     assert {int(channels) for channels in ground["serve"]} == set(serving.CHANNELS)
