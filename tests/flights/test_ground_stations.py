@@ -19,7 +19,13 @@ DURATION = ("--duration", "6")
 WATCHED = ("HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY", "AUTOPILOT_VERSION", "PARAM_VALUE", "PING")
 
 
-@pytest.mark.parametrize(("track", "profile"), [("lemniscate", "flight"), ("circle", "se3"), ("wave", "thesis")])
+@pytest.mark.parametrize(
+    ("track", "profile"),
+    [
+        ("lemniscate", "flight"),
+        *(pytest.param(*flown, marks=pytest.mark.long) for flown in (("circle", "se3"), ("wave", "thesis"))),
+    ],
+)
 def test_a_watched_flight_is_the_same_bit_for_bit(tmp_path: Path, track: str, profile: str) -> None:
     asked = ("--profile", profile, *DURATION)
     alone = fly(tmp_path / "alone", track, "--link", "memory", *asked)

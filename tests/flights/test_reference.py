@@ -30,7 +30,7 @@ def test_direct_equals_the_reference(tmp_path: Path, track: str, integrator: str
     assert (figures["frames"], figures["resent"], figures["qp_failures"]) == (1000, 0, 0)
 
 
-@pytest.mark.parametrize("track", TRACKS)
+@pytest.mark.parametrize("track", ["spiral", pytest.param("line", marks=pytest.mark.long)])
 def test_udp_equals_the_reference_and_memory_bit_for_bit(tmp_path: Path, track: str) -> None:
     flights = [
         fly_thesis(tmp_path / "udp", track, "--link", "udp"),
