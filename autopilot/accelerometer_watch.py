@@ -110,6 +110,8 @@ class AccelerometerWatch:
         return self._judge(len(self._fixes) - 1 - self._rejected)
 
     def _judge(self, first: int) -> Found | None:
+        if first < _FEWEST_BEFORE:
+            return None
         rows = np.array(
             [
                 (time_us * 1e-6, *state, *innovation, height if tested_us != before_us else nan)
@@ -117,8 +119,6 @@ class AccelerometerWatch:
             ]
         )
         found = np.empty((3, 3))
-        if first < _FEWEST_BEFORE:
-            return None
         variance = find_bias(rows, first, self._velocity_variance, self._height_variance, self._gravity, found)
         return Found(found[0], variance, found[1], found[2]) if variance > 0.0 else None
 

@@ -1,11 +1,10 @@
 """What must hold before the rotors may turn; every check says why it fails."""
 
 from collections.abc import Callable
-from math import acos, degrees
 from typing import NamedTuple
 
 from autopilot.controller import VehicleState
-from mavlink.frames import rotation_matrix
+from mavlink.frames import tilt_deg
 
 LARGEST_TILT_DEG = 45.0
 LARGEST_SPEED_M_S = 0.5
@@ -40,8 +39,10 @@ class Facts(NamedTuple):
 
 def _tilt(facts: Facts) -> str:
     assert facts.state is not None
-    tilt_deg = degrees(acos(min(1.0, max(-1.0, rotation_matrix(facts.state.attitude)[2][2]))))
-    return f"tilted by {tilt_deg:.0f} degrees, more than {LARGEST_TILT_DEG:.0f}" if tilt_deg > LARGEST_TILT_DEG else ""
+    tilted_deg = tilt_deg(facts.state.attitude)
+    if tilted_deg <= LARGEST_TILT_DEG:
+        return ""
+    return f"tilted by {tilted_deg:.0f} degrees, more than {LARGEST_TILT_DEG:.0f}"
 
 
 def _speed(facts: Facts) -> str:

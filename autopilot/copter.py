@@ -10,7 +10,7 @@ from autopilot.behaviour import Behaviour
 from autopilot.companion import Companion
 from autopilot.conditions import NEVER_US, Seen
 from autopilot.controller import Clock, Decision, VehicleState
-from autopilot.core import STILL, Step, follows
+from autopilot.core import STILL, Step, follows, nothing_known
 from autopilot.course import Course, Scene, Steered
 from autopilot.courses import Along, Climb, Legs, Stop, homeward, landing, to_track
 from autopilot.failsafes import Action, Condition
@@ -188,9 +188,7 @@ class Copter:
             self._waiting_us = frame.time_us
             if self._time_us is not None:  # another flight, of which nothing is known yet
                 self.stations.restart = REBOOT
-            return Step(
-                ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s, known=False
-            )
+            return nothing_known(frame.time_us, self._clock() - started_s)
         if not goes_on:
             self._missed_us = self._time_us if self._missed_us is None else self._missed_us
             self._begin(known)

@@ -44,6 +44,11 @@ class Step(NamedTuple):
     known: bool = True
 
 
+def nothing_known(time_us: int, duration_s: float) -> Step:
+    """Return the answer to a frame of a vehicle of which nothing is known."""
+    return Step(ActuatorCommand(time_us, STILL, armed=False), None, duration_s, known=False)
+
+
 class Autopilot:
     """Flies one track with one control law.
 
@@ -97,9 +102,7 @@ class Autopilot:
         known = self._senses.state(frame, asked=due)
         if known is None:
             self._time_us = None
-            return Step(
-                ActuatorCommand(frame.time_us, STILL, armed=False), None, self._clock() - started_s, known=False
-            )
+            return nothing_known(frame.time_us, self._clock() - started_s)
         if not follows(frame.time_us, self._time_us, self.frame_interval_us):
             self._begin(frame)
         self._time_us = frame.time_us

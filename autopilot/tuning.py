@@ -15,7 +15,7 @@ from autopilot.controller import (
     check_rotor_speeds,
     load_controller,
 )
-from autopilot.parameters import Numbers
+from autopilot.parameters import ImpossibleError, Numbers
 from autopilot.profile import Profile
 from mavlink.parameters import Refusal, Value
 from plant.vehicle import Vehicle
@@ -64,6 +64,9 @@ class Tuning:
             return None
         try:
             profile, vehicle = self._numbers.applied(values)
+        except ImpossibleError:
+            return Refusal.VALUE_OUT_OF_RANGE
+        try:
             controller = self._build(profile, vehicle)
             _try(profile.controller, controller, vehicle)
         except Exception:  # a control law of somebody else refuses numbers, or fails by them, in its own way

@@ -5,7 +5,7 @@ cannot be changed by whoever reads them. Quaternions are wxyz, Hamilton, and rot
 Euler angles are Z-Y'-X'': yaw psi, pitch theta, roll phi.
 """
 
-from math import asin, atan2, cos, floor, pi, sin, sqrt
+from math import acos, asin, atan2, cos, degrees, floor, pi, sin, sqrt
 from typing import TypeAlias
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -57,6 +57,11 @@ def rotation_matrix(q: Quaternion) -> Matrix:
         (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
         (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
     )
+
+
+def tilt_deg(q: Quaternion) -> float:
+    """Return how far the body's z axis points from straight up, degrees."""
+    return degrees(acos(min(1.0, max(-1.0, rotation_matrix(q)[2][2]))))
 
 
 def earth_from_body(q: Quaternion, vector: Vector) -> Vector:

@@ -15,7 +15,7 @@ from autopilot.senses import estimator_for
 from autopilot.stations import StationSettings
 from mavlink.failures import MOTOR, OFF, WRONG, Fault
 from mavlink.feedback import Feedback
-from mavlink.frames import rotation_matrix
+from mavlink.frames import tilt_deg
 from mavlink.geodesy import DEFAULT_ORIGIN
 from plant.core import Plant
 from plant.scenario import Start
@@ -211,5 +211,4 @@ def _step(copter: Copter, plant: Plant) -> tuple[float, ...]:
 
 def _seen(plant: Plant) -> tuple[float, ...]:
     frame = state_frame(plant.world)
-    up = min(max(rotation_matrix(frame.attitude)[2][2], -1.0), 1.0)
-    return (*frame.position_enu_m, frame.velocity_enu_m_s[2], float(np.degrees(np.arccos(up))), frame.rate_flu_rad_s[2])
+    return (*frame.position_enu_m, frame.velocity_enu_m_s[2], tilt_deg(frame.attitude), frame.rate_flu_rad_s[2])

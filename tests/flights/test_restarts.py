@@ -1,7 +1,7 @@
 """The autopilot is killed in flight and started again: with what was kept of the flight it goes on."""
 
 from collections.abc import Callable
-from math import acos, degrees, dist, hypot, nan
+from math import degrees, dist, hypot, nan
 
 import pytest
 
@@ -11,7 +11,7 @@ from autopilot.profile import load_profile
 from mavlink.dialect import mav
 from mavlink.failures import MOTOR, WRONG
 from mavlink.feedback import Feedback
-from mavlink.frames import Vector, rotation_matrix
+from mavlink.frames import Vector, tilt_deg
 from mavlink.services.mission_items import FENCE, RALLY
 from plant.world import state_frame
 from tests.flights.copter import ACCEPTED, DENIED, CopterFlight, in_the_air
@@ -149,7 +149,7 @@ def test_a_landing_on_three_rotors_goes_on() -> None:
     tilts: list[float] = []
 
     def landed() -> bool:
-        tilts.append(degrees(acos(rotation_matrix(state_frame(flight.world).attitude)[2][2])))
+        tilts.append(tilt_deg(state_frame(flight.world).attitude))
         return not flight.armed
 
     flight.until(landed, 20.0)

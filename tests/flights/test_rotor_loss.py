@@ -1,16 +1,16 @@
 """A rotor is lost in flight: the vehicle says so, gives up yaw, stays upright and lands; whatever flew it before."""
 
-from math import acos, degrees, dist, hypot
+from math import dist, hypot
 from typing import NamedTuple
 
 import pytest
 from msgspec import structs
 
 from autopilot.modes import Mode
+from mavlink import frames
 from mavlink.dialect import mav
 from mavlink.failures import MOTOR, OFF, WRONG
 from mavlink.feedback import Feedback
-from mavlink.frames import rotation_matrix
 from plant.world import state_frame
 from tests.flights.copter import ACCEPTED, DENIED, FLIGHT, CopterFlight, in_the_air
 
@@ -42,7 +42,7 @@ class Fall(NamedTuple):
 
 
 def tilt_deg(flight: CopterFlight) -> float:
-    return degrees(acos(min(1.0, rotation_matrix(state_frame(flight.world).attitude)[2][2])))
+    return frames.tilt_deg(state_frame(flight.world).attitude)
 
 
 def fall(flight: CopterFlight, rotor: int) -> Fall:

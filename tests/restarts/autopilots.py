@@ -11,6 +11,7 @@ from mavlink.feedback import Feedback
 from tests.restarts.between import COMPILES_S, Between, Phase
 from tests.restarts.station import HOVERS, LEGS, Station, mission
 from tests.runs import Array, Process, rows
+from tools.scenarios.record import tilt_deg
 
 _APART_S, _SPREAD_S = 1.8, 1.6
 _JUDGED_S = 2.0
@@ -153,7 +154,7 @@ class _Killer:
 def judged(truth: dict[str, Array], kills: list[_Killed]) -> list[Kill]:
     """Return what the vehicle did after each kill."""
     t, place = truth["t"], np.stack([truth[axis] for axis in "xyz"], axis=1)
-    tilt = np.degrees(np.arccos(np.clip(1.0 - 2.0 * (truth["qx"] ** 2 + truth["qy"] ** 2), -1.0, 1.0)))
+    tilt = tilt_deg(truth)
     speed = np.sqrt(truth["u"] ** 2 + truth["v"] ** 2 + truth["w"] ** 2)
     found = []
     for kill, following in zip(kills, [*kills[1:], None], strict=True):

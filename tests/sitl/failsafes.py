@@ -37,13 +37,12 @@ from tests.sitl.steps import (
     start_mission,
     sticks,
     takeoff,
-    tilt_deg,
     until,
     upload,
     upload_fence,
 )
 from tools.scenarios import items
-from tools.scenarios.record import Columns
+from tools.scenarios.record import Columns, tilt_deg
 from tools.scenarios.sitl import Sitl
 
 PLACE = (0.0, 0.0, 5.0)

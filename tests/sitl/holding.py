@@ -17,7 +17,6 @@ from tests.sitl.steps import (
     run,
     select,
     sticks,
-    tilt_deg,
     until,
 )
 
@@ -88,7 +87,7 @@ SCENARIOS = (
         steps=(
             run(1.5),
             measured("the tilt", most_tilted, 20.0),
-            lambda sitl: kicked(tilt_deg(sitl.flown()).max()),
+            lambda sitl: kicked(most_tilted(sitl.flown())),
             check(every(tilted_less(1.0), near(PLACE, 0.3))),
         ),
         setting=KICKED,

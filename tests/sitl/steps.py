@@ -16,7 +16,7 @@ from mavlink.services.mission_items import MissionItem
 from tests.sitl.conditions import Condition
 from tests.sitl.scenario import Step
 from tools.scenarios.items import Item
-from tools.scenarios.record import Columns
+from tools.scenarios.record import Columns, tilt_deg
 from tools.scenarios.sitl import Sitl
 from tools.scenarios.station import RefusedError
 
@@ -223,11 +223,6 @@ def farthest_from(place: Sequence[float]) -> Callable[[Columns], float]:
 def highest(columns: Columns) -> float:
     """Return the figure: how high it was at most."""
     return float(columns["z"].max())
-
-
-def tilt_deg(columns: Columns) -> Array:
-    """Return how far thrust pointed from straight up, degrees, (n,)."""
-    return np.degrees(np.arccos(np.clip(1.0 - 2.0 * (columns["qx"] ** 2 + columns["qy"] ** 2), -1.0, 1.0)))
 
 
 def most_tilted(columns: Columns) -> float:

@@ -1,16 +1,13 @@
 """A vehicle in flight as a test sees it: orders that wait for their answer, and time that passes only when told to."""
 
-from collections.abc import Callable, Iterable, Sequence
-from math import acos, degrees, dist, hypot, nan, pi
+from collections.abc import Callable, Iterable
+from math import dist, nan, pi
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from autopilot.behaviour_parameters import TRACKS
-from autopilot.modes import Mode, custom_mode, mode_of_custom
+from autopilot.modes import Mode, custom_mode
 from mavlink.dialect import AUTOPILOT_COMPONENT, mav
-from mavlink.frames import Vector, euler_from_quaternion, ned_from_enu
+from mavlink.frames import Vector, ned_from_enu
 from mavlink.geodesy import Geodetic, geodetic_of
 from mavlink.hil import ActuatorCommand
 from mavlink.parameters import Value
@@ -19,17 +16,15 @@ from mavlink.turns import Parcel, Turn
 from tools.scenarios import items
 from tools.scenarios.items import Item, on_wire
 from tools.scenarios.links import Trouble
-from tools.scenarios.record import Columns, Record
+from tools.scenarios.record import Record
 from tools.scenarios.setting import Setting
 from tools.scenarios.stage import Stage
 from tools.scenarios.station import RefusedError, Station
+from tools.scenarios.view import View
 
 FORCE = 21196.0
 """What a command to arm or disarm needs to pass over every check."""
 READY_WITHIN_S = 40.0
-_NEAR_M = {"state": 0.3, "sensors": 2.0}
-"""Closer than this it is there: an estimate is as far from the truth as GPS is."""
-_SLOW_M_S = 0.3
 
 
 class NotInTimeError(AssertionError):
@@ -49,19 +44,17 @@ class Links(NamedTuple):
     plant: Trouble
 
 
-class Sitl:
+class Sitl(View):
     """A vehicle, its plant, its ground stations, and the links between them.
 
-    Positions and velocities are true, ENU, m and m/s; the origin is where the vehicle stood, or what `home` says.
+    What it looks like is in `View`.
 
     Attributes:
-        setting: What the flight began with.
         items: Items of missions and fences, `items.waypoint(3.0, 0.0, 5.0)` say.
         Refused: What is raised where the vehicle refuses.
         NotInTime: What is raised where something does not come about, an AssertionError.
         gcs: The first ground station; what `Sitl` does itself it does through it.
         link: What the links do.
-        record: All that was flown.
     """
 
     items = items
@@ -375,118 +368,6 @@ class Sitl:
         station = Station(self, number, system=system, component=component, trouble=trouble, seed=seed, beats=beats)
         self._stations.append(station)
         return station
-
-    # What it looks like.
-
-    @property
-    def time_us(self) -> int:
-        """Simulated time, µs."""
-        return self._stage.truth.time_us
-
-    @property
-    def time_s(self) -> float:
-        """Simulated time, s."""
-        return self.time_us * 1e-6
-
-    @property
-    def system(self) -> int:
-        """The vehicle's system id."""
-        return self.setting.system
-
-    @property
-    def position(self) -> Vector:
-        """Where the vehicle is."""
-        return self._stage.truth.position_enu_m
-
-    @property
-    def velocity(self) -> Vector:
-        """How fast it flies."""
-        return self._stage.truth.velocity_enu_m_s
-
-    @property
-    def speed_m_s(self) -> float:
-        """How fast, whatever the direction."""
-        return hypot(*self.velocity)
-
-    @property
-    def rates(self) -> Vector:
-        """Body rates p, q, r, FLU, rad/s."""
-        return self._stage.truth.rate_flu_rad_s
-
-    @property
-    def euler(self) -> Vector:
-        """Roll, pitch, yaw, FLU to ENU, rad."""
-        return euler_from_quaternion(self._stage.truth.attitude)
-
-    @property
-    def tilt_deg(self) -> float:
-        """How far its thrust points from straight up, degrees."""
-        _, x, y, _ = self._stage.truth.attitude
-        return degrees(acos(max(-1.0, min(1.0, 1.0 - 2.0 * (x * x + y * y)))))
-
-    @property
-    def mode(self) -> Mode | None:
-        """The flight mode, as the autopilot has it at this frame, whatever the links do."""
-        return mode_of_custom(self._said.custom_mode)
-
-    @property
-    def armed(self) -> bool:
-        """Whether its rotors may turn, as the autopilot has it at this frame."""
-        return self._said.armed
-
-    @property
-    def home(self) -> Vector | None:
-        """Where home is, as HOME_POSITION said last; None before."""
-        if not self.gcs.heard["HOME_POSITION"]:
-            return None
-        told = self.gcs.latest("HOME_POSITION")
-        return ned_from_enu((told.x, told.y, told.z))
-
-    @property
-    def texts(self) -> list[str]:
-        """Every STATUSTEXT that the first ground station has heard."""
-        return self.gcs.texts
-
-    def said(self, part: str) -> bool:
-        """Whether a STATUSTEXT has said so."""
-        return self.gcs.said(part)
-
-    def heard(self, name: str) -> list[Any]:
-        """Return all messages of a name that the first ground station has heard, as their fields."""
-        return self.gcs.heard[name]
-
-    def is_at(self, place: Sequence[float], near_m: float | None = None, slow_m_s: float = _SLOW_M_S) -> bool:
-        """Whether it is near a place, ENU, and hardly moves; near is 0.3 m, or 2 m on sensors."""
-        near_m = _NEAR_M[self.setting.feedback] if near_m is None else near_m
-        return dist(place, self.position) < near_m and self.speed_m_s < slow_m_s
-
-    def flown(self, since_s: float = 0.0) -> Columns:
-        """Return `record.COLUMNS` from a time on, an array each."""
-        return self.record.columns(since_s)
-
-    @property
-    def path(self) -> NDArray[np.float64]:
-        """Where it was at each frame, ENU, (n, 3)."""
-        flown = self.flown()
-        return np.stack([flown["x"], flown["y"], flown["z"]], axis=1)
-
-    @property
-    def processes(self) -> dict[str, int]:
-        """Numbers of the processes "plant" and "autopilot"; empty in memory."""
-        return self._stage.processes()
-
-    @property
-    def sha256(self) -> str:
-        """Of the whole flight: truth and command at each frame. The same on every machine of a kind, on every link."""
-        return self.record.sha256
-
-    def __str__(self) -> str:
-        """Return how it is, for who reads a failed test."""
-        east, north, up = self.position
-        words = f"t = {self.time_s:.3f} s, {self.mode or 'no mode'}, {'armed' if self.armed else 'disarmed'}"
-        where = f"at ({east:.2f}, {north:.2f}, {up:.2f}) m, {self.speed_m_s:.2f} m/s, tilt {self.tilt_deg:.1f} degrees"
-        last = f"; last said: {'; '.join(self.texts[-3:])}" if self.texts else ""
-        return f"{words}, {where}{last}"
 
 
 def _number(kind: str, of: str | int) -> int:
