@@ -76,6 +76,23 @@ def test_a_run_ends_with_its_sum_which_is_the_same_again(pytester: pytest.Pytest
     assert not (pytester.path / "sitl-failures").exists()
 
 
+def test_a_flight_is_gone_when_its_test_is_over(pytester: pytest.Pytester) -> None:
+    text = """
+        import gc
+        import weakref
+
+        flown = []
+
+        def test_one(sitl):
+            flown.append(weakref.ref(sitl))
+
+        def test_two():
+            gc.collect()
+            assert flown[0]() is None
+    """
+    run(pytester, text).assert_outcomes(passed=2)
+
+
 def test_a_failed_test_keeps_its_flight_and_says_how_to_fly_it_again(pytester: pytest.Pytester) -> None:
     result = run(
         pytester,

@@ -116,7 +116,12 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
     """Keep the flights of a failed test, and tell the end of the run of all."""
     report = yield
     flights = item.stash.get(_FLIGHTS, None)
-    if flights is None or report.when == "teardown" or (report.when == "setup" and report.passed):
+    if flights is None:
+        return report
+    if report.when == "teardown":
+        del item.stash[_FLIGHTS]
+        return report
+    if report.when == "setup" and report.passed:
         return report
     setattr(report, FLOWN, flights.summary())
     if report.failed:
