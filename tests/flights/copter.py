@@ -1,9 +1,8 @@
 """A whole vehicle in one process: plant and autopilot in lockstep on simulated time, flown by clients over MAVLink.
 
-Nothing is simulated of the links but the bytes: a client encodes what it sends, and decodes what it is sent.
+Nothing is simulated of the links but the bytes.
 """
 
-from collections import Counter, defaultdict
 from collections.abc import Callable
 from dataclasses import replace
 from math import nan, pi
@@ -12,7 +11,7 @@ from typing import Any
 import pytest
 from msgspec import structs
 
-from autopilot.copter import Copter, Received
+from autopilot.copter import Copter
 from autopilot.estimate import Estimate
 from autopilot.kept import Kept, Past
 from autopilot.modes import Mode, custom_mode, mode_of_custom
@@ -20,7 +19,7 @@ from autopilot.profile import Profile, load_profile
 from autopilot.senses import estimator_for
 from autopilot.stations import StationSettings
 from autopilot.tracks import Track
-from mavlink.dialect import Codec, Message, mav
+from mavlink.dialect import mav
 from mavlink.failures import Fault
 from mavlink.feedback import Feedback
 from mavlink.files import Files
@@ -35,99 +34,18 @@ from plant.core import Plant
 from plant.scenario import Start
 from plant.vehicle import Vehicle, load_vehicle
 from plant.world import Physics, World, starting_world, state_frame
+from tests.flights.client import COMPONENT, SYSTEM, Client
 from tests.plant.flights import blowing
 
-SYSTEM, COMPONENT = 1, 1
-GCS_PORT, SDK_PORT = 14550, 14540
 STANDING = Start()
 """On its feet: z counts from where the vehicle stands."""
 NO_CLOCK_S = 0.0
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 DENIED: int = mav.MAV_RESULT_DENIED
 FORCE = 21196.0
-_KEPT = 4000
 _AS_IT_IS = load_profile("flight")
 FLIGHT = structs.replace(_AS_IT_IS, simulation=structs.replace(_AS_IT_IS.simulation, frame_interval_s=None))
 """The flight profile with a frame for each control sample and none between: a third less to compute."""
-
-
-class Client:
-    """A ground station, or whatever else speaks MAVLink to the vehicle.
-
-    Attributes:
-        system: Its system id.
-        component: Its component id.
-        address: Where the vehicle sees it.
-        heard: Messages from the vehicle that were decoded, by name, the latest last.
-        acks: Every COMMAND_ACK, in order.
-        texts: Every STATUSTEXT, in order.
-    """
-
-    def __init__(self, system: int = 255, component: int = 190, port: int = GCS_PORT, link: int = 0) -> None:
-        """Be a component at a port of this computer."""
-        self.system, self.component = system, component
-        self.link = link
-        self.address = ("127.0.0.1", port)
-        self._codec = Codec(system, component)
-        self._to_send: list[bytes] = []
-        self.heard: defaultdict[str, list[Any]] = defaultdict(list)
-        self.counts: Counter[str] = Counter()
-        self.acks: list[Any] = []
-        self.texts: list[str] = []
-
-    def send(self, name: str, *fields: Any) -> None:
-        """Send a message with the next frame."""
-        self._to_send.append(self._codec.encode(name, *fields))
-
-    def send_raw(self, datagram: bytes) -> None:
-        """Send any bytes with the next frame."""
-        self._to_send.append(datagram)
-
-    def take_sent(self) -> list[Received]:
-        """Return what is on its way to the vehicle, and forget it."""
-        sent, self._to_send = self._to_send, []
-        return [Received(datagram, self.link, self.address) for datagram in sent]
-
-    def receive(self, datagram: bytes) -> None:
-        """Decode what the vehicle sent."""
-        for message in self._codec.decode(datagram):
-            self._hear(message)
-
-    def _hear(self, message: Message) -> None:
-        if message.source != (SYSTEM, COMPONENT):
-            return
-        self.counts[message.name] += 1
-        kept = self.heard[message.name]
-        kept.append(message.fields)
-        if len(kept) > _KEPT:
-            del kept[: _KEPT // 2]
-        if message.name == "COMMAND_ACK":
-            self.acks.append(message.fields)
-        elif message.name == "STATUSTEXT":
-            self._hear_text(message.fields)
-
-    def _hear_text(self, fields: Any) -> None:
-        """Take in a line; a long one comes in chunks of 50 characters."""
-        if fields.chunk_seq:
-            self.texts[-1] += fields.text
-        else:
-            self.texts.append(fields.text)
-
-    def forget(self) -> None:
-        """Forget all but the latest of each message."""
-        for kept in self.heard.values():
-            del kept[:-1]
-        self.acks.clear()
-        self.texts.clear()
-
-    def latest(self, name: str) -> Any:
-        """Return the last message of a name."""
-        assert self.heard[name], f"no {name} was heard"
-        return self.heard[name][-1]
-
-    def said(self, part: str) -> bool:
-        """Whether a STATUSTEXT said so."""
-        return any(part in text for text in self.texts)
 
 
 def in_the_air(height_m: float = 5.0, **settings: Any) -> "CopterFlight":

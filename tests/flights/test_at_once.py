@@ -6,7 +6,8 @@ import pytest
 
 from autopilot.modes import Mode, custom_mode
 from mavlink.dialect import mav
-from tests.flights.copter import COMPONENT, SYSTEM, CopterFlight
+from tests.flights.client import COMPONENT, SYSTEM
+from tests.flights.copter import CopterFlight
 
 POSITION_ONLY = 0x9F8
 

@@ -10,7 +10,8 @@ from autopilot.modes import Mode
 from mavlink.dialect import mav
 from mavlink.failures import MOTOR, OFF
 from mavlink.services.mission_items import FENCE, MissionItem
-from tests.flights.copter import ACCEPTED, DENIED, FLIGHT, Client, CopterFlight, in_the_air
+from tests.flights.client import Client
+from tests.flights.copter import ACCEPTED, DENIED, FLIGHT, CopterFlight, in_the_air
 
 SAMPLE_S = 0.008
 RETURN, LAND = 2, 3

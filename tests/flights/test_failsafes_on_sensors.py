@@ -12,7 +12,8 @@ from mavlink.feedback import Feedback
 from mavlink.geodesy import Geodetic
 from mavlink.hil import StateFrame
 from mavlink.sensors import Frame, SensorFrame, Updated
-from tests.flights.copter import ACCEPTED, DENIED, Client, CopterFlight, in_the_air
+from tests.flights.client import Client
+from tests.flights.copter import ACCEPTED, DENIED, CopterFlight, in_the_air
 
 GPS, OFF, OK = (float(number) for number in (mav.FAILURE_UNIT_SENSOR_GPS, mav.FAILURE_TYPE_OFF, mav.FAILURE_TYPE_OK))
 

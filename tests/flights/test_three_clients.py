@@ -5,7 +5,8 @@ import gc
 from autopilot.modes import Mode
 from tests.clients.soak import crew, faults
 from tests.clients.station import Station
-from tests.flights.copter import Client, CopterFlight
+from tests.flights.client import Client
+from tests.flights.copter import CopterFlight
 
 LASTS_S = 20.0
 WARM_S = 8.0

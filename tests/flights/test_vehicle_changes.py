@@ -12,7 +12,8 @@ from mavlink.dialect import mav
 from mavlink.feedback import Feedback
 from mavlink.parameters import Value
 from plant.vehicle import load_vehicle
-from tests.flights.copter import ACCEPTED, COMPONENT, DENIED, SYSTEM, CopterFlight, in_the_air
+from tests.flights.client import COMPONENT, SYSTEM
+from tests.flights.copter import ACCEPTED, DENIED, CopterFlight, in_the_air
 
 
 def test_a_speed_and_a_behaviour_act_at_once() -> None:

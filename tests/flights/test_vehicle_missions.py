@@ -12,7 +12,8 @@ from mavlink.dialect import mav
 from mavlink.geodesy import DEFAULT_ORIGIN, geodetic_of
 from mavlink.services.mission_items import MISSION, MissionItem
 from plant.scenario import Start
-from tests.flights.copter import ACCEPTED, DENIED, FLIGHT, SYSTEM, CopterFlight, in_the_air
+from tests.flights.client import SYSTEM
+from tests.flights.copter import ACCEPTED, DENIED, FLIGHT, CopterFlight, in_the_air
 
 RELATIVE = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 NO_FRAME = mav.MAV_FRAME_MISSION

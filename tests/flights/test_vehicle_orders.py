@@ -11,7 +11,8 @@ from mavlink.frames import Vector
 from mavlink.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
 from mavlink.services.command import NOT_GIVEN
 from mavlink.services.mission_items import FENCE, MissionItem
-from tests.flights.copter import ACCEPTED, DENIED, FORCE, STANDING, SYSTEM, CopterFlight, in_the_air
+from tests.flights.client import SYSTEM
+from tests.flights.copter import ACCEPTED, DENIED, FORCE, STANDING, CopterFlight, in_the_air
 
 GLOBAL, RELATIVE = mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 REPOSITION = mav.MAV_CMD_DO_REPOSITION

@@ -9,7 +9,8 @@ from autopilot.modes import Mode
 from mavlink.dialect import mav
 from mavlink.frames import Quaternion, Vector, ned_frd_from_enu_flu, quaternion_from_euler
 from mavlink.geodesy import DEFAULT_ORIGIN, geodetic_of
-from tests.flights.copter import ACCEPTED, COMPONENT, DENIED, SYSTEM, CopterFlight, in_the_air
+from tests.flights.client import COMPONENT, SYSTEM
+from tests.flights.copter import ACCEPTED, DENIED, CopterFlight, in_the_air
 
 EVERY_S = 0.1
 

@@ -14,7 +14,8 @@ from mavlink.geodesy import DEFAULT_ORIGIN
 from mavlink.services.command import NOT_GIVEN
 from mavlink.services.mission_items import FENCE, MISSION, RALLY, MissionItem
 from plant.scenario import Start
-from tests.flights.copter import ACCEPTED, COMPONENT, FORCE, STANDING, SYSTEM, Client, CopterFlight
+from tests.flights.client import COMPONENT, SYSTEM, Client
+from tests.flights.copter import ACCEPTED, FORCE, STANDING, CopterFlight
 from tests.fuzz.messages import Messages, Sent
 from tests.fuzz.sensible import COMMANDS, SENSIBLE, asked
 

@@ -1,6 +1,5 @@
 """A ground station, or whatever else speaks MAVLink to the vehicle: what it says and what it has heard."""
 
-from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
@@ -8,14 +7,13 @@ from mavlink.dialect import AUTOPILOT_COMPONENT, Bits, Codec, Message, mav, para
 from mavlink.parameters import Kind, Value, bits_of, value_of
 from mavlink.services.command import NOT_GIVEN
 from mavlink.services.mission_items import MISSION, MissionItem
+from tools.scenarios.hearing import Hearing
 from tools.scenarios.links import Pipe, Trouble
 
 HEARTBEAT_EVERY_US = 1_000_000
 AGAIN_AFTER_S = 0.5
 """What stays unanswered is asked again, as ground stations do."""
 ANSWER_WITHIN_S = 15.0
-KEPT = 20_000
-"""Messages of one name that are remembered."""
 _IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
 
 
@@ -52,21 +50,16 @@ class Flying(Protocol):
         ...
 
 
-class Station:
-    """A component on a link of its own.
+class Station(Hearing):
+    """A component on a link of its own; what it has heard is in `Hearing`.
 
     What it says goes out with the next frame; what waits for an answer lets simulated time go on, and says it again
     every half second until the answer comes.
 
     Attributes:
-        system: Its system id.
         component: Its component id.
         number: Of its link.
         silent: Whether it says no HEARTBEAT and nothing else, while it still hears.
-        heard: Messages from the vehicle, as their fields, by name, the latest last.
-        counts: How many were heard, by name.
-        acks: Every COMMAND_ACK, in order.
-        texts: Every STATUSTEXT, in order.
         dropped: What came and was no message, by reason.
     """
 
@@ -74,9 +67,10 @@ class Station:
         self, flight: Flying, number: int, *, system: int, component: int, trouble: Trouble, seed: int, beats: bool
     ) -> None:
         """Be component `component` of `system` on link `number`; one that `beats` sends a HEARTBEAT a second."""
+        super().__init__(system)
         self._flight = flight
         self.number = number
-        self.system, self.component = system, component
+        self.component = component
         self._codec = Codec(system, component)
         self._up = Pipe(trouble, f"{seed} {number} up")
         self._down = Pipe(trouble, f"{seed} {number} down")
@@ -87,10 +81,6 @@ class Station:
         self._kinds: dict[str, Kind] = {}
         self._values: dict[str, Value] = {}
         self._param_errors: dict[str, int] = {}
-        self.heard: defaultdict[str, list[Any]] = defaultdict(list)
-        self.counts: Counter[str] = Counter()
-        self.acks: list[Any] = []
-        self.texts: list[str] = []
         self.dropped = self._codec.dropped
 
     # What a flight does with it.
@@ -115,7 +105,21 @@ class Station:
         for datagram in self._down.due(now_us):
             for message in self._codec.decode(datagram):
                 if message.source == (self._flight.system, AUTOPILOT_COMPONENT):
-                    self._hear(message)
+                    self.hear(message)
+
+    def hear(self, message: Message) -> None:
+        """Take in a message of the vehicle's, and what it answers."""
+        super().hear(message)
+        name, fields = message.name, message.fields
+        if name == "PARAM_VALUE":
+            kind = Kind(fields.param_type)
+            self._kinds[fields.param_id] = kind
+            self._values[fields.param_id] = value_of(kind, param_bits(message))
+        elif name == "PARAM_ERROR":
+            self._param_errors[fields.param_id] = fields.error
+        elif name in ("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK"):
+            for upload in self._uploads:
+                upload.hear(name, fields)
 
     # What it says.
 
@@ -212,24 +216,6 @@ class Station:
         self._uploads.append(upload)
         return upload
 
-    # What it has heard.
-
-    def latest(self, name: str) -> Any:
-        """Return the last message of a name, as its fields."""
-        assert self.heard[name], f"no {name} was heard"
-        return self.heard[name][-1]
-
-    def said(self, part: str) -> bool:
-        """Whether a STATUSTEXT of the vehicle's has said so."""
-        return any(part in text for text in self.texts)
-
-    def forget(self) -> None:
-        """Forget all that was heard up to now."""
-        self.heard.clear()
-        self.counts.clear()
-        self.acks.clear()
-        self.texts.clear()
-
     def _acknowledged(self, number: int, send: Callable[[int], None]) -> int:
         before = len(self.acks)
 
@@ -266,35 +252,6 @@ class Station:
                 within=2.0 * AGAIN_AFTER_S,
                 what=what,
             )
-
-    def _hear(self, message: Message) -> None:
-        name, fields = message.name, message.fields
-        self.counts[name] += 1
-        kept = self.heard[name]
-        kept.append(fields)
-        if len(kept) > KEPT:
-            del kept[: KEPT // 2]
-        if name == "COMMAND_ACK":
-            if fields.target_system in (0, self.system):
-                self.acks.append(fields)
-        elif name == "STATUSTEXT":
-            self._hear_text(fields)
-        elif name == "PARAM_VALUE":
-            kind = Kind(fields.param_type)
-            self._kinds[fields.param_id] = kind
-            self._values[fields.param_id] = value_of(kind, param_bits(message))
-        elif name == "PARAM_ERROR":
-            self._param_errors[fields.param_id] = fields.error
-        elif name in ("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK"):
-            for upload in self._uploads:
-                upload.hear(name, fields)
-
-    def _hear_text(self, fields: Any) -> None:
-        """Take in a line; a long one comes in chunks of 50 characters."""
-        if fields.chunk_seq and self.texts:
-            self.texts[-1] += fields.text
-        else:
-            self.texts.append(fields.text)
 
 
 class Upload:

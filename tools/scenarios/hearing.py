@@ -1,0 +1,64 @@
+"""What somebody who listens to a vehicle has heard of it."""
+
+from collections import Counter, defaultdict
+from typing import Any
+
+from mavlink.dialect import Message
+
+
+class Hearing:
+    """What was heard.
+
+    Attributes:
+        system: The listener's own system id; what is acknowledged to others is none of its business.
+        heard: Messages, as their fields, by name, the latest last.
+        counts: How many were heard, by name.
+        acks: Every COMMAND_ACK, in order.
+        texts: Every STATUSTEXT, in order.
+    """
+
+    def __init__(self, system: int, remembers: int = 20_000) -> None:
+        """Have heard nothing yet; of one name so many messages are remembered, at least the last half of them."""
+        self.system = system
+        self._remembers = remembers
+        self.heard: defaultdict[str, list[Any]] = defaultdict(list)
+        self.counts: Counter[str] = Counter()
+        self.acks: list[Any] = []
+        self.texts: list[str] = []
+
+    def latest(self, name: str) -> Any:
+        """Return the last message of a name, as its fields."""
+        assert self.heard[name], f"no {name} was heard"
+        return self.heard[name][-1]
+
+    def said(self, part: str) -> bool:
+        """Whether a STATUSTEXT of the vehicle's has said so."""
+        return any(part in text for text in self.texts)
+
+    def forget(self) -> None:
+        """Forget all that was heard up to now."""
+        self.heard.clear()
+        self.counts.clear()
+        self.acks.clear()
+        self.texts.clear()
+
+    def hear(self, message: Message) -> None:
+        """Take in a message of the vehicle's."""
+        name, fields = message.name, message.fields
+        self.counts[name] += 1
+        kept = self.heard[name]
+        kept.append(fields)
+        if len(kept) > self._remembers:
+            del kept[: self._remembers // 2]
+        if name == "COMMAND_ACK":
+            if fields.target_system in (0, self.system):
+                self.acks.append(fields)
+        elif name == "STATUSTEXT":
+            self._hear_text(fields)
+
+    def _hear_text(self, fields: Any) -> None:
+        """Take in a line; a long one comes in chunks of 50 characters."""
+        if fields.chunk_seq and self.texts:
+            self.texts[-1] += fields.text
+        else:
+            self.texts.append(fields.text)
