@@ -23,12 +23,14 @@ SCENARIOS = (
         peer="PX4: healthy within 30 s, armable within 45 s",
         holds="armed 0.1 s after the first heartbeat",
         steps=(arm(), until(ARMED, within=0.1)),
+        calm="asks how soon",
     ),
     Scenario(
         name="armable-on-sensors-soon-after-the-start",
         peer="PX4: healthy within 30 s, armable within 45 s",
         holds="armed within 5 s, the estimator's alignment included",
         steps=(arm(), check(ARMED), soon),
+        calm="asks how soon",
         setting={"feedback": "sensors"},
     ),
     Scenario(

@@ -16,7 +16,7 @@ from tests.sitl.steps import (
     put,
     run,
     select,
-    sticks,
+    then,
     until,
 )
 
@@ -40,9 +40,13 @@ SCENARIOS = (
         peer="AP ModeAltHold: ± 1 m for 5 s",
         holds="± 0.05 m for 5 s",
         steps=(
-            by_hand(0.3),
-            select(Mode.ALTITUDE),
-            hold(every(mode(Mode.ALTITUDE), height(5.0, 0.05)), for_=5.0, meanwhile=sticks()),
+            by_hand(
+                then(
+                    run(0.3),
+                    select(Mode.ALTITUDE),
+                    hold(every(mode(Mode.ALTITUDE), height(5.0, 0.05)), for_=5.0),
+                )
+            ),
         ),
         setting={"airborne": 5.0},
     ),
@@ -98,9 +102,8 @@ SCENARIOS = (
         holds="error below 0.5° after 1 s",
         steps=(
             put("MPC_MAN_TILT_MAX", 20.0),
-            by_hand(0.3),
-            select(Mode.STABILIZED),
-            by_hand(1.0, pitch=1.0, thrust=0.45),
+            by_hand(then(run(0.3), select(Mode.STABILIZED))),
+            by_hand(run(1.0), pitch=1.0, thrust=0.45),
             lambda sitl: is_tilted(sitl.tilt_deg),
         ),
         setting={"airborne": 20.0},
@@ -117,11 +120,9 @@ SCENARIOS = (
         peer="ours",
         holds="5 m/s by sticks, then stands within 4 s, and stays within 0.05 m",
         steps=(
-            by_hand(0.3),
-            select(Mode.POSITION),
-            by_hand(4.0, pitch=1.0),
-            until(slower(0.05), within=4.0, meanwhile=sticks()),
-            hold(every(slower(0.1), height(5.0, 0.1)), for_=2.0, meanwhile=sticks()),
+            by_hand(then(run(0.3), select(Mode.POSITION))),
+            by_hand(run(4.0), pitch=1.0),
+            by_hand(then(until(slower(0.05), within=4.0), hold(every(slower(0.1), height(5.0, 0.1)), for_=2.0))),
         ),
         setting={"airborne": 5.0},
     ),

@@ -149,6 +149,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         peer="AP: two more, 30 s",
         holds="30 in 30 s for each of three",
         steps=(many_listen,),
+        calm="counts heartbeats",
     ),
     Scenario(
         name="what-is-meant-for-another-moves-nothing",

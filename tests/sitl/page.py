@@ -13,12 +13,17 @@ def page() -> str:
     """Return the page."""
     count = sum(len(group) for group in GROUPS.values())
     flights = sum(len(each.seeds) if isinstance(each, Scenario) else 1 for group in GROUPS.values() for each in group)
+    calm = [each for group in GROUPS.values() for each in group if isinstance(each, Scenario) and each.calm]
     lines = [
         "# The scenarios",
         "",
         f"{count} scenarios, {flights} tests with their seeds, in `tests/sitl/`: `make scenarios` flies them over UDP,",
-        "`make scenarios-rough` over ground links that lose 30 % each way, `make soak` again and again. This page is",
-        "written from them by `python -m tests.sitl.page docs`; a test holds that they agree.",
+        "`make soak` again and again. This page is written from them by `python -m tests.sitl.page docs`; a test holds",
+        "that they agree.",
+        "",
+        "`make scenarios-rough` flies them over ground links that lose 30 % each way, with 50 ms of jitter: all but",
+        "",
+        *(f"- {each.name}: {each.calm}" for each in calm),
         "",
         "AP is ArduPilot's autotest, PX4 its mavsdk_tests, MAVSDK its system tests: the numbers of trusted suites, and",
         "beside each what is asked for here. Times are simulated, places are true.",

@@ -26,6 +26,7 @@ class Scenario:
         steps: What is done, in order.
         setting: What the flight begins with, as mark `sitl` has it.
         seeds: One flight for each; none: seed 0.
+        calm: Why it needs ground links that lose nothing; empty where it ends as well on rough ones.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Scenario:
     steps: Sequence[Step]
     setting: Mapping[str, Any] = field(default_factory=dict)
     seeds: Sequence[int] = (0,)
+    calm: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,10 @@ ALONE = [
     pytest.param(
         scenario,
         id=f"{group}-{scenario.name}" + (f"-seed{seed}" if scenario.seeds != (0,) else ""),
-        marks=pytest.mark.sitl(**{"seed": seed, **scenario.setting}),
+        marks=[
+            pytest.mark.sitl(**{"seed": seed, **scenario.setting}),
+            *([pytest.mark.calm(reason=scenario.calm)] if scenario.calm else []),
+        ],
     )
     for group, scenarios in GROUPS.items()
     for scenario in scenarios

@@ -97,6 +97,31 @@ def test_orders_pass_a_bad_link_to_the_ground() -> None:
     assert flown(None, fly, airborne=3.0, seed=2) != first
 
 
+def test_sticks_are_held_whatever_is_done_meanwhile() -> None:
+    with Flights(Setting(airborne=3.0), None) as flights:
+        sitl = flights.begin()
+        sitl.link.ground.loss, sitl.link.ground.jitter_s = 0.3, 0.05
+        with sitl.sticks_held():
+            sitl.run(0.3)
+            sitl.select(Mode.POSITION)
+            with sitl.sticks_held(pitch=1.0):
+                sitl.run(1.0)
+            assert sitl.velocity[1] > 1.0
+            sitl.wait_until(lambda: sitl.speed_m_s < 0.1, within=4.0)
+            assert sitl.mode is Mode.POSITION
+        sitl.wait_until(lambda: sitl.mode is Mode.HOLD, within=0.7)
+
+
+def test_what_the_vehicle_says_is_known_though_the_link_loses_it() -> None:
+    with Flights(Setting(airborne=3.0), None) as flights:
+        sitl = flights.begin()
+        sitl.link.ground.down = True
+        sitl.inject("motor", "off", 2)
+        sitl.run(0.3)
+        assert sitl.said("rotor 2 failed")
+        assert not sitl.gcs.said("rotor 2 failed")
+
+
 @pytest.mark.parametrize("package", ["plant", "autopilot"])
 def test_a_process_that_dies_is_named(forked: Launcher, package: str) -> None:
     with Flights(Setting(airborne=3.0), forked) as flights:

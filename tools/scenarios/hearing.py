@@ -3,7 +3,9 @@
 from collections import Counter, defaultdict
 from typing import Any
 
-from mavlink.dialect import Message
+from mavlink.dialect import Codec, Message, mav
+
+_STATUSTEXT = int(mav.MAVLINK_MSG_ID_STATUSTEXT).to_bytes(3, "little")
 
 
 class Hearing:
@@ -62,3 +64,20 @@ class Hearing:
             self.texts[-1] += fields.text
         else:
             self.texts.append(fields.text)
+
+
+class Words(Hearing):
+    """Every STATUSTEXT that a vehicle sends to one listener, heard where it is sent: no link loses it."""
+
+    def __init__(self, system: int) -> None:
+        """Have heard nothing yet; `system` is the listener's."""
+        super().__init__(system)
+        self._codec = Codec(system, 0)
+
+    def overhear(self, datagram: bytes) -> None:
+        """Take in a datagram that is sent."""
+        if _STATUSTEXT not in datagram:  # most have none: what costs time is to decode them
+            return
+        for message in self._codec.decode(datagram):
+            if message.name == "STATUSTEXT":
+                self.hear(message)

@@ -1,6 +1,7 @@
 """A vehicle in flight as a test sees it: orders that wait for their answer, and time that passes only when told to."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from math import dist, nan, pi
 from typing import Any, NamedTuple
 
@@ -14,6 +15,7 @@ from mavlink.parameters import Value
 from mavlink.services.mission_items import FENCE, MISSION, RALLY, MissionItem
 from mavlink.turns import Parcel, Turn
 from tools.scenarios import items
+from tools.scenarios.hearing import Words
 from tools.scenarios.items import Item, on_wire
 from tools.scenarios.links import Trouble
 from tools.scenarios.record import Record
@@ -25,6 +27,8 @@ from tools.scenarios.view import View
 FORCE = 21196.0
 """What a command to arm or disarm needs to pass over every check."""
 READY_WITHIN_S = 40.0
+STICKS_EVERY_US = 40_000
+"""25 times a second, as QGroundControl sends those of a joystick."""
 
 
 class NotInTimeError(AssertionError):
@@ -70,8 +74,11 @@ class Sitl(View):
         self._stage = stage
         self._said = Turn(0, ())
         self._injected = b""
+        self._sticks: dict[str, float] | None = None
+        self._sticks_at_us = 0
         self._stations: list[Station] = []
         self.gcs = self.client(255, 190)
+        self._words = Words(self.gcs.system)
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
 
     def begin(self) -> None:
@@ -84,6 +91,9 @@ class Sitl(View):
     def step(self) -> None:
         """Fly one frame."""
         now_us = self.time_us
+        if self._sticks is not None and now_us >= self._sticks_at_us:
+            self._sticks_at_us = now_us + STICKS_EVERY_US
+            self.stick(**self._sticks)
         parcels = []
         for station in self._stations:
             for datagram in station.departing(now_us):
@@ -95,6 +105,8 @@ class Sitl(View):
         self._said, self.rotors = instant.said, instant.command
         for number, datagram in instant.said.parcels:
             self.record.note(now_us, datagram)
+            if number == self.gcs.number:
+                self._words.overhear(datagram)
             self._stations[number - 1].arriving(datagram, now_us)
         for station in self._stations:
             station.listen(self.time_us)
@@ -302,6 +314,15 @@ class Sitl(View):
             RefusedError: There is no such, or it cannot have that value.
         """
         return self.gcs.set_param(name, value)
+
+    @contextmanager
+    def sticks_held(self, **axes: float) -> Iterator[None]:
+        """Hold the sticks so, see `stick`, whatever else is done meanwhile: they are sent 25 times a second."""
+        before, self._sticks, self._sticks_at_us = self._sticks, axes, self.time_us
+        try:
+            yield
+        finally:
+            self._sticks = before
 
     # What is said once, and not answered.
 

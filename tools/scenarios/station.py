@@ -167,6 +167,28 @@ class Station(Hearing):
         if result != mav.MAV_RESULT_ACCEPTED:
             raise RefusedError(what, result, "; ".join(self.texts[said:]))
 
+    def ask(self, send: Callable[[int], None], answered: Callable[[], object], what: str) -> None:
+        """Say something, and again every half second until it is answered; `send` is told how often it was said before.
+
+        Raises:
+            NotInTimeError: It is not answered within `ANSWER_WITHIN_S`.
+        """
+        flight = self._flight
+        gives_up_us = flight.time_us + round(ANSWER_WITHIN_S * 1e6)
+        tries = 0
+        while not answered():
+            send(tries)
+            tries += 1
+            again_us = flight.time_us + round(AGAIN_AFTER_S * 1e6)
+            if again_us > gives_up_us:
+                flight.wait_until(answered, within=AGAIN_AFTER_S, what=f"{what}, asked for {tries} times,")
+                return
+            flight.wait_until(
+                lambda due_us=again_us: answered() or flight.time_us >= due_us,  # type: ignore[misc]
+                within=2.0 * AGAIN_AFTER_S,
+                what=what,
+            )
+
     # Parameters.
 
     def get_param(self, name: str) -> Value:
@@ -223,35 +245,17 @@ class Station(Hearing):
             mine = (ack for ack in self.acks[before:] if ack.command == number)
             return [int(ack.result) for ack in mine if ack.result != _IN_PROGRESS]
 
-        self._ask(send, results, f"the COMMAND_ACK of {number}")
+        self.ask(send, results, f"the COMMAND_ACK of {number}")
         return results()[0]
 
     def _parameter(self, name: str, ask: Callable[[], None]) -> Value:
         self._param_errors.pop(name, None)
-        self._ask(
+        self.ask(
             lambda _: ask(), lambda: name in self._values or name in self._param_errors, f"the PARAM_VALUE of {name}"
         )
         if name in self._param_errors:
             raise RefusedError(f"parameter {name}", self._param_errors[name], "PARAM_ERROR")
         return self._values[name]
-
-    def _ask(self, send: Callable[[int], None], answered: Callable[[], object], what: str) -> None:
-        """Say something again and again until it is answered."""
-        flight = self._flight
-        gives_up_us = flight.time_us + round(ANSWER_WITHIN_S * 1e6)
-        tries = 0
-        while not answered():
-            send(tries)
-            tries += 1
-            again_us = flight.time_us + round(AGAIN_AFTER_S * 1e6)
-            if again_us > gives_up_us:
-                flight.wait_until(answered, within=AGAIN_AFTER_S, what=f"{what}, asked for {tries} times,")
-                return
-            flight.wait_until(
-                lambda due_us=again_us: answered() or flight.time_us >= due_us,  # type: ignore[misc]
-                within=2.0 * AGAIN_AFTER_S,
-                what=what,
-            )
 
 
 class Upload:

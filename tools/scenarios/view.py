@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from autopilot.modes import Mode, mode_of_custom
 from mavlink.frames import Vector, euler_from_quaternion, ned_from_enu, tilt_deg
 from mavlink.turns import Turn
+from tools.scenarios.hearing import Words
 from tools.scenarios.record import Columns, Record
 from tools.scenarios.setting import Setting
 from tools.scenarios.stage import Stage
@@ -36,6 +37,7 @@ class View:
     record: Record
     _stage: Stage
     _said: Turn
+    _words: Words
 
     @property
     def time_us(self) -> int:
@@ -102,12 +104,12 @@ class View:
 
     @property
     def texts(self) -> list[str]:
-        """Every STATUSTEXT that the first ground station has heard."""
-        return self.gcs.texts
+        """Every STATUSTEXT that the vehicle has sent to the first ground station, whatever the links do."""
+        return self._words.texts
 
     def said(self, part: str) -> bool:
-        """Whether a STATUSTEXT has said so."""
-        return self.gcs.said(part)
+        """Whether a STATUSTEXT has said so, whatever the links do; what was heard of it is in `gcs.texts`."""
+        return self._words.said(part)
 
     def heard(self, name: str) -> list[Any]:
         """Return all messages of a name that the first ground station has heard, as their fields."""
