@@ -12,10 +12,10 @@ class Hearing:
     """What was heard.
 
     Attributes:
-        system: The listener's own system id; what is acknowledged to others is none of its business.
+        system: The listener's own system id.
         heard: Messages, as their fields, by name, the latest last.
         counts: How many were heard, by name.
-        acks: Every COMMAND_ACK, in order.
+        acks: Every COMMAND_ACK, in order, whoever it is for.
         texts: Every STATUSTEXT, in order.
     """
 
@@ -53,8 +53,7 @@ class Hearing:
         if len(kept) > self._remembers:
             del kept[: self._remembers // 2]
         if name == "COMMAND_ACK":
-            if fields.target_system in (0, self.system):
-                self.acks.append(fields)
+            self.acks.append(fields)
         elif name == "STATUSTEXT":
             self._hear_text(fields)
 

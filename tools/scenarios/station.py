@@ -242,7 +242,8 @@ class Station(Hearing):
         before = len(self.acks)
 
         def results() -> list[int]:
-            mine = (ack for ack in self.acks[before:] if ack.command == number)
+            to_us = (0, self.system)
+            mine = (ack for ack in self.acks[before:] if ack.command == number and ack.target_system in to_us)
             return [int(ack.result) for ack in mine if ack.result != _IN_PROGRESS]
 
         self.ask(send, results, f"the COMMAND_ACK of {number}")
