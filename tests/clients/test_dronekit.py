@@ -5,6 +5,8 @@ import sys
 from math import dist, hypot
 from pathlib import Path
 
+import pytest
+
 from autopilot.modes import Mode
 from mavlink.geodesy import Geodetic, enu_of
 from mavlink.home import DEFAULT_HOME
@@ -30,6 +32,7 @@ def said(program: str, flown: Vehicle) -> list[str]:
     return done.stdout.splitlines()
 
 
+@pytest.mark.long
 def test_it_arms_takes_off_goes_somewhere_and_lands(tmp_path: Path) -> None:
     with vehicle(tmp_path, speed=SPEED) as flown:
         lines = said("dronekit_flight.py", flown)
@@ -48,6 +51,7 @@ def test_it_arms_takes_off_goes_somewhere_and_lands(tmp_path: Path) -> None:
         assert "MIS_TAKEOFF_ALT\t4.5" in kept.read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_it_flies_a_mission(tmp_path: Path) -> None:
     with vehicle(tmp_path, speed=SPEED) as flown:
         lines = said("dronekit_mission.py", flown)

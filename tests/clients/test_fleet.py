@@ -4,6 +4,7 @@ from collections.abc import Callable
 from math import nan
 from pathlib import Path
 
+import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
 from tests.clients.ground_station import GroundStation, Message
@@ -31,6 +32,7 @@ def take_off(station: GroundStation, system: int, height_m: float) -> None:
     assert station.command(mavlink2.MAV_CMD_NAV_TAKEOFF, *climb, system=system) == ACCEPTED
 
 
+@pytest.mark.long
 def test_each_flies_its_own_flight(tmp_path: Path) -> None:
     with GroundStation() as station:
         with vehicle(tmp_path, "--count", "3", "--instance", "2", links=(station.url,)) as flown:

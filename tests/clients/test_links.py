@@ -4,6 +4,7 @@ import socket
 import sys
 from pathlib import Path
 
+import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
 from tests.clients.client import Client
@@ -45,6 +46,7 @@ def test_a_client_of_the_tcp_server(tmp_path: Path) -> None:
                 assert "BAD_DATA" not in names
 
 
+@pytest.mark.long
 def test_mavsdk_over_tcp(tmp_path: Path) -> None:
     with vehicle(tmp_path, links=("tcpin:127.0.0.1:0",), speed=3.0) as flown:
         run("mavsdk_scripts.takeoff_and_land", f"tcpout://127.0.0.1:{flown.port}", tmp_path)
@@ -52,6 +54,7 @@ def test_mavsdk_over_tcp(tmp_path: Path) -> None:
         assert 4.7 < max(sight.height_m for sight in flown.seen.sights) < 5.1
 
 
+@pytest.mark.long
 def test_mavsdk_with_a_generic_vehicle(tmp_path: Path) -> None:
     with vehicle(tmp_path, "--identity", "generic", speed=3.0) as flown:
         run("programs.mavsdk_generic", flown.mavsdk_url, tmp_path)

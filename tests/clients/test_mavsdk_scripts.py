@@ -85,6 +85,7 @@ def test_failure(tmp_path: Path) -> None:
         assert flown.seen.parameter("SYS_FAILURE_EN") == 0.0
 
 
+@pytest.mark.long
 def test_takeoff_and_land(tmp_path: Path) -> None:
     with after("takeoff_and_land", tmp_path) as flown:
         lands(flown.seen, HOME)

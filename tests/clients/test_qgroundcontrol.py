@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from math import atan2, dist, hypot, nan, pi
 from pathlib import Path
 
+import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
 from autopilot.modes import Mode, custom_mode
@@ -142,6 +143,7 @@ def test_it_flies_where_it_is_told_to(tmp_path: Path) -> None:
         assert abs(landed.height_m) < 0.05
 
 
+@pytest.mark.long
 def test_it_flies_a_plan_and_returns(tmp_path: Path) -> None:
     with connected(tmp_path) as (station, flown):
         away = degrees_e7(0.0, 12.0)

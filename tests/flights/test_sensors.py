@@ -24,6 +24,7 @@ def frames_of(tlog: Path) -> Counter[str]:
     return Counter(names)
 
 
+@pytest.mark.long
 def test_a_bad_link_does_not_change_what_sensors_tell(tmp_path: Path) -> None:
     """20 % lost, 10 % duplicated, 10 % reordered, both ways: the flight is the one in memory, noise and all."""
     duration = ("--duration", "1.6")

@@ -111,6 +111,7 @@ def test_serving_ground_stations_is_measured_and_what_it_does_to_the_control_ste
     assert {figure["samples"] for figure in steps.values()} == {24}
 
 
+@pytest.mark.long
 def test_the_estimator_is_timed_and_flights_on_sensors_beside_those_on_the_state(tmp_path: Path) -> None:
     sensors = figures_of(tmp_path / "sensors.json", "--only", "sensors")["sensors"]
     assert set(sensors["estimator_us"]) == {sensing.ALWAYS, sensing.IN_FLIGHT}

@@ -43,6 +43,7 @@ def test_a_track_names_a_folder(name: str, folder: str) -> None:
     assert folder_name(name) == folder
 
 
+@pytest.mark.long
 def test_only_what_is_asked_for_is_drawn(tmp_path: Path) -> None:
     assert main(["figures", "--only", "4.9", "--only", "A.7", "--out", str(tmp_path), "--quiet"]) == 0
     drawn = {path.name for path in tmp_path.iterdir() if path.is_file()}
