@@ -52,6 +52,7 @@ def test_telemetry_tells_what_the_sensors_measure() -> None:
     assert 0.0 < status.vel_ratio < 1.0
 
 
+@pytest.mark.long
 def test_lost_gps_is_said_and_survived() -> None:
     """20 s without: it drifts a little, says so, and goes back without a jump."""
     flight = on_sensors()

@@ -18,6 +18,7 @@ def test_autopilots_killed_in_a_mission(tmp_path: Path, feedback: Feedback) -> N
     assert max(kill.tilt_deg for kill in flight.kills) < 45.0
 
 
+@pytest.mark.long
 def test_plants_killed_in_a_mission(tmp_path: Path) -> None:
     kills, words = plants.fly(tmp_path / "flight", Feedback.STATE, seed=1, kills=2)
     assert words == ""

@@ -58,7 +58,7 @@ def run(path: source.Path) -> Run:
     return Run(np.array(nees), {kind: float(np.mean(values)) for kind, values in nis.items()})
 
 
-@pytest.mark.parametrize("path", [source.circle, source.hover])
+@pytest.mark.parametrize("path", [source.circle, pytest.param(source.hover, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("part", "numbers"), [(0, 9), (1, 3), (2, 3), (3, 3)])
 def test_nees_is_within_its_bounds(path: source.Path, part: int, numbers: int) -> None:
     """At one instant in twenty it may not be, and errors last for some of them."""
