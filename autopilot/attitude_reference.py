@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.attitude_slew import LEAN, POSE, SPIN, Slew, limit_tilt, slew_on
+from autopilot.behaviour import Behaviour
 from autopilot.controller import AttitudeDemand, Preview, VehicleState
 from mavlink.frames import Quaternion, Vector, euler_from_quaternion, nearest_turn, rotation_matrix
 from mavlink.setpoints import AttitudeSetpoint, Sticks
@@ -50,6 +51,17 @@ class AttitudeLimits(NamedTuple):
 
 
 DEFAULT_LIMITS = AttitudeLimits()
+
+
+def attitude_limits(behaviour: Behaviour) -> AttitudeLimits:
+    """Return the limits that the parameters say."""
+    yaw_rate_rad_s = behaviour.stick_yaw_rate_rad_s
+    slew = DEFAULT_LIMITS.slew
+    return DEFAULT_LIMITS._replace(
+        stick_tilt_rad=radians(behaviour.largest_tilt_deg),
+        stick_yaw_rate_rad_s=yaw_rate_rad_s,
+        slew=slew._replace(yaw_rate_rad_s=max(slew.yaw_rate_rad_s, yaw_rate_rad_s)),
+    )
 
 
 class Wish(NamedTuple):

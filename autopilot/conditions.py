@@ -10,7 +10,7 @@ from typing import NamedTuple
 from autopilot.controller import Diagnostics, Fallback, VehicleState
 from autopilot.estimate import Estimate
 from autopilot.failsafe_parameters import Limits
-from autopilot.failsafes import Condition
+from autopilot.failsafe_table import Condition
 from autopilot.modes import MANUAL, Mode
 from autopilot.reference_chain import Limits as Pace
 from mavlink.frames import Vector

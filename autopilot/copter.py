@@ -1,42 +1,33 @@
 """The whole vehicle as a pure composition: frames of the plant and datagrams of ground stations in, answers out."""
 
 from collections.abc import Iterable
-from math import radians
 from typing import NamedTuple
 
 from autopilot.arming import Facts, battery_fault
-from autopilot.attitude_reference import DEFAULT_LIMITS, AttitudeLimits, AttitudeReference
-from autopilot.behaviour import Behaviour
-from autopilot.companion import Companion
+from autopilot.attitude_reference import AttitudeReference, attitude_limits
 from autopilot.conditions import NEVER_US, Seen
 from autopilot.controller import Clock, Decision, VehicleState
 from autopilot.core import STILL, Step, follows, nothing_known
-from autopilot.course import Course, Scene, Steered
-from autopilot.courses import Along, Climb, Legs, Stop, homeward, landing, to_track
-from autopilot.failsafes import Action, Condition
+from autopilot.course import Steered
+from autopilot.failsafe_table import Condition
 from autopilot.health_watch import HealthWatch, not_known
 from autopilot.instants import instants
 from autopilot.keeper import Keeper
-from autopilot.kept import CourseRecord, Kept, Past, course_again, goes_on, maker_of
-from autopilot.leader import Following
-from autopilot.leaning import AltitudeSticks, Descent, Stabilized
+from autopilot.kept import Kept, Past, goes_on, maker_of
 from autopilot.loop import ControlLoop
+from autopilot.mode_courses import ModeCourses
 from autopilot.modes import MANUAL, Mode, Need
-from autopilot.orders import Land
 from autopilot.parameters import Numbers, behaviour, definitions
 from autopilot.pilot import RESTS, Guidance, Pilot
-from autopilot.planner import Planner, plan, start_yaw
 from autopilot.power import PowerMeter
 from autopilot.profile import Profile
-from autopilot.reference import Reference, target_of
 from autopilot.rotor_loss import RotorLoss
 from autopilot.senses import Estimator, Senses
 from autopilot.snapshots import Photographer
 from autopilot.solve_time import SolveTime
 from autopilot.stations import REBOOT, Stations, StationSettings
-from autopilot.sticks import PositionSticks
 from autopilot.supervisor import Supervisor
-from autopilot.tracks import Track, track
+from autopilot.tracks import Track
 from autopilot.tuning import Tuning, builder
 from mavlink.aside import NOTHING, Aside
 from mavlink.hil import ActuatorCommand, StateFrame
@@ -123,7 +114,6 @@ class Copter:
         self._loop = ControlLoop(flown, believed, clock)
         self._tuning = Tuning(numbers, builder(profile.controller, clock), self._loop)
         self.parameters.check = self._tuning.check
-        self._references = profile.references
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock
         self.frame_interval_us = self._loop.frame_interval_us
@@ -134,11 +124,21 @@ class Copter:
         self._attitude: AttitudeReference | None = None
         if self._loop.takes_attitude:
             self._attitude = AttitudeReference(believed, self._loop.preview, attitude_limits(flies_by))
-        self._instants = instants(self._loop.preview, self._loop.control_interval_us)
-        self.pilot = Pilot(self._instants, flies_by, self._course, self._missing)
+        planned_at = instants(self._loop.preview, self._loop.control_interval_us)
+        self.pilot = Pilot(planned_at, flies_by, lambda mode, scene: self._courses.begin(mode, scene), self._missing)
         self.stations = Stations(settings, self.pilot, self.parameters)
         self.power = PowerMeter(believed)
         self.supervisor = Supervisor(self.pilot, self.parameters)
+        self._courses = ModeCourses(
+            self.pilot,
+            self.supervisor,
+            self.stations.missions,
+            self._loop,
+            self._attitude,
+            planned_at,
+            profile.references,
+            first,
+        )
         self._missed_us: int | None = None
         self._waiting_us: int | None = None
         self._solving = SolveTime(self._loop.control_interval_us)
@@ -147,7 +147,6 @@ class Copter:
         self.rotor_loss = RotorLoss(believed, self._loop.control_interval_us)
         self.rotor_loss.enabled = flies_by.land_on_three
         self._photographer = Photographer(believed, self._interval_s)
-        self._first = first
         parts = (self._loop, self._senses, self.pilot, self.stations, self.power, self.rotor_loss, self.supervisor)
         self._keeper = Keeper(maker_of(profile, vehicle), *parts)
         self._past = past
@@ -250,9 +249,9 @@ class Copter:
         """Go on with the flight in which the autopilot was killed."""
         pilot, kept = self.pilot, past.kept
         if kept.pilot.mode is not Mode.TRACK or kept.course.began_us != 0:
-            self._first = None
+            self._courses.first = None
         self._resumed_us = frame.time_us
-        self._keeper.resume(past, frame, self._course_again)
+        self._keeper.resume(past, frame, self._courses.again)
         self._sent = self._loop.controls if pilot.state.armed and not pilot.idles else STILL
         self._solving.at_once(self._sent)
         self.rotor_loss.begin(self._sent)
@@ -263,16 +262,6 @@ class Copter:
             pilot.say(WARNING, FALLS)
         self.resumed = goes_on(pilot.state.mode, self.stations.missions.executor.progress.seq)
         pilot.say(WARNING, self.resumed)
-
-    def _course_again(self, record: CourseRecord, mode: Mode, scene: Scene) -> Course:
-        """Return how a mode goes on after a restart."""
-        if mode is Mode.TRACK and self._first is None and record.began_us is not None:
-            chosen = track(scene.behaviour.track)
-            return Along(plan(chosen, self._references, self._instants.preview), chosen.duration_s, record.began_us)
-        if mode is Mode.MISSION:
-            return self.stations.missions.course_again(record.turns, record.legs)
-        course = course_again(mode, record, scene) or self._course(mode, scene)
-        return course.skip(record.legs) if isinstance(course, Legs) else course
 
     def _begin(self, frame: StateFrame) -> None:
         """See the vehicle for the first time, or anew after frames were missed."""
@@ -291,8 +280,9 @@ class Copter:
         rests = self._senses.rests
         if rests:
             speed = loop.vehicle.rotors.idle_speed
-        loop.begin(speed, self._first_yaw())
-        self.pilot.begin(frame.time_us, loop.state(frame), mode=Mode.TRACK if self._first else None, rests=rests)
+        loop.begin(speed, self._courses.first_yaw_rad)
+        mode = Mode.TRACK if self._courses.first else None
+        self.pilot.begin(frame.time_us, loop.state(frame), mode=mode, rests=rests)
         self._sent = STILL if self.pilot.standing else loop.controls
         self._solving.at_once(self._sent)
         self.rotor_loss.forget()
@@ -301,9 +291,6 @@ class Copter:
         if self._senses.estimate is not None and not rests:
             self.pilot.say(WARNING, FALLS)
         self.stations.say(INFO, self.stations.banner())
-
-    def _first_yaw(self) -> float:
-        return start_yaw(self._first, self._references) if self._first else 0.0
 
     def _sense(self, now_us: int, state: VehicleState) -> None:
         """Take in what steers the vehicle, and what has ceased to."""
@@ -464,63 +451,3 @@ class Copter:
             self._photographer = Photographer(tuned.vehicle, self._interval_s)
             if self._attitude is not None:
                 self._attitude.adopt(tuned.vehicle)
-
-    def _course(self, mode: Mode, scene: Scene) -> Course:
-        """Return how a mode begins."""
-        if mode is Mode.TAKEOFF:
-            behaviour = scene.behaviour
-            high_m = self.pilot.ground_m + behaviour.takeoff_height_m
-            return Climb(high_m, None, scene, behaviour.takeoff_speed_m_s)
-        if mode is Mode.LAND:
-            return self._down()
-        if mode is Mode.RETURN:
-            return homeward(scene)
-        if mode is Mode.MISSION:
-            return self.stations.missions.course()
-        if mode is Mode.OFFBOARD:
-            return Companion(self._attitude)
-        if mode is Mode.FOLLOW:
-            return Following()
-        if mode is Mode.POSITION:
-            return PositionSticks()
-        if mode is Mode.TRACK:
-            return self._on_track(scene)
-        if mode is Mode.STABILIZED and self._attitude is not None:
-            return Stabilized(self._attitude)
-        if mode is Mode.ALTITUDE and self._attitude is not None:
-            return AltitudeSticks(self._attitude, self._loop.vehicle.gravity_m_s2)
-        return Stop()
-
-    def _down(self) -> Course:
-        """Return how to land: level, where nobody knows the place; a law that takes no attitude sinks where it is."""
-        blind = self.pilot.saving is Action.DESCEND or not self.supervisor.knows_position
-        if blind and self._attitude is not None:
-            return Descent(self._attitude, self._loop.vehicle.gravity_m_s2)
-        return landing(Land())
-
-    def _on_track(self, scene: Scene) -> Course:
-        if self._first is not None:
-            first, self._first = self._first, None
-            planner = plan(first, self._references, self._instants.preview)
-            for_law = None if self._instants.rows is None else plan(first, self._references, self._loop.preview)
-            self.pilot.reference = _at_start(planner, scene.now_us)
-            return Along(planner, first.duration_s, 0, for_law)
-        chosen = track(scene.behaviour.track)
-        return to_track(plan(chosen, self._references, self._instants.preview), chosen.duration_s)
-
-
-def _at_start(planner: Planner, now_us: int) -> Reference:
-    """Return a reference that is on a track that began at time 0."""
-    target = target_of(planner.horizon(now_us))
-    return Reference(target.motion[0, :4].copy(), target.heading[0, :2].copy())
-
-
-def attitude_limits(flies_by: Behaviour) -> AttitudeLimits:
-    """Return how far full sticks go."""
-    yaw_rate_rad_s = flies_by.stick_yaw_rate_rad_s
-    slew = DEFAULT_LIMITS.slew
-    return DEFAULT_LIMITS._replace(
-        stick_tilt_rad=radians(flies_by.largest_tilt_deg),
-        stick_yaw_rate_rad_s=yaw_rate_rad_s,
-        slew=slew._replace(yaw_rate_rad_s=max(slew.yaw_rate_rad_s, yaw_rate_rad_s)),
-    )

@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from typing import NamedTuple, TypeAlias
 
-from autopilot.failsafes import NAMES, TABLE, Action, Condition, Setting
+from autopilot.failsafe_table import NAMES, TABLE, Action, Condition
+from autopilot.failsafes import Setting
 from mavlink.parameters import Kind, Parameter, Parameters
 
 Limits: TypeAlias = Mapping[str, float]

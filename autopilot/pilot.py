@@ -11,7 +11,7 @@ from autopilot.behaviour import Behaviour
 from autopilot.controller import Array, AttitudeDemand, Horizon, VehicleState
 from autopilot.course import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
 from autopilot.courses import Stop
-from autopilot.failsafes import Action
+from autopilot.failsafe_table import Action
 from autopilot.instants import Instants
 from autopilot.landing import Landing, is_below, stands_at_first, watch
 from autopilot.modes import FIRST, Event, Mode, Need, Refusal, State, following

@@ -3,7 +3,7 @@
 from math import nan
 
 from autopilot.controller import Array, AttitudeDemand, Decision, Fallback, Horizon, VehicleState
-from autopilot.failsafes import Action
+from autopilot.failsafe_table import Action
 from autopilot.forecast import Forecaster
 from autopilot.health_watch import told
 from autopilot.modes import ROWS, Mode, custom_mode

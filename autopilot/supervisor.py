@@ -2,7 +2,8 @@
 
 from autopilot.conditions import Conditions, Seen, knows_position
 from autopilot.failsafe_parameters import Limits, limits, settings
-from autopilot.failsafes import Action, Condition, Flight, Memory, following
+from autopilot.failsafe_table import Action, Condition
+from autopilot.failsafes import Flight, Memory, following
 from autopilot.pilot import Pilot
 from mavlink.dialect import mav
 from mavlink.parameters import Parameters

@@ -6,7 +6,8 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-from autopilot.failsafes import CLEAR_AFTER_US, MEANINGS, NAMES, TABLE, Action, Row
+from autopilot.failsafe_table import MEANINGS, NAMES, TABLE, Action, Row
+from autopilot.failsafes import CLEAR_AFTER_US
 from autopilot.parameters import definitions
 from autopilot.profile import load_profile
 from mavlink.parameters import Kind, Parameter
@@ -14,8 +15,8 @@ from plant.vehicle import load_vehicle
 
 _HEAD = """# Failsafes
 
-This page and its picture are written from the table in `autopilot/failsafes.py` by `python -m tools.failsafe_page
-docs`; a test holds that they agree.
+This page and its picture are written from `autopilot/failsafe_table.py` by `python -m tools.failsafe_page docs`; a test
+holds that they agree.
 
 ![What leads to what, drawn from the table](failsafes.png)
 

@@ -18,7 +18,7 @@ from autopilot.conditions import (
 )
 from autopilot.controller import Diagnostics, Fallback, VehicleState
 from autopilot.failsafe_parameters import NUMBERS
-from autopilot.failsafes import Condition
+from autopilot.failsafe_table import Condition
 from autopilot.modes import Mode
 from autopilot.reference import Kind, Reference, lead, still_target
 from autopilot.reference_chain import Limits

@@ -9,20 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.failsafe_parameters import NUMBERS, failsafe_parameters, limits, settings
-from autopilot.failsafes import (
-    CLEAR_AFTER_US,
-    NAMES,
-    ROWS,
-    TABLE,
-    Action,
-    Condition,
-    Flight,
-    Memory,
-    Row,
-    Setting,
-    Verdict,
-    following,
-)
+from autopilot.failsafe_table import NAMES, ROWS, TABLE, Action, Condition, Row
+from autopilot.failsafes import CLEAR_AFTER_US, Flight, Memory, Setting, Verdict, following
 from autopilot.modes import Mode
 from autopilot.parameters import definitions
 from autopilot.profile import load_profile

@@ -5,7 +5,7 @@ from math import hypot
 import pytest
 from msgspec import structs
 
-from autopilot.failsafes import Condition
+from autopilot.failsafe_table import Condition
 from autopilot.modes import Mode
 from mavlink.dialect import mav
 from mavlink.failures import MOTOR, OFF

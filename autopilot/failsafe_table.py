@@ -1,0 +1,285 @@
+"""The failsafes as data: what may be lost, how that is known, and what the vehicle does then.
+
+`docs/failsafes.md` is written from this table; `failsafes` is the rule that reads it in flight.
+"""
+
+from collections.abc import Mapping
+from enum import IntEnum, StrEnum
+from typing import NamedTuple
+
+
+class Action(IntEnum):
+    """What is done; the higher the number, the higher its rank."""
+
+    NONE = 0
+    WARN = 1
+    HOLD = 2
+    RETURN = 3
+    LAND = 4
+    DESCEND = 5
+    TERMINATE = 6
+
+
+NAMES: Mapping[Action, str] = {
+    Action.NONE: "nothing",
+    Action.WARN: "warning",
+    Action.HOLD: "hold",
+    Action.RETURN: "return",
+    Action.LAND: "land",
+    Action.DESCEND: "descend",
+    Action.TERMINATE: "rotors stop",
+}
+MEANINGS: Mapping[Action, str] = {
+    Action.NONE: "nothing is done, nor said",
+    Action.WARN: "it is said",
+    Action.HOLD: "mode hold: stop and stay",
+    Action.RETURN: "mode return: climb, fly home, land",
+    Action.LAND: "mode land: sink here, disarm",
+    Action.DESCEND: "mode land without a position: level, sinking at the speed of landings, with the wind",
+    Action.TERMINATE: "the rotors stop at once, in the air too",
+}
+
+
+class Condition(StrEnum):
+    """What may be lost, as it is said."""
+
+    ATTITUDE_LOST = "attitude lost"
+    TILTED = "tilted too far"
+    ROTOR_FAILED = "rotor failed"
+    POSITION_LOST = "position lost"
+    ESTIMATE_DOUBTED = "estimate not healthy"
+    BATTERY_EMERGENCY = "battery nearly empty"
+    BATTERY_CRITICAL = "battery critical"
+    PLAN_FAILED = "control law finds no plan"
+    DEADLINE_MISSED = "control deadline missed"
+    TELEMETRY_MISSED = "telemetry missed"
+    STATION_LOST = "ground station lost"
+    FENCE_BREACHED = "geofence breached"
+    GPS_LOST = "GPS lost"
+    STICKS_LOST = "sticks lost"
+    SETPOINTS_LOST = "setpoints lost"
+    BATTERY_LOW = "battery low"
+
+
+class Row(NamedTuple):
+    """A failsafe of the table.
+
+    Attributes:
+        condition: What it watches for.
+        holds: When that holds.
+        limits: Parameters of its limits.
+        delay: Parameter of how long it must hold; empty where that is no parameter.
+        parameter: Parameter of the action.
+        choices: What that may be.
+        default: What it is until somebody changes it.
+        clears: When it is over.
+        grounded: Whether it is watched with the rotors standing, too.
+        kept: Whether it holds, once it does, until the rotors stop.
+        warns: What a mere warning adds.
+        said: Whether it is said here; not where who notices it says more.
+    """
+
+    condition: Condition
+    holds: str
+    limits: tuple[str, ...]
+    delay: str
+    parameter: str
+    choices: tuple[tuple[int, Action], ...]
+    default: int
+    clears: str
+    grounded: bool = False
+    kept: bool = False
+    warns: str = ""
+    said: bool = True
+
+
+_NOTHING, _WARN = (0, Action.NONE), (0, Action.WARN)
+_HOLD, _RETURN, _LAND = (1, Action.HOLD), (2, Action.RETURN), (3, Action.LAND)
+_DESCEND, _TERMINATE = (4, Action.DESCEND), (5, Action.TERMINATE)
+_CLIMBING = (_HOLD, _RETURN, _LAND, _TERMINATE)
+"""As NAV_DLL_ACT and NAV_RCL_ACT number them; DESCEND in the gap."""
+FLIGHT_TERMINATION_OFF = 121212
+_FULL_AGAIN = "never in flight"
+
+TABLE: tuple[Row, ...] = (
+    Row(
+        Condition.ATTITUDE_LOST,
+        "on sensors: the gyroscope fails, or roll and pitch are known no better than to 10°; state told: it stays the "
+        "same to the last bit though it says that it moves",
+        (),
+        "COM_ATT_LOSS_T",
+        "COM_ATT_LOSS_ACT",
+        (_WARN, _TERMINATE),
+        5,
+        "the attitude is known again",
+    ),
+    Row(
+        Condition.TILTED,
+        "roll or pitch beyond the limit",
+        ("FD_FAIL_R", "FD_FAIL_P"),
+        "FD_FAIL_R_TTRI",
+        "CBRK_FLIGHTTERM",
+        ((0, Action.TERMINATE), (FLIGHT_TERMINATION_OFF, Action.WARN)),
+        FLIGHT_TERMINATION_OFF,
+        "both are within it",
+    ),
+    Row(
+        Condition.ROTOR_FAILED,
+        "the vehicle moves as with one rotor missing; it then lands on the other three, whatever is chosen",
+        (),
+        "",
+        "CA_FAILURE_MODE",
+        (_NOTHING, (1, Action.LAND)),
+        1,
+        _FULL_AGAIN,
+        kept=True,
+        said=False,
+    ),
+    Row(
+        Condition.POSITION_LOST,
+        "on sensors, in a mode that flies by place: standard deviation of position or velocity beyond the limit",
+        ("COM_POS_FS_EPH", "COM_VEL_FS_EVH"),
+        "COM_POS_FS_DELAY",
+        "COM_POS_FS_ACT",
+        (_WARN, _DESCEND, _TERMINATE),
+        4,
+        "both are known again",
+    ),
+    Row(
+        Condition.ESTIMATE_DOUBTED,
+        "on sensors: heading, height or climb is not known",
+        (),
+        "COM_EST_LOSS_T",
+        "COM_EST_LOSS_ACT",
+        (_WARN, _LAND, _DESCEND, _TERMINATE),
+        4,
+        "all are known again",
+    ),
+    Row(
+        Condition.BATTERY_EMERGENCY,
+        "charge, or terminal voltage where its limit is not 0, below the limit",
+        ("BAT_EMERGEN_THR", "BAT_EMERGEN_VOLT"),
+        "BAT_LOW_T",
+        "COM_LOW_BAT_ACT",
+        ((0, Action.WARN), (1, Action.LAND), (2, Action.LAND), (3, Action.LAND)),
+        0,
+        _FULL_AGAIN,
+        grounded=True,
+        kept=True,
+    ),
+    Row(
+        Condition.BATTERY_CRITICAL,
+        "the same",
+        ("BAT_CRIT_THR", "BAT_CRIT_VOLT"),
+        "BAT_LOW_T",
+        "COM_LOW_BAT_ACT",
+        ((0, Action.WARN), (1, Action.LAND), (2, Action.LAND), (3, Action.RETURN)),
+        0,
+        _FULL_AGAIN,
+        grounded=True,
+        kept=True,
+    ),
+    Row(
+        Condition.PLAN_FAILED,
+        "the QP is not solved, and a fallback decides",
+        (),
+        "COM_QP_LOSS_T",
+        "COM_QP_LOSS_ACT",
+        (_WARN, _HOLD, _RETURN, _LAND),
+        1,
+        "plans are found",
+    ),
+    Row(
+        Condition.DEADLINE_MISSED,
+        "the declared solve time (`SIM_SOLVE_MS`) is longer than a control sample",
+        (),
+        "COM_LATE_T",
+        "COM_LATE_ACT",
+        (_WARN, _HOLD, _RETURN, _LAND),
+        0,
+        "it is shorter",
+    ),
+    Row(
+        Condition.TELEMETRY_MISSED,
+        "the time of the plant's frames leaps",
+        (),
+        "COM_TEL_LOSS_T",
+        "COM_TEL_LOSS_ACT",
+        (_WARN, _HOLD, _RETURN, _LAND),
+        0,
+        "frames follow one another",
+    ),
+    Row(
+        Condition.STATION_LOST,
+        "no HEARTBEAT of a ground station (MAV_TYPE_GCS), where one was ever heard",
+        (),
+        "COM_DL_LOSS_T",
+        "NAV_DLL_ACT",
+        (_NOTHING, *_CLIMBING),
+        0,
+        "any ground station is heard",
+    ),
+    Row(
+        Condition.FENCE_BREACHED,
+        "closer to the edge than the margin, or beyond: of the fence that was uploaded, of a circle around home, of a "
+        "height above it; with GF_PREDICT, where it would come to rest",
+        ("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST", "GF_MARGIN", "GF_PREDICT"),
+        "",
+        "GF_ACTION",
+        (
+            (0, Action.NONE),
+            (1, Action.WARN),
+            (2, Action.HOLD),
+            (3, Action.RETURN),
+            (4, Action.TERMINATE),
+            (5, Action.LAND),
+        ),
+        2,
+        "it is inside",
+    ),
+    Row(
+        Condition.GPS_LOST,
+        "on sensors: no fix is believed",
+        (),
+        "COM_GNSSLOSS_T",
+        "COM_GNSSLOSS_ACT",
+        (_WARN, _HOLD, _LAND, _DESCEND, _TERMINATE),
+        0,
+        "fixes are believed again",
+        grounded=True,
+        warns="position by dead reckoning",
+    ),
+    Row(
+        Condition.STICKS_LOST,
+        "in a mode flown by hand: no MANUAL_CONTROL of who flies",
+        (),
+        "COM_RC_LOSS_T",
+        "NAV_RCL_ACT",
+        _CLIMBING,
+        1,
+        "sticks are heard",
+    ),
+    Row(
+        Condition.SETPOINTS_LOST,
+        "in mode offboard: no setpoint of the companion",
+        (),
+        "COM_OF_LOSS_T",
+        "COM_OBL_RC_ACT",
+        ((3, Action.RETURN), (4, Action.LAND), (5, Action.HOLD), (6, Action.TERMINATE)),
+        5,
+        "setpoints are heard",
+    ),
+    Row(
+        Condition.BATTERY_LOW,
+        "charge or voltage below the limit",
+        ("BAT_LOW_THR", "BAT_LOW_VOLT"),
+        "BAT_LOW_T",
+        "COM_LOW_BAT_ACT",
+        ((0, Action.WARN), (1, Action.RETURN), (2, Action.WARN), (3, Action.WARN)),
+        0,
+        _FULL_AGAIN,
+        grounded=True,
+        kept=True,
+    ),
+)
+ROWS: Mapping[Condition, Row] = {row.condition: row for row in TABLE}

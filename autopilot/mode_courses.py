@@ -1,0 +1,116 @@
+"""How each mode begins to be flown, and how it goes on after the autopilot was killed in it."""
+
+from dataclasses import dataclass
+
+from autopilot.attitude_reference import AttitudeReference
+from autopilot.companion import Companion
+from autopilot.course import Course, Scene
+from autopilot.courses import Along, Climb, Legs, Stop, homeward, landing, to_track
+from autopilot.failsafe_table import Action
+from autopilot.instants import Instants
+from autopilot.kept import CourseRecord, course_again
+from autopilot.leader import Following
+from autopilot.leaning import AltitudeSticks, Descent, Stabilized
+from autopilot.loop import ControlLoop
+from autopilot.missions import Missions
+from autopilot.modes import Mode
+from autopilot.orders import Land
+from autopilot.pilot import Pilot
+from autopilot.planner import Planner, plan, start_yaw
+from autopilot.profile import References
+from autopilot.reference import Reference, target_of
+from autopilot.sticks import PositionSticks
+from autopilot.supervisor import Supervisor
+from autopilot.tracks import Track, track
+
+
+@dataclass(slots=True)
+class ModeCourses:
+    """Makes the courses of one vehicle.
+
+    Attributes:
+        pilot: Flies them.
+        supervisor: Says whether the place is known.
+        missions: Have the course of a mission.
+        loop: The control law, and the vehicle that it believes in.
+        attitude: Leads attitude and thrust; None for a law that takes neither.
+        instants: At which references are planned.
+        references: How a track is planned, as the profile says it.
+        first: A track that is flown from time 0 on, until it is begun; None for none.
+    """
+
+    pilot: Pilot
+    supervisor: Supervisor
+    missions: Missions
+    loop: ControlLoop
+    attitude: AttitudeReference | None
+    instants: Instants
+    references: References
+    first: Track | None
+
+    @property
+    def first_yaw_rad(self) -> float:
+        """Heading of the vehicle at time 0."""
+        return start_yaw(self.first, self.references) if self.first else 0.0
+
+    def begin(self, mode: Mode, scene: Scene) -> Course:
+        """Return how a mode begins."""
+        attitude = self.attitude
+        if mode is Mode.TAKEOFF:
+            behaviour = scene.behaviour
+            return Climb(self.pilot.ground_m + behaviour.takeoff_height_m, None, scene, behaviour.takeoff_speed_m_s)
+        if mode is Mode.LAND:
+            return self._down()
+        if mode is Mode.RETURN:
+            return homeward(scene)
+        if mode is Mode.MISSION:
+            return self.missions.course()
+        if mode is Mode.OFFBOARD:
+            return Companion(attitude)
+        if mode is Mode.FOLLOW:
+            return Following()
+        if mode is Mode.POSITION:
+            return PositionSticks()
+        if mode is Mode.TRACK:
+            return self._on_track(scene)
+        if mode is Mode.STABILIZED and attitude is not None:
+            return Stabilized(attitude)
+        if mode is Mode.ALTITUDE and attitude is not None:
+            return AltitudeSticks(attitude, self.loop.vehicle.gravity_m_s2)
+        return Stop()
+
+    def again(self, record: CourseRecord, mode: Mode, scene: Scene) -> Course:
+        """Return how a mode goes on after a restart in which `record` was flown."""
+        if mode is Mode.TRACK and self.first is None and record.began_us is not None:
+            chosen = track(scene.behaviour.track)
+            return Along(self._plan(chosen), chosen.duration_s, record.began_us)
+        if mode is Mode.MISSION:
+            return self.missions.course_again(record.turns, record.legs)
+        course = course_again(mode, record, scene) or self.begin(mode, scene)
+        return course.skip(record.legs) if isinstance(course, Legs) else course
+
+    def _down(self) -> Course:
+        """Return how to land: level, where nobody knows the place; a law that takes no attitude sinks where it is."""
+        blind = self.pilot.saving is Action.DESCEND or not self.supervisor.knows_position
+        if blind and self.attitude is not None:
+            return Descent(self.attitude, self.loop.vehicle.gravity_m_s2)
+        return landing(Land())
+
+    def _on_track(self, scene: Scene) -> Course:
+        if self.first is not None:
+            first, self.first = self.first, None
+            planner = self._plan(first)
+            for_law = None if self.instants.rows is None else plan(first, self.references, self.loop.preview)
+            self.pilot.reference = _at_start(planner, scene.now_us)
+            return Along(planner, first.duration_s, 0, for_law)
+        chosen = track(scene.behaviour.track)
+        return to_track(self._plan(chosen), chosen.duration_s)
+
+    def _plan(self, chosen: Track) -> Planner:
+        return plan(chosen, self.references, self.instants.preview)
+
+
+def _at_start(planner: Planner, now_us: int) -> Reference:
+    """Return a reference that is on a track that began at time 0."""
+    target = target_of(planner.horizon(now_us))
+    return Reference(target.motion[0, :4].copy(), target.heading[0, :2].copy())
