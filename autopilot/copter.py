@@ -112,7 +112,9 @@ class Copter:
         self.parameters.load(values or {})
         flown, believed = numbers.applied(self.parameters.values)
         self._loop = ControlLoop(flown, believed, clock)
-        self._tuning = Tuning(numbers, builder(profile.controller, clock), self._loop)
+        self._tuning = Tuning(
+            numbers, builder(profile.controller, clock), self._loop, lambda words: self.stations.say(WARNING, words)
+        )
         self.parameters.check = self._tuning.check
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock

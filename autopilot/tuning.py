@@ -8,6 +8,8 @@ import numpy as np
 from autopilot.controller import (
     Clock,
     Controller,
+    ControllerError,
+    DecisionError,
     Horizon,
     Preview,
     VehicleState,
@@ -17,6 +19,7 @@ from autopilot.controller import (
 )
 from autopilot.parameters import ImpossibleError, Numbers
 from autopilot.profile import Profile
+from autopilot.settings import SettingsError
 from mavlink.parameters import Refusal, Value
 from plant.vehicle import Vehicle
 
@@ -46,10 +49,11 @@ class Tuned(NamedTuple):
 class Tuning:
     """Tries every change before it is made: what no control law can be built from, or fly by, is refused."""
 
-    def __init__(self, numbers: Numbers, build: Build, running: Rhythm) -> None:
-        """Tune `numbers` while a law flies in the rhythm of `running`."""
+    def __init__(self, numbers: Numbers, build: Build, running: Rhythm, say: Callable[[str], None]) -> None:
+        """Tune `numbers` while a law flies in the rhythm of `running`; `say` tells what a law says of its refusal."""
         self._numbers = numbers
         self._build = build
+        self._say = say
         self._rhythm = _rhythm(running)
         self._tuned: Tuned | None = None
 
@@ -69,7 +73,10 @@ class Tuning:
         try:
             controller = self._build(profile, vehicle)
             _try(profile.controller, controller, vehicle)
-        except Exception:  # a control law of somebody else refuses numbers, or fails by them, in its own way
+        except (
+            Exception
+        ) as error:  # whatever a control law of somebody else raises, the flight goes on with the old one
+            self._say(f"{name} not changed: {_in_words(error)}")
             return Refusal.VALUE_OUT_OF_RANGE
         if _rhythm(controller) != self._rhythm:
             return Refusal.PERMISSION_DENIED
@@ -96,6 +103,14 @@ def builder(controller: str, clock: Clock) -> Build:
         return law
 
     return build
+
+
+def _in_words(error: Exception) -> str:
+    """Return one line: a refusal is its own words, of anything else the words may not say what it is."""
+    words = " ".join(str(error).split())
+    if words and isinstance(error, ControllerError | DecisionError | SettingsError):
+        return words
+    return f"{type(error).__name__}: {words}" if words else type(error).__name__
 
 
 def _rhythm(controller: Rhythm) -> tuple[int, Preview]:

@@ -27,7 +27,8 @@ class Flight:
     def __init__(self, profile: Profile, vehicle: Vehicle) -> None:
         self.build = builder(profile.controller, clock)
         self.law = self.build(profile, vehicle)
-        self.tuning = Tuning(Numbers(profile, vehicle), self.build, self.law)
+        self.said: list[str] = []
+        self.tuning = Tuning(Numbers(profile, vehicle), self.build, self.law, self.said.append)
         self.parameters = Parameters(definitions(profile, vehicle), self.tuning.check)
         self.memory = self.law.initial(vehicle.hover_speed)
         self.samples = 0
@@ -105,6 +106,7 @@ def test_behaviour_builds_nothing(flight: Flight) -> None:
 def test_a_law_that_nobody_described_refuses_for_itself(value: float) -> None:
     flight = Flight(load_profile("se3"), load_vehicle("hummingbird-thesis"))
     assert flight.parameters.set("GEO_POSIT_FREQU", value) == Refusal.VALUE_OUT_OF_RANGE
+    assert flight.said == ["GEO_POSIT_FREQU not changed: position_frequency_rad_s: Expected `float` > 0.0"]
     assert flight.parameters.set("GEO_POSIT_FREQU", 5.0) is None
 
 
@@ -127,6 +129,8 @@ class Faulty:
             raise SettingsError("way: not this one")
         if self.way == 2.0:
             raise ZeroDivisionError
+        if self.way == 6.0:
+            raise KeyError("nobody has this")
 
     def initial(self, rotor_speed: float) -> float:
         return rotor_speed
@@ -138,9 +142,33 @@ class Faulty:
 
 
 @pytest.mark.parametrize(
-    ("way", "refusal"), [(0.5, None), *((float(way), Refusal.VALUE_OUT_OF_RANGE) for way in range(1, 6))]
+    ("way", "said"),
+    [
+        (1.0, "way: not this one"),
+        (2.0, "ZeroDivisionError"),
+        (3.0, "controller faulty gave rotor speeds [nan nan nan nan]: expected four from 0 to 838"),
+        (4.0, "controller faulty gave rotor speeds [-1. -1. -1. -1.]: expected four from 0 to 838"),
+        (5.0, "controller faulty gave rotor speeds [1.e+09 1.e+09 1.e+09 1.e+09]: expected four from 0 to 838"),
+        (6.0, "KeyError: 'nobody has this'"),
+    ],
 )
-def test_a_law_that_fails_is_not_flown(way: Value, refusal: Refusal | None) -> None:
+def test_a_law_that_fails_is_not_flown_and_says_why(way: Value, said: str) -> None:
+    tuning, parameters, words = faulty()
+    assert parameters.set("FAU_WAY", way) == Refusal.VALUE_OUT_OF_RANGE
+    assert parameters["FAU_WAY"] == 0.0
+    assert tuning.take() is None
+    assert words == [f"FAU_WAY not changed: {said}"]
+
+
+def test_a_law_that_does_not_fail_is_flown() -> None:
+    tuning, parameters, words = faulty()
+    assert parameters.set("FAU_WAY", 0.5) is None
+    assert parameters["FAU_WAY"] == 0.5
+    assert tuning.take() is not None
+    assert words == []
+
+
+def faulty() -> tuple[Tuning, Parameters, list[str]]:
     vehicle = load_vehicle("hummingbird")
     table = {"way": 0.0}
     profile = Profile(
@@ -150,8 +178,7 @@ def test_a_law_that_fails_is_not_flown(way: Value, refusal: Refusal | None) -> N
         controllers={"faulty": table},
         simulation=load_profile("flight").simulation,
     )
-    tuning = Tuning(Numbers(profile, vehicle), lambda profile, _: Faulty(profile.table("faulty")), Faulty(table))
-    parameters = Parameters(definitions(profile, vehicle), tuning.check)
-    assert parameters.set("FAU_WAY", way) == refusal
-    assert parameters["FAU_WAY"] == (0.0 if refusal else way)
-    assert (tuning.take() is None) == (refusal is not None)
+    words: list[str] = []
+    numbers = Numbers(profile, vehicle)
+    tuning = Tuning(numbers, lambda profile, _: Faulty(profile.table("faulty")), Faulty(table), words.append)
+    return tuning, Parameters(definitions(profile, vehicle), tuning.check), words

@@ -22,7 +22,7 @@ class Client(Hearing):
 
     def __init__(self, system: int = 255, component: int = 190, port: int = GCS_PORT, link: int = 0) -> None:
         """Be a component at a port of this computer."""
-        super().__init__(system, remembers=4000)
+        super().__init__(remembers=4000)
         self.component = component
         self.link = link
         self.address = ("127.0.0.1", port)

@@ -7,6 +7,7 @@ import pytest
 from msgspec import structs
 
 from autopilot.modes import FIRST, Mode
+from autopilot.profile import load_profile
 from autopilot.stations import REBOOT, SHUT_DOWN
 from mavlink.dialect import mav
 from mavlink.feedback import Feedback
@@ -48,6 +49,15 @@ def test_a_number_that_changes_in_flight_jolts_nothing(name: str, value: Value) 
     assert max(jolts) < 1.2  # in 8 ms
     flight.run(1.0)
     assert flight.velocity[0] > 3.0
+
+
+def test_why_a_control_law_refuses_a_number_is_heard() -> None:
+    flight = CopterFlight(profile=load_profile("se3"))
+    before = flight.copter.parameters["GEO_POSIT_FREQU"]
+    flight.client.send("PARAM_SET", SYSTEM, COMPONENT, b"GEO_POSIT_FREQU", -4.0, mav.MAV_PARAM_TYPE_REAL32)
+    flight.run(0.1)
+    assert flight.copter.parameters["GEO_POSIT_FREQU"] == before
+    assert flight.client.said("GEO_POSIT_FREQU not changed: position_frequency_rad_s: Expected `float` > 0.0")
 
 
 def test_a_heavier_vehicle_than_is_believed_flies_and_lands() -> None:

@@ -10,6 +10,7 @@ from mavlink.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Codec, Message, mav
 from mavlink.geodesy import DEFAULT_ORIGIN, geodetic_of
 from mavlink.services.mission_items import MISSION, MissionItem, item_fields
 from mavlink.services.service import Peer
+from tools.scenarios.hearing import Hearing
 
 _VEHICLE = Peer(0, 1, AUTOPILOT_COMPONENT)
 _LARGEST = 65536
@@ -41,7 +42,6 @@ class Station:
         url: The link that the vehicle is to serve.
         mode, armed: As the vehicle says; None before it has.
         seq: The current item.
-        texts: What it said.
         flown: Whether the mission was begun and is over, the rotors at rest.
     """
 
@@ -53,6 +53,7 @@ class Station:
         self.socket.setblocking(False)
         self.url = f"udpout:127.0.0.1:{self.socket.getsockname()[1]}"
         self._items = items
+        self._words = Hearing()
         self._codec = Codec(255, mav.MAV_COMP_ID_MISSIONPLANNER)
         self.begin_anew()
 
@@ -61,9 +62,14 @@ class Station:
         self.mode: Mode | None = None
         self.armed: bool | None = None
         self.seq = 0
-        self.texts: list[str] = []
+        self._words.forget()
         self.flown = self.has_armed = self._has_mission = False
         self._vehicle: tuple[str, int] | None = None
+
+    @property
+    def texts(self) -> list[str]:
+        """What it said, line by line."""
+        return self._words.texts
 
     def hear(self) -> None:
         """Take in what has come, and answer it."""
@@ -94,10 +100,7 @@ class Station:
             case "HEARTBEAT":
                 self._see(mode_of_custom(fields.custom_mode), bool(fields.base_mode & MODE_ARMED))
             case "STATUSTEXT":
-                if fields.chunk_seq and self.texts:
-                    self.texts[-1] += fields.text
-                else:
-                    self.texts.append(fields.text)
+                self._words.hear(message)
             case "MISSION_CURRENT":
                 self.seq = fields.seq
             case "MISSION_REQUEST_INT" | "MISSION_REQUEST":

@@ -12,16 +12,14 @@ class Hearing:
     """What was heard.
 
     Attributes:
-        system: The listener's own system id.
         heard: Messages, as their fields, by name, the latest last.
         counts: How many were heard, by name.
         acks: Every COMMAND_ACK, in order, whoever it is for.
         texts: Every STATUSTEXT, in order.
     """
 
-    def __init__(self, system: int, remembers: int = 20_000) -> None:
+    def __init__(self, remembers: int = 20_000) -> None:
         """Have heard nothing yet; of one name so many messages are remembered, at least the last half of them."""
-        self.system = system
         self._remembers = remembers
         self.heard: defaultdict[str, list[Any]] = defaultdict(list)
         self.counts: Counter[str] = Counter()
@@ -68,10 +66,10 @@ class Hearing:
 class Words(Hearing):
     """Every STATUSTEXT that a vehicle sends to one listener, heard where it is sent: no link loses it."""
 
-    def __init__(self, system: int) -> None:
-        """Have heard nothing yet; `system` is the listener's."""
-        super().__init__(system)
-        self._codec = Codec(system, 0)
+    def __init__(self) -> None:
+        """Have heard nothing yet."""
+        super().__init__()
+        self._codec = Codec(0, 0)
 
     def overhear(self, datagram: bytes) -> None:
         """Take in a datagram that is sent."""

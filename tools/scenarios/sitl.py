@@ -78,7 +78,7 @@ class Sitl(View):
         self._sticks_at_us = 0
         self._stations: list[Station] = []
         self.gcs = self.client(255, 190)
-        self._words = Words(self.gcs.system)
+        self._words = Words()
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
 
     def begin(self) -> None:

@@ -57,7 +57,7 @@ class Station(Hearing):
     every half second until the answer comes.
 
     Attributes:
-        component: Its component id.
+        system, component: Its ids.
         number: Of its link.
         silent: Whether it says no HEARTBEAT and nothing else, while it still hears.
         dropped: What came and was no message, by reason.
@@ -67,9 +67,10 @@ class Station(Hearing):
         self, flight: Flying, number: int, *, system: int, component: int, trouble: Trouble, seed: int, beats: bool
     ) -> None:
         """Be component `component` of `system` on link `number`; one that `beats` sends a HEARTBEAT a second."""
-        super().__init__(system)
+        super().__init__()
         self._flight = flight
         self.number = number
+        self.system = system
         self.component = component
         self._codec = Codec(system, component)
         self._up = Pipe(trouble, f"{seed} {number} up")
