@@ -176,7 +176,7 @@ def draw(points: Sequence[Point], path: Path) -> None:
             heights = [where if name == "step" else where - 0.07] * len(lost)
             axes.plot(lost, heights, "x", color=color, transform=axes.get_xaxis_transform(), label=f"{name}: lost")
     errors.set_yscale("log")
-    errors.set_ylabel("m")
+    errors.set_ylabel("error (m)")
     tilts.set_ylabel("largest tilt (°)")
     tilts.set_xlabel("round trip (ms)")
     for axes in (errors, tilts):
