@@ -1,4 +1,4 @@
-"""What a flight needs to go on after the autopilot was killed, as plain data, and how a vehicle goes on with it.
+"""What a flight needs to go on after the autopilot was killed, as plain data.
 
 A record is made at each control sample; whoever keeps it hands it to the vehicle of the next process. The first frame
 says whether it is of the same flight: its time follows the record's. Close behind it everything goes on, with the
@@ -14,14 +14,14 @@ import msgspec
 
 from autopilot.circling import Round
 from autopilot.controller import Array
-from autopilot.course import Course, Scene
+from autopilot.course import Course
 from autopilot.courses import Along, Climb, Legs, Stop, Way
 from autopilot.failsafes import Memory
 from autopilot.loop import LoopRecord
 from autopilot.mission import MissionRecord
 from autopilot.missions import MissionCourse
 from autopilot.modes import Mode
-from autopilot.orders import Circle, GoTo, OrderRecord, TakeOff, order_of, record_of
+from autopilot.orders import OrderRecord, record_of
 from autopilot.pilot import PilotRecord
 from autopilot.profile import Profile
 from mavlink.geodesy import Geodetic
@@ -127,18 +127,6 @@ def course_record(course: Course) -> CourseRecord:
     if isinstance(course, Way | Round | Climb | Stop):
         return CourseRecord(record_of(course.order))
     return CourseRecord()
-
-
-def course_again(mode: Mode, record: CourseRecord, scene: Scene) -> Course | None:
-    """Return the course of an order that was flown in a mode; None where the mode itself says how it begins."""
-    order = None if record.order is None else order_of(record.order)
-    if mode is Mode.HOLD and isinstance(order, GoTo):
-        return Way(order, scene)
-    if mode is Mode.TAKEOFF and isinstance(order, TakeOff):
-        return Climb(order.height_enu_m, order.yaw_rad, scene, scene.behaviour.takeoff_speed_m_s)
-    if mode is Mode.ORBIT and isinstance(order, Circle):
-        return Round(order, scene)
-    return None
 
 
 def goes_on(mode: Mode, seq: int) -> str:

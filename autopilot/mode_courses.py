@@ -3,18 +3,19 @@
 from dataclasses import dataclass
 
 from autopilot.attitude_reference import AttitudeReference
+from autopilot.circling import Round
 from autopilot.companion import Companion
 from autopilot.course import Course, Scene
-from autopilot.courses import Along, Climb, Legs, Stop, homeward, landing, to_track
+from autopilot.courses import Along, Climb, Legs, Stop, Way, homeward, landing, to_track
 from autopilot.failsafe_table import Action
 from autopilot.instants import Instants
-from autopilot.kept import CourseRecord, course_again
+from autopilot.kept import CourseRecord
 from autopilot.leader import Following
 from autopilot.leaning import AltitudeSticks, Descent, Stabilized
 from autopilot.loop import ControlLoop
 from autopilot.missions import Missions
 from autopilot.modes import Mode
-from autopilot.orders import Land
+from autopilot.orders import Circle, GoTo, Land, TakeOff, order_of
 from autopilot.pilot import Pilot
 from autopilot.planner import Planner, plan, start_yaw
 from autopilot.profile import References
@@ -86,7 +87,7 @@ class ModeCourses:
             return Along(self._plan(chosen), chosen.duration_s, record.began_us)
         if mode is Mode.MISSION:
             return self.missions.course_again(record.turns, record.legs)
-        course = course_again(mode, record, scene) or self.begin(mode, scene)
+        course = _ordered(mode, record, scene) or self.begin(mode, scene)
         return course.skip(record.legs) if isinstance(course, Legs) else course
 
     def _down(self) -> Course:
@@ -108,6 +109,18 @@ class ModeCourses:
 
     def _plan(self, chosen: Track) -> Planner:
         return plan(chosen, self.references, self.instants.preview)
+
+
+def _ordered(mode: Mode, record: CourseRecord, scene: Scene) -> Course | None:
+    """Return the course of an order that was flown in a mode; None where the mode itself says how it begins."""
+    order = None if record.order is None else order_of(record.order)
+    if mode is Mode.HOLD and isinstance(order, GoTo):
+        return Way(order, scene)
+    if mode is Mode.TAKEOFF and isinstance(order, TakeOff):
+        return Climb(order.height_enu_m, order.yaw_rad, scene, scene.behaviour.takeoff_speed_m_s)
+    if mode is Mode.ORBIT and isinstance(order, Circle):
+        return Round(order, scene)
+    return None
 
 
 def _at_start(planner: Planner, now_us: int) -> Reference:

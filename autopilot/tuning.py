@@ -73,9 +73,7 @@ class Tuning:
         try:
             controller = self._build(profile, vehicle)
             _try(profile.controller, controller, vehicle)
-        except (
-            Exception
-        ) as error:  # whatever a control law of somebody else raises, the flight goes on with the old one
+        except Exception as error:  # whatever somebody else's law raises, the flight goes on with the old one
             self._say(f"{name} not changed: {_in_words(error)}")
             return Refusal.VALUE_OUT_OF_RANGE
         if _rhythm(controller) != self._rhythm:

@@ -7,7 +7,7 @@ from typing import Any
 from mavlink.dialect import Codec, Message, mav
 from mavlink.services.command import Outcome
 from mavlink.services.mission import MissionService, Progress, Vehicle
-from mavlink.services.mission_items import ACCEPTED, PLAN_TYPES, MissionItem, Plan
+from mavlink.services.mission_items import ACCEPTED, MISSION, PLAN_TYPES, MissionItem, Plan
 from mavlink.services.mission_upload import Rules
 from mavlink.services.service import Peer, Send
 from mavlink.services.statustext import StatusText
@@ -23,6 +23,9 @@ def some_item(number: int = 0, **changes: Any) -> MissionItem:
     """Return an item that differs from those of other numbers."""
     values = (3, 16, 1, 0.5 * number, 1.0, float("nan"), -0.25, 473977420 + number, 85455940 - number, 2.5 + number)
     return MissionItem(*values)._replace(**changes)
+
+
+ITEMS = [some_item(number) for number in range(3)]
 
 
 class Ground:
@@ -209,3 +212,22 @@ def asked(messages: Iterable[Message]) -> list[tuple[str, int]]:
 
 
 CANCELLED: int = mav.MAV_MISSION_OPERATION_CANCELLED
+
+
+def count(ground: Ground, number: int, peer: Any = FIRST, plan_type: int = MISSION) -> list[Any]:
+    """Begin an upload of so many items; return the answers."""
+    return ground.hear(peer, "MISSION_COUNT", *VEHICLE, number, plan_type)
+
+
+def give(ground: Ground, seq: int, item: MissionItem, peer: Any = FIRST, plan_type: int = MISSION) -> list[Any]:
+    """Give an item of an upload; return the answers."""
+    return ground.hear(peer, "MISSION_ITEM_INT", *VEHICLE, seq, *fielded(item, plan_type))
+
+
+def upload(ground: Ground, items: Any = ITEMS, plan_type: int = MISSION) -> list[Any]:
+    """Give every item as it is asked for; return the last answers."""
+    answers = count(ground, len(items), plan_type=plan_type)
+    for seq, item in enumerate(items):
+        assert asked(answers) == [("MISSION_REQUEST_INT", seq)]
+        answers = give(ground, seq, item, plan_type=plan_type)
+    return answers
