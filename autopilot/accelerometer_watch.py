@@ -23,8 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.eskf import Filter
+from common.elementary import square
+from common.jit import compiled
 from mavlink.atmosphere import METRES_PER_PASCAL
-from mavlink.compiled import compiled, rotation_matrix
+from mavlink.compiled import rotation_matrix
 from plant.vehicle import Sensors
 
 Array: TypeAlias = NDArray[np.float64]
@@ -78,8 +80,8 @@ class AccelerometerWatch:
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float) -> None:
         """Begin with nothing seen. What is compiled is loaded here."""
-        self._velocity_variance = max(sensors.gps.velocity_noise_m_s, _LEAST_SIGMA) ** 2
-        self._height_variance = max(sensors.barometer.noise_pa * METRES_PER_PASCAL, _LEAST_SIGMA) ** 2
+        self._velocity_variance = square(max(sensors.gps.velocity_noise_m_s, _LEAST_SIGMA))
+        self._height_variance = square(max(sensors.barometer.noise_pa * METRES_PER_PASCAL, _LEAST_SIGMA))
         self._gravity = gravity_m_s2
         self._fixes: deque[_Fix] = deque(maxlen=ceil(_KEPT_S * sensors.gps.rate_hz))
         self._rejected = 0

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.inertial import Reading
+from common.matrices import matmul, norm
 from mavlink.frames import Quaternion, Vector
 from mavlink.sensors import GpsFix
 from plant.vehicle import Sensors
@@ -101,13 +102,13 @@ class Alignment:
         mean, spread = motions.mean(axis=0), motions.std(axis=0)
         force, rate = mean[:3], mean[3:]
         field = np.mean(self._fields, axis=0)
-        strength = float(np.linalg.norm(self._earth_field))
+        strength = norm(np.array(self._earth_field))
         if (
             spread[:3].max() > self._unrest_m_s2
             or spread[3:].max() > self._unrest_rad_s
-            or abs(np.linalg.norm(force) - self._gravity) > self._tilt_m_s2
+            or abs(norm(force) - self._gravity) > self._tilt_m_s2
             or np.abs(rate).max() > self._turn_rad_s
-            or abs(np.linalg.norm(field) - strength) > _FIELD_PART * strength
+            or abs(norm(field) - strength) > _FIELD_PART * strength
         ):
             return None
         return Aligned(
@@ -127,14 +128,14 @@ def attitude_of(force: NDArray[np.float64], field: NDArray[np.float64], earth_fi
     """Return the attitude in which specific force shows up and the field's level part is the earth's (TRIAD)."""
     body = _triad(force, field)
     earth = _triad(np.array([0.0, 0.0, 1.0]), earth_field)
-    return _quaternion(earth @ body.T)
+    return _quaternion(matmul(earth, body.T))
 
 
 def _triad(up: NDArray[np.float64], field: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return magnetic east, magnetic north and up as columns."""
-    up = up / np.linalg.norm(up)
+    up = up / norm(up)
     east = np.cross(field, up)
-    east = east / np.linalg.norm(east)
+    east = east / norm(east)
     return np.column_stack([east, np.cross(up, east), up])
 
 
@@ -151,7 +152,7 @@ def _quaternion(R: NDArray[np.float64]) -> Quaternion:
             [R[1, 0] - R[0, 1], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], 1.0 + 2.0 * R[2, 2] - trace],
         ]
     )[largest]
-    w, x, y, z = (products / np.linalg.norm(products)).tolist()
+    w, x, y, z = (products / norm(products)).tolist()
     return (w, x, y, z)
 
 

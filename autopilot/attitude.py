@@ -7,7 +7,8 @@ from autopilot.lpv import ATTITUDE_OUTPUT, Discretisation, attitude_model, discr
 from autopilot.mpc import Solution, Weights, augment, condense, solve
 from autopilot.qp import QpSolver
 from autopilot.settings import Count, Table
-from mavlink.frames import Vector, euler_rates
+from mavlink.compiled import euler_rates
+from mavlink.frames import Vector
 from plant.vehicle import Positive, Vehicle
 
 PerAxis = tuple[Positive, Positive, Positive]

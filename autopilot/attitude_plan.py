@@ -4,15 +4,17 @@ from math import radians
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from autopilot import constrained, prediction
 from autopilot.controller import Active, Array, Clock, Diagnostics
 from autopilot.mixer import exact_inverse
 from autopilot.prediction import INPUTS, STATES
 from autopilot.qp import Qp, QpSolver, QpStatus
+from autopilot.riccati import lqr
 from autopilot.rotor_lag import RotorLag
 from autopilot.settings import Count, Degrees, Table
+from common.elementary import square
+from common.matrices import matmul, matvec
 from plant.vehicle import Positive, Vehicle
 
 PerAxis: TypeAlias = tuple[Positive, Positive, Positive]
@@ -188,8 +190,8 @@ class AttitudeMpc:
             self._checked,
             self._limits,
             self._largest_increment,
-            self._lag.least**2,
-            now.fastest**2,
+            square(self._lag.least),
+            square(now.fastest),
             self._H,
             self._f,
             self._G,
@@ -232,7 +234,7 @@ class AttitudeMpc:
         state = np.concatenate([now.x, now.u])
         wanted = target.end.copy()
         wanted[list(prediction.ANGLES)] = target.angles[0]
-        moments: Array = now.u - self._gain @ (state - wanted)
+        moments: Array = now.u - matvec(self._gain, state - wanted)
         return moments
 
     def _riccati(self) -> tuple[Array, Array]:
@@ -241,10 +243,9 @@ class AttitudeMpc:
         B = A[:, STATES:]
         C = np.zeros((INPUTS, STATES + INPUTS))
         C[range(INPUTS), prediction.ANGLES] = 1.0
-        Q, R = C.T @ np.diag(self._output_weight) @ C, np.diag(self._increment_weight)
-        S = np.asarray(solve_discrete_are(A, B, Q, R), dtype=np.float64)
-        K = np.linalg.solve(R + B.T @ S @ B, B.T @ S @ A)
-        return np.ascontiguousarray(0.5 * (S + S.T)), np.asarray(K, dtype=np.float64)
+        Q, R = matmul(C.T * self._output_weight, C), np.diag(self._increment_weight).copy()
+        S, K = lqr(A, B, Q, R)
+        return 0.5 * (S + S.T), K
 
     def _hover_transition(self) -> Array:
         """Return Ã = [[A, B], [0, I]] of one step at hover, (12, 12)."""
@@ -270,5 +271,5 @@ def body_of(vehicle: Vehicle) -> prediction.Body:
 
 def squared_speeds_from(vehicle: Vehicle) -> tuple[Array, Array]:
     """Return what maps U1 (4,) and U2, U3, U4 (4, 3) to squared rotor speeds, in parts of the largest."""
-    inverse = exact_inverse(vehicle.allocation()) / vehicle.rotors.max_speed**2
+    inverse = exact_inverse(vehicle.allocation()) / square(vehicle.rotors.max_speed)
     return inverse[:, 0].copy(), inverse[:, 1:].copy()

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from autopilot.attitude_slew import LEAN, POSE, SPIN, Slew, limit_tilt, slew_on
 from autopilot.behaviour import Behaviour
 from autopilot.controller import AttitudeDemand, Preview, VehicleState
-from mavlink.frames import Quaternion, Vector, euler_from_quaternion, nearest_turn, rotation_matrix
+from common.elementary import square
+from mavlink.compiled import euler_from_quaternion
+from mavlink.frames import Quaternion, Vector, nearest_turn, rotation_matrix
 from mavlink.setpoints import AttitudeSetpoint, Sticks
 from plant.vehicle import Vehicle
 
@@ -117,7 +119,7 @@ class AttitudeReference:
     def adopt(self, vehicle: Vehicle) -> None:
         """Go on for a vehicle of other numbers."""
         self.weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
-        self.most_thrust_n = float(vehicle.allocation()[0].sum()) * vehicle.rotors.max_speed**2
+        self.most_thrust_n = float(vehicle.allocation()[0].sum()) * square(vehicle.rotors.max_speed)
 
     def initial(self, state: VehicleState, thrust_n: float | None = None) -> ReferenceMemory:
         """Begin with the attitude that the vehicle has, and the thrust that it makes, N: its weight if None."""

@@ -5,13 +5,14 @@ only the rate is asked for by v' = 2 w (target' - v). A largest acceleration of 
 the braking to the first of them, so that nothing overshoots.
 """
 
-from math import atan2, cos, floor, isnan, pi, sin, sqrt
+from math import floor, isnan, pi, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink.compiled import compiled
+from common.jit import compiled
+from common.kernels import atan2, cos, sin
 
 Array: TypeAlias = NDArray[np.float64]
 

@@ -7,6 +7,8 @@ charge taken, and the rotors' top speed in proportion to V.
 from math import sqrt
 
 from autopilot.controller import Array
+from common.elementary import square
+from common.matrices import dot
 from plant.vehicle import Battery, Vehicle
 
 _SECONDS_PER_HOUR = 3600.0
@@ -35,7 +37,7 @@ class BatteryModel:
     def __init__(self, vehicle: Vehicle) -> None:
         """Follow the battery of `vehicle`."""
         self._battery = vehicle.battery
-        drag_torque = vehicle.rotors.torque_coefficient * vehicle.rotors.max_speed**2
+        drag_torque = vehicle.rotors.torque_coefficient * square(vehicle.rotors.max_speed)
         efficiency = vehicle.battery.efficiency if vehicle.battery else 1.0
         self._full_power_w = drag_torque * vehicle.rad_s_per_speed_unit * vehicle.rotors.max_speed / efficiency
         self._fastest: dict[int, float] = {}
@@ -46,7 +48,7 @@ class BatteryModel:
         """Return the charge taken, Ah, after `duration_s` at rotor speeds (4,), parts of the largest."""
         if self._battery is None:
             return charge_ah
-        power_w = self._full_power_w * float((speeds * speeds) @ speeds)
+        power_w = self._full_power_w * dot(speeds * speeds, speeds)
         current_a = power_w / _voltage_v(self._battery, charge_ah, power_w)
         return charge_ah + current_a * duration_s / _SECONDS_PER_HOUR
 
@@ -54,7 +56,7 @@ class BatteryModel:
         """Return the terminal voltage, V, and the current, A, at rotor speeds (4,), parts of the largest; 0 without."""
         if self._battery is None:
             return 0.0, 0.0
-        power_w = self._full_power_w * float((speeds * speeds) @ speeds)
+        power_w = self._full_power_w * dot(speeds * speeds, speeds)
         voltage_v = _voltage_v(self._battery, charge_ah, power_w)
         return voltage_v, power_w / voltage_v
 
@@ -67,7 +69,7 @@ class BatteryModel:
         """
         if self._battery is None:
             return 1.0
-        power_w = self._full_power_w * float((speeds * speeds) @ speeds)
+        power_w = self._full_power_w * dot(speeds * speeds, speeds)
         return _voltage_v(self._battery, charge_ah, power_w) / self._battery.full_voltage_v
 
     def fastest_together(self, charge_ah: float) -> float:
@@ -91,7 +93,7 @@ class BatteryModel:
         low, high = 0.0, 1.0
         for _ in range(_BISECTIONS):
             speed = 0.5 * (low + high)
-            power_w = 4.0 * self._full_power_w * speed**3
+            power_w = 4.0 * self._full_power_w * speed * speed * speed
             enough = _voltage_v(battery, charge_ah, power_w) >= speed * battery.full_voltage_v
             low, high = (speed, high) if enough else (low, speed)
         return low

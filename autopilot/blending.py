@@ -6,8 +6,9 @@ comes back and corrects by metres, it is given in at a speed that the vehicle fo
 what exceeds the usual is kept back: there the controller must know at once.
 """
 
-from math import exp, sqrt
+from math import sqrt
 
+from common.kernels import exp
 from mavlink.frames import Vector
 
 _TIME_CONSTANT_S = 1.0

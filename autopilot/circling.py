@@ -1,6 +1,6 @@
 """The course around a centre: to the circle, then along it."""
 
-from math import atan2, copysign, cos, hypot, pi, sin, sqrt
+from math import copysign, hypot, pi, sqrt
 
 import numpy as np
 
@@ -9,6 +9,8 @@ from autopilot.course import Endless, Motion, Scene
 from autopilot.courses import Way
 from autopilot.orders import Circle, GoTo
 from autopilot.reference import ALL_BOUND, Target
+from common import elementwise
+from common.kernels import atan2, cos, sin
 from mavlink.dialect import mav
 from mavlink.frames import Vector
 
@@ -84,10 +86,10 @@ class Round(Endless):
 
     def _motion(self, angles: Array, rate: float) -> Array:
         motion = np.zeros((len(angles), 5, 3))
-        spoke = self._radius_m * np.exp(1j * angles)
+        east, north = self._radius_m * elementwise.cos(angles), self._radius_m * elementwise.sin(angles)
         for order in range(5):
-            motion[:, order, 0], motion[:, order, 1] = spoke.real, spoke.imag
-            spoke = spoke * 1j * rate
+            motion[:, order, 0], motion[:, order, 1] = east, north
+            east, north = -rate * north, rate * east
         motion[:, 0] += self.order.center_enu_m
         return motion
 

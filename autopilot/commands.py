@@ -1,13 +1,14 @@
 """MAVLink commands to the vehicle, each checked and handed to the pilot: what is not finite or too large is denied."""
 
 from collections.abc import Callable, Mapping
-from math import cos, hypot, isfinite, isnan, nan, pi, radians, sin
+from math import hypot, isfinite, isnan, nan, pi, radians
 
 from autopilot.circling import Round
 from autopilot.courses import Climb, Stop, Way
 from autopilot.modes import Mode, Refusal, mode_of, mode_of_custom
 from autopilot.orders import Circle, GoTo
 from autopilot.pilot import Pilot
+from common.kernels import cos, sin
 from mavlink.dialect import mav
 from mavlink.frames import Vector
 from mavlink.geodesy import Geodetic, enu_of, is_on_earth

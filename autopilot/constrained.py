@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.prediction import ANGLES, INPUTS, STATES, P, Q, R
-from mavlink.compiled import compiled
+from common.jit import compiled
+from common.matrices import matmul
 
 Array: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]
@@ -82,7 +83,7 @@ def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f:
         for k in range(i, moved, INPUTS):
             E[STATES + i, 1 + k] = 1.0
     E[:, 0] -= terminal
-    weighted = np.dot(S, E)
+    weighted = matmul(S, E)
     for k in range(moved):
         for row in range(STATES + INPUTS):
             f[k] += E[row, 1 + k] * weighted[row, 0]

@@ -112,6 +112,12 @@ class Fallback(StrEnum):
     THREE_ROTORS = "three rotors"
 
 
+STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, status in enumerate(QpStatus)}
+"""How logs and telemetry write the status of a QP: 0 is solved, -1 no QP."""
+FALLBACK_CODES: dict[Fallback | None, int] = {None: -1} | {fallback: code for code, fallback in enumerate(Fallback)}
+"""How they write a fallback: -1 is none."""
+
+
 class Active(NamedTuple):
     """How many constraints of each kind bind at the solution."""
 

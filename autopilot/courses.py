@@ -1,13 +1,14 @@
 """Courses by place: how each order is flown, as a target for the reference to follow, sample after sample."""
 
 from collections.abc import Callable
-from math import atan2, dist, hypot
+from math import dist, hypot
 from typing import TypeAlias
 
 from autopilot.course import Asked, Course, Endless, Motion, Planned, Scene
 from autopilot.orders import GoTo, Hold, Land, Order, TakeOff
 from autopilot.planner import Planner
 from autopilot.reference import Kind, still_target
+from common.kernels import atan2
 from mavlink.frames import Vector
 
 Leg: TypeAlias = Callable[[Scene], Course]

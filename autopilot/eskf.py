@@ -30,6 +30,7 @@ from autopilot.eskf_predict import (
 )
 from autopilot.estimate import Reason, Test, Tests
 from autopilot.falling import Caught
+from common.elementary import square
 from mavlink.atmosphere import METRES_PER_PASCAL, altitude_m, altitude_slope_m_pa
 from mavlink.frames import Vector
 from mavlink.sensors import GpsFix
@@ -168,13 +169,13 @@ class Filter:
         self.field_gauss = hypot(*field_enu_gauss)
         self._noise = noise_of(sensors)
         gps = sensors.gps
-        self._horizontal = gps.horizontal_noise_m**2 + _PLACE_STEP_M**2 / 12.0
-        self._vertical = gps.vertical_noise_m**2 + _HEIGHT_STEP_M**2 / 12.0
-        speed = gps.velocity_noise_m_s**2 + _SPEED_STEP_M_S**2 / 12.0
+        self._horizontal = square(gps.horizontal_noise_m) + square(_PLACE_STEP_M) / 12.0
+        self._vertical = square(gps.vertical_noise_m) + square(_HEIGHT_STEP_M) / 12.0
+        speed = square(gps.velocity_noise_m_s) + square(_SPEED_STEP_M_S) / 12.0
         self._fix, self._fix_y, self._fix_nis = np.zeros(6), np.zeros(6), np.zeros(3)
         self._claims = (nan, nan)
         self._fix_variances = np.array([speed, self._horizontal, self._vertical])
-        self._field_variance = max(sensors.magnetometer.noise_gauss, _LEAST_NOISE) ** 2
+        self._field_variance = square(max(sensors.magnetometer.noise_gauss, _LEAST_NOISE))
         self.x, self.P = np.zeros(NOMINAL), np.zeros((ERRORS, ERRORS))
         self.velocity = Kind(3, 7_000_000, (VELOCITY, 3, _DOUBTED_M_S))
         self.position = Kind(2, 7_000_000, (POSITION, 2, _DOUBTED_M))
@@ -209,7 +210,7 @@ class Filter:
         if aligned.pressure_height_m is not None:
             x[19] = aligned.pressure_height_m - x[2]
             sigma = self._sensors.barometer.noise_pa * METRES_PER_PASCAL
-            variance = max(sigma, _LEAST_NOISE) ** 2 / aligned.heights
+            variance = square(max(sigma, _LEAST_NOISE)) / aligned.heights
             update.fuse_pressure_height(x, P, aligned.pressure_height_m, variance, inf, y1)
 
     def start_in_air(self, caught: Caught, place_enu_m: Vector, time_us: int) -> None:
@@ -246,8 +247,8 @@ class Filter:
     def _rest(self, aligned: Aligned) -> None:
         """Fuse the means of specific force, field and rate."""
         x, P, sensors = self.x, self.P, self._sensors
-        force = max(sensors.accelerometer.noise_density_m_s2_rthz, _LEAST_NOISE) ** 2 / aligned.duration_s
-        rate = max(sensors.gyroscope.noise_density_rad_s_rthz, _LEAST_NOISE) ** 2 / aligned.duration_s
+        force = square(max(sensors.accelerometer.noise_density_m_s2_rthz, _LEAST_NOISE)) / aligned.duration_s
+        rate = square(max(sensors.gyroscope.noise_density_rad_s_rthz, _LEAST_NOISE)) / aligned.duration_s
         field, y = self._field_variance / aligned.fields, np.zeros(6)
         mean_force, mean_field = np.array(aligned.force), np.array(aligned.field)
         update.fuse_rest(x, P, mean_force, self._gravity, force, mean_field, self._field, field, y)
@@ -300,7 +301,7 @@ class Filter:
         """Fuse a pressure; return why it was rejected, if it was."""
         height = self.pressure_height_m = altitude_m(pressure_pa)
         sigma = self._sensors.barometer.noise_pa * altitude_slope_m_pa(pressure_pa)
-        variance = max(-sigma, _LEAST_NOISE) ** 2
+        variance = square(max(-sigma, _LEAST_NOISE))
         believed = self.pressure.fuse(self, time_us, update.fuse_pressure_height, height, variance)
         return None if believed else Reason.INNOVATION
 
@@ -347,9 +348,9 @@ class Filter:
         """
         P, angle_rad = self.P, _UNSURE_TURN * turned_rad
         update.doubt(P, ATTITUDE, 3, angle_rad * angle_rad)
-        update.doubt(P, GYRO_BIAS, 3, (angle_rad / since_s) ** 2)
+        update.doubt(P, GYRO_BIAS, 3, square(angle_rad / since_s))
         speed_m_s = hypot(*self.velocity.test.innovation)
-        update.doubt(P, POSITION, 3, (_UNSURE_S * speed_m_s) ** 2)
+        update.doubt(P, POSITION, 3, square(_UNSURE_S * speed_m_s))
         update.doubt(P, VELOCITY, 3, speed_m_s * speed_m_s)
         self.velocity.resets += 1
         self.velocity.accept(time_us)
@@ -378,20 +379,22 @@ class Filter:
 def noise_of(sensors: Sensors) -> Noise:
     """Return what drives the errors of a vehicle with `sensors`."""
     accel, gyro, gps, barometer = sensors.accelerometer, sensors.gyroscope, sensors.gps, sensors.barometer
-    horizontal, vertical = (max(sigma, _LEAST_NOISE) ** 2 for sigma in (gps.horizontal_drift_m, gps.vertical_drift_m))
+    horizontal, vertical = (
+        square(max(sigma, _LEAST_NOISE)) for sigma in (gps.horizontal_drift_m, gps.vertical_drift_m)
+    )
     drift_m = max(barometer.drift_pa * METRES_PER_PASCAL, _LEAST_NOISE)
     return Noise(
-        force=max(accel.noise_density_m_s2_rthz, _LEAST_NOISE) ** 2,
-        rate=max(gyro.noise_density_rad_s_rthz, _LEAST_NOISE) ** 2,
-        gyro_bias=max(gyro.bias_walk_rad_s2_rthz, _LEAST_NOISE) ** 2,
-        accel_bias=max(accel.bias_walk_m_s3_rthz, _LEAST_NOISE) ** 2,
+        force=square(max(accel.noise_density_m_s2_rthz, _LEAST_NOISE)),
+        rate=square(max(gyro.noise_density_rad_s_rthz, _LEAST_NOISE)),
+        gyro_bias=square(max(gyro.bias_walk_rad_s2_rthz, _LEAST_NOISE)),
+        accel_bias=square(max(accel.bias_walk_m_s3_rthz, _LEAST_NOISE)),
         gps_drift=(horizontal, horizontal, vertical),
         gps_drift_time_s=gps.drift_time_s,
-        baro_offset=2.0 * drift_m**2 / barometer.drift_time_s,
-        hard_iron=_IRON_WALK_GAUSS**2,
+        baro_offset=2.0 * square(drift_m) / barometer.drift_time_s,
+        hard_iron=square(_IRON_WALK_GAUSS),
     )
 
 
 def _excess(claimed_m: float, described: float) -> float:
     """Return by how much the variance that a receiver claims, rounded to cm by the wire, is above what is described."""
-    return max(0.0, max(claimed_m - 0.5 * _CLAIM_STEP_M, 0.0) ** 2 - described) if isfinite(claimed_m) else 0.0
+    return max(0.0, square(max(claimed_m - 0.5 * _CLAIM_STEP_M, 0.0)) - described) if isfinite(claimed_m) else 0.0

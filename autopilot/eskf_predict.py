@@ -4,13 +4,14 @@ J. Solà, Quaternion kinematics for the error-state Kalman filter, arXiv:1711.02
 the attitude rotates body vectors into the earth frame, and its error is a small rotation in the body frame.
 """
 
-from math import cos, exp, sin, sqrt
+from math import sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink.compiled import compiled
+from common.jit import compiled
+from common.kernels import cos, exp, sin
 
 Array: TypeAlias = NDArray[np.float64]
 Three: TypeAlias = tuple[float, float, float]

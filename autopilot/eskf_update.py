@@ -7,7 +7,7 @@ Every `fuse_…` returns NIS = yᵀ S⁻¹ y, and writes the innovation y to its
 is no number, nothing else changes.
 """
 
-from math import asin, inf, sqrt
+from math import inf, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -23,7 +23,8 @@ from autopilot.eskf_predict import (
     POSITION,
     VELOCITY,
 )
-from mavlink.compiled import compiled
+from common.jit import compiled
+from common.kernels import asin
 
 Array: TypeAlias = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ up is: the vehicle is taken to have been level, its heading is the magnetic fiel
 that is worth. The first corrections by GPS find the tilt.
 """
 
-from math import sqrt
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -64,7 +64,7 @@ class Falling:
             self._begins_in_flight = time_us > 0
         self._field = field or self._field
         self._height_m = self._height_m if height_m is None else height_m
-        felt = sqrt(sum(axis * axis for axis in reading.force))
+        felt = hypot(*reading.force)
         if not (reading.force_good and reading.rate_good and 0.0 < felt < _FALLS_PART * self._gravity):
             self._since_us = None
             return None

@@ -4,6 +4,9 @@ import numpy as np
 
 from autopilot import prediction
 from autopilot.controller import Array, Diagnostics, Horizon, VehicleState
+from common.elementary import square
+from common.elementwise import cos, sin
+from common.matrices import matvec
 from mavlink.snapshot import Forecast
 from plant.vehicle import Vehicle
 
@@ -16,7 +19,7 @@ class Forecaster:
 
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
         """Take plans whose steps are `interval_s` apart."""
-        self._full_thrust_n = vehicle.allocation()[0] * vehicle.rotors.max_speed**2
+        self._full_thrust_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
         self._mass_kg = vehicle.body.mass_kg
         self._gravity_m_s2 = vehicle.gravity_m_s2
         self._interval_s = interval_s
@@ -35,10 +38,10 @@ class Forecaster:
         """Integrate thrust along the body's z axis and gravity; drag does not matter in so short a time."""
         ahead = plan[1:]
         phi, theta, psi = (ahead[:, column] for column in prediction.ANGLES)
-        x = np.cos(phi) * np.sin(theta) * np.cos(psi) + np.sin(phi) * np.sin(psi)
-        y = np.cos(phi) * np.sin(theta) * np.sin(psi) - np.sin(phi) * np.cos(psi)
-        up = np.stack([x, y, np.cos(phi) * np.cos(theta)], axis=1)
-        acceleration = up * (squared @ self._full_thrust_n / self._mass_kg)[:, None]
+        x = cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi)
+        y = cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi)
+        up = np.stack([x, y, cos(phi) * cos(theta)], axis=1)
+        acceleration = up * (matvec(squared, self._full_thrust_n) / self._mass_kg)[:, None]
         acceleration[:, 2] -= self._gravity_m_s2
         velocity = np.array(state.velocity_enu_m_s) + self._interval_s * np.cumsum(acceleration, axis=0)
         position = np.array(state.position_enu_m) + self._interval_s * np.cumsum(velocity, axis=0)

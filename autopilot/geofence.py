@@ -98,15 +98,15 @@ class Polygon:
         self._from: Array = np.array(list(vertices_m), dtype=float)
         self._to = np.roll(self._from, -1, axis=0)
         self._along = self._to - self._from
-        squared = np.einsum("ij,ij->i", self._along, self._along)
+        squared = (self._along * self._along).sum(axis=1)
         self._squared = np.where(squared > 0.0, squared, 1.0)
 
     def depth_m(self, east_m: float, north_m: float) -> float:
         """Return how far a point is inside, m; negative outside."""
         to = np.array((east_m, north_m)) - self._from  # each edge's start to the point
-        part = np.clip(np.einsum("ij,ij->i", to, self._along) / self._squared, 0.0, 1.0)
+        part = np.clip((to * self._along).sum(axis=1) / self._squared, 0.0, 1.0)
         away = to - part[:, None] * self._along
-        nearest = float(np.sqrt(np.einsum("ij,ij->i", away, away).min()))
+        nearest = float(np.sqrt((away * away).sum(axis=1).min()))
         # An edge is crossed where just one of its ends is north of the point. Both edges of a corner compare the same
         # two numbers, so that a ray through it crosses once or not at all, however they round.
         starts, ends = self._from[:, 1] > north_m, self._to[:, 1] > north_m

@@ -15,7 +15,11 @@ import numpy as np
 from autopilot.controller import Array, AttitudeDemand, Clock, Decision, Horizon, Preview, VehicleState
 from autopilot.mixer import Mixer
 from autopilot.settings import ControlInterval, Table, interval_us, read_settings
-from mavlink.frames import nearest_turn, quaternion_from_euler, rotation_matrix
+from common.elementary import square
+from common.kernels import asin, atan2, cos, sin
+from common.matrices import dot, matmul, matvec, norm
+from mavlink.compiled import quaternion_from_euler
+from mavlink.frames import nearest_turn, rotation_matrix
 from plant.vehicle import Positive, Vehicle
 
 _LEAST_FORCE = 0.05
@@ -59,7 +63,7 @@ class GeometricController:
         self._mass_kg = vehicle.body.mass_kg
         self._gravity_m_s2 = vehicle.gravity_m_s2
         self._inertia = np.array(vehicle.body.inertia_kg_m2)
-        self._k_position = settings.position_frequency_rad_s**2
+        self._k_position = square(settings.position_frequency_rad_s)
         self._k_velocity = 2.0 * settings.position_frequency_rad_s
         frequencies = np.array([settings.attitude_frequency_rad_s] * 2 + [settings.yaw_frequency_rad_s])
         self._k_rotation = self._inertia * frequencies**2
@@ -77,7 +81,7 @@ class GeometricController:
         rate = np.array(state.rate_flu_rad_s)
         acceleration, jerk = self._demand(state, references, R)
         target = track_direction(acceleration, jerk, float(references.yaw_rad[0]), float(references.yaw_rate_rad_s[0]))
-        thrust_n = self._mass_kg * float(acceleration @ R[:, 2])  # [15]
+        thrust_n = self._mass_kg * dot(acceleration, R[:, 2])  # [15]
         moment_n_m = self._moment(R, rate, target)
         speeds = self._mixer.rotor_speeds(np.array([max(thrust_n, 0.0), *moment_n_m]))
         return None, Decision(speeds, euler_of(target.rotation, float(references.yaw_rad[0])))
@@ -105,17 +109,17 @@ class GeometricController:
         wanted = references.acceleration_enu_m_s2[0]
         force = -self._k_position * position_error - self._k_velocity * velocity_error + wanted + gravity
         floor = _LEAST_FORCE * self._gravity_m_s2
-        if np.linalg.norm(force) < floor:
+        if norm(force) < floor:
             force = floor * R[:, 2]
-        lifted = float(force @ R[:, 2]) * R[:, 2] - gravity
+        lifted = dot(force, R[:, 2]) * R[:, 2] - gravity
         jerk = -self._k_position * velocity_error - self._k_velocity * (lifted - wanted) + references.jerk_enu_m_s3[0]
         return force, jerk
 
     def _moment(self, R: Array, rate: Array, target: Target) -> Array:
         """Return the moment, N m, [16], but for the angular acceleration of the target."""
-        difference = target.rotation.T @ R
+        difference = matmul(target.rotation.T, R)
         rotation_error = 0.5 * vee(difference - difference.T)  # [10]
-        carried = difference.T @ target.rate
+        carried = matvec(difference.T, target.rate)
         rate_error = rate - carried  # [11]
         feedback = -self._k_rotation * rotation_error - self._k_rate * rate_error
         gyroscopic = np.cross(rate, self._inertia * rate) - self._inertia * np.cross(rate, carried)
@@ -132,27 +136,27 @@ def track_direction(force: Array, force_rate: Array, yaw_rad: float, yaw_rate_ra
         yaw_rad: Heading wanted, from east.
         yaw_rate_rad_s: Its derivative.
     """
-    heading = np.array([np.cos(yaw_rad), np.sin(yaw_rad), 0.0])
+    heading = np.array([cos(yaw_rad), sin(yaw_rad), 0.0])
     heading_rate = yaw_rate_rad_s * np.array([-heading[1], heading[0], 0.0])
     z, z_rate = _unit(force, force_rate)
     y, y_rate = _unit(np.cross(z, heading), np.cross(z_rate, heading) + np.cross(z, heading_rate))
     x, x_rate = np.cross(y, z), np.cross(y_rate, z) + np.cross(y, z_rate)
     rotation = np.column_stack([x, y, z])
-    return Target(rotation, vee(rotation.T @ np.column_stack([x_rate, y_rate, z_rate])))
+    return Target(rotation, vee(matmul(rotation.T, np.column_stack([x_rate, y_rate, z_rate]))))
 
 
 def euler_of(rotation: Array, near_yaw_rad: float) -> tuple[float, float, float]:
     """Return phi, theta, psi, rad, of a rotation matrix, psi within half a turn of `near_yaw_rad`."""
-    phi = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
-    theta = float(np.arcsin(np.clip(-rotation[2, 0], -1.0, 1.0)))
-    psi = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+    phi = atan2(rotation[2, 1], rotation[2, 2])
+    theta = asin(min(max(-rotation[2, 0], -1.0), 1.0))
+    psi = atan2(rotation[1, 0], rotation[0, 0])
     return phi, theta, nearest_turn(psi, near_yaw_rad)
 
 
 def body_rate_of(phi: float, theta: float, angle_rates: Array) -> Array:
     """Return p, q, r, rad/s, (3,), of Euler-angle rates (3,): the inverse of THESIS [2.7]."""
-    s, c, st, ct = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    return np.array([[1.0, 0.0, -st], [0.0, c, s * ct], [0.0, -s, c * ct]]) @ angle_rates
+    s, c, st, ct = sin(phi), cos(phi), sin(theta), cos(theta)
+    return matvec(np.array([[1.0, 0.0, -st], [0.0, c, s * ct], [0.0, -s, c * ct]]), angle_rates)
 
 
 def vee(skew: Array) -> Array:
@@ -162,6 +166,6 @@ def vee(skew: Array) -> Array:
 
 def _unit(vector: Array, rate: Array) -> tuple[Array, Array]:
     """Return a vector's direction and how fast that turns."""
-    length = np.linalg.norm(vector)
+    length = norm(vector)
     unit = vector / length
-    return unit, (rate - unit * float(unit @ rate)) / length
+    return unit, (rate - unit * dot(unit, rate)) / length

@@ -17,7 +17,8 @@ from autopilot.mixer import Mixer
 from autopilot.mpc import Weights, augment, condense, solve
 from autopilot.qp import QpSolver
 from autopilot.settings import ControlInterval, Count, QpSettings, Table, interval_us, read_settings
-from mavlink.frames import Vector, euler_rates
+from mavlink.compiled import euler_rates
+from mavlink.frames import Vector
 from plant.vehicle import Positive, Vehicle
 
 PerOutput = tuple[Positive, Positive, Positive, Positive]

@@ -5,13 +5,15 @@ that is predicted, so that thrust points right whatever yaw does. The errors ahe
 Source of the flat output to thrust direction: Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018.
 """
 
-from math import atan2, cos, floor, pi, sin, sqrt
+from math import floor, pi, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink.compiled import compiled
+from common import elementwise
+from common.jit import compiled
+from common.kernels import atan2, cos, sin
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -59,12 +61,12 @@ class Airframe(NamedTuple):
 def error_transition(poles: tuple[float, float], interval_s: float, samples: int) -> Array:
     """Return how an error and its rate (2,) go on at each sample from now, (samples, 2, 2), the poles being placed."""
     first, second = poles
-    t = interval_s * np.arange(samples)
+    t = interval_s * np.arange(samples, dtype=np.float64)
     if first == second:
-        decay = np.exp(first * t)
+        decay = elementwise.exp(first * t)
         rows = [[(1.0 - first * t) * decay, t * decay], [-first * first * t * decay, (1.0 + first * t) * decay]]
     else:
-        a, b = np.exp(first * t), np.exp(second * t)
+        a, b = elementwise.exp(first * t), elementwise.exp(second * t)
         apart = first - second
         rows = [
             [(first * b - second * a) / apart, (a - b) / apart],

@@ -1,6 +1,7 @@
 """What the estimator's health means to people: lines when it changes, and reasons not to arm."""
 
 from collections.abc import Callable
+from math import hypot
 from typing import NamedTuple
 
 from autopilot.estimate import Estimate, Health
@@ -82,7 +83,7 @@ def told(estimate: Estimate) -> EstimatorState:
         position_ratio=tests.position.ratio,
         height_ratio=max(tests.height.ratio, tests.pressure.ratio),
         field_ratio=tests.field.ratio,
-        horizontal_accuracy_m=float((east * east + north * north) ** 0.5),
+        horizontal_accuracy_m=hypot(east, north),
         vertical_accuracy_m=up,
         failed_sensors=failed,
     )

@@ -11,6 +11,8 @@ from typing import Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from common import elementwise
+
 Array: TypeAlias = NDArray[np.float64]
 
 
@@ -90,7 +92,7 @@ def atan2(y: Jet, x: Jet) -> Jet:
     squared = (x * x + y * y).coefficients
     turning = (x * y.padded_rate() - y * x.padded_rate()).coefficients
     theta = np.zeros_like(squared)
-    theta[0] = np.arctan2(y.coefficients[0], x.coefficients[0])
+    theta[0] = elementwise.atan2(y.coefficients[0], x.coefficients[0])
     for k in range(1, len(theta)):
         slope = np.arange(1, k)[:, None] * theta[1:k]
         rest = turning[k - 1] - (slope * squared[k - 1 : 0 : -1]).sum(axis=0)
@@ -102,7 +104,7 @@ def _sin_cos(x: Jet) -> tuple[Jet, Jet]:
     """Both together, from s' = c x' and c' = -s x'."""
     a = x.coefficients
     s, c = np.empty_like(a), np.empty_like(a)
-    s[0], c[0] = np.sin(a[0]), np.cos(a[0])
+    s[0], c[0] = elementwise.sin(a[0]), elementwise.cos(a[0])
     for k in range(1, len(a)):
         slope = np.arange(1, k + 1)[:, None] * a[1 : k + 1]
         s[k] = (slope * c[k - 1 :: -1][:k]).sum(axis=0) / k

@@ -1,6 +1,6 @@
 """The course behind a leader: where FOLLOW_TARGET says that it is, at a distance, seen from a chosen side."""
 
-from math import atan2, cos, hypot, pi, radians, sin
+from math import hypot, pi, radians
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from autopilot.companion import allowed_velocity
 from autopilot.course import Endless, Motion, Scene
 from autopilot.courses import Stop
 from autopilot.reference import still_target
+from common.kernels import atan2, cos, sin
 
 _STANDS_M_S = 0.3
 LOWEST_M = 1.0

@@ -1,7 +1,5 @@
 """Courses by attitude and thrust: what sticks or a companion ask for, made smooth, and height held under sticks."""
 
-from math import cos
-
 import numpy as np
 
 from autopilot.attitude_reference import AttitudeReference, ReferenceMemory, Wish, lean
@@ -10,6 +8,7 @@ from autopilot.courses import Stop, sinking_m_s
 from autopilot.landing import CARRIED, is_below
 from autopilot.reference import Kind, Reference, Target, lead, moving_with, still_target
 from autopilot.sticks import stick_climb, without_play
+from common.kernels import cos
 from mavlink.setpoints import AttitudeSetpoint, Sticks
 
 _LIFTING, _SINKING = 0.9, 0.5

@@ -20,7 +20,8 @@ from autopilot.controller import (
 )
 from autopilot.profile import Profile, ProfileError
 from autopilot.settings import SettingsError
-from mavlink.frames import euler_from_quaternion, nearest_turn
+from mavlink.compiled import euler_from_quaternion
+from mavlink.frames import nearest_turn
 from mavlink.hil import StateFrame
 from mavlink.plain import of_bytes, to_bytes
 from plant.vehicle import Vehicle

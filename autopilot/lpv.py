@@ -1,11 +1,12 @@
 """The LPV models of attitude and position, THESIS [3.1-3.4], and their discretisation."""
 
-from math import cos, sin
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
+
+from common.kernels import cos, sin
+from common.matrices import expm
 
 Array: TypeAlias = NDArray[np.float64]
 Discretisation: TypeAlias = Literal["zero-order-hold", "forward-euler"]

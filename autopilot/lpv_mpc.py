@@ -1,7 +1,7 @@
 """The flight profile's control law: position by feedback linearisation with preview, attitude by LPV-MPC."""
 
 from collections.abc import Mapping
-from math import cos, radians, tan
+from math import radians
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +29,9 @@ from autopilot.controller import (
 from autopilot.lpv_mpc_settings import GuidanceSettings, LpvMpcSettings, ObserverSettings
 from autopilot.qp import QpSolver
 from autopilot.settings import interval_us, read_settings
+from common.elementary import square
+from common.kernels import cos, tan
+from common.matrices import dot, matvec
 from mavlink.frames import rotation_matrix
 from plant.vehicle import Vehicle
 
@@ -133,7 +136,7 @@ class LpvMpc:
         self.preview = Preview(self.control_interval_us, self._samples)
         self._fallback = settings.fallback
         self._from_thrust, self._from_moments = squared_speeds_from(vehicle)
-        self._allocation = vehicle.allocation() * vehicle.rotors.max_speed**2
+        self._allocation = vehicle.allocation() * square(vehicle.rotors.max_speed)
         self._momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
         self._inertia = np.array(vehicle.body.inertia_kg_m2)
         self._airframe = airframe_of(vehicle)
@@ -174,7 +177,7 @@ class LpvMpc:
     def initial(self, rotor_speed: float) -> Memory:
         """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
         speeds = np.full(4, rotor_speed / self._vehicle.rotors.max_speed)
-        wrench = self._allocation @ (speeds * speeds)
+        wrench = matvec(self._allocation, speeds * speeds)
         return Memory(speeds, wrench[1:].copy(), wrench, wrench, None, np.zeros(observer.ESTIMATES), 0.0, None, 0)
 
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
@@ -230,7 +233,7 @@ class LpvMpc:
             measured,
             float(memory.mean_wrench[0]),
             memory.mean_wrench[1:],
-            float(self._momentum @ memory.speeds),
+            dot(self._momentum, memory.speeds),
             drag,
             self._airframe,
             self._inertia,
@@ -314,7 +317,7 @@ class LpvMpc:
     def _choose(self, memory: Memory, now: Situation, course: Course, rotation: Array) -> Choice:
         """Plan; where that cannot be had, fall back."""
         target = course.target
-        steep = float(rotation[2, 0]) ** 2 > 1.0 - _RECOVER_BEYOND**2
+        steep = square(float(rotation[2, 0])) > 1.0 - square(_RECOVER_BEYOND)
         if steep or course.aligned < _RECOVER_BEYOND:
             return self._recover(now, course.force, rotation)
         ahead = memory.plan.states[memory.age + 1 :] if memory.plan else None
@@ -339,23 +342,23 @@ class LpvMpc:
         p, q, r = state.rate_flu_rad_s
         thrust_n, *moments_n_m = memory.wrench.tolist()
         x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
-        momentum = float(self._momentum @ memory.speeds)
+        momentum = dot(self._momentum, memory.speeds)
         fastest = self._battery.fastest_now(memory.charge_ah, memory.speeds)
         return Situation(x, memory.moments, estimate[9:], momentum, fastest), thrust_n
 
     def _limits(self, fastest: float) -> guidance.Limits:
         """Return what the outer loop may ask for while all rotors can turn at `fastest`, parts of the largest."""
         span_n = self._span_n
-        least_n, most_n = span_n * self._lag.least**2, span_n * fastest**2
+        least_n, most_n = span_n * square(self._lag.least), span_n * square(fastest)
         margin_n = self._thrust_margin * (most_n - least_n)
         return guidance.Limits(self._tilt_tangent, least_n + margin_n, most_n - margin_n, self._position_error_m)
 
     def _recover(self, now: Situation, force: Array, rotation: Array) -> Choice:
         """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
-        direction = rotation.T @ (force / guidance.length(force))
+        direction = matvec(rotation.T, force / guidance.length(force))
         moments = recovery.turning_moment(direction, now.x[list(prediction.RATES)], self._inertia, self._turn)
-        squared = self._mixed(max(float(force @ rotation[:, 2]), 0.0), moments, now)
-        return Choice(squared, self._allocation[1:] @ squared, None, 1, Diagnostics(fallback=Fallback.RECOVERY))
+        squared = self._mixed(max(dot(force, rotation[:, 2]), 0.0), moments, now)
+        return Choice(squared, matvec(self._allocation[1:], squared), None, 1, Diagnostics(fallback=Fallback.RECOVERY))
 
     def _descend(self, now: Situation, age: int, diagnostics: Diagnostics) -> Choice:
         """Level and sink, the last resort."""
@@ -370,7 +373,7 @@ class LpvMpc:
         return Choice(squared, moments, None, age, how)
 
     def _mixed(self, thrust_n: float, moments: Array, now: Situation) -> Array:
-        least, most = self._lag.least**2, now.fastest**2
+        least, most = square(self._lag.least), square(now.fastest)
         return recovery.prioritised(thrust_n, moments, self._from_thrust, self._from_moments, least, most)
 
 

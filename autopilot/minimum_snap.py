@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.jet import Array, Jet
+from common.matrices import inverse, matmul, solve
 
 SNAP = 4
 ACCELERATION = 2
@@ -53,15 +54,16 @@ def minimise(order: int, times_s: Array, points: Array) -> PiecewisePolynomial:
         points: What it passes, (n, axes).
     """
     durations = np.diff(times_s)
-    from_ends = np.linalg.inv(_ends(order))
-    elements = _elements(durations, from_ends.T @ _cost(order) @ from_ends)
+    from_ends = inverse(_ends(order))
+    elements = _elements(durations, matmul(matmul(from_ends.T, _cost(order)), from_ends))
     knots = np.zeros((len(times_s), order, points.shape[1]))
     knots[:, 0] = points
     if len(times_s) > 2:
         knots[1:-1, 1:] = _free_derivatives(elements, points)
     both = np.concatenate([knots[:-1], knots[1:]], axis=1)
     in_own_time = both * np.tile(_powers(durations, order), 2)[:, :, None]
-    return PiecewisePolynomial(times_s, from_ends @ in_own_time)
+    coefficients = matmul(from_ends, np.moveaxis(in_own_time, 0, 1).reshape(2 * order, -1))
+    return PiecewisePolynomial(times_s, np.moveaxis(coefficients.reshape(2 * order, *points[1:].shape), 1, 0))
 
 
 def _ends(order: int) -> Array:
@@ -84,48 +86,42 @@ def _cost(order: int) -> Array:
 
 def _powers(durations: Array, order: int) -> Array:
     """Return what turns derivatives per second into those per segment, (segments, order)."""
-    powers: Array = durations[:, None] ** np.arange(order)
-    return powers
+    powers = np.ones((len(durations), order))
+    powers[:, 1:] = durations[:, None]
+    return np.cumprod(powers, axis=1, dtype=np.float64)
 
 
 def _elements(durations: Array, stiffness: Array) -> Array:
     """Return each segment's cost as a form of the derivatives at its ends: (segments, end, order, end, order)."""
     order = len(stiffness) // 2
     scale = np.tile(_powers(durations, order), 2)
-    elements = stiffness * scale[:, :, None] * scale[:, None, :] * durations[:, None, None] ** (1.0 - 2.0 * order)
+    elements = stiffness * scale[:, :, None] * scale[:, None, :] / _powers(durations, 2 * order)[:, -1:, None]
     return elements.reshape(-1, 2, order, 2, order)
 
 
 def _free_derivatives(elements: Array, points: Array) -> Array:
-    """Return the derivatives at the inner points where the cost is least, (n - 2, order - 1, axes)."""
-    before, after = elements[:-1], elements[1:]
-    from scipy.linalg import cho_solve_banded, cholesky_banded  # slow to load: most tracks do without
+    """Return the derivatives at the inner points where the cost is least, (n - 2, order - 1, axes).
 
+    The blocks of the cost's curvature couple only neighbours: block elimination forwards, then backwards.
+    """
+    before, after = elements[:-1], elements[1:]
     pull = (
         before[:, 1, 1:, 0, :1] * points[:-2, None]
         + (before[:, 1, 1:, 1, :1] + after[:, 0, 1:, 0, :1]) * points[1:-1, None]
         + after[:, 0, 1:, 1, :1] * points[2:, None]
     )
-    curvature = _banded(before[:, 1, 1:, 1, 1:] + after[:, 0, 1:, 0, 1:], after[:-1, 0, 1:, 1, 1:])
-    free: Array = cho_solve_banded((cholesky_banded(curvature), False), -pull.reshape(-1, points.shape[1]))
-    return free.reshape(pull.shape)
-
-
-def _banded(diagonal: Array, coupling: Array) -> Array:
-    """Return the upper bands, as LAPACK stores them, of a symmetric matrix of blocks along two diagonals.
-
-    Args:
-        diagonal: Blocks on the diagonal, (n, q, q).
-        coupling: Blocks to the right of them, (n - 1, q, q).
-    """
-    count, q, _ = diagonal.shape
-    bands = np.zeros((2 * q, count * q))
-    for i in range(q):
-        for j in range(q):
-            bands[q - 1 + i - j, q + j :: q] = coupling[:, i, j]
-            if i <= j:
-                bands[2 * q - 1 + i - j, j::q] = diagonal[:, i, j]
-    return bands
+    curvature = before[:, 1, 1:, 1, 1:] + after[:, 0, 1:, 0, 1:]
+    coupling = after[:-1, 0, 1:, 1, 1:]
+    free = -pull
+    through = np.empty_like(coupling)
+    for k, block in enumerate(coupling):
+        through[k], free[k] = solve(curvature[k], block), solve(curvature[k], free[k])
+        curvature[k + 1] -= matmul(block.T, through[k])
+        free[k + 1] -= matmul(block.T, free[k])
+    free[-1] = solve(curvature[-1], free[-1])
+    for k in range(len(coupling) - 1, -1, -1):
+        free[k] -= matmul(through[k], free[k + 1])
+    return free
 
 
 def _horner(coefficients: Array, x: Jet) -> Jet:

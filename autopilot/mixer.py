@@ -3,6 +3,8 @@
 import numpy as np
 
 from autopilot.controller import Array
+from common.elementary import square
+from common.matrices import dot, inverse, matmul, matvec
 from plant.vehicle import Vehicle
 
 
@@ -14,22 +16,22 @@ class Mixer:
         self._allocation = vehicle.allocation()
         self._inverse = exact_inverse(self._allocation)
         self._momentum = vehicle.rotor_momentum()
-        self._squared_max = vehicle.rotors.max_speed**2
+        self._squared_max = square(vehicle.rotors.max_speed)
 
     def rotor_speeds(self, wrench: Array) -> Array:
         """Return the rotor speeds (4,), in the vehicle's unit, that make U1 (N), U2, U3, U4 (N m), or come closest.
 
         What one rotor cannot do is cut at that rotor's limit.
         """
-        return np.sqrt(np.clip(self._inverse @ wrench, 0.0, self._squared_max))
+        return np.sqrt(np.clip(matvec(self._inverse, wrench), 0.0, self._squared_max))
 
     def wrench(self, speeds: Array) -> Array:
         """Return U1..U4 (4,) of rotor speeds (4,)."""
-        return self._allocation @ (speeds * speeds)
+        return matvec(self._allocation, speeds * speeds)
 
     def momentum(self, speeds: Array) -> float:
         """Return the rotors' angular momentum h along body z, N m s."""
-        return float(self._momentum @ speeds)
+        return dot(self._momentum, speeds)
 
 
 def exact_inverse(allocation: Array) -> Array:
@@ -38,7 +40,7 @@ def exact_inverse(allocation: Array) -> Array:
     The rows of a symmetrical allocation are orthogonal, and A⁻¹ = Aᵀ (A Aᵀ)⁻¹ then only divides; elimination would
     leave a moment of 1e-17 N m where none was asked for, enough to drift in open loop.
     """
-    scale = np.linalg.norm(allocation, axis=1)
+    scale = np.sqrt((allocation * allocation).sum(axis=1))
     unit = allocation / scale[:, None]
-    inverse: Array = unit.T @ np.linalg.inv(unit @ unit.T) / scale
-    return inverse
+    exact: Array = matmul(unit.T, inverse(matmul(unit, unit.T))) / scale
+    return exact

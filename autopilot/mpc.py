@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from autopilot.controller import Active, Clock, Diagnostics
 from autopilot.qp import Qp, QpSolver, box
+from common.matrices import dot, matmul, matvec
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -75,17 +76,17 @@ def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, we
     responses = np.empty((horizon + 1, *model.C.shape))
     responses[0] = model.C
     for step in range(horizon):
-        np.matmul(responses[step], model.A, out=responses[step + 1])
+        responses[step + 1] = matmul(responses[step], model.A)
     Phi = responses[1:].reshape(horizon * p, -1)
-    markov = (responses[:horizon] @ model.B).reshape(horizon * p, m)
+    markov = matmul(responses[:horizon].reshape(horizon * p, -1), model.B)
     Gamma = np.zeros((horizon * p, horizon * m))
     for column in range(horizon):
         Gamma[column * p :, column * m : (column + 1) * m] = markov[: (horizon - column) * p]
     weighted = Gamma.T * _along(horizon, weights)
-    H = weighted @ Gamma
+    H = matmul(weighted, Gamma)
     H.flat[:: horizon * m + 1] += np.concatenate([weights.increment] * horizon)
-    free = Phi @ x
-    return CondensedQp(0.5 * (H + H.T), weighted @ (free - reference.ravel()), free, Gamma)
+    free = matvec(Phi, x)
+    return CondensedQp(0.5 * (H + H.T), matvec(weighted, free - reference.ravel()), free, Gamma)
 
 
 def _along(horizon: int, weights: Weights) -> Array:
@@ -118,8 +119,8 @@ def solve(qp: CondensedQp, bound: Array, solver: QpSolver, clock: Clock) -> Solu
     diagnostics = Diagnostics(
         status,
         solve_time_s=solve_time_s,
-        cost=float(increments @ (0.5 * qp.H @ increments + qp.f)),
+        cost=dot(increments, 0.5 * matvec(qp.H, increments) + qp.f),
         active=Active(increments=int(np.count_nonzero(np.abs(increments) > (1.0 - _BINDING) * largest))),
-        predicted=(qp.free + qp.Gamma @ increments).reshape(horizon, -1),
+        predicted=(qp.free + matvec(qp.Gamma, increments)).reshape(horizon, -1),
     )
     return Solution(increments[:m], diagnostics)

@@ -4,14 +4,15 @@ A Luenberger observer on the velocity and one on the body rates, each with its d
 poles at one place. They are driven by what the rotors really did, within their limits, so nothing winds up.
 """
 
-from math import exp
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.guidance import Airframe
-from mavlink.compiled import compiled
+from common.elementary import square
+from common.jit import compiled
+from common.kernels import exp
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ class Observer(NamedTuple):
 def gains(frequency_rad_s: float, interval_s: float) -> tuple[float, float]:
     """Return the gains, on what is observed and on its disturbance (1/s), of an observer with both poles there."""
     pole = exp(-frequency_rad_s * interval_s)
-    return 1.0 - pole * pole, (1.0 - pole) ** 2 / interval_s
+    return 1.0 - pole * pole, square(1.0 - pole) / interval_s
 
 
 def first_estimate(measured: Array) -> Array:

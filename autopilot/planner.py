@@ -1,5 +1,7 @@
 """Setpoints: a track, tabulated at equal intervals, handed out as a horizon."""
 
+from math import hypot
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,6 +9,7 @@ from autopilot.controller import Horizon, Preview
 from autopilot.jet import Array, Jet, atan2
 from autopilot.profile import References
 from autopilot.tracks import Track, position
+from common import elementary, elementwise
 
 _VERTICAL_SPEED_DECIMALS = 8
 _SNAP, _YAW_ACCELERATION = 4, 2
@@ -87,7 +90,7 @@ def _by_formula(track: Track, t: Array, interval_s: float) -> Horizon:
 def _along(x: Jet, y: Jet) -> list[Array]:
     """Return yaw along the horizontal velocity, its rate and acceleration; held, both zero, where it is still."""
     vx, vy = (axis.rate().coefficients[: _YAW_ACCELERATION + 1] for axis in (x, y))
-    moving = np.hypot(vx[0], vy[0]) >= _STILL
+    moving = np.sqrt(vx[0] * vx[0] + vy[0] * vy[0]) >= _STILL
     direction = atan2(Jet(np.where(moving, vy, 0.0)), Jet(np.where(moving, vx, 0.0)))
     yaw, known = direction.derivative(0), moving.copy()
     departure = _departure(x, y)
@@ -100,8 +103,8 @@ def _departure(x: Jet, y: Jet) -> float | None:
     """Return which way the first sample leaves, rad: along its first derivative that is not still; None if all are."""
     for order in range(1, len(x.coefficients)):
         ahead, left = float(x.derivative(order)[0]), float(y.derivative(order)[0])
-        if np.hypot(ahead, left) >= _STILL:
-            return float(np.arctan2(left, ahead))
+        if hypot(ahead, left) >= _STILL:
+            return elementary.atan2(left, ahead)
     return None
 
 
@@ -133,7 +136,7 @@ def _by_differences(track: Track, t: Array, interval_s: float) -> Horizon:
 
 def _along_differences(points: Array, interval_s: float) -> Array:
     x, y = points[:, 0], points[:, 1]
-    first = np.arctan2(y[:1], x[:1]) + np.pi / 2.0
+    first = elementwise.atan2(y[:1], x[:1]) + np.pi / 2.0
     dx, dy = np.diff(x), np.diff(y)
-    known = np.concatenate([[True], np.hypot(dx, dy) >= _STILL * interval_s])
-    return _unwrapped(np.concatenate([first, np.arctan2(dy, dx)]), known)
+    known = np.concatenate([[True], np.sqrt(dx * dx + dy * dy) >= _STILL * interval_s])
+    return _unwrapped(np.concatenate([first, elementwise.atan2(dy, dx)]), known)

@@ -1,9 +1,9 @@
 """The outer loop: feedback linearisation of the position, THESIS [3.24-3.33]."""
 
-from math import atan, cos, sin
 from typing import NamedTuple
 
 from autopilot.settings import Count, Negative, Table
+from common.kernels import atan, cos, sin
 from mavlink.frames import Vector
 from plant.vehicle import Vehicle
 

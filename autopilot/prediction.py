@@ -10,13 +10,13 @@ Scheduling: phi, theta, p, q, r at each step of the horizon. Source of schedulin
 and Werner, "Efficient nonlinear model predictive control via quasi-LPV representation", CDC 2016.
 """
 
-from math import cos, sin
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink.compiled import compiled
+from common.jit import compiled
+from common.kernels import cos, sin
 
 Array: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from autopilot.controller import Active, ControllerError, DecisionError, Fallback
+from autopilot.controller import FALLBACK_CODES, STATUS_CODES, Active, ControllerError, DecisionError
 from autopilot.core import Autopilot, Step
 from autopilot.estimate import Estimate, Tests
 from autopilot.inputs import Heard, Setup, line
 from autopilot.profile import Profile, ProfileError, load_profile
-from autopilot.qp import QpStatus, SolverError
+from autopilot.qp import SolverError
 from autopilot.senses import Estimator, estimator_for
 from autopilot.tracks import TrackError, track
 from mavlink.dialect import RESULT_UNSUPPORTED
@@ -47,11 +47,6 @@ CHECK_COLUMNS = (
     *(f"nis_{kind}" for kind in Tests._fields),
     *(f"believed_{kind}" for kind in Tests._fields),
 )
-
-STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, status in enumerate(QpStatus)}
-"""How `qp_status` is written: 0 is solved, -1 no QP."""
-FALLBACK_CODES: dict[Fallback | None, int] = {None: -1} | {fallback: code for code, fallback in enumerate(Fallback)}
-"""How `fallback` is written: -1 is none."""
 
 TRACK = "spiral"
 """What flies where nothing else is said."""

@@ -5,13 +5,14 @@ McClamroch, IEEE Control Systems 31(3), 2011) and only damps the rotation about 
 turn the thrust axis, moves the thrust as far as they need, and gives yaw what is left.
 """
 
-from math import atan2, sqrt
+from math import sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink.compiled import compiled
+from common.jit import compiled
+from common.kernels import atan2
 
 Array: TypeAlias = NDArray[np.float64]
 

@@ -12,13 +12,15 @@ Of the rotors that are left, a and b stand beside the lost one and o opposite. T
 the thrust as the body sees it (x, y), the rates p and q, and two forces that follow their commands: d = f_b - f_a, f_o.
 """
 
-from math import atan, exp, hypot, log, sqrt, tan
+from math import hypot, inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from autopilot.controller import Array
+from autopilot.riccati import lqr
+from common.kernels import atan, exp, log, tan
+from common.matrices import dot, expm, matvec
 from plant.vehicle import Vehicle
 
 _SPINS_RAD_S = np.arange(-8.0, 45.0)
@@ -29,8 +31,6 @@ _LARGEST_CONE_RAD = 0.35
 _SCARCE = 0.03
 """Of the cost's measure of f_o where the solution has none: there it can push, and not pull."""
 _TIGHTEST = 1e-3
-_DOUBLINGS = 30
-_RESIDUE = 1e-12
 _BISECTIONS = 50
 _SAME_SAMPLE = 1e-9
 
@@ -129,7 +129,7 @@ class ReducedAttitude:
             h = h / max(hypot(h[0], h[1]), _TIGHTEST)
         deviation = np.array([*(h - solution.h), *(rate[:2] - solution.rate), forces[0], forces[1]])
         deviation[5] -= solution.opposite_n
-        d, f_o = (-self._gain(spin) @ deviation).tolist()
+        d, f_o = matvec(-self._gain(spin), deviation).tolist()
         return d, f_o + solution.opposite_n
 
     def solution(self, spin: float) -> Solution:
@@ -158,14 +158,15 @@ class ReducedAttitude:
 
     def _designed(self, interval_s: float, follows: float, weights: Weights) -> Array:
         """Return the gains, (spins, 2, 6)."""
-        models = np.array([self._model(float(spin), interval_s, follows) for spin in _SPINS_RAD_S])
-        sampled = expm(models * interval_s)
         opened = (_SPINS_RAD_S - _NO_CONE_RAD_S) / (_WHOLE_CONE_RAD_S - _NO_CONE_RAD_S)
         newton = weights.force_part * self._weight_n / 4.0
-        Q = np.diag([weights.direction**-2] * 2 + [weights.rate**-2] * 2 + [0.0] * 2)
-        R = np.zeros((len(models), 2, 2))
-        R[:, 0, 0], R[:, 1, 1] = newton**-2, (newton * np.clip(opened, _SCARCE, 1.0)) ** -2
-        return lqr(sampled[:, :6, :6], sampled[:, :6, 6:], Q, R)
+        Q = np.diag(1.0 / np.array([weights.direction, weights.direction, weights.rate, weights.rate, inf, inf]) ** 2)
+        gains = []
+        for spin, part in zip(_SPINS_RAD_S.tolist(), np.clip(opened, _SCARCE, 1.0).tolist(), strict=True):
+            sampled = expm(self._model(spin, interval_s, follows) * interval_s)
+            R = np.diag(1.0 / np.array([newton, newton * part]) ** 2)
+            gains.append(lqr(sampled[:6, :6], sampled[:6, 6:], Q, R)[1])
+        return np.array(gains)
 
     def _model(self, spin: float, interval_s: float, follows: float) -> Array:
         """Return the generator of state and held commands, (8, 8), linearised about the periodic solution.
@@ -206,41 +207,12 @@ def balancing_thrust(vehicle: Vehicle, trio: Trio, spin_rad_s: float) -> float:
     for _ in range(_BISECTIONS):
         opposite_n = 0.5 * (low + high)
         speeds = _speeds(vehicle, trio, opposite_n)
-        torque = trio.sign * float(vehicle.allocation()[3, list(trio[1:4])] @ speeds**2)
+        torque = trio.sign * dot(vehicle.allocation()[3, list(trio[1:4])], speeds**2)
         if torque > _spin_drag(vehicle, trio, speeds) * spin_rad_s:
             low = opposite_n
         else:
             high = opposite_n
     return low
-
-
-def lqr(A: Array, B: Array, Q: Array, R: Array) -> Array:
-    """Return the gains of many discrete-time LQR at once, (n, m, s), by structure-preserving doubling.
-
-    E. K.-W. Chu, H.-Y. Fan, W.-W. Lin and C.-S. Wang, Structure-preserving algorithms for periodic discrete-time
-    algebraic Riccati equations, International Journal of Control 77(8), 2004.
-
-    Args:
-        A: (n, s, s).
-        B: (n, s, m).
-        Q: (s, s).
-        R: (n, m, m).
-    """
-    F, H = A, np.broadcast_to(Q, A.shape)
-    G = B @ _inverse(R) @ np.swapaxes(B, 1, 2)
-    for _ in range(_DOUBLINGS):
-        W = _inverse(np.eye(A.shape[1]) + G @ H)
-        transposed = np.swapaxes(F, 1, 2)
-        step = transposed @ H @ W @ F
-        F, G, H = F @ W @ F, G + F @ W @ G @ transposed, H + step
-        if float(np.abs(step).max()) <= _RESIDUE * float(np.abs(H).max()):
-            break
-    transposed = np.swapaxes(B, 1, 2)
-    return _inverse(R + transposed @ H @ B) @ transposed @ H @ A
-
-
-def _inverse(matrices: Array) -> Array:
-    return np.asarray(np.linalg.inv(matrices), dtype=np.float64)
 
 
 def _speeds(vehicle: Vehicle, trio: Trio, opposite_n: float) -> Array:
@@ -254,9 +226,9 @@ def _spin_drag(vehicle: Vehicle, trio: Trio, speeds: Array) -> float:
     if vehicle.drag is None:
         return 0.0
     hubs_m = np.array(vehicle.rotors.position_m)[list(trio[1:4])]
-    return vehicle.drag.rotor_coefficient * float(speeds @ (hubs_m * hubs_m).sum(axis=1))
+    return vehicle.drag.rotor_coefficient * dot(speeds, (hubs_m * hubs_m).sum(axis=1))
 
 
 def _momentum(vehicle: Vehicle, trio: Trio, opposite_n: float) -> float:
     """Return the angular momentum of the rotors along body z, N m s, as they carry the weight."""
-    return float(vehicle.rotor_momentum()[list(trio[1:4])] @ _speeds(vehicle, trio, opposite_n))
+    return dot(vehicle.rotor_momentum()[list(trio[1:4])], _speeds(vehicle, trio, opposite_n))

@@ -5,13 +5,14 @@ rotor is then commanded so that its squared speed, which makes the force, is at 
 two time constants and the root between speed and force so cost nothing. Speeds are parts of the largest.
 """
 
-from math import exp, sqrt
+from math import sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink.compiled import compiled
+from common.jit import compiled
+from common.kernels import exp
 from plant.vehicle import Vehicle
 
 Array: TypeAlias = NDArray[np.float64]

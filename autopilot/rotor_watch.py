@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from autopilot.battery import BatteryModel
 from autopilot.controller import VehicleState
 from autopilot.rotor_lag import RotorLag, follow, rotor_lag
-from mavlink.compiled import compiled
+from common.elementary import square
+from common.jit import compiled
 from mavlink.frames import rotation_matrix
 from plant.vehicle import Vehicle
 
@@ -66,11 +67,11 @@ def signature_of(vehicle: Vehicle) -> Signature:
     allocation = vehicle.allocation()
     effect = allocation / allocation[0]
     lift_n = vehicle.body.mass_kg * vehicle.gravity_m_s2 / 4.0
-    arm_m = float(np.hypot(effect[1], effect[2]).mean())
+    arm_m = float(np.sqrt(effect[1] * effect[1] + effect[2] * effect[2]).mean())
     yaw_m = float(np.abs(effect[3]).mean())
     deviations = lift_n * np.array([_FORCE_PART, _TILT_PART * arm_m, _TILT_PART * arm_m, _YAW_PART * yaw_m])
     return Signature(
-        allocation[0] * vehicle.rotors.max_speed**2,
+        allocation[0] * square(vehicle.rotors.max_speed),
         effect,
         vehicle.rotor_momentum() * vehicle.rotors.max_speed,
         np.array(vehicle.body.inertia_kg_m2),

@@ -2,23 +2,29 @@
 
 from math import nan
 
-from autopilot.controller import Array, AttitudeDemand, Decision, Fallback, Horizon, VehicleState
+from autopilot.controller import (
+    FALLBACK_CODES,
+    STATUS_CODES,
+    Array,
+    AttitudeDemand,
+    Decision,
+    Horizon,
+    VehicleState,
+)
 from autopilot.failsafe_table import Action
 from autopilot.forecast import Forecaster
 from autopilot.health_watch import told
 from autopilot.modes import ROWS, Mode, custom_mode
 from autopilot.pilot import Guidance, Pilot
-from autopilot.qp import QpStatus
 from autopilot.senses import Senses
 from autopilot.stations import Stations
+from mavlink.compiled import quaternion_from_euler
 from mavlink.dialect import mav
-from mavlink.frames import Vector, quaternion_from_euler
+from mavlink.frames import Vector
 from mavlink.snapshot import NO_SETPOINT, NOT_SOLVED, BatteryState, FourOf, Home, Setpoint, Snapshot, SolverState
 from plant.vehicle import Vehicle
 
 FORECAST_EVERY_US = 200_000
-_STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, status in enumerate(QpStatus)}
-_FALLBACK_CODES: dict[Fallback | None, int] = {None: -1} | {fallback: code for code, fallback in enumerate(Fallback)}
 _CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 _MANUAL = _CUSTOM | mav.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED | mav.MAV_MODE_FLAG_STABILIZE_ENABLED
 _AUTO = (
@@ -122,8 +128,8 @@ class Photographer:
             forecast = self._forecaster.forecast(state, horizon, how)
             squared = () if how.planned_squared is None else tuple(map(tuple, how.planned_squared.tolist()))
         self._solver = SolverState(
-            status=_STATUS_CODES[how.qp_status],
-            fallback=_FALLBACK_CODES[how.fallback],
+            status=STATUS_CODES[how.qp_status],
+            fallback=FALLBACK_CODES[how.fallback],
             solve_time_s=how.solve_time_s,
             step_time_s=duration_s,
             cost=how.cost,

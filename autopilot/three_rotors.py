@@ -1,6 +1,6 @@
 """Landing on three rotors: place and height above the reduced attitude, and how the rotors share what is asked for."""
 
-from math import atan2, cos, hypot, radians, sin, tan
+from math import hypot, radians
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +10,9 @@ from autopilot.battery import BatteryModel
 from autopilot.controller import Array, Decision, Diagnostics, Fallback, VehicleState
 from autopilot.reduced_attitude import ReducedAttitude, Trio, Weights
 from autopilot.rotor_lag import follow, lead, rotor_lag
+from common.elementary import square
+from common.kernels import atan2, cos, sin, tan
+from common.matrices import dot, matvec, norm
 from mavlink.frames import Vector, rotation_matrix
 from plant.vehicle import Vehicle
 
@@ -116,7 +119,7 @@ class ThreeRotors:
         spin_rad_s = min(_FASTEST_SPIN_RAD_S, measured)
         self.law = ReducedAttitude(vehicle, lost, interval_s, self._lag.planned, spin_rad_s, weights)
         self._battery = BatteryModel(vehicle)
-        self._full_n = vehicle.allocation()[0] * vehicle.rotors.max_speed**2
+        self._full_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
         self._gravity = vehicle.gravity_m_s2
         self._weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
         self._speeds = speeds.copy()
@@ -144,11 +147,11 @@ class ThreeRotors:
         self._observe(state)
         up = self._acceleration(state)
         up[2] += self._gravity
-        direction = up / float(np.linalg.norm(up))
+        direction = up / norm(up)
         thrust_n = self._weight_n / self._gravity * float(up[2]) / max(float(R[2, 2]), _LEAST_UPRIGHT)
         if abs(state.rate_flu_rad_s[2]) < _SPUN_UP_RAD_S:
             thrust_n = max(thrust_n, _SPIN_UP_THRUST * self._weight_n)
-        commands = self._commands(thrust_n, R.T @ direction, np.array(state.rate_flu_rad_s), charge_ah)
+        commands = self._commands(thrust_n, matvec(R.T, direction), np.array(state.rate_flu_rad_s), charge_ah)
         self._turn(commands, R[:, 2])
         self._watch_ground(state)
         c1, c2, c3, c4 = (0.0, 0.0, 0.0, 0.0) if self.landed else commands.tolist()
@@ -162,17 +165,18 @@ class ThreeRotors:
         forces = self._full_n * self._speeds**2
         d, f_o = self.law.command(direction, rate, np.array([forces[b] - forces[a], forces[o]]))
         fastest = self._battery.fastest_now(charge_ah, self._speeds)
-        squared = shared(self.law.trio, thrust_n, d, f_o, self._full_n, (self._lag.least**2, fastest**2))
+        squared = shared(self.law.trio, thrust_n, d, f_o, self._full_n, (square(self._lag.least), square(fastest)))
         commands = lead(self._speeds, squared, self._lag, fastest)
-        commands[squared <= self._lag.least**2 + _AT_LIMIT] = self._lag.least  # all that the rotor has, not the plan's
-        commands[squared >= fastest**2 - _AT_LIMIT] = fastest
+        least = self._lag.least  # all that the rotor has, not the plan's
+        commands[squared <= square(least) + _AT_LIMIT] = least
+        commands[squared >= square(fastest) - _AT_LIMIT] = fastest
         commands[lost] = 0.0
         return commands
 
     def _turn(self, commands: Array, up: Array) -> None:
         """Follow the rotors, and what their thrust makes of the velocity until the next sample."""
         before, self._speeds = self._speeds, follow(self._speeds, commands, self._lag)
-        thrust_n = 0.5 * float(self._full_n @ (before**2 + self._speeds**2))
+        thrust_n = 0.5 * dot(self._full_n, before**2 + self._speeds**2)
         self._explained = thrust_n / self._weight_n * self._gravity * up
         self._explained[2] -= self._gravity
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.jet import Array, Jet, atan2, cos, sin
-from autopilot.minimum_snap import ACCELERATION, SNAP, minimise
 from autopilot.settings import Table
 from autopilot.waypoints import Waypoints, WaypointsError, read_waypoints
 
@@ -217,6 +216,8 @@ OPTIONS: dict[str, type[Options]] = {
 
 def through(waypoints: Waypoints) -> Track:
     """Return the track through waypoints with the least snap, and the least yaw acceleration if they say which yaw."""
+    from autopilot.minimum_snap import ACCELERATION, SNAP, minimise  # slow to load: most tracks do without
+
     times_s = waypoints.times_s
     places = minimise(SNAP, times_s, waypoints.points_enu_m)
 

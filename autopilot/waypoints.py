@@ -78,7 +78,8 @@ def _given_times(table: _Table) -> Array:
 
 
 def _times(table: _Table, points: Array, speed_m_s: float) -> Array:
-    legs_s = np.linalg.norm(np.diff(points, axis=0), axis=1) / speed_m_s
+    steps = np.diff(points, axis=0)
+    legs_s = np.sqrt((steps * steps).sum(axis=1)) / speed_m_s
     for row in np.flatnonzero(legs_s < LEAST_LEG_S)[:1] + 1:
         raise table.error(row, "x", f"less than {LEAST_LEG_S:g} s from the line before at {speed_m_s:g} m/s")
     legs_s[[0, -1]] *= 2.0

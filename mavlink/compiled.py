@@ -1,26 +1,12 @@
-"""Numerical kernels: how they are compiled, and the rotations of `frames` for use inside them."""
+"""The rotations of `frames`, compiled: for kernels, and for whoever turns attitudes many times a second."""
 
-from collections.abc import Callable
-from typing import Any, Protocol, TypeVar, cast
-
-from numba import njit
-
+from common import kernels
+from common.jit import compiled
 from mavlink import frames
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
-
-
-class _Decorator(Protocol):
-    def __call__(self, function: _Function, /) -> _Function: ...
-
-
-compiled = cast(_Decorator, njit(cache=True, error_model="numpy"))
-"""Compile a function at its first call, and keep the machine code on disk for every later process.
-
-The disk's copy is renewed when the function's own file changes, and only then: so a kernel calls no other file's.
-
-Arithmetic stays IEEE 754's in the order written, so that a kernel gives the same bits on every run; division by zero
-gives an infinity, as in numpy.
-"""
+__all__ = ["euler_from_quaternion", "euler_rates", "kernels", "quaternion_from_euler", "rotation_matrix"]
 
 rotation_matrix = compiled(frames.rotation_matrix)
+euler_from_quaternion = compiled(frames.euler_from_quaternion)
+euler_rates = compiled(frames.euler_rates)
+quaternion_from_euler = compiled(frames.quaternion_from_euler)

@@ -5,8 +5,10 @@ cannot be changed by whoever reads them. Quaternions are wxyz, Hamilton, and rot
 Euler angles are Z-Y'-X'': yaw psi, pitch theta, roll phi.
 """
 
-from math import acos, asin, atan2, cos, degrees, floor, pi, sin, sqrt
+from math import degrees, floor, pi, sqrt
 from typing import TypeAlias
+
+from common.elementary import acos, asin, atan2, cos, sin
 
 Vector: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]

@@ -4,9 +4,10 @@ The projection and the radius are those that PX4 and the ground stations that fl
 waypoint on the same spot. Altitude is not projected: z is the height above the origin's.
 """
 
-from math import acos, asin, atan2, cos, degrees, hypot, isfinite, radians, sin
+from math import degrees, hypot, isfinite, radians
 from typing import NamedTuple
 
+from common.elementary import acos, asin, atan2, cos, sin
 from mavlink.frames import Vector
 
 EARTH_RADIUS_M = 6371000.0

@@ -15,6 +15,7 @@ YEAR = 2026.0
 """Of the model, which is good from 2025 to 2030: no clock is asked, so that a flight can be flown again."""
 
 _GAUSS_PER_NT = 1e-5
+_DECIMALS_NT = 3
 _LOWEST_KM, _HIGHEST_KM = -1.0, 850.0
 
 
@@ -30,4 +31,9 @@ def field_enu_gauss(place: Geodetic, year: float = YEAR) -> Vector:
     field = GeoMag(coefficients_data=WMM_2025).calculate(
         glat=place.latitude_deg, glon=place.longitude_deg, alt=altitude_km, time=year
     )
-    return (field.y * _GAUSS_PER_NT, field.x * _GAUSS_PER_NT, -field.z * _GAUSS_PER_NT)
+    return (_gauss(field.y), _gauss(field.x), _gauss(-field.z))
+
+
+def _gauss(field_nt: float) -> float:
+    """Return a component in gauss, rounded far below what the model knows: libm's last bits differ by computer."""
+    return round(field_nt, _DECIMALS_NT) * _GAUSS_PER_NT

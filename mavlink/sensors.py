@@ -8,9 +8,10 @@ number that a broken sensor sends.
 
 from dataclasses import dataclass
 from enum import IntEnum
-from math import atan2, degrees, hypot, nan
+from math import degrees, hypot, nan
 from typing import TypeAlias
 
+from common.kernels import atan2
 from mavlink.atmosphere import altitude_m
 from mavlink.dialect import Codec, Message
 from mavlink.frames import Vector, frd_from_flu, ned_from_enu

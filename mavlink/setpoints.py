@@ -1,8 +1,9 @@
 """What clients ask a vehicle to do from moment to moment: setpoints, sticks, a target to follow; in SI, ENU and FLU."""
 
-from math import cos, isnan, nan, sin
+from math import isnan, nan
 from typing import NamedTuple, TypeAlias
 
+from common.kernels import cos, sin
 from mavlink.frames import Quaternion, Vector
 
 NOWHERE: Vector = (nan, nan, nan)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from enum import IntEnum
 
+import numpy as np
 from numpy.random import SeedSequence, default_rng
 
 _BLOCK = 1024
@@ -22,6 +23,7 @@ def streams(seed: int, source: Source, count: int) -> list[Iterator[float]]:
 
 
 def _normal(seed: SeedSequence) -> Iterator[float]:
+    """Yield numbers of 24 bits: NumPy takes the rare ones of the tail from libm, whose last bit differs by computer."""
     generator = default_rng(seed)
     while True:
-        yield from generator.standard_normal(_BLOCK).tolist()
+        yield from generator.standard_normal(_BLOCK).astype(np.float32).tolist()

@@ -1,11 +1,8 @@
-"""The vehicle's equations of motion, x' = f(x), and the fixed-step rule that integrates them: one compiled kernel.
+"""The vehicle's equations of motion, x' = f(x), as one compiled kernel.
 
 x is the rigid body's `STATE`, then the four rotor speeds in the vehicle's unit, then the charge taken from the battery
 in Ah: 18 values. The attitude is a quaternion, so that no attitude is singular: body velocity m/s and body rates rad/s
 in FLU, position m in ENU, and the unit quaternion that turns FLU into ENU.
-
-All that the kernel calls is in this file, and so is the type of its parameters: numba's cache on disk notices a change
-in the file of the function that is called, and in no other.
 """
 
 from collections.abc import Sequence
@@ -15,7 +12,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink.compiled import compiled, rotation_matrix
+from common.jit import compiled
+from mavlink.compiled import rotation_matrix
 from mavlink.frames import Matrix, Quaternion, Vector
 
 Array: TypeAlias = NDArray[np.float64]
@@ -237,7 +235,7 @@ def derivative(x: Array, target: FourOf, parameters: Packed) -> Array:
         parameters: Of vehicle and air.
     """
     change = np.empty_like(x)
-    _write_derivative(change, x, target, parameters[0])
+    write_derivative(change, x, target, parameters[0])
     return change
 
 
@@ -270,27 +268,6 @@ def close(x: Array, parameters: Packed) -> float:
     return battery((x[13], x[14], x[15], x[16]), x[17], parameters[0])[0]
 
 
-@compiled
-def runge_kutta_4(x: Array, target: FourOf, parameters: Packed, duration_s: float, steps: int) -> tuple[Array, float]:
-    """Return x after `duration_s` by the classical fourth-order rule in `steps` equal steps, and the voltage then."""
-    h = duration_s / steps
-    x = held(x, target, parameters)
-    k1, k2, k3, k4 = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
-    y = np.empty_like(x)
-    for _ in range(steps):
-        _write_derivative(k1, x, target, parameters[0])
-        _write_sum(y, x, 0.5 * h, k1)
-        _write_derivative(k2, y, target, parameters[0])
-        _write_sum(y, x, 0.5 * h, k2)
-        _write_derivative(k3, y, target, parameters[0])
-        _write_sum(y, x, h, k3)
-        _write_derivative(k4, y, target, parameters[0])
-        for i in range(x.size):
-            x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
-        close(x, parameters)
-    return x, close(x, parameters)
-
-
 def attitude_of(state: Sequence[float]) -> Quaternion:
     """Return the attitude quaternion of a state."""
     qw, qx, qy, qz = state[9:13]
@@ -298,7 +275,8 @@ def attitude_of(state: Sequence[float]) -> Quaternion:
 
 
 @compiled
-def _write_derivative(change: Array, x: Array, target: FourOf, parameters: Parameters) -> None:
+def write_derivative(change: Array, x: Array, target: FourOf, parameters: Parameters) -> None:
+    """Write `derivative` to `change`, (18,); the parameters are a record of `packed`."""
     speeds = (x[13], x[14], x[15], x[16])
     voltage_v, current_a = battery(speeds, x[17], parameters)
     speed_rates = _speed_rates(speeds, target, voltage_v, parameters)
@@ -379,12 +357,6 @@ def _voltage_share(target: FourOf, share: float, charge_ah: float, parameters: P
     most = share * parameters.top_speed
     speeds = (min(target[0], most), min(target[1], most), min(target[2], most), min(target[3], most))
     return battery(speeds, charge_ah, parameters)[0] / parameters.full_voltage_v
-
-
-@compiled
-def _write_sum(y: Array, x: Array, factor: float, k: Array) -> None:
-    for i in range(x.size):
-        y[i] = x[i] + factor * k[i]
 
 
 @compiled

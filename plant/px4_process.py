@@ -2,6 +2,7 @@
 
 import argparse
 from dataclasses import replace
+from math import hypot
 from time import perf_counter, sleep
 
 from mavlink.frames import earth_from_body
@@ -126,7 +127,7 @@ class Simulator:
         state = state_frame(world)
         east, north, up = earth_from_body(state.attitude, self._physics.specific_force(world))
         moving = (own - air for own, air in zip(state.velocity_enu_m_s, world.wind_enu_m_s, strict=True))
-        airspeed_m_s = sum(part * part for part in moving) ** 0.5
+        airspeed_m_s = hypot(*moving)
         acceleration = (east, north, up - self._gravity_m_s2)
         return Truth(state, geodetic_of(state.position_enu_m, self._origin), acceleration, airspeed_m_s)
 

@@ -6,8 +6,10 @@ Sources: PX4 Airframes Reference, Quadrotor x and +; ArduPilot, AP_MotorsMatrix.
 """
 
 from collections.abc import Sequence
-from math import atan2, degrees
+from math import degrees
 from typing import Literal, NamedTuple, TypeAlias
+
+from common.elementary import atan2
 
 FourOf: TypeAlias = tuple[float, float, float, float]
 Shape: TypeAlias = Literal["+", "x"]

@@ -7,6 +7,8 @@ from argparse import ArgumentTypeError
 from math import radians
 from typing import NamedTuple
 
+import numpy as np
+
 from mavlink.frames import Quaternion, Vector, earth_from_body, quaternion_from_euler, rotation_matrix
 from mavlink.process import ArgumentParser, number
 from plant.vehicle import Vehicle, VehicleError
@@ -88,7 +90,7 @@ def check_start(start: Start, vehicle: Vehicle) -> None:
     if vehicle.ground is None:
         return
     _, _, up = rotation_matrix(start.attitude)
-    lowest_m = start.z + float((vehicle.ground.contacts_m(vehicle.rotors) @ up).min())
+    lowest_m = start.z + float((vehicle.ground.contacts_m(vehicle.rotors) * np.array(up)).sum(axis=1).min())
     depth_m = vehicle.ground_height_m - lowest_m
     if depth_m > _DEEPEST_START_M:
         raise VehicleError(f"{vehicle.name} would start {depth_m:.3g} m below the ground: start it higher")

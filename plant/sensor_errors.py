@@ -1,8 +1,9 @@
 """How sensors err: processes driven by a stream of standard normal numbers, exact at any interval."""
 
 from collections.abc import Iterator
-from math import exp, sqrt
+from math import sqrt
 
+from common.kernels import exp
 from mavlink.frames import Vector
 from plant.sensor_parts import Accelerometer, Gyroscope
 

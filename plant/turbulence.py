@@ -9,11 +9,12 @@ function of seed and frame, so that a memory has but one future. Turning of the 
 span is small against the eddies.
 """
 
-from math import exp, expm1, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
+from common.kernels import exp, expm1, power
 from plant.chance import Source
 from plant.weather import Intensity
 
@@ -69,7 +70,7 @@ def scales(intensity: Intensity, height_m: float) -> Scales:
     height_m = min(max(height_m, LEAST_HEIGHT_M), LARGEST_HEIGHT_M)
     slope = 0.177 + 0.000823 * height_m * FEET_PER_M
     sigma_w = 0.1 * W20_KNOTS[intensity] * KNOT_M_S
-    return Scales(sigma_w / slope**0.4, sigma_w, height_m / slope**1.2, height_m)
+    return Scales(sigma_w / power(slope, 0.4), sigma_w, height_m / power(slope, 1.2), height_m)
 
 
 def eddy_velocity(eddies: Eddies, scale: Scales) -> tuple[float, float, float]:

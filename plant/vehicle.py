@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from common.elementary import square
 from plant.rotor_order import Numbering, numbering
 from plant.sensor_parts import Sensors as Sensors
 
@@ -252,7 +253,7 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     def largest_wrench(self) -> Array:
         """Return the largest U1 (N), U2, U3, U4 (N m) that the rotors can make, each on its own, (4,)."""
-        largest: Array = np.clip(self.allocation(), 0.0, None).sum(axis=1) * self.rotors.max_speed**2
+        largest: Array = np.clip(self.allocation(), 0.0, None).sum(axis=1) * square(self.rotors.max_speed)
         return largest
 
     def rotor_momentum(self) -> Array:
@@ -346,10 +347,10 @@ def _fastest_contact_rad_s(vehicle: Vehicle, ground: Ground) -> float:
 
 def _contact_matrix(contacts_m: Array, along_axes: tuple[float, float, float]) -> Array:
     """Return the 6 x 6 matrix that maps a small motion (m, rad) of the body to force and moment against it."""
-    matrix = np.zeros((6, 6))
+    matrix, weights = np.zeros((6, 6)), np.array(along_axes)[:, None, None]
     for x, y, z in contacts_m:
         motion = np.array([[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]])
-        matrix += motion.T @ np.diag(along_axes) @ motion
+        matrix += (weights * motion[:, :, None] * motion[:, None, :]).sum(axis=0)
     return matrix
 
 

@@ -6,10 +6,11 @@ Velocities are those of the air, ENU, m/s. `plant.air` makes it blow.
 from argparse import ArgumentTypeError, Namespace
 from bisect import bisect_right
 from itertools import pairwise
-from math import cos, pi, radians, sin
+from math import pi, radians
 from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
+from common.elementary import cos, sin
 from mavlink.frames import Vector
 from mavlink.process import ArgumentParser, number
 

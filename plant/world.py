@@ -113,7 +113,9 @@ class Physics:
         if self._battery is None:
             return None
         numbers = self._parameters[0]
-        power_w = sum(w * speed**3 for w, speed in zip(numbers["power"].tolist(), world.rotor_speeds, strict=True))
+        power_w = 0.0
+        for at_one_w, speed in zip(numbers["power"].tolist(), world.rotor_speeds, strict=True):
+            power_w += at_one_w * speed * speed * speed
         voltage_v = world.voltage_v if isfinite(world.voltage_v) else self._battery.full_voltage_v
         left = max(0.0, 1.0 - world.charge_used_ah / self._battery.capacity_ah)
         return PlantBattery(voltage_v, power_w / voltage_v, world.charge_used_ah, left)

@@ -45,8 +45,8 @@ class Recording:
     Attributes:
         table: Columns as in `COLUMNS`, (n, 27). Row k holds the state at its time and the inputs that led to it, with
             the references they were computed for; row 0 the start.
-        qp_status: How each QP ended, as in `autopilot.process.STATUS_CODES`, (m,).
-        fallback: What decided in its place, as in `autopilot.process.FALLBACK_CODES`, (m,).
+        qp_status: How each QP ended, as in `autopilot.controller.STATUS_CODES`, (m,).
+        fallback: What decided in its place, as in `autopilot.controller.FALLBACK_CODES`, (m,).
         solve_time_us: Time of each QP, (m,).
         control_step_us: Time of each control step, (m,).
         slack: By how much soft limits were planned to be exceeded, in parts of each, (m,).

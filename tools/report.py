@@ -7,8 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.controller import Active, Fallback
-from autopilot.process import FALLBACK_CODES, STATUS_CODES
+from autopilot.controller import FALLBACK_CODES, STATUS_CODES, Active, Fallback
 from autopilot.qp import QpStatus
 from mavlink.feedback import Feedback
 from tools.estimation import FIGURES, read_estimation

@@ -10,8 +10,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.controller import DecisionError, Fallback
-from autopilot.process import FALLBACK_CODES, STATUS_CODES
+from autopilot.controller import FALLBACK_CODES, STATUS_CODES, DecisionError, Fallback
 from autopilot.profile import Profile
 from autopilot.qp import QpStatus
 from autopilot.tracks import DURATION_S

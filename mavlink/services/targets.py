@@ -11,9 +11,10 @@ POSITION_TARGET_TYPEMASK and ATTITUDE_TARGET_TYPEMASK. What they leave open, her
 - Altitude above terrain is altitude above home: the ground is flat.
 """
 
-from math import cos, hypot, isfinite, isnan, nan, pi, sin, sqrt
+from math import hypot, isfinite, isnan, nan, pi, sqrt
 from typing import Any, NamedTuple
 
+from common.kernels import cos, sin
 from mavlink.dialect import mav
 from mavlink.frames import Quaternion, Vector, frd_from_flu, nearest_turn, ned_frd_from_enu_flu, ned_from_enu
 from mavlink.geodesy import DEFAULT_ORIGIN, Geodetic, enu_of, is_on_earth

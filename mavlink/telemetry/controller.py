@@ -1,7 +1,8 @@
 """Messages of the control law: what it steers to, and how its model predictive control comes to a decision."""
 
-from math import atan2, degrees, hypot, isnan
+from math import degrees, hypot, isnan
 
+from common.kernels import atan2
 from mavlink.dialect import mav
 from mavlink.frames import euler_from_quaternion, frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 from mavlink.geodesy import geodetic_of

@@ -1,7 +1,8 @@
 """Messages of where the vehicle is, how it moves, and where it came from."""
 
-from math import atan2, cos, hypot, isfinite, nan, sin
+from math import hypot, isfinite, nan
 
+from common.kernels import atan2, cos, sin
 from mavlink.dialect import mav
 from mavlink.frames import euler_from_quaternion, ned_from_enu
 from mavlink.geodesy import geodetic_of

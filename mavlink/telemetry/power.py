@@ -35,7 +35,7 @@ def battery_status(s: Snapshot) -> Fields | None:
 
 def esc_status(s: Snapshot) -> Fields:
     """ESC_STATUS (291): rpm, V, A; the current is shared as the power of a rotor goes, by the cube of its speed."""
-    cubes = [speed**3 for speed in s.rotor_speeds_rad_s]
+    cubes = [speed * speed * speed for speed in s.rotor_speeds_rad_s]
     total = sum(cubes) or 1.0
     voltage, current = (s.battery.voltage_v, s.battery.current_a) if s.battery else (0.0, 0.0)
     rpm = tuple(RPM * speed for speed in s.rotor_speeds_rad_s)

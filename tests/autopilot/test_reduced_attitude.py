@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.linalg import solve_discrete_are
 
-from autopilot.reduced_attitude import ReducedAttitude, Weights, balancing_thrust, lqr, trio_without
+from autopilot.reduced_attitude import ReducedAttitude, Weights, balancing_thrust, trio_without
 from autopilot.rotor_lag import rotor_lag
 from autopilot.three_rotors import shared
 from plant.dynamics import angular_acceleration
@@ -64,17 +63,6 @@ def test_at_the_final_spin_drag_and_torque_balance(lost: int) -> None:
     fast, slow = (balancing_thrust(HUMMINGBIRD, trio, spin) for spin in (30.0, 20.0))
     assert 0.0 < fast < slow < 0.5 * HUMMINGBIRD.body.mass_kg * HUMMINGBIRD.gravity_m_s2
     assert law(lost).solution(SPIN_RAD_S).opposite_n == pytest.approx(balancing_thrust(HUMMINGBIRD, trio, SPIN_RAD_S))
-
-
-def test_the_gains_are_those_of_the_riccati_equation() -> None:
-    random = np.random.default_rng(1)
-    A = np.eye(6) + 0.1 * random.standard_normal((5, 6, 6))
-    B = random.standard_normal((5, 6, 2))
-    Q = np.diag([1.0, 2.0, 3.0, 4.0, 0.0, 0.0])
-    R = np.broadcast_to(np.diag([0.5, 0.1]), (5, 2, 2))
-    for a, b, r, gain in zip(A, B, R, lqr(A, B, Q, R), strict=True):
-        X = solve_discrete_are(a, b, Q, r)
-        assert gain == pytest.approx(np.linalg.solve(r + b.T @ X @ b, b.T @ X @ a), rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("lost", range(4))

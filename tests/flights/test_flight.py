@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import plant
-from autopilot.controller import Fallback
-from autopilot.process import FALLBACK_CODES
+from autopilot.controller import FALLBACK_CODES, Fallback
 from tests.runs import fly, rows
 
 HUMMINGBIRD = Path(plant.__file__).parent / "vehicles" / "hummingbird.toml"

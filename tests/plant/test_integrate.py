@@ -9,8 +9,8 @@ import pytest
 
 from mavlink.hil import ActuatorCommand
 from plant.air import CALM
-from plant.dynamics import Array, packed, runge_kutta_4
-from plant.integrate import Integrator, dormand_prince, fixed_step, solver
+from plant.dynamics import Array, packed
+from plant.integrate import Integrator, adaptive_step, fixed_step, runge_kutta_4, solver
 from plant.parameters import parameters_of
 from plant.scenario import IntegrationError, Start
 from plant.vehicle import load_vehicle
@@ -20,10 +20,10 @@ from tests.plant.flights import command, flight, hummingbird, states
 UNEVEN = (480.0, 500.0, 510.0, 495.0)
 PARAMETERS = packed(parameters_of(hummingbird("drag", "rotor-lag"), (1.0, -2.0, 0.0)))
 CACHED = """
-from plant.dynamics import derivative, runge_kutta_4
+from plant.integrate import dormand_prince, runge_kutta_4
 from plant.vehicle import load_vehicle
 from plant.world import Physics
-for name, kernel in (("rk4", runge_kutta_4), ("adaptive", derivative)):
+for name, kernel in (("rk4", runge_kutta_4), ("adaptive", dormand_prince)):
     Physics(load_vehicle("hummingbird"), name)
     print(sum(kernel.stats.cache_hits.values()), sum(kernel.stats.cache_misses.values()))
 """
@@ -34,7 +34,7 @@ def tumbling() -> Array:
 
 
 def test_runge_kutta_is_of_fourth_order() -> None:
-    exact, _ = dormand_prince()(tumbling(), UNEVEN, PARAMETERS, 0.4)
+    exact, _ = adaptive_step(tumbling(), UNEVEN, PARAMETERS, 0.4)
     counts = (16, 32, 64)
     errors = [
         float(np.abs(runge_kutta_4(tumbling(), UNEVEN, PARAMETERS, 0.4, steps)[0] - exact)[:13].max())

@@ -1,0 +1,1 @@
+"""What every package may use and nothing here knows a vehicle or MAVLink."""

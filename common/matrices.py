@@ -1,0 +1,121 @@
+"""Small dense matrices, in double precision and in a fixed order of operations: the same bits on every computer.
+
+BLAS and LAPACK choose their code by the CPU, and with it the order of sums and whether a product is rounded before it
+is added. At the sizes of a control law, 3 to 100, nothing is lost by doing without.
+
+Matrices may have any strides, but they must be writable arrays of float64; results are C-ordered and new.
+"""
+
+from math import sqrt
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from common.jit import compiled, compiled_for
+
+Array: TypeAlias = NDArray[np.float64]
+
+_MATRIX, _VECTOR = "float64[:, :]", "float64[:]"
+_NEW_MATRIX, _NEW_VECTOR = "float64[:, ::1]", "float64[::1]"
+_TAYLOR_TERMS = 15
+_TAYLOR_NORM = 0.5
+"""Beyond it the exponential is that of a half, squared: 0.5^16 / 16! is far below what a double shows."""
+
+
+@compiled_for(f"{_NEW_MATRIX}({_MATRIX}, {_MATRIX})")
+def matmul(A: Array, B: Array) -> Array:
+    """Return A B, (n, m), of A (n, k) and B (k, m)."""
+    product = np.zeros((A.shape[0], B.shape[1]))
+    for i in range(A.shape[0]):
+        for k in range(A.shape[1]):
+            factor = A[i, k]
+            for j in range(B.shape[1]):
+                product[i, j] += factor * B[k, j]
+    return product
+
+
+@compiled_for(f"{_NEW_VECTOR}({_MATRIX}, {_VECTOR})")
+def matvec(A: Array, x: Array) -> Array:
+    """Return A x, (n,), of A (n, k) and x (k,)."""
+    product = np.zeros(A.shape[0])
+    for i in range(A.shape[0]):
+        for k in range(A.shape[1]):
+            product[i] += A[i, k] * x[k]
+    return product
+
+
+@compiled_for(f"float64({_VECTOR}, {_VECTOR})")
+def dot(x: Array, y: Array) -> float:
+    """Return xᵀ y of two vectors of one length."""
+    total = 0.0
+    for k in range(x.shape[0]):
+        total += x[k] * y[k]
+    return total
+
+
+@compiled_for(f"float64({_VECTOR})")
+def norm(x: Array) -> float:
+    """Return the Euclidean length of x, (n,)."""
+    return sqrt(dot(x, x))
+
+
+@compiled_for(f"{_NEW_MATRIX}({_MATRIX}, {_MATRIX})")
+def solve(A: Array, B: Array) -> Array:
+    """Return X of A X = B, (n, m), by elimination with partial pivoting; not finite where A (n, n) is singular."""
+    n, m = B.shape
+    U, X = A.copy(), B.copy()
+    for column in range(n):
+        pivot = column
+        for row in range(column + 1, n):
+            if abs(U[row, column]) > abs(U[pivot, column]):
+                pivot = row
+        for j in range(n):
+            U[column, j], U[pivot, j] = U[pivot, j], U[column, j]
+        for j in range(m):
+            X[column, j], X[pivot, j] = X[pivot, j], X[column, j]
+        for row in range(column + 1, n):
+            factor = U[row, column] / U[column, column]
+            if factor != 0.0:
+                for j in range(column + 1, n):
+                    U[row, j] -= factor * U[column, j]
+                for j in range(m):
+                    X[row, j] -= factor * X[column, j]
+    for row in range(n - 1, -1, -1):
+        for j in range(m):
+            for k in range(row + 1, n):
+                X[row, j] -= U[row, k] * X[k, j]
+            X[row, j] /= U[row, row]
+    return X
+
+
+@compiled_for(f"{_NEW_MATRIX}({_MATRIX})")
+def inverse(A: Array) -> Array:
+    """Return the inverse of A, (n, n); not finite where A is singular."""
+    return solve(A, np.eye(A.shape[0]))
+
+
+@compiled
+def _largest_column_sum(A: Array) -> float:
+    largest = 0.0
+    for j in range(A.shape[1]):
+        total = 0.0
+        for i in range(A.shape[0]):
+            total += abs(A[i, j])
+        largest = max(largest, total)
+    return largest
+
+
+@compiled_for(f"{_NEW_MATRIX}({_MATRIX})")
+def expm(A: Array) -> Array:
+    """Return the exponential of A, (n, n), by scaling and squaring of Taylor's series."""
+    squarings, size = 0, _largest_column_sum(A)
+    while _TAYLOR_NORM < size < np.inf:
+        size, squarings = 0.5 * size, squarings + 1
+    scaled = A * 0.5**squarings
+    total = np.eye(A.shape[0])
+    for k in range(_TAYLOR_TERMS, 0, -1):
+        total = np.eye(A.shape[0]) + matmul(scaled, total) / k
+    for _ in range(squarings):
+        total = matmul(total, total)
+    return total
