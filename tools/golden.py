@@ -12,6 +12,7 @@ import msgspec
 from autopilot.controller import ControllerError, DecisionError
 from autopilot.profile import ProfileError
 from autopilot.qp import SolverError
+from autopilot.tracks import TrackError
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, fail
 from plant.scenario import IntegrationError
 from tools.cases import Case, SitlCase
@@ -30,7 +31,7 @@ FOUND = "golden.json"
 _SHOWN = 16
 _NO_HASH = "-"
 _ERRORS = (
-    *(ControllerError, DecisionError, ProfileError, SolverError, IntegrationError, PlanError, FlightError),
+    *(ControllerError, DecisionError, ProfileError, SolverError, TrackError, IntegrationError, PlanError, FlightError),
     *(RecordingError, SettingError, StageError, RefusedError, NotInTimeError),
 )
 

@@ -1,10 +1,14 @@
 """The golden flights, on this computer and on others as far as it can pass for them, are the same to the last bit."""
 
+import os
+import sys
 from pathlib import Path
 
 import pytest
 
+from tests.golden.__main__ import main as golden_main
 from tests.golden.__main__ import table
+from tests.golden.pythons import environments, other_pythons, set_up
 from tests.golden.variations import Flown, Variation, fly, variations
 from tools.cli import main
 from tools.golden_flights import FLIGHTS
@@ -73,3 +77,28 @@ def test_the_table_says_what_differs_and_how_long_it_took(monkeypatch: pytest.Mo
         "| wave | = | = |",
         "| took | 2 s | 4 s |",
     ]
+
+
+def test_an_unknown_variation_is_refused_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        golden_main(["--variation", "abacus"])
+    assert end.value.code == 2
+    error = capsys.readouterr().err
+    assert "--variation abacus: there is no such variation; there are as-it-is, openblas-nehalem" in error
+    assert error.count("\n") == 1
+
+
+def test_environments_are_those_that_are_set_up_and_newer_than_the_lock_they_stay(tmp_path: Path) -> None:
+    (tmp_path / "requirements.lock").touch()
+    for version in ("3.10", "3.12", "3.13"):
+        (tmp_path / f".venv-{version}").mkdir()
+    for version in ("3.10", "3.12"):
+        (tmp_path / f".venv-{version}" / ".ready").touch()
+    os.utime(tmp_path / "requirements.lock", (0.0, 0.0))
+    assert environments(tmp_path) == {"3.12": tmp_path / ".venv-3.12" / "bin" / "python"}
+    set_up(tmp_path, "3.12", Path("/no/such/python"))
+
+
+def test_other_pythons_are_of_other_versions_that_can_run_the_project() -> None:
+    own = f"3.{sys.version_info.minor}"
+    assert all(version != own and int(version[2:]) >= 11 for version in other_pythons())
