@@ -3,7 +3,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out/spiral
 
-.PHONY: setup fly test test-long lint test-clients fuzz scenarios scenarios-rough soak soak-clients kills bench lock clean
+.PHONY: setup fly test test-long lint test-clients fuzz scenarios scenarios-rough soak soak-clients kills \
+  golden verify-pythons bench lock clean
 
 setup: .venv/.ready
 
@@ -75,6 +76,16 @@ kills: setup
 	$(BIN)/python -m tests.restarts --kills 100 --feedback sensors
 	$(BIN)/python -m tests.restarts --kills 200 --of plant
 
+# The golden flights as on other computers: other kernels of OpenBLAS, numpy, numba and glibc; which flight differs, and
+# how long each took. GOLDEN="--link udp --table FILE", say.
+golden: setup
+	$(BIN)/python -m tests.golden $(GOLDEN)
+
+# The same under every other Python from 3.11 on that there is, each in .venv-3.N from the lock; `make test-long` flies
+# them in those, too, once they are there.
+verify-pythons: setup
+	$(BIN)/python -m tests.golden --pythons $(GOLDEN)
+
 bench: setup
 	$(BIN)/colibri bench
 
@@ -86,4 +97,4 @@ lock:
 	  --extra clients pyproject.toml -o requirements-clients.lock
 
 clean:
-	rm -rf .venv .venv-clients out dist
+	rm -rf .venv .venv-clients .venv-3.* out dist

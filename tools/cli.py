@@ -14,6 +14,7 @@ from plant.scenario import LATENCY_HELP, add_world_arguments, latency
 from plant.weather import NO_WIND, add_weather_arguments
 
 COMPARED_S = 100.0
+GOLDEN_HASHES = Path("tests/golden/hashes.json")
 TRACK_HELP = (
     "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
     "hover[:x=0,y=0,height=2,yaw=0], lemniscate[:size=4,height=3,lap=6,yaw=path|fixed], "
@@ -56,6 +57,10 @@ def main(argv: list[str] | None = None) -> int:
             from tools.replay import replay
 
             return replay(args)
+        if args.command == "verify" and args.golden is not None:
+            from tools.golden import verify_golden
+
+            return verify_golden(args)
         if args.command == "verify":
             from tools.verify import verify
 
@@ -86,7 +91,11 @@ def _parser() -> ArgumentParser:
     _add_replay(
         commands.add_parser("replay", help="feed a recorded flight to the autopilot: are its answers the same?")
     )
-    _add_verify(commands.add_parser("verify", help="fly a fixed set of flights twice: is every bit the same?"))
+    _add_verify(
+        commands.add_parser(
+            "verify", help="fly a fixed set of flights: is every bit the same, twice, or as it once was?"
+        )
+    )
     return parser
 
 
@@ -190,14 +199,19 @@ def _add_replay(parser: ArgumentParser) -> None:
 
 def _add_verify(parser: ArgumentParser) -> None:
     add = parser.add_argument
-    add("--link", default="udp", choices=("udp", "memory"), help="of the two flights (default %(default)s)")
+    add("--link", default="udp", choices=("udp", "memory"), help="of the flights (default %(default)s)")
+    add("--duration", type=positive, metavar="S", help="simulated time of each flight (default 20; golden: its own)")
     add(
-        "--duration",
-        type=positive,
-        default=20.0,
-        metavar="S",
-        help="simulated time of each flight (default %(default)s)",
+        "--golden",
+        type=Path,
+        nargs="?",
+        const=GOLDEN_HASHES,
+        metavar="FILE",
+        help="fly the golden flights instead, once each, and compare their hashes with those in FILE "
+        f"(default {GOLDEN_HASHES})",
     )
+    add("--renew", action="store_true", help="with --golden: write the hashes to FILE, and show which have changed")
+    add("--only", action="append", default=[], metavar="NAME", help="with --golden: only this flight; may be repeated")
     add("--out", type=Path, default=Path("out/verify"), metavar="DIR", help="folder for the logs (default %(default)s)")
     add("--quiet", action="store_true", help="say nothing but errors")
 

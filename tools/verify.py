@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from autopilot.controller import ControllerError, DecisionError
 from autopilot.profile import ProfileError
@@ -10,26 +10,12 @@ from autopilot.qp import SolverError
 from mavlink.feedback import Feedback
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, fail
 from plant.scenario import IntegrationError
-from plant.weather import wind
-from tools.fly import keep_flight, prepare
-from tools.plan import FlightPlan
-from tools.processes import FlightError, fly_processes
+from tools.cases import Case
+from tools.processes import FlightError
 from tools.replay import replay_flight
 
 _SHOWN = 16
-
-
-class Case(NamedTuple):
-    """A flight of the set.
-
-    Attributes:
-        name: What it is called.
-        options: Of `colibri fly`, by their names there.
-    """
-
-    name: str
-    options: dict[str, Any]
-
+DEFAULT_DURATION_S = 20.0
 
 CASES = (
     Case("thesis-spiral", {"track": "spiral", "profile": "thesis"}),
@@ -76,6 +62,10 @@ class Verdict(NamedTuple):
 
 def verify(args: argparse.Namespace) -> int:
     """Verify as the command line says; return the exit code."""
+    if args.renew or args.only:
+        fail(f"--{'renew' if args.renew else 'only'} goes with --golden alone")
+    if args.duration is None:
+        args.duration = DEFAULT_DURATION_S
     try:
         verdicts = [_verdict(case, args) for case in CASES]
     except (ControllerError, ProfileError, SolverError, IntegrationError, DecisionError) as error:
@@ -102,18 +92,7 @@ def _verdict(case: Case, args: argparse.Namespace) -> Verdict:
 
 def _flown(case: Case, out: Path, link: str, duration_s: float) -> str:
     """Fly a case; return the hash of its trajectory."""
-    prepare(out)
-    options = case.options | ({"wind": wind(case.options["wind"])} if "wind" in case.options else {})
-    plan = FlightPlan.of_options(out, **options, link=link, duration=duration_s, seed=SEED)
-    if link == "udp":
-        summary = fly_processes(plan, lambda _sim_time_s: None)
-    else:
-        from tools.local import fly_locally
-
-        summary = fly_locally(plan, lambda _sim_time_s: None)
-    _, figures = keep_flight(plan, summary)
-    sha256: str = figures["trajectory_sha256"]
-    return sha256
+    return case.fly(out, link, duration=duration_s, seed=SEED)
 
 
 def _print(verdicts: list[Verdict], args: argparse.Namespace) -> None:

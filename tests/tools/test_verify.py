@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from tools import verify
+from tools.cases import Case
 from tools.cli import main
 
 
@@ -25,7 +26,7 @@ def test_what_is_not_the_same_is_named(
     flown = verify._flown  # noqa: SLF001
     seeds = iter((1, 2, 3))
 
-    def another_each_time(case: verify.Case, out: Path, link: str, duration_s: float) -> str:
+    def another_each_time(case: Case, out: Path, link: str, duration_s: float) -> str:
         return f"{next(seeds)}{flown(case, out, link, duration_s)}"
 
     monkeypatch.setattr(verify, "_flown", another_each_time)

@@ -66,12 +66,12 @@ class Flights:
         self._ends.callback(autopilot.close)
         return Stage(plant, autopilot, setting.system, setting.seed)
 
-    def keep(self, folder: Path) -> list[Path]:
-        """Write all that is known of the flights below `folder`; return where each is."""
+    def keep(self, folder: Path, *, figures: bool = True) -> list[Path]:
+        """Write all that is known of the flights below `folder`, with or without figures; return where each is."""
         places = []
         for number, sitl in enumerate(self.flown):
             place = folder / f"flight-{number}" if len(self.flown) > 1 else folder
-            sitl.record.keep(place)
+            sitl.record.keep(place, figure=figures)
             facts = {"setting": str(sitl.setting), "sha256": sitl.sha256, "ended": str(sitl), "texts": sitl.texts}
             (place / "flight.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
             places.append(place)

@@ -69,8 +69,8 @@ class Record:
         table = np.frombuffer(bytes(self._rows), dtype="<f8").reshape(-1, len(COLUMNS))
         return dict(zip(COLUMNS, table[table[:, 0] >= since_s - 1e-9].T, strict=True))
 
-    def keep(self, folder: Path) -> None:
-        """Write the table, both logs and the figure into `folder`."""
+    def keep(self, folder: Path, *, figure: bool = True) -> None:
+        """Write the table, both logs and, if asked for, the figure into `folder`."""
         folder.mkdir(parents=True, exist_ok=True)
         table = CsvLog(folder / TABLE, COLUMNS)
         for row in _ROW.iter_unpack(bytes(self._rows)):
@@ -82,7 +82,7 @@ class Record:
             for time_us, datagram in passed:
                 log.write(time_us, framer.take(datagram))
             log.close()
-        if self.frames:
+        if figure and self.frames:
             self._draw(folder / FIGURE)
 
     def _draw(self, path: Path) -> None:

@@ -1,0 +1,72 @@
+"""Every Python that this computer has and that can run the project, each in an environment of its own from the lock."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+OLDEST, LATEST = 11, 19
+"""Minor versions of Python 3 to look for."""
+_SAYS_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
+
+
+def environments(root: Path) -> dict[str, Path]:
+    """Return the interpreters of the environments that are set up beside .venv, by version."""
+    found = {}
+    for minor in range(OLDEST, LATEST + 1):
+        folder = root / f".venv-3.{minor}"
+        if (folder / ".ready").exists():
+            found[f"3.{minor}"] = folder / "bin" / "python"
+    return found
+
+
+def other_pythons() -> dict[str, Path]:
+    """Return an interpreter of each version that the computer has, but of the one that runs this."""
+    found = {}
+    for minor in range(OLDEST, LATEST + 1):
+        for python in _candidates(minor):
+            if minor != sys.version_info.minor and _version(python) == f"3.{minor}":
+                found[f"3.{minor}"] = python
+                break
+    return found
+
+
+def set_up(root: Path, version: str, python: Path) -> None:
+    """Make the environment of a version from the lock, unless there is one that is newer than the lock.
+
+    Raises:
+        subprocess.CalledProcessError: It cannot be made; its output says why.
+    """
+    folder, lock = root / f".venv-{version}", root / "requirements.lock"
+    ready = folder / ".ready"
+    if ready.exists() and ready.stat().st_mtime > lock.stat().st_mtime:
+        return
+    pip = (str(folder / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
+    for command in (
+        (str(python), "-m", "venv", "--clear", str(folder)),
+        (*pip, "--require-hashes", "-r", str(lock)),
+        (*pip, "--no-deps", "--no-build-isolation", "--editable", str(root)),
+    ):
+        subprocess.run(command, check=True, capture_output=True, text=True, cwd=root)
+    ready.touch()
+
+
+def _candidates(minor: int) -> list[Path]:
+    """Return where a version may be: in pyenv's folder, the latest first, and on the path."""
+    kept = Path.home() / ".pyenv" / "versions"
+    pyenv = sorted(kept.glob(f"3.{minor}.*"), key=lambda folder: [_number(part) for part in folder.name.split(".")])
+    on_path = shutil.which(f"python3.{minor}")
+    return [*(folder / "bin" / "python" for folder in reversed(pyenv)), *([Path(on_path)] if on_path else [])]
+
+
+def _number(part: str) -> int:
+    return int(part) if part.isdigit() else -1
+
+
+def _version(python: Path) -> str:
+    """Return which Python it is; nothing where it does not run."""
+    try:
+        said = subprocess.run([str(python), "-c", _SAYS_VERSION], capture_output=True, text=True, check=False)
+    except OSError:
+        return ""
+    return said.stdout.strip()
