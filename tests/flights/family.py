@@ -27,23 +27,25 @@ DURATION_S = 40.0
 CAUGHT_UP_S = 4.0
 """The start, 1 m below and beside the track, no longer counts."""
 
+Array = NDArray[np.float64]
 
-class Extremes(NamedTuple):
-    """The worst of one flight.
+
+class Flown(NamedTuple):
+    """A flight, one value a frame.
 
     Attributes:
-        max_tilt_deg: Of the body's z axis from the vertical, from the start on.
-        max_error_m: Distance to the reference of the same instant, once caught up.
-        min_z_m: Height, from the start on.
-        max_z_m: Height, from the start on.
-        fallbacks: Control samples that something other than a plan decided.
+        t: s, (n,).
+        tilt_deg: Of the body's z axis from the vertical, (n,).
+        error_m: Distance to the reference of the same instant, (n,).
+        z_m: Height, (n,).
+        fallback: Whether something other than a plan decided, (n,).
     """
 
-    max_tilt_deg: float
-    max_error_m: float
-    min_z_m: float
-    max_z_m: float
-    fallbacks: int
+    t: Array
+    tilt_deg: Array
+    error_m: Array
+    z_m: Array
+    fallback: NDArray[np.bool_]
 
 
 def starts(start: Start, count: int) -> Iterator[Start]:
@@ -56,13 +58,13 @@ def starts(start: Start, count: int) -> Iterator[Start]:
         yield start._replace(x=start.x + scale * x, y=start.y + scale * y, z=start.z + scale * z)
 
 
-def fly_family(track: str, count: int, duration_s: float) -> list[Extremes]:
-    """Fly profile `flight` from each of `count` starts."""
-    plan = FlightPlan.of_track(track, Path(), profile="flight")
-    return [_fly(plan, start, duration_s) for start in starts(plan.start, count)]
+def fly_family(track: str, count: int, duration_s: float, **start: float) -> list[Flown]:
+    """Fly profile `flight` from each of `count` starts; `start` as in `Start`, in place of the profile's."""
+    plan = FlightPlan.of_options(Path(), track=track, profile="flight", link="direct", start=start)
+    return [_fly(plan, it, duration_s) for it in starts(plan.start, count)]
 
 
-def _fly(plan: FlightPlan, start: Start, duration_s: float) -> Extremes:
+def _fly(plan: FlightPlan, start: Start, duration_s: float) -> Flown:
     autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, lambda: 0.0)
     plant = Plant(
         starting_world(nudged(start), plan.plant_vehicle),
@@ -73,36 +75,35 @@ def _fly(plan: FlightPlan, start: Start, duration_s: float) -> Extremes:
         seed=0,
         interval_us=autopilot.frame_interval_us,
     )
-    exchange, states, fallbacks = Direct(autopilot), [], 0
+    exchange, states, fallback = Direct(autopilot), [], []
     with undisturbed():
         while plant.world.time_us < duration_s * 1e6:
             step, command = exchange(plant)
-            fallbacks += step.decision is not None and step.decision.diagnostics.fallback is not None
             plant.answer(command)
             states.append((plant.world.time_us * 1e-6, *plant.world.state))
-    return _extremes(plan, np.array(states), fallbacks)
+            fallback.append(step.decision is not None and step.decision.diagnostics.fallback is not None)
+    return _flown(plan, np.array(states), np.array(fallback))
 
 
-def _extremes(plan: FlightPlan, states: NDArray[np.float64], fallbacks: int) -> Extremes:
-    """Return the worst of time and state, (n, 14)."""
+def _flown(plan: FlightPlan, states: Array, fallback: NDArray[np.bool_]) -> Flown:
+    """Return the flight of times and states (n, 14)."""
     t, places, (_, q1, q2, _) = states[:, 0], states[:, 7:10], states[:, 10:14].T
     tilt = np.arccos(np.clip(1.0 - 2.0 * (q1 * q1 + q2 * q2), -1.0, 1.0))
-    late = t > CAUGHT_UP_S
-    errors = np.linalg.norm(places[late] - position(plan.track, t[late]), axis=1)
-    z = places[:, 2]
-    return Extremes(float(np.degrees(tilt.max())), float(errors.max()), float(z.min()), float(z.max()), fallbacks)
+    errors = np.linalg.norm(places - position(plan.track, t), axis=1)
+    return Flown(t, np.degrees(tilt), errors, places[:, 2], fallback)
 
 
 def main() -> None:
     """Print the table."""
-    print("| lap (s) | tilt: largest (deg) | median | distance: largest (m) | height (m) | fallback samples |")  # noqa: T201
+    print("| lap (s) | tilt: largest (deg) | median of the largest | distance (m) | height (m) | fallback samples |")  # noqa: T201
     print("| ---: | ---: | ---: | ---: | ---: | ---: |")  # noqa: T201
     for lap_s in LAPS_S:
         flown = fly_family(f"lemniscate:lap={lap_s}", STARTS, DURATION_S)
-        tilts = [it.max_tilt_deg for it in flown]
-        heights = f"{min(it.min_z_m for it in flown):.2f} to {max(it.max_z_m for it in flown):.2f}"
-        error_m, fallbacks = max(it.max_error_m for it in flown), max(it.fallbacks for it in flown)
-        print(f"| {lap_s:g} | {max(tilts):.1f} | {np.median(tilts):.1f} | {error_m:.2f} | {heights} | {fallbacks} |")  # noqa: T201
+        tilts = [float(it.tilt_deg.max()) for it in flown]
+        heights = f"{min(it.z_m.min() for it in flown):.2f} to {max(it.z_m.max() for it in flown):.2f}"
+        error_m = max(it.error_m[it.t > CAUGHT_UP_S].max() for it in flown)
+        samples = max(it.fallback.sum() for it in flown)
+        print(f"| {lap_s:g} | {max(tilts):.1f} | {np.median(tilts):.1f} | {error_m:.2f} | {heights} | {samples} |")  # noqa: T201
 
 
 if __name__ == "__main__":
