@@ -22,6 +22,8 @@ PerAxis: TypeAlias = tuple[Positive, Positive, Positive]
 _BINDING = 1e-6
 """A limit counts as active where this part of it or less is left."""
 _MOST_SLACK = 100.0
+_KEPT = 1e-3
+"""A limit of the tilt that is exceeded by this part of it or less counts as kept."""
 
 
 class AttitudeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -35,6 +37,7 @@ class AttitudeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
     increment_weight: PerAxis
     largest_increment_n_m: PerAxis
     largest_angle_deg: Degrees
+    """Of the tilt, and of phi and theta each."""
     largest_rate_rad_s: PerAxis
     check_every: Count
     """Steps between those at which angles and rates are limited."""
@@ -79,10 +82,12 @@ class Plan(NamedTuple):
     Attributes:
         moments: Commanded at each step, N m, (N, 3).
         states: Predicted, (N + 1, 9).
+        angle_slack: Part by which the limit of tilt, phi and theta is exceeded.
     """
 
     moments: Array
     states: Array
+    angle_slack: float
 
 
 class AttitudeMpc:
@@ -126,7 +131,7 @@ class AttitudeMpc:
         moved = INPUTS * len(settings.moves)
         n = moved + constrained.SLACKS
         self._rotor_rows = 2 * constrained.ROTORS * len(settings.moves)
-        rows = self._rotor_rows + 2 * constrained.LIMITED * len(self._checked)
+        rows = self._rotor_rows + constrained.MOTION_ROWS * len(self._checked)
         self._schedule = np.empty((self.horizon, len(prediction.SCHEDULE)))
         self._responses = np.zeros((self.horizon + 1, STATES, 1 + moved))
         self._H, self._f = np.zeros((n, n)), np.zeros(n)
@@ -141,12 +146,30 @@ class AttitudeMpc:
     def plan(self, now: Situation, target: Target, ahead: Array | None) -> tuple[Plan | None, Diagnostics]:
         """Plan from `now` towards `target`; no plan where the QP is not solved.
 
+        The thrust leaves the rotors only a part of the moments that they could make. Where no plan with these keeps the
+        tilt within its limit, thrust gives way: a second plan has the thrust that leaves most for moments.
+
         Args:
             now: What the plan begins with.
             target: What it is to reach.
             ahead: States that the last plan has at the samples after this one, (n, 9); None without one.
         """
         self.predict(now, ahead)
+        plan, diagnostics = self._solve(now, target)
+        if plan is None or plan.angle_slack <= _KEPT:
+            return plan, diagnostics
+        less_thrust = target._replace(thrust_n=np.minimum(target.thrust_n, self._middle_thrust_n(now)))
+        second, how = self._solve(now, less_thrust)
+        how = how._replace(solve_time_s=diagnostics.solve_time_s + how.solve_time_s)
+        return (second, how) if second is not None else (plan, diagnostics)
+
+    def _middle_thrust_n(self, now: Situation) -> float:
+        """Return the thrust, N, that leaves the rotors most for moments of either sign."""
+        middle = 0.5 * (square(self._lag.least) + square(now.fastest))
+        return middle / float(self._from_thrust.max())
+
+    def _solve(self, now: Situation, target: Target) -> tuple[Plan | None, Diagnostics]:
+        """Plan from the responses predicted last."""
         qp = self.condense(now, target)
         started_s = self._clock()
         status, z = self._solver.solve(qp)
@@ -181,6 +204,7 @@ class AttitudeMpc:
         """
         constrained.condense(
             self._responses,
+            self._schedule,
             target,
             now.u,
             self._weights,
@@ -227,7 +251,7 @@ class AttitudeMpc:
             predicted=states,
             planned_squared=squared,
         )
-        return Plan(moments, states), diagnostics
+        return Plan(moments, states, float(z[-constrained.SLACKS + constrained.ANGLE_SLACK])), diagnostics
 
     def lqr(self, now: Situation, target: Target) -> Array:
         """Return the moments, N m, (3,), of the unconstrained law at hover that the terminal weight belongs to."""

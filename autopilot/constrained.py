@@ -6,6 +6,7 @@
 The cost is the thesis's [3.13-3.20], its terminal weight a full matrix on state and input.
 """
 
+from math import sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from autopilot.prediction import ANGLES, INPUTS, STATES, P, Q, R
 from common.jit import compiled
+from common.kernels import atan2, cos, sin
 from common.matrices import matmul
 
 Array: TypeAlias = NDArray[np.float64]
@@ -22,8 +24,12 @@ SLACKS = 2
 ANGLE_SLACK, RATE_SLACK = 0, 1
 ROTORS = 4
 LIMITED = 5
-"""Softly limited: phi and theta with one slack; p, q and r with the other."""
+"""Softly limited on both sides: phi and theta with one slack, which the tilt shares; p, q and r with the other."""
 _TWO_SIDES = 2
+MOTION_ROWS = 1 + _TWO_SIDES * LIMITED
+"""Of each step that is checked: tilt, then both sides of phi, theta, p, q and r."""
+_ANGLE_ROWS = 1 + _TWO_SIDES * 2
+_NO_TILT = 1e-9
 
 
 @compiled
@@ -155,21 +161,59 @@ def limit_rotors(
 
 
 @compiled
-def limit_motion(responses: Array, checked: Integers, limits: Array, first: int, G: Array, h: Array) -> int:
-    """Fill the soft rows of angles and rates from row `first`; return the row after them.
+def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> float:
+    """Write the normal of the tangent to the largest tilt, in the direction of a tilt; return its distance.
+
+    cos(phi) cos(theta) >= cos(max_tilt) is a convex set of (phi, theta). All of it lies on the near side of the
+    tangent, normal . (phi, theta) <= distance, and the tangent touches it where the tilt has the given direction.
+
+    Args:
+        phi: Roll of the tilt that gives the direction, rad.
+        theta: Its pitch, rad.
+        max_tilt: rad, less than a right angle.
+        normal: (2,); is filled, with zeros where there is no tilt and so no direction.
+    """
+    x, y = sin(theta) * cos(phi), sin(phi)
+    across = sqrt(x * x + y * y)
+    normal[:] = 0.0
+    if across < _NO_TILT:
+        return 1.0
+    x, y, z = x / across * sin(max_tilt), y / across * sin(max_tilt), cos(max_tilt)
+    xz = sqrt(x * x + z * z)
+    normal[0], normal[1] = y / xz, x / z
+    distance: float = normal[0] * atan2(y, xz) + normal[1] * atan2(x, z)
+    return distance
+
+
+@compiled
+def limit_motion(
+    responses: Array, schedule: Array, checked: Integers, limits: Array, first: int, G: Array, h: Array
+) -> int:
+    """Fill the soft rows of tilt, angles and rates from row `first`; return the row after them.
+
+    The tilt is limited by a tangent in the direction that it is expected to have.
 
     Args:
         responses: Of `respond`, (N + 1, 9, 1 + 3 b).
+        schedule: phi, theta, p, q, r expected at each step, (N, 5).
         checked: Steps at which the limits are held, (c,).
-        limits: Of |phi|, |theta|, |p|, |q|, |r|, rad and rad/s, (5,).
+        limits: Of |phi|, |theta|, |p|, |q|, |r|, rad and rad/s, (5,); the first also of the tilt.
         first: Row to begin at.
         G: (m, n).
         h: (m,).
     """
     states = (ANGLES[0], ANGLES[1], P, Q, R)
     moved = responses.shape[2] - 1
+    normal = np.empty(2)
     count = first
     for step in checked:
+        phi, theta = responses[step, ANGLES[0]], responses[step, ANGLES[1]]
+        distance = tilt_tangent(schedule[step - 1, 0], schedule[step - 1, 1], limits[0], normal)
+        for k in range(moved):
+            G[count, k] = (normal[0] * phi[1 + k] + normal[1] * theta[1 + k]) / distance
+        G[count, moved + ANGLE_SLACK] = -1.0
+        h[count] = 1.0 - (normal[0] * phi[0] + normal[1] * theta[0]) / distance
+        count += 1
         for i in range(LIMITED):
             row = responses[step, states[i]]
             slack = moved + (ANGLE_SLACK if i < 2 else RATE_SLACK)
@@ -252,7 +296,6 @@ def count_active(
         if z[k] - lower[k] < binding or upper[k] - z[k] < binding:
             increments += 1
     rotors, angles, rates = 0, 0, 0
-    angle_rows = 2 * _TWO_SIDES
     for row in range(G.shape[0]):
         left = h[row]
         for k in range(z.shape[0]):
@@ -260,7 +303,7 @@ def count_active(
         if left < binding:
             if row < rotor_rows:
                 rotors += 1
-            elif (row - rotor_rows) % (LIMITED * _TWO_SIDES) < angle_rows:
+            elif (row - rotor_rows) % MOTION_ROWS < _ANGLE_ROWS:
                 angles += 1
             else:
                 rates += 1
@@ -270,6 +313,7 @@ def count_active(
 @compiled
 def condense(
     responses: Array,
+    schedule: Array,
     wanted: tuple[Array, Array, Array],
     u: Array,
     weights: tuple[Array, Array, Array],
@@ -292,6 +336,7 @@ def condense(
 
     Args:
         responses: Of `respond`, (N + 1, 9, 1 + 3 b).
+        schedule: See `limit_motion`.
         wanted: Angles (N, 3) and end (12,) of `quadratic_cost`, and the thrust commanded at each step, N, (N,).
         u: Moments last commanded, N m, (3,).
         weights: Q (3,), S (12, 12) and R (3,).
@@ -313,7 +358,7 @@ def condense(
     limit_first_move(u, largest_increment, lower, upper)
     quadratic_cost(responses, wanted[0], wanted[1], u, weights[0], weights[1], weights[2], H, f)
     row = limit_rotors(from_moments, from_thrust, wanted[2], u, starts, squared_least, squared_most, G, h)
-    limit_motion(responses, checked, limits, row, G, h)
+    limit_motion(responses, schedule, checked, limits, row, G, h)
 
 
 @compiled

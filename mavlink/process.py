@@ -54,6 +54,11 @@ def use_one_thread() -> None:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
+def nudge_m() -> float:
+    """Return how far every flight begins beside its start, m: a test of the tests, 0 unless COLIBRI_NUDGE_M is set."""
+    return float(os.environ.get("COLIBRI_NUDGE_M", "0"))
+
+
 @contextmanager
 def undisturbed() -> Iterator[None]:
     """Keep the garbage collector from all that exists already: to look at it again and again costs a flight time."""

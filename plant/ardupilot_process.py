@@ -7,7 +7,7 @@ from mavlink.link import LinkError, UdpLink
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Progress, Status, Stop, fail, undisturbed
 from plant.ardupilot import Address, ArduPilotEnd
 from plant.process import TRUTH_COLUMNS, truth_row
-from plant.scenario import IntegrationError, Start
+from plant.scenario import IntegrationError, Start, nudged
 from plant.vehicle import VehicleError, load_vehicle
 from plant.weather import weather_of
 from plant.world import Physics, starting_world
@@ -22,7 +22,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         weather = weather_of(args)
         vehicle = load_vehicle(args.vehicle).without(args.without)
         motors = vehicle.rotors.numbering()
-        start = starting_world(Start(psi=args.home.yaw_enu_deg)._replace(**args.start), vehicle, weather)
+        start = starting_world(nudged(Start(psi=args.home.yaw_enu_deg)._replace(**args.start)), vehicle, weather)
     except VehicleError as error:
         fail(str(error))
     frame_type = motors.ardupilot_frame_type

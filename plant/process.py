@@ -11,7 +11,7 @@ from mavlink.lockstep import Outgoing, PlantEnd
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, CsvLog, Progress, Status, Stop, TlogWriter, fail, undisturbed
 from plant.core import Plant
 from plant.dynamics import STATE
-from plant.scenario import IntegrationError, Start
+from plant.scenario import IntegrationError, Start, nudged
 from plant.sensors import served_by
 from plant.vehicle import VehicleError, load_vehicle
 from plant.weather import weather_of
@@ -37,7 +37,9 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         weather = weather_of(args)
         vehicle = load_vehicle(args.vehicle).without(args.without)
         serves = served_by(vehicle)
-        worlds = {it: starting_world(DEFAULT_STARTS[it]._replace(**args.start), vehicle, weather) for it in serves}
+        worlds = {
+            it: starting_world(nudged(DEFAULT_STARTS[it]._replace(**args.start)), vehicle, weather) for it in serves
+        }
     except VehicleError as error:
         fail(str(error))
     physics = Physics(vehicle, args.integrator, weather)

@@ -12,7 +12,7 @@ from mavlink.link import GroundLink, LinkError, receive_soon
 from mavlink.process import EXIT_FAILED, EXIT_INTERRUPTED, Progress, Status, Stop, fail, undisturbed
 from mavlink.px4_simulator import SimulatorEnd, Truth
 from plant.process import Pace, PlantLogs
-from plant.scenario import IntegrationError, Start
+from plant.scenario import IntegrationError, Start, nudged
 from plant.sensors import SensorSuite
 from plant.vehicle import VehicleError, load_vehicle
 from plant.weather import weather_of
@@ -55,7 +55,7 @@ class Simulator:
         self._sensors = vehicle.sensors
         self._rotors, self._order = vehicle.rotors, vehicle.rotors.numbering()
         self._gravity_m_s2 = vehicle.gravity_m_s2
-        self._start = starting_world(Start(psi=args.home.yaw_enu_deg)._replace(**args.start), vehicle, weather)
+        self._start = starting_world(nudged(Start(psi=args.home.yaw_enu_deg)._replace(**args.start)), vehicle, weather)
         self._physics = Physics(vehicle, args.integrator, weather)
         self._origin: Geodetic = args.home.origin
         self._interval_us = round(1e3 / args.rate) * 1000

@@ -17,6 +17,7 @@ from mavlink.process import undisturbed
 from plant.core import Plant
 from plant.integrate import Integrator
 from plant.process import PlantLogs
+from plant.scenario import nudged
 from plant.world import Physics, starting_world
 from tools.plan import FlightPlan
 from tools.recording import Summary
@@ -51,7 +52,7 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
     interval_us = autopilot.frame_interval_us
     plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out, _setup(plan))
     plant = Plant(
-        starting_world(plan.start, plan.plant_vehicle, plan.weather),
+        starting_world(nudged(plan.start), plan.plant_vehicle, plan.weather),
         plan.plant_vehicle,
         physics,
         plan.feedback,

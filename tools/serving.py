@@ -14,6 +14,7 @@ from autopilot.stations import StationSettings
 from mavlink.geodesy import DEFAULT_ORIGIN
 from mavlink.process import EXIT_FAILED, fail, undisturbed
 from mavlink.services.rates import GCS, SDK
+from plant.scenario import nudged
 from plant.world import Physics, starting_world, state_frame
 from tools.plan import FlightPlan, GroundAccess
 from tools.processes import FlightError, fly_processes
@@ -58,7 +59,7 @@ def served(plan: FlightPlan, channels: int) -> Figures:
     for link in range(channels):
         copter.stations.use(copter.stations.hub.open(link, ("127.0.0.1", link)), KINDS[link % len(KINDS)])
     physics = Physics(plan.plant_vehicle, "rk4")
-    world = starting_world(plan.start, plan.plant_vehicle)
+    world = starting_world(nudged(plan.start), plan.plant_vehicle)
     times_us = []
     with undisturbed():
         while world.time_us < plan.duration_s * 1e6:

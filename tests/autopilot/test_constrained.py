@@ -78,12 +78,17 @@ def test_rotor_rows_hold_just_where_every_rotor_is_within_its_limits(rng: np.ran
     assert verdicts == {True, False}
 
 
+def tilt_of(phi: float, theta: float) -> float:
+    return float(np.arccos(np.cos(phi) * np.cos(theta)))
+
+
 def test_motion_rows_hold_just_where_the_slacks_cover_what_is_exceeded(rng: np.random.Generator) -> None:
     u = rng.normal(size=3) * 0.05
     responses = responses_of(rng, u)
-    rows = 2 * constrained.LIMITED * len(CHECKED)
+    schedule = np.zeros((STEPS, len(prediction.SCHEDULE)))  # without a tilt: no tangent
+    rows = constrained.MOTION_ROWS * len(CHECKED)
     G, h = np.zeros((rows + 3, N)), np.zeros(rows + 3)
-    assert constrained.limit_motion(responses, CHECKED, LIMITS, 3, G, h) == rows + 3
+    assert constrained.limit_motion(responses, schedule, CHECKED, LIMITS, 3, G, h) == rows + 3
     verdicts = set()
     for slacks in ([0.0, 0.0], [5.0, 0.0], [0.0, 5.0], [0.3, 0.3], [5.0, 5.0]):
         for size in np.geomspace(0.01, 0.5, 20):
@@ -94,6 +99,39 @@ def test_motion_rows_hold_just_where_the_slacks_cover_what_is_exceeded(rng: np.r
             assert bool((G[3:] @ z <= h[3:]).all()) is bool(within)
             verdicts.add(bool(within))
     assert verdicts == {True, False}
+
+
+def test_the_tilts_row_is_the_tangent_in_the_direction_expected(rng: np.random.Generator) -> None:
+    """Of two angles that each keep to the limit the tilt may not: the row sees that."""
+    u = rng.normal(size=3) * 0.05
+    responses = responses_of(rng, u)
+    schedule = rng.uniform(-1.0, 1.0, (STEPS, len(prediction.SCHEDULE)))
+    G = np.zeros((constrained.MOTION_ROWS * len(CHECKED), N))
+    h, normal = np.zeros(len(G)), np.empty(2)
+    constrained.limit_motion(responses, schedule, CHECKED, LIMITS, 0, G, h)
+    for place, step in enumerate(CHECKED):
+        row = constrained.MOTION_ROWS * place
+        phi, theta = schedule[step - 1, :2]
+        distance = constrained.tilt_tangent(phi, theta, LIMITS[0], normal)
+        z = np.concatenate([rng.normal(size=MOVED) * 0.1, [0.2, 7.0]])
+        angles = (responses @ [1.0, *z[:MOVED]])[step, list(ANGLES[:2])]
+        assert h[row] - G[row] @ z == pytest.approx(1.2 - normal @ angles / distance)
+
+
+@pytest.mark.parametrize("max_tilt", [0.3, 1.0, 1.3])
+def test_no_tilt_within_the_limit_is_beyond_any_tangent_to_it(rng: np.random.Generator, max_tilt: float) -> None:
+    normal = np.empty(2)
+    for phi, theta in rng.uniform(-1.4, 1.4, (50, 2)):
+        distance = constrained.tilt_tangent(phi, theta, max_tilt, normal)
+        assert normal @ [phi, theta] > 0.0
+        others = rng.uniform(-1.5, 1.5, (200, 2))
+        within = np.array([tilt_of(*other) <= max_tilt for other in others])
+        assert (others[within] @ normal <= distance).all()
+        x, y = np.sin(theta) * np.cos(phi), np.sin(phi)  # the same direction at the limit: it touches
+        x, y = np.sin(max_tilt) * np.array((x, y)) / np.hypot(x, y)
+        touched = (np.arcsin(y), np.arctan2(x, np.cos(max_tilt)))
+        assert tilt_of(*touched) == pytest.approx(max_tilt)
+        assert normal @ touched == pytest.approx(distance)
 
 
 def test_the_plan_is_read_as_it_was_predicted(rng: np.random.Generator) -> None:
@@ -107,11 +145,11 @@ def test_the_plan_is_read_as_it_was_predicted(rng: np.random.Generator) -> None:
 
 
 def test_active_limits_are_counted_by_kind() -> None:
-    rotor_rows, motion_rows = 8, 2 * constrained.LIMITED
+    rotor_rows, motion_rows = 8, constrained.MOTION_ROWS
     G, h = np.zeros((rotor_rows + motion_rows, N)), np.ones(rotor_rows + motion_rows)
     h[[0, 5]] = 0.0  # rotors
-    h[[rotor_rows, rotor_rows + 3]] = 0.0  # phi, theta
-    h[[rotor_rows + 4, rotor_rows + 7, rotor_rows + 9]] = 0.0  # p, q, r
+    h[[rotor_rows, rotor_rows + 4]] = 0.0  # tilt, theta
+    h[[rotor_rows + 5, rotor_rows + 8, rotor_rows + 10]] = 0.0  # p, q, r
     lower, upper = -np.ones(N), np.ones(N)
     z = np.zeros(N)
     z[[1, 2, 4]] = (1.0, -1.0, 1.0)

@@ -168,6 +168,21 @@ def test_an_excess_that_can_be_avoided_is_avoided_at_any_cost() -> None:
     assert diagnostics.slack == pytest.approx(0.0, abs=1e-9)
 
 
+def test_thrust_gives_way_where_it_leaves_too_little_to_stop_a_tilt() -> None:
+    """Turning fast towards the limit under full thrust: the rotors make half of it, and moments with the rest."""
+    controller, _ = build()
+    planner = plan(track("hover:height=30"), "by-formula", controller.preview)  # far above: all thrust there is
+    thrusts = []
+    for rate in (0.0, 9.0):
+        decision = steps(controller, planner, turned(30, -30, (rate, -rate, 0.0)), 1)[0]
+        planned = decision.diagnostics.planned_squared
+        assert planned is not None
+        assert decision.diagnostics.qp_status is QpStatus.SOLVED
+        thrusts.append(float(planned.mean(axis=1).max()))
+    assert thrusts[0] > 0.6
+    assert thrusts[1] < 0.52
+
+
 def test_daqp_and_clarabel_agree_on_every_input_of_a_flight() -> None:
     """The same QPs, recorded from an upset: each increment to 1e-4 N m and less."""
     recorded: list[Qp] = []

@@ -31,7 +31,7 @@ from mavlink.plain import of_bytes, to_bytes
 from mavlink.services.command import NOT_GIVEN
 from plant.air import CALM
 from plant.core import Plant
-from plant.scenario import Start
+from plant.scenario import Start, nudged
 from plant.vehicle import Vehicle, load_vehicle
 from plant.world import Physics, World, starting_world, state_frame
 from tests.flights.client import COMPONENT, SYSTEM, Client
@@ -98,7 +98,7 @@ class CopterFlight:
         self._estimator = estimator_for(feedback, self._believed, origin)
         self.copter = self._copter(values, first)
         self.plant = Plant(
-            starting_world(start, self._believed, self._weather),
+            starting_world(nudged(start), self._believed, self._weather),
             vehicle or self._believed,
             self._physics,
             feedback,

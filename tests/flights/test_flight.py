@@ -8,6 +8,7 @@ import pytest
 
 import plant
 from autopilot.controller import FALLBACK_CODES, Fallback
+from tests.flights.family import CAUGHT_UP_S, DURATION_S, LAPS_S, STARTS, Flown, fly_family
 from tests.runs import fly, rows
 
 HUMMINGBIRD = Path(plant.__file__).parent / "vehicles" / "hummingbird.toml"
@@ -135,16 +136,57 @@ def test_any_start_is_recovered_from(tmp_path: Path, start: str) -> None:
         assert not recovering[flown["t"][1:] > 1.0].any()
 
 
+RECOVERED: dict[str, dict[str, float]] = {
+    "upside down": {"phi": 180.0},
+    "nose down": {"theta": 89.0},
+    "tumbling upside down": {"phi": 170.0, "p": 6.0, "q": -6.0, "r": 5.0},
+}
+
+
+def test_whichever_way_it_turns_it_recovers() -> None:
+    """20 starts a millimetre apart: which way is the shortest is decided by nothing when it is upside down."""
+    check_recovered(fly_family("hover:height=20", 20, 2.5, x=0.0, y=0.0, z=20.0, **RECOVERED["upside down"]))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("start", RECOVERED)
+def test_whichever_way_it_turns_it_comes_back(start: str) -> None:
+    flown = fly_family("hover:height=20", STARTS, 10.0, x=0.0, y=0.0, z=20.0, **RECOVERED[start])
+    check_recovered(flown)
+    assert max(it.error_m[it.t > 8.0].max() for it in flown) < 0.01
+
+
+def check_recovered(flown: list[Flown]) -> None:
+    """Check that all are upright within a second and no lower than 3 m below."""
+    assert max(it.tilt_deg[it.t > 1.0].max() for it in flown) < 65.0
+    assert min(it.z_m.min() for it in flown) > 17.0
+
+
 @pytest.mark.parametrize("lap_s", [4.0, 1.0])
-def test_what_no_vehicle_can_follow_is_followed_upright_and_never_lost(tmp_path: Path, lap_s: float) -> None:
-    """Up to 36 m/s and 400 m/s²: it saturates, stays within the size of the figure, and does not fall."""
-    figures = fly(tmp_path, f"lemniscate:lap={lap_s}", "--link", "memory", "--duration", "40")
-    flown = rows(tmp_path / "flight.csv")
-    late = flown["t"] > 20.0
+def test_what_no_vehicle_can_follow_is_followed_upright_and_never_lost(lap_s: float) -> None:
+    """Up to 36 m/s and 400 m/s²: from 20 starts a millimetre apart, for these are chaotic flights."""
+    check_upright_and_near(fly_family(f"lemniscate:lap={lap_s}", 20, 6.0))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("lap_s", [*LAPS_S, 1.5, 0.7, 0.5])
+def test_what_no_vehicle_can_follow_is_followed_upright_from_any_start(lap_s: float) -> None:
+    """The bounds of docs/flight.md over 50 starts of 40 s each."""
+    check_upright_and_near(fly_family(f"lemniscate:lap={lap_s}", STARTS, DURATION_S))
+
+
+def check_upright_and_near(flown: list[Flown]) -> None:
+    """Check the tilt against its limit of 70° and what it may overshoot, the distance against the figure's size."""
+    assert max(it.tilt_deg.max() for it in flown) < 75.0
+    assert max(it.error_m[it.t > CAUGHT_UP_S].max() for it in flown) < 10.0
+    assert min(it.z_m.min() for it in flown) > 1.5  # it begins at 2 m
+    assert max(it.z_m.max() for it in flown) < 4.5
+
+
+@pytest.mark.parametrize("lap_s", [4.0, 1.0])
+def test_what_no_vehicle_can_follow_takes_it_to_its_limits(tmp_path: Path, lap_s: float) -> None:
+    figures = fly(tmp_path, f"lemniscate:lap={lap_s}", "--link", "memory", "--duration", "10")
     assert figures["constrained_samples"]["rotors"] + figures["constrained_samples"]["rates"] > 0
-    assert (np.cos(flown["phi"]) * np.cos(flown["theta"]))[late].min() > 0.2
-    assert largest_error_m(flown, 20.0) < 10.0
-    assert np.ptp(flown["z"][late]) < 2.0
 
 
 def test_it_stands_on_the_ground_until_it_is_time(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from mavlink.turns import Turn
 from plant.__main__ import command_line as plant_command_line
 from plant.core import Plant
 from plant.process import DEFAULT_STARTS
-from plant.scenario import IntegrationError
+from plant.scenario import IntegrationError, nudged
 from plant.sensors import served_by
 from plant.vehicle import VehicleError, load_vehicle
 from plant.weather import weather_of
@@ -50,7 +50,8 @@ class MemoryPlant:
             self._vehicle = load_vehicle(args.vehicle).without(args.without)
             serves = served_by(self._vehicle)
             worlds = {
-                it: starting_world(DEFAULT_STARTS[it]._replace(**args.start), self._vehicle, weather) for it in serves
+                it: starting_world(nudged(DEFAULT_STARTS[it]._replace(**args.start)), self._vehicle, weather)
+                for it in serves
             }
         except VehicleError as error:
             raise SettingError(str(error)) from error
