@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from plant.scenario import PARTS
-from tests.runs import fly_thesis, largest_difference, reference, rows
+from tests.runs import begins_as_recorded, fly_thesis, largest_difference, reference, rows
 from tools.recording import ATTITUDE_REFERENCE, COLUMNS, INPUT, STATE
 
 TRACKS = ("spiral", "line")
 SETTLED_RMS_M = {"spiral": 0.1254, "line": 0.0578}
 
 
+@begins_as_recorded
 @pytest.mark.parametrize("integrator", ["adaptive", "rk4"])
 @pytest.mark.parametrize("track", TRACKS)
 def test_direct_equals_the_reference(tmp_path: Path, track: str, integrator: str) -> None:
