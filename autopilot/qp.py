@@ -98,7 +98,7 @@ class QpSolver:
             return QpResult(QpStatus.NOT_ACCURATE, None)
         if not solution.found or solution.x is None:
             return QpResult(why_none(qp), None)
-        x = np.asarray(solution.x, dtype=np.float64)
+        x = np.array(solution.x, dtype=np.float64)  # of our own: some solvers give what cannot be written to
         lower, upper, z, z_box = map(_some, (qp.lower, qp.upper, solution.z, solution.z_box))
         if self._residual(qp.H, qp.f, qp.G, qp.h, lower, upper, x, z, z_box) > LARGEST_RESIDUAL:
             return QpResult(QpStatus.NOT_ACCURATE, None)

@@ -5,14 +5,15 @@ from types import FunctionType
 from numba.extending import register_jitable
 
 from common import elementary
-from common.jit import compiled
+from common.jit import compiled_for
 
 for _function in vars(elementary).values():
     if isinstance(_function, FunctionType):
         register_jitable(_function)
 
-sin, cos, tan = compiled(elementary.sin), compiled(elementary.cos), compiled(elementary.tan)
-asin, acos, atan = compiled(elementary.asin), compiled(elementary.acos), compiled(elementary.atan)
-atan2 = compiled(elementary.atan2)
-exp, expm1, log = compiled(elementary.exp), compiled(elementary.expm1), compiled(elementary.log)
-power = compiled(elementary.power)
+_of_one, _of_two = compiled_for("float64(float64)"), compiled_for("float64(float64, float64)")
+
+sin, cos, tan = _of_one(elementary.sin), _of_one(elementary.cos), _of_one(elementary.tan)
+asin, acos, atan = _of_one(elementary.asin), _of_one(elementary.acos), _of_one(elementary.atan)
+atan2, power = _of_two(elementary.atan2), _of_two(elementary.power)
+exp, expm1, log = _of_one(elementary.exp), _of_one(elementary.expm1), _of_one(elementary.log)

@@ -1,12 +1,14 @@
 """The rotations of `frames`, compiled: for kernels, and for whoever turns attitudes many times a second."""
 
 from common import kernels
-from common.jit import compiled
+from common.jit import compiled, compiled_for
 from mavlink import frames
 
 __all__ = ["euler_from_quaternion", "euler_rates", "kernels", "quaternion_from_euler", "rotation_matrix"]
 
+_VECTOR, _QUATERNION = "UniTuple(float64, 3)", "UniTuple(float64, 4)"
+
 rotation_matrix = compiled(frames.rotation_matrix)
-euler_from_quaternion = compiled(frames.euler_from_quaternion)
-euler_rates = compiled(frames.euler_rates)
-quaternion_from_euler = compiled(frames.quaternion_from_euler)
+euler_from_quaternion = compiled_for(f"{_VECTOR}({_QUATERNION})")(frames.euler_from_quaternion)
+euler_rates = compiled_for(f"{_VECTOR}(float64, float64, {_VECTOR})")(frames.euler_rates)
+quaternion_from_euler = compiled_for(f"{_QUATERNION}(float64, float64, float64)")(frames.quaternion_from_euler)

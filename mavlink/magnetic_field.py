@@ -15,7 +15,7 @@ YEAR = 2026.0
 """Of the model, which is good from 2025 to 2030: no clock is asked, so that a flight can be flown again."""
 
 _GAUSS_PER_NT = 1e-5
-_DECIMALS_NT = 3
+_DECIMALS_NT = 6
 _LOWEST_KM, _HIGHEST_KM = -1.0, 850.0
 
 

@@ -159,6 +159,15 @@ class Observer:
                 assert left_s > 0.0, f"waited in vain for {what}; {last}; {self._texts}"
                 self._news.wait(left_s)
 
+    def wait_until_disarmed(self) -> Sight:
+        """Return the first sight from now on in which a flight that was seen is over.
+
+        On a busy machine what is seen lags behind what a client has been told already.
+        """
+        return self.wait(
+            lambda sight: not sight.armed and any(it.armed for it in self._sights), "the end of the flight"
+        )
+
     def ask(self, answer: str, name: str, *fields: Any, within_s: float = 5.0) -> Any:
         """Send message `name` to the vehicle; return the fields of the first message `answer` after it.
 

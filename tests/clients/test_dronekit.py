@@ -42,7 +42,7 @@ def test_it_arms_takes_off_goes_somewhere_and_lands(tmp_path: Path) -> None:
         assert [line for line in lines[3:] if not line.startswith("text")] == ["armed", "up", "there", "landed"]
         assert "text landed, rotors stopped" in lines
 
-        seen = flown.seen.wait(lambda sight: not sight.armed, "the end of the flight")
+        seen = flown.seen.wait_until_disarmed()
         assert flown.seen.modes()[-3:] == [Mode.TAKEOFF, Mode.HOLD, Mode.LAND]
         assert min(dist(sight.position_enu_m, place(47.3978, 8.5456, 6.0)) for sight in flown.seen.sights) < 0.3
         assert max(hypot(*sight.velocity_enu_m_s[:2]) for sight in flown.seen.sights) < 4.2
@@ -56,7 +56,7 @@ def test_it_flies_a_mission(tmp_path: Path) -> None:
     with vehicle(tmp_path, speed=SPEED) as flown:
         lines = said("dronekit_mission.py", flown)
         assert lines == ["downloaded [16, 16, 21]", "armed", "mission", "last item", "landed"]
-        flown.seen.wait(lambda sight: not sight.armed, "the end of the flight")
+        flown.seen.wait_until_disarmed()
         assert [mode for mode in flown.seen.modes() if mode is not Mode.HOLD] == [Mode.MISSION]
         assert min(dist(sight.position_enu_m, place(47.3978, 8.545594, 4.0)) for sight in flown.seen.sights) < 1.0
         assert hypot(*flown.seen.now.position_enu_m[:2]) < 0.3

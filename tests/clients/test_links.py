@@ -50,7 +50,7 @@ def test_a_client_of_the_tcp_server(tmp_path: Path) -> None:
 def test_mavsdk_over_tcp(tmp_path: Path) -> None:
     with vehicle(tmp_path, links=("tcpin:127.0.0.1:0",), speed=3.0) as flown:
         run("mavsdk_scripts.takeoff_and_land", f"tcpout://127.0.0.1:{flown.port}", tmp_path)
-        flown.seen.wait(lambda sight: not sight.armed, "the end of the flight")
+        flown.seen.wait_until_disarmed()
         assert 4.7 < max(sight.height_m for sight in flown.seen.sights) < 5.1
 
 
@@ -58,5 +58,5 @@ def test_mavsdk_over_tcp(tmp_path: Path) -> None:
 def test_mavsdk_with_a_generic_vehicle(tmp_path: Path) -> None:
     with vehicle(tmp_path, "--identity", "generic", speed=3.0) as flown:
         run("programs.mavsdk_generic", flown.mavsdk_url, tmp_path)
-        flown.seen.wait(lambda sight: not sight.armed, "the end of the flight")
+        flown.seen.wait_until_disarmed()
         assert 2.7 < max(sight.height_m for sight in flown.seen.sights) < 3.1

@@ -48,7 +48,7 @@ def run(code: str, default_port: int, port: int, folder: Path) -> None:
 
 def assert_landed(flown: Vehicle) -> None:
     """Hold that the flight is over, on the ground."""
-    landed = flown.seen.wait(lambda sight: not sight.armed, "the end of the flight")
+    landed = flown.seen.wait_until_disarmed()
     assert abs(landed.height_m) < 0.05
 
 

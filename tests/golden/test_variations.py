@@ -10,6 +10,7 @@ from tests.golden.__main__ import main as golden_main
 from tests.golden.__main__ import table
 from tests.golden.pythons import environments, other_pythons, set_up
 from tests.golden.variations import Flown, Variation, fly, variations
+from tests.runs import begins_as_recorded
 from tools.cli import main
 from tools.golden_flights import FLIGHTS
 
@@ -35,16 +36,19 @@ def fly_here(variation: Variation, tmp_path: Path, link: str = "memory", only: t
     return fly(variation, tmp_path, link, only)
 
 
+@begins_as_recorded
 def test_a_few_golden_flights_are_what_they_were(tmp_path: Path) -> None:
     only = [f"--only={name}" for name in FEW]
     assert main(["verify", "--golden", "--link", "memory", "--out", str(tmp_path), "--quiet", *only]) == 0
 
 
+@begins_as_recorded
 @pytest.mark.parametrize("name", FEW_VARIATIONS)
 def test_fewer_are_the_same_under_a_few_variations(tmp_path: Path, name: str) -> None:
     check(ALL[name], fly_here(ALL[name], tmp_path, only=FEWER))
 
 
+@begins_as_recorded
 @pytest.mark.long
 @pytest.mark.parametrize("name", ALL)
 def test_every_golden_flight_is_the_same_under_every_variation(tmp_path: Path, name: str) -> None:
@@ -53,6 +57,7 @@ def test_every_golden_flight_is_the_same_under_every_variation(tmp_path: Path, n
     check(ALL[name], flown)
 
 
+@begins_as_recorded
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["as-it-is", "openblas-haswell"])
 def test_every_golden_flight_is_the_same_over_udp(tmp_path: Path, name: str) -> None:
