@@ -38,7 +38,7 @@ test-long: setup
 # its examples flown too; they need the ports 14540 and 50051. TABLE=FILE keeps what came of them, as Markdown.
 test-clients: setup .venv-clients/.ready
 	COLIBRI_CLIENTS=.venv-clients $(BIN)/python -m pytest -m clients tests/clients
-	$(if $(MAVSDK_EXAMPLES),$(BIN)/python -m tests.clients.mavsdk_examples $(MAVSDK_EXAMPLES) \
+	$(if $(MAVSDK_EXAMPLES),$(BIN)/python -m tests.clients.support.mavsdk_examples $(MAVSDK_EXAMPLES) \
 	  --python .venv-clients/bin/python $(if $(TABLE),--table $(TABLE)))
 
 .venv-clients/.ready: requirements-clients.lock
@@ -49,42 +49,42 @@ test-clients: setup .venv-clients/.ready
 	@touch $@
 
 fuzz: setup
-	$(BIN)/python -m tests.fuzz
+	$(BIN)/python -m tools.fuzz
 
-# Every scenario of tests/sitl, over UDP: SITL_LINK=memory flies them in one process each.
+# Every scenario of tests/scenarios/, over UDP: SITL_LINK=memory flies them in one process each.
 SITL_LINK ?= udp
 scenarios: setup
-	$(BIN)/python -m pytest -m scenarios tests/sitl -n 2 --dist worksteal --sitl-link $(SITL_LINK)
+	$(BIN)/python -m pytest -m scenarios tests/scenarios/ -n 2 --dist worksteal --sitl-link $(SITL_LINK)
 
 # Over ground links that lose 30 % each way and are up to 50 ms late: all but those that say why they need better ones.
 scenarios-rough: setup
-	$(BIN)/python -m pytest -m "scenarios and not calm" tests/sitl -n 2 --dist worksteal --sitl-link $(SITL_LINK) \
+	$(BIN)/python -m pytest -m "scenarios and not calm" tests/scenarios/ -n 2 --dist worksteal --sitl-link $(SITL_LINK) \
 	  --sitl-ground loss=0.3,jitter_s=0.05
 
 # All of them 100 times, in memory and over UDP in turn: no verdict and no hash may differ. SOAK="--runs 10 --load", or
 # --keep DIR to go on where it was interrupted.
 soak: setup
-	$(BIN)/python -m tests.sitl.soak $(SOAK)
+	$(BIN)/python -m tools.soak.scenarios $(SOAK)
 
 # Two ground stations and a companion on one vehicle, for ten minutes by the clock.
 soak-clients: setup
-	$(BIN)/python -m tests.clients.soak
+	$(BIN)/python -m tools.soak.clients
 
 # Processes killed in flight and started again, over UDP: what the vehicle does meanwhile.
 kills: setup
-	$(BIN)/python -m tests.restarts --kills 200
-	$(BIN)/python -m tests.restarts --kills 100 --feedback sensors
-	$(BIN)/python -m tests.restarts --kills 200 --of plant
+	$(BIN)/python -m tools.kills --kills 200
+	$(BIN)/python -m tools.kills --kills 100 --feedback sensors
+	$(BIN)/python -m tools.kills --kills 200 --of plant
 
 # The golden flights as on other computers: other kernels of OpenBLAS, numpy, numba and glibc; which flight differs, and
 # how long each took. GOLDEN="--link udp --table FILE", say.
 golden: setup
-	$(BIN)/python -m tests.golden $(GOLDEN)
+	$(BIN)/python -m tools.golden $(GOLDEN)
 
 # The same under every other Python from 3.11 on that there is, each in .venv-3.N from the lock; `make test-long` flies
 # them in those, too, once they are there.
 verify-pythons: setup
-	$(BIN)/python -m tests.golden --pythons $(GOLDEN)
+	$(BIN)/python -m tools.golden --pythons $(GOLDEN)
 
 bench: setup
 	$(BIN)/colibri bench

@@ -1,12 +1,14 @@
-"""`python -m autopilot`: the command line of the autopilot."""
+"""`colibri autopilot`: the command line of the autopilot."""
 
 import sys
 from pathlib import Path
 
-from mavlink.feedback import Feedback, feedback
-from mavlink.home import DEFAULT_HOME, home
-from mavlink.link import OneByOne, open_ground_link, open_link
-from mavlink.process import ArgumentParser, add_common_arguments, begin
+from colibri.common.earth.home import DEFAULT_HOME, home
+from colibri.common.process.arguments import ArgumentParser, add_common_arguments
+from colibri.mavlink.hil.feedback import Feedback, feedback
+from colibri.mavlink.links.link import OneByOne
+from colibri.mavlink.links.open import open_ground_link, open_link
+from colibri.mavlink.links.startup import begin
 
 DEFAULT_PLANT = "udpout:127.0.0.1:14560"
 
@@ -14,10 +16,10 @@ DEFAULT_PLANT = "udpout:127.0.0.1:14560"
 def command_line() -> ArgumentParser:
     """Return what reads the command line."""
     parser = ArgumentParser(
-        prog="python -m autopilot",
+        prog="colibri autopilot",
         description="The autopilot: takes the vehicle's state, or what its sensors measure, from a plant and answers "
-        "with rotor commands, over MAVLink/UDP. Start `python -m plant` in another terminal, before or after.",
-        epilog="Example: python -m autopilot --track spiral",
+        "with rotor commands, over MAVLink/UDP. Start `colibri plant` in another terminal, before or after.",
+        epilog="Example: colibri autopilot --track spiral",
     )
     add = parser.add_argument
     add("--plant", default=DEFAULT_PLANT, metavar="URL", help="the plant to call (default %(default)s)")
@@ -54,12 +56,12 @@ def main() -> int:
     args = command_line().parse_args()
     if args.simulator is None:
         link, status, stop = begin("autopilot", args.plant, args, open_link)
-        from autopilot.process import run
+        from colibri.autopilot.process.run import run
 
         return run(args, link, status, stop)
     args.feedback = Feedback.SENSORS
     simulator, status, stop = begin("autopilot", args.simulator, args, open_ground_link)
-    from autopilot.process import run
+    from colibri.autopilot.process.run import run
 
     return run(args, OneByOne(simulator), status, stop)
 

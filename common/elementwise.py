@@ -1,14 +1,12 @@
 """The functions of `elementary` for whole arrays, bit for bit: NumPy's own choose their code by the CPU."""
 
 from math import pi
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from common import elementary as one
-
-Array: TypeAlias = NDArray[np.float64]
+from colibri.common import elementary as one
+from colibri.common.types import Array
 
 _HEADS, _TAILS = np.array(one.ATAN).T.copy()
 

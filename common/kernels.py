@@ -4,8 +4,8 @@ from types import FunctionType
 
 from numba.extending import register_jitable
 
-from common import elementary
-from common.jit import compiled_for
+from colibri.common import elementary
+from colibri.common.jit import compiled_for
 
 for _function in vars(elementary).values():
     if isinstance(_function, FunctionType):

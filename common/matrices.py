@@ -7,14 +7,11 @@ Matrices may have any strides, but they must be writable arrays of float64; resu
 """
 
 from math import sqrt
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from common.jit import compiled, compiled_for
-
-Array: TypeAlias = NDArray[np.float64]
+from colibri.common.jit import compiled, compiled_for
+from colibri.common.types import Array
 
 _MATRIX, _VECTOR = "float64[:, :]", "float64[:]"
 _NEW_MATRIX, _NEW_VECTOR = "float64[:, ::1]", "float64[::1]"

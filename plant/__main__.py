@@ -1,12 +1,14 @@
-"""`python -m plant`: the command line of the plant. It listens before it loads what takes time to load."""
+"""`colibri plant`: the command line of the plant. It listens before it loads what takes time to load."""
 
 import sys
 from math import inf
 
-from mavlink.home import DEFAULT_HOME, home
-from mavlink.link import open_ground_link, open_link
-from mavlink.process import ArgumentParser, add_common_arguments, begin, fail, natural, positive, speed
-from plant.scenario import LATENCY_HELP, add_world_arguments, latency
+from colibri.common.earth.home import DEFAULT_HOME, home
+from colibri.common.process.arguments import ArgumentParser, add_common_arguments, natural, positive, speed
+from colibri.common.process.lifecycle import fail
+from colibri.mavlink.links.open import open_ground_link, open_link
+from colibri.mavlink.links.startup import begin
+from colibri.plant.process.options import LATENCY_HELP, add_world_arguments, latency
 
 DEFAULT_LINKS = {
     "colibri": "udpin:127.0.0.1:14560",
@@ -18,19 +20,19 @@ DEFAULT_LINKS = {
 def command_line() -> ArgumentParser:
     """Return what reads the command line."""
     parser = ArgumentParser(
-        prog="python -m plant",
+        prog="colibri plant",
         description="The quadrotor and its world: integrates the nonlinear vehicle, sends its state, or what its "
         "sensors measure, as the autopilot asks, and takes rotor commands over MAVLink/UDP. In lockstep, unless "
         "--realtime: it waits for each answer, however long that takes. "
-        "Start `python -m autopilot` in another terminal, before or after.",
-        epilog="Example: python -m plant --duration 100 --out out/flight",
+        "Start `colibri autopilot` in another terminal, before or after.",
+        epilog="Example: colibri plant --duration 100 --out out/flight",
     )
     add = parser.add_argument
     add(
         "--serve",
         default="colibri",
         choices=DEFAULT_LINKS,
-        help="colibri: python -m autopilot (default); ardupilot-json: ArduPilot's SITL, started with --model JSON, "
+        help="colibri: colibri autopilot (default); ardupilot-json: ArduPilot's SITL, started with --model JSON, "
         "which sets rate and speed itself; px4: PX4's SITL, over TCP, or UDP where it waits to be called (udpout:)",
     )
     links = ", ".join(f"{url} for {whom}" for whom, url in DEFAULT_LINKS.items())
@@ -72,21 +74,21 @@ def main() -> int:
     """Run the plant; return the exit code."""
     args = command_line().parse_args()
     if args.realtime and (args.serve != "colibri" or args.speed == inf):
-        fail("--realtime follows the wall clock for python -m autopilot: no --serve beside it, and no --speed max")
+        fail("--realtime follows the wall clock for colibri autopilot: no --serve beside it, and no --speed max")
     args.speed = args.speed or (1.0 if args.realtime else inf)
     url = args.link or DEFAULT_LINKS[args.serve]
     if args.serve == "px4":
         link_to_px4, status, stop = begin("plant", url, args, open_ground_link)
         status.say("listening", f"waiting for PX4 on {link_to_px4.url}", url=link_to_px4.url)
-        from plant.px4_process import run as serve_px4
+        from colibri.plant.process.px4_server import run as serve_px4
 
         return serve_px4(args, link_to_px4, status, stop)
     link, status, stop = begin("plant", url, args, open_link)
     status.say("listening", f"waiting for an autopilot on {link.url}", url=link.url)
     if args.serve == "ardupilot-json":
-        from plant.ardupilot_process import run
+        from colibri.plant.process.ardupilot_server import run
     else:
-        from plant.process import run
+        from colibri.plant.process.run import run
 
     return run(args, link, status, stop)
 

@@ -4,7 +4,7 @@ import signal
 
 from hypothesis import settings
 
-from mavlink.process import use_one_thread
+from colibri.common.process.lifecycle import use_one_thread
 
 settings.register_profile("same-verdict", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("same-verdict")

@@ -8,13 +8,12 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from mavlink.frames import Vector
-from mavlink.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
-from mavlink.magnetic_field import field_enu_gauss
-from mavlink.sensors import GpsFix, SensorFrame, Updated
-from plant.sensor_parts import Sensors
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
+from colibri.common.earth.magnetic_field import field_enu_gauss
+from colibri.common.types import Array, Vector
+from colibri.mavlink.hil.sensors import GpsFix, SensorFrame, Updated
+from colibri.plant.vehicle.sensors import Sensors
 
-Array: TypeAlias = NDArray[np.float64]
 Path: TypeAlias = Callable[[Array], Array]
 """Times, s, (n,) to position, m ENU, and yaw, rad, (n, 4); four times differentiable."""
 

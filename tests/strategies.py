@@ -4,7 +4,8 @@ from math import pi
 
 from hypothesis import strategies as st
 
-from mavlink.frames import Quaternion, Vector, normalized
+from colibri.common.rotations import normalized
+from colibri.common.types import Quaternion, Vector
 
 
 def reals(limit: float) -> st.SearchStrategy[float]:

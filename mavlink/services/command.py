@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from math import nan
 from typing import Any, NamedTuple, TypeAlias
 
-from mavlink.dialect import Message, mav
-from mavlink.services.service import Peer, Send, to
-from mavlink.services.statustext import ERROR, WARNING, StatusText
+from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.services.statustext import ERROR, WARNING, StatusText
+from colibri.mavlink.wire.dialect import Message, mav
 
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 TEMPORARILY_REJECTED: int = mav.MAV_RESULT_TEMPORARILY_REJECTED

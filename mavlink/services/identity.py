@@ -7,8 +7,8 @@ way AUTOPILOT_VERSION and the text at the start say that this is Colibri.
 
 from dataclasses import dataclass
 
-from mavlink.dialect import mav
-from mavlink.services.service import Fields
+from colibri.mavlink.node.service import Fields
+from colibri.mavlink.wire.dialect import mav
 
 Triple = tuple[int, int, int]
 

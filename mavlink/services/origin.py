@@ -7,10 +7,10 @@ SET_HOME_POSITION and SET_MODE are old ways of DO_SET_HOME and DO_SET_MODE, whic
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from mavlink.dialect import Message
-from mavlink.geodesy import Geodetic, is_on_earth
-from mavlink.services.service import Peer, Send, to_all
-from mavlink.services.statustext import WARNING, StatusText
+from colibri.common.earth.geodesy import Geodetic, is_on_earth
+from colibri.mavlink.node.service import Peer, Send, to_all
+from colibri.mavlink.services.statustext import WARNING, StatusText
+from colibri.mavlink.wire.dialect import Message
 
 _LOWEST_MM, _HIGHEST_MM = -1_000_000, 20_000_000
 

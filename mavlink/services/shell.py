@@ -6,8 +6,8 @@ Specification: SERIAL_CONTROL (126), https://mavlink.io/en/messages/common.html#
 from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias
 
-from mavlink.dialect import Message, mav
-from mavlink.services.service import Peer, Send, to
+from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.wire.dialect import Message, mav
 
 DATA_BYTES = 70
 LONGEST_LINE_BYTES = 200

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable, Sequence
 from math import isnan
 from typing import NamedTuple, TypeAlias
 
-from mavlink.dialect import Message, mav
-from mavlink.services.command import DENIED, FAILED, Command, Entry, Handler, Outcome
-from mavlink.services.service import Fields, Peer, Send, to, to_all
+from colibri.mavlink.node.service import Fields, Peer, Send, to, to_all
+from colibri.mavlink.services.command import DENIED, FAILED, Command, Entry, Handler, Outcome
+from colibri.mavlink.wire.dialect import Message, mav
 
 MONITOR_EVERY_US = 10_000_000
 NAME_BYTES = 34

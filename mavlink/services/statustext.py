@@ -4,8 +4,8 @@ Specification: mavlink.io, message STATUSTEXT (253): text beyond 50 bytes goes o
 that is not zero, counted by chunk_seq; a chunk that is not full ends it.
 """
 
-from mavlink.dialect import mav
-from mavlink.services.service import Send, to_all
+from colibri.mavlink.node.service import Send, to_all
+from colibri.mavlink.wire.dialect import mav
 
 CHUNK_BYTES = 50
 LONGEST_BYTES = 254

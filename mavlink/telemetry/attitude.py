@@ -2,11 +2,9 @@
 
 from math import nan
 
-from mavlink.dialect import mav
-from mavlink.frames import euler_from_quaternion, ned_frd_from_enu_flu, ned_from_enu
-from mavlink.services.service import Fields
-from mavlink.snapshot import Snapshot
-from mavlink.telemetry.wire import (
+from colibri.common.rotations import euler_from_quaternion
+from colibri.mavlink.node.service import Fields
+from colibri.mavlink.telemetry.encoder import (
     MILLI_G,
     airspeed_m_s,
     boot_ms,
@@ -18,6 +16,9 @@ from mavlink.telemetry.wire import (
     velocity_ned_cm_s,
     yaw_ned,
 )
+from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.ned import ned_frd_from_enu_flu, ned_from_enu
 
 FULL_QUALITY_PERCENT = 100
 COVARIANCE_UNKNOWN = (nan,) + (0.0,) * 20

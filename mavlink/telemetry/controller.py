@@ -2,13 +2,14 @@
 
 from math import degrees, hypot, isnan
 
-from common.kernels import atan2
-from mavlink.dialect import mav
-from mavlink.frames import euler_from_quaternion, frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
-from mavlink.geodesy import geodetic_of
-from mavlink.services.service import Fields
-from mavlink.snapshot import Forecast, Setpoint, Snapshot
-from mavlink.telemetry.wire import UNKNOWN_U16, boot_ms, minus, yaw_ned
+from colibri.common.earth.geodesy import geodetic_of
+from colibri.common.kernels import atan2
+from colibri.common.rotations import euler_from_quaternion
+from colibri.mavlink.node.service import Fields
+from colibri.mavlink.telemetry.encoder import UNKNOWN_U16, boot_ms, minus, yaw_ned
+from colibri.mavlink.telemetry.snapshot import Forecast, Setpoint, Snapshot
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
 POINTS = 5
 """That TRAJECTORY_REPRESENTATION_WAYPOINTS holds."""

@@ -2,13 +2,11 @@
 
 from math import hypot, isfinite, nan
 
-from common.kernels import atan2, cos, sin
-from mavlink.dialect import mav
-from mavlink.frames import euler_from_quaternion, ned_from_enu
-from mavlink.geodesy import geodetic_of
-from mavlink.services.service import Fields
-from mavlink.snapshot import Snapshot
-from mavlink.telemetry.wire import (
+from colibri.common.earth.geodesy import geodetic_of
+from colibri.common.kernels import atan2, cos, sin
+from colibri.common.rotations import euler_from_quaternion
+from colibri.mavlink.node.service import Fields
+from colibri.mavlink.telemetry.encoder import (
     UNKNOWN_U16,
     airspeed_m_s,
     boot_ms,
@@ -19,6 +17,9 @@ from mavlink.telemetry.wire import (
     velocity_ned_cm_s,
     yaw_ned,
 )
+from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.ned import ned_from_enu
 
 SATELLITES = 12
 """As many as a receiver in the open sees; there is none: the position is the state itself."""

@@ -2,10 +2,11 @@
 
 from math import isfinite, pi
 
-from mavlink.dialect import mav
-from mavlink.services.service import Fields
-from mavlink.snapshot import BatteryState, FourOf, Snapshot
-from mavlink.telemetry.wire import UNKNOWN_I16, UNKNOWN_U8, UNKNOWN_U16
+from colibri.common.types import FourRotors
+from colibri.mavlink.node.service import Fields
+from colibri.mavlink.telemetry.encoder import UNKNOWN_I16, UNKNOWN_U8, UNKNOWN_U16
+from colibri.mavlink.telemetry.snapshot import BatteryState, Snapshot
+from colibri.mavlink.wire.dialect import mav
 
 CELLS = 10
 """That BATTERY_STATUS holds; four more go into its extension."""
@@ -83,7 +84,7 @@ def _stick_us(stick: float) -> float:
     return LOW_US + 0.5 * SPAN_US * (1.0 + stick)
 
 
-def _pulses_us(controls: FourOf) -> tuple[float, ...]:
+def _pulses_us(controls: FourRotors) -> tuple[float, ...]:
     return tuple(LOW_US + SPAN_US * control for control in controls)
 
 

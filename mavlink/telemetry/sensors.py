@@ -1,11 +1,12 @@
 """Messages of the sensors: what they measure; where the state is told and there are none, what they would measure."""
 
-from mavlink.atmosphere import pressure_pa, temperature_c
-from mavlink.dialect import mav
-from mavlink.frames import Vector, frd_from_flu
-from mavlink.services.service import Fields
-from mavlink.snapshot import Snapshot
-from mavlink.telemetry.wire import MILLI_G, Constants, boot_ms, in_body_frd, times
+from colibri.common.earth.atmosphere import pressure_pa, temperature_c
+from colibri.common.types import Vector
+from colibri.mavlink.node.service import Fields
+from colibri.mavlink.telemetry.encoder import MILLI_G, Constants, boot_ms, in_body_frd, times
+from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.ned import frd_from_flu
 
 EARTH_FIELD_NED_GAUSS: Vector = (0.2152, 0.0124, 0.4312)
 """The earth's field at Zurich: 0.482 gauss, dipping 63.4° below the horizon, 3.3° east of true north. Taken everywhere:

@@ -2,10 +2,10 @@
 
 from math import isfinite
 
-from mavlink.dialect import mav
-from mavlink.services.service import Fields
-from mavlink.snapshot import Snapshot
-from mavlink.telemetry.wire import UNKNOWN_U16, Constants, boot_ms
+from colibri.mavlink.node.service import Fields
+from colibri.mavlink.telemetry.encoder import UNKNOWN_U16, Constants, boot_ms
+from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.wire.dialect import mav
 
 SENSORS: int = (
     mav.MAV_SYS_STATUS_SENSOR_3D_GYRO

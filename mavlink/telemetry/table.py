@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from functools import partial
 
-from mavlink.services.service import Fields
-from mavlink.telemetry import attitude, controller, position, power, sensors, status
-from mavlink.telemetry.wire import Constants, Encoder, fitted
+from colibri.mavlink.node.service import Fields
+from colibri.mavlink.telemetry import attitude, controller, position, power, sensors, status
+from colibri.mavlink.telemetry.encoder import Constants, Encoder, fitted
 
 
 def telemetry(constants: Constants | None = None) -> dict[str, Encoder]:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.modes import Mode
-from mavlink.geodesy import Geodetic, enu_of
-from mavlink.home import DEFAULT_HOME
-from tests.clients.vehicle import Vehicle, vehicle
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.common.earth.geodesy import Geodetic, enu_of
+from colibri.common.earth.home import DEFAULT_HOME
+from tools.harness.sitl_process import Vehicle, vehicle
 
 PROGRAMS = Path(__file__).parent / "programs"
 SPEED = 4.0

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
-from tests.clients.ground_station import GroundStation, Message
-from tests.clients.vehicle import vehicle
+from tests.clients.support.ground_station import GroundStation, Message
+from tools.harness.sitl_process import vehicle
 
 ACCEPTED = mavlink2.MAV_RESULT_ACCEPTED
 SYSTEMS = (3, 4, 5)

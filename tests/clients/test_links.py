@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
-from tests.clients.client import Client
-from tests.clients.vehicle import vehicle
+from tests.clients.support.client import Client
+from tools.harness.sitl_process import vehicle
 
 ROOT = Path(__file__).parents[2]
 WITHIN_S = 120.0

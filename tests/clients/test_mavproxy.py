@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.modes import Mode
-from mavlink.geodesy import Geodetic, geodetic_of
-from mavlink.home import DEFAULT_HOME
-from tests.clients.mavproxy import MavProxy
-from tests.clients.vehicle import Vehicle, vehicle
-from tests.runs import wait_for
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.common.earth.home import DEFAULT_HOME
+from tests.clients.support.mavproxy import MavProxy
+from tools.harness.processes import wait_for
+from tools.harness.sitl_process import Vehicle, vehicle
 
 pytestmark = pytest.mark.clients
 

@@ -8,11 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.modes import Mode
-from mavlink.dialect import mav
-from mavlink.frames import Vector
-from tests.clients.client import Client
-from tests.clients.geometry import away_m, closest_m, during, heading_deg, speed_m_s, swept_rad
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.common.types import Vector
+from colibri.mavlink.wire.dialect import mav
 from tests.clients.mavsdk_scripts import (
     follow_me,
     geofence,
@@ -25,8 +23,10 @@ from tests.clients.mavsdk_scripts import (
     orbit,
     takeoff_and_land,
 )
-from tests.clients.observer import Observer
-from tests.clients.vehicle import Vehicle, vehicle
+from tests.clients.support.client import Client
+from tests.clients.support.geometry import away_m, closest_m, during, heading_deg, speed_m_s, swept_rad
+from tools.harness.observer import Observer
+from tools.harness.sitl_process import Vehicle, vehicle
 
 ROOT = Path(__file__).parents[2]
 SPEED = 3.0

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.clients.plan_client import ACCEPTED, Item, PlanClient
-from tests.clients.vehicle import vehicle
-from tests.flights.relay import BadLink
-from tests.mavlink.missions import some_item
+from tests.clients.support.plan_client import ACCEPTED, Item, PlanClient
+from tests.mavlink.mission.missions import some_item
+from tools.harness.lossy_relay import BadLink
+from tools.harness.sitl_process import vehicle
 
 SPEED = 10.0
 """The vehicle asks again after a quarter of a simulated second."""

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.clients.vehicle import vehicle
+from tools.harness.sitl_process import vehicle
 
 NAME = "SYS_AUTOCONFIG"
 SIGNALLING = [(-8388607, -4194305), (2139095041, 2143289343)]
@@ -19,7 +19,7 @@ VALUES = (
 def test_every_integer_survives_the_way_there_and_back(tmp_path: Path) -> None:
     with vehicle(tmp_path) as flown:
         values = [str(value) for value in VALUES]
-        command = [sys.executable, "-m", "tests.clients.int_parameters", flown.mavsdk_url, NAME, *values]
+        command = [sys.executable, "-m", "tests.clients.support.int_parameters", flown.mavsdk_url, NAME, *values]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         assert tuple(json.loads(done.stdout.splitlines()[-1])) == VALUES

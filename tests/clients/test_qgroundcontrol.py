@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
-from autopilot.modes import Mode, custom_mode
-from mavlink.geodesy import Geodetic, geodetic_of
-from mavlink.home import DEFAULT_HOME
-from tests.clients.ground_station import GroundStation
-from tests.clients.observer import Sight
-from tests.clients.vehicle import Vehicle, vehicle
+from colibri.autopilot.commander.rules.modes import Mode, custom_mode
+from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.common.earth.home import DEFAULT_HOME
+from tests.clients.support.ground_station import GroundStation
+from tools.harness.observer import Sight
+from tools.harness.sitl_process import Vehicle, vehicle
 
 ACCEPTED = mavlink2.MAV_RESULT_ACCEPTED
 CUSTOM = mavlink2.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from autopilot.modes import Mode
-from mavlink.geodesy import Geodetic, enu_of
-from mavlink.home import DEFAULT_HOME
-from tests.clients.mavproxy import MavProxy
-from tests.clients.vehicle import Vehicle, vehicle
-from tools.sitl import GROUND_PORT, SDK_PORT
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.common.earth.geodesy import Geodetic, enu_of
+from colibri.common.earth.home import DEFAULT_HOME
+from colibri.flights.fleet import GROUND_PORT, SDK_PORT
+from tests.clients.support.mavproxy import MavProxy
+from tools.harness.sitl_process import Vehicle, vehicle
 
 README = Path(__file__).parents[2] / "README.md"
 GIVE_UP_AFTER_S = 120.0

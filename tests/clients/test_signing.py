@@ -6,9 +6,9 @@ from time import time
 import pytest
 from pymavlink.dialects.v20 import development as mavlink2
 
-from tests.clients.ground_station import GroundStation
-from tests.clients.vehicle import vehicle
-from tests.runs import wait_for
+from tests.clients.support.ground_station import GroundStation
+from tools.harness.processes import wait_for
+from tools.harness.sitl_process import vehicle
 
 KEY = bytes(range(1, 33))
 ACCEPTED = mavlink2.MAV_RESULT_ACCEPTED

@@ -1,7 +1,7 @@
 from pathlib import Path
 
-from autopilot.modes import Mode
-from tests.clients.vehicle import vehicle
+from colibri.autopilot.commander.rules.modes import Mode
+from tools.harness.sitl_process import vehicle
 
 
 def test_it_stands_ready_and_ends_when_told_to(tmp_path: Path) -> None:

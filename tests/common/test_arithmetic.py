@@ -12,14 +12,14 @@ _TRANSCENDENTAL = (
     "acos acosh asin asinh atan atan2 atanh cbrt cos cosh exp exp2 expm1 log log10 log1p log2 pow sin sinh"
 )
 OF_LIBM = {*_TRANSCENDENTAL.split(), "tan", "tanh"}
-"""`common.elementary` has those that are needed; `math.sqrt`, `hypot` and `dist` are exact, or Python's own."""
+"""`colibri.common.elementary` has those that are needed; `math.sqrt`, `hypot` and `dist` are exact, or Python's own."""
 OF_NUMPY = {
     *(name.replace("a", "arc", 1) if name.startswith("a") else name for name in OF_LIBM),
     *("dot", "einsum", "float_power", "hypot", "inner", "linalg", "logaddexp", "matmul", "power", "tensordot", "vdot"),
 }
-OF_SCIPY = {"autopilot/qp.py": {"scipy.optimize", "scipy.sparse"}}
+OF_SCIPY = {"autopilot/control/qp.py": {"scipy.optimize", "scipy.sparse"}}
 """To say why a QP has no solution, and to hand it to the sparse solvers: no number of a flight."""
-CHECKS = {"plant/vehicle.py": {"linalg"}}
+CHECKS = {"plant/vehicle/description.py": {"linalg"}}
 """A vehicle file is refused by its rank or its fastest rate: no number of a flight."""
 
 

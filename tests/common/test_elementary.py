@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common import elementary, elementwise, kernels
+from colibri.common import elementary, elementwise, kernels
 
 ONE_ULP, THREE_ULP = 1.0, 3.0
 DIGITS = 60

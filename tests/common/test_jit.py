@@ -12,11 +12,8 @@ import pytest
 from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
-import autopilot
-import common
-import mavlink
-import plant
-from common.jit import files_of
+from colibri import autopilot, common, mavlink, plant
+from colibri.common.jit import files_of
 
 MODULES = [
     importlib.import_module(f"{package.__name__}.{entry.name}")
@@ -31,7 +28,7 @@ KERNELS = {
     if isinstance(kernel, Dispatcher)
 }
 CALLER = """
-from common.jit import compiled
+from colibri.common.jit import compiled
 from callee import doubled
 
 @compiled
@@ -42,7 +39,7 @@ if __name__ == "__main__":
     print(quadrupled(1.0), sum(quadrupled.stats.cache_hits.values()))
 """
 CALLEE = """
-from common.jit import compiled
+from colibri.common.jit import compiled
 
 @compiled
 def doubled(x):
@@ -51,7 +48,11 @@ def doubled(x):
 
 
 def test_there_are_kernels_on_both_sides() -> None:
-    assert {"autopilot.prediction.respond", "plant.dynamics.derivative", "common.elementary.sin"} <= set(KERNELS)
+    assert {
+        "colibri.autopilot.control.lpv_mpc.prediction.respond",
+        "colibri.plant.physics.equations.derivative",
+        "colibri.common.elementary.sin",
+    } <= set(KERNELS)
 
 
 @pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
@@ -64,7 +65,7 @@ def test_kernels_are_exact_and_kept_on_disk_and_call_others_by_name(kernel: Disp
 
 
 def test_the_files_of_a_kernel_are_those_of_all_that_it_calls() -> None:
-    names = {Path(file).name for file in files_of(KERNELS["plant.integrate.runge_kutta_4"])}
+    names = {Path(file).name for file in files_of(KERNELS["colibri.plant.physics.integrators.runge_kutta_4"])}
     assert names == {"integrate.py", "dynamics.py", "frames.py"}
 
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import linalg
 
-from common import matrices
-from common.matrices import Array
+from colibri.common import matrices
+from colibri.common.types import Array
 
 SIZES = st.integers(1, 12)
 SEEDS = st.integers(0, 2**32 - 1)

@@ -8,11 +8,12 @@ from typing import Any
 import msgspec
 import pytest
 
-from autopilot.profile import load_profile
-from autopilot.qp import installed_solvers
-from tools import bench, peer, sensing, serving, speed, stages
-from tools.cli import main
-from tools.variants import plan_of, toml_lines, with_intervals, with_moves
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.qp import installed_solvers
+from colibri.bench import run, sensing, serving, speed, stages
+from colibri.bench.variants import plan_of, toml_lines, with_intervals, with_moves
+from colibri.cli.main import main
+from tools.bench import rotorpy_peer
 
 SHORT_S = "0.2"
 
@@ -64,8 +65,8 @@ def test_what_was_timed_is_as_it_was_before(measured: dict[str, Any]) -> None:
 def test_flies_beside_the_peer_in_every_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(peer, "installed", lambda: True)
-    monkeypatch.setattr(peer, "real_time_factor", lambda _frames_hz, _duration_s: 2.0)
+    monkeypatch.setattr(rotorpy_peer, "installed", lambda: True)
+    monkeypatch.setattr(rotorpy_peer, "real_time_factor", lambda _frames_hz, _duration_s: 2.0)
     monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 8.0)
     flights = figures_of(tmp_path / "flights.json", "--only", "flights")["flights"]
     assert {int(frames_hz) for frames_hz in flights["rates_hz"]} == set(speed.CONTROL_S)
@@ -78,17 +79,17 @@ def test_flies_beside_the_peer_in_every_run(
 def test_a_missing_peer_is_said_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(peer, "installed", lambda: False)
+    monkeypatch.setattr(rotorpy_peer, "installed", lambda: False)
     monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 1.0)
     flights = figures_of(tmp_path / "flights.json", "--only", "flights")["flights"]
     assert all(set(rate) == {"memory", "udp"} for rate in flights["rates_hz"].values())
-    assert capsys.readouterr().err == f"colibri: {peer.MISSING}\n"
-    assert "colibri-sitl[bench]" in peer.MISSING
+    assert capsys.readouterr().err == f"colibri: {rotorpy_peer.MISSING}\n"
+    assert "colibri-sitl[bench]" in rotorpy_peer.MISSING
 
 
-@pytest.mark.skipif(not peer.installed(), reason="needs RotorPy, which the lock leaves out")
+@pytest.mark.skipif(not rotorpy_peer.installed(), reason="needs RotorPy, which the lock leaves out")
 def test_the_peer_flies() -> None:
-    assert peer.real_time_factor(100, 0.2) > 0.0
+    assert rotorpy_peer.real_time_factor(100, 0.2) > 0.0
 
 
 @pytest.mark.long
@@ -123,10 +124,10 @@ def test_the_estimator_is_timed_and_flights_on_sensors_beside_those_on_the_state
 def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[str] = []
     monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 1.0)
-    profile = load_profile(bench.PROFILE)
-    monkeypatch.setattr(peer, "real_time_factor", lambda *_: 1.0)
+    profile = load_profile(run.PROFILE)
+    monkeypatch.setattr(rotorpy_peer, "real_time_factor", lambda *_: 1.0)
     speed.rate_figures(profile, tmp_path, 0.1, 2, told.append, beside=True)
-    assert len(told) == bench.parts(["flights"], 2, beside=True)
+    assert len(told) == run.parts(["flights"], 2, beside=True)
 
 
 @pytest.mark.parametrize(
@@ -160,5 +161,5 @@ def test_toml_leaves_out_what_is_not_given() -> None:
 
 
 def test_the_flight_profile_is_measured_at_its_own_horizon() -> None:
-    moves = load_profile(bench.PROFILE).table("lpv-mpc")["attitude"]["moves"]
+    moves = load_profile(run.PROFILE).table("lpv-mpc")["attitude"]["moves"]
     assert tuple(msgspec.convert(moves, list[int])) == stages.MOVES[stages.PROFILE_HORIZON]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tools.latency_page import STEP, Merit, Point, fly, merit, page
-from tools.recording import COLUMNS, Recording
+from colibri.analysis.recording import COLUMNS, Recording
+from tools.pages.latency import STEP, Merit, Point, fly, merit, page
 
 GOOD, BAD = Merit(0.001, 0.0, 40.0), Merit(0.4, 0.1, 70.0)
 

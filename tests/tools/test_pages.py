@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from tools import fault_page, parameter_page
+from tools.pages import faults, parameters
 
 DOCS = Path(__file__).parents[2] / "docs"
 
 
 def test_the_page_of_parameters_is_current() -> None:
-    assert (DOCS / "parameters.md").read_text() == parameter_page.page()
+    assert (DOCS / "parameters.md").read_text() == parameters.page()
 
 
 def test_the_page_of_faults_is_current() -> None:
-    assert (DOCS / "faults.md").read_text() == fault_page.page()
+    assert (DOCS / "faults.md").read_text() == faults.page()

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tools.rotor_loss_flights import Flown
-from tools.rotor_loss_page import CASES, SEEDS, draw, table
+from tools.pages.rotor_loss import CASES, SEEDS, draw, table
+from tools.pages.rotor_loss_flights import Flown
 
 PAGE = Path(__file__).parents[2] / "docs" / "rotor-loss.md"
 

@@ -4,8 +4,8 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from mavlink.dialect import Codec, Message
-from mavlink.services.service import Peer, Send
+from colibri.mavlink.node.service import Peer, Send
+from colibri.mavlink.wire.dialect import Codec, Message
 
 GROUND = Peer(1, 245, 190)
 OTHER = Peer(2, 255, 230)

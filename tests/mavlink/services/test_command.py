@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavlink.dialect import Message, mav
-from mavlink.services.command import (
+from colibri.mavlink.node.service import Peer, Send
+from colibri.mavlink.services.command import (
     ACCEPTED,
     CANCELLED,
     COMMAND_INT_ONLY,
@@ -25,8 +25,8 @@ from mavlink.services.command import (
     Handler,
     Outcome,
 )
-from mavlink.services.service import Peer, Send
-from mavlink.services.statustext import ERROR, WARNING, StatusText
+from colibri.mavlink.services.statustext import ERROR, WARNING, StatusText
+from colibri.mavlink.wire.dialect import Message, mav
 from tests.mavlink.services.peers import (
     ANY_LONG,
     BYTES,

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavlink.dialect import mav
-from mavlink.services.identity import GENERIC, IDENTITIES, PX4, autopilot_version, banner, version_of
-from mavlink.services.service import Send
+from colibri.mavlink.node.service import Send
+from colibri.mavlink.services.identity import GENERIC, IDENTITIES, PX4, autopilot_version, banner, version_of
+from colibri.mavlink.wire.dialect import mav
 from tests.mavlink.services.peers import on_the_wire
 
 

@@ -4,11 +4,11 @@ from collections.abc import Iterable
 
 import pytest
 
-from mavlink.dialect import Message
-from mavlink.geodesy import Geodetic
-from mavlink.services.origin import OriginService, Setters
-from mavlink.services.service import Send
-from mavlink.services.statustext import StatusText
+from colibri.common.earth.geodesy import Geodetic
+from colibri.mavlink.node.service import Send
+from colibri.mavlink.services.origin import OriginService, Setters
+from colibri.mavlink.services.statustext import StatusText
+from colibri.mavlink.wire.dialect import Message
 from tests.mavlink.services.peers import GROUND, message, on_the_wire
 
 Q = [1.0, 0.0, 0.0, 0.0]

@@ -3,10 +3,10 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mavlink.dialect import mav
-from mavlink.services import shell
-from mavlink.services.service import Peer
-from mavlink.services.shell import PROMPT, Shell
+from colibri.mavlink.node.service import Peer
+from colibri.mavlink.services import shell
+from colibri.mavlink.services.shell import PROMPT, Shell
+from colibri.mavlink.wire.dialect import mav
 from tests.mavlink.services.peers import GROUND, OTHER, message, on_the_wire
 
 RESPOND = mav.SERIAL_CONTROL_FLAG_RESPOND

@@ -3,9 +3,9 @@
 import pytest
 from hypothesis import given
 
-from mavlink.services.command import ACCEPTED, DENIED, FAILED, Command, Outcome
-from mavlink.services.service import Send
-from mavlink.services.standard_modes import ModeInfo, StandardModes
+from colibri.mavlink.node.service import Send
+from colibri.mavlink.services.command import ACCEPTED, DENIED, FAILED, Command, Outcome
+from colibri.mavlink.services.standard_modes import ModeInfo, StandardModes
 from tests.mavlink.services.peers import FLOATS, GROUND, NAN, on_the_wire
 
 MODES = (

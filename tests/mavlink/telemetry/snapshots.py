@@ -5,12 +5,12 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from mavlink.dialect import Codec
-from mavlink.frames import quaternion_from_euler
-from mavlink.geodesy import Geodetic
-from mavlink.snapshot import BatteryState, Forecast, Home, Setpoint, Snapshot, SolverState
-from mavlink.telemetry.table import TELEMETRY
-from mavlink.telemetry.wire import Encoder
+from colibri.common.earth.geodesy import Geodetic
+from colibri.common.rotations import quaternion_from_euler
+from colibri.mavlink.telemetry.encoder import Encoder
+from colibri.mavlink.telemetry.snapshot import BatteryState, Forecast, Home, Setpoint, Snapshot, SolverState
+from colibri.mavlink.telemetry.table import TELEMETRY
+from colibri.mavlink.wire.dialect import Codec
 
 ORIGIN = Geodetic(47.0, 8.0, 400.0)
 YAW_NORTH = pi / 2

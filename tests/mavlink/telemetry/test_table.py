@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from mavlink.dialect import mav
-from mavlink.snapshot import BatteryState, Snapshot
-from mavlink.telemetry.controller import ARRAY_HEAD
-from mavlink.telemetry.table import TELEMETRY, telemetry
-from mavlink.telemetry.wire import Constants
+from colibri.mavlink.telemetry.controller import ARRAY_HEAD
+from colibri.mavlink.telemetry.encoder import Constants
+from colibri.mavlink.telemetry.snapshot import BatteryState, Snapshot
+from colibri.mavlink.telemetry.table import TELEMETRY, telemetry
+from colibri.mavlink.wire.dialect import mav
 from tests.mavlink.telemetry.snapshots import ARBITRARY, FLYING, told
 
 METRES_A_DEGREE = radians(1.0) * 6371000.0

@@ -1,0 +1,472 @@
+"""The pilot: modes, arming, take-off and landing; decides what the control law is given to follow."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from colibri.autopilot.commander.rules.arming import Facts, refusals
+from colibri.autopilot.commander.rules.failsafe_table import Action
+from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, Refusal, State, following
+from colibri.autopilot.control.interface import AttitudeDemand, Horizon, VehicleState
+from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.landing_detector import Landing, is_below, stands_at_first, watch
+from colibri.autopilot.guidance.reference import Reference, at_rest, lead, lead_along, moving_with, still_target
+from colibri.autopilot.guidance.sample_grid import Instants
+from colibri.autopilot.guidance.tasks.position import Stop
+from colibri.autopilot.guidance.tasks.task import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
+from colibri.common.types import Array, Vector
+from colibri.mavlink.services.statustext import EMERGENCY, INFO, NOTICE
+
+CourseMaker: TypeAlias = Callable[[Mode, Scene], Course]
+_ORIGIN: Vector = (0.0, 0.0, 0.0)
+_SAVED_BY = {
+    Action.HOLD: Event.SAVED_BY_HOLD,
+    Action.RETURN: Event.SAVED_BY_RETURN,
+    Action.LAND: Event.SAVED_BY_LANDING,
+    Action.DESCEND: Event.SAVED_BY_LANDING,
+    Action.TERMINATE: Event.TERMINATED,
+}
+
+
+class Said(NamedTuple):
+    """A line for the ground station.
+
+    Attributes:
+        severity: MAV_SEVERITY.
+        text: The line.
+    """
+
+    severity: int
+    text: str
+
+
+class Guidance(NamedTuple):
+    """What the control law is to follow now; neither while the rotors stand or idle.
+
+    Attributes:
+        horizon: References of position and yaw.
+        attitude: References of attitude and thrust.
+        begins: Whether the rotors leave idle now: the control law begins anew.
+    """
+
+    horizon: Horizon | None = None
+    attitude: AttitudeDemand | None = None
+    begins: bool = False
+
+
+RESTS = Guidance()
+
+
+class PilotRecord(NamedTuple):
+    """What a pilot needs to go on after a restart, as plain data; but for the course, what `Pilot` says of each.
+
+    Attributes:
+        idles: Whether the rotors stand or idle.
+        home_is_chosen: Whether a take-off leaves home where it is.
+        motion: Of the reference, (4, 3).
+        heading: Of the reference, (2,).
+    """
+
+    mode: Mode
+    armed: bool
+    standing: bool
+    idles: bool
+    home_enu_m: Vector
+    home_yaw_rad: float
+    home_is_chosen: bool
+    speed_m_s: float | None
+    armed_us: int
+    takeoff_us: int
+    landing_us: int
+    flights: int
+    ground_m: float
+    saving: Action
+    motion: Array
+    heading: Array
+
+
+class Pilot:
+    """Flies courses, one mode after another.
+
+    Attributes:
+        state: Mode, and whether the rotors may turn.
+        behaviour: The numbers to fly by; whoever changes them replaces all of it.
+        home_enu_m: Where it took off, or was told to return to.
+        home_yaw_rad: Its heading there.
+        standing: Whether it stands on the ground.
+        idles: Whether the rotors stand or idle.
+        course: What is flown.
+        reference: Where the reference stands.
+        speed_m_s: Cruise speed that was asked for; None for the parameters'.
+        armed_us: When the rotors were last armed; 0 before.
+        takeoff_us: When it last left the ground; 0 before.
+        landing_us: When it last stood again; 0 before.
+        ground_m: Height of where it last stood, z of ENU.
+        flights: How often the rotors were armed.
+        saving: The failsafe that is flown, until somebody chooses a mode or the rotors stop.
+        terminated: Whether a failsafe stopped the rotors in the air.
+        rotor_failed: Which rotor has failed, in words; empty if none has. Nothing but landing is possible then.
+    """
+
+    def __init__(
+        self,
+        instants: Instants,
+        behaviour: Behaviour,
+        make_course: CourseMaker,
+        missing: Callable[[], Sequence[Need]],
+    ) -> None:
+        """Begin on the ground, or in the air: see `begin`. What is compiled is loaded here.
+
+        Args:
+            instants: At which references are planned, and which of them the control law previews.
+            behaviour: The numbers to fly by.
+            make_course: Says how each mode begins.
+            missing: Says which needs of modes nothing meets at the moment.
+        """
+        self._instants = instants
+        self._make_course = make_course
+        self.state = FIRST
+        self.behaviour = behaviour
+        self.home_enu_m = _ORIGIN
+        self.home_yaw_rad = 0.0
+        self.standing = True
+        self.course: Course = Stop()
+        self.reference: Reference | None = None
+        self.speed_m_s: float | None = None
+        self.armed_us = self.takeoff_us = self.landing_us = 0
+        self.flights = 0
+        self.saving = Action.NONE
+        self.terminated = False
+        self.rotor_failed = ""
+        self.ground_m = 0.0
+        self._home_is_chosen = False
+        self._course_is_chosen = False
+        self.idles = True
+        self._landing = Landing()
+        self._now_us = 0
+        self._vehicle: VehicleState | None = None
+        self._facts = Facts(None, standing=True, charge=1.0, thrust_stick=None)
+        self._missing = missing
+        self._steered = NOT_STEERED
+        self._said: list[Said] = []
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        """Load what is compiled: a take-off is no time for that."""
+        interval_us, samples = self._instants.preview
+        motionless = Reference(np.zeros((4, 3)), np.zeros(2))
+        lead(motionless, still_target((1.0, 0.0, 0.0), 0.0, samples), self.behaviour.limits, interval_us * 1e-6)
+
+    def begin(self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None, rests: bool = False) -> None:
+        """See the vehicle for the first time: it stands, or it is picked up in flight, in `mode` or in hold.
+
+        Where it is known that it `rests` it stands, however high it seems to be: an estimate of height is not exact.
+        """
+        self._now_us, self._vehicle = now_us, vehicle
+        self.armed_us = self.takeoff_us = self.landing_us = 0
+        self.standing = self.idles = mode is None and (rests or stands_at_first(vehicle, 0.0))
+        self.reference = moving_with(vehicle)
+        if self.standing:
+            if not self._home_is_chosen:
+                self.set_home(vehicle.position_enu_m, vehicle.euler[2], chosen=False)
+            self.state = FIRST
+        else:
+            self.state = State(mode or Mode.HOLD, armed=True)
+            self._begin_flight()
+        self._engage(self.state.mode)
+
+    def record(self) -> PilotRecord:
+        """Return what is needed to go on after a restart, but for the course."""
+        assert self.reference is not None, "the pilot has seen the vehicle"
+        return PilotRecord(
+            *self.state,
+            self.standing,
+            self.idles,
+            self.home_enu_m,
+            self.home_yaw_rad,
+            self._home_is_chosen,
+            self.speed_m_s,
+            self.armed_us,
+            self.takeoff_us,
+            self.landing_us,
+            self.flights,
+            self.ground_m,
+            self.saving,
+            *self.reference,
+        )
+
+    def resume(
+        self,
+        now_us: int,
+        vehicle: VehicleState,
+        record: PilotRecord,
+        again: CourseMaker,
+        *,
+        closely: bool,
+    ) -> None:
+        """See the vehicle for the first time since a restart: it goes on as it was.
+
+        The reference goes on where it was if the restart took no time, that is `closely`, and else from where the
+        vehicle is. One that has come down meanwhile stays there. `again` says how a mode goes on.
+        """
+        self._now_us, self._vehicle = now_us, vehicle
+        self.home_enu_m, self.home_yaw_rad = record.home_enu_m, record.home_yaw_rad
+        self._home_is_chosen, self.speed_m_s = record.home_is_chosen, record.speed_m_s
+        self.armed_us, self.takeoff_us, self.landing_us = record.armed_us, record.takeoff_us, record.landing_us
+        self.flights, self.ground_m = record.flights, record.ground_m
+        came_down = not closely and not record.standing and stands_at_first(vehicle, record.ground_m)
+        self.standing = record.standing or came_down
+        self.state = FIRST if came_down else State(record.mode, record.armed)
+        self.saving = Action.NONE if came_down else record.saving
+        self.idles = record.idles or came_down
+        self.reference = Reference(record.motion, record.heading) if closely else moving_with(vehicle)
+        self.course = (self._make_course if came_down else again)(self.state.mode, self.scene())
+        self._course_is_chosen = not came_down
+
+    def sense(self, now_us: int, vehicle: VehicleState, steered: Steered = NOT_STEERED) -> None:
+        """Take in what a control sample needs.
+
+        Args:
+            now_us: Simulated time.
+            vehicle: The vehicle.
+            steered: What clients ask for.
+        """
+        self._now_us, self._vehicle, self._steered = now_us, vehicle, steered
+
+    @property
+    def has_seen(self) -> bool:
+        """Whether it has ever known where the vehicle is: on sensors that takes a while."""
+        return self._vehicle is not None
+
+    def take_stock(self, facts: Facts) -> None:
+        """Take in what arming is judged by."""
+        self._facts = facts
+
+    def scene(self) -> Scene:
+        """Return what a course sees now."""
+        assert self._vehicle is not None, "the pilot has seen the vehicle"
+        assert self.reference is not None, "the pilot has seen the vehicle"
+        interval_us, samples = self._instants.preview
+        behaviour = self.behaviour
+        speed = behaviour.limits.speed_m_s if self.speed_m_s is None else self.speed_m_s
+        speed = min(speed, behaviour.fastest_m_s)
+        if speed != behaviour.limits.speed_m_s:
+            behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed))
+        interval_s = interval_us * 1e-6
+        return Scene(
+            self._now_us,
+            self._vehicle,
+            self.reference,
+            self.home_enu_m,
+            behaviour,
+            interval_s,
+            samples,
+            self._steered,
+        )
+
+    def refusals(self) -> list[str]:
+        """Return why the rotors may not be armed; empty if they may."""
+        return refusals(self._facts) + ([self.rotor_failed] if self.rotor_failed else [])
+
+    def arm(self, *, force: bool = False) -> Refusal | None:
+        """Let the rotors turn; return why not."""
+        if self.state.armed:
+            return None
+        forced = force and self._vehicle is not None and not self.rotor_failed
+        reasons = [] if forced else self.refusals()
+        if reasons:
+            return Refusal("not armed: " + "; ".join(reasons))
+        refusal = self._follow(Event.ARM, "rotors armed", met=(Need.POSITION,))  # a check of its own, and by force
+        if refusal is None:
+            self.armed_us = self._now_us
+            self.flights += 1
+            self.terminated = False
+            if not self._home_is_chosen and self._vehicle is not None:
+                self.set_home(self._vehicle.position_enu_m, self._vehicle.euler[2], chosen=False)
+            if not self._course_is_chosen:
+                self._engage(self.state.mode)
+        return refusal
+
+    def disarm(self, *, force: bool = False) -> Refusal | None:
+        """Stop the rotors; return why not."""
+        if not self.state.armed:
+            return None
+        if not self.standing and not force:
+            return Refusal("not disarmed: the vehicle is flying")
+        return self._stop_rotors(Event.DISARM, "rotors stopped" if self.standing else "rotors stopped in the air")
+
+    def select(self, mode: Mode) -> Refusal | None:
+        """Change the mode; return why not."""
+        if mode is self.state.mode and mode is not Mode.HOLD:
+            return None
+        refusal = self._follow(Event.SELECT, "", mode)
+        if refusal is None:
+            self.saving = Action.NONE
+            self._engage(mode)
+        return refusal
+
+    def fly(self, mode: Mode, course: Course) -> Refusal | None:
+        """Change to `mode` and fly `course` in it, now or once the rotors are armed; return why not."""
+        refusal = self._follow(Event.SELECT, "", mode, met=(Need.CIRCLE,))
+        if refusal is None:
+            self.saving = Action.NONE
+            self.course, self._course_is_chosen = course, True
+        return refusal
+
+    def save(self, action: Action) -> None:
+        """Do what a failsafe says, whatever is flown: it has been weighed against that, and been said."""
+        if not self.state.armed:
+            return
+        if action is Action.TERMINATE:
+            self.terminated = not self.standing
+            self._stop_rotors(Event.TERMINATED, "")
+            return
+        self.saving = action
+        self._follow(_SAVED_BY[action], "")
+        self._engage(self.state.mode)
+
+    def set_home(self, position_enu_m: Vector, yaw_rad: float, *, chosen: bool = True) -> None:
+        """Say where home is; where somebody chose it, a take-off does not move it."""
+        self.home_enu_m, self.home_yaw_rad = position_enu_m, yaw_rad
+        self._home_is_chosen = self._home_is_chosen or chosen
+
+    def happened(self, event: Event) -> None:
+        """Tell of an event that may change the mode: what is finished."""
+        before = self.state
+        stays = event in (Event.ARRIVED, Event.FINISHED)  # where the course that ends has led
+        if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode and not stays:
+            self._engage(self.state.mode)
+
+    def lose_rotor(self, rotor: int) -> None:
+        """Choose nothing any more: rotor 0..3 has failed, and the failsafe of that lands."""
+        self.rotor_failed = f"rotor {rotor + 1} failed"
+        self.say(EMERGENCY, f"{self.rotor_failed}: landing on three rotors")
+
+    def touch_down(self) -> None:
+        """Stand, and stop the rotors: something else than the reference tells of the ground."""
+        self._stand()
+        self._stop_rotors(Event.TOUCHED_DOWN, f"{Event.TOUCHED_DOWN}, rotors stopped")
+
+    def step(self) -> Guidance:
+        """Return what to follow from now on. Called once a control sample."""
+        if not self.state.armed:
+            self._rest()
+            return RESTS
+        scene = self.scene()
+        asked = self.course.ask(scene)
+        if self.standing:
+            if not (asked.lifts if isinstance(asked, Lean) else lifts(asked.target, scene.state)):
+                self._idle()
+                return RESTS
+            self._begin_flight()
+        begins, self.idles = self.idles, False
+        guidance = self._lean(asked, begins) if isinstance(asked, Lean) else self._move(scene, asked, begins)
+        if self.course.arrived(scene):
+            self._arrive()
+        return guidance
+
+    def take_said(self) -> list[Said]:
+        """Return the lines for the ground station, and forget them."""
+        said, self._said = self._said, []
+        return said
+
+    def say(self, severity: int, text: str) -> None:
+        """Add a line for the ground station."""
+        self._said.append(Said(severity, text))
+
+    def _move(self, scene: Scene, asked: Motion | Planned, begins: bool) -> Guidance:
+        horizon = self._lead(scene, asked)
+        self._watch_ground(scene.state, sinks=is_below(scene.reference, scene.state))
+        return Guidance(horizon=horizon, begins=begins)
+
+    def _lead(self, scene: Scene, asked: Motion | Planned) -> Horizon:
+        """Move the reference on, and return what the control law previews of it."""
+        reference, limits, interval_s = scene.reference, asked.limits, scene.interval_s
+        if isinstance(asked, Planned):
+            horizon, self.reference = lead_along(reference, asked.horizon, limits, interval_s)
+            if asked.for_law is not None and horizon.position_enu_m is asked.horizon.position_enu_m:
+                turned = horizon.yaw_rad[0] - asked.horizon.yaw_rad[0]
+                return asked.for_law._replace(yaw_rad=asked.for_law.yaw_rad + turned)
+        else:
+            horizon, self.reference = lead(reference, asked.target, limits, interval_s)
+        return self._instants.for_law(horizon)
+
+    def _lean(self, asked: Lean, begins: bool) -> Guidance:
+        assert self._vehicle is not None, "the pilot has seen the vehicle"
+        self.reference = asked.reference
+        self._watch_ground(self._vehicle, sinks=asked.sinks, drifts=asked.drifts)
+        return Guidance(attitude=asked.demand, begins=begins)
+
+    def _rest(self) -> None:
+        """Lie, or fall, with the rotors standing still or idle."""
+        vehicle = self._vehicle
+        assert vehicle is not None, "the pilot has seen the vehicle"
+        self.idles = True
+        self.reference = at_rest(vehicle)
+        self._landing, lies = watch(self._landing, self._now_us, vehicle, sinks=True)
+        self.standing = self.standing or lies
+        if self.standing:
+            self.ground_m = vehicle.position_enu_m[2]
+
+    def _idle(self) -> None:
+        """Stand with idling rotors; not for ever."""
+        self._rest()
+        on_ground_us = self._now_us - max(self.armed_us, self.landing_us)
+        landed = self.landing_us > self.armed_us
+        behaviour = self.behaviour
+        allowed_s = behaviour.disarm_after_landing_s if landed else behaviour.disarm_on_ground_s
+        if allowed_s > 0.0 and on_ground_us >= allowed_s * 1e6:
+            event = Event.TOUCHED_DOWN if landed else Event.LEFT_STANDING
+            self._stop_rotors(event, f"{event}, rotors stopped")
+
+    def _stop_rotors(self, event: Event, text: str) -> Refusal | None:
+        """Stop the rotors, and forget what was asked for this flight alone."""
+        refusal = self._follow(event, text)
+        if refusal is None:
+            self.speed_m_s = None
+            self.saving = Action.NONE
+            self._landing = Landing()
+            self._engage(self.state.mode)
+        return refusal
+
+    def _begin_flight(self) -> None:
+        self.standing = False
+        self._landing = Landing()
+        self.takeoff_us = self._now_us
+        self.say(INFO, "take-off")
+
+    def _watch_ground(self, vehicle: VehicleState, *, sinks: bool, drifts: bool = False) -> None:
+        self._landing, stands = watch(self._landing, self._now_us, vehicle, sinks, drifts=drifts)
+        if stands:
+            self._stand()
+
+    def _stand(self) -> None:
+        self.standing = True
+        self.landing_us = self._now_us
+        self.say(NOTICE, "landing detected")
+
+    def _arrive(self) -> None:
+        if self.state.mode is Mode.TAKEOFF:
+            self.happened(Event.ARRIVED)
+        elif self.state.mode in (Mode.MISSION, Mode.TRACK):
+            self.happened(Event.FINISHED)
+
+    def _engage(self, mode: Mode) -> None:
+        if self.reference is not None:
+            self.course, self._course_is_chosen = self._make_course(mode, self.scene()), False
+
+    def _follow(
+        self, event: Event, text: str, selected: Mode | None = None, met: Sequence[Need] = ()
+    ) -> Refusal | None:
+        if event is Event.SELECT and self.state.armed and self.rotor_failed:
+            return Refusal(f"{selected} refused: {self.rotor_failed}")
+        missing = [need for need in self._missing() if need not in met]
+        after = following(self.state, event, selected, missing)
+        if isinstance(after, Refusal):
+            return after
+        if after != self.state and text:
+            self.say(INFO, text.format(mode=after.mode))
+        self.state = after
+        return None

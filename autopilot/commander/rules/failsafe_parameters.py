@@ -1,0 +1,157 @@
+"""The parameters of the failsafes: limits, delays and actions, under PX4's names where they mean what PX4 means."""
+
+from collections.abc import Mapping
+from typing import NamedTuple, TypeAlias
+
+from colibri.autopilot.commander.rules.failsafe_rule import Setting
+from colibri.autopilot.commander.rules.failsafe_table import NAMES, TABLE, Action, Condition
+from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
+
+Limits: TypeAlias = Mapping[str, float]
+"""Name of a parameter -> its value, in the parameter's unit."""
+
+GROUP = "Failsafes"
+_US = 1e6
+
+
+class Number(NamedTuple):
+    """A limit or a delay.
+
+    Attributes:
+        name: Of the parameter.
+        default: Of its value; a whole number makes one of whole numbers.
+        minimum: Least value.
+        maximum: Largest value.
+        unit: Of the value.
+        description: In a few words.
+        details: The rest.
+    """
+
+    name: str
+    default: float
+    minimum: float
+    maximum: float
+    unit: str
+    description: str
+    details: str = ""
+
+    def parameter(self) -> Parameter:
+        """Return the parameter."""
+        switch = isinstance(self.default, int)
+        return Parameter(
+            name=self.name,
+            kind=Kind.INT if switch else Kind.REAL,
+            default=self.default,
+            minimum=self.minimum,
+            maximum=self.maximum,
+            unit=self.unit,
+            decimals=2,
+            description=self.description,
+            details=self.details,
+            group=GROUP,
+            values=((0, "Disabled"), (1, "Enabled")) if switch else (),
+        )
+
+
+NUMBERS = (
+    Number("COM_ATT_LOSS_T", 0.5, 0.0, 60.0, "s", "Attitude loss delay"),
+    Number("FD_FAIL_R", 80.0, 30.0, 180.0, "deg", "Largest roll", "Beyond it the vehicle is tilted too far."),
+    Number("FD_FAIL_P", 80.0, 30.0, 180.0, "deg", "Largest pitch", "Beyond it the vehicle is tilted too far."),
+    Number("FD_FAIL_R_TTRI", 0.3, 0.02, 5.0, "s", "Tilt delay", "Of roll and of pitch."),
+    Number("COM_POS_FS_EPH", 5.0, 0.1, 400.0, "m", "Position loss limit", "Horizontal standard deviation."),
+    Number("COM_VEL_FS_EVH", 1.0, 0.1, 30.0, "m/s", "Velocity loss limit", "Horizontal standard deviation."),
+    Number("COM_POS_FS_DELAY", 1.0, 0.0, 100.0, "s", "Position loss delay"),
+    Number("COM_EST_LOSS_T", 1.0, 0.0, 60.0, "s", "Estimate loss delay"),
+    Number("BAT_LOW_THR", 0.15, 0.0, 1.0, "norm", "Low battery", "Part of its charge."),
+    Number("BAT_CRIT_THR", 0.07, 0.0, 1.0, "norm", "Critical battery", "Part of its charge."),
+    Number("BAT_EMERGEN_THR", 0.05, 0.0, 1.0, "norm", "Nearly empty battery", "Part of its charge."),
+    Number("BAT_LOW_VOLT", 0.0, 0.0, 100.0, "V", "Low battery voltage", "At its terminals; 0: not looked at."),
+    Number("BAT_CRIT_VOLT", 0.0, 0.0, 100.0, "V", "Critical battery voltage", "At its terminals; 0: not looked at."),
+    Number("BAT_EMERGEN_VOLT", 0.0, 0.0, 100.0, "V", "Nearly empty voltage", "At its terminals; 0: not looked at."),
+    Number("BAT_LOW_T", 1.0, 0.0, 120.0, "s", "Battery delay", "Voltage sags while it climbs."),
+    Number("COM_QP_LOSS_T", 0.5, 0.0, 60.0, "s", "Plan loss delay"),
+    Number("COM_LATE_T", 1.0, 0.0, 60.0, "s", "Deadline delay"),
+    Number("COM_TEL_LOSS_T", 0.5, 0.0, 60.0, "s", "Telemetry loss timeout", "The plant may be silent so long."),
+    Number("COM_DL_LOSS_T", 10.0, 0.5, 300.0, "s", "Ground station loss timeout", "All may be silent so long."),
+    Number("GF_MARGIN", 0.0, 0.0, 1000.0, "m", "Fence margin", "So close to its edge counts as a breach."),
+    Number(
+        "GF_PREDICT", 0, 0, 1, "", "Fence prediction", "Act where the vehicle would come to rest beyond the margin."
+    ),
+    Number("COM_GNSSLOSS_T", 1.0, 1.0, 300.0, "s", "GPS loss timeout"),
+)
+
+ELSEWHERE = ("COM_OF_LOSS_T", "COM_RC_LOSS_T")
+"""Delays that are parameters of the behaviour, as modes need what they speak of."""
+
+_ACTIONS: Mapping[str, str] = {
+    "COM_ATT_LOSS_ACT": "Attitude loss action",
+    "CBRK_FLIGHTTERM": "Tilt action",
+    "COM_POS_FS_ACT": "Position loss action",
+    "COM_EST_LOSS_ACT": "Estimate loss action",
+    "COM_LOW_BAT_ACT": "Battery action",
+    "COM_QP_LOSS_ACT": "Plan loss action",
+    "COM_LATE_ACT": "Deadline action",
+    "COM_TEL_LOSS_ACT": "Telemetry loss action",
+    "NAV_DLL_ACT": "Ground station loss action",
+    "GF_ACTION": "Fence action",
+    "COM_GNSSLOSS_ACT": "GPS loss action",
+    "NAV_RCL_ACT": "Pilot loss action",
+    "COM_OBL_RC_ACT": "Offboard loss action",
+}
+_BATTERY_ACTIONS = (
+    (0, "Warning"),
+    (1, "Return when low, land when critical"),
+    (2, "Land when critical"),
+    (3, "Return when critical, land when nearly empty"),
+)
+
+
+def failsafe_parameters() -> list[Parameter]:
+    """Return the parameters of limits, delays and actions."""
+    return [*(number.parameter() for number in NUMBERS), *_actions()]
+
+
+def limits(parameters: Parameters) -> Limits:
+    """Return the values of limits and delays; numbers that nobody changed keep their 64 bits."""
+    found: dict[str, float] = {}
+    for number in NUMBERS:
+        value = parameters[number.name]
+        found[number.name] = number.default if value == parameters.default(number.name) else value
+    for name in ELSEWHERE:
+        found[name] = parameters[name]
+    return found
+
+
+def settings(parameters: Parameters) -> dict[Condition, Setting]:
+    """Return what the parameters make of each row."""
+    known = limits(parameters)
+    return {
+        row.condition: Setting(
+            round(known[row.delay] * _US) if row.delay else 0,
+            dict(row.choices)[int(parameters[row.parameter])],
+        )
+        for row in TABLE
+    }
+
+
+def _actions() -> list[Parameter]:
+    rows = {row.parameter: row for row in TABLE}
+    return [
+        Parameter(
+            name=name,
+            kind=Kind.INT,
+            default=row.default,
+            minimum=min(number for number, _ in row.choices),
+            maximum=max(number for number, _ in row.choices),
+            description=_ACTIONS[name],
+            details=f"See failsafes.md: {row.condition}.",
+            group=GROUP,
+            values=_BATTERY_ACTIONS if name == "COM_LOW_BAT_ACT" else _named(row.choices),
+        )
+        for name, row in rows.items()
+        if name in _ACTIONS
+    ]
+
+
+def _named(choices: tuple[tuple[int, Action], ...]) -> tuple[tuple[int, str], ...]:
+    return tuple((number, NAMES[action].capitalize()) for number, action in choices)

@@ -1,0 +1,150 @@
+"""Failsafes: the rule that says what the vehicle does when something is lost, and which loss wins.
+
+Pure: since when each condition of `failsafe_table` holds goes in (`conditions` gathers that), an action and the lines
+to say come out. The actions are ranked; what is flown gives way to a higher one alone, until the pilot chooses a mode
+or the rotors stop.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from colibri.autopilot.commander.rules.failsafe_table import NAMES, ROWS, TABLE, Action, Condition, Row
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.mavlink.services.statustext import CRITICAL, EMERGENCY, NOTICE, WARNING
+
+CLEAR_AFTER_US = 1_000_000
+"""So long a condition must not hold before it is over: a link that comes and goes is lost once."""
+
+_SEVERITIES: Mapping[Action, int] = {
+    Action.WARN: WARNING,
+    Action.HOLD: WARNING,
+    Action.RETURN: CRITICAL,
+    Action.LAND: CRITICAL,
+    Action.DESCEND: CRITICAL,
+    Action.TERMINATE: EMERGENCY,
+}
+_RANKS: Mapping[Mode, Action] = {Mode.RETURN: Action.RETURN, Mode.LAND: Action.LAND}
+
+
+class Setting(NamedTuple):
+    """What the parameters make of a row.
+
+    Attributes:
+        delay_us: How long its condition must hold.
+        action: What is then done.
+    """
+
+    delay_us: int
+    action: Action
+
+
+class Flight(NamedTuple):
+    """What the table decides about.
+
+    Attributes:
+        armed: Whether the rotors may turn.
+        standing: Whether the vehicle stands on the ground.
+        mode: The flight mode.
+        saving: The failsafe that is flown; NONE if none is.
+    """
+
+    armed: bool
+    standing: bool
+    mode: Mode
+    saving: Action
+
+    @property
+    def rank(self) -> Action:
+        """What the vehicle does anyway: who returns need not hold, who lands need not return."""
+        return max(self.saving, _RANKS.get(self.mode, Action.NONE))
+
+
+class Memory(NamedTuple):
+    """What is remembered from one control sample to the next.
+
+    Attributes:
+        held_us: When each condition that goes on, beyond its delay, last held.
+        armed: Whether the rotors were armed.
+    """
+
+    held_us: Mapping[Condition, int] = {}
+    armed: bool = False
+
+
+class Verdict(NamedTuple):
+    """What the table decides.
+
+    Attributes:
+        memory: For the next control sample.
+        action: To begin now; NONE to go on as before.
+        said: Severities and lines.
+    """
+
+    memory: Memory
+    action: Action
+    said: tuple[tuple[int, str], ...]
+
+
+def following(
+    memory: Memory,
+    now_us: int,
+    since_us: Mapping[Condition, int],
+    settings: Mapping[Condition, Setting],
+    flight: Flight,
+) -> Verdict:
+    """Return what begins and what is over.
+
+    An action begins with its condition: a pilot who then chooses another mode is obeyed until another condition
+    begins. At each arming all that holds begins anew.
+
+    Args:
+        memory: What the sample before returned.
+        now_us: Simulated time.
+        since_us: Since when each condition holds; those that do not are not in it.
+        settings: What the parameters say.
+        flight: What is decided about.
+    """
+    held_us = {} if flight.armed and not memory.armed else _watched(memory.held_us, flight.armed)
+    begun: list[Row] = []
+    said: list[tuple[int, str]] = []
+    for row in TABLE:
+        condition, setting = row.condition, settings[row.condition]
+        began_us = since_us.get(condition)
+        holds = began_us is not None and now_us - began_us > setting.delay_us
+        if holds and setting.action is not Action.NONE and (flight.armed or row.grounded):
+            if condition not in held_us:
+                begun.append(row)
+            held_us[condition] = now_us
+        elif now_us - held_us.get(condition, now_us) >= CLEAR_AFTER_US and not (row.kept and flight.armed):
+            del held_us[condition]
+            said.append((NOTICE, f"{condition}: cleared"))
+    action, lines = _begin([(row, settings[row.condition].action) for row in begun], flight)
+    return Verdict(Memory(held_us, flight.armed), action, (*lines, *said))
+
+
+def _watched(held_us: Mapping[Condition, int], armed: bool) -> dict[Condition, int]:
+    """Return what is remembered; with the flight ends what is watched in flight alone."""
+    return {condition: at_us for condition, at_us in held_us.items() if armed or ROWS[condition].grounded}
+
+
+def _begin(begun: list[tuple[Row, Action]], flight: Flight) -> tuple[Action, list[tuple[int, str]]]:
+    """Return the highest action that goes beyond what is flown, and what to say of each condition."""
+    begins, said = Action.NONE, []
+    for row, wanted in sorted(begun, key=lambda each: -each[1]):
+        action = _fitting(wanted, flight)
+        if action is Action.WARN:
+            said.append((WARNING, f"{row.condition}: {row.warns}" if row.warns else str(row.condition)))
+        elif action > max(begins, flight.rank):
+            begins = action
+            if row.said:
+                said.append((_SEVERITIES[action], f"{row.condition}: {NAMES[action]}"))
+        elif row.said:
+            said.append((WARNING, f"{row.condition}: {NAMES[max(begins, flight.rank)]} goes on"))
+    return begins, said
+
+
+def _fitting(action: Action, flight: Flight) -> Action:
+    """Return what an action is for a vehicle on the ground: its rotors stop, or it is no more than a warning."""
+    if action is Action.WARN or not flight.armed:
+        return Action.WARN
+    return Action.TERMINATE if flight.standing else action

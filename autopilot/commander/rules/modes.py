@@ -1,0 +1,306 @@
+"""Flight modes: what each needs, how one follows another, and the numbers they have on the wire.
+
+One table of modes and one of transitions decide; `docs/modes.md` is drawn from them. The layout of custom modes is
+PX4's (main mode << 16 | sub mode << 24), which every ground station knows.
+"""
+
+from collections.abc import Sequence
+from enum import Enum, StrEnum
+from typing import NamedTuple
+
+from colibri.mavlink.wire.dialect import mav
+
+
+class Mode(StrEnum):
+    """A flight mode."""
+
+    STABILIZED = "stabilized"
+    ALTITUDE = "altitude"
+    POSITION = "position"
+    HOLD = "hold"
+    TAKEOFF = "takeoff"
+    LAND = "land"
+    RETURN = "return"
+    MISSION = "mission"
+    OFFBOARD = "offboard"
+    ORBIT = "orbit"
+    FOLLOW = "follow"
+    TRACK = "track"
+
+
+class Need(Enum):
+    """What a mode cannot do without; the value says what is missing."""
+
+    ATTITUDE_CONTROL = "the control law takes no attitude setpoints"
+    STICKS = "no MANUAL_CONTROL is heard"
+    SETPOINTS = "no offboard setpoints are heard: send them before the mode"
+    MISSION = "there is no mission"
+    INSIDE_FENCE = "the mission leads outside the geofence"
+    CIRCLE = "command DO_ORBIT says where"
+    POSITION = "the position is not known"
+    FLYING = "the vehicle is not flying"
+
+
+class Event(StrEnum):
+    """What changes the mode, or whether the rotors may turn."""
+
+    SELECT = "selected"
+    ARM = "armed"
+    DISARM = "disarmed"
+    ARRIVED = "height reached"
+    FINISHED = "finished"
+    RETURN_ITEM = "mission says return"
+    SAVED_BY_HOLD = "failsafe: hold"
+    SAVED_BY_RETURN = "failsafe: return"
+    SAVED_BY_LANDING = "failsafe: land"
+    TERMINATED = "failsafe: rotors stop"
+    TOUCHED_DOWN = "landed"
+    LEFT_STANDING = "no take-off"
+
+
+class ModeRow(NamedTuple):
+    """A mode of the table.
+
+    Attributes:
+        mode: Which.
+        main: PX4's main mode.
+        sub: PX4's sub mode.
+        standard: MAV_STANDARD_MODE, 0 where it is none.
+        needs: What it needs to be entered in flight.
+        to_arm: Whether the rotors may be armed in it.
+        selectable: Whether a ground station may choose it.
+        meaning: What it does.
+    """
+
+    mode: Mode
+    main: int
+    sub: int
+    standard: int
+    needs: tuple[Need, ...]
+    to_arm: bool
+    selectable: bool
+    meaning: str
+
+
+AUTO = 4
+
+MODES: tuple[ModeRow, ...] = (
+    ModeRow(
+        Mode.STABILIZED,
+        7,
+        0,
+        0,
+        (Need.ATTITUDE_CONTROL, Need.STICKS),
+        True,
+        True,
+        "sticks to tilt, yaw rate and thrust",
+    ),
+    ModeRow(
+        Mode.ALTITUDE,
+        2,
+        0,
+        mav.MAV_STANDARD_MODE_ALTITUDE_HOLD,
+        (Need.ATTITUDE_CONTROL, Need.STICKS),
+        True,
+        True,
+        "sticks to tilt, yaw rate and climb; height is held",
+    ),
+    ModeRow(
+        Mode.POSITION,
+        3,
+        0,
+        mav.MAV_STANDARD_MODE_POSITION_HOLD,
+        (Need.STICKS, Need.POSITION),
+        True,
+        True,
+        "sticks to velocity; place and height are held",
+    ),
+    ModeRow(
+        Mode.HOLD,
+        AUTO,
+        3,
+        0,
+        (Need.POSITION,),
+        True,
+        True,
+        "stops and stays; flies where a reposition command says",
+    ),
+    ModeRow(
+        Mode.TAKEOFF,
+        AUTO,
+        2,
+        mav.MAV_STANDARD_MODE_TAKEOFF,
+        (Need.POSITION,),
+        True,
+        True,
+        "climbs to the take-off height",
+    ),
+    ModeRow(
+        Mode.LAND,
+        AUTO,
+        6,
+        mav.MAV_STANDARD_MODE_LAND,
+        (),
+        False,
+        True,
+        "sinks here, then disarms; level, where the position is not known",
+    ),
+    ModeRow(
+        Mode.RETURN,
+        AUTO,
+        5,
+        mav.MAV_STANDARD_MODE_SAFE_RECOVERY,
+        (Need.POSITION,),
+        False,
+        True,
+        "climbs, flies home and lands",
+    ),
+    ModeRow(
+        Mode.MISSION,
+        AUTO,
+        4,
+        mav.MAV_STANDARD_MODE_MISSION,
+        (Need.MISSION, Need.INSIDE_FENCE, Need.POSITION),
+        True,
+        True,
+        "flies the uploaded mission",
+    ),
+    ModeRow(Mode.OFFBOARD, 6, 0, 0, (Need.SETPOINTS,), True, True, "follows the setpoints of a companion"),
+    ModeRow(
+        Mode.ORBIT,
+        3,
+        1,
+        mav.MAV_STANDARD_MODE_ORBIT,
+        (Need.FLYING, Need.CIRCLE, Need.POSITION),
+        False,
+        False,
+        "flies around a centre",
+    ),
+    ModeRow(
+        Mode.FOLLOW,
+        AUTO,
+        8,
+        0,
+        (Need.FLYING, Need.POSITION),
+        False,
+        True,
+        "follows the target that FOLLOW_TARGET tells",
+    ),
+    ModeRow(Mode.TRACK, AUTO, 11, 0, (Need.POSITION,), True, True, "flies the track that parameter TRACK picks"),
+)
+ROWS = {row.mode: row for row in MODES}
+
+
+class Transition(NamedTuple):
+    """A change of the state.
+
+    Attributes:
+        sources: Modes it begins in; empty for any.
+        event: What brings it about.
+        armed: Whether it needs the rotors armed.
+        target: The mode it leads to; None for the same, or the one that is selected.
+        disarms: Whether the rotors stop.
+    """
+
+    sources: tuple[Mode, ...]
+    event: Event
+    armed: bool
+    target: Mode | None
+    disarms: bool = False
+
+
+MANUAL = (Mode.STABILIZED, Mode.ALTITUDE, Mode.POSITION)
+TRANSITIONS: tuple[Transition, ...] = (
+    Transition((), Event.SELECT, armed=False, target=None),
+    Transition((), Event.ARM, armed=False, target=None),
+    Transition((Mode.LAND, Mode.RETURN, Mode.ORBIT, Mode.FOLLOW), Event.DISARM, True, Mode.HOLD, disarms=True),
+    Transition((), Event.DISARM, armed=True, target=None, disarms=True),
+    Transition((), Event.TOUCHED_DOWN, armed=True, target=Mode.HOLD, disarms=True),
+    Transition((), Event.LEFT_STANDING, armed=True, target=Mode.HOLD, disarms=True),
+    Transition((Mode.TAKEOFF,), Event.ARRIVED, armed=True, target=Mode.HOLD),
+    Transition((Mode.MISSION, Mode.TRACK), Event.FINISHED, armed=True, target=Mode.HOLD),
+    Transition((Mode.MISSION,), Event.RETURN_ITEM, armed=True, target=Mode.RETURN),
+    Transition((), Event.SAVED_BY_HOLD, armed=True, target=Mode.HOLD),
+    Transition((), Event.SAVED_BY_RETURN, armed=True, target=Mode.RETURN),
+    Transition((), Event.SAVED_BY_LANDING, armed=True, target=Mode.LAND),
+    Transition((), Event.TERMINATED, armed=True, target=Mode.HOLD, disarms=True),
+)
+
+
+class State(NamedTuple):
+    """What the tables decide about.
+
+    Attributes:
+        mode: The flight mode.
+        armed: Whether the rotors may turn.
+    """
+
+    mode: Mode
+    armed: bool
+
+
+class Refusal(NamedTuple):
+    """Why an event changes nothing."""
+
+    reason: str
+
+
+FIRST = State(Mode.HOLD, armed=False)
+
+
+def following(state: State, event: Event, selected: Mode | None, missing: Sequence[Need]) -> State | Refusal:
+    """Return the state after an event, or why there is none.
+
+    Args:
+        state: Before.
+        event: What happened.
+        selected: The mode that is selected, of SELECT.
+        missing: Needs that nothing meets now.
+    """
+    for row in TRANSITIONS:
+        if row.event is event and (not row.sources or state.mode in row.sources) and (state.armed or not row.armed):
+            break
+    else:
+        return Refusal(f"nothing follows from '{event}' in {state.mode}")
+    mode = row.target or selected or state.mode
+    if event is Event.SELECT and (state.armed or not ROWS[mode].selectable):
+        reason = first_missing(mode, missing)
+        if reason:
+            return Refusal(f"{mode} refused: {reason}")
+    if event is Event.ARM:
+        reason = first_missing(mode, missing)
+        if reason or not ROWS[mode].to_arm:
+            return Refusal(f"not armed in {mode}: {reason or 'choose another mode first'}")
+    armed = event is Event.ARM or (state.armed and not row.disarms)
+    return State(mode, armed)
+
+
+def first_missing(mode: Mode, missing: Sequence[Need]) -> str:
+    """Return the first need of a mode that nothing meets; empty if all are met."""
+    return next((need.value for need in ROWS[mode].needs if need in missing), "")
+
+
+def custom_mode(mode: Mode) -> int:
+    """Return the number of a mode in a HEARTBEAT."""
+    row = ROWS[mode]
+    return row.main << 16 | row.sub << 24
+
+
+_BY_NUMBER = {custom_mode(row.mode): row.mode for row in MODES}
+_ALIASES = {(1, 0): Mode.STABILIZED}
+"""PX4's manual mode flies a multicopter as its stabilized one does."""
+
+
+def mode_of(main: int, sub: int) -> Mode | None:
+    """Return the mode of PX4's main and sub mode; None if this vehicle has none such."""
+    return _BY_NUMBER.get(main << 16 | sub << 24, _ALIASES.get((main, sub)))
+
+
+def mode_of_custom(number: int) -> Mode | None:
+    """Return the mode of a HEARTBEAT's number."""
+    return mode_of(number >> 16 & 0xFF, number >> 24 & 0xFF) if number & 0xFFFF == 0 else None
+
+
+def mode_of_standard(standard: int) -> Mode | None:
+    """Return the mode of a MAV_STANDARD_MODE; None if this vehicle has none such."""
+    return next((row.mode for row in MODES if row.standard == standard and standard), None)

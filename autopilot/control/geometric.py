@@ -1,0 +1,173 @@
+"""A geometric tracking controller on SE(3), as a baseline beside the LPV-MPC.
+
+Source: T. Lee, M. Leok, N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010; their
+equation numbers in brackets. The frames are ours (ENU, FLU, thrust along +z), so gravity and thrust change sign.
+
+Tuned as three critically damped second-order loops, each well below the next faster one: the position's gains are
+ω² and 2ω times the mass, the attitude's ω² and 2ω times the inertia.
+"""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import AttitudeDemand, Clock, Decision, Horizon, Preview, VehicleState
+from colibri.autopilot.control.settings import ControlInterval, interval_us
+from colibri.autopilot.control.vehicle_model.mixer import Mixer
+from colibri.common.compiled_rotations import quaternion_from_euler
+from colibri.common.config import Positive, Table, read_settings
+from colibri.common.elementary import square
+from colibri.common.kernels import asin, atan2, cos, sin
+from colibri.common.matrices import dot, matmul, matvec, norm
+from colibri.common.rotations import nearest_turn, rotation_matrix
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+_LEAST_FORCE = 0.05
+"""The demanded force never falls below this part of the weight: its direction would mean nothing."""
+
+
+class GeometricSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The natural frequencies of its three loops."""
+
+    control_interval_s: ControlInterval
+    position_frequency_rad_s: Positive
+    attitude_frequency_rad_s: Positive
+    yaw_frequency_rad_s: Positive
+
+
+class Target(NamedTuple):
+    """The attitude to be tracked: rotation R_d (3, 3) and its body rates Ω_d, rad/s, (3,)."""
+
+    rotation: Array
+    rate: Array
+
+
+class GeometricController:
+    """The control law.
+
+    Attributes:
+        control_interval_us: The control sample.
+        preview: Now.
+    """
+
+    def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
+        """Control `vehicle` as the profile's `table` says.
+
+        Raises:
+            SettingsError: The table is wrong.
+        """
+        del clock
+        settings = read_settings(table, GeometricSettings)
+        self.control_interval_us = interval_us(settings.control_interval_s)
+        self.preview = Preview(self.control_interval_us, 1)
+        self._mass_kg = vehicle.body.mass_kg
+        self._gravity_m_s2 = vehicle.gravity_m_s2
+        self._inertia = np.array(vehicle.body.inertia_kg_m2)
+        self._k_position = square(settings.position_frequency_rad_s)
+        self._k_velocity = 2.0 * settings.position_frequency_rad_s
+        frequencies = np.array([settings.attitude_frequency_rad_s] * 2 + [settings.yaw_frequency_rad_s])
+        self._k_rotation = self._inertia * frequencies**2
+        self._k_rate = self._inertia * 2.0 * frequencies
+        self._mixer = Mixer(vehicle)
+
+    def initial(self, rotor_speed: float) -> None:
+        """Remember nothing."""
+        del rotor_speed
+
+    def step(self, memory: None, time_us: int, state: VehicleState, references: Horizon) -> tuple[None, Decision]:
+        """Decide the rotor speeds to hold until the next control sample."""
+        del memory, time_us
+        R = np.array(rotation_matrix(state.attitude))
+        rate = np.array(state.rate_flu_rad_s)
+        acceleration, jerk = self._demand(state, references, R)
+        target = track_direction(acceleration, jerk, float(references.yaw_rad[0]), float(references.yaw_rate_rad_s[0]))
+        thrust_n = self._mass_kg * dot(acceleration, R[:, 2])  # [15]
+        moment_n_m = self._moment(R, rate, target)
+        speeds = self._mixer.rotor_speeds(np.array([max(thrust_n, 0.0), *moment_n_m]))
+        return None, Decision(speeds, euler_of(target.rotation, float(references.yaw_rad[0])))
+
+    def step_attitude(
+        self, memory: None, time_us: int, state: VehicleState, demand: AttitudeDemand
+    ) -> tuple[None, Decision]:
+        """Decide the same for an attitude and a thrust."""
+        del memory, time_us
+        phi, theta, psi = demand.angles[0].tolist()
+        R = np.array(rotation_matrix(state.attitude))
+        target = Target(
+            np.array(rotation_matrix(quaternion_from_euler(phi, theta, psi))),
+            body_rate_of(phi, theta, demand.angle_rates_rad_s[0]),
+        )
+        moment_n_m = self._moment(R, np.array(state.rate_flu_rad_s), target)
+        speeds = self._mixer.rotor_speeds(np.array([max(float(demand.thrust_n[0]), 0.0), *moment_n_m]))
+        return None, Decision(speeds, (phi, theta, psi))
+
+    def _demand(self, state: VehicleState, references: Horizon, R: Array) -> tuple[Array, Array]:
+        """Return the specific force wanted, m/s², [15], and its derivative along the motion, m/s³."""
+        gravity = np.array([0.0, 0.0, self._gravity_m_s2])
+        position_error = np.array(state.position_enu_m) - references.position_enu_m[0]
+        velocity_error = np.array(state.velocity_enu_m_s) - references.velocity_enu_m_s[0]
+        wanted = references.acceleration_enu_m_s2[0]
+        force = -self._k_position * position_error - self._k_velocity * velocity_error + wanted + gravity
+        floor = _LEAST_FORCE * self._gravity_m_s2
+        if norm(force) < floor:
+            force = floor * R[:, 2]
+        lifted = dot(force, R[:, 2]) * R[:, 2] - gravity
+        jerk = -self._k_position * velocity_error - self._k_velocity * (lifted - wanted) + references.jerk_enu_m_s3[0]
+        return force, jerk
+
+    def _moment(self, R: Array, rate: Array, target: Target) -> Array:
+        """Return the moment, N m, [16], but for the angular acceleration of the target."""
+        difference = matmul(target.rotation.T, R)
+        rotation_error = 0.5 * vee(difference - difference.T)  # [10]
+        carried = matvec(difference.T, target.rate)
+        rate_error = rate - carried  # [11]
+        feedback = -self._k_rotation * rotation_error - self._k_rate * rate_error
+        gyroscopic = np.cross(rate, self._inertia * rate) - self._inertia * np.cross(rate, carried)
+        moment: Array = feedback + gyroscopic
+        return moment
+
+
+def track_direction(force: Array, force_rate: Array, yaw_rad: float, yaw_rate_rad_s: float) -> Target:
+    """Return the attitude whose z axis lies along `force` and whose heading is `yaw_rad`, and how fast it turns.
+
+    Args:
+        force: Specific force, m/s², ENU, (3,).
+        force_rate: Its derivative, m/s³, (3,).
+        yaw_rad: Heading wanted, from east.
+        yaw_rate_rad_s: Its derivative.
+    """
+    heading = np.array([cos(yaw_rad), sin(yaw_rad), 0.0])
+    heading_rate = yaw_rate_rad_s * np.array([-heading[1], heading[0], 0.0])
+    z, z_rate = _unit(force, force_rate)
+    y, y_rate = _unit(np.cross(z, heading), np.cross(z_rate, heading) + np.cross(z, heading_rate))
+    x, x_rate = np.cross(y, z), np.cross(y_rate, z) + np.cross(y, z_rate)
+    rotation = np.column_stack([x, y, z])
+    return Target(rotation, vee(matmul(rotation.T, np.column_stack([x_rate, y_rate, z_rate]))))
+
+
+def euler_of(rotation: Array, near_yaw_rad: float) -> tuple[float, float, float]:
+    """Return phi, theta, psi, rad, of a rotation matrix, psi within half a turn of `near_yaw_rad`."""
+    phi = atan2(rotation[2, 1], rotation[2, 2])
+    theta = asin(min(max(-rotation[2, 0], -1.0), 1.0))
+    psi = atan2(rotation[1, 0], rotation[0, 0])
+    return phi, theta, nearest_turn(psi, near_yaw_rad)
+
+
+def body_rate_of(phi: float, theta: float, angle_rates: Array) -> Array:
+    """Return p, q, r, rad/s, (3,), of Euler-angle rates (3,): the inverse of THESIS [2.7]."""
+    s, c, st, ct = sin(phi), cos(phi), sin(theta), cos(theta)
+    return matvec(np.array([[1.0, 0.0, -st], [0.0, c, s * ct], [0.0, -s, c * ct]]), angle_rates)
+
+
+def vee(skew: Array) -> Array:
+    """Return the vector of a skew-symmetric matrix."""
+    return np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+
+
+def _unit(vector: Array, rate: Array) -> tuple[Array, Array]:
+    """Return a vector's direction and how fast that turns."""
+    length = norm(vector)
+    unit = vector / length
+    return unit, (rate - unit * dot(unit, rate)) / length

@@ -1,0 +1,197 @@
+"""The interface of a control law, and where control laws are found.
+
+A control law is a class that a package registers under the entry point group `colibri.controllers`. Its instances are
+given the vehicle's state and the references ahead once a control sample, and return the rotor speeds to hold until the
+next. What they remember they return too: a controller has no state of its own, so the same inputs give the same flight.
+"""
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
+
+from colibri.autopilot.control.qp import QpStatus
+from colibri.common.types import Array, Quaternion, Vector
+
+Clock: TypeAlias = Callable[[], float]
+"""Returns seconds. A control law may measure itself with it; it must decide nothing by it."""
+Memory = TypeVar("Memory")
+
+
+class Preview(NamedTuple):
+    """Which references a control law wants at each control sample.
+
+    Attributes:
+        interval_us: Time between two references, µs. The first is that of the interval that now lies in.
+        samples: How many.
+    """
+
+    interval_us: int
+    samples: int
+
+
+class Horizon(NamedTuple):
+    """References from now on, as far apart as the preview asks.
+
+    Attributes:
+        position_enu_m: (n, 3), m, ENU.
+        velocity_enu_m_s: (n, 3), m/s, ENU.
+        acceleration_enu_m_s2: (n, 3), m/s², ENU; zero where planned by differences.
+        jerk_enu_m_s3: (n, 3), m/s³, ENU; zero where planned by differences.
+        snap_enu_m_s4: (n, 3), m/s⁴, ENU; zero where planned by differences.
+        yaw_rad: (n,), rad, counter-clockwise from east, unwrapped.
+        yaw_rate_rad_s: (n,), rad/s; zero where planned by differences, or where yaw is held for want of a direction.
+        yaw_acceleration_rad_s2: (n,), rad/s²; zero where planned by differences, or where yaw is held.
+    """
+
+    position_enu_m: Array
+    velocity_enu_m_s: Array
+    acceleration_enu_m_s2: Array
+    jerk_enu_m_s3: Array
+    snap_enu_m_s4: Array
+    yaw_rad: Array
+    yaw_rate_rad_s: Array
+    yaw_acceleration_rad_s2: Array
+
+
+class AttitudeDemand(NamedTuple):
+    """An attitude to hold and a thrust to make, from now on, as far apart as the preview asks.
+
+    Attributes:
+        angles: phi, theta, psi, rad, psi unwrapped, (n, 3).
+        angle_rates_rad_s: Their derivatives, (n, 3).
+        thrust_n: Along the body's z axis, N, (n,).
+    """
+
+    angles: Array
+    angle_rates_rad_s: Array
+    thrust_n: Array
+
+
+class VehicleState(NamedTuple):
+    """What a control law knows of the vehicle.
+
+    Attributes:
+        position_enu_m: Position, m, ENU.
+        velocity_enu_m_s: Velocity, m/s, ENU.
+        attitude: Unit quaternion wxyz, FLU body to ENU earth.
+        euler: phi, theta, psi in rad, psi unwrapped.
+        rate_flu_rad_s: Body rates p, q, r, rad/s, FLU.
+    """
+
+    position_enu_m: Vector
+    velocity_enu_m_s: Vector
+    attitude: Quaternion
+    euler: Vector
+    rate_flu_rad_s: Vector
+
+
+class Fallback(StrEnum):
+    """What decided in place of a solved QP."""
+
+    SHIFTED_PLAN = "shifted plan"
+    LQR = "LQR"
+    DESCENT = "level and descend"
+    RECOVERY = "recovery"
+    THREE_ROTORS = "three rotors"
+
+
+STATUS_CODES: dict[QpStatus | None, int] = {None: -1} | {status: code for code, status in enumerate(QpStatus)}
+"""How logs and telemetry write the status of a QP: 0 is solved, -1 no QP."""
+FALLBACK_CODES: dict[Fallback | None, int] = {None: -1} | {fallback: code for code, fallback in enumerate(Fallback)}
+"""How they write a fallback: -1 is none."""
+
+
+class Active(NamedTuple):
+    """How many constraints of each kind bind at the solution."""
+
+    rotors: int = 0
+    increments: int = 0
+    angles: int = 0
+    rates: int = 0
+
+
+class Diagnostics(NamedTuple):
+    """How a decision came about; a control law without a QP leaves the defaults.
+
+    Attributes:
+        qp_status: How the QP ended; None if there was none.
+        fallback: What decided in its place; None if it was solved, or there was none.
+        solve_time_s: Time that the QP took, s.
+        cost: The QP's objective at its solution.
+        active: Constraints that bind at the solution.
+        slack: By how much soft limits are exceeded, in parts of each: the largest.
+        predicted: Outputs predicted over the horizon, (N, p), in the order and units that the control law documents.
+        planned_squared: Squared rotor speeds that the plan commands at each step, in parts of the largest, (N, 4).
+    """
+
+    qp_status: QpStatus | None = None
+    fallback: Fallback | None = None
+    solve_time_s: float = 0.0
+    cost: float = 0.0
+    active: Active = Active()
+    slack: float = 0.0
+    predicted: Array | None = None
+    planned_squared: Array | None = None
+
+
+class Decision(NamedTuple):
+    """What a control law decided.
+
+    Attributes:
+        rotor_speeds: In the vehicle's unit and rotor order, within its limits, (4,).
+        attitude_reference: phi, theta, psi that the attitude is steered to, rad.
+        diagnostics: How it came about.
+    """
+
+    rotor_speeds: Array
+    attitude_reference: Vector
+    diagnostics: Diagnostics = Diagnostics()
+
+
+@runtime_checkable
+class Controller(Protocol[Memory]):
+    """A control law.
+
+    Attributes:
+        control_interval_us: Time between two control samples: whole milliseconds.
+        preview: The references it wants.
+    """
+
+    control_interval_us: int
+    preview: Preview
+
+    def initial(self, rotor_speed: float) -> Memory:
+        """Return what the law remembers before its first sample, every rotor at `rotor_speed` (vehicle's unit)."""
+        ...
+
+    def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
+        """Decide the rotor speeds to hold until the next control sample.
+
+        Args:
+            memory: What the step before returned.
+            time_us: Simulated time, µs, a multiple of the control interval.
+            state: The vehicle now.
+            references: The references that `preview` asks for.
+        """
+        ...
+
+
+@runtime_checkable
+class AttitudeController(Controller[Memory], Protocol[Memory]):
+    """A control law that can also be told an attitude; one that cannot simply flies no mode that needs it.
+
+    Its two ways to decide share what they remember: a flight may change between them at any sample.
+    """
+
+    def step_attitude(
+        self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
+    ) -> tuple[Memory, Decision]:
+        """Decide the rotor speeds to hold until the next control sample.
+
+        Args:
+            memory: What the step before returned, of either kind.
+            time_us: Simulated time, µs, a multiple of the control interval.
+            state: The vehicle now.
+            demand: At the samples that `preview` asks for.
+        """
+        ...

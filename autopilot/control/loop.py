@@ -1,0 +1,182 @@
+"""The control loop: what the state frames tell, one control law, and the rotor command between its samples."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import (
+    AttitudeController,
+    AttitudeDemand,
+    Clock,
+    Controller,
+    Decision,
+    Horizon,
+    VehicleState,
+)
+from colibri.autopilot.control.profile import Profile, ProfileError
+from colibri.autopilot.control.registry import check_controller, check_rotor_speeds, load_controller
+from colibri.autopilot.control.vehicle_model.battery import believed
+from colibri.common.compiled_rotations import euler_from_quaternion
+from colibri.common.config import SettingsError
+from colibri.common.rotations import nearest_turn
+from colibri.common.serialization import of_bytes, to_bytes
+from colibri.common.types import Array
+from colibri.mavlink.hil.state import StateFrame
+from colibri.plant.vehicle.description import Vehicle
+
+
+class LoopRecord(NamedTuple):
+    """What a control loop needs to go on after a restart, as plain data.
+
+    Attributes:
+        yaw_rad: Unwrapped.
+        controls: Rotor speeds commanded, in parts of the largest.
+        memory: Bytes of the control law's memory; empty where that is not plain data.
+    """
+
+    yaw_rad: float
+    controls: tuple[float, float, float, float]
+    memory: bytes
+
+
+class ControlLoop:
+    """One control law flying one vehicle.
+
+    Attributes:
+        vehicle: That it controls.
+        preview: The references that the law wants.
+        control_interval_us: Its sample.
+        frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
+        takes_attitude: Whether the law can be told an attitude and a thrust.
+        controls: Rotor speeds commanded now, in parts of the largest.
+    """
+
+    def __init__(self, profile: Profile, vehicle: Vehicle, clock: Clock) -> None:
+        """Control `vehicle` as `profile` says; `clock` only measures, it decides nothing.
+
+        Raises:
+            ControllerError: The profile's control law cannot be used.
+            ProfileError: Its table is wrong.
+            SolverError: Its solver cannot be used.
+        """
+        self._name = profile.controller
+        self._controller = _build(profile, vehicle, clock)
+        self.vehicle = vehicle
+        self.preview = self._controller.preview
+        self.takes_attitude = isinstance(self._controller, AttitudeController)
+        self.control_interval_us = self._controller.control_interval_us
+        self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
+        self._memory: Any = None
+        self._told_ah = 0.0
+        self._is_plain = True
+        self._yaw_rad = 0.0
+        self.controls = (0.0, 0.0, 0.0, 0.0)
+
+    def begin(self, rotor_speed: float, yaw_rad: float, *, afresh: bool = True) -> None:
+        """Begin with every rotor at `rotor_speed` (the vehicle's unit), yaw unwrapped near `yaw_rad`.
+
+        Unless all begins `afresh`, a law that remembers its battery goes on with the charge that is left; else with
+        what the battery has told of it.
+        """
+        before, self._memory = self._memory, self._controller.initial(rotor_speed)
+        if hasattr(before, "charge_ah") and not afresh:
+            self._memory = self._memory._replace(charge_ah=before.charge_ah)
+        elif hasattr(self._memory, "charge_ah"):
+            self._memory = self._memory._replace(charge_ah=self._told_ah)
+        self._yaw_rad = yaw_rad
+        self._command(np.full(4, rotor_speed))
+
+    def know_charge(self, used_ah: float) -> None:
+        """Take in the charge that the battery itself tells, Ah: a law that remembers another goes on with this."""
+        self._told_ah = used_ah
+        if hasattr(self._memory, "charge_ah"):
+            charge_ah = believed(self._memory.charge_ah, used_ah, self.vehicle)
+            self._memory = self._memory._replace(charge_ah=charge_ah)
+
+    def record(self) -> LoopRecord:
+        """Return what is remembered; a law of somebody else's may remember what cannot be kept."""
+        memory = b""
+        if self._is_plain:
+            try:
+                memory = to_bytes(self._memory)
+            except TypeError:
+                self._is_plain = False
+        return LoopRecord(self._yaw_rad, self.controls, memory)
+
+    def resume(self, record: LoopRecord, *, closely: bool) -> None:
+        """Go on with what was remembered: `closely`, or as one begins in mid-flight, with the charge that is left."""
+        hover_speed = self.vehicle.hover_speed
+        first = self._controller.initial(hover_speed)
+        kept = of_bytes(type(first), record.memory)
+        self._memory = first if kept is None else kept
+        if closely and kept is not None:
+            self._yaw_rad, self.controls = record.yaw_rad, record.controls
+        else:
+            self.begin(hover_speed, record.yaw_rad, afresh=False)
+
+    def is_due(self, time_us: int) -> bool:
+        """Whether a control sample is at `time_us`."""
+        return time_us % self.control_interval_us == 0
+
+    def state(self, frame: StateFrame) -> VehicleState:
+        """Unwrap yaw by continuity: a quaternion forgets full turns."""
+        phi, theta, psi = euler_from_quaternion(frame.attitude)
+        self._yaw_rad = nearest_turn(psi, self._yaw_rad)
+        euler = (phi, theta, self._yaw_rad)
+        return VehicleState(frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
+
+    def decide(self, time_us: int, state: VehicleState, references: Horizon) -> Decision:
+        """Decide the rotor speeds to hold until the next control sample.
+
+        Raises:
+            DecisionError: The control law gave what no rotor can follow.
+        """
+        self._memory, decision = self._controller.step(self._memory, time_us, state, references)
+        self._command(decision.rotor_speeds)
+        return decision
+
+    def decide_attitude(self, time_us: int, state: VehicleState, demand: AttitudeDemand) -> Decision:
+        """Decide the rotor speeds by which a law that takes attitudes follows `demand`.
+
+        Raises:
+            DecisionError: The control law gave what no rotor can follow.
+        """
+        assert isinstance(self._controller, AttitudeController), "asked for only where attitudes are taken"
+        self._memory, decision = self._controller.step_attitude(self._memory, time_us, state, demand)
+        self._command(decision.rotor_speeds)
+        return decision
+
+    def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
+        """Go on with a law of the same kind and rhythm, built from other numbers; it takes over what is remembered."""
+        self._controller = controller
+        self.vehicle = vehicle
+
+    def _command(self, rotor_speeds: Array) -> None:
+        check_rotor_speeds(self._name, rotor_speeds, self.vehicle.rotors.max_speed)
+        c1, c2, c3, c4 = (rotor_speeds / self.vehicle.rotors.max_speed).tolist()
+        self.controls = (c1, c2, c3, c4)
+
+
+def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
+    """Return the longest interval of whole milliseconds that divides the control interval, as short as asked for."""
+    wanted_s = profile.simulation.frame_interval_s
+    if wanted_s is None:
+        return control_interval_us
+    control_ms, wanted_ms = control_interval_us // 1000, round(wanted_s * 1e6) // 1000
+    return 1000 * max(ms for ms in range(1, control_ms + 1) if control_ms % ms == 0 and ms <= wanted_ms)
+
+
+def _build(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:
+    factory = load_controller(profile.controller)
+    try:
+        controller = factory(profile.table(profile.controller), vehicle, clock)
+    except SettingsError as error:
+        if profile.controller not in profile.controllers:
+            known = ", ".join(profile.controllers)
+            raise ProfileError(
+                f"profile {profile.name} has no numbers for controller {profile.controller}, only for {known}: "
+                f"choose another profile, or add a table controllers.{profile.controller} to a copy of it"
+            ) from error
+        raise ProfileError(f"profile {profile.name}: controllers.{profile.controller}: {error}") from error
+    check_controller(profile.controller, controller)
+    return controller

@@ -1,0 +1,1 @@
+"""The flight profile's law: position with preview, attitude by constrained LPV-MPC, fallbacks."""

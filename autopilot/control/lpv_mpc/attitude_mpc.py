@@ -1,0 +1,300 @@
+"""The attitude LPV-MPC: predicts, condenses, solves, and says what it planned."""
+
+from math import radians
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from colibri.autopilot.control.interface import Active, Clock, Diagnostics
+from colibri.autopilot.control.lpv_mpc import condensing, prediction
+from colibri.autopilot.control.lpv_mpc.prediction import INPUTS, STATES
+from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus
+from colibri.autopilot.control.riccati import lqr
+from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
+from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag
+from colibri.common.config import Count, Degrees, Positive, Table
+from colibri.common.elementary import square
+from colibri.common.matrices import matmul, matvec
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+PerAxis: TypeAlias = tuple[Positive, Positive, Positive]
+
+_BINDING = 1e-6
+"""A limit counts as active where this part of it or less is left."""
+_MOST_SLACK = 100.0
+_KEPT = 1e-3
+"""A limit of the tilt that is exceeded by this part of it or less counts as kept."""
+
+
+class AttitudeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The attitude LPV-MPC."""
+
+    moves: tuple[Count, ...]
+    """Steps that each planned moment is held for; the horizon is their sum."""
+    scheduling: Literal["frozen", "along-plan"]
+    """At the present state, or along the last plan."""
+    output_weight: PerAxis
+    increment_weight: PerAxis
+    largest_increment_n_m: PerAxis
+    largest_angle_deg: Degrees
+    """Of the tilt, and of phi and theta each."""
+    largest_rate_rad_s: PerAxis
+    check_every: Count
+    """Steps between those at which angles and rates are limited."""
+    slack_weight: Positive
+
+
+class Situation(NamedTuple):
+    """What a plan begins with.
+
+    Attributes:
+        x: The state of `prediction`, (9,).
+        u: Moments last commanded, N m, (3,).
+        disturbance_n_m: Moment that the model does not explain, (3,).
+        momentum: h of the rotors along body z, N m s.
+        fastest: Largest rotor speed that can be had, in parts of the vehicle's largest.
+    """
+
+    x: Array
+    u: Array
+    disturbance_n_m: Array
+    momentum: float
+    fastest: float
+
+
+class Target(NamedTuple):
+    """What a plan is to reach.
+
+    Attributes:
+        angles: phi, theta, psi after each step, rad, (N, 3).
+        end: State and moments at the end of the horizon, (12,).
+        thrust_n: U1 commanded at each step, N, (N,).
+    """
+
+    angles: Array
+    end: Array
+    thrust_n: Array
+
+
+class Plan(NamedTuple):
+    """A solved QP.
+
+    Attributes:
+        moments: Commanded at each step, N m, (N, 3).
+        states: Predicted, (N + 1, 9).
+        angle_slack: Part by which the limit of tilt, phi and theta is exceeded.
+    """
+
+    moments: Array
+    states: Array
+    angle_slack: float
+
+
+class AttitudeMpc:
+    """LPV-MPC of roll, pitch and yaw, within the limits of the rotors.
+
+    Attributes:
+        horizon: N.
+    """
+
+    def __init__(
+        self,
+        settings: AttitudeSettings,
+        vehicle: Vehicle,
+        lag: RotorLag,
+        solver: QpSolver,
+        interval_s: float,
+        clock: Clock,
+    ) -> None:
+        """Control `vehicle` every `interval_s`; `clock` only measures, it decides nothing."""
+        self.horizon = sum(settings.moves)
+        self._body = body_of(vehicle)
+        self._interval_s = interval_s
+        self._solver = solver
+        self._clock = clock
+        self._along_plan = settings.scheduling == "along-plan"
+        self._starts = np.cumsum((0, *settings.moves[:-1]))
+        self._checked = np.arange(settings.check_every, self.horizon + 1, settings.check_every)
+        self._output_weight = np.array(settings.output_weight)
+        self._increment_weight = np.array(settings.increment_weight)
+        angle = radians(settings.largest_angle_deg)
+        self._limits = np.array([angle, angle, *settings.largest_rate_rad_s])
+        self._lag = lag
+        self._vehicle = vehicle
+        self._from_thrust, self._from_moments = squared_speeds_from(vehicle)
+        terminal_weight, self._gain = self._riccati()
+        self._weights = (self._output_weight, terminal_weight, self._increment_weight)
+        self._prepare(settings)
+
+    def _prepare(self, settings: AttitudeSettings) -> None:
+        """Make the arrays that every QP fills anew, and the parts that never change."""
+        moved = INPUTS * len(settings.moves)
+        n = moved + condensing.SLACKS
+        self._rotor_rows = 2 * condensing.ROTORS * len(settings.moves)
+        rows = self._rotor_rows + condensing.MOTION_ROWS * len(self._checked)
+        self._schedule = np.empty((self.horizon, len(prediction.SCHEDULE)))
+        self._responses = np.zeros((self.horizon + 1, STATES, 1 + moved))
+        self._H, self._f = np.zeros((n, n)), np.zeros(n)
+        self._H[moved:, moved:] = settings.slack_weight * np.eye(condensing.SLACKS)
+        self._f[moved:] = settings.slack_weight
+        self._G, self._h = np.zeros((rows, n)), np.zeros(rows)
+        self._largest_increment = np.array(settings.largest_increment_n_m)
+        largest = np.concatenate([self._largest_increment] * len(settings.moves))
+        self._lower = np.concatenate([-largest, np.zeros(condensing.SLACKS)])
+        self._upper = np.concatenate([largest, np.full(condensing.SLACKS, _MOST_SLACK)])
+
+    def plan(self, now: Situation, target: Target, ahead: Array | None) -> tuple[Plan | None, Diagnostics]:
+        """Plan from `now` towards `target`; no plan where the QP is not solved.
+
+        The thrust leaves the rotors only a part of the moments that they could make. Where no plan with these keeps the
+        tilt within its limit, thrust gives way: a second plan has the thrust that leaves most for moments.
+
+        Args:
+            now: What the plan begins with.
+            target: What it is to reach.
+            ahead: States that the last plan has at the samples after this one, (n, 9); None without one.
+        """
+        self.predict(now, ahead)
+        plan, diagnostics = self._solve(now, target)
+        if plan is None or plan.angle_slack <= _KEPT:
+            return plan, diagnostics
+        less_thrust = target._replace(thrust_n=np.minimum(target.thrust_n, self._middle_thrust_n(now)))
+        second, how = self._solve(now, less_thrust)
+        how = how._replace(solve_time_s=diagnostics.solve_time_s + how.solve_time_s)
+        return (second, how) if second is not None else (plan, diagnostics)
+
+    def _middle_thrust_n(self, now: Situation) -> float:
+        """Return the thrust, N, that leaves the rotors most for moments of either sign."""
+        middle = 0.5 * (square(self._lag.least) + square(now.fastest))
+        return middle / float(self._from_thrust.max())
+
+    def _solve(self, now: Situation, target: Target) -> tuple[Plan | None, Diagnostics]:
+        """Plan from the responses predicted last."""
+        qp = self.condense(now, target)
+        started_s = self._clock()
+        status, z = self._solver.solve(qp)
+        solve_time_s = self._clock() - started_s
+        if z is None:
+            return None, Diagnostics(status, solve_time_s=solve_time_s)
+        return self.read(now, target, qp, z, solve_time_s)
+
+    def predict(self, now: Situation, ahead: Array | None) -> None:
+        """Predict the responses, scheduled along the last plan if there is one."""
+        if ahead is not None and len(ahead) and self._along_plan:
+            prediction.schedule_along(now.x, ahead, self._schedule)
+        else:
+            self._schedule[:] = now.x[list(prediction.SCHEDULE)]
+        prediction.respond(
+            now.x,
+            now.u,
+            now.disturbance_n_m,
+            self._schedule,
+            now.momentum,
+            self._body,
+            self._starts,
+            self._interval_s,
+            self._responses,
+        )
+
+    def condense(self, now: Situation, target: Target) -> Qp:
+        """Condense what was predicted to a QP; it lies in arrays that the next one overwrites.
+
+        The first move may always take back the moments last commanded, however large a fallback left them: without
+        them the rotors make the thrust alone, so that the hard limits can always be kept.
+        """
+        condensing.condense(
+            self._responses,
+            self._schedule,
+            target,
+            now.u,
+            self._weights,
+            self._from_moments,
+            self._from_thrust,
+            self._starts,
+            self._checked,
+            self._limits,
+            self._largest_increment,
+            square(self._lag.least),
+            square(now.fastest),
+            self._H,
+            self._f,
+            self._G,
+            self._h,
+            self._lower,
+            self._upper,
+        )
+        return Qp(self._H, self._f, self._G, self._h, self._lower, self._upper)
+
+    def read(self, now: Situation, target: Target, qp: Qp, z: Array, solve_time_s: float) -> tuple[Plan, Diagnostics]:
+        """Return the plan that the QP's solution `z` (n,) stands for, and what there is to say of it."""
+        states, moments = np.empty((self.horizon + 1, STATES)), np.empty((self.horizon, INPUTS))
+        squared = np.empty((self.horizon, condensing.ROTORS))
+        condensing.read_plan(
+            self._responses,
+            self._starts,
+            now.u,
+            z,
+            target.thrust_n,
+            self._from_thrust,
+            self._from_moments,
+            states,
+            moments,
+            squared,
+        )
+        active = condensing.count_active(qp.G, qp.h, self._lower, self._upper, z, self._rotor_rows, _BINDING)
+        diagnostics = Diagnostics(
+            QpStatus.SOLVED,
+            solve_time_s=solve_time_s,
+            cost=condensing.objective(qp.H, qp.f, z),
+            active=Active(*active),
+            slack=max(z[-condensing.SLACKS :].tolist()),
+            predicted=states,
+            planned_squared=squared,
+        )
+        return Plan(moments, states, float(z[-condensing.SLACKS + condensing.ANGLE_SLACK])), diagnostics
+
+    def lqr(self, now: Situation, target: Target) -> Array:
+        """Return the moments, N m, (3,), of the unconstrained law at hover that the terminal weight belongs to."""
+        state = np.concatenate([now.x, now.u])
+        wanted = target.end.copy()
+        wanted[list(prediction.ANGLES)] = target.angles[0]
+        moments: Array = now.u - matvec(self._gain, state - wanted)
+        return moments
+
+    def _riccati(self) -> tuple[Array, Array]:
+        """Return S (12, 12) and K (3, 12) of the LQR at hover on state and last moments, for the same Q and R."""
+        A = self._hover_transition()
+        B = A[:, STATES:]
+        C = np.zeros((INPUTS, STATES + INPUTS))
+        C[range(INPUTS), prediction.ANGLES] = 1.0
+        Q, R = matmul(C.T * self._output_weight, C), np.diag(self._increment_weight).copy()
+        S, K = lqr(A, B, Q, R)
+        return 0.5 * (S + S.T), K
+
+    def _hover_transition(self) -> Array:
+        """Return Ã = [[A, B], [0, I]] of one step at hover, (12, 12)."""
+        A = np.eye(STATES + INPUTS)
+        responses = np.zeros((2, STATES, 1 + INPUTS))
+        level, never = np.zeros((1, len(prediction.SCHEDULE))), np.zeros(1, dtype=np.int64)
+        nothing = np.zeros(INPUTS)
+        for state in range(STATES):
+            prediction.respond(
+                np.eye(STATES)[state], nothing, nothing, level, 0.0, self._body, never, self._interval_s, responses
+            )
+            A[:STATES, state] = responses[1, :, 0]
+        A[:STATES, STATES:] = responses[1, :, 1:]
+        return A
+
+
+def body_of(vehicle: Vehicle) -> prediction.Body:
+    """Return what the model knows of `vehicle`: its moments follow like the slower of its rotors' two lags."""
+    lag = vehicle.rotors.lag
+    lag_1_s = 1.0 / max(lag.time_constant_up_s, lag.time_constant_down_s) if lag else 0.0
+    return prediction.Body(*vehicle.body.inertia_kg_m2, lag_1_s)
+
+
+def squared_speeds_from(vehicle: Vehicle) -> tuple[Array, Array]:
+    """Return what maps U1 (4,) and U2, U3, U4 (4, 3) to squared rotor speeds, in parts of the largest."""
+    inverse = exact_inverse(vehicle.allocation()) / square(vehicle.rotors.max_speed)
+    return inverse[:, 0].copy(), inverse[:, 1:].copy()

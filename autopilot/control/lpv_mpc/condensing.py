@@ -1,0 +1,372 @@
+"""The constrained MPC's QP, condensed to the increments and two slacks, as compiled kernels.
+
+    z = [Δu at each move, angle slack, rate slack]
+    min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
+
+The cost is the thesis's [3.13-3.20], its terminal weight a full matrix on state and input.
+"""
+
+from math import sqrt
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, STATES, P, Q, R
+from colibri.common.jit import compiled
+from colibri.common.kernels import atan2, cos, sin
+from colibri.common.matrices import matmul
+from colibri.common.types import Array
+
+Integers: TypeAlias = NDArray[np.int64]
+
+SLACKS = 2
+ANGLE_SLACK, RATE_SLACK = 0, 1
+ROTORS = 4
+LIMITED = 5
+"""Softly limited on both sides: phi and theta with one slack, which the tilt shares; p, q and r with the other."""
+_TWO_SIDES = 2
+MOTION_ROWS = 1 + _TWO_SIDES * LIMITED
+"""Of each step that is checked: tilt, then both sides of phi, theta, p, q and r."""
+_ANGLE_ROWS = 1 + _TWO_SIDES * 2
+_NO_TILT = 1e-9
+
+
+@compiled
+def quadratic_cost(
+    responses: Array,
+    angles: Array,
+    terminal: Array,
+    u: Array,
+    output_weight: Array,
+    terminal_weight: Array,
+    increment_weight: Array,
+    H: Array,
+    f: Array,
+) -> None:
+    """Fill the part of H and f that belongs to the increments.
+
+    Args:
+        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
+        angles: phi, theta, psi wanted after each step, rad, (N, 3).
+        terminal: State and input wanted at the end, (12,).
+        u: Moments last commanded, N m, (3,).
+        output_weight: Diagonal of Q, (3,).
+        terminal_weight: S on state and input, (12, 12), symmetric.
+        increment_weight: Diagonal of R, (3,).
+        H: (n, n), n = 3 b + 2.
+        f: (n,).
+    """
+    steps = responses.shape[0] - 1
+    moved = responses.shape[2] - 1
+    H[:moved, :moved] = 0.0
+    f[:moved] = 0.0
+    for step in range(1, steps + 1):
+        for j in range(INPUTS):
+            row = responses[step, ANGLES[j]]
+            weight = output_weight[j]
+            error = weight * (row[0] - angles[step - 1, j])
+            for k in range(moved):
+                f[k] += error * row[1 + k]
+                weighted = weight * row[1 + k]
+                for i in range(k + 1):
+                    H[k, i] += weighted * row[1 + i]
+    _add_terminal(responses[steps], terminal, u, terminal_weight, H, f)
+    for k in range(moved):
+        H[k, k] += increment_weight[k % INPUTS]
+        for i in range(k):
+            H[i, k] = H[k, i]
+
+
+@compiled
+def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f: Array) -> None:
+    """Add ½ eᵀSe of the error of state and input at the end, to the lower triangle of H."""
+    moved = last.shape[1] - 1
+    E = np.zeros((STATES + INPUTS, moved + 1))
+    E[:STATES] = last
+    for i in range(INPUTS):
+        E[STATES + i, 0] = u[i]
+        for k in range(i, moved, INPUTS):
+            E[STATES + i, 1 + k] = 1.0
+    E[:, 0] -= terminal
+    weighted = matmul(S, E)
+    for k in range(moved):
+        for row in range(STATES + INPUTS):
+            f[k] += E[row, 1 + k] * weighted[row, 0]
+        for i in range(k + 1):
+            for row in range(STATES + INPUTS):
+                H[k, i] += E[row, 1 + k] * weighted[row, 1 + i]
+
+
+@compiled
+def limit_first_move(u: Array, largest: Array, lower: Array, upper: Array) -> None:
+    """Bound the first increments by `largest`, but let them take back all of u.
+
+    Args:
+        u: Moments last commanded, N m, (3,).
+        largest: Largest increments, N m, (3,).
+        lower: Of all variables, (n,); the first three are filled.
+        upper: The same.
+    """
+    for i in range(INPUTS):
+        lower[i] = min(-largest[i], -u[i])
+        upper[i] = max(largest[i], -u[i])
+
+
+@compiled
+def limit_rotors(
+    rotors_from_moments: Array,
+    rotors_from_thrust: Array,
+    thrust_n: Array,
+    u: Array,
+    starts: Integers,
+    squared_least: float,
+    squared_most: float,
+    G: Array,
+    h: Array,
+) -> int:
+    """Fill the rows that keep every rotor within its limits at every step of the horizon; return how many.
+
+    Linear in squared speed, and with the thrust known only the moments move it. Between two moves the moments stay, so
+    one row a side holds the tightest step of them. Rows are in parts of the largest squared speed.
+
+    Args:
+        rotors_from_moments: Squared speeds from U2, U3, U4, in parts of the largest, (4, 3).
+        rotors_from_thrust: The same from U1, (4,).
+        thrust_n: U1 commanded at each step, N, (N,).
+        u: Moments last commanded, N m, (3,).
+        starts: Step of each move, (b,).
+        squared_least: Least squared speed, in parts of the largest.
+        squared_most: Largest squared speed, in the same parts.
+        G: Is filled from row 0, (m, n), zeros where nothing is written.
+        h: (m,).
+    """
+    count = 0
+    for move in range(starts.shape[0]):
+        end = starts[move + 1] if move + 1 < starts.shape[0] else thrust_n.shape[0]
+        least, most = thrust_n[starts[move]], thrust_n[starts[move]]
+        for step in range(starts[move], end):
+            least, most = min(least, thrust_n[step]), max(most, thrust_n[step])
+        for rotor in range(ROTORS):
+            turned = 0.0
+            for i in range(INPUTS):
+                turned += rotors_from_moments[rotor, i] * u[i]
+                for j in range(move + 1):
+                    G[count, INPUTS * j + i] = rotors_from_moments[rotor, i]
+                    G[count + 1, INPUTS * j + i] = -rotors_from_moments[rotor, i]
+            h[count] = squared_most - rotors_from_thrust[rotor] * most - turned
+            h[count + 1] = turned + rotors_from_thrust[rotor] * least - squared_least
+            count += _TWO_SIDES
+    return count
+
+
+@compiled
+def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> float:
+    """Write the normal of the tangent to the largest tilt, in the direction of a tilt; return its distance.
+
+    cos(phi) cos(theta) >= cos(max_tilt) is a convex set of (phi, theta). All of it lies on the near side of the
+    tangent, normal . (phi, theta) <= distance, and the tangent touches it where the tilt has the given direction.
+
+    Args:
+        phi: Roll of the tilt that gives the direction, rad.
+        theta: Its pitch, rad.
+        max_tilt: rad, less than a right angle.
+        normal: (2,); is filled, with zeros where there is no tilt and so no direction.
+    """
+    x, y = sin(theta) * cos(phi), sin(phi)
+    across = sqrt(x * x + y * y)
+    normal[:] = 0.0
+    if across < _NO_TILT:
+        return 1.0
+    x, y, z = x / across * sin(max_tilt), y / across * sin(max_tilt), cos(max_tilt)
+    xz = sqrt(x * x + z * z)
+    normal[0], normal[1] = y / xz, x / z
+    distance: float = normal[0] * atan2(y, xz) + normal[1] * atan2(x, z)
+    return distance
+
+
+@compiled
+def limit_motion(
+    responses: Array, schedule: Array, checked: Integers, limits: Array, first: int, G: Array, h: Array
+) -> int:
+    """Fill the soft rows of tilt, angles and rates from row `first`; return the row after them.
+
+    The tilt is limited by a tangent in the direction that it is expected to have.
+
+    Args:
+        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
+        schedule: phi, theta, p, q, r expected at each step, (N, 5).
+        checked: Steps at which the limits are held, (c,).
+        limits: Of |phi|, |theta|, |p|, |q|, |r|, rad and rad/s, (5,); the first also of the tilt.
+        first: Row to begin at.
+        G: (m, n).
+        h: (m,).
+    """
+    states = (ANGLES[0], ANGLES[1], P, Q, R)
+    moved = responses.shape[2] - 1
+    normal = np.empty(2)
+    count = first
+    for step in checked:
+        phi, theta = responses[step, ANGLES[0]], responses[step, ANGLES[1]]
+        distance = tilt_tangent(schedule[step - 1, 0], schedule[step - 1, 1], limits[0], normal)
+        for k in range(moved):
+            G[count, k] = (normal[0] * phi[1 + k] + normal[1] * theta[1 + k]) / distance
+        G[count, moved + ANGLE_SLACK] = -1.0
+        h[count] = 1.0 - (normal[0] * phi[0] + normal[1] * theta[0]) / distance
+        count += 1
+        for i in range(LIMITED):
+            row = responses[step, states[i]]
+            slack = moved + (ANGLE_SLACK if i < 2 else RATE_SLACK)
+            for k in range(moved):
+                G[count, k] = row[1 + k] / limits[i]
+                G[count + 1, k] = -row[1 + k] / limits[i]
+            G[count, slack] = -1.0
+            G[count + 1, slack] = -1.0
+            h[count] = 1.0 - row[0] / limits[i]
+            h[count + 1] = 1.0 + row[0] / limits[i]
+            count += _TWO_SIDES
+    return count
+
+
+@compiled
+def read_plan(
+    responses: Array,
+    starts: Integers,
+    u: Array,
+    z: Array,
+    thrust_n: Array,
+    rotors_from_thrust: Array,
+    rotors_from_moments: Array,
+    states: Array,
+    moments: Array,
+    squared: Array,
+) -> None:
+    """Write what increments lead to.
+
+    Args:
+        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
+        starts: Step of each move, (b,).
+        u: Moments last commanded, N m, (3,).
+        z: The QP's solution, (n,).
+        thrust_n: U1 commanded at each step, N, (N,).
+        rotors_from_thrust: Squared speeds from U1, in parts of the largest, (4,).
+        rotors_from_moments: The same from U2, U3, U4, (4, 3).
+        states: Is filled: predicted, (N + 1, 9).
+        moments: Is filled: commanded at each step, N m, (N, 3).
+        squared: Is filled: squared rotor speeds commanded at each step, in parts of the largest, (N, 4).
+    """
+    moved = responses.shape[2] - 1
+    for step in range(responses.shape[0]):
+        for state in range(STATES):
+            total = responses[step, state, 0]
+            for k in range(moved):
+                total += responses[step, state, 1 + k] * z[k]
+            states[step, state] = total
+    held = u.copy()
+    move = 0
+    for step in range(moments.shape[0]):
+        if move < starts.shape[0] and starts[move] == step:
+            held += z[INPUTS * move : INPUTS * move + INPUTS]
+            move += 1
+        moments[step] = held
+        for rotor in range(ROTORS):
+            total = rotors_from_thrust[rotor] * thrust_n[step]
+            for i in range(INPUTS):
+                total += rotors_from_moments[rotor, i] * held[i]
+            squared[step, rotor] = total
+
+
+@compiled
+def count_active(
+    G: Array, h: Array, lower: Array, upper: Array, z: Array, rotor_rows: int, binding: float
+) -> tuple[int, int, int, int]:
+    """Return how many limits of rotors, increments, angles and rates bind at z.
+
+    Args:
+        G: Rows of `limit_rotors`, then of `limit_motion`, (m, n).
+        h: (m,).
+        lower: (n,).
+        upper: (n,).
+        z: (n,).
+        rotor_rows: How many rows are the rotors'.
+        binding: A limit binds where no more is left.
+    """
+    increments = 0
+    for k in range(z.shape[0] - SLACKS):
+        if z[k] - lower[k] < binding or upper[k] - z[k] < binding:
+            increments += 1
+    rotors, angles, rates = 0, 0, 0
+    for row in range(G.shape[0]):
+        left = h[row]
+        for k in range(z.shape[0]):
+            left -= G[row, k] * z[k]
+        if left < binding:
+            if row < rotor_rows:
+                rotors += 1
+            elif (row - rotor_rows) % MOTION_ROWS < _ANGLE_ROWS:
+                angles += 1
+            else:
+                rates += 1
+    return rotors, increments, angles, rates
+
+
+@compiled
+def condense(
+    responses: Array,
+    schedule: Array,
+    wanted: tuple[Array, Array, Array],
+    u: Array,
+    weights: tuple[Array, Array, Array],
+    from_moments: Array,
+    from_thrust: Array,
+    starts: Integers,
+    checked: Integers,
+    limits: Array,
+    largest_increment: Array,
+    squared_least: float,
+    squared_most: float,
+    H: Array,
+    f: Array,
+    G: Array,
+    h: Array,
+    lower: Array,
+    upper: Array,
+) -> None:
+    """Fill a whole QP; slacks keep their part of H and f.
+
+    Args:
+        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
+        schedule: See `limit_motion`.
+        wanted: Angles (N, 3) and end (12,) of `quadratic_cost`, and the thrust commanded at each step, N, (N,).
+        u: Moments last commanded, N m, (3,).
+        weights: Q (3,), S (12, 12) and R (3,).
+        from_moments: Squared speeds from U2, U3, U4, in parts of the largest, (4, 3).
+        from_thrust: The same from U1, (4,).
+        starts: Step of each move, (b,).
+        checked: See `limit_motion`.
+        limits: See `limit_motion`.
+        largest_increment: N m, (3,).
+        squared_least: Least squared speed, in parts of the largest.
+        squared_most: Largest squared speed, in the same parts.
+        H: (n, n).
+        f: (n,).
+        G: (m, n).
+        h: (m,).
+        lower: (n,).
+        upper: (n,).
+    """
+    limit_first_move(u, largest_increment, lower, upper)
+    quadratic_cost(responses, wanted[0], wanted[1], u, weights[0], weights[1], weights[2], H, f)
+    row = limit_rotors(from_moments, from_thrust, wanted[2], u, starts, squared_least, squared_most, G, h)
+    limit_motion(responses, schedule, checked, limits, row, G, h)
+
+
+@compiled
+def objective(H: Array, f: Array, z: Array) -> float:
+    """Return ½ zᵀHz + fᵀz."""
+    total = 0.0
+    for i in range(z.shape[0]):
+        total += f[i] * z[i]
+        for k in range(z.shape[0]):
+            total += 0.5 * z[i] * H[i, k] * z[k]
+    return total

@@ -1,0 +1,377 @@
+"""The flight profile's control law: position by feedback linearisation with preview, attitude by LPV-MPC."""
+
+from collections.abc import Mapping
+from math import radians
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import (
+    AttitudeDemand,
+    Clock,
+    Decision,
+    Diagnostics,
+    Fallback,
+    Horizon,
+    Preview,
+    VehicleState,
+)
+from colibri.autopilot.control.lpv_mpc import position_loop, prediction, recovery
+from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc, Plan, Situation, Target, squared_speeds_from
+from colibri.autopilot.control.lpv_mpc.position_loop import Limits
+from colibri.autopilot.control.lpv_mpc.settings import GuidanceSettings, LpvMpcSettings, ObserverSettings
+from colibri.autopilot.control.qp import QpSolver
+from colibri.autopilot.control.settings import interval_us
+from colibri.autopilot.control.vehicle_model import disturbance_observer, rotor_lag
+from colibri.autopilot.control.vehicle_model.airframe import airframe_of
+from colibri.autopilot.control.vehicle_model.battery import BatteryModel
+from colibri.common.config import read_settings
+from colibri.common.elementary import square
+from colibri.common.kernels import cos, tan
+from colibri.common.matrices import dot, matvec
+from colibri.common.rotations import rotation_matrix
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+_RECOVER_BEYOND = cos(radians(75.0))
+"""A thrust axis further from where it must point, or a steeper pitch, is for the recovery law."""
+_NO_YAW = np.empty(0)
+_NOWHERE = (0.0, 0.0, 0.0)
+
+
+class Memory(NamedTuple):
+    """What the law carries from one control sample to the next.
+
+    Attributes:
+        speeds: Rotor speeds now, as the lag has them, parts of the largest, (4,).
+        moments: U2..U4 last commanded, N m, (3,).
+        wrench: U1..U4 now, (4,).
+        mean_wrench: The same over the interval that ends now, (4,).
+        measured: What the observer measured a sample ago, (9,); None before the first.
+        estimate: Of the observer a sample ago, (12,).
+        charge_ah: Charge taken from the battery.
+        plan: The last plan, made `age` samples ago; None where there is none to build on.
+        age: Samples since that plan.
+    """
+
+    speeds: Array
+    moments: Array
+    wrench: Array
+    mean_wrench: Array
+    measured: Array | None
+    estimate: Array
+    charge_ah: float
+    plan: Plan | None
+    age: int
+
+
+class Course(NamedTuple):
+    """What the outer loop asks for.
+
+    Attributes:
+        force: Wanted now, N, ENU, (3,).
+        aligned: Cosine of the angle from the thrust to it.
+        target: Of the attitude.
+    """
+
+    force: Array
+    aligned: float
+    target: Target
+
+
+class Seen(NamedTuple):
+    """What a decision begins with.
+
+    Attributes:
+        rotation: Body to earth, (3, 3).
+        measured: By the observer, (9,).
+        estimate: Of the observer, (12,).
+        now: For the attitude's plan.
+        thrust_n: Now, N.
+    """
+
+    rotation: Array
+    measured: Array
+    estimate: Array
+    now: Situation
+    thrust_n: float
+
+
+class Choice(NamedTuple):
+    """What was chosen: squared rotor speeds (4,) in parts of the largest, their moments, and the plan to go on with."""
+
+    squared: Array
+    moments: Array
+    plan: Plan | None
+    age: int
+    diagnostics: Diagnostics
+
+
+class LpvMpc:
+    """The control law. Its predicted outputs are the states of `prediction`.
+
+    Attributes:
+        control_interval_us: The control sample.
+        preview: From now to one sample past the horizon.
+    """
+
+    def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
+        """Control `vehicle` as the profile's `table` says; `clock` only measures.
+
+        Raises:
+            SettingsError: The table is wrong.
+            SolverError: The solver cannot be used.
+        """
+        settings = read_settings(table, LpvMpcSettings)
+        self.control_interval_us = interval_us(settings.control_interval_s)
+        self._interval_s = settings.control_interval_s
+        self._vehicle = vehicle
+        self._lag = rotor_lag.rotor_lag(vehicle, self._interval_s)
+        self._battery = BatteryModel(vehicle)
+        solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
+        self._attitude = AttitudeMpc(settings.attitude, vehicle, self._lag, solver, self._interval_s, clock)
+        self._samples = self._attitude.horizon + 2
+        self.preview = Preview(self.control_interval_us, self._samples)
+        self._fallback = settings.fallback
+        self._from_thrust, self._from_moments = squared_speeds_from(vehicle)
+        self._allocation = vehicle.allocation() * square(vehicle.rotors.max_speed)
+        self._momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
+        self._inertia = np.array(vehicle.body.inertia_kg_m2)
+        self._airframe = airframe_of(vehicle)
+        self._prepare_guidance(settings.guidance)
+        self._prepare_observer(settings.observer)
+        self._turn = recovery.TurnGains(
+            settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.fastest_rad_s
+        )
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        """Load what is compiled: three steps from hover, the last of them upside down."""
+        still = np.zeros((self._samples, 3))
+        level = np.zeros(self._samples)
+        references = Horizon(still, still, still, still, still, level, level, level)
+        memory = self.initial(self._vehicle.hover_speed)
+        for attitude in ((1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)):
+            state = VehicleState(_NOWHERE, _NOWHERE, attitude, _NOWHERE, _NOWHERE)
+            memory, _ = self.step(memory, 0, state, references)
+        self.step_attitude(memory, 0, state, AttitudeDemand(still, still, level))
+
+    def _prepare_guidance(self, settings: GuidanceSettings) -> None:
+        first, second = settings.poles
+        self._gains = (first * second, -(first + second))
+        self._errors_ahead = position_loop.error_transition(settings.poles, self._interval_s, self._samples)
+        self._span_n = float(self._allocation[0].sum())
+        self._thrust_margin = settings.thrust_margin
+        self._tilt_tangent = tan(radians(settings.largest_tilt_deg))
+        self._position_error_m = settings.approach_speed_m_s * self._gains[1] / self._gains[0]
+
+    def _prepare_observer(self, settings: ObserverSettings) -> None:
+        on_velocity, on_acceleration = disturbance_observer.gains(settings.acceleration_rad_s, self._interval_s)
+        on_rate, on_turn = disturbance_observer.gains(settings.moment_rad_s, self._interval_s)
+        self._observer = disturbance_observer.Observer(
+            on_velocity, on_acceleration, on_rate, on_turn, settings.most_m_s2, settings.most_n_m
+        )
+
+    def initial(self, rotor_speed: float) -> Memory:
+        """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
+        speeds = np.full(4, rotor_speed / self._vehicle.rotors.max_speed)
+        wrench = matvec(self._allocation, speeds * speeds)
+        return Memory(
+            speeds, wrench[1:].copy(), wrench, wrench, None, np.zeros(disturbance_observer.ESTIMATES), 0.0, None, 0
+        )
+
+    def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
+        """Decide the rotor speeds to hold until the next control sample."""
+        del time_us
+        seen = self._see(memory, state)
+        course = self.position(memory, seen.now, seen.thrust_n, state, seen.measured, references, seen.estimate)
+        return self._decide(memory, seen, course)
+
+    def step_attitude(
+        self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
+    ) -> tuple[Memory, Decision]:
+        """Decide the same for an attitude and a thrust, which is kept within what the rotors leave to the moments."""
+        del time_us
+        seen = self._see(memory, state)
+        return self._decide(memory, seen, self.attitude(memory, seen, demand))
+
+    def _see(self, memory: Memory, state: VehicleState) -> Seen:
+        rotation = np.array(rotation_matrix(state.attitude))
+        measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2].tolist()])
+        estimate = self.estimate(memory, measured)
+        now, thrust_n = self._situation(memory, state, estimate)
+        return Seen(rotation, measured, estimate, now, thrust_n)
+
+    def _decide(self, memory: Memory, seen: Seen, course: Course) -> tuple[Memory, Decision]:
+        choice = self._choose(memory, seen.now, course, seen.rotation)
+        commands, speeds, wrench, mean_wrench = self.mix(memory, choice.squared, seen.now.fastest)
+        charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
+        after = Memory(
+            speeds,
+            choice.moments,
+            wrench,
+            mean_wrench,
+            seen.measured,
+            seen.estimate,
+            charge_ah,
+            choice.plan,
+            choice.age,
+        )
+        phi, theta, psi = course.target.angles[0].tolist()
+        return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), choice.diagnostics)
+
+    def estimate(self, memory: Memory, measured: Array) -> Array:
+        """Return the observer's estimate, (12,), now that `measured`, (9,), is."""
+        if memory.measured is None:
+            return disturbance_observer.first_estimate(measured)
+        middle = 0.5 * (memory.measured + measured)
+        drag = np.empty(3)
+        position_loop.drag_force(self._airframe, middle[:3], middle[6:], float(memory.mean_wrench[0]), drag)
+        return disturbance_observer.observe(
+            memory.estimate,
+            memory.measured,
+            measured,
+            float(memory.mean_wrench[0]),
+            memory.mean_wrench[1:],
+            dot(self._momentum, memory.speeds),
+            drag,
+            self._airframe,
+            self._inertia,
+            self._observer,
+            self._interval_s,
+        )
+
+    def position(
+        self,
+        memory: Memory,
+        now: Situation,
+        thrust_n: float,
+        state: VehicleState,
+        measured: Array,
+        references: Horizon,
+        estimate: Array,
+    ) -> Course:
+        """Return where the thrust must point now, and what the attitude is to reach for it and for what follows."""
+        forces, angles = np.empty((self._samples, 3)), np.empty((self._samples, 3))
+        thrusts, end = np.empty(self._attitude.horizon), np.empty(prediction.STATES + prediction.INPUTS)
+        planned_yaw = memory.plan.states[memory.age :, prediction.PSI].copy() if memory.plan else _NO_YAW
+        aligned = position_loop.guide(
+            np.array(state.position_enu_m),
+            measured[:3],
+            measured[6:],
+            float(now.x[prediction.PSI]),
+            thrust_n,
+            (
+                references.position_enu_m,
+                references.velocity_enu_m_s,
+                references.acceleration_enu_m_s2,
+                references.yaw_rad,
+            ),
+            planned_yaw,
+            self._errors_ahead,
+            self._gains,
+            estimate[6:],
+            self._airframe,
+            self._inertia,
+            self._limits(self._battery.fastest_together(memory.charge_ah)),
+            self._lag.planned,
+            self._interval_s,
+            forces,
+            angles,
+            thrusts,
+            end,
+        )
+        return Course(forces[0], aligned, Target(angles[1:-1], end, thrusts))
+
+    def attitude(self, memory: Memory, seen: Seen, demand: AttitudeDemand) -> Course:
+        """Return the course that a demanded attitude is, its thrust within the limits of the position loop's."""
+        angles, force = np.empty((self._samples, 3)), np.empty(3)
+        thrusts, end = np.empty(self._attitude.horizon), np.empty(prediction.STATES + prediction.INPUTS)
+        aligned = position_loop.hold_attitude(
+            seen.measured[6:],
+            float(seen.now.x[prediction.PSI]),
+            seen.thrust_n,
+            (demand.angles, demand.thrust_n),
+            seen.estimate[9:],
+            self._inertia,
+            self._limits(self._battery.fastest_together(memory.charge_ah)),
+            self._lag.planned,
+            self._interval_s,
+            force,
+            angles,
+            thrusts,
+            end,
+        )
+        return Course(force, aligned, Target(angles[1:-1], end, thrusts))
+
+    def mix(self, memory: Memory, squared: Array, fastest: float) -> tuple[Array, Array, Array, Array]:
+        """Return the rotors' commands, their speeds and wrench a sample later, the mean wrench until then, (4,) each.
+
+        Args:
+            memory: Of the sample before.
+            squared: Squared speeds that the plan commands, in parts of the largest, (4,).
+            fastest: Largest speed that can be had, in parts of the largest.
+        """
+        return rotor_lag.actuate(memory.speeds, squared, self._lag, fastest, self._allocation)
+
+    def _choose(self, memory: Memory, now: Situation, course: Course, rotation: Array) -> Choice:
+        """Plan; where that cannot be had, fall back."""
+        target = course.target
+        steep = square(float(rotation[2, 0])) > 1.0 - square(_RECOVER_BEYOND)
+        if steep or course.aligned < _RECOVER_BEYOND:
+            return self._recover(now, course.force, rotation)
+        ahead = memory.plan.states[memory.age + 1 :] if memory.plan else None
+        plan, diagnostics = self._attitude.plan(now, target, ahead)
+        if plan is not None:
+            assert diagnostics.planned_squared is not None, "a plan says what it commands"
+            return Choice(diagnostics.planned_squared[0], plan.moments[0], plan, 1, diagnostics)
+        age = memory.age + 1
+        if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._attitude.horizon - 1):
+            moments = memory.plan.moments[memory.age]
+            how = diagnostics._replace(fallback=Fallback.SHIFTED_PLAN)
+            return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, memory.plan, age, how)
+        if memory.age <= self._fallback.shifted_samples + self._fallback.lqr_samples:
+            moments = self._attitude.lqr(now, target)
+            how = diagnostics._replace(fallback=Fallback.LQR)
+            return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, None, age, how)
+        return self._descend(now, age, diagnostics)
+
+    def _situation(self, memory: Memory, state: VehicleState, estimate: Array) -> tuple[Situation, float]:
+        """Return what a plan begins with, and the thrust now, N."""
+        phi, theta, psi = state.euler
+        p, q, r = state.rate_flu_rad_s
+        thrust_n, *moments_n_m = memory.wrench.tolist()
+        x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
+        momentum = dot(self._momentum, memory.speeds)
+        fastest = self._battery.fastest_now(memory.charge_ah, memory.speeds)
+        return Situation(x, memory.moments, estimate[9:], momentum, fastest), thrust_n
+
+    def _limits(self, fastest: float) -> Limits:
+        """Return what the outer loop may ask for while all rotors can turn at `fastest`, parts of the largest."""
+        span_n = self._span_n
+        least_n, most_n = span_n * square(self._lag.least), span_n * square(fastest)
+        margin_n = self._thrust_margin * (most_n - least_n)
+        return Limits(self._tilt_tangent, least_n + margin_n, most_n - margin_n, self._position_error_m)
+
+    def _recover(self, now: Situation, force: Array, rotation: Array) -> Choice:
+        """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
+        direction = matvec(rotation.T, force / position_loop.length(force))
+        moments = recovery.turning_moment(direction, now.x[list(prediction.RATES)], self._inertia, self._turn)
+        squared = self._mixed(max(dot(force, rotation[:, 2]), 0.0), moments, now)
+        return Choice(squared, matvec(self._allocation[1:], squared), None, 1, Diagnostics(fallback=Fallback.RECOVERY))
+
+    def _descend(self, now: Situation, age: int, diagnostics: Diagnostics) -> Choice:
+        """Level and sink, the last resort."""
+        end = np.zeros(prediction.STATES + prediction.INPUTS)
+        end[prediction.PSI] = now.x[prediction.PSI]
+        end[9:] = end[6:9] = -now.disturbance_n_m
+        level = Target(end[None, [0, 2, 4]], end, np.zeros(1))
+        moments = self._attitude.lqr(now, level)
+        weight_n = self._airframe.mass_kg * self._airframe.gravity_m_s2
+        how = diagnostics._replace(fallback=Fallback.DESCENT)
+        squared = self._mixed(weight_n * self._fallback.descent_thrust, moments, now)
+        return Choice(squared, moments, None, age, how)
+
+    def _mixed(self, thrust_n: float, moments: Array, now: Situation) -> Array:
+        least, most = square(self._lag.least), square(now.fastest)
+        return recovery.prioritised(thrust_n, moments, self._from_thrust, self._from_moments, least, most)

@@ -1,0 +1,333 @@
+"""The outer loop over a horizon: references, feedback and limits to attitudes and thrusts, as compiled kernels.
+
+Thrust must make F = m (a_ref + k1 e + k2 e' + g - d) plus the drag; its direction gives roll and pitch about the yaw
+that is predicted, so that thrust points right whatever yaw does. The errors ahead are those of the closed loop.
+Source of the flat output to thrust direction: Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018.
+"""
+
+from math import floor, pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.vehicle_model.airframe import Airframe
+from colibri.common import elementwise
+from colibri.common.jit import compiled
+from colibri.common.kernels import atan2, cos, sin
+from colibri.common.types import Array
+
+_DRAG_PASSES = 2
+"""Drag depends on the direction of the force that has to overcome it."""
+
+
+class Limits(NamedTuple):
+    """What the outer loop may ask for.
+
+    Attributes:
+        tilt_tangent: Tangent of the largest tilt.
+        least_thrust_n: Least thrust, N.
+        most_thrust_n: Largest thrust, N.
+        position_error_m: A larger error counts as this one, which limits the speed of an approach; velocity and
+            acceleration of a reference that far away are followed in the same proportion, which keeps one that no
+            vehicle can follow from leading this one astray.
+    """
+
+    tilt_tangent: float
+    least_thrust_n: float
+    most_thrust_n: float
+    position_error_m: float
+
+
+def error_transition(poles: tuple[float, float], interval_s: float, samples: int) -> Array:
+    """Return how an error and its rate (2,) go on at each sample from now, (samples, 2, 2), the poles being placed."""
+    first, second = poles
+    t = interval_s * np.arange(samples, dtype=np.float64)
+    if first == second:
+        decay = elementwise.exp(first * t)
+        rows = [[(1.0 - first * t) * decay, t * decay], [-first * first * t * decay, (1.0 + first * t) * decay]]
+    else:
+        a, b = elementwise.exp(first * t), elementwise.exp(second * t)
+        apart = first - second
+        rows = [
+            [(first * b - second * a) / apart, (a - b) / apart],
+            [first * second * (b - a) / apart, (first * a - second * b) / apart],
+        ]
+    return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
+
+
+@compiled
+def drag_force(airframe: Airframe, velocity: Array, up: Array, thrust_n: float, out: Array) -> None:
+    """Write the drag, N, ENU, on a vehicle whose z axis is `up` while it makes `thrust_n`.
+
+    Args:
+        airframe: The vehicle.
+        velocity: Through the air, m/s, ENU, (3,).
+        up: Body z axis, ENU, (3,).
+        thrust_n: Thrust, N.
+        out: (3,).
+    """
+    along = velocity[0] * up[0] + velocity[1] * up[1] + velocity[2] * up[2]
+    across = airframe.drag_xy + airframe.rotor_drag * sqrt(max(thrust_n, 0.0))
+    for i in range(3):
+        out[i] = -across * (velocity[i] - along * up[i]) - airframe.drag_z * along * up[i]
+
+
+@compiled
+def limited_force(force: Array, limits: Limits) -> None:
+    """Limit a force in place, its vertical part first: height before place."""
+    force[2] = min(max(force[2], limits.least_thrust_n), limits.most_thrust_n)
+    horizontal = sqrt(force[0] * force[0] + force[1] * force[1])
+    left = sqrt(max(limits.most_thrust_n * limits.most_thrust_n - force[2] * force[2], 0.0))
+    allowed = min(force[2] * limits.tilt_tangent, left)
+    if horizontal > allowed:
+        force[0] *= allowed / horizontal
+        force[1] *= allowed / horizontal
+
+
+@compiled
+def wanted_forces(
+    position: Array,
+    velocity: Array,
+    references: tuple[Array, Array, Array],
+    errors_ahead: Array,
+    gains: tuple[float, float],
+    disturbance_m_s2: Array,
+    airframe: Airframe,
+    limits: Limits,
+    forces: Array,
+) -> None:
+    """Fill `forces` with what the thrust must do at each sample of the horizon, N, ENU, (n, 3).
+
+    Args:
+        position: Now, m, ENU, (3,).
+        velocity: Now, m/s, ENU, (3,).
+        references: Position, velocity and acceleration at each sample, (n, 3) each.
+        errors_ahead: Of `error_transition`, (n, 2, 2).
+        gains: k1, 1/s², and k2, 1/s.
+        disturbance_m_s2: Acceleration that the model does not explain, ENU, (3,).
+        airframe: The vehicle.
+        limits: Of the forces.
+        forces: Is filled.
+    """
+    e = references[0][0] - position
+    near = min(1.0, limits.position_error_m / max(length(e), limits.position_error_m))
+    e *= near
+    e_rate = near * references[1][0] - velocity
+    k1, k2 = gains
+    free, drag, moving, up = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for n in range(forces.shape[0]):
+        E = errors_ahead[n]
+        for i in range(3):
+            ahead = E[0, 0] * e[i] + E[0, 1] * e_rate[i]
+            ahead_rate = E[1, 0] * e[i] + E[1, 1] * e_rate[i]
+            moving[i] = near * references[1][n, i] - ahead_rate
+            demanded = near * references[2][n, i] + k1 * ahead + k2 * ahead_rate - disturbance_m_s2[i]
+            free[i] = airframe.mass_kg * demanded
+        free[2] += airframe.mass_kg * airframe.gravity_m_s2
+        forces[n] = free
+        limited_force(forces[n], limits)
+        for _ in range(_DRAG_PASSES):
+            thrust = length(forces[n])
+            for i in range(3):
+                up[i] = forces[n, i] / thrust
+            drag_force(airframe, moving, up, thrust, drag)
+            for i in range(3):
+                forces[n, i] = free[i] - drag[i]
+            limited_force(forces[n], limits)
+
+
+@compiled
+def attitudes(forces: Array, yaw_wanted: Array, yaw_predicted: Array, angles: Array) -> None:
+    """Fill `angles` (n, 3): roll and pitch that point body z along each force, given the yaw there; the yaw wanted.
+
+    Args:
+        forces: N, ENU, (n, 3), upwards.
+        yaw_wanted: rad, (n,).
+        yaw_predicted: rad, (n,).
+        angles: phi, theta, psi, rad; is filled.
+    """
+    for n in range(forces.shape[0]):
+        c, s = cos(yaw_predicted[n]), sin(yaw_predicted[n])
+        x, y, z = forces[n]
+        ahead = x * c + y * s
+        angles[n, 0] = atan2(x * s - y * c, sqrt(ahead * ahead + z * z))
+        angles[n, 1] = atan2(ahead, z)
+        angles[n, 2] = yaw_wanted[n]
+
+
+@compiled
+def thrust_commands(thrust_n: float, forces: Array, up: Array, follows: float, limits: Limits, commands: Array) -> None:
+    """Fill `commands` (N,): thrusts to command so that the lagging thrust is the wanted one at the end of each step.
+
+    The next thrust is the part of the force along the body's z axis; those after it trust in the attitude.
+
+    Args:
+        thrust_n: Now, N.
+        forces: Wanted at each sample from now, N, ENU, (N + 1 or more, 3).
+        up: Body z axis now, ENU, (3,).
+        follows: Part of the way to its command that thrust goes in a step.
+        limits: Of the commands.
+        commands: Is filled.
+    """
+    for n in range(commands.shape[0]):
+        force = forces[n + 1]
+        wanted = force[0] * up[0] + force[1] * up[1] + force[2] * up[2] if n == 0 else length(force)
+        command = thrust_n + (wanted - thrust_n) / follows
+        command = min(max(command, limits.least_thrust_n), limits.most_thrust_n)
+        thrust_n += (command - thrust_n) * follows
+        commands[n] = command
+
+
+@compiled
+def end_of_motion(angles: Array, inertia: Array, disturbance_n_m: Array, interval_s: float, end: Array) -> None:
+    """Fill `end` with the state and the moments that follow the angles at the last but one sample.
+
+    Args:
+        angles: phi, theta, psi at each sample, rad, (n, 3), n >= 3.
+        inertia: Ix, Iy, Iz, kg m², (3,).
+        disturbance_n_m: Moment that acts besides, (3,).
+        interval_s: Between two samples.
+        end: phi, p, theta, q, psi, r, M1, M2, M3, U2, U3, U4; is filled.
+    """
+    before, here, after = angles[-3], angles[-2], angles[-1]
+    rate = (after - before) / (2.0 * interval_s)
+    turn = (after - 2.0 * here + before) / (interval_s * interval_s)
+    s, c = sin(here[0]), cos(here[0])
+    st, ct = sin(here[1]), cos(here[1])
+    body_rate = (rate[0] - st * rate[2], c * rate[1] + s * ct * rate[2], c * ct * rate[2] - s * rate[1])
+    body_turn = (turn[0] - st * turn[2], c * turn[1] + s * ct * turn[2], c * ct * turn[2] - s * turn[1])
+    for i in range(3):
+        end[2 * i] = here[i]
+        end[2 * i + 1] = body_rate[i]
+        end[6 + i] = end[9 + i] = inertia[i] * body_turn[i] - disturbance_n_m[i]
+
+
+@compiled
+def yaw_ahead(yaw_rad: float, wanted: Array, planned: Array, ahead: Array) -> float:
+    """Fill `ahead` with the yaw expected at each sample; return the full turns between the yaw wanted and this, rad.
+
+    As planned, and after the plan's end, or without one, turning as the yaw that is wanted does.
+
+    Args:
+        yaw_rad: Now.
+        wanted: At each sample, rad, (n,).
+        planned: By the last plan, from now, rad, (m,), m <= n; (0,) without one.
+        ahead: (n,); is filled.
+    """
+    ahead[0] = yaw_rad
+    for n in range(1, ahead.shape[0]):
+        path = planned if n < planned.shape[0] else wanted
+        ahead[n] = ahead[n - 1] + path[n] - path[n - 1]
+    turns: float = 2.0 * pi * floor((yaw_rad - wanted[0]) / (2.0 * pi) + 0.5)
+    return turns
+
+
+@compiled
+def guide(
+    position: Array,
+    velocity: Array,
+    up: Array,
+    yaw_rad: float,
+    thrust_n: float,
+    references: tuple[Array, Array, Array, Array],
+    planned_yaw: Array,
+    errors_ahead: Array,
+    gains: tuple[float, float],
+    disturbances: Array,
+    airframe: Airframe,
+    inertia: Array,
+    limits: Limits,
+    follows: float,
+    interval_s: float,
+    forces: Array,
+    angles: Array,
+    thrusts: Array,
+    end: Array,
+) -> float:
+    """Do all that the outer loop does; return the cosine of the angle from the thrust to where it must point.
+
+    Args:
+        position: Now, m, ENU, (3,).
+        velocity: Now, m/s, ENU, (3,).
+        up: Body z axis now, ENU, (3,).
+        yaw_rad: Now.
+        thrust_n: Now, N.
+        references: Position, velocity, acceleration (N + 2, 3) and yaw (N + 2,) at each sample from now.
+        planned_yaw: See `yaw_ahead`.
+        errors_ahead: Of `error_transition`, (N + 2, 2, 2).
+        gains: k1, 1/s², and k2, 1/s.
+        disturbances: Acceleration, m/s², ENU, and moment, N m, FLU, that the model does not explain, (6,).
+        airframe: The vehicle.
+        inertia: Ix, Iy, Iz, kg m², (3,).
+        limits: Of the forces.
+        follows: Part of the way to its command that thrust goes in a step.
+        interval_s: Between two samples.
+        forces: Is filled, N, ENU, (N + 2, 3).
+        angles: Is filled, rad, (N + 2, 3).
+        thrusts: Is filled: to command at each step, N, (N,).
+        end: Is filled, see `end_of_motion`.
+    """
+    wanted_forces(position, velocity, references[:3], errors_ahead, gains, disturbances[:3], airframe, limits, forces)
+    ahead = np.empty(forces.shape[0])
+    turns = yaw_ahead(yaw_rad, references[3], planned_yaw, ahead)
+    attitudes(forces, references[3] + turns, ahead, angles)
+    thrust_commands(thrust_n, forces, up, follows, limits, thrusts)
+    end_of_motion(angles, inertia, disturbances[3:], interval_s, end)
+    force = forces[0]
+    aligned: float = (force[0] * up[0] + force[1] * up[1] + force[2] * up[2]) / length(force)
+    return aligned
+
+
+@compiled
+def hold_attitude(
+    up: Array,
+    yaw_rad: float,
+    thrust_n: float,
+    demanded: tuple[Array, Array],
+    disturbance_n_m: Array,
+    inertia: Array,
+    limits: Limits,
+    follows: float,
+    interval_s: float,
+    force: Array,
+    angles: Array,
+    thrusts: Array,
+    end: Array,
+) -> float:
+    """Do what `guide` does where attitude and thrust are demanded themselves; return the same cosine.
+
+    Args:
+        up: Body z axis now, ENU, (3,).
+        yaw_rad: Now.
+        thrust_n: Now, N.
+        demanded: phi, theta, psi, rad, (N + 2, 3), and thrust, N, (N + 2,), at each sample from now.
+        disturbance_n_m: Moment that the model does not explain, (3,).
+        inertia: Ix, Iy, Iz, kg m², (3,).
+        limits: Of the thrust.
+        follows: Part of the way to its command that thrust goes in a step.
+        interval_s: Between two samples.
+        force: Is filled: demanded now, N, ENU, (3,).
+        angles: Is filled, rad, (N + 2, 3): psi in the full turn that the vehicle is in.
+        thrusts: Is filled: to command at each step, N, (N,).
+        end: Is filled, see `end_of_motion`.
+    """
+    turns = 2.0 * pi * floor((yaw_rad - demanded[0][0, 2]) / (2.0 * pi) + 0.5)
+    along = np.zeros((angles.shape[0], 3))
+    for n in range(angles.shape[0]):
+        angles[n] = demanded[0][n]
+        angles[n, 2] += turns
+        along[n, 2] = min(max(demanded[1][n], limits.least_thrust_n), limits.most_thrust_n)
+    thrust_commands(thrust_n, along, np.array([0.0, 0.0, 1.0]), follows, limits, thrusts)
+    end_of_motion(angles, inertia, disturbance_n_m, interval_s, end)
+    phi, theta, psi = angles[0]
+    force[0] = along[0, 2] * (cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi))
+    force[1] = along[0, 2] * (cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi))
+    force[2] = along[0, 2] * cos(phi) * cos(theta)
+    aligned: float = (force[0] * up[0] + force[1] * up[1] + force[2] * up[2]) / along[0, 2]
+    return aligned
+
+
+@compiled
+def length(vector: Array) -> float:
+    """Return the length of a vector (3,)."""
+    return sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])

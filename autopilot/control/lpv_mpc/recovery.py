@@ -1,0 +1,92 @@
+"""When no plan can be had: an attitude law for any attitude, and a mixer that gives up what matters least.
+
+The law turns the thrust axis the shortest way to where it must point (reduced attitude: Chaturvedi, Sanyal and
+McClamroch, IEEE Control Systems 31(3), 2011) and only damps the rotation about it. The mixer keeps the moments that
+turn the thrust axis, moves the thrust as far as they need, and gives yaw what is left.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.common.jit import compiled
+from colibri.common.kernels import atan2
+from colibri.common.types import Array
+
+_ANTIPARALLEL = 1e-6
+
+
+class TurnGains(NamedTuple):
+    """How the thrust axis is turned: rad/s for each rad, 1/s on the rates, the fastest turn in rad/s."""
+
+    angle: float
+    rate: float
+    fastest_rad_s: float
+
+
+@compiled
+def turning_moment(direction: Array, rate: Array, inertia: Array, gains: TurnGains) -> Array:
+    """Return the moment, N m, FLU, (3,), that turns the body's z axis to `direction`.
+
+    Args:
+        direction: Where the thrust must point, in the body's frame, (3,), of length 1.
+        rate: Body rates, rad/s, (3,).
+        inertia: Ix, Iy, Iz, kg m², (3,).
+        gains: Of the law.
+    """
+    across = sqrt(direction[0] * direction[0] + direction[1] * direction[1])
+    wanted = np.zeros(3)
+    speed = min(gains.angle * atan2(across, direction[2]), gains.fastest_rad_s)
+    if across > _ANTIPARALLEL:
+        wanted[0], wanted[1] = -direction[1] / across * speed, direction[0] / across * speed
+    else:
+        wanted[0] = speed
+    ix, iy, iz = inertia
+    p, q, r = rate
+    moment = np.empty(3)
+    moment[0] = ix * gains.rate * (wanted[0] - p) - (iy - iz) * q * r
+    moment[1] = iy * gains.rate * (wanted[1] - q) - (iz - ix) * p * r
+    moment[2] = -iz * gains.rate * r
+    return moment
+
+
+@compiled
+def prioritised(
+    thrust_n: float,
+    moment_n_m: Array,
+    rotors_from_thrust: Array,
+    rotors_from_moments: Array,
+    squared_least: float,
+    squared_most: float,
+) -> Array:
+    """Return squared rotor speeds (4,) within their limits: tilting moments first, then thrust, then yaw.
+
+    Args:
+        thrust_n: Wanted, N.
+        moment_n_m: U2, U3, U4 wanted, N m, (3,).
+        rotors_from_thrust: Squared speeds from U1, in parts of the largest, (4,).
+        rotors_from_moments: The same from U2, U3, U4, (4, 3).
+        squared_least: Least squared speed, in the same parts.
+        squared_most: Largest squared speed.
+    """
+    tilt = rotors_from_moments[:, 0] * moment_n_m[0] + rotors_from_moments[:, 1] * moment_n_m[1]
+    yaw = rotors_from_moments[:, 2] * moment_n_m[2]
+    room = squared_most - squared_least
+    spread = tilt.max() - tilt.min()
+    if spread > room:
+        tilt *= room / spread
+    lift = rotors_from_thrust * thrust_n
+    lowest, highest = (lift + tilt).min(), (lift + tilt).max()
+    shift = max(squared_least - lowest, 0.0) + min(squared_most - highest, 0.0)
+    squared = lift + tilt + shift
+    share = 1.0
+    for i in range(squared.shape[0]):
+        if yaw[i] > 0.0:
+            share = min(share, max(squared_most - squared[i], 0.0) / yaw[i])
+        elif yaw[i] < 0.0:
+            share = min(share, max(squared[i] - squared_least, 0.0) / -yaw[i])
+    result: Array = squared + share * yaw
+    for i in range(result.shape[0]):
+        result[i] = min(max(result[i], squared_least), squared_most)
+    return result

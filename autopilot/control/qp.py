@@ -1,0 +1,207 @@
+"""Quadratic programs through qpsolvers; the one place that knows it. Every result is a value, never an exception."""
+
+from enum import StrEnum
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+from warnings import catch_warnings, simplefilter
+
+import numpy as np
+
+from colibri.common.types import Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
+
+IN_SOLVERS_EXTRA = ("highs", "osqp", "piqp", "proxqp", "quadprog", "scs")
+"""What `pip install colibri-sitl[solvers]` brings, by the names that qpsolvers uses."""
+
+LARGEST_RESIDUAL = 1e-6
+"""A solution that misses its optimality conditions by more is not accurate."""
+
+MOST_ITERATIONS = 100_000
+
+
+_NONE = np.empty(0)
+_PATTERNS = 64
+
+
+class SolverError(Exception):
+    """A solver that cannot be used; the message says what to do."""
+
+
+class QpStatus(StrEnum):
+    """How a QP ended."""
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    TIME_OUT = "time-out"
+    """The solver stopped at its most iterations: counted, not timed, so that a flight stays the same flight."""
+    NOT_ACCURATE = "not accurate"
+    """What the solver gave is no number, or does not satisfy the optimality conditions."""
+
+
+class Qp(NamedTuple):
+    """min ½ xᵀ H x + fᵀ x subject to G x <= h, lower <= x <= upper.
+
+    Attributes:
+        H: Symmetric, positive definite, (n, n).
+        f: (n,).
+        G: (m, n).
+        h: (m,).
+        lower: (n,); None for no bounds.
+        upper: (n,); None for no bounds.
+    """
+
+    H: Array
+    f: Array
+    G: Array
+    h: Array
+    lower: Array | None = None
+    upper: Array | None = None
+
+
+class QpResult(NamedTuple):
+    """The solution (n,), or None with the status that says why there is none."""
+
+    status: QpStatus
+    x: Array | None
+
+
+class QpSolver:
+    """One solver of qpsolvers, held to a tolerance."""
+
+    def __init__(self, name: str, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
+        """Use solver `name`; those that work to a tolerance stop at `tolerance`, all at `max_iterations`.
+
+        Raises:
+            SolverError: There is no such solver, or it is not installed.
+        """
+        check_solver(name)
+        import qpsolvers  # slow to load, as is what is compiled: who only reads a result does without
+
+        from colibri.autopilot.control.qp_residual import residual
+
+        self._qpsolvers = qpsolvers
+        self._residual = residual
+        self._name = name
+        self._sparse = name in qpsolvers.sparse_solvers and name not in qpsolvers.dense_solvers
+        self._options = _options(name, tolerance, max_iterations)
+        self.solve(Qp(np.eye(1), np.zeros(1), np.eye(1), np.ones(1)))  # loads what is loaded late, before any flight
+
+    def solve(self, qp: Qp) -> QpResult:
+        """Solve a QP."""
+        P, G = (_filled("P", qp.H), _filled("G", qp.G)) if self._sparse else (qp.H, qp.G)
+        try:
+            solution = self._quietly(qp, P, G) if self._sparse else self._solution(qp, P, G)
+        except (self._qpsolvers.QPError, ArithmeticError, ValueError, RuntimeWarning):
+            return QpResult(QpStatus.NOT_ACCURATE, None)
+        if not solution.found or solution.x is None:
+            return QpResult(why_none(qp), None)
+        x = np.array(solution.x, dtype=np.float64)  # of our own: some solvers give what cannot be written to
+        lower, upper, z, z_box = map(_some, (qp.lower, qp.upper, solution.z, solution.z_box))
+        if self._residual(qp.H, qp.f, qp.G, qp.h, lower, upper, x, z, z_box) > LARGEST_RESIDUAL:
+            return QpResult(QpStatus.NOT_ACCURATE, None)
+        return QpResult(QpStatus.SOLVED, x)
+
+    def _solution(self, qp: Qp, P: Any, G: Any) -> Any:
+        problem = self._qpsolvers.Problem(P, qp.f, G, qp.h, lb=qp.lower, ub=qp.upper)
+        return self._qpsolvers.solve_problem(problem, self._name, **self._options)
+
+    def _quietly(self, qp: Qp, P: Any, G: Any) -> Any:
+        """Solve without a word: the sparse solvers' interfaces warn of what they do with their matrices."""
+        with catch_warnings():
+            simplefilter("ignore")
+            return self._solution(qp, P, G)
+
+
+def _some(vector: Array | None) -> Array:
+    return _NONE if vector is None else np.ascontiguousarray(vector, dtype=np.float64)
+
+
+def why_none(qp: Qp) -> QpStatus:
+    """Tell why a QP has no solution: no point satisfies its constraints (a linear program's phase one), or no time."""
+    from scipy.optimize import linprog
+
+    if not all(np.isfinite(part).all() for part in (qp.H, qp.f, qp.G, qp.h)):
+        return QpStatus.NOT_ACCURATE
+    n = len(qp.f)
+    lower = np.full(n, -np.inf) if qp.lower is None else qp.lower
+    upper = np.full(n, np.inf) if qp.upper is None else qp.upper
+    bounds = list(zip(lower.tolist(), upper.tolist(), strict=True))
+    feasible = linprog(np.zeros(n), A_ub=qp.G, b_ub=qp.h, bounds=bounds).status == 0
+    return QpStatus.TIME_OUT if feasible else QpStatus.INFEASIBLE
+
+
+def installed_solvers() -> list[str]:
+    """Return the names of the QP solvers that can be used here."""
+    import qpsolvers
+
+    return sorted(qpsolvers.available_solvers)
+
+
+def check_solver(name: str) -> None:
+    """Check that a solver can be used.
+
+    Raises:
+        SolverError: There is no such solver, or it is not installed.
+    """
+    import qpsolvers
+
+    if name in qpsolvers.available_solvers:
+        return
+    if name not in _known_solvers():
+        raise SolverError(f"unknown solver {name}: installed are {', '.join(installed_solvers())}")
+    extra = "colibri-sitl[solvers]" if name in IN_SOLVERS_EXTRA else f"qpsolvers[{name}]"
+    raise SolverError(f"solver {name} is not installed: pip install '{extra}'")
+
+
+@cache
+def box(n: int) -> Array:
+    """Return G of the box G x <= [upper; -lower]."""
+    return np.vstack([np.eye(n), -np.eye(n)])
+
+
+def _filled(role: str, matrix: Array) -> "csc_matrix":
+    """Return a matrix as CSC: to build one anew costs five times what Clarabel takes, so its pattern is kept."""
+    filled = matrix.T != 0.0
+    sparse = _pattern(role, matrix.shape, filled.tobytes())
+    np.asarray(sparse.data)[:] = matrix.T[filled]
+    return sparse
+
+
+@lru_cache(maxsize=_PATTERNS)
+def _pattern(role: str, shape: tuple[int, int], filled: bytes) -> "csc_matrix":
+    """Return a matrix of ones where the bytes of its transpose are."""
+    from scipy.sparse import csc_matrix
+
+    del role  # two matrices of one pattern are two matrices
+    return csc_matrix(np.frombuffer(filled, dtype=np.bool_).reshape(shape[::-1]).T.astype(np.float64))
+
+
+@cache
+def _known_solvers() -> frozenset[str]:
+    import qpsolvers
+
+    suffix = "_solve_qp"
+    return frozenset(entry.removesuffix(suffix) for entry in dir(qpsolvers) if entry.endswith(suffix))
+
+
+def _options(name: str, tolerance: float, max_iterations: int) -> dict[str, Any]:
+    """Return what each solver calls its tolerances and its most iterations; quadprog has neither."""
+    absolute_and_relative = {"eps_abs": tolerance, "eps_rel": tolerance}
+    options: dict[str, dict[str, Any]] = {
+        "clarabel": {
+            **{f"tol_{what}": tolerance for what in ("gap_abs", "gap_rel", "feas")},
+            "max_iter": max_iterations,
+        },
+        "daqp": {"iter_limit": max_iterations},
+        "osqp": {**absolute_and_relative, "max_iter": max_iterations},
+        "piqp": {**absolute_and_relative, "max_iter": max_iterations},
+        "proxqp": {**absolute_and_relative, "max_iter": max_iterations},
+        "scs": {**absolute_and_relative, "max_iters": max_iterations},
+        "highs": {
+            **{f"{what}_feasibility_tolerance": tolerance for what in ("primal", "dual")},
+            "qp_iteration_limit": max_iterations,
+        },
+    }
+    return options.get(name, {})

@@ -1,0 +1,72 @@
+"""Control laws by name: found as entry points, made, and what they return checked."""
+
+from collections.abc import Callable, Mapping
+from importlib.metadata import entry_points
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from colibri.autopilot.control.interface import Clock, Controller
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+GROUP = "colibri.controllers"
+DEFAULT = "cascade"
+
+
+class ControllerError(Exception):
+    """A control law that cannot be used."""
+
+
+class DecisionError(Exception):
+    """A control law decided in flight what no rotor can follow."""
+
+
+Factory: TypeAlias = Callable[[Mapping[str, Any], Vehicle, Clock], Controller[Any]]
+"""(the profile's table for this controller, the vehicle to control, clock) -> control law."""
+
+
+def controller_names() -> list[str]:
+    """Return the names of the control laws that are installed."""
+    return sorted({entry.name for entry in entry_points(group=GROUP)})
+
+
+def load_controller(name: str) -> Factory:
+    """Return the factory registered as `name`.
+
+    Raises:
+        ControllerError: There is none, or its package cannot be loaded.
+    """
+    for entry in entry_points(group=GROUP, name=name):
+        try:
+            factory: Factory = entry.load()
+        except (ImportError, AttributeError) as error:
+            raise ControllerError(f"controller {name} ({entry.value}) cannot be loaded: {error}") from error
+        return factory
+    raise ControllerError(f"unknown controller {name}: installed are {', '.join(controller_names())}")
+
+
+def check_controller(name: str, controller: object) -> None:
+    """Check what a control law promises before anything flies.
+
+    Raises:
+        ControllerError: It is not a control law.
+    """
+    if not isinstance(controller, Controller):
+        raise ControllerError(f"controller {name} needs control_interval_us, preview, initial() and step()")
+    interval_us = controller.control_interval_us
+    if not 1_000 <= interval_us <= 1_000_000 or interval_us % 1_000:
+        raise ControllerError(f"controller {name}: control_interval_us must be whole milliseconds up to a second")
+
+
+def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float) -> None:
+    """Check that rotors can follow a decision.
+
+    Raises:
+        DecisionError: They cannot.
+    """
+    speeds = np.asarray(rotor_speeds).tolist()
+    if not isinstance(speeds, list) or len(speeds) != 4 or not all(0.0 <= speed <= max_speed for speed in speeds):
+        raise DecisionError(
+            f"controller {name} gave rotor speeds {rotor_speeds}: expected four from 0 to {max_speed:g}"
+        )

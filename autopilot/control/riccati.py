@@ -1,0 +1,37 @@
+"""The discrete-time linear-quadratic regulator, by structure-preserving doubling of its Riccati equation.
+
+E. K.-W. Chu, H.-Y. Fan, W.-W. Lin and C.-S. Wang, Structure-preserving algorithms for periodic discrete-time algebraic
+Riccati equations, International Journal of Control 77(8), 2004.
+"""
+
+import numpy as np
+
+from colibri.common.jit import compiled_for
+from colibri.common.matrices import inverse, matmul, solve
+from colibri.common.types import Array
+
+_DOUBLINGS = 40
+_RESIDUE = 1e-15
+"""Of the cost matrix: a doubling that adds no more has converged."""
+
+
+@compiled_for("Tuple((float64[:, ::1], float64[:, ::1]))(" + ", ".join(["float64[:, :]"] * 4) + ")")
+def lqr(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
+    """Return the cost matrix S, (n, n), and the gain K, (m, n), of u = -K x for x[k+1] = A x[k] + B u[k].
+
+    Args:
+        A: (n, n); (A, B) can be stabilised, and what (Q, A) does not show is stable.
+        B: (n, m).
+        Q: Weight of the state, symmetric, (n, n).
+        R: Weight of the input, symmetric and positive definite, (m, m).
+    """
+    eye = np.eye(A.shape[0])
+    F, G, S = A.copy(), matmul(matmul(B, inverse(R)), B.T), Q.copy()
+    for _ in range(_DOUBLINGS):
+        W = inverse(eye + matmul(G, S))
+        step = matmul(F.T, matmul(S, matmul(W, F)))
+        F, G, S = matmul(F, matmul(W, F)), G + matmul(F, matmul(W, matmul(G, F.T))), S + step
+        if np.abs(step).max() <= _RESIDUE * np.abs(S).max():
+            break
+    weighted = matmul(B.T, S)
+    return S, solve(R + matmul(weighted, B), matmul(weighted, A))

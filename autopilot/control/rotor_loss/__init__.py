@@ -1,0 +1,1 @@
+"""A lost rotor: detected, and flown down on the other three."""

@@ -1,0 +1,207 @@
+"""Whether a rotor is lost: told from thrust and moments that the commanded rotors should make and the vehicle misses.
+
+Newton and Euler, backwards: from one control sample to the next the vehicle's velocity and rates say which force along
+its z axis and which moments acted. What the rotors were commanded to make, their lag followed, is taken off; a dead
+rotor i leaves a residual -fᵢ aᵢ of its own direction aᵢ = (1, yᵢ, -xᵢ, κᵢ), fᵢ being the thrust that it should have.
+
+For each rotor a CUSUM (E. S. Page, Continuous inspection schemes, Biometrika 41, 1954) sums the log likelihood of "it
+makes nothing" over that of "it is weak by a quarter, and the moments of inertia are whatever explains the rest". So
+it grows for a rotor that has less than 0.375 of its thrust, which is about what a hover on four needs, and for
+nothing else. One sample adds a bounded amount, so that no single jump, of a knock or of the estimate, makes an alarm.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import VehicleState
+from colibri.autopilot.control.vehicle_model.battery import BatteryModel
+from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag, follow, rotor_lag
+from colibri.common.elementary import square
+from colibri.common.jit import compiled
+from colibri.common.rotations import rotation_matrix
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+ALARM = 20.0
+"""Logarithm of the odds: e²⁰ samples are a century."""
+MOST_EVIDENCE = 10.0
+"""Of one sample: an alarm takes two."""
+_WEAK = 0.25
+"""Part of its thrust that a weak rotor lacks. Half way from here to all of it lies what is told apart."""
+_INERT, _AGILE = -0.4, 1.0
+"""A vehicle may turn by so much less or more than it is expected to: moments of inertia that are 1.67 or 0.5 times."""
+_NOISE_PART = 1.0 / 64.0
+"""Of what one sample says of the noise: sensors that fail are to be doubted, and not the rotors."""
+_FORCE_PART, _TILT_PART, _YAW_PART = 0.6, 0.1, 0.5
+"""Standard deviations of the residual, in parts of what one rotor makes in hover: far above what sensors add, because
+it is the model that errs (mass, drag, gusts, weak rotors), and drag hardly turns the vehicle but about z."""
+
+
+class Signature(NamedTuple):
+    """What the rotors of one vehicle are to the watch; forces in N at the largest speed.
+
+    Attributes:
+        full_thrust_n: Of each rotor, (4,).
+        effect: Force along z, moments about x, y, z of each newton, (4, 4), column i that of rotor i.
+        momentum: Angular momentum of each rotor at the largest speed, N m s, (4,).
+        inertia: Ix, Iy, Iz, kg m², (3,).
+        variances: Of the residual, N² and N² m², (4,).
+        mass_kg: Mass.
+        gravity_m_s2: Gravity.
+    """
+
+    full_thrust_n: Array
+    effect: Array
+    momentum: Array
+    inertia: Array
+    variances: Array
+    mass_kg: float
+    gravity_m_s2: float
+
+
+def signature_of(vehicle: Vehicle) -> Signature:
+    """Return the signature of a vehicle's rotors."""
+    allocation = vehicle.allocation()
+    effect = allocation / allocation[0]
+    lift_n = vehicle.body.mass_kg * vehicle.gravity_m_s2 / 4.0
+    arm_m = float(np.sqrt(effect[1] * effect[1] + effect[2] * effect[2]).mean())
+    yaw_m = float(np.abs(effect[3]).mean())
+    deviations = lift_n * np.array([_FORCE_PART, _TILT_PART * arm_m, _TILT_PART * arm_m, _YAW_PART * yaw_m])
+    return Signature(
+        allocation[0] * square(vehicle.rotors.max_speed),
+        effect,
+        vehicle.rotor_momentum() * vehicle.rotors.max_speed,
+        np.array(vehicle.body.inertia_kg_m2),
+        deviations**2,
+        vehicle.body.mass_kg,
+        vehicle.gravity_m_s2,
+    )
+
+
+class RotorWatch:
+    """Watches the rotors of one vehicle.
+
+    Attributes:
+        lost: The rotor that is lost, 0..3; None while all turn. Once lost it stays so.
+        evidence: What each rotor's CUSUM has come to, (4,).
+        speeds: Rotor speeds now, as their lag has them, in parts of the largest, (4,).
+        largest: The most that any CUSUM has ever come to.
+    """
+
+    def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
+        """Watch `vehicle`, a control sample every `interval_s`."""
+        self._interval_s = interval_s
+        self.lost: int | None = None
+        self.evidence = np.zeros(4)
+        self.speeds = np.zeros(4)
+        self.largest = 0.0
+        self._before: Array | None = None
+        self._residual, self._noise = np.zeros(4), np.zeros(4)
+        self.adopt(vehicle)
+        still = np.zeros(9)
+        _evidence(still, still, self.speeds, self.speeds, interval_s, self._signature, self._residual, self._noise)
+        self.begin((0.0, 0.0, 0.0, 0.0))
+
+    def adopt(self, vehicle: Vehicle) -> None:
+        """Go on with other numbers of the vehicle."""
+        self._signature = signature_of(vehicle)
+        self._lag: RotorLag = rotor_lag(vehicle, self._interval_s)
+        self._battery = BatteryModel(vehicle)
+
+    def begin(self, controls: tuple[float, float, float, float]) -> None:
+        """Begin anew with the rotors at `controls`, parts of the largest speed: no sample was before."""
+        self.speeds = np.array(controls)
+        self.evidence[:] = self._residual[:] = self._noise[:] = 0.0
+        self._before = None
+
+    def step(
+        self, state: VehicleState, controls: tuple[float, float, float, float], charge_ah: float, *, airborne: bool
+    ) -> int | None:
+        """Take in a control sample; return the rotor that is lost, None while all turn.
+
+        Args:
+            state: The vehicle now.
+            controls: What the rotors were commanded to since the sample before, parts of the largest speed.
+            charge_ah: Charge taken from the battery.
+            airborne: Whether nothing but air touches it.
+        """
+        fastest = self._battery.fastest_now(charge_ah, self.speeds)
+        commands = np.minimum(np.maximum(np.array(controls), self._lag.least), fastest)
+        before, self.speeds = self.speeds, follow(self.speeds, commands, self._lag)
+        last = self._before
+        R = rotation_matrix(state.attitude)
+        self._before = now = np.array((*state.velocity_enu_m_s, *state.rate_flu_rad_s, R[0][2], R[1][2], R[2][2]))
+        if last is None or not airborne:
+            self.evidence[:] = 0.0
+            return self.lost
+        self.evidence += _evidence(
+            last, now, before, self.speeds, self._interval_s, self._signature, self._residual, self._noise
+        )
+        np.maximum(self.evidence, 0.0, out=self.evidence)
+        most = int(np.argmax(self.evidence))
+        self.largest = max(self.largest, float(self.evidence[most]))
+        if self.lost is None and self.evidence[most] >= ALARM:
+            self.lost = most
+        return self.lost
+
+
+@compiled
+def _evidence(
+    before: Array,
+    now: Array,
+    speeds_before: Array,
+    speeds: Array,
+    interval_s: float,
+    signature: Signature,
+    last: Array,
+    noise: Array,
+) -> Array:
+    """Return how much more likely it is of each rotor that it makes nothing than that it is weak, as logarithms.
+
+    Args:
+        before: Velocity (m/s, ENU), rates (rad/s, FLU), body z axis (ENU) a sample ago, (9,).
+        now: The same now.
+        speeds_before: Rotor speeds then, parts of the largest, (4,).
+        speeds: The same now.
+        interval_s: Between the two.
+        signature: Of the vehicle.
+        last: Residual of the sample before, (4,); that of this one afterwards.
+        noise: Variances of what changes in it from sample to sample, (4,); carried on in place.
+    """
+    thrust_n = np.empty(4)
+    h, h_rate = 0.0, 0.0
+    for i in range(4):
+        squared = 0.5 * (speeds_before[i] * speeds_before[i] + speeds[i] * speeds[i])
+        thrust_n[i] = signature.full_thrust_n[i] * squared
+        h += signature.momentum[i] * 0.5 * (speeds_before[i] + speeds[i])
+        h_rate += signature.momentum[i] * (speeds[i] - speeds_before[i]) / interval_s
+    ix, iy, iz = signature.inertia
+    p, q, r = 0.5 * (before[3] + now[3]), 0.5 * (before[4] + now[4]), 0.5 * (before[5] + now[5])
+    residual, expected = np.zeros(4), np.zeros(4)
+    for i in range(3):
+        acceleration = (now[i] - before[i]) / interval_s + (signature.gravity_m_s2 if i == 2 else 0.0)
+        residual[0] += signature.mass_kg * acceleration * 0.5 * (before[6 + i] + now[6 + i])
+    residual[1] = ix * (now[3] - before[3]) / interval_s - (iy - iz) * q * r + q * h
+    residual[2] = iy * (now[4] - before[4]) / interval_s - (iz - ix) * p * r - p * h
+    residual[3] = iz * (now[5] - before[5]) / interval_s - (ix - iy) * p * q + h_rate
+    for row in range(4):
+        for i in range(4):
+            expected[row] += signature.effect[row, i] * thrust_n[i]
+        residual[row] -= expected[row]
+        change = residual[row] - last[row]
+        noise[row] += _NOISE_PART * (0.5 * change * change - noise[row])
+        last[row] = residual[row]
+    evidence = np.zeros(4)
+    for i in range(4):
+        for row in range(4):
+            missing = signature.effect[row, i] * thrust_n[i]
+            weak, none = residual[row] + _WEAK * missing, residual[row] + missing
+            if row > 0:
+                least, most = _INERT * expected[row], _AGILE * expected[row]
+                if least > most:
+                    least, most = most, least
+                weak -= min(max(weak, least), most)
+            evidence[i] += 0.5 * (weak * weak - none * none) / (signature.variances[row] + noise[row])
+        evidence[i] = min(evidence[i], MOST_EVIDENCE)
+    return evidence

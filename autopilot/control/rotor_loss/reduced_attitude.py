@@ -1,0 +1,234 @@
+"""The attitude of a quadrotor on three rotors: yaw is given up, the vehicle spins, and its thrust circles a direction.
+
+Beyond the loss of a rotor there is no equilibrium but a periodic solution (M. W. Mueller and R. D'Andrea, Stability
+and control of a quadrocopter despite the complete loss of one, two, or three propellers, ICRA 2014): the vehicle turns
+about an axis that stands still in its body and on earth, off the rotors' axis by a cone that the thrust of the rotor
+opposite to the lost one opens. That thrust brakes the spin: without any, the gyroscope would leave its range.
+
+The law is an LQR on what deviates from the periodic solution of the moment's spin: scheduled by the spin (LPV), from
+none at all right after the loss to the final one, with the rotors' lag and the sampling inside the model.
+
+Of the rotors that are left, a and b stand beside the lost one and o opposite. The state is h, the wanted direction of
+the thrust as the body sees it (x, y), the rates p and q, and two forces that follow their commands: d = f_b - f_a, f_o.
+"""
+
+from math import hypot, inf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.riccati import lqr
+from colibri.common.kernels import atan, exp, log, tan
+from colibri.common.matrices import dot, expm, matvec
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+_SPINS_RAD_S = np.arange(-8.0, 45.0)
+"""That gains are found for. The torque of the rotors that are left turns the vehicle towards positive ones."""
+_NO_CONE_RAD_S, _WHOLE_CONE_RAD_S = 5.0, 15.0
+"""The cone opens between these: what spins slowly would tilt far for little thrust."""
+_LARGEST_CONE_RAD = 0.35
+_SCARCE = 0.03
+"""Of the cost's measure of f_o where the solution has none: there it can push, and not pull."""
+_TIGHTEST = 1e-3
+_BISECTIONS = 50
+_SAME_SAMPLE = 1e-9
+
+
+class Weights(NamedTuple):
+    """What is much of each: the quadratic cost weighs with one over its square.
+
+    Attributes:
+        direction: Error of direction, rad.
+        rate: Error of p and q, rad/s.
+        force_part: Deviation of the forces, in parts of a quarter of the weight.
+    """
+
+    direction: float = 0.12
+    rate: float = 3.0
+    force_part: float = 0.6
+
+
+class Trio(NamedTuple):
+    """The three rotors that are left, by number.
+
+    Attributes:
+        lost: The one that is not.
+        a: One beside it.
+        b: The other beside it.
+        o: The opposite one, of the same hand.
+        sign: +1 where their torque spins the vehicle counter-clockwise seen from above, -1 otherwise.
+    """
+
+    lost: int
+    a: int
+    b: int
+    o: int
+    sign: float
+
+
+class Solution(NamedTuple):
+    """The periodic solution of a spin.
+
+    Attributes:
+        h: Direction of the mean thrust as the body sees it, x and y, (2,).
+        rate: p and q, rad/s, (2,).
+        opposite_n: Thrust of the opposite rotor, N.
+    """
+
+    h: Array
+    rate: Array
+    opposite_n: float
+
+
+class ReducedAttitude:
+    """The law for one vehicle that has lost one rotor.
+
+    Attributes:
+        trio: The rotors that are left.
+        cone_rad: Angle between thrust and spin axis at the final spin.
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, lost: int, interval_s: float, follows: float, spin_rad_s: float, weights: Weights
+    ) -> None:
+        """Find the gains: some ms.
+
+        Args:
+            vehicle: Before it lost a rotor.
+            lost: The rotor, 0..3.
+            interval_s: Between two control samples.
+            follows: Part of the way to its command that a force goes in one of them.
+            spin_rad_s: The final spin, positive.
+            weights: Of the cost.
+        """
+        self.trio = trio_without(vehicle, lost)
+        allocation = vehicle.allocation()
+        a, b, o = (allocation[1:3, rotor] / allocation[0, rotor] for rotor in self.trio[1:4])
+        self._per_difference, self._per_opposite = 0.5 * (b - a), o - 0.5 * (a + b)
+        self._inertia = vehicle.body.inertia_kg_m2
+        self._weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
+        opposite_n = balancing_thrust(vehicle, self.trio, spin_rad_s)
+        self._momentum = _momentum(vehicle, self.trio, opposite_n)
+        rate = self._steady_rate(spin_rad_s * self.trio.sign) * opposite_n
+        self.cone_rad = min(atan(hypot(rate[0], rate[1]) / spin_rad_s), _LARGEST_CONE_RAD)
+        self._gains = self._designed(interval_s, follows, weights)
+
+    def command(self, direction: Array, rate: Array, forces: Array) -> tuple[float, float]:
+        """Return the commands of d and f_o, N, before any limit.
+
+        Args:
+            direction: Where the mean thrust is to point, in the body's frame, (3,), of length 1.
+            rate: p, q, r, rad/s, (3,).
+            forces: d and f_o now, N, (2,).
+        """
+        spin = float(rate[2]) * self.trio.sign
+        solution = self.solution(spin)
+        h = direction[:2]
+        if direction[2] < 0.0:  # beyond the horizon the error no longer grows with the sine of the angle
+            h = h / max(hypot(h[0], h[1]), _TIGHTEST)
+        deviation = np.array([*(h - solution.h), *(rate[:2] - solution.rate), forces[0], forces[1]])
+        deviation[5] -= solution.opposite_n
+        d, f_o = matvec(-self._gain(spin), deviation).tolist()
+        return d, f_o + solution.opposite_n
+
+    def solution(self, spin: float) -> Solution:
+        """Return the periodic solution of a spin, rad/s, positive where the rotors turn the vehicle to."""
+        opened = (spin - _NO_CONE_RAD_S) / (_WHOLE_CONE_RAD_S - _NO_CONE_RAD_S)
+        if opened <= 0.0:
+            return Solution(np.zeros(2), np.zeros(2), 0.0)
+        tangent = tan(min(opened, 1.0) * self.cone_rad)
+        r = spin * self.trio.sign
+        per_newton = self._steady_rate(r)
+        opposite_n = tangent * spin / hypot(per_newton[0], per_newton[1])
+        rate = per_newton * opposite_n
+        return Solution(rate / r / sqrt(1.0 + tangent * tangent), rate, opposite_n)
+
+    def _steady_rate(self, r: float) -> Array:
+        """Return p and q for each newton of the opposite rotor, (2,), at which p' = q' = 0 while r stays."""
+        ix, iy, iz = self._inertia
+        x, y = self._per_opposite
+        return np.array([-y / (r * (iz - ix) + self._momentum), x / (r * (iz - iy) + self._momentum)])
+
+    def _gain(self, spin: float) -> Array:
+        place = min(max(spin - _SPINS_RAD_S[0], 0.0), len(_SPINS_RAD_S) - 1.0 - _SAME_SAMPLE)
+        first = int(place)
+        gain: Array = self._gains[first] + (place - first) * (self._gains[first + 1] - self._gains[first])
+        return gain
+
+    def _designed(self, interval_s: float, follows: float, weights: Weights) -> Array:
+        """Return the gains, (spins, 2, 6)."""
+        opened = (_SPINS_RAD_S - _NO_CONE_RAD_S) / (_WHOLE_CONE_RAD_S - _NO_CONE_RAD_S)
+        newton = weights.force_part * self._weight_n / 4.0
+        Q = np.diag(1.0 / np.array([weights.direction, weights.direction, weights.rate, weights.rate, inf, inf]) ** 2)
+        gains = []
+        for spin, part in zip(_SPINS_RAD_S.tolist(), np.clip(opened, _SCARCE, 1.0).tolist(), strict=True):
+            sampled = expm(self._model(spin, interval_s, follows) * interval_s)
+            R = np.diag(1.0 / np.array([newton, newton * part]) ** 2)
+            gains.append(lqr(sampled[:6, :6], sampled[:6, 6:], Q, R)[1])
+        return np.array(gains)
+
+    def _model(self, spin: float, interval_s: float, follows: float) -> Array:
+        """Return the generator of state and held commands, (8, 8), linearised about the periodic solution.
+
+        h' = -ω × h; Euler's equations with rotors, THESIS [2.8]; first-order lags.
+        """
+        r = spin * self.trio.sign
+        (hx, hy), (p, q), _ = self.solution(spin)
+        hz = sqrt(1.0 - hx * hx - hy * hy)
+        ix, iy, iz = self._inertia
+        M = np.zeros((8, 8))
+        M[0, :4] = q * hx / hz, r + q * hy / hz, 0.0, -hz
+        M[1, :4] = -r - p * hx / hz, -p * hy / hz, hz, 0.0
+        M[2, 3] = (r * (iy - iz) - self._momentum) / ix
+        M[3, 2] = (r * (iz - ix) + self._momentum) / iy
+        M[2:4, 4] = self._per_difference / (ix, iy)
+        M[2:4, 5] = self._per_opposite / (ix, iy)
+        lag_1_s = -log(max(1.0 - follows, exp(-20.0))) / interval_s
+        M[4, 4], M[5, 5], M[4, 6], M[5, 7] = -lag_1_s, -lag_1_s, lag_1_s, lag_1_s
+        return M
+
+
+def trio_without(vehicle: Vehicle, lost: int) -> Trio:
+    """Return what is left without rotor `lost`: the one of its hand is opposite to it."""
+    torque = vehicle.allocation()[3]
+    o = next(i for i in range(4) if i != lost and torque[i] * torque[lost] > 0.0)
+    a, b = (i for i in range(4) if i not in (lost, o))
+    return Trio(lost, a, b, o, 1.0 if torque[a] > 0.0 else -1.0)
+
+
+def balancing_thrust(vehicle: Vehicle, trio: Trio, spin_rad_s: float) -> float:
+    """Return the thrust of the opposite rotor, N, at which drag and the rotors' torque balance at a spin.
+
+    All three carry the weight. The drag of a rotor in its plane acts at its hub, which moves at ω × r: -c Ω r² about z.
+    """
+    weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
+    low, high = 0.0, 0.5 * weight_n
+    for _ in range(_BISECTIONS):
+        opposite_n = 0.5 * (low + high)
+        speeds = _speeds(vehicle, trio, opposite_n)
+        torque = trio.sign * dot(vehicle.allocation()[3, list(trio[1:4])], speeds**2)
+        if torque > _spin_drag(vehicle, trio, speeds) * spin_rad_s:
+            low = opposite_n
+        else:
+            high = opposite_n
+    return low
+
+
+def _speeds(vehicle: Vehicle, trio: Trio, opposite_n: float) -> Array:
+    """Return the speeds of a, b and o that carry the weight, the vehicle's unit, (3,)."""
+    pair_n = 0.5 * (vehicle.body.mass_kg * vehicle.gravity_m_s2 - opposite_n)
+    return np.sqrt(np.array([pair_n, pair_n, opposite_n]) / vehicle.allocation()[0, list(trio[1:4])])
+
+
+def _spin_drag(vehicle: Vehicle, trio: Trio, speeds: Array) -> float:
+    """Return the moment against a spin, N m for each rad/s."""
+    if vehicle.drag is None:
+        return 0.0
+    hubs_m = np.array(vehicle.rotors.position_m)[list(trio[1:4])]
+    return vehicle.drag.rotor_coefficient * dot(speeds, (hubs_m * hubs_m).sum(axis=1))
+
+
+def _momentum(vehicle: Vehicle, trio: Trio, opposite_n: float) -> float:
+    """Return the angular momentum of the rotors along body z, N m s, as they carry the weight."""
+    return dot(vehicle.rotor_momentum()[list(trio[1:4])], _speeds(vehicle, trio, opposite_n))

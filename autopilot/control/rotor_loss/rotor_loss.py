@@ -1,0 +1,96 @@
+"""A rotor is lost: noticed, and flown down on the other three, whatever control law flew before."""
+
+from colibri.autopilot.control.interface import Decision, VehicleState
+from colibri.autopilot.control.rotor_loss.detector import RotorWatch
+from colibri.autopilot.control.rotor_loss.three_rotors import ThreeRotors
+from colibri.common.types import Array, FourRotors
+from colibri.plant.vehicle.description import Vehicle
+
+LONGEST_INTERVAL_S = 0.02
+"""A vehicle that spins at four turns a second turns half a radian in so long: who decides less often cannot do it."""
+_CLEAR_M = 0.3
+"""Closer to the ground than this it may touch, and the ground pushes as a rotor does."""
+
+
+class RotorLoss:
+    """Watches the rotors of one vehicle, and flies it once one is lost.
+
+    Attributes:
+        watch: Tells which is lost.
+        enabled: Whether anything is done, or noticed.
+    """
+
+    def __init__(self, vehicle: Vehicle, interval_us: int) -> None:
+        """Look after `vehicle`, which is controlled every `interval_us`."""
+        self._vehicle, self._interval_s = vehicle, interval_us * 1e-6
+        self._possible = self._interval_s <= LONGEST_INTERVAL_S
+        self.watch = RotorWatch(vehicle, self._interval_s)
+        self._three: ThreeRotors | None = None
+        self.enabled = True
+
+    @property
+    def lost(self) -> int | None:
+        """The rotor that is lost, 0..3; None while all turn, as far as is known."""
+        return self.watch.lost
+
+    @property
+    def flies(self) -> bool:
+        """Whether the vehicle is flown on three rotors now."""
+        return self._three is not None and not self._three.landed
+
+    @property
+    def landed(self) -> bool:
+        """Whether it has come down on three rotors."""
+        return self._three is not None and self._three.landed
+
+    def adopt(self, vehicle: Vehicle) -> None:
+        """Go on with other numbers of the vehicle; one that is flown on three rotors goes on with those it has."""
+        self._vehicle = vehicle
+        self.watch.adopt(vehicle)
+
+    def begin(self, controls: FourRotors) -> None:
+        """Begin after frames that were missed, the rotors turning at `controls`."""
+        self.watch.begin(controls)
+
+    def resume(self, lost: int, speeds: Array, state: VehicleState, ground_m: float, *, flying: bool) -> None:
+        """Go on after a restart without a rotor that was lost before, the others turning at `speeds`."""
+        self.watch.lost, self.watch.speeds = lost, speeds
+        if flying and self._possible:
+            self._three = ThreeRotors(self._vehicle, lost, self._interval_s, speeds, state, ground_m)
+
+    def forget(self) -> None:
+        """Take all rotors for whole again."""
+        self.watch.lost, self._three = None, None
+
+    def look(
+        self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool, ground_m: float
+    ) -> bool:
+        """Take in a control sample; return whether a rotor is known to be lost since this very one.
+
+        Args:
+            state: The vehicle now.
+            controls: What the rotors were commanded to since the sample before, parts of the largest speed.
+            charge_ah: Charge taken from the battery.
+            airborne: Whether the vehicle flies, and feels how.
+            ground_m: Height of the ground, z of ENU, as far as it is known.
+        """
+        if not (self.enabled and self._possible):
+            return False
+        if self.watch.lost is not None:
+            return False
+        clear = airborne and state.position_enu_m[2] - ground_m > _CLEAR_M
+        lost = self.watch.step(state, controls, charge_ah, airborne=clear)
+        if lost is None:
+            return False
+        self._three = ThreeRotors(self._vehicle, lost, self._interval_s, self.watch.speeds, state, ground_m)
+        return True
+
+    def decide(self, state: VehicleState, charge_ah: float) -> tuple[FourRotors, Decision]:
+        """Return the controls to hold until the next control sample, and the decision that they are."""
+        assert self._three is not None, "asked for only while three rotors fly"
+        decision = self._three.step(state, charge_ah)
+        return self._three.controls, decision
+
+    def end(self) -> None:
+        """Stop flying on three rotors; what is lost stays lost."""
+        self._three = None

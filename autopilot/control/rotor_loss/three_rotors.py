@@ -1,0 +1,274 @@
+"""Landing on three rotors: place and height above the reduced attitude, and how the rotors share what is asked for."""
+
+from math import hypot, radians
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import Decision, Diagnostics, Fallback, VehicleState
+from colibri.autopilot.control.rotor_loss.reduced_attitude import ReducedAttitude, Trio, Weights
+from colibri.autopilot.control.vehicle_model import disturbance_observer
+from colibri.autopilot.control.vehicle_model.battery import BatteryModel
+from colibri.autopilot.control.vehicle_model.rotor_lag import follow, lead, rotor_lag
+from colibri.common.elementary import square
+from colibri.common.kernels import atan2, cos, sin, tan
+from colibri.common.matrices import dot, matvec, norm
+from colibri.common.rotations import rotation_matrix
+from colibri.common.types import Array, Vector
+from colibri.plant.vehicle.description import Vehicle
+
+_FASTEST_SPIN_RAD_S = 28.0
+_SPIN_PART = 0.8
+"""Of the gyroscope's range: the rest is for transients."""
+_SPUN_UP_RAD_S = 10.0
+_SPIN_UP_THRUST = 1.3
+"""Parts of the weight: before it spins the thrust axis can only be turned one way, so the spin must come at once."""
+_LEAST_UPRIGHT = 0.5
+_AT_LIMIT = 1e-9
+
+
+class Descent(NamedTuple):
+    """How it is flown.
+
+    Attributes:
+        place_rad_s: Frequency of the position loop, critically damped.
+        climb_1_s: Gain on the vertical speed.
+        lift_m_s2: Largest vertical acceleration asked for.
+        lean_deg: Largest tilt of the mean thrust for the sake of place.
+        most_lean_deg: The same for place and wind together; the cone comes on top.
+        farther_deg_m: More of it for each metre that the vehicle is too far from its place.
+        far_m: How far that is.
+        blown_lean_deg: Largest tilt of the mean thrust at all.
+        wind_rad_s: Frequency at which what the model does not explain is observed: wind, most of all.
+        most_wind_m_s2: Largest of that believed.
+        settle_s: So long it stays at its height.
+        sink_m_s: Then it sinks.
+        land_m_s: At this speed close to the ground.
+        land_above_m: How close that is.
+    """
+
+    place_rad_s: float = 1.0
+    climb_1_s: float = 3.0
+    lift_m_s2: float = 4.0
+    lean_deg: float = 6.0
+    most_lean_deg: float = 8.0
+    farther_deg_m: float = 2.0
+    far_m: float = 1.5
+    blown_lean_deg: float = 16.0
+    wind_rad_s: float = 1.5
+    most_wind_m_s2: float = 2.0
+    settle_s: float = 1.5
+    sink_m_s: float = 1.0
+    land_m_s: float = 0.6
+    land_above_m: float = 2.0
+
+
+class Contact(NamedTuple):
+    """When the ground holds a vehicle that is told to sink: it knocks, or the vehicle stays. Rates do not count.
+
+    Attributes:
+        knock: Upward acceleration of one sample that nothing else makes, in parts of gravity, where the ground is near.
+        slower_m_s: Speed of a vehicle that stays.
+        for_s: For so long.
+    """
+
+    knock: float = 0.5
+    slower_m_s: float = 0.2
+    for_s: float = 1.5
+
+
+DESCENT, CONTACT, WEIGHTS = Descent(), Contact(), Weights()
+
+
+class ThreeRotors:
+    """Flies one vehicle that has lost a rotor, until the ground holds it.
+
+    Attributes:
+        controls: Rotor commands, parts of the largest speed.
+        landed: Whether the ground holds it.
+        law: Of its attitude.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        lost: int,
+        interval_s: float,
+        speeds: Array,
+        state: VehicleState,
+        ground_m: float,
+        descent: Descent = DESCENT,
+        contact: Contact = CONTACT,
+        weights: Weights = WEIGHTS,
+    ) -> None:
+        """Take over in flight.
+
+        Args:
+            vehicle: Before it lost a rotor.
+            lost: The rotor, 0..3.
+            interval_s: Between two control samples.
+            speeds: Of the rotors now, parts of the largest, (4,).
+            state: The vehicle now. It lands where it can stop.
+            ground_m: Height of the ground, z of ENU, as far as it is known.
+            descent: How it is flown.
+            contact: How the ground is told.
+            weights: Of the attitude.
+        """
+        self._vehicle, self._interval_s, self._descent, self._contact = vehicle, interval_s, descent, contact
+        self._lag = rotor_lag(vehicle, interval_s)
+        measured = vehicle.sensors.gyroscope.range_rad_s * _SPIN_PART if vehicle.sensors else _FASTEST_SPIN_RAD_S
+        spin_rad_s = min(_FASTEST_SPIN_RAD_S, measured)
+        self.law = ReducedAttitude(vehicle, lost, interval_s, self._lag.planned, spin_rad_s, weights)
+        self._battery = BatteryModel(vehicle)
+        self._full_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
+        self._gravity = vehicle.gravity_m_s2
+        self._weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
+        self._speeds = speeds.copy()
+        self._speeds[lost] = 0.0
+        self._lean_m_s2 = self._gravity * tan(radians(descent.lean_deg))
+        self._ground_m = ground_m
+        self._place = stopping_place(state, 0.5 * self._lean_m_s2)
+        self._gains = disturbance_observer.gains(descent.wind_rad_s, interval_s)
+        self._velocity, self._wind = np.array(state.velocity_enu_m_s), np.zeros(3)
+        self._explained = np.zeros(3)
+        self._elapsed_s = self._held_s = self._knock_m_s = 0.0
+        self._climbed_m_s = state.velocity_enu_m_s[2]
+        self.landed = False
+        self.controls = (0.0, 0.0, 0.0, 0.0)
+
+    def step(self, state: VehicleState, charge_ah: float) -> Decision:
+        """Decide the rotor speeds to hold until the next control sample.
+
+        Args:
+            state: The vehicle now.
+            charge_ah: Charge taken from the battery.
+        """
+        self._elapsed_s += self._interval_s
+        R = np.array(rotation_matrix(state.attitude))
+        self._observe(state)
+        up = self._acceleration(state)
+        up[2] += self._gravity
+        direction = up / norm(up)
+        thrust_n = self._weight_n / self._gravity * float(up[2]) / max(float(R[2, 2]), _LEAST_UPRIGHT)
+        if abs(state.rate_flu_rad_s[2]) < _SPUN_UP_RAD_S:
+            thrust_n = max(thrust_n, _SPIN_UP_THRUST * self._weight_n)
+        commands = self._commands(thrust_n, matvec(R.T, direction), np.array(state.rate_flu_rad_s), charge_ah)
+        self._turn(commands, R[:, 2])
+        self._watch_ground(state)
+        c1, c2, c3, c4 = (0.0, 0.0, 0.0, 0.0) if self.landed else commands.tolist()
+        self.controls = (c1, c2, c3, c4)
+        speeds = np.array(self.controls) * self._vehicle.rotors.max_speed
+        return Decision(speeds, _angles(direction, state.euler[2]), Diagnostics(fallback=Fallback.THREE_ROTORS))
+
+    def _commands(self, thrust_n: float, direction: Array, rate: Array, charge_ah: float) -> Array:
+        """Return the commands of the rotors, parts of the largest, (4,)."""
+        lost, a, b, o, _ = self.law.trio
+        forces = self._full_n * self._speeds**2
+        d, f_o = self.law.command(direction, rate, np.array([forces[b] - forces[a], forces[o]]))
+        fastest = self._battery.fastest_now(charge_ah, self._speeds)
+        squared = shared(self.law.trio, thrust_n, d, f_o, self._full_n, (square(self._lag.least), square(fastest)))
+        commands = lead(self._speeds, squared, self._lag, fastest)
+        least = self._lag.least  # all that the rotor has, not the plan's
+        commands[squared <= square(least) + _AT_LIMIT] = least
+        commands[squared >= square(fastest) - _AT_LIMIT] = fastest
+        commands[lost] = 0.0
+        return commands
+
+    def _turn(self, commands: Array, up: Array) -> None:
+        """Follow the rotors, and what their thrust makes of the velocity until the next sample."""
+        before, self._speeds = self._speeds, follow(self._speeds, commands, self._lag)
+        thrust_n = 0.5 * dot(self._full_n, before**2 + self._speeds**2)
+        self._explained = thrust_n / self._weight_n * self._gravity * up
+        self._explained[2] -= self._gravity
+
+    def _observe(self, state: VehicleState) -> None:
+        """Observe the acceleration that the rotors do not explain."""
+        expected = self._velocity + self._interval_s * (self._explained + self._wind)
+        missed = np.array(state.velocity_enu_m_s) - expected
+        self._knock_m_s = state.velocity_enu_m_s[2] - self._climbed_m_s - self._interval_s * float(self._explained[2])
+        self._climbed_m_s = state.velocity_enu_m_s[2]
+        most = self._descent.most_wind_m_s2
+        self._velocity = expected + self._gains[0] * missed
+        self._wind = np.clip(self._wind + self._gains[1] * missed, -most, most)
+
+    def _acceleration(self, state: VehicleState) -> Array:
+        """Return the acceleration to ask for, m/s², ENU, (3,)."""
+        how, w = self._descent, self._descent.place_rad_s
+        velocity = np.array(state.velocity_enu_m_s)
+        error = self._place - np.array(state.position_enu_m)
+        wanted: Array = w * w * error - 2.0 * w * velocity
+        _limit(wanted, self._lean_m_s2)
+        wanted[2] = how.climb_1_s * (self._climb_m_s(state) - velocity[2])
+        wanted -= self._wind
+        _limit(wanted, self._most_lean_m_s2(hypot(error[0], error[1])))
+        wanted[2] = min(max(wanted[2], -how.lift_m_s2), how.lift_m_s2)
+        return wanted
+
+    def _most_lean_m_s2(self, off_m: float) -> float:
+        """Return the largest horizontal acceleration so far from the place: upright first, unless it is blown away."""
+        how = self._descent
+        lean_deg = how.most_lean_deg + how.farther_deg_m * max(off_m - how.far_m, 0.0)
+        return self._gravity * tan(radians(min(lean_deg, how.blown_lean_deg)))
+
+    def _climb_m_s(self, state: VehicleState) -> float:
+        how = self._descent
+        if self._elapsed_s < how.settle_s:
+            return 0.0
+        return -how.sink_m_s if state.position_enu_m[2] - self._ground_m > how.land_above_m else -how.land_m_s
+
+    def _watch_ground(self, state: VehicleState) -> None:
+        """Land where the ground knocks at a vehicle that is low, or holds one that is told to sink."""
+        how = self._contact
+        sinks = self._climb_m_s(state) < 0.0
+        slow = hypot(*state.velocity_enu_m_s) < how.slower_m_s
+        self._held_s = self._held_s + self._interval_s if sinks and slow else 0.0
+        low = state.position_enu_m[2] - self._ground_m < self._descent.land_above_m
+        knocked = low and sinks and self._knock_m_s > how.knock * self._gravity * self._interval_s
+        self.landed = self.landed or knocked or self._held_s >= how.for_s
+
+
+def shared(
+    trio: Trio, thrust_n: float, d: float, f_o: float, full_n: Array, squared_limits: tuple[float, float]
+) -> Array:
+    """Return squared rotor speeds, parts of the largest, (4,): what turns the thrust axis first, then thrust.
+
+    Args:
+        trio: The rotors that are left.
+        thrust_n: Of all together, N.
+        d: Of b less that of a, N.
+        f_o: Of o, N.
+        full_n: Of each rotor at its largest speed, N, (4,).
+        squared_limits: Least and largest squared speed, parts of the largest.
+    """
+    least, most = squared_limits
+    lowest_n = least * max(full_n[trio.a], full_n[trio.b])
+    highest_n = most * min(full_n[trio.a], full_n[trio.b])
+    f_o = min(max(f_o, least * full_n[trio.o]), most * full_n[trio.o])
+    d = min(max(d, lowest_n - highest_n), highest_n - lowest_n)
+    pair_n = min(max(thrust_n - f_o, 2.0 * lowest_n + abs(d)), 2.0 * highest_n - abs(d))
+    forces = np.zeros(4)
+    forces[trio.a], forces[trio.b], forces[trio.o] = 0.5 * (pair_n - d), 0.5 * (pair_n + d), f_o
+    squared: Array = forces / full_n
+    return squared
+
+
+def stopping_place(state: VehicleState, braking_m_s2: float) -> Array:
+    """Return where a vehicle that brakes like that comes to rest, m, ENU, (3,)."""
+    x, y, z = state.position_enu_m
+    vx, vy, _ = state.velocity_enu_m_s
+    time_s = hypot(vx, vy) / (2.0 * braking_m_s2)
+    return np.array([x + vx * time_s, y + vy * time_s, z])
+
+
+def _limit(acceleration: Array, most_m_s2: float) -> None:
+    """Shorten the horizontal part of an acceleration, (3,), in place."""
+    flat = hypot(acceleration[0], acceleration[1])
+    if flat > most_m_s2:
+        acceleration[:2] *= most_m_s2 / flat
+
+
+def _angles(direction: Array, psi: float) -> Vector:
+    """Return phi, theta, psi at which the body's z axis points there."""
+    x, y, z = direction.tolist()
+    forward, left = cos(psi) * x + sin(psi) * y, cos(psi) * y - sin(psi) * x
+    return (atan2(-left, hypot(forward, z)), atan2(forward, z), psi)

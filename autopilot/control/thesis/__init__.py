@@ -1,0 +1,1 @@
+"""The thesis's two strategies, as printed."""

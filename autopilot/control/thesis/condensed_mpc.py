@@ -1,0 +1,124 @@
+"""The MPC in input increments, condensed to a QP in the increments alone, THESIS [3.13-3.22]."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import Active, Clock, Diagnostics
+from colibri.autopilot.control.qp import Qp, QpSolver, box
+from colibri.common.matrices import dot, matmul, matvec
+from colibri.common.types import Array
+
+_BINDING = 1e-6
+"""A bound counts as active where this part of it or less is left."""
+
+
+class Weights(NamedTuple):
+    """Diagonals of Q (each predicted error), S (the last one) and R (each increment)."""
+
+    output: Array
+    terminal: Array
+    increment: Array
+
+
+class CondensedQp(NamedTuple):
+    """min ½ Δuᵀ H Δu + fᵀ Δu over the increments of the whole horizon, (N · m,).
+
+    Attributes:
+        H: (N · m, N · m).
+        f: (N · m,).
+        free: Outputs predicted without any increment, (N · p,).
+        Gamma: What the increments add to them, (N · p, N · m).
+    """
+
+    H: Array
+    f: Array
+    free: Array
+    Gamma: Array
+
+
+class IncrementModel(NamedTuple):
+    """A model whose state x̃ = [x; u₋₁] holds the last input, so that the decision is its increment.
+
+    Ã = [[A, B], [0, I]], B̃ = [B; I], C̃ = [C, 0].
+    """
+
+    A: Array
+    B: Array
+    C: Array
+
+
+def augment(transition: Array, C: Array) -> IncrementModel:
+    """Return the increment model of a discretised model [[Ad, Bd], [0, I]], (n + m, n + m), and its output C, (p, n).
+
+    The transition is Ã as it stands, and its last m columns are B̃.
+    """
+    outputs, n = C.shape
+    inputs = len(transition) - n
+    return IncrementModel(transition, transition[:, n:], np.hstack([C, np.zeros((outputs, inputs))]))
+
+
+def condense(model: IncrementModel, horizon: int, x: Array, reference: Array, weights: Weights) -> CondensedQp:
+    """Eliminate the states: outputs over the horizon are an affine function of the increments.
+
+    With Y = Phi x + Gamma Δu: H = Gammaᵀ Q̄ Gamma + R̄ and f = Gammaᵀ Q̄ (Phi x - r), THESIS [3.20] with C folded in.
+
+    Args:
+        model: The increment model; n states, m inputs, p outputs.
+        horizon: N, number of steps.
+        x: Present augmented state, (n,).
+        reference: r, the output wanted at each step, (N, p).
+        weights: Diagonals of Q, S (p,) and R (m,).
+    """
+    p, m = model.C.shape[0], model.B.shape[1]
+    responses = np.empty((horizon + 1, *model.C.shape))
+    responses[0] = model.C
+    for step in range(horizon):
+        responses[step + 1] = matmul(responses[step], model.A)
+    Phi = responses[1:].reshape(horizon * p, -1)
+    markov = matmul(responses[:horizon].reshape(horizon * p, -1), model.B)
+    Gamma = np.zeros((horizon * p, horizon * m))
+    for column in range(horizon):
+        Gamma[column * p :, column * m : (column + 1) * m] = markov[: (horizon - column) * p]
+    weighted = Gamma.T * _along(horizon, weights)
+    H = matmul(weighted, Gamma)
+    H.flat[:: horizon * m + 1] += np.concatenate([weights.increment] * horizon)
+    free = matvec(Phi, x)
+    return CondensedQp(0.5 * (H + H.T), matvec(weighted, free - reference.ravel()), free, Gamma)
+
+
+def _along(horizon: int, weights: Weights) -> Array:
+    """Return the diagonal of Q̄: Q at every step, S at the last."""
+    return np.concatenate([weights.output] * (horizon - 1) + [weights.terminal])
+
+
+class Solution(NamedTuple):
+    """What the MPC decided.
+
+    Attributes:
+        increment: The first increment, to be applied now, (m,); zero if the QP was not solved.
+        diagnostics: How it came about; `predicted` holds the outputs over the horizon, (N, p).
+    """
+
+    increment: Array
+    diagnostics: Diagnostics
+
+
+def solve(qp: CondensedQp, bound: Array, solver: QpSolver, clock: Clock) -> Solution:
+    """Solve a condensed QP with every increment within ±`bound`, (m,)."""
+    m = len(bound)
+    horizon = len(qp.f) // m
+    largest = np.concatenate([bound] * horizon)
+    started_s = clock()
+    status, increments = solver.solve(Qp(qp.H, qp.f, box(len(qp.f)), np.concatenate([largest, largest])))
+    solve_time_s = clock() - started_s
+    if increments is None:
+        return Solution(np.zeros(m), Diagnostics(status, solve_time_s=solve_time_s))
+    diagnostics = Diagnostics(
+        status,
+        solve_time_s=solve_time_s,
+        cost=dot(increments, 0.5 * matvec(qp.H, increments) + qp.f),
+        active=Active(increments=int(np.count_nonzero(np.abs(increments) > (1.0 - _BINDING) * largest))),
+        predicted=(qp.free + matvec(qp.Gamma, increments)).reshape(horizon, -1),
+    )
+    return Solution(increments[:m], diagnostics)

@@ -1,0 +1,86 @@
+"""The LPV models of attitude and position, THESIS [3.1-3.4], and their discretisation."""
+
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from colibri.common.kernels import cos, sin
+from colibri.common.matrices import expm
+from colibri.common.types import Array
+
+Discretisation: TypeAlias = Literal["zero-order-hold", "forward-euler"]
+
+ATTITUDE_OUTPUT = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0], [0, 0, 0, 0, 1.0, 0]])
+"""C: the outputs phi, theta, psi of the state [phi phi' theta theta' psi psi']."""
+
+
+def attitude_model(
+    phi_rate: float, theta_rate: float, rotor_momentum_n_m_s: float, *, inertia_kg_m2: tuple[float, float, float]
+) -> tuple[Array, Array]:
+    """Return A (6, 6) and B (6, 3) of x' = A x + B u at one scheduling point.
+
+    State [phi phi' theta theta' psi psi'] in rad and rad/s, inputs U2, U3, U4 in N m.
+
+    Args:
+        phi_rate: phi', rad/s.
+        theta_rate: theta', rad/s.
+        rotor_momentum_n_m_s: h along body z, the vehicle's `rotor_momentum` times its rotor speeds: THESIS's Ω J.
+        inertia_kg_m2: Ix, Iy, Iz.
+    """
+    ix, iy, iz = inertia_kg_m2
+    h = rotor_momentum_n_m_s
+    A = np.zeros((6, 6))
+    A[0, 1] = A[2, 3] = A[4, 5] = 1.0
+    A[1, 3], A[1, 5] = -h / ix, theta_rate * (iy - iz) / ix
+    A[3, 1], A[3, 5] = h / iy, phi_rate * (iz - ix) / iy
+    A[5, 1], A[5, 3] = 0.5 * theta_rate * (ix - iy) / iz, 0.5 * phi_rate * (ix - iy) / iz
+    B = np.zeros((6, 3))
+    B[1, 0], B[3, 1], B[5, 2] = 1.0 / ix, 1.0 / iy, 1.0 / iz
+    return A, B
+
+
+GLOBAL_OUTPUT = np.zeros((4, 12))
+"""C: the outputs x, y, z, psi of the state [x x' y y' z z' phi phi' theta theta' psi psi']."""
+GLOBAL_OUTPUT[[0, 1, 2, 3], [0, 2, 4, 10]] = 1.0
+
+
+def global_model(
+    attitude: tuple[Array, Array],
+    euler: tuple[float, float, float],
+    thrust_n: float,
+    *,
+    mass_kg: float,
+    gravity_m_s2: float,
+) -> tuple[Array, Array]:
+    """Return A (12, 12) and B (12, 4) of position and attitude together, THESIS [3.1, 3.4].
+
+    State [x x' y y' z z' phi phi' theta theta' psi psi'] in m, m/s, rad, rad/s (ENU), inputs U1 in N, U2..U4 in N m.
+    Thrust enters the position through B alone, at the present tilt; gravity is divided by the last thrust to fit in.
+
+    Args:
+        attitude: A and B of `attitude_model`.
+        euler: phi, theta, psi, rad.
+        thrust_n: The last U1, above zero, N.
+        mass_kg: Mass.
+        gravity_m_s2: Gravitational acceleration.
+    """
+    phi, theta, psi = euler
+    A, B = np.zeros((12, 12)), np.zeros((12, 4))
+    A[0, 1] = A[2, 3] = A[4, 5] = 1.0
+    A[6:, 6:], B[6:, 1:] = attitude
+    B[1, 0] = (cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi)) / mass_kg
+    B[3, 0] = (cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi)) / mass_kg
+    B[5, 0] = -gravity_m_s2 / thrust_n + cos(phi) * cos(theta) / mass_kg
+    return A, B
+
+
+def discretise(A: Array, B: Array, interval_s: float, method: Discretisation) -> Array:
+    """Return [[Ad, Bd], [0, I]] of x[k+1] = Ad x[k] + Bd u[k], (n + m, n + m).
+
+    Zero-order hold is exact for an input held over `interval_s`: the exponential of [[A, B], [0, 0]] (Van Loan, 1978);
+    forward Euler is its first-order term. The block is at once the Ã of a model in input increments.
+    """
+    n, m = B.shape
+    block = np.zeros((n + m, n + m))
+    block[:n, :n], block[:n, n:] = interval_s * A, interval_s * B
+    return expm(block) if method == "zero-order-hold" else np.eye(n + m) + block

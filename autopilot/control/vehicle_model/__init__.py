@@ -1,0 +1,1 @@
+"""What a law believes of the vehicle: allocation, rotor lag, battery, airframe, the disturbance observed."""

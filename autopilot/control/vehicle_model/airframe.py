@@ -1,0 +1,34 @@
+"""The airframe's numbers as the control laws' kernels take them."""
+
+from typing import NamedTuple
+
+from colibri.plant.vehicle.description import Vehicle
+
+
+class Airframe(NamedTuple):
+    """What the outer loop knows of the vehicle.
+
+    Attributes:
+        mass_kg: Mass.
+        gravity_m_s2: Gravitational acceleration.
+        drag_xy: Drag of the airframe along body x and y, N s/m.
+        drag_z: Along body z, N s/m.
+        rotor_drag: Of all rotors in their plane, N s/m, at a thrust of 1 N: it grows with the root of the thrust.
+    """
+
+    mass_kg: float
+    gravity_m_s2: float
+    drag_xy: float
+    drag_z: float
+    rotor_drag: float
+
+
+def airframe_of(vehicle: Vehicle) -> Airframe:
+    """Return what the outer loop knows of `vehicle`."""
+    mass_kg, gravity = vehicle.body.mass_kg, vehicle.gravity_m_s2
+    if vehicle.drag is None:
+        return Airframe(mass_kg, gravity, 0.0, 0.0, 0.0)
+    x, y, z = vehicle.drag.linear_n_s_m
+    rotors = vehicle.drag.rotor_coefficient * len(vehicle.rotors.position_m)
+    speed_at_1_n = (len(vehicle.rotors.position_m) * vehicle.rotors.thrust_coefficient) ** -0.5
+    return Airframe(mass_kg, gravity, 0.5 * (x + y), z, rotors * speed_at_1_n)

@@ -1,0 +1,106 @@
+"""The battery as the vehicle file has it: the charge that the rotors took, and how fast they can turn on the rest.
+
+No frame tells the voltage, so it is followed as the rotors are: V = V0 - R I, V0 falling linearly with the
+charge taken, and the rotors' top speed in proportion to V.
+"""
+
+from math import sqrt
+
+from colibri.common.elementary import square
+from colibri.common.matrices import dot
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Battery, Vehicle
+
+_SECONDS_PER_HOUR = 3600.0
+_INTERVALS = 100
+_BISECTIONS = 40
+_APART = 0.02
+"""Model and battery may differ by this part of the charge; the model is the smoother of both."""
+
+
+def believed(model_ah: float, told_ah: float, vehicle: Vehicle) -> float:
+    """Return the charge taken, Ah, that is believed where a model and the battery itself say different things.
+
+    Args:
+        model_ah: What the model has counted.
+        told_ah: What the battery says.
+        vehicle: Whose battery it is.
+    """
+    if vehicle.battery is None:
+        return model_ah
+    return told_ah if abs(told_ah - model_ah) > _APART * vehicle.battery.capacity_ah else model_ah
+
+
+class BatteryModel:
+    """The battery of one vehicle; one that has none never tires."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        """Follow the battery of `vehicle`."""
+        self._battery = vehicle.battery
+        drag_torque = vehicle.rotors.torque_coefficient * square(vehicle.rotors.max_speed)
+        efficiency = vehicle.battery.efficiency if vehicle.battery else 1.0
+        self._full_power_w = drag_torque * vehicle.rad_s_per_speed_unit * vehicle.rotors.max_speed / efficiency
+        self._fastest: dict[int, float] = {}
+        if self._battery:
+            self._step_ah = self._battery.capacity_ah / _INTERVALS
+
+    def charge_after(self, charge_ah: float, speeds: Array, duration_s: float) -> float:
+        """Return the charge taken, Ah, after `duration_s` at rotor speeds (4,), parts of the largest."""
+        if self._battery is None:
+            return charge_ah
+        power_w = self._full_power_w * dot(speeds * speeds, speeds)
+        current_a = power_w / _voltage_v(self._battery, charge_ah, power_w)
+        return charge_ah + current_a * duration_s / _SECONDS_PER_HOUR
+
+    def terminal(self, charge_ah: float, speeds: Array) -> tuple[float, float]:
+        """Return the terminal voltage, V, and the current, A, at rotor speeds (4,), parts of the largest; 0 without."""
+        if self._battery is None:
+            return 0.0, 0.0
+        power_w = self._full_power_w * dot(speeds * speeds, speeds)
+        voltage_v = _voltage_v(self._battery, charge_ah, power_w)
+        return voltage_v, power_w / voltage_v
+
+    def fastest_now(self, charge_ah: float, speeds: Array) -> float:
+        """Return the speed that a rotor can reach while all take the power that they take now, in parts of the largest.
+
+        Args:
+            charge_ah: Charge taken.
+            speeds: Rotor speeds now, parts of the largest, (4,).
+        """
+        if self._battery is None:
+            return 1.0
+        power_w = self._full_power_w * dot(speeds * speeds, speeds)
+        return _voltage_v(self._battery, charge_ah, power_w) / self._battery.full_voltage_v
+
+    def fastest_together(self, charge_ah: float) -> float:
+        """Return the speed that all rotors can keep up together once `charge_ah` is taken, in parts of the largest."""
+        if self._battery is None:
+            return 1.0
+        whole, part = divmod(charge_ah / self._step_ah, 1.0)
+        if whole >= _INTERVALS:
+            return self._balanced(self._battery, _INTERVALS)
+        before, after = self._balanced(self._battery, int(whole)), self._balanced(self._battery, int(whole) + 1)
+        return before + part * (after - before)
+
+    def _balanced(self, battery: Battery, point: int) -> float:
+        """Return the balance at so many steps of charge; found when first asked for, so that it is quick to begin."""
+        if point not in self._fastest:
+            self._fastest[point] = self._balance(battery, self._step_ah * point)
+        return self._fastest[point]
+
+    def _balance(self, battery: Battery, charge_ah: float) -> float:
+        """Find the speed, in parts of the largest, at which the voltage left is just in that proportion."""
+        low, high = 0.0, 1.0
+        for _ in range(_BISECTIONS):
+            speed = 0.5 * (low + high)
+            power_w = 4.0 * self._full_power_w * speed * speed * speed
+            enough = _voltage_v(battery, charge_ah, power_w) >= speed * battery.full_voltage_v
+            low, high = (speed, high) if enough else (low, speed)
+        return low
+
+
+def _voltage_v(battery: Battery, charge_ah: float, power_w: float) -> float:
+    """Return the terminal voltage at which `power_w` is drawn: V² - V0 V + R P = 0, but at least half of V0."""
+    used = min(charge_ah / battery.capacity_ah, 1.0)
+    open_v = battery.full_voltage_v + (battery.empty_voltage_v - battery.full_voltage_v) * used
+    return 0.5 * (open_v + sqrt(max(0.0, open_v * open_v - 4.0 * battery.resistance_ohm * power_w)))

@@ -1,0 +1,46 @@
+"""Thrust and moments -> rotor speeds within their limits: the inverse of THESIS [2.2]."""
+
+import numpy as np
+
+from colibri.common.elementary import square
+from colibri.common.matrices import dot, inverse, matmul, matvec
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+
+class Mixer:
+    """The inverse allocation of one vehicle."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        """Invert the allocation of `vehicle`."""
+        self._allocation = vehicle.allocation()
+        self._inverse = exact_inverse(self._allocation)
+        self._momentum = vehicle.rotor_momentum()
+        self._squared_max = square(vehicle.rotors.max_speed)
+
+    def rotor_speeds(self, wrench: Array) -> Array:
+        """Return the rotor speeds (4,), in the vehicle's unit, that make U1 (N), U2, U3, U4 (N m), or come closest.
+
+        What one rotor cannot do is cut at that rotor's limit.
+        """
+        return np.sqrt(np.clip(matvec(self._inverse, wrench), 0.0, self._squared_max))
+
+    def wrench(self, speeds: Array) -> Array:
+        """Return U1..U4 (4,) of rotor speeds (4,)."""
+        return matvec(self._allocation, speeds * speeds)
+
+    def momentum(self, speeds: Array) -> float:
+        """Return the rotors' angular momentum h along body z, N m s."""
+        return dot(self._momentum, speeds)
+
+
+def exact_inverse(allocation: Array) -> Array:
+    """Invert an allocation (4, 4) so that a symmetrical airframe stays symmetrical to the last bit.
+
+    The rows of a symmetrical allocation are orthogonal, and A⁻¹ = Aᵀ (A Aᵀ)⁻¹ then only divides; elimination would
+    leave a moment of 1e-17 N m where none was asked for, enough to drift in open loop.
+    """
+    scale = np.sqrt((allocation * allocation).sum(axis=1))
+    unit = allocation / scale[:, None]
+    exact: Array = matmul(unit.T, inverse(matmul(unit, unit.T))) / scale
+    return exact

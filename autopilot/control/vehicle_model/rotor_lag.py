@@ -1,0 +1,93 @@
+"""What the rotors do, as far as the autopilot can know: their lag followed, and inverted, as compiled kernels.
+
+The control law plans with forces that follow their commands as one linear lag, the slower of the rotors' two. Each
+rotor is then commanded so that its squared speed, which makes the force, is at the next sample where the plan has it:
+two time constants and the root between speed and force so cost nothing. Speeds are parts of the largest.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.common.jit import compiled
+from colibri.common.kernels import exp
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+
+class RotorLag(NamedTuple):
+    """How far towards its command a rotor goes in one control sample, and where it must stay.
+
+    Attributes:
+        up: Part of the way while it speeds up.
+        down: Part of the way while it slows down.
+        planned: Part of the way that the plan has force go.
+        least: Least speed.
+    """
+
+    up: float
+    down: float
+    planned: float
+    least: float
+
+
+def rotor_lag(vehicle: Vehicle, interval_s: float) -> RotorLag:
+    """Return the lag of a vehicle's rotors over a control sample."""
+    lag = vehicle.rotors.lag
+    up = 1.0 - exp(-interval_s / lag.time_constant_up_s) if lag else 1.0
+    down = 1.0 - exp(-interval_s / lag.time_constant_down_s) if lag else 1.0
+    return RotorLag(up, down, min(up, down), vehicle.rotors.idle_speed / vehicle.rotors.max_speed)
+
+
+@compiled
+def follow(speeds: Array, commands: Array, lag: RotorLag) -> Array:
+    """Return the speeds (4,) one control sample after `commands` (4,) were given at `speeds` (4,)."""
+    after = np.empty_like(speeds)
+    for i in range(speeds.shape[0]):
+        way = commands[i] - speeds[i]
+        after[i] = speeds[i] + way * (lag.up if way > 0.0 else lag.down)
+    return after
+
+
+@compiled
+def lead(speeds: Array, squared_commands: Array, lag: RotorLag, fastest: float) -> Array:
+    """Return the commands (4,) that bring squared speed where the plan has it after one control sample.
+
+    Args:
+        speeds: Now, (4,).
+        squared_commands: Squared speeds that the plan commands, (4,).
+        lag: Of the rotors.
+        fastest: Largest speed that can be had.
+    """
+    commands = np.empty_like(speeds)
+    for i in range(speeds.shape[0]):
+        squared = speeds[i] * speeds[i]
+        after = sqrt(max(squared + (squared_commands[i] - squared) * lag.planned, 0.0))
+        way = after - speeds[i]
+        command = speeds[i] + way / (lag.up if way > 0.0 else lag.down)
+        commands[i] = min(max(command, lag.least), fastest)
+    return commands
+
+
+@compiled
+def actuate(
+    speeds: Array, squared_commands: Array, lag: RotorLag, fastest: float, allocation: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Return commands as `lead` does, speeds and wrench a sample later, and the mean wrench until then, (4,) each.
+
+    Args:
+        speeds: Now, (4,).
+        squared_commands: Squared speeds that the plan commands, (4,).
+        lag: Of the rotors.
+        fastest: Largest speed that can be had.
+        allocation: From squared speeds to U1 (N), U2, U3, U4 (N m), (4, 4).
+    """
+    commands = lead(speeds, squared_commands, lag, fastest)
+    after = follow(speeds, commands, lag)
+    wrench, mean = np.zeros(allocation.shape[0]), np.zeros(allocation.shape[0])
+    for row in range(allocation.shape[0]):
+        for i in range(speeds.shape[0]):
+            wrench[row] += allocation[row, i] * after[i] * after[i]
+            mean[row] += 0.5 * allocation[row, i] * (speeds[i] * speeds[i] + after[i] * after[i])
+    return commands, after, wrench, mean

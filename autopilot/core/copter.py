@@ -1,0 +1,437 @@
+"""The whole vehicle as a pure composition: frames of the plant and datagrams of ground stations in, answers out."""
+
+from collections.abc import Iterable
+
+from colibri.autopilot.commander.mode_tasks import ModeCourses
+from colibri.autopilot.commander.pilot import RESTS, Guidance, Pilot
+from colibri.autopilot.commander.rules.arming import Facts, battery_fault
+from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, Seen
+from colibri.autopilot.commander.rules.failsafe_table import Condition
+from colibri.autopilot.commander.rules.modes import MANUAL, Mode, Need
+from colibri.autopilot.commander.supervisor import Supervisor
+from colibri.autopilot.control.interface import Clock, Decision, VehicleState
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
+from colibri.autopilot.core.checkpoint import Keeper, Kept, Past, goes_on, maker_of
+from colibri.autopilot.core.solve_time import SolveTime
+from colibri.autopilot.core.step import STILL, Received, Step, follows, nothing_known
+from colibri.autopilot.estimation.health import HealthWatch, not_known
+from colibri.autopilot.estimation.state_source import Estimator, Senses
+from colibri.autopilot.ground.battery_monitor import PowerMeter
+from colibri.autopilot.ground.snapshots import Photographer
+from colibri.autopilot.ground.stations import REBOOT, Stations, StationSettings
+from colibri.autopilot.guidance.attitude_reference import AttitudeReference, attitude_limits
+from colibri.autopilot.guidance.sample_grid import instants
+from colibri.autopilot.guidance.tasks.task import Steered
+from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
+from colibri.autopilot.parameters.retuning import Tuning, builder
+from colibri.mavlink.hil.plant_status import NOTHING, Aside
+from colibri.mavlink.hil.sensors import Frame
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
+from colibri.mavlink.node.hub import Outgoing
+from colibri.mavlink.parameters.store import Parameters, Value
+from colibri.mavlink.services.statustext import INFO, WARNING
+from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks
+from colibri.mavlink.telemetry.snapshot import BatteryState
+from colibri.plant.vehicle.description import Vehicle
+
+FALLS = "restarted in the air, knowing nothing: found falling"
+_LEADER_LOST_US = 10_000_000
+_EVER_US = 10**15
+
+
+class Copter:
+    """A vehicle that ground stations fly.
+
+    Attributes:
+        frame_interval_us: How often it wants a frame.
+        pilot: Decides what is flown.
+        parameters: All numbers that can be changed.
+        stations: What ground stations see and say.
+        power: The battery, as far as the autopilot knows.
+        rotor_loss: Notices when a rotor is lost, and lands on the others.
+        solve_time_s: Of the last QP.
+        supervisor: Has the pilot do what the failsafes say.
+        samples: How many control samples ground stations were told of.
+        resumed: What goes on of a flight in which an autopilot was killed, in words; empty where none does.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        vehicle: Vehicle,
+        settings: StationSettings,
+        clock: Clock,
+        *,
+        values: dict[str, Value] | None = None,
+        first: Track | None = None,
+        estimator: Estimator | None = None,
+        past: Past | None = None,
+    ) -> None:
+        """Fly `vehicle` by `profile`; `clock` only measures, it decides nothing.
+
+        Args:
+            profile: The control law and its numbers.
+            vehicle: That it controls.
+            settings: Towards ground stations.
+            clock: Seconds.
+            values: Of parameters that were changed before.
+            first: A track that is flown from time 0 on, the vehicle being in the air; None: it stands, or is picked
+                up in hold.
+            estimator: Makes what turns frames of sensors into states; None: frames are states.
+            past: Of a flight in which an autopilot was killed; it goes on if the first frame is of the same flight.
+
+        Raises:
+            ControllerError: The profile's control law cannot be used.
+            ProfileError: Its table is wrong.
+            SolverError: Its solver cannot be used.
+            ImpossibleError: The values of the parameters make an impossible vehicle.
+        """
+        numbers = Numbers(profile, vehicle)
+        self.parameters = Parameters(definitions(profile, vehicle, settings.system_id))
+        self.parameters.load(values or {})
+        flown, believed = numbers.applied(self.parameters.values)
+        self._loop = ControlLoop(flown, believed, clock)
+        self._tuning = Tuning(
+            numbers, builder(profile.controller, clock), self._loop, lambda words: self.stations.say(WARNING, words)
+        )
+        self.parameters.check = self._tuning.check
+        self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
+        self._clock = clock
+        self.frame_interval_us = self._loop.frame_interval_us
+        self._senses = Senses(estimator, self.frame_interval_us)
+        self._health = HealthWatch()
+        self._interval_s = self._loop.control_interval_us * 1e-6
+        flies_by = behaviour(self.parameters)
+        self._attitude: AttitudeReference | None = None
+        if self._loop.takes_attitude:
+            self._attitude = AttitudeReference(believed, self._loop.preview, attitude_limits(flies_by))
+        planned_at = instants(self._loop.preview, self._loop.control_interval_us)
+        self.pilot = Pilot(planned_at, flies_by, lambda mode, scene: self._courses.begin(mode, scene), self._missing)
+        self.stations = Stations(settings, self.pilot, self.parameters)
+        self.power = PowerMeter(believed)
+        self.supervisor = Supervisor(self.pilot, self.parameters)
+        self._courses = ModeCourses(
+            self.pilot,
+            self.supervisor,
+            self.stations.missions,
+            self._loop,
+            self._attitude,
+            planned_at,
+            profile.references,
+            first,
+        )
+        self._missed_us: int | None = None
+        self._waiting_us: int | None = None
+        self._solving = SolveTime(self._loop.control_interval_us)
+        self._aside = NOTHING
+        self._sent = STILL
+        self.rotor_loss = RotorLoss(believed, self._loop.control_interval_us)
+        self.rotor_loss.enabled = flies_by.land_on_three
+        self._photographer = Photographer(believed, self._interval_s)
+        parts = (self._loop, self._senses, self.pilot, self.stations, self.power, self.rotor_loss, self.supervisor)
+        self._keeper = Keeper(maker_of(profile, vehicle), *parts)
+        self._past = past
+        self._wakes = past is not None
+        self._resumed_us: int | None = None
+        self.samples, self.resumed = 0, ""
+        self._time_us: int | None = None
+        self._decision: Decision | None = None
+        self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
+        self._step_time_s = 0.0
+        self.solve_time_s = 0.0
+
+    @property
+    def deadlines_missed(self) -> int:
+        """How many decisions have taken longer than a control interval, in simulated time."""
+        return self._solving.missed
+
+    def hear(self, aside: Aside) -> None:
+        """Take in what the plant tells beside the frame of the next step."""
+        self._aside = aside
+        if aside.battery is not None:
+            self._loop.know_charge(aside.battery.used_ah)
+            self.power.hear(aside.battery)
+
+    def step(self, frame: Frame) -> Step:
+        """Answer a frame of the plant; on sensors nothing is known, and nobody obeyed, before the first estimate.
+
+        Raises:
+            DecisionError: The control law gave what no rotor can follow.
+        """
+        started_s = self._clock()
+        if self._wakes:
+            self._wake(frame.time_us)
+        due = self._loop.is_due(frame.time_us)
+        goes_on = follows(frame.time_us, self._time_us, self.frame_interval_us)
+        known = self._senses.state(frame, asked=due or not goes_on)
+        if known is None:
+            self._waiting_us = frame.time_us
+            if self._time_us is not None:  # another flight, of which nothing is known yet
+                self.stations.restart = REBOOT
+            return nothing_known(frame.time_us, self._clock() - started_s)
+        if not goes_on:
+            self._missed_us = self._time_us if self._missed_us is None else self._missed_us
+            self._begin(known)
+        self._time_us = frame.time_us
+        decision = None
+        if due:
+            state = self._loop.state(known)
+            self._watch_rotors(state)
+            self._sense(frame.time_us, state)
+            guidance = self.pilot.step()
+            decision = self._decide(frame.time_us, state, guidance)
+            if not self._solving.busy(frame.time_us) or decision is not None:
+                self._decision = decision
+            self._sample = (frame.time_us, state, guidance, self._decision)
+        self._sent = self._solving.controls(frame.time_us)
+        command = ActuatorCommand(frame.time_us, self._sent, armed=self.pilot.state.armed)
+        self._step_time_s = self._clock() - started_s
+        estimate = self._senses.estimate if due else None
+        return Step(command, decision, self._step_time_s, estimate, self.stations.failures.take())
+
+    def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
+        """Hear ground stations, and return what to send them; after each `step`, while the plant integrates."""
+        now_us = self._time_us
+        if now_us is None:
+            return self._put_off(inbox)
+        if self._sample is not None:
+            sample, self._sample = self._sample, None
+            self._report(*sample)
+        self.stations.hear_plant(self._aside, now_us)
+        self._aside = NOTHING
+        hub = self.stations.hub
+        for datagram, link, address, loopback in inbox:
+            hub.receive(datagram, link, address, now_us, loopback=loopback)
+        if self.parameters.take_changed():
+            self._adopt()
+        return self.stations.poll(now_us)
+
+    def _put_off(self, inbox: Iterable[Received]) -> list[Outgoing]:
+        """Deny what is commanded: nothing is known of the vehicle yet."""
+        if self._waiting_us is None:
+            return []
+        self.stations.wait("not ready: attitude and position are not known yet")
+        for datagram, link, address, loopback in inbox:
+            self.stations.hub.receive(datagram, link, address, self._waiting_us, loopback=loopback)
+        self.stations.wait("")
+        return self.stations.take_outbox()
+
+    def record(self) -> Kept | None:
+        """Return what the flight needs to go on after a restart; None as long as nothing is known of it."""
+        return None if self._time_us is None else self._keeper.record(self._time_us)
+
+    def _wake(self, time_us: int) -> None:
+        """Have the estimator go on before it sees the first frame."""
+        self._wakes = False
+        if self._past is not None and self._past.kept.senses:
+            self._senses.resume(self._past.kept.senses, time_us)
+
+    def _resume(self, past: Past, frame: StateFrame) -> None:
+        """Go on with the flight in which the autopilot was killed."""
+        pilot, kept = self.pilot, past.kept
+        if kept.pilot.mode is not Mode.TRACK or kept.course.began_us != 0:
+            self._courses.first = None
+        self._resumed_us = frame.time_us
+        self._keeper.resume(past, frame, self._courses.again)
+        self._sent = self._loop.controls if pilot.state.armed and not pilot.idles else STILL
+        self._solving.at_once(self._sent)
+        self.rotor_loss.begin(self._sent)
+        self.stations.say(INFO, self.stations.banner())
+        if not pilot.state.armed:
+            return
+        if self._senses.estimate is not None and not self._senses.rests:
+            pilot.say(WARNING, FALLS)
+        self.resumed = goes_on(pilot.state.mode, self.stations.missions.executor.progress.seq)
+        pilot.say(WARNING, self.resumed)
+
+    def _begin(self, frame: StateFrame) -> None:
+        """See the vehicle for the first time, or anew after frames were missed."""
+        past, self._past = self._past, None
+        if past is not None and past.kept.is_followed_by(frame.time_us):
+            self._resume(past, frame)
+            return
+        loop, hover_speed = self._loop, self._loop.vehicle.hover_speed
+        if self._time_us is not None and frame.time_us > self._time_us:
+            loop.begin(hover_speed, loop.state(frame).euler[2])
+            self.rotor_loss.begin(loop.controls)
+            return
+        if self._time_us is not None:  # another flight: nothing that any service remembers is of any use
+            self.stations.restart = REBOOT
+        speed = self._start_speed if frame.time_us == 0 else hover_speed
+        rests = self._senses.rests
+        if rests:
+            speed = loop.vehicle.rotors.idle_speed
+        loop.begin(speed, self._courses.first_yaw_rad)
+        mode = Mode.TRACK if self._courses.first else None
+        self.pilot.begin(frame.time_us, loop.state(frame), mode=mode, rests=rests)
+        self._sent = STILL if self.pilot.standing else loop.controls
+        self._solving.at_once(self._sent)
+        self.rotor_loss.forget()
+        self.rotor_loss.begin(self._sent)
+        self.pilot.rotor_failed = ""
+        if self._senses.estimate is not None and not rests:
+            self.pilot.say(WARNING, FALLS)
+        self.stations.say(INFO, self.stations.banner())
+
+    def _sense(self, now_us: int, state: VehicleState) -> None:
+        """Take in what steers the vehicle, and what has ceased to."""
+        pilot, stations = self.pilot, self.stations
+        sticks, setpoint = self._heard(now_us)
+        pilot.sense(now_us, state, Steered(sticks, setpoint, stations.follow.latest(now_us, _LEADER_LOST_US)))
+        self.supervisor.step(self._seen(now_us, state))
+        self._missed_us = None
+
+    def _seen(self, now_us: int, state: VehicleState) -> Seen:
+        """Return what the failsafes' conditions are judged by."""
+        pilot, stations = self.pilot, self.stations
+        sticks = stations.manual.latest(now_us, _EVER_US)
+        return Seen(
+            now_us=now_us,
+            missed_us=self._missed_us,
+            state=state,
+            mode=pilot.state.mode,
+            standing=pilot.standing,
+            estimate=self._senses.estimate,
+            setpoint=stations.offboard.latest(now_us, _EVER_US),
+            sticks_us=None if sticks is None else sticks.time_us,
+            listening_us=NEVER_US if self._resumed_us is None else self._resumed_us,
+            station_us=stations.station_us,
+            battery=self.power.state(),
+            fence=stations.missions.margin_m if stations.missions.has_fence else None,
+            decided=None if self._decision is None else self._decision.diagnostics,
+            late=pilot.behaviour.solve_time_s * 1e6 > self._loop.control_interval_us,
+            rotor_lost=self.rotor_loss.lost,
+            pace=pilot.behaviour.limits,
+        )
+
+    def _watch_rotors(self, state: VehicleState) -> None:
+        """Notice whether a rotor is lost: then there is but one way to fly."""
+        pilot, estimate = self.pilot, self._senses.estimate
+        if not pilot.state.armed:
+            self.rotor_loss.end()
+        feels = estimate is None or (estimate.health.gyroscope and estimate.health.accelerometer)
+        airborne = feels and pilot.state.armed and not pilot.standing
+        charge_ah = self.power.charge_ah
+        if self.rotor_loss.look(state, self._sent, charge_ah, airborne=airborne, ground_m=pilot.ground_m):
+            assert self.rotor_loss.lost is not None, "what is lost has a number"
+            pilot.lose_rotor(self.rotor_loss.lost)
+
+    def _take_stock(self, state: VehicleState) -> None:
+        """Take in what orders of ground stations are judged by."""
+        pilot = self.pilot
+        sticks = pilot.scene().steered.sticks
+        thrust = sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None
+        outside = self.stations.missions.breach(state.position_enu_m, self._time_us or 0)
+        estimate = self._senses.estimate
+        unknown = not_known(estimate.health) if estimate is not None else ""
+        facts = Facts(state, pilot.standing, self.power.left, thrust, outside, unknown, self._battery_fault())
+        pilot.take_stock(facts)
+
+    def _battery_fault(self) -> str:
+        """Return why nobody may take off on the battery, apart from its charge; empty if one may."""
+        battery, model = self.power.state(), self._loop.vehicle.battery
+        if battery is None or model is None:
+            return ""
+        if any(map(self.supervisor.holds, (Condition.BATTERY_EMERGENCY, Condition.BATTERY_CRITICAL))):
+            return f"battery critical: {battery.voltage_v:.1f} V"
+        return battery_fault(battery.voltage_v, model.empty_voltage_v, model.full_voltage_v)
+
+    def _missing(self) -> list[Need]:
+        """Return needs of modes that nothing meets now: the message before the one that asks may have met one."""
+        sticks, setpoint = self._heard(self._time_us or 0)
+        missions = self.stations.missions
+        met = {
+            Need.ATTITUDE_CONTROL: self._attitude is not None,
+            Need.STICKS: sticks is not None,
+            Need.SETPOINTS: setpoint is not None,
+            Need.MISSION: missions.has_mission,
+            Need.INSIDE_FENCE: not missions.leaves_fence,
+            Need.CIRCLE: False,
+            Need.FLYING: not self.pilot.standing,
+            Need.POSITION: self.supervisor.knows_position,
+        }
+        return [need for need, there in met.items() if not there]
+
+    def _heard(self, now_us: int) -> tuple[Sticks | None, OffboardSetpoint | None]:
+        """Return the sticks and the setpoint that are obeyed, where they are fresh."""
+        stations, behaviour = self.stations, self.pilot.behaviour
+        return (
+            stations.manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6)),
+            stations.offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6)),
+        )
+
+    def _decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
+        loop = self._loop
+        if self.rotor_loss.flies:
+            controls, decision = self.rotor_loss.decide(state, self.power.charge_ah)
+            self._solving.at_once(controls)
+            if self.rotor_loss.landed:
+                self.pilot.touch_down()
+            return decision
+        if guidance.begins:
+            loop.begin(loop.vehicle.rotors.idle_speed, state.euler[2], afresh=False)
+        elif guidance is not RESTS and self._solving.busy(now_us):
+            return None
+        if guidance.horizon is not None:
+            decision = loop.decide(now_us, state, guidance.horizon)
+        elif guidance.attitude is not None:
+            decision = loop.decide_attitude(now_us, state, guidance.attitude)
+        else:
+            self._solving.at_once(STILL)
+            return None
+        self._solving.decided(loop.controls, now_us, round(self.pilot.behaviour.solve_time_s * 1e6))
+        self.solve_time_s = decision.diagnostics.solve_time_s
+        return decision
+
+    def _report(self, now_us: int, state: VehicleState, guidance: Guidance, decision: Decision | None) -> None:
+        pilot, stations = self.pilot, self.stations
+        self.samples += 1
+        self._take_stock(state)
+        if self._senses.estimate is not None:
+            for severity, line in self._health.lines(self._senses.estimate.health):
+                stations.say(severity, line)
+        idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
+        least = idle if pilot.state.armed else 0.0
+        c1, c2, c3, c4 = (max(control, least) for control in self._solving.controls(now_us))
+        self.power.run((c1, c2, c3, c4), self._interval_s)
+        stations.missions.watch_mode(pilot.state.mode)
+        stations.update(
+            self._photographer.take(
+                now_us,
+                state,
+                pilot,
+                guidance,
+                decision,
+                self._step_time_s,
+                (c1, c2, c3, c4),
+                self._battery(),
+                stations,
+                self._senses,
+            )
+        )
+
+    def _battery(self) -> BatteryState | None:
+        """Return the battery as it is told."""
+        battery = self.power.state()
+        return None if battery is None else battery._replace(charge_state=self.supervisor.charge_state)
+
+    def _adopt(self) -> None:
+        """Fly by the parameters as they are now."""
+        self.pilot.behaviour = behaviour(self.parameters)
+        self.supervisor.adopt(self.parameters)
+        self.rotor_loss.enabled = self.pilot.behaviour.land_on_three
+        if not self.rotor_loss.enabled:
+            self.rotor_loss.forget()
+            self.pilot.rotor_failed = ""
+        if self._attitude is not None:
+            self._attitude.limits = attitude_limits(self.pilot.behaviour)
+        tuned = self._tuning.take()
+        if tuned is not None:
+            self._loop.adopt(tuned.controller, tuned.vehicle)
+            self.rotor_loss.adopt(tuned.vehicle)
+            self._photographer = Photographer(tuned.vehicle, self._interval_s)
+            if self._attitude is not None:
+                self._attitude.adopt(tuned.vehicle)

@@ -1,0 +1,57 @@
+"""What a step of any autopilot takes and returns."""
+
+from typing import NamedTuple
+
+from colibri.autopilot.control.interface import Decision
+from colibri.autopilot.estimation.estimate import Estimate
+from colibri.mavlink.hil.faults import Fault
+from colibri.mavlink.hil.state import ActuatorCommand
+
+STILL = (0.0, 0.0, 0.0, 0.0)
+"""Rotors that stand."""
+
+
+MISSED_US = 100_000
+"""Frames of so long a time may be missing: what is known of the rotors still holds, more or less."""
+
+
+def follows(time_us: int, before_us: int | None, interval_us: int) -> bool:
+    """Whether a frame goes on from the one before, where they come every `interval_us`."""
+    return before_us is not None and 0 < time_us - before_us <= max(interval_us, MISSED_US)
+
+
+class Step(NamedTuple):
+    """The answer to a frame: the command to send, the decision behind it, and how long it took.
+
+    Between two control samples the last command is sent again, and there is no decision. Where the state is told, there
+    is no estimate. Faults are what the plant is asked to have happen with the command. As long as nothing is `known` of
+    the vehicle, its rotors stand.
+    """
+
+    command: ActuatorCommand
+    decision: Decision | None
+    duration_s: float
+    estimate: Estimate | None = None
+    faults: tuple[Fault, ...] = ()
+    known: bool = True
+
+
+def nothing_known(time_us: int, duration_s: float) -> Step:
+    """Return the answer to a frame of a vehicle of which nothing is known."""
+    return Step(ActuatorCommand(time_us, STILL, armed=False), None, duration_s, known=False)
+
+
+class Received(NamedTuple):
+    """What came from a ground station.
+
+    Attributes:
+        datagram: The bytes.
+        link: Number of the link.
+        address: Where from.
+        loopback: Whether from this computer.
+    """
+
+    datagram: bytes
+    link: int
+    address: tuple[str, int] | None
+    loopback: bool = True

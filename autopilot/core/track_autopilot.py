@@ -1,0 +1,85 @@
+"""An autopilot that flies one track, without ground stations."""
+
+from colibri.autopilot.control.interface import Clock
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.core.step import Step, follows, nothing_known
+from colibri.autopilot.estimation.state_source import Estimator, Senses
+from colibri.autopilot.guidance.trajectories.planner import plan
+from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.mavlink.hil.plant_status import Aside
+from colibri.mavlink.hil.sensors import Frame
+from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.plant.vehicle.description import Vehicle
+
+
+class Autopilot:
+    """Flies one track with one control law.
+
+    Attributes:
+        frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
+    """
+
+    def __init__(
+        self, profile: Profile, vehicle: Vehicle, track: Track, clock: Clock, *, estimator: Estimator | None = None
+    ) -> None:
+        """Fly `vehicle` along `track`; `clock` only measures, it decides nothing.
+
+        Args:
+            profile: The control law and its numbers.
+            vehicle: That it controls.
+            track: What it flies, from time 0 on.
+            clock: Seconds.
+            estimator: Makes what turns frames of sensors into states; None: frames are states.
+
+        Raises:
+            ControllerError: The profile's control law cannot be used.
+            ProfileError: Its table is wrong.
+            SolverError: Its solver cannot be used.
+        """
+        self._loop = ControlLoop(profile, vehicle, clock)
+        self._planner = plan(track, profile.references, self._loop.preview)
+        self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
+        self._clock = clock
+        self._time_us: int | None = None
+        self.frame_interval_us = self._loop.frame_interval_us
+        self._senses = Senses(estimator, self.frame_interval_us)
+
+    def hear(self, aside: Aside) -> None:
+        """Take in what the plant tells beside the frame of the next step."""
+        if aside.battery is not None:
+            self._loop.know_charge(aside.battery.used_ah)
+
+    def step(self, frame: Frame) -> Step:
+        """Answer a frame.
+
+        Frames follow one another at the frame interval; a plant that runs freely may lose a few. One that comes much
+        later, or earlier, begins a new flight: with the profile's rotor speed at time 0, and with hover in mid-flight,
+        where nothing is known of the rotors. On sensors a flight
+        begins with the first estimate, of a vehicle that stands, or falls; until then it is not armed.
+
+        Raises:
+            DecisionError: The control law gave what no rotor can follow.
+        """
+        started_s = self._clock()
+        due = self._loop.is_due(frame.time_us)
+        known = self._senses.state(frame, asked=due)
+        if known is None:
+            self._time_us = None
+            return nothing_known(frame.time_us, self._clock() - started_s)
+        if not follows(frame.time_us, self._time_us, self.frame_interval_us):
+            self._begin(frame)
+        self._time_us = frame.time_us
+        decision = None
+        if due:
+            state = self._loop.state(known)
+            decision = self._loop.decide(frame.time_us, state, self._planner.horizon(frame.time_us))
+        command = ActuatorCommand(frame.time_us, self._loop.controls, armed=True)
+        return Step(command, decision, self._clock() - started_s, self._senses.estimate if due else None)
+
+    def _begin(self, frame: Frame) -> None:
+        vehicle = self._loop.vehicle
+        speed = self._start_speed if frame.time_us == 0 else vehicle.hover_speed
+        if self._time_us is None and self._senses.rests:
+            speed = vehicle.rotors.idle_speed
+        self._loop.begin(speed, float(self._planner.horizon(frame.time_us).yaw_rad[0]))

@@ -1,0 +1,1 @@
+"""Sensors to state: the error-state Kalman filter, its fault monitors, what is published and how good it is."""

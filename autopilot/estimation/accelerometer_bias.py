@@ -1,0 +1,303 @@
+"""Notices that the accelerometer is suddenly off, when GPS velocity contradicts what the filter makes of it.
+
+A bias b that is there from one instant on makes the filter's velocity run away, and GPS velocity is rejected fix after
+fix, its innovations on a ramp: y = y₀ - ∫R dt · b. Where they are, b is fitted by least squares. That is no proof yet:
+a receiver that lies or is late makes ramps, too. So another sensor must say the same:
+
+- across the body, the accelerometer itself. A multirotor's thrust is along its z axis; what it feels sideways is drag,
+  and a bias. If it is the latter, that has changed by b, however the vehicle was flown since;
+- along body z, the barometer: what its height differs by from the integral of the filter's velocity must follow the
+  integral of the ramp.
+
+PX4's EKF2 checks for bad vertical acceleration likewise, by innovations of the same sign. The test of one against
+the other is by likelihood: A. Willsky, H. Jones, A generalized likelihood ratio approach to the detection and
+estimation of jumps in linear systems, IEEE TAC 21 (1976).
+"""
+
+from collections import deque
+from itertools import pairwise
+from math import ceil, nan, sqrt
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from colibri.autopilot.estimation.eskf import Filter
+from colibri.common.compiled_rotations import rotation_matrix
+from colibri.common.earth.atmosphere import METRES_PER_PASCAL
+from colibri.common.elementary import square
+from colibri.common.jit import compiled
+from colibri.common.types import Array
+from colibri.plant.vehicle.sensors import Sensors
+
+_Fix: TypeAlias = tuple[int, list[float], tuple[float, ...], int, float]
+"""Its time, µs; the nominal state (10,) that it met; the innovation of velocity, m/s ENU; when pressure was last
+tested, µs; which height that was, m."""
+
+TIME, POSITION, VELOCITY, ATTITUDE, INNOVATION, HEIGHT = 0, 1, 4, 7, 11, 14
+ROW = 15
+"""A fix as a row of numbers: s, the state (10,), innovation of velocity, m/s ENU, and the barometer's height, m."""
+
+_FEWEST_FIXES = 3
+_LONGEST_US = 2_500_000
+"""Since the first rejected fix: what is not seen by then is no sudden bias, and left to the filter's patience."""
+_KEPT_S = 6.0
+_BEFORE_S, _FEWEST_BEFORE = 1.0, 4
+"""What is felt in flight is compared with that of so long before the fault, of so many fixes at least."""
+_ONSET_S = 0.05
+_LONGEST_GAP_S = 0.35
+_ALONG_PART = 0.5
+"""The part of the bias along body z from which on the barometer is asked."""
+_ALIKE_PART = 0.5
+"""By how much of the larger may differ what two sensors say, that yet agree."""
+_CLEAR = 9.0
+"""How much two hypotheses must differ, σ², before a test can choose between them."""
+_FOUR_SIGMA = 22.06
+"""χ² of three degrees of freedom: a bias beyond that is one. The velocity was rejected at five already."""
+_LEAST_SIGMA = 1e-3
+_STEPS = 4
+"""Of the least squares: the rest falls by the square of the angle turned, and a few find it to what noise leaves."""
+
+
+class Found(NamedTuple):
+    """What the accelerometer has done to the filter.
+
+    Attributes:
+        bias_m_s2: By how much its bias has changed, FLU.
+        variance: Of that, along each axis, (m/s²)².
+        velocity_m_s: What the filter's velocity lacks, ENU.
+        position_m: What its position lacks, ENU.
+    """
+
+    bias_m_s2: Array
+    variance: float
+    velocity_m_s: Array
+    position_m: Array
+
+
+class AccelerometerWatch:
+    """Looks at every fix after it was tested."""
+
+    def __init__(self, sensors: Sensors, gravity_m_s2: float) -> None:
+        """Begin with nothing seen. What is compiled is loaded here."""
+        self._velocity_variance = square(max(sensors.gps.velocity_noise_m_s, _LEAST_SIGMA))
+        self._height_variance = square(max(sensors.barometer.noise_pa * METRES_PER_PASCAL, _LEAST_SIGMA))
+        self._gravity = gravity_m_s2
+        self._fixes: deque[_Fix] = deque(maxlen=ceil(_KEPT_S * sensors.gps.rate_hz))
+        self._rejected = 0
+        self._first_us = 0
+        self._resets = 0
+        find_bias(np.zeros((_FEWEST_FIXES, ROW)), 0, 1.0, 1.0, gravity_m_s2, np.zeros((3, 3)))
+
+    def look(self, time_us: int, state: list[float], filter_: Filter) -> Found | None:
+        """Look at a fix of `time_us` which the filter has tested; return what it tells, if it does.
+
+        `state` (10,) is the filter's nominal state before that.
+        """
+        velocity = filter_.velocity
+        if velocity.resets != self._resets:
+            self._resets = velocity.resets
+            self._fixes.clear()
+        self._fixes.append(
+            (time_us, state, velocity.test.innovation, filter_.pressure.test.time_us, filter_.pressure_height_m)
+        )
+        if velocity.rejected_us is None:
+            self._rejected = 0
+            return None
+        if self._rejected == 0:
+            self._first_us = time_us
+        self._rejected += 1
+        if self._rejected < _FEWEST_FIXES or time_us - self._first_us > _LONGEST_US:
+            return None
+        return self._judge(len(self._fixes) - 1 - self._rejected)
+
+    def _judge(self, first: int) -> Found | None:
+        if first < _FEWEST_BEFORE:
+            return None
+        rows = np.array(
+            [
+                (time_us * 1e-6, *state, *innovation, height if tested_us != before_us else nan)
+                for (time_us, state, innovation, tested_us, height), (_, _, _, before_us, _) in pairwise(self._fixes)
+            ]
+        )
+        found = np.empty((3, 3))
+        variance = find_bias(rows, first, self._velocity_variance, self._height_variance, self._gravity, found)
+        return Found(found[0], variance, found[1], found[2]) if variance > 0.0 else None
+
+
+@compiled
+def find_bias(
+    rows: Array, first: int, velocity_variance: float, height_variance: float, gravity: float, found: Array
+) -> float:
+    """Return the variance of a bias that is found, along each axis; 0 if none is.
+
+    Args:
+        rows: Fixes, (n, 15); the height is nan where the barometer told nothing new.
+        first: The first of them whose velocity was rejected, as were those behind it.
+        velocity_variance: Of the noise of GPS velocity, (m/s)².
+        height_variance: Of the barometer's, m².
+        gravity: m/s².
+        found: The bias, m/s² FLU; what the last row's velocity lacks, m/s ENU; and its position, m ENU.
+    """
+    n = len(rows) - first
+    for k in range(1, len(rows)):
+        if rows[k, TIME] - rows[k - 1, TIME] > _LONGEST_GAP_S:
+            return 0.0
+    A, d = _turned(rows, first), rows[first:, INNOVATION : INNOVATION + 3].copy()
+    middle = _centred(d)
+    for i in range(3):
+        _centred(A[:, i, :])
+    bias, spread = _fitted(A, d)
+    size = sqrt(bias[0] ** 2 + bias[1] ** 2 + bias[2] ** 2)
+    if not size * size * spread > _FOUR_SIGMA * velocity_variance:
+        return 0.0
+    lacks, rest = np.empty((n, 3)), 0.0
+    for k in range(n):
+        for i in range(3):
+            ramp = -(A[k, i, 0] * bias[0] + A[k, i, 1] * bias[1] + A[k, i, 2] * bias[2])
+            rest += (d[k, i] - ramp) ** 2
+            lacks[k, i] = middle[i] + ramp
+    freedom = 3 * (n - 2)
+    if rest > (freedom + 5.0 * sqrt(2.0 * freedom)) * velocity_variance:
+        return 0.0
+    began_s = sqrt(lacks[0, 0] ** 2 + lacks[0, 1] ** 2 + lacks[0, 2] ** 2) / size
+    moved, last = _moved(rows, first, lacks, began_s), first
+    while last >= 0 and rows[last, TIME] > rows[first, TIME] - began_s - _ONSET_S:
+        last -= 1
+    begin = last
+    while begin > 0 and rows[begin - 1, TIME] >= rows[last, TIME] - _BEFORE_S:
+        begin -= 1
+    if last - begin < _FEWEST_BEFORE - 1:
+        return 0.0
+    drifted = _drifted(rows, begin)
+    if abs(bias[2]) > _ALONG_PART * size and not _is_seen(rows, first, begin, last, moved, drifted, height_variance):
+        return 0.0
+    if not _is_felt(rows, first, begin, last, gravity, bias):
+        return 0.0
+    found[0], found[1], found[2] = bias, lacks[-1], moved[-1]
+    found[2] -= (
+        rows[-1, POSITION : POSITION + 3] - rows[last, POSITION : POSITION + 3] - (drifted[-1] - drifted[last - begin])
+    )
+    return velocity_variance / spread
+
+
+@compiled
+def _drifted(rows: Array, begin: int) -> Array:
+    """Return the integral of the filter's velocity from a fix to each one after it, m ENU."""
+    drifted = np.zeros((len(rows) - begin, 3))
+    for k in range(1, len(drifted)):
+        row = begin + k
+        dt = rows[row, TIME] - rows[row - 1, TIME]
+        drifted[k] = drifted[k - 1]
+        for i in range(3):
+            drifted[k, i] += 0.5 * dt * (rows[row - 1, VELOCITY + i] + rows[row, VELOCITY + i])
+    return drifted
+
+
+@compiled
+def _is_seen(
+    rows: Array, first: int, begin: int, last: int, moved: Array, drifted: Array, height_variance: float
+) -> bool:
+    """Whether the barometer contradicts the filter's velocity as what position lacks (n, 3) does.
+
+    Rows from `begin` to `last` are of before; `drifted` is from `begin` on.
+    """
+    rest = 0.0
+    for k in range(begin, last + 1):
+        rest += (rows[k, HEIGHT] - drifted[k - begin, 2]) / (last + 1 - begin)
+    clear, follows = 0.0, 0.0
+    for k in range(len(moved)):
+        up, row = moved[k, 2], first + k
+        clear += up * up
+        follows += up * (rows[row, HEIGHT] - drifted[row - begin, 2] - rest)
+    return clear >= _CLEAR * height_variance and abs(follows - clear) <= _ALIKE_PART * max(follows, clear)
+
+
+@compiled
+def _is_felt(rows: Array, first: int, begin: int, last: int, gravity: float, bias: Array) -> bool:
+    """Whether what is felt across the body has changed by the bias since the rows from `begin` to `last`."""
+    now, before = np.zeros(2), np.zeros(2)
+    for k in range(first + 1, len(rows)):
+        now += _felt(rows, k, gravity)
+    for k in range(begin + 1, last + 1):
+        before += _felt(rows, k, gravity)
+    change = now / (len(rows) - 1 - first) - before / (last - begin)
+    felt = sqrt(change[0] ** 2 + change[1] ** 2)
+    size = sqrt(bias[0] ** 2 + bias[1] ** 2 + bias[2] ** 2)
+    return sqrt((change[0] - bias[0]) ** 2 + (change[1] - bias[1]) ** 2) <= _ALIKE_PART * max(felt, size)
+
+
+@compiled
+def _felt(rows: Array, k: int, gravity: float) -> Array:
+    """Return the mean specific force from the fix before to this, along body x and y, by the filter's velocity."""
+    R, dt = _between(rows, k), rows[k, TIME] - rows[k - 1, TIME]
+    force = np.zeros(2)
+    for i in range(3):
+        along = (rows[k, VELOCITY + i] - rows[k - 1, VELOCITY + i]) / dt + (gravity if i == 2 else 0.0)
+        force[0] += R[i, 0] * along
+        force[1] += R[i, 1] * along
+    return force
+
+
+@compiled
+def _turned(rows: Array, first: int) -> Array:
+    """Return ∫R dt from the first rejected fix to each one, (n, 3, 3)."""
+    A = np.zeros((len(rows) - first, 3, 3))
+    for k in range(1, len(A)):
+        dt = rows[first + k, TIME] - rows[first + k - 1, TIME]
+        A[k] = A[k - 1] + _between(rows, first + k) * dt
+    return A
+
+
+@compiled
+def _between(rows: Array, k: int) -> Array:
+    """Return the mean rotation from the body to the earth, from the fix before to this, (3, 3)."""
+    R = np.empty((2, 3, 3))
+    for j in range(2):
+        w, x, y, z = rows[k - j, ATTITUDE : ATTITUDE + 4]
+        R[j] = np.array(rotation_matrix((w, x, y, z)))
+    mean: Array = 0.5 * (R[0] + R[1])
+    return mean
+
+
+@compiled
+def _centred(columns: Array) -> Array:
+    """Take from columns (n, 3) their means, in place, and return those."""
+    mean = np.zeros(3)
+    for row in columns:
+        mean += row
+    mean /= len(columns)
+    for k in range(len(columns)):
+        columns[k] -= mean
+    return mean
+
+
+@compiled
+def _fitted(A: Array, d: Array) -> tuple[Array, float]:
+    """Return the bias that minimises |d + A b|², and how far A spreads, s².
+
+    AᵀA is a multiple of the identity but for what the body has turned: each step takes the rest of that away.
+    """
+    spread = 0.0
+    for k in range(len(A)):
+        for i in range(3):
+            spread += (A[k, i, 0] ** 2 + A[k, i, 1] ** 2 + A[k, i, 2] ** 2) / 3.0
+    bias = np.zeros(3)
+    for _ in range(_STEPS):
+        step = np.zeros(3)
+        for k in range(len(A)):
+            for i in range(3):
+                rest = d[k, i] + A[k, i, 0] * bias[0] + A[k, i, 1] * bias[1] + A[k, i, 2] * bias[2]
+                step += rest * A[k, i]
+        bias -= step / spread
+    return bias, spread
+
+
+@compiled
+def _moved(rows: Array, first: int, lacks: Array, began_s: float) -> Array:
+    """Return what position lacks at each fix, m ENU, where velocity has lacked since `began_s` before the first."""
+    moved = np.empty((len(lacks), 3))
+    moved[0] = 0.5 * began_s * lacks[0]
+    for k in range(1, len(lacks)):
+        dt = rows[first + k, TIME] - rows[first + k - 1, TIME]
+        moved[k] = moved[k - 1] + 0.5 * dt * (lacks[k - 1] + lacks[k])
+    return moved

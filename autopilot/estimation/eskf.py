@@ -1,0 +1,398 @@
+"""The error-state Kalman filter: its state, what it believes of the sensors, and when it stops to.
+
+A kind of measurement that is rejected for long is believed again: the part of the state that it speaks of is doubted
+first, so that it is taken anew. For a magnetic field that is the field of the vehicle itself, and yaw stays; for
+pressure it is the offset of the barometer, and height stays; for GPS it is position or velocity.
+"""
+
+from collections.abc import Callable
+from math import hypot, inf, isfinite, nan, radians
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.estimation import eskf_update as update
+from colibri.autopilot.estimation.eskf_predict import (
+    ACCEL_BIAS,
+    ATTITUDE,
+    BARO_OFFSET,
+    ERRORS,
+    GPS_DRIFT,
+    GYRO_BIAS,
+    HARD_IRON,
+    NOMINAL,
+    POSITION,
+    VELOCITY,
+    Noise,
+    predict,
+)
+from colibri.autopilot.estimation.estimate import Test, Tests
+from colibri.autopilot.estimation.sensing.alignment import Aligned
+from colibri.autopilot.estimation.sensing.free_fall import Caught
+from colibri.autopilot.estimation.sensing.rejection import Reason
+from colibri.common.earth.atmosphere import METRES_PER_PASCAL, altitude_m, altitude_slope_m_pa
+from colibri.common.elementary import square
+from colibri.common.types import Array, Vector
+from colibri.mavlink.hil.sensors import GpsFix
+from colibri.plant.vehicle.sensors import Sensors
+
+FIVE_SIGMA = (25.0, 28.74, 31.81)
+"""χ² of one, two and three degrees of freedom that is exceeded as rarely as five standard deviations are."""
+
+_FIX_GATES = np.array([FIVE_SIGMA[2], FIVE_SIGMA[1], FIVE_SIGMA[0]])
+_FIRST_POSITION_M, _FIRST_VELOCITY_M_S, _FIRST_ATTITUDE_RAD, _FIRST_OFFSET_M = 100.0, 0.02, 0.5, 1000.0
+_CAUGHT_M, _CAUGHT_M_S, _CAUGHT_RAD = 3.0, 1.0, 0.4
+"""How well a vehicle that falls is known: it need not have been level."""
+_ITERATIONS = 4
+_LEAST_NOISE = 1e-6
+"""Of anything, in its own unit: a perfect sensor would leave nothing to divide by."""
+_PLACE_STEP_M, _HEIGHT_STEP_M, _SPEED_STEP_M_S = 0.011, 0.001, 0.01
+"""HIL_GPS has degE7, mm and cm/s."""
+_CLAIM_STEP_M = 0.01
+_STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)
+"""By how much the field may differ from the earth's in strength and inclination."""
+_IRON_WALK_GAUSS = 1e-5
+_UNSURE_PART = 0.3
+"""Of what position lacked by a bias, as well as that is known."""
+_UNSURE_TIMES = 3.0
+"""The variance of that bias: what velocity lacked errs with it."""
+_UNSURE_TURN = 2.0
+"""The field does not see a turn about itself: it may be larger than what it sees."""
+_UNSURE_S = 0.5
+"""For how long a velocity that has grown wrong was, in the mean."""
+_DOUBTED_M, _DOUBTED_M_S, _DOUBTED_GAUSS = 100.0, 10.0, 0.3
+
+
+class KindRecord(NamedTuple):
+    """When a kind of measurement was last believed, since when it is not, and how often it had to be."""
+
+    accepted_us: int
+    rejected_us: int | None
+    resets: int
+
+
+class FilterRecord(NamedTuple):
+    """A filter as plain data: state, covariance, the kinds of what is measured, and when biases were taken anew."""
+
+    x: Array
+    P: Array
+    kinds: list[KindRecord]
+    accel_bias_us: int | None
+    gyro_bias_us: int | None
+
+
+class Kind:
+    """One kind of measurement: its last test, and for how long it has been rejected.
+
+    Attributes:
+        test: The last.
+        accepted_us: When it was last believed.
+        rejected_us: Since when it is not; None while it is.
+        resets: How often it had to be believed.
+        nis: Sum of the normalised innovations squared that were believed at once.
+        believed: How many they are.
+    """
+
+    def __init__(self, numbers: int, patience_us: int, doubted: tuple[int, int, float]) -> None:
+        """Measure `numbers` at once; after `patience_us` of rejections, doubt (first state, count, σ) and believe."""
+        self.gate = FIVE_SIGMA[numbers - 1]
+        self.test = Test(-1, (0.0,) * numbers, 0.0, self.gate)
+        self.accepted_us = 0
+        self.rejected_us: int | None = None
+        self._patience_us = patience_us
+        self._doubted = doubted
+        self._y = np.zeros(numbers)
+        self.resets = 0
+        self.nis = 0.0
+        self.believed = 0
+
+    def fuse(self, filter_: "Filter", time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
+        """Fuse a measurement; return whether it was believed."""
+        nis = kernel(filter_.x, filter_.P, *arguments, self.gate, self._y)
+        if self.note(time_us, tuple(self._y.tolist()), nis):
+            return True
+        return self.insist(filter_, time_us, kernel, *arguments)
+
+    def note(self, time_us: int, innovation: tuple[float, ...], nis: float) -> bool:
+        """Note a test; return whether the measurement was believed."""
+        self.test = Test(time_us, innovation, nis, self.gate)
+        if nis <= self.gate:
+            self.accepted_us, self.rejected_us = time_us, None
+            self.nis += nis
+            self.believed += 1
+            return True
+        return False
+
+    def insist(self, filter_: "Filter", time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
+        """Reject a measurement, but believe it if this has lasted too long; return whether it was believed."""
+        if not self.reject(time_us):
+            return False
+        first, count, sigma = self._doubted
+        update.doubt(filter_.P, first, count, sigma * sigma)
+        kernel(filter_.x, filter_.P, *arguments, inf, self._y)
+        self.resets += 1
+        self.accept(time_us)
+        return True
+
+    def accept(self, time_us: int) -> None:
+        """Note that a measurement was believed."""
+        self.accepted_us = time_us
+        self.rejected_us = None
+
+    def reject(self, time_us: int) -> bool:
+        """Note that a measurement was not believed; return whether this has lasted too long."""
+        if self.rejected_us is None:
+            self.rejected_us = time_us
+        return time_us - self.rejected_us >= self._patience_us
+
+
+class Filter:
+    """State and covariance, at a time some way behind the vehicle's.
+
+    Attributes:
+        x: Nominal state, (23,).
+        P: Covariance of its error, (22, 22).
+        position, velocity, height, pressure, field: What is measured.
+        kinds: All of them, in the order of `Tests`.
+        pressure_height_m: What pressure told last.
+        field_gauss: Strength of the earth's field.
+        accel_bias_us: When the accelerometer's bias was last taken anew; None if never.
+        gyro_bias_us: When the gyroscope's was.
+    """
+
+    def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector) -> None:
+        """Believe what `sensors` say of themselves."""
+        self._sensors, self._gravity = sensors, gravity_m_s2
+        self._field = np.array(field_enu_gauss)
+        self.field_gauss = hypot(*field_enu_gauss)
+        self._noise = noise_of(sensors)
+        gps = sensors.gps
+        self._horizontal = square(gps.horizontal_noise_m) + square(_PLACE_STEP_M) / 12.0
+        self._vertical = square(gps.vertical_noise_m) + square(_HEIGHT_STEP_M) / 12.0
+        speed = square(gps.velocity_noise_m_s) + square(_SPEED_STEP_M_S) / 12.0
+        self._fix, self._fix_y, self._fix_nis = np.zeros(6), np.zeros(6), np.zeros(3)
+        self._claims = (nan, nan)
+        self._fix_variances = np.array([speed, self._horizontal, self._vertical])
+        self._field_variance = square(max(sensors.magnetometer.noise_gauss, _LEAST_NOISE))
+        self.x, self.P = np.zeros(NOMINAL), np.zeros((ERRORS, ERRORS))
+        self.velocity = Kind(3, 7_000_000, (VELOCITY, 3, _DOUBTED_M_S))
+        self.position = Kind(2, 7_000_000, (POSITION, 2, _DOUBTED_M))
+        self.height = Kind(1, 7_000_000, (POSITION + 2, 1, _DOUBTED_M))
+        self.pressure = Kind(1, 7_000_000, (BARO_OFFSET, 1, _DOUBTED_M))
+        self.field = Kind(3, 10_000_000, (HARD_IRON, 3, _DOUBTED_GAUSS))
+        self.pressure_height_m = 0.0
+        self.accel_bias_us: int | None = None
+        self.gyro_bias_us: int | None = None
+        self.kinds = (self.velocity, self.position, self.height, self.pressure, self.field)
+
+    def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
+        """Begin at rest: each mean is fused as a measurement, so that the covariance knows what it took from where.
+
+        The attitude is found by iteration. A tilt seen by the accelerometer may be its bias, and the magnetic field
+        knows better: a covariance linearised where the first guess was would later be taken for knowledge.
+        """
+        x, P = self.x, self.P
+        attitude = aligned.attitude
+        for _ in range(_ITERATIONS):
+            self._know_nothing(place_enu_m)
+            x[6:10] = attitude
+            self._rest(aligned)
+            attitude = tuple(x[6:10].tolist())
+        for kind in self.kinds:
+            kind.accept(time_us)
+        y1, y2, y3 = np.zeros(1), np.zeros(2), np.zeros(3)
+        place, horizontal, vertical = np.array(place_enu_m), *self._of_place(aligned.fix)
+        update.fuse_velocity(x, P, np.array(aligned.fix.velocity_enu_m_s), self._fix_variances[0], inf, y3)
+        update.fuse_horizontal(x, P, place, 0.0, horizontal, inf, y2)
+        update.fuse_height(x, P, place, 0.0, vertical, inf, y1)
+        if aligned.pressure_height_m is not None:
+            x[19] = aligned.pressure_height_m - x[2]
+            sigma = self._sensors.barometer.noise_pa * METRES_PER_PASCAL
+            variance = square(max(sigma, _LEAST_NOISE)) / aligned.heights
+            update.fuse_pressure_height(x, P, aligned.pressure_height_m, variance, inf, y1)
+
+    def start_in_air(self, caught: Caught, place_enu_m: Vector, time_us: int) -> None:
+        """Begin with a vehicle that falls, at a place."""
+        x, P = self.x, self.P
+        self._know_nothing(place_enu_m)
+        x[3:6], x[6:10] = caught.velocity_enu_m_s, caught.attitude
+        for first, sigma in ((POSITION, _CAUGHT_M), (VELOCITY, _CAUGHT_M_S), (ATTITUDE, _CAUGHT_RAD)):
+            for i in range(first, first + 3):
+                P[i, i] = sigma * sigma
+        if caught.pressure_height_m is not None:
+            x[19] = caught.pressure_height_m - x[2]
+        for kind in self.kinds:
+            kind.accept(time_us)
+
+    def _know_nothing(self, place_enu_m: Vector) -> None:
+        """Know of a vehicle at a place what can be known before anything is measured."""
+        sensors, P = self._sensors, self.P
+        self.x[:], P[:] = 0.0, 0.0
+        self.x[:3] = place_enu_m
+        for first, count, sigma in (
+            (POSITION, 3, _FIRST_POSITION_M),
+            (VELOCITY, 3, _FIRST_VELOCITY_M_S),
+            (ATTITUDE, 3, _FIRST_ATTITUDE_RAD),
+            (GYRO_BIAS, 3, max(sensors.gyroscope.turn_on_bias_rad_s, _LEAST_NOISE)),
+            (ACCEL_BIAS, 3, max(sensors.accelerometer.turn_on_bias_m_s2, _LEAST_NOISE)),
+            (BARO_OFFSET, 1, _FIRST_OFFSET_M),
+            (HARD_IRON, 3, max(sensors.magnetometer.hard_iron_gauss, _LEAST_NOISE)),
+        ):
+            update.doubt(P, first, count, sigma * sigma)
+        for i, variance in enumerate(self._noise.gps_drift):
+            P[GPS_DRIFT + i, GPS_DRIFT + i] = variance
+
+    def _rest(self, aligned: Aligned) -> None:
+        """Fuse the means of specific force, field and rate."""
+        x, P, sensors = self.x, self.P, self._sensors
+        force = square(max(sensors.accelerometer.noise_density_m_s2_rthz, _LEAST_NOISE)) / aligned.duration_s
+        rate = square(max(sensors.gyroscope.noise_density_rad_s_rthz, _LEAST_NOISE)) / aligned.duration_s
+        field, y = self._field_variance / aligned.fields, np.zeros(6)
+        mean_force, mean_field = np.array(aligned.force), np.array(aligned.field)
+        update.fuse_rest(x, P, mean_force, self._gravity, force, mean_field, self._field, field, y)
+        for i in range(3):
+            variance = P[GYRO_BIAS + i, GYRO_BIAS + i]
+            gain = variance / (variance + rate)
+            x[10 + i] = gain * aligned.rate[i]
+            P[GYRO_BIAS + i, GYRO_BIAS + i] = gain * rate
+
+    def record(self) -> FilterRecord:
+        """Return state, covariance and what was believed."""
+        kinds = [KindRecord(kind.accepted_us, kind.rejected_us, kind.resets) for kind in self.kinds]
+        return FilterRecord(self.x, self.P, kinds, self.accel_bias_us, self.gyro_bias_us)
+
+    def resume(self, record: FilterRecord) -> bool:
+        """Go on from a record; return whether it is one of such a filter."""
+        if (record.x.shape, record.P.shape, len(record.kinds)) != (self.x.shape, self.P.shape, len(self.kinds)):
+            return False
+        self.x[:], self.P[:] = record.x, record.P
+        self.accel_bias_us, self.gyro_bias_us = record.accel_bias_us, record.gyro_bias_us
+        for kind, (accepted_us, rejected_us, resets) in zip(self.kinds, record.kinds, strict=True):
+            kind.accepted_us, kind.rejected_us, kind.resets = accepted_us, rejected_us, resets
+        return True
+
+    def predict(self, samples: Array, row: int) -> None:
+        """Go on by one sample of many."""
+        predict(self.x, self.P, samples, row, self._noise, self._gravity)
+
+    def fuse_fix(self, fix: GpsFix, place_enu_m: Vector, after_s: float, time_us: int) -> Reason | None:
+        """Fuse a fix measured `after_s` after the filter's time; return why a part of it was rejected, if one was."""
+        x, P, z, y, variances = self.x, self.P, self._fix, self._fix_y, self._fix_variances
+        z[:3], z[3:] = place_enu_m, fix.velocity_enu_m_s
+        claims = (fix.horizontal_accuracy_m, fix.vertical_accuracy_m)
+        if claims != self._claims:
+            self._claims = claims
+            variances[1:] = self._of_place(fix)
+        update.fuse_fix(x, P, z, after_s, variances, _FIX_GATES, y, self._fix_nis)
+        ve, vn, vu, e, n, u = y.tolist()
+        moves, lies, stands = self._fix_nis.tolist()
+        believed = True
+        if not self.velocity.note(time_us, (ve, vn, vu), moves):
+            believed &= self.velocity.insist(self, time_us, update.fuse_velocity, z[3:], variances[0])
+        if not self.position.note(time_us, (e, n), lies):
+            believed &= self.position.insist(self, time_us, update.fuse_horizontal, z[:3], after_s, variances[1])
+        if not self.height.note(time_us, (u,), stands):
+            believed &= self.height.insist(self, time_us, update.fuse_height, z[:3], after_s, variances[2])
+        return None if believed else Reason.INNOVATION
+
+    def fuse_pressure(self, pressure_pa: float, time_us: int) -> Reason | None:
+        """Fuse a pressure; return why it was rejected, if it was."""
+        height = self.pressure_height_m = altitude_m(pressure_pa)
+        sigma = self._sensors.barometer.noise_pa * altitude_slope_m_pa(pressure_pa)
+        variance = square(max(-sigma, _LEAST_NOISE))
+        believed = self.pressure.fuse(self, time_us, update.fuse_pressure_height, height, variance)
+        return None if believed else Reason.INNOVATION
+
+    def fuse_field(self, field: Vector, time_us: int) -> Reason | None:
+        """Fuse a magnetic field; return why it was rejected, if it was."""
+        measured = np.array(field)
+        is_of_earth = update.is_of_earth(self.x, measured, self._field, _STRENGTH_PART, _DIP_RAD)
+        if not is_of_earth and not self.field.reject(time_us):
+            return Reason.FIELD
+        believed = self.field.fuse(self, time_us, update.fuse_field, measured, self._field, self._field_variance)
+        return None if believed else Reason.INNOVATION
+
+    def take_accel_bias_anew(
+        self, change_m_s2: Array, variance: float, velocity_m_s: Array, position_m: Array, time_us: int
+    ) -> None:
+        """Believe that the accelerometer's bias has changed, and undo what that has done since.
+
+        Args:
+            change_m_s2: Of the bias, FLU.
+            variance: Of the change, along each axis, (m/s²)².
+            velocity_m_s: What the velocity lacks by it, ENU.
+            position_m: What the position lacks, ENU.
+            time_us: Now.
+        """
+        x, P = self.x, self.P
+        x[:3] += position_m
+        x[3:6] += velocity_m_s
+        x[13:16] += change_m_s2
+        moved_m = _UNSURE_PART * float(np.abs(position_m).max())
+        update.doubt(P, POSITION, 3, moved_m * moved_m)
+        update.doubt(P, VELOCITY, 3, self._fix_variances[0])
+        update.doubt(P, ACCEL_BIAS, 3, _UNSURE_TIMES * variance)
+        self.velocity.resets += 1
+        self.velocity.accept(time_us)
+        self.accel_bias_us = time_us
+
+    def take_gyro_bias_anew(self, turned_rad: float, since_s: float, time_us: int) -> None:
+        """Doubt what a gyroscope that is off has spoilt: attitude and bias, and the velocity that is contradicted.
+
+        Args:
+            turned_rad: By how much the magnetic field has turned.
+            since_s: For how long it has.
+            time_us: Now.
+        """
+        P, angle_rad = self.P, _UNSURE_TURN * turned_rad
+        update.doubt(P, ATTITUDE, 3, angle_rad * angle_rad)
+        update.doubt(P, GYRO_BIAS, 3, square(angle_rad / since_s))
+        speed_m_s = hypot(*self.velocity.test.innovation)
+        update.doubt(P, POSITION, 3, square(_UNSURE_S * speed_m_s))
+        update.doubt(P, VELOCITY, 3, speed_m_s * speed_m_s)
+        self.velocity.resets += 1
+        self.velocity.accept(time_us)
+        self.field.accept(self.field.test.time_us)
+        self.gyro_bias_us = time_us
+
+    @property
+    def tests(self) -> Tests:
+        """The last test of each kind."""
+        return Tests(self.velocity.test, self.position.test, self.height.test, self.pressure.test, self.field.test)
+
+    @property
+    def resets(self) -> int:
+        """How often something was taken anew."""
+        return sum(kind.resets for kind in self.kinds)
+
+    def _of_place(self, fix: GpsFix) -> tuple[float, float]:
+        """Return the variances of the white noise of a fix: as described, and more if it claims to be worse."""
+        drift = self._noise.gps_drift
+        return (
+            self._horizontal + _excess(fix.horizontal_accuracy_m, self._horizontal + drift[0]),
+            self._vertical + _excess(fix.vertical_accuracy_m, self._vertical + drift[2]),
+        )
+
+
+def noise_of(sensors: Sensors) -> Noise:
+    """Return what drives the errors of a vehicle with `sensors`."""
+    accel, gyro, gps, barometer = sensors.accelerometer, sensors.gyroscope, sensors.gps, sensors.barometer
+    horizontal, vertical = (
+        square(max(sigma, _LEAST_NOISE)) for sigma in (gps.horizontal_drift_m, gps.vertical_drift_m)
+    )
+    drift_m = max(barometer.drift_pa * METRES_PER_PASCAL, _LEAST_NOISE)
+    return Noise(
+        force=square(max(accel.noise_density_m_s2_rthz, _LEAST_NOISE)),
+        rate=square(max(gyro.noise_density_rad_s_rthz, _LEAST_NOISE)),
+        gyro_bias=square(max(gyro.bias_walk_rad_s2_rthz, _LEAST_NOISE)),
+        accel_bias=square(max(accel.bias_walk_m_s3_rthz, _LEAST_NOISE)),
+        gps_drift=(horizontal, horizontal, vertical),
+        gps_drift_time_s=gps.drift_time_s,
+        baro_offset=2.0 * square(drift_m) / barometer.drift_time_s,
+        hard_iron=square(_IRON_WALK_GAUSS),
+    )
+
+
+def _excess(claimed_m: float, described: float) -> float:
+    """Return by how much the variance that a receiver claims, rounded to cm by the wire, is above what is described."""
+    return max(0.0, square(max(claimed_m - 0.5 * _CLAIM_STEP_M, 0.0)) - described) if isfinite(claimed_m) else 0.0

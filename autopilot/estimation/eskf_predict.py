@@ -1,0 +1,237 @@
+"""Error-state Kalman filter: how state and covariance go on with what gyroscope and accelerometer measure.
+
+J. Solà, Quaternion kinematics for the error-state Kalman filter, arXiv:1711.02508, sections 5.3 and 5.4, in ENU/FLU:
+the attitude rotates body vectors into the earth frame, and its error is a small rotation in the body frame.
+"""
+
+from math import sqrt
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from colibri.common.jit import compiled
+from colibri.common.kernels import cos, exp, sin
+from colibri.common.types import Array
+
+Three: TypeAlias = tuple[float, float, float]
+Four: TypeAlias = tuple[float, float, float, float]
+Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
+
+POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCEL_BIAS, GPS_DRIFT, BARO_OFFSET, HARD_IRON = 0, 3, 6, 9, 12, 15, 18, 19
+"""Where the parts of the error state begin: m and m/s ENU, rad FLU, rad/s, m/s², m ENU, m, gauss FLU."""
+ERRORS = 22
+NOMINAL = 23
+"""The nominal state is the same with a quaternion for the attitude: what follows it lies one place later."""
+
+INTERVAL, FORCE, RATE, BLIND_FORCE, BLIND_RATE = 0, 1, 4, 7, 8
+SAMPLE = 9
+"""Of the interval from one frame to the next: its length, s; mean specific force and rate as measured; and whether
+either is not known (1.0): then the vehicle is taken to keep its velocity, or its attitude."""
+
+_BLIND_FORCE_DENSITY = 3.0**2
+"""(m/s²)²/Hz: 3 m/s after a second without an accelerometer."""
+_BLIND_RATE_DENSITY = 0.5**2
+"""(rad/s)²/Hz."""
+_SMALL_TURN = 0.05
+"""Half a turn, rad, below which the series of sine and cosine are exact to the last bits."""
+_MOST_POSITION, _MOST_VELOCITY, _MOST_ATTITUDE = 1e6, 1e4, 1.0
+"""Variances beyond which a part is unknown: it forgets what it had to do with the others, and all stays positive."""
+
+
+class Noise(NamedTuple):
+    """What drives the errors: spectral densities of white noise.
+
+    Attributes:
+        force: Of the specific force, (m/s²)²/Hz.
+        rate: Of the rates, (rad/s)²/Hz.
+        gyro_bias: Of the walk of the gyroscope's bias, (rad/s²)²/Hz.
+        accel_bias: Of the walk of the accelerometer's bias, (m/s³)²/Hz.
+        gps_drift: Variances of the Gauss-Markov drift of GPS, m², east, north, up.
+        gps_drift_time_s: Its correlation time.
+        baro_offset: Of the walk of the barometer's offset, m²/s.
+        hard_iron: Of the walk of the vehicle's own field, gauss²/s.
+    """
+
+    force: float
+    rate: float
+    gyro_bias: float
+    accel_bias: float
+    gps_drift: tuple[float, float, float]
+    gps_drift_time_s: float
+    baro_offset: float
+    hard_iron: float
+
+
+@compiled
+def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine, Three, Three]:
+    """Move the nominal state on by one sample, Solà's (260) with the attitude at the middle of the interval.
+
+    Returns:
+        The rotation at the middle, row by row; specific force without its bias, FLU; the angle turned, rad, FLU.
+    """
+    dt = samples[row, INTERVAL]
+    a, b, c = 0.0, 0.0, 0.0
+    if samples[row, BLIND_RATE] == 0.0:
+        a = (samples[row, RATE] - x[10]) * dt
+        b = (samples[row, RATE + 1] - x[11]) * dt
+        c = (samples[row, RATE + 2] - x[12]) * dt
+    q = (x[6], x[7], x[8], x[9])
+    R = _matrix(_turned(q, 0.5 * a, 0.5 * b, 0.5 * c))
+    fx, fy, fz = R[6] * gravity, R[7] * gravity, R[8] * gravity
+    if samples[row, BLIND_FORCE] == 0.0:
+        fx = samples[row, FORCE] - x[13]
+        fy = samples[row, FORCE + 1] - x[14]
+        fz = samples[row, FORCE + 2] - x[15]
+    dvx = (R[0] * fx + R[1] * fy + R[2] * fz) * dt
+    dvy = (R[3] * fx + R[4] * fy + R[5] * fz) * dt
+    dvz = (R[6] * fx + R[7] * fy + R[8] * fz - gravity) * dt
+    x[0] += (x[3] + 0.5 * dvx) * dt
+    x[1] += (x[4] + 0.5 * dvy) * dt
+    x[2] += (x[5] + 0.5 * dvz) * dt
+    x[3] += dvx
+    x[4] += dvy
+    x[5] += dvz
+    w, i, j, k = _turned(q, a, b, c)
+    scale = 1.0 / sqrt(w * w + i * i + j * j + k * k)
+    x[6], x[7], x[8], x[9] = w * scale, i * scale, j * scale, k * scale
+    return R, (fx, fy, fz), (a, b, c)
+
+
+@compiled
+def predict(x: Array, P: Array, samples: Array, row: int, noise: Noise, gravity: float) -> None:
+    """Move state (23,) and covariance (22, 22) on by one sample, in place: P = F P Fᵀ + Q, Solà's (270) and (271)."""
+    dt = samples[row, INTERVAL]
+    sees_force, sees_rate = samples[row, BLIND_FORCE] == 0.0, samples[row, BLIND_RATE] == 0.0
+    R, force, turn = strap_down(x, samples, row, gravity)
+    decay = exp(-dt / noise.gps_drift_time_s)
+    F = np.zeros((9, 3))
+    push, lever, back = F[:3], F[3:6], F[6:]
+    if sees_force:
+        fx, fy, fz = force[0] * dt, force[1] * dt, force[2] * dt
+        for i in range(3):
+            a, b, c = R[3 * i], R[3 * i + 1], R[3 * i + 2]
+            push[i, 0], push[i, 1], push[i, 2] = c * fy - b * fz, a * fz - c * fx, b * fx - a * fy
+            lever[i, 0], lever[i, 1], lever[i, 2] = a * dt, b * dt, c * dt
+    unturned = _matrix(_turned((1.0, 0.0, 0.0, 0.0), -0.5 * turn[0], -0.5 * turn[1], -0.5 * turn[2]))
+    for i in range(9):
+        back[i // 3, i % 3] = unturned[i]
+    half_s = 0.5 * dt if sees_rate else 0.0
+    _carry(P, push, lever, back, half_s, decay, dt)
+    _carry(P.T, push, lever, back, half_s, decay, dt)
+    force_noise = noise.force if sees_force else _BLIND_FORCE_DENSITY
+    rate_noise = noise.rate if sees_rate else _BLIND_RATE_DENSITY
+    for i in range(3):
+        x[16 + i] *= decay
+        P[VELOCITY + i, VELOCITY + i] += force_noise * dt
+        P[ATTITUDE + i, ATTITUDE + i] += rate_noise * dt
+        P[GYRO_BIAS + i, GYRO_BIAS + i] += noise.gyro_bias * dt
+        P[ACCEL_BIAS + i, ACCEL_BIAS + i] += noise.accel_bias * dt
+        P[GPS_DRIFT + i, GPS_DRIFT + i] += noise.gps_drift[i] * (1.0 - decay * decay)
+        P[HARD_IRON + i, HARD_IRON + i] += noise.hard_iron * dt
+    P[BARO_OFFSET, BARO_OFFSET] += noise.baro_offset * dt
+    _bound(P, POSITION, _MOST_POSITION)
+    _bound(P, VELOCITY, _MOST_VELOCITY)
+    _bound(P, ATTITUDE, _MOST_ATTITUDE)
+
+
+@compiled
+def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravity: float, now: Array) -> None:
+    """Write the state that `count` samples after the filter's lead to, and how well it is known.
+
+    Args:
+        x: Nominal state of the filter, (23,).
+        P: Its covariance.
+        samples: A ring of samples, (n, 9).
+        first: The one that follows the filter's state.
+        count: How many.
+        gravity: m/s².
+        now: Position, velocity, attitude (10,); standard deviations of position, of velocity (ENU), and of attitude
+            about east, north and up, rad (9,).
+    """
+    ahead = x.copy()
+    delay, row = 0.0, first
+    for _ in range(count):
+        delay += samples[row, INTERVAL]
+        strap_down(ahead, samples, row, gravity)
+        row += 1
+        if row == len(samples):
+            row = 0
+    now[:10] = ahead[:10]
+    R = _matrix((x[6], x[7], x[8], x[9]))
+    for i in range(3):
+        p, v = POSITION + i, VELOCITY + i
+        now[10 + i] = sqrt(P[p, p] + delay * (2.0 * P[p, v] + delay * P[v, v]))
+        now[13 + i] = sqrt(P[v, v])
+        variance = 0.0
+        for j in range(3):
+            for k in range(3):
+                variance += R[3 * i + j] * P[ATTITUDE + j, ATTITUDE + k] * R[3 * i + k]
+        now[16 + i] = sqrt(variance)
+
+
+@compiled
+def _carry(P: Array, push: Array, lever: Array, back: Array, half_s: float, decay: float, dt: float) -> None:
+    """Multiply P by the transition matrix from the left: half of the turn, the push, the other half."""
+    for column in range(ERRORS):
+        g0, g1, g2 = half_s * P[9, column], half_s * P[10, column], half_s * P[11, column]
+        t0, t1, t2 = P[6, column], P[7, column], P[8, column]
+        a0 = back[0, 0] * t0 + back[0, 1] * t1 + back[0, 2] * t2 - g0
+        a1 = back[1, 0] * t0 + back[1, 1] * t1 + back[1, 2] * t2 - g1
+        a2 = back[2, 0] * t0 + back[2, 1] * t1 + back[2, 2] * t2 - g2
+        b0, b1, b2 = P[12, column], P[13, column], P[14, column]
+        for i in range(3):
+            v = P[3 + i, column]
+            after = v + (push[i, 0] * a0 + push[i, 1] * a1 + push[i, 2] * a2)
+            after -= lever[i, 0] * b0 + lever[i, 1] * b1 + lever[i, 2] * b2
+            P[i, column] += 0.5 * dt * (v + after)
+            P[3 + i, column] = after
+            P[15 + i, column] *= decay
+        a0, a1, a2 = a0 - g0, a1 - g1, a2 - g2
+        P[6, column] = back[0, 0] * a0 + back[0, 1] * a1 + back[0, 2] * a2
+        P[7, column] = back[1, 0] * a0 + back[1, 1] * a1 + back[1, 2] * a2
+        P[8, column] = back[2, 0] * a0 + back[2, 1] * a1 + back[2, 2] * a2
+
+
+@compiled
+def _bound(P: Array, part: int, most: float) -> None:
+    for i in range(part, part + 3):
+        if P[i, i] > most:
+            P[i, :] = 0.0
+            P[:, i] = 0.0
+            P[i, i] = most
+
+
+@compiled
+def _turned(q: Four, x: float, y: float, z: float) -> Four:
+    """Return the quaternion turned by a rotation vector in the body frame, rad: q ⊗ Exp."""
+    square = 0.25 * (x * x + y * y + z * z)
+    if square < _SMALL_TURN * _SMALL_TURN:
+        c = 1.0 - square * (0.5 - square / 24.0)
+        s = 0.5 * (1.0 - square * (1.0 / 6.0 - square / 120.0))
+    else:
+        half = sqrt(square)
+        c, s = cos(half), 0.5 * sin(half) / half
+    x, y, z = s * x, s * y, s * z
+    w, i, j, k = q
+    return (
+        w * c - i * x - j * y - k * z,
+        w * x + i * c + j * z - k * y,
+        w * y - i * z + j * c + k * x,
+        w * z + i * y - j * x + k * c,
+    )
+
+
+@compiled
+def _matrix(q: Four) -> Nine:
+    w, x, y, z = q
+    return (
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - w * z),
+        2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y),
+        2.0 * (y * z + w * x),
+        1.0 - 2.0 * (x * x + y * y),
+    )

@@ -1,0 +1,399 @@
+"""The estimator: sensor frames in, the vehicle's state now out, with what it is worth.
+
+GPS tells of the past. The filter therefore runs the delay of GPS behind: inertial samples, magnetic field and pressure
+wait in a ring until it comes to them, and each fix is fused at the instant that it was measured, so that the update is
+the exact one of a Kalman filter and its covariance is honest. The state now is the filter's, carried on through the
+samples that wait: with the inertial sensors alone, over a tenth of a second, nothing is lost by that. PX4's EKF2 runs
+so too, with an observer in place of the second integration, which is exact and costs a few microseconds.
+"""
+
+from collections import deque
+from math import ceil, isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.estimation.accelerometer_bias import AccelerometerWatch
+from colibri.autopilot.estimation.eskf import Filter, FilterRecord
+from colibri.autopilot.estimation.eskf_predict import SAMPLE, look_ahead
+from colibri.autopilot.estimation.estimate import Check, Estimate, Health
+from colibri.autopilot.estimation.gyroscope_bias import turned_since
+from colibri.autopilot.estimation.output_smoothing import Blending
+from colibri.autopilot.estimation.sensing.alignment import Aligned, Alignment
+from colibri.autopilot.estimation.sensing.clock_resets import LONGEST_GAP_US, Strays
+from colibri.autopilot.estimation.sensing.free_fall import Caught, Falling
+from colibri.autopilot.estimation.sensing.inertial import Inertial, Reading, sample_between
+from colibri.autopilot.estimation.sensing.plausibility import GpsWatch, Watch
+from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
+from colibri.common.earth.atmosphere import altitude_m
+from colibri.common.earth.geodesy import Geodetic, enu_of
+from colibri.common.earth.magnetic_field import field_enu_gauss
+from colibri.common.serialization import of_bytes, to_bytes
+from colibri.common.types import Array, Vector
+from colibri.mavlink.hil.sensors import GpsFix, SensorFrame, Updated
+from colibri.mavlink.hil.state import StateFrame
+from colibri.plant.vehicle.sensors import Sensors
+
+_FIELD, _PRESSURE = Updated.MAGNETOMETER, Updated.BAROMETER
+"""Plain numbers: flags of an enumeration cost a microsecond."""
+_LARGEST_GAUSS = 4.0
+_LEAST_PA, _MOST_PA = 20e3, 115e3
+_PATIENCE_US = 500_000
+_BRIDGED_S = 0.1
+"""A longer gap between two frames is crossed without what was measured at its ends."""
+_SPARE_SAMPLES = 8
+_LATE_US = 1_000_000
+"""Since when nothing was believed that comes several times a second: its source is lost."""
+_LEARNING_US = 5_000_000
+"""How long a bias taken anew is doubted."""
+_OLDEST_FIX_S = 0.5
+"""How far from the filter's time a fix may have been measured."""
+_KNOWN_TILT_RAD, _KNOWN_YAW_RAD = 0.17, 0.26
+_KNOWN_M_S = 1.0
+_KNOWN_M = 5.0
+_FASTEST_M_S = 500.0
+_TYPICAL_PA = 95e3
+_CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000
+"""Between two fixes: a frame with one has enough to do."""
+_UPPER = np.triu_indices(9)
+_NOTHING = Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
+
+
+class _Waiting(NamedTuple):
+    """What was measured at the end of a sample that the filter has not come to."""
+
+    time_us: int
+    field: Vector | None
+    pressure_pa: float | None
+
+
+class EstimatorRecord(NamedTuple):
+    """What an estimator needs to go on after a restart, as plain data.
+
+    Attributes:
+        time_us: Of the last frame.
+        filter_us: The filter's time.
+        filter: The filter.
+        samples: The ring, whose first sample that waits is row `first`.
+        waiting: What was measured at the ends of the samples that wait.
+        reading: Of the last frame.
+        fix_us: Time of the last fix that was taken; None before the first.
+        position_m, velocity_m_s: What is still to be given in of the last corrections.
+    """
+
+    time_us: int
+    filter_us: int
+    filter: FilterRecord
+    samples: Array
+    first: int
+    waiting: list[_Waiting]
+    reading: Reading
+    fix_us: int | None
+    position_m: Vector
+    velocity_m_s: Vector
+
+
+class Estimator:
+    """Estimates the state of one vehicle.
+
+    Attributes:
+        filter: The filter, as far behind as GPS is.
+        filter_us: Its time, µs.
+        caught: Whether it began with a vehicle that fell, not with one that rested.
+    """
+
+    def __init__(self, sensors: Sensors, gravity_m_s2: float, origin: Geodetic, interval_us: int) -> None:
+        """Estimate from frames that come every `interval_us`, in ENU from `origin`.
+
+        What is compiled is loaded here, not in the first step.
+        """
+        self._sensors, self._gravity, self._origin = sensors, gravity_m_s2, origin
+        self._interval_us = interval_us
+        self._field = field_enu_gauss(origin)
+        self._delay_us = round(sensors.gps.delay_s * 1e6)
+        self._samples = np.zeros((ceil(self._delay_us / interval_us) + _SPARE_SAMPLES, SAMPLE))
+        self._now = np.zeros(19)
+        self._rejected = Rejected()
+        self._time_us: int | None = None
+        self._reading = _NOTHING
+        self._restart()
+        self._warm_up()
+        self._rejected = Rejected()
+        self._restart()
+
+    def step(self, frame: SensorFrame, *, asked: bool = True) -> Estimate | None:
+        """Take a frame; return the estimate at its time, or None as long as the vehicle has not rested with a fix.
+
+        Unless `asked`, the estimate before is returned again, which takes half of the time.
+
+        A frame whose time does not follow is rejected: the last estimate is given again. When such frames go on, the
+        simulator has begun anew, and so does the estimator.
+        """
+        last_us = self._time_us
+        if last_us is not None and not 0 < frame.time_us - last_us <= LONGEST_GAP_US:
+            self._rejected.add(Source.CLOCK, Reason.TIME)
+            if not self._strays.settle(frame.time_us):
+                return self._estimate
+            self._restart()
+            last_us = None
+        self._strays.clear()
+        self._time_us = frame.time_us
+        before, self._reading = self._reading, self._inertial.read(frame)
+        field, pressure_pa, fix = self._field_of(frame), self._pressure_of(frame), self._fix_of(frame)
+        if self._estimate is None or last_us is None:
+            height = None if pressure_pa is None else altitude_m(pressure_pa)
+            aligned = self._alignment.feed(frame.time_us, self._reading, field, height, fix)
+            caught = self._falling.feed(frame.time_us, self._reading, field, height, fix)
+            if aligned is not None:
+                self._start(aligned, frame.time_us)
+            elif caught is not None:
+                self._start_in_air(caught, frame.time_us)
+            else:
+                return None
+        else:
+            self._wait(before, (frame.time_us - last_us) * 1e-6, _Waiting(frame.time_us, field, pressure_pa))
+            self._catch_up(frame.time_us)
+            if fix is not None:
+                self._fuse(fix, frame.time_us)
+        if not asked and self._estimate is not None:
+            return self._estimate
+        return self._publish(frame.time_us)
+
+    def record(self) -> bytes:
+        """Return what is needed to go on after a restart; empty before the first estimate."""
+        if self._estimate is None or self._time_us is None:
+            return b""
+        return to_bytes(
+            EstimatorRecord(
+                self._time_us,
+                self.filter_us,
+                self.filter.record(),
+                self._samples,
+                self._first,
+                list(self._waiting),
+                self._reading,
+                self._gps_watch.time_us,
+                self._blending.position_m,
+                self._blending.velocity_m_s,
+            )
+        )
+
+    def resume(self, record: bytes, time_us: int) -> bool:
+        """Go on from a record, the next frame being of `time_us`; return whether that can be.
+
+        A frame that came before, and whose answer was lost with the process, comes again.
+        """
+        kept = of_bytes(EstimatorRecord, record)
+        if (
+            kept is None
+            or not 0 <= time_us - kept.time_us <= LONGEST_GAP_US
+            or kept.samples.shape != self._samples.shape
+        ):
+            return False
+        if not self.filter.resume(kept.filter):
+            return False
+        self._samples[:], self._first = kept.samples, kept.first
+        self._waiting.clear()
+        self._waiting.extend(kept.waiting)
+        self.filter_us, self._reading, self._gps_watch.time_us = kept.filter_us, kept.reading, kept.fix_us
+        self._blending.position_m, self._blending.velocity_m_s = kept.position_m, kept.velocity_m_s
+        self._time_us = self._published_us = kept.time_us
+        if self._publish(kept.time_us) is None:
+            return False
+        if time_us == kept.time_us and self._waiting:
+            self._waiting.pop()
+            self._time_us -= self._interval_us
+        return True
+
+    def _restart(self) -> None:
+        """Forget everything but what was counted."""
+        sensors = self._sensors
+        self._inertial = Inertial(sensors, self._rejected)
+        self._field_watch = Watch(-_LARGEST_GAUSS, _LARGEST_GAUSS, _PATIENCE_US)
+        self._pressure_watch = Watch(_LEAST_PA, _MOST_PA, _PATIENCE_US)
+        self._gps_watch = GpsWatch()
+        self._falling = Falling(self._gravity, self._field, sensors.gps.delay_s)
+        self.caught = False
+        self._alignment = Alignment(sensors, self._gravity, self._field, self._interval_us * 1e-6)
+        self.filter = Filter(sensors, self._gravity, self._field)
+        self._accelerometer_watch = AccelerometerWatch(sensors, self._gravity)
+        self._blending = Blending()
+        self._strays = Strays()
+        self._waiting: deque[_Waiting] = deque()
+        self._first = 0
+        self.filter_us = 0
+        self._reading = _NOTHING
+        self._time_us = None
+        self._published_us = 0
+        self._estimate: Estimate | None = None
+
+    def _field_of(self, frame: SensorFrame) -> Vector | None:
+        if frame.updated & _FIELD != _FIELD:
+            return None
+        reason = self._field_watch.reason(frame.magnetic_field_flu_gauss, frame.time_us)
+        if reason is not None:
+            self._rejected.add(Source.MAGNETOMETER, reason)
+            return None
+        return frame.magnetic_field_flu_gauss if self._field_watch.is_new else None
+
+    def _pressure_of(self, frame: SensorFrame) -> float | None:
+        if frame.updated & _PRESSURE != _PRESSURE:
+            return None
+        reason = self._pressure_watch.reason((frame.pressure_pa,), frame.time_us)
+        if reason is not None:
+            self._rejected.add(Source.BAROMETER, reason)
+            return None
+        return frame.pressure_pa if self._pressure_watch.is_new else None
+
+    def _fix_of(self, frame: SensorFrame) -> GpsFix | None:
+        if frame.gps is None:
+            return None
+        reason = self._gps_watch.reason(frame.gps, frame.time_us)
+        if reason is not None:
+            self._rejected.add(Source.GPS, reason)
+            return None
+        return frame.gps
+
+    def _start(self, aligned: Aligned, time_us: int) -> None:
+        self._published_us = time_us
+        self.filter.start(aligned, enu_of(aligned.fix.place, self._origin), time_us)
+        self.filter_us = time_us
+
+    def _start_in_air(self, caught: Caught, time_us: int) -> None:
+        self.caught = True
+        self._published_us = time_us
+        (e, n, u), (de, dn, du) = enu_of(caught.fix.place, self._origin), caught.moved_m
+        self.filter.start_in_air(caught, (e + de, n + dn, u + du), time_us)
+        self.filter_us = time_us
+
+    def _wait(self, before: Reading, interval_s: float, measured: _Waiting) -> None:
+        """Put a sample into the ring, and what was measured at its end beside it."""
+        if interval_s > _BRIDGED_S:
+            before = before._replace(force_good=False, rate_good=False)
+        if len(self._waiting) == len(self._samples):
+            self._take()
+        last = (self._first + len(self._waiting)) % len(self._samples)
+        self._samples[last] = sample_between(before, self._reading, interval_s)
+        self._waiting.append(measured)
+
+    def _catch_up(self, now_us: int) -> None:
+        """Bring the filter to the instant that a fix told now would be of."""
+        while self._waiting and now_us - self._waiting[0].time_us >= self._delay_us:
+            self._take()
+
+    def _take(self) -> None:
+        """Bring the filter on by one sample."""
+        time_us, field, pressure_pa = self._waiting.popleft()
+        self.filter.predict(self._samples, self._first)
+        self._first = (self._first + 1) % len(self._samples)
+        self.filter_us = time_us
+        if field is not None and (reason := self.filter.fuse_field(field, time_us)) is not None:
+            self._rejected.add(Source.MAGNETOMETER, reason)
+        if pressure_pa is not None and (reason := self.filter.fuse_pressure(pressure_pa, time_us)) is not None:
+            self._rejected.add(Source.BAROMETER, reason)
+
+    def _fuse(self, fix: GpsFix, now_us: int) -> None:
+        after_s = (fix.time_us - self._delay_us - self.filter_us) * 1e-6
+        if abs(after_s) > _OLDEST_FIX_S:
+            self._rejected.add(Source.GPS, Reason.TIME)
+            return
+        before = self.filter.x[:10].tolist()
+        reason = self.filter.fuse_fix(fix, enu_of(fix.place, self._origin), after_s, now_us)
+        if reason is not None:
+            self._rejected.add(Source.GPS, reason)
+        self._blending.absorb(before[:6], self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
+        found = self._accelerometer_watch.look(fix.time_us, before, self.filter)
+        if found is not None:
+            self.filter.take_accel_bias_anew(*found, now_us)
+        turned = turned_since(self.filter, now_us)
+        if turned is not None:
+            self.filter.take_gyro_bias_anew(*turned, now_us)
+
+    def _publish(self, now_us: int) -> Estimate | None:
+        """Return the estimate now; None, and all anew, if it is of no vehicle."""
+        filter_ = self.filter
+        look_ahead(filter_.x, filter_.P, self._samples, self._first, len(self._waiting), self._gravity, self._now)
+        e, n, u, ve, vn, vu, qw, qx, qy, qz, *sigma = self._now.tolist()
+        if not isfinite(sum(sigma) + e + n + u + qw) or not abs(ve) + abs(vn) + abs(vu) < _FASTEST_M_S:
+            self._restart()
+            return None
+        (de, dn, du), (dve, dvn, dvu) = self._blending.position_m, self._blending.velocity_m_s
+        since_us = now_us - self._published_us
+        self._published_us = now_us
+        self._blending.give_in(since_us * 1e-6)
+        bx, by, bz, ax, ay, az = filter_.x[10:16].tolist()
+        p, q, r = self._reading.rate if self._reading.rate_good else (bx, by, bz)
+        position, velocity, attitude = sigma[:3], sigma[3:6], sigma[6:9]
+        self._estimate = Estimate(
+            StateFrame(
+                now_us,
+                (e + de, n + dn, u + du),
+                (ve + dve, vn + dvn, vu + dvu),
+                (qw, qx, qy, qz),
+                (p - bx, q - by, r - bz),
+            ),
+            (position[0], position[1], position[2]),
+            (velocity[0], velocity[1], velocity[2]),
+            (attitude[0], attitude[1], attitude[2]),
+            (bx, by, bz),
+            (ax, ay, az),
+            self._health(now_us, sigma),
+            filter_.tests,
+            self._rejected.counts,
+            filter_.resets,
+            (-de, -dn, -du),
+            self._check(now_us, since_us),
+        )
+        return self._estimate
+
+    def _check(self, now_us: int, since_us: int) -> Check | None:
+        at_us = now_us - _CHECK_AT_US
+        if at_us // _CHECK_EVERY_US == (at_us - since_us) // _CHECK_EVERY_US:
+            return None
+        upper = self.filter.P[:9, :9][_UPPER]
+        kinds = self.filter.kinds
+        return Check(
+            self.filter_us,
+            tuple(self.filter.x[:10].tolist()),
+            tuple(upper.tolist()),
+            tuple(kind.nis for kind in kinds),
+            tuple(kind.believed for kind in kinds),
+        )
+
+    def _health(self, now_us: int, sigma: list[float]) -> Health:
+        filter_, reading = self.filter, self._reading
+        position_us, velocity_us = filter_.position.accepted_us, filter_.velocity.accepted_us
+        believed_us = min(position_us, velocity_us)
+        lost = now_us - believed_us > _LATE_US
+        filter_age_us = now_us - self.filter_us
+        field_good = now_us - filter_.field.accepted_us <= _LATE_US + filter_age_us
+        pressure_good = now_us - filter_.pressure.accepted_us <= _LATE_US + filter_age_us
+        return Health(
+            reading.rate_good and sigma[6] <= _KNOWN_TILT_RAD and sigma[7] <= _KNOWN_TILT_RAD,
+            sigma[8] <= _KNOWN_YAW_RAD,
+            sigma[3] <= _KNOWN_M_S and sigma[4] <= _KNOWN_M_S,
+            sigma[5] <= _KNOWN_M_S,
+            sigma[0] <= _KNOWN_M and sigma[1] <= _KNOWN_M,
+            sigma[2] <= _KNOWN_M,
+            now_us - max(position_us, velocity_us) > _LATE_US,
+            believed_us if lost else None,
+            filter_.position.rejected_us is not None or filter_.velocity.rejected_us is not None,
+            reading.force_good,
+            reading.rate_good,
+            field_good,
+            pressure_good,
+            filter_.accel_bias_us is None or now_us - filter_.accel_bias_us > _LEARNING_US,
+            filter_.gyro_bias_us is None or now_us - filter_.gyro_bias_us > _LEARNING_US,
+        )
+
+    def _warm_up(self) -> None:
+        """Load what is compiled, on a vehicle that rests at the origin."""
+        fix = GpsFix(0, 3, self._origin, (0.0, 0.0, 0.0), 1.0, 1.0, 10)
+        force = (0.0, 0.0, self._gravity)
+        aligned = Aligned(1.0, force, (0.0, 0.0, 0.0), self._field, 50, 0.0, 50, fix, (1.0, 0.0, 0.0, 0.0))
+        self.filter.start(aligned, (0.0, 0.0, 0.0), 0)
+        rest = Reading(force, (0.0, 0.0, 0.0), True, True)
+        self._wait(rest, self._interval_us * 1e-6, _Waiting(self._interval_us, self._field, _TYPICAL_PA))
+        self._take()
+        self._fuse(fix, self._interval_us)
+        self._publish(self._interval_us)

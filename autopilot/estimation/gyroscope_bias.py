@@ -1,0 +1,36 @@
+"""Notices that the gyroscope is suddenly off, when magnetic field and GPS velocity both contradict the attitude.
+
+A bias of the rate that is there from one instant on turns the filter's attitude away from the vehicle's. The magnetic
+field is rejected within a tenth of a second, GPS velocity after another second or two, since thrust then points
+elsewhere. Either alone proves nothing: iron turns a field, and a receiver may lie. Together they leave only what they
+have in common. The filter then doubts attitude and bias by as much as the field has turned since, and finds both by
+itself. PX4's EKF2 likewise takes its yaw anew where field and GPS velocity contradict it.
+"""
+
+from math import hypot
+from typing import NamedTuple
+
+from colibri.autopilot.estimation.eskf import Filter
+
+_REJECTED_US = 200_000
+"""Of GPS velocity, before it is a witness: three fixes at 10 Hz."""
+_MOST_TURNED_RAD = 0.3
+"""Beyond that the field is not believable either."""
+
+
+class Turned(NamedTuple):
+    """By what angle the field is off, rad, and for how long it has been, s."""
+
+    angle_rad: float
+    since_s: float
+
+
+def turned_since(filter_: Filter, now_us: int) -> Turned | None:
+    """Look at a filter after it has tested a fix; return what a gyroscope that is off has done, if it has."""
+    velocity, field = filter_.velocity, filter_.field
+    if velocity.rejected_us is None or now_us - velocity.rejected_us < _REJECTED_US:
+        return None
+    if field.rejected_us is None or field.test.time_us <= field.rejected_us:
+        return None
+    angle_rad = hypot(*field.test.innovation) / filter_.field_gauss
+    return Turned(angle_rad, (field.test.time_us - field.rejected_us) * 1e-6) if angle_rad <= _MOST_TURNED_RAD else None

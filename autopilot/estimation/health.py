@@ -1,0 +1,89 @@
+"""What the estimator's health means to people: lines when it changes, and reasons not to arm."""
+
+from collections.abc import Callable
+from math import hypot
+from typing import NamedTuple
+
+from colibri.autopilot.estimation.estimate import Estimate, Health
+from colibri.mavlink.services.statustext import INFO, WARNING
+from colibri.mavlink.telemetry.snapshot import EstimatorState
+from colibri.mavlink.wire.dialect import mav
+
+
+class _Matter(NamedTuple):
+    """Something that may be well or not.
+
+    Attributes:
+        well: Whether it is.
+        ceased: The line when it ceases to be.
+        again: The line when it is again.
+    """
+
+    well: Callable[[Health], bool]
+    ceased: str
+    again: str
+
+
+_MATTERS = (
+    _Matter(lambda health: health.accelerometer, "accelerometer failed", "accelerometer is back"),
+    _Matter(lambda health: health.accel_bias, "accelerometer off: bias learned anew", "accelerometer believed again"),
+    _Matter(lambda health: health.gyroscope, "gyroscope failed", "gyroscope is back"),
+    _Matter(lambda health: health.gyro_bias, "gyroscope off: bias learned anew", "gyroscope believed again"),
+    _Matter(lambda health: health.magnetometer, "magnetometer not believed", "magnetometer believed again"),
+    _Matter(lambda health: health.barometer, "barometer not believed", "barometer believed again"),
+)
+
+_UNKNOWN: tuple[tuple[Callable[[Health], bool], str], ...] = (
+    (lambda health: health.attitude, "attitude not known"),
+    (lambda health: health.heading, "heading not known"),
+    (lambda health: health.horizontal_velocity and health.vertical_velocity, "velocity not known"),
+    (lambda health: health.horizontal_position and not health.dead_reckoning, "position not known"),
+    (lambda health: health.height, "height not known"),
+)
+
+_SENSORS: tuple[tuple[Callable[[Health], bool], int], ...] = (
+    (lambda health: health.gyroscope, mav.MAV_SYS_STATUS_SENSOR_3D_GYRO),
+    (lambda health: health.accelerometer, mav.MAV_SYS_STATUS_SENSOR_3D_ACCEL),
+    (lambda health: health.magnetometer, mav.MAV_SYS_STATUS_SENSOR_3D_MAG),
+    (lambda health: health.barometer, mav.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE),
+    (lambda health: health.gps_lost_since_us is None, mav.MAV_SYS_STATUS_SENSOR_GPS),
+)
+
+
+class HealthWatch:
+    """Notices what has ceased to be well, and what is well again."""
+
+    def __init__(self) -> None:
+        """Begin with everything well."""
+        self._ill: frozenset[int] = frozenset()
+
+    def lines(self, health: Health) -> list[tuple[int, str]]:
+        """Return severity and text of what has changed."""
+        ill = frozenset(number for number, matter in enumerate(_MATTERS) if not matter.well(health))
+        if ill == self._ill:
+            return []
+        before, self._ill = self._ill, ill
+        ceased = [(WARNING, _MATTERS[number].ceased) for number in sorted(ill - before)]
+        return ceased + [(INFO, _MATTERS[number].again) for number in sorted(before - ill)]
+
+
+def not_known(health: Health) -> str:
+    """Return what a vehicle that is to fly must know and does not; empty if there is nothing."""
+    return ", ".join(reason for known, reason in _UNKNOWN if not known(health))
+
+
+def told(estimate: Estimate) -> EstimatorState:
+    """Return an estimate's worth as telemetry tells it."""
+    tests, health = estimate.tests, estimate.health
+    east, north, up = estimate.position_std_m
+    failed = sum(bit for well, bit in _SENSORS if not well(health))
+    return EstimatorState(
+        flags=int(health.flags),
+        velocity_ratio=tests.velocity.ratio,
+        position_ratio=tests.position.ratio,
+        height_ratio=max(tests.height.ratio, tests.pressure.ratio),
+        field_ratio=tests.field.ratio,
+        horizontal_accuracy_m=hypot(east, north),
+        vertical_accuracy_m=up,
+        failed_sensors=failed,
+    )

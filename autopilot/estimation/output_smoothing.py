@@ -1,0 +1,73 @@
+"""Smooths what is published: the filter's estimate jumps with every fix, the vehicle must not.
+
+Each correction of the position is taken back from what is published, and given in with a time constant: a control loop
+that follows each of them is shaken by them, as PX4's is spared by the time constants of its output predictor. Where GPS
+comes back and corrects by metres, it is given in at a speed that the vehicle follows without haste. Of velocity only
+what exceeds the usual is kept back: there the controller must know at once.
+"""
+
+from math import sqrt
+
+from colibri.common.kernels import exp
+from colibri.common.types import Vector
+
+_TIME_CONSTANT_S = 1.0
+_USUAL_M_S = 0.05
+_GIVEN_IN_M_S, _GIVEN_IN_M_S2 = 0.5, 1.0
+_SMALLEST_M = 1e-6
+_NONE: Vector = (0.0, 0.0, 0.0)
+
+
+class Blending:
+    """What is still to be given in.
+
+    Attributes:
+        position_m: To be added to the filter's position, ENU.
+        velocity_m_s: To be added to its velocity, ENU.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self.position_m = _NONE
+        self.velocity_m_s = _NONE
+
+    def absorb(self, before: list[float], after: list[float], delay_s: float) -> None:
+        """Take a correction of position and velocity (6,), made `delay_s` ago."""
+        (x, y, z, vx, vy, vz), (x1, y1, z1, vx1, vy1, vz1) = before, after
+        dvx, dvy, dvz = vx1 - vx, vy1 - vy, vz1 - vz
+        moved = (x1 - x + delay_s * dvx, y1 - y + delay_s * dvy, z1 - z + delay_s * dvz)
+        self.position_m = _less(self.position_m, moved)
+        self.velocity_m_s = _less(self.velocity_m_s, _beyond((dvx, dvy, dvz), _USUAL_M_S))
+
+    def give_in(self, interval_s: float) -> None:
+        """Let time pass."""
+        if self.position_m is not _NONE:
+            self.position_m = _faded(self.position_m, interval_s)
+        if self.velocity_m_s is not _NONE:
+            self.velocity_m_s = _beyond(self.velocity_m_s, _GIVEN_IN_M_S2 * interval_s)
+
+
+def _faded(vector: Vector, interval_s: float) -> Vector:
+    """Return what is left of a vector after an interval: less by its time constant, but never faster than allowed."""
+    x, y, z = vector
+    norm = sqrt(x * x + y * y + z * z)
+    if norm <= _SMALLEST_M:
+        return _NONE
+    left = max(exp(-interval_s / _TIME_CONSTANT_S), 1.0 - _GIVEN_IN_M_S * interval_s / norm)
+    return (left * x, left * y, left * z)
+
+
+def _beyond(vector: Vector, length: float) -> Vector:
+    """Return the part of a vector that is beyond a length."""
+    x, y, z = vector
+    norm = sqrt(x * x + y * y + z * z)
+    if norm <= length:
+        return _NONE
+    part = 1.0 - length / norm
+    return (part * x, part * y, part * z)
+
+
+def _less(vector: Vector, part: Vector) -> Vector:
+    if part is _NONE:
+        return vector
+    return (vector[0] - part[0], vector[1] - part[1], vector[2] - part[2])

@@ -1,0 +1,93 @@
+"""Accelerometer and gyroscope: frames in, samples for the filter out, whatever the sensors do."""
+
+from math import inf
+from typing import NamedTuple
+
+from colibri.autopilot.estimation.sensing.plausibility import Watch
+from colibri.autopilot.estimation.sensing.rejection import Rejected, Source
+from colibri.common.types import Vector
+from colibri.mavlink.hil.sensors import SensorFrame, Updated
+from colibri.plant.vehicle.sensors import Sensors
+
+Sample = tuple[float, ...]
+"""`eskf_predict.SAMPLE`: interval, mean specific force, mean rate, and whether either is unknown."""
+
+_BEYOND_RANGE = 1.01
+"""The bits of the wire and of a converter may lie a little above the range."""
+_PATIENCE_US = 100_000
+_BRIDGED_US = 20_000
+"""How long the last good value stands for those that are missing."""
+
+
+class _Axes:
+    """One of the two, watched."""
+
+    def __init__(self, source: Source, group: int, largest: float, noise: float, rejected: Rejected) -> None:
+        self._source, self._group, self._rejected = source, int(group), rejected
+        self._watch = Watch(-largest, largest, _PATIENCE_US if noise > 0.0 else inf)
+        self._time_us: int | None = None
+        self.value: Vector = (0.0, 0.0, 0.0)
+
+    def read(self, frame: SensorFrame, value: Vector) -> bool:
+        """Read a value; return whether the one that is held can be used at this frame."""
+        if frame.updated & self._group == self._group:
+            reason = self._watch.reason(value, frame.time_us)
+            if reason is None:
+                self.value, self._time_us = value, frame.time_us
+                return True
+            self._rejected.add(self._source, reason)
+        return self._time_us is not None and frame.time_us - self._time_us <= _BRIDGED_US
+
+
+class Reading(NamedTuple):
+    """What accelerometer and gyroscope say at one frame: m/s² and rad/s, FLU, and whether either can be used."""
+
+    force: Vector
+    rate: Vector
+    force_good: bool
+    rate_good: bool
+
+
+class Inertial:
+    """Reads frames."""
+
+    def __init__(self, sensors: Sensors, rejected: Rejected) -> None:
+        """Read accelerometer and gyroscope of `sensors`, and count what is rejected."""
+        accel, gyro = sensors.accelerometer, sensors.gyroscope
+        self._force = _Axes(
+            Source.ACCELEROMETER,
+            Updated.ACCELEROMETER,
+            accel.range_m_s2 * _BEYOND_RANGE,
+            accel.noise_density_m_s2_rthz,
+            rejected,
+        )
+        self._rate = _Axes(
+            Source.GYROSCOPE,
+            Updated.GYROSCOPE,
+            gyro.range_rad_s * _BEYOND_RANGE,
+            gyro.noise_density_rad_s_rthz,
+            rejected,
+        )
+
+    def read(self, frame: SensorFrame) -> Reading:
+        """Read one frame."""
+        force_good = self._force.read(frame, frame.specific_force_flu_m_s2)
+        rate_good = self._rate.read(frame, frame.rate_flu_rad_s)
+        return Reading(self._force.value, self._rate.value, force_good, rate_good)
+
+
+def sample_between(before: Reading, now: Reading, interval_s: float) -> Sample:
+    """Return the sample from one frame to the next, by the trapezoidal rule."""
+    (ax, ay, az), (bx, by, bz) = before.force, now.force
+    (ap, aq, ar), (bp, bq, br) = before.rate, now.rate
+    return (
+        interval_s,
+        0.5 * (ax + bx),
+        0.5 * (ay + by),
+        0.5 * (az + bz),
+        0.5 * (ap + bp),
+        0.5 * (aq + bq),
+        0.5 * (ar + br),
+        0.0 if before.force_good and now.force_good else 1.0,
+        0.0 if before.rate_good and now.rate_good else 1.0,
+    )

@@ -1,0 +1,51 @@
+"""Which measurement was rejected, and why."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from types import MappingProxyType
+
+
+class Source(StrEnum):
+    """Where a value came from that was rejected."""
+
+    CLOCK = "clock"
+    ACCELEROMETER = "accelerometer"
+    GYROSCOPE = "gyroscope"
+    MAGNETOMETER = "magnetometer"
+    BAROMETER = "barometer"
+    GPS = "gps"
+
+
+class Reason(StrEnum):
+    """Why a value was rejected."""
+
+    NOT_FINITE = "not finite"
+    RANGE = "out of range"
+    FROZEN = "frozen"
+    TIME = "time"
+    NO_FIX = "no fix"
+    FIELD = "not the field of the earth"
+    INNOVATION = "innovation"
+
+
+Rejections = Mapping[tuple[Source, Reason], int]
+
+
+class Rejected:
+    """Counts what was rejected."""
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self._counts: dict[tuple[Source, Reason], int] = {}
+        self._published: Rejections = MappingProxyType({})
+
+    def add(self, source: Source, reason: Reason) -> None:
+        """Count one value."""
+        key = (source, reason)
+        self._counts[key] = self._counts.get(key, 0) + 1
+        self._published = MappingProxyType(dict(self._counts))
+
+    @property
+    def counts(self) -> Rejections:
+        """How many values were rejected, by sensor and reason; what is given out does not change any more."""
+        return self._published

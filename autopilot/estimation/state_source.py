@@ -1,0 +1,124 @@
+"""What the autopilot knows of its vehicle: the state that it is told, or the one that it estimates from sensors."""
+
+from collections.abc import Callable
+from typing import Protocol, TypeAlias
+
+from colibri.autopilot.estimation.estimate import Estimate
+from colibri.common.earth.geodesy import Geodetic
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.sensors import FixType, Frame, GpsFix, SensorFrame
+from colibri.mavlink.hil.state import StateFrame
+from colibri.plant.vehicle.description import Vehicle, VehicleError
+
+
+class Estimating(Protocol):
+    """An estimator of one flight.
+
+    Attributes:
+        caught: Whether it began with a vehicle that fell, not with one that rested.
+    """
+
+    caught: bool
+
+    def step(self, frame: SensorFrame, /, *, asked: bool) -> Estimate | None:
+        """Take in the next frame; return None until the first estimate. Unless `asked`, an older one will do."""
+
+    def record(self) -> bytes:
+        """Return what is needed to go on after a restart; empty before the first estimate."""
+        ...
+
+    def resume(self, record: bytes, time_us: int, /) -> bool:
+        """Go on from a record, the next frame being of `time_us`; return whether that can be."""
+        ...
+
+
+Estimator: TypeAlias = Callable[[int], Estimating]
+"""Makes an estimator for frames that are so many µs apart."""
+
+
+def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> Estimator | None:
+    """Return what estimates the state of `vehicle`, whose ENU frame begins at `origin`; None where it is told.
+
+    Raises:
+        VehicleError: Sensors are asked for that the vehicle has not.
+    """
+    if feedback is Feedback.STATE:
+        return None
+    sensors = vehicle.sensors
+    if sensors is None:
+        raise VehicleError(f"{vehicle.name} has no sensors: fly a vehicle with a table sensors, or --feedback state")
+    from colibri.autopilot.estimation import estimator  # only where there is something to estimate
+
+    gravity_m_s2 = vehicle.gravity_m_s2
+    return lambda interval_us: estimator.Estimator(sensors, gravity_m_s2, origin, interval_us)
+
+
+_LATE_US = 1_000_000
+_NO_FIX_AFTER_US = 500_000
+"""Receivers of a few hertz are sometimes late, too."""
+
+
+class Senses:
+    """Turns any frame into a state.
+
+    Attributes:
+        estimate: The last one; None before the first, and where the state is told.
+        sensed: What was measured on board last.
+        fix: The last of GPS.
+    """
+
+    def __init__(self, estimator: Estimator | None, interval_us: int) -> None:
+        """Estimate by `estimator` from frames `interval_us` apart; without one there are no frames of sensors.
+
+        What is compiled is loaded here, not at the first frame.
+        """
+        self._interval_us = interval_us
+        self._make = estimator
+        self._estimating = None if estimator is None else estimator(interval_us)
+        self._time_us: int | None = None
+        self.estimate: Estimate | None = None
+        self.sensed: SensorFrame | None = None
+        self.fix: GpsFix | None = None
+        self._fix_us = 0
+
+    @property
+    def rests(self) -> bool:
+        """Whether the estimate began with a vehicle that rested."""
+        return self.estimate is not None and self._estimating is not None and not self._estimating.caught
+
+    def record(self) -> bytes:
+        """Return what the estimator needs to go on after a restart; empty where there is nothing to go on with."""
+        return b"" if self._estimating is None else self._estimating.record()
+
+    def resume(self, record: bytes, time_us: int) -> bool:
+        """Have the estimator go on from a record, the next frame being of `time_us`; return whether it does."""
+        return self._estimating is not None and self._estimating.resume(record, time_us)
+
+    def state(self, frame: Frame, *, asked: bool = True) -> StateFrame | None:
+        """Return the state at a frame, or unless `asked` an older one; None until there is an estimate.
+
+        Time that begins again is another flight, of which nothing is known. A frame that is a little late is the
+        estimator's to judge.
+        """
+        if isinstance(frame, StateFrame):
+            return frame
+        assert self._make is not None, "frames of sensors come to who asks for them"
+        if self._estimating is None or self._begins_again(frame):
+            self._estimating, self.estimate = self._make(self._interval_us), None
+        self._time_us = frame.time_us
+        self.sensed = frame
+        if frame.gps is not None:
+            self.fix, self._fix_us = frame.gps, frame.time_us
+        self.estimate = self._estimating.step(frame, asked=asked)
+        return None if self.estimate is None else self.estimate.frame
+
+    def has_gps(self, now_us: int) -> bool:
+        """Whether there is GPS; where the state is told there is what it would tell."""
+        if self._make is None:
+            return True
+        return self.fix is not None and self.fix.fix_type >= FixType.FIX_3D and now_us < self._fix_us + _NO_FIX_AFTER_US
+
+    def _begins_again(self, frame: SensorFrame) -> bool:
+        if self._time_us is None:
+            return False
+        return frame.time_us == 0 or frame.time_us < self._time_us - _LATE_US

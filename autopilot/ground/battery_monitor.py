@@ -1,0 +1,81 @@
+"""The battery as the ground station is told of it: followed from the rotor speeds that are commanded.
+
+Where the battery itself tells, and says something else, it is believed.
+"""
+
+from math import nan
+
+import numpy as np
+
+from colibri.autopilot.control.vehicle_model.battery import BatteryModel, believed
+from colibri.common.types import FourRotors
+from colibri.mavlink.hil.plant_status import PlantBattery
+from colibri.mavlink.telemetry.snapshot import BatteryState
+from colibri.plant.vehicle.description import Vehicle
+
+_CELL_V = 4.2
+_SECONDS_PER_HOUR = 3600.0
+_LEAST_CURRENT_A = 0.01
+_SAG = 0.03
+"""Voltages that differ by less than this part of the full one are the same: the model's rotors do not lag."""
+
+
+class PowerMeter:
+    """Counts what one vehicle's battery gives.
+
+    Attributes:
+        charge_ah: Taken so far.
+        energy_wh: The same as energy.
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        """Begin with a full battery."""
+        self._model = BatteryModel(vehicle)
+        self._battery = vehicle.battery
+        self.energy_wh = 0.0
+        self._now = self._model.terminal(0.0, np.zeros(4))
+        self._vehicle = vehicle
+        self._told = False
+        self._sag_v = 0.0
+        self.charge_ah = 0.0
+
+    def hear(self, told: PlantBattery) -> None:
+        """Take in what the battery says of itself."""
+        if self._battery is None:
+            return
+        model_ah = self.charge_ah if self._told else told.used_ah
+        self.charge_ah, self._told = believed(model_ah, told.used_ah, self._vehicle), True
+        sag_v = told.voltage_v - self._now[0]
+        self._sag_v = sag_v if abs(sag_v) > _SAG * self._battery.full_voltage_v else 0.0
+
+    def resume(self, charge_ah: float, energy_wh: float) -> None:
+        """Go on with a battery that has given so much, unless it says itself how much."""
+        self.energy_wh = energy_wh
+        if self._told:
+            return
+        self.charge_ah = charge_ah
+        self._now = self._model.terminal(charge_ah, np.zeros(4))
+
+    def run(self, controls: FourRotors, duration_s: float) -> None:
+        """Turn the rotors at `controls`, parts of the largest speed, for `duration_s`."""
+        voltage_v, current_a = self._now = self._model.terminal(self.charge_ah, np.array(controls))
+        self.charge_ah += current_a * duration_s / _SECONDS_PER_HOUR
+        self.energy_wh += voltage_v * current_a * duration_s / _SECONDS_PER_HOUR
+
+    @property
+    def left(self) -> float:
+        """Part of the charge that is left; 1 without a battery."""
+        if self._battery is None:
+            return 1.0
+        return max(0.0, 1.0 - self.charge_ah / self._battery.capacity_ah)
+
+    def state(self) -> BatteryState | None:
+        """Return what to tell of it; None without a battery."""
+        if self._battery is None:
+            return None
+        voltage_v, current_a = self._now
+        left_ah = self.left * self._battery.capacity_ah
+        left_s = left_ah / current_a * _SECONDS_PER_HOUR if current_a > _LEAST_CURRENT_A else nan
+        cells = max(1, round(self._battery.full_voltage_v / _CELL_V))
+        voltage_v = max(0.0, voltage_v + self._sag_v)
+        return BatteryState(cells, voltage_v, current_a, self.charge_ah, self.left, left_s, self.energy_wh)

@@ -1,0 +1,63 @@
+"""Calibrations, gone through as ground stations expect them; with a simulated vehicle there is nothing to find out.
+
+MAV_CMD_PREFLIGHT_CALIBRATION, and the lines "[cal] ..." by which PX4 tells how far one is: ground stations read them.
+"""
+
+from colibri.mavlink.services.command import DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Outcome
+
+_STEP_US = 100_000
+_STEPS = 10
+_KINDS = {"gyro": 2, "mag": 2, "accel": 2, "level": 2}
+
+
+class Calibration:
+    """Goes through one calibration at a time."""
+
+    def __init__(self) -> None:
+        """Calibrate nothing yet."""
+        self._kind = ""
+        self._step = 0
+        self._due_us = 0
+
+    def begin(self, command: Command, *, armed: bool) -> Outcome:
+        """Obey a command: calibrate what its parameters choose, or stop where they choose nothing."""
+        if armed:
+            return Outcome(DENIED, "calibration refused: the rotors are armed")
+        chosen = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
+        kind = _kind_of(chosen)
+        if kind is None:
+            return Outcome(UNSUPPORTED, "calibration refused: only gyro, mag, accel and level are known")
+        if kind and self._kind:
+            return Outcome(TEMPORARILY_REJECTED, "calibration refused: another one is under way")
+        if not kind:
+            cancelled, self._kind = self._kind, ""
+            self._step = -1 if cancelled else 0
+        else:
+            self._kind, self._step, self._due_us = kind, 0, command.now_us
+        return Outcome()
+
+    def poll(self, now_us: int) -> list[str]:
+        """Return the lines that are due."""
+        if self._step == -1:
+            self._step = 0
+            return ["[cal] calibration cancelled"]
+        if not self._kind or now_us < self._due_us:
+            return []
+        self._due_us = now_us + _STEP_US
+        step, self._step = self._step, self._step + 1
+        if step == 0:
+            return [f"[cal] calibration started: {_KINDS[self._kind]} {self._kind}"]
+        if step <= _STEPS:
+            return [f"[cal] progress <{100 * step // _STEPS}>"]
+        kind, self._kind, self._step = self._kind, "", 0
+        return [f"[cal] calibration done: {kind}"]
+
+
+def _kind_of(p: tuple[float, ...]) -> str | None:
+    """Return what to calibrate; empty where nothing is chosen, None where it is not known."""
+    given = [0.0 if value != value else value for value in p]  # nan: not given
+    chosen = [(place, value) for place, value in enumerate(given) if value != 0.0]
+    if not chosen:
+        return ""
+    known = {(0, 1.0): "gyro", (1, 1.0): "mag", (4, 1.0): "accel", (4, 2.0): "level"}
+    return known.get(chosen[0]) if len(chosen) == 1 else None

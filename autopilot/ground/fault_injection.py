@@ -1,0 +1,69 @@
+"""Injected faults, MAV_CMD_INJECT_FAILURE: obeyed only where parameter SYS_FAILURE_EN says so; done by the plant.
+
+A fault travels with the answer to the next frame, and the frame after that tells what became of it. Only then is told
+whoever asked: what is accepted has happened.
+"""
+
+from colibri.mavlink.hil.faults import Fault, Part, Refusal, fault_from, judged
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.plant_status import FaultResult
+from colibri.mavlink.services.command import DENIED, FAILED, LATER, UNSUPPORTED, Command, Outcome
+from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED
+
+ANSWERED_WITHIN_US = 1_000_000
+"""A plant that knows faults answers with the next frame but one."""
+
+
+class Failures:
+    """Hands faults on to the plant, and its answers back."""
+
+    def __init__(self, feedback: Feedback, *, relays: bool) -> None:
+        """Have none; what flies by `feedback` has them at all where the other end `relays` them."""
+        self._relays = relays
+        self._parts = [part for part in Part if part is not Part.SENSORS or feedback is Feedback.SENSORS]
+        self._to_send: list[Fault] = []
+        self._asked: tuple[Fault, Command] | None = None
+
+    def inject(self, command: Command, *, enabled: bool) -> Outcome:
+        """Obey a command, or say why not; what became of it comes by `poll`."""
+        if not enabled:
+            return Outcome(DENIED, "failure refused: parameter SYS_FAILURE_EN is 0")
+        if not self._relays:
+            return Outcome(UNSUPPORTED, "failure refused: this simulator takes none")
+        fault = fault_from(command.p1, command.p2, command.p3, (command.p4, command.x, command.y, command.z))
+        if fault is None:
+            return Outcome(DENIED, "failure refused: unit, type and instance must be whole numbers")
+        judgement = judged(fault, self._parts)
+        if isinstance(judgement, Refusal):
+            return Outcome(judgement.result, f"failure refused: {judgement.reason}")
+        self._to_send.append(judgement)
+        self._asked = (judgement, command)
+        return Outcome(LATER)
+
+    def take(self) -> tuple[Fault, ...]:
+        """Return the faults to hand on with the next answer, and forget them."""
+        if not self._to_send:
+            return ()
+        faults, self._to_send = tuple(self._to_send), []
+        return faults
+
+    def poll(self, results: tuple[FaultResult, ...], now_us: int) -> tuple[Command, Outcome] | None:
+        """Take in what the plant says of faults; return the command that has come to its end, and how."""
+        if self._asked is None:
+            return None
+        fault, command = self._asked
+        for told in results:
+            if (told.unit, told.kind) == (fault.unit, fault.kind):
+                self._asked = None
+                return command, _outcome(told.result)
+        if not 0 <= now_us - command.now_us < ANSWERED_WITHIN_US:
+            self._asked = None
+            return command, Outcome(FAILED, "failure refused: the plant does not answer")
+        return None
+
+
+def _outcome(result: int) -> Outcome:
+    if result == RESULT_ACCEPTED:
+        return Outcome()
+    why = "impossible numbers" if result == RESULT_DENIED else "it has no such part"
+    return Outcome(result, f"failure refused by the plant: {why}")

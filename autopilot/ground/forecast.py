@@ -1,0 +1,64 @@
+"""Where the control law's plan leads: its predicted attitudes and thrusts, integrated to velocity and position."""
+
+import numpy as np
+
+from colibri.autopilot.control.interface import Diagnostics, Horizon, VehicleState
+from colibri.autopilot.control.lpv_mpc import prediction
+from colibri.common.elementary import square
+from colibri.common.elementwise import cos, sin
+from colibri.common.matrices import matvec
+from colibri.common.types import Array
+from colibri.mavlink.telemetry.snapshot import Forecast
+from colibri.plant.vehicle.description import Vehicle
+
+POINTS = 5
+"""What TRAJECTORY_REPRESENTATION_WAYPOINTS holds."""
+
+
+class Forecaster:
+    """Integrates the plans of one vehicle's control law."""
+
+    def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
+        """Take plans whose steps are `interval_s` apart."""
+        self._full_thrust_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
+        self._mass_kg = vehicle.body.mass_kg
+        self._gravity_m_s2 = vehicle.gravity_m_s2
+        self._interval_s = interval_s
+
+    def forecast(self, state: VehicleState, references: Horizon | None, how: Diagnostics) -> tuple[Forecast, ...]:
+        """Return points of the plan, the last at its end; of the references where the law predicts no attitude."""
+        plan, squared = how.predicted, how.planned_squared
+        if plan is not None and squared is not None and plan.shape[1] == prediction.STATES:
+            return self._integrated(state, plan, squared)
+        if references is None or len(references.position_enu_m) < POINTS:
+            return ()
+        columns = references.position_enu_m, references.velocity_enu_m_s, references.acceleration_enu_m_s2
+        return self._points(*columns, references.yaw_rad, references.yaw_rate_rad_s)
+
+    def _integrated(self, state: VehicleState, plan: Array, squared: Array) -> tuple[Forecast, ...]:
+        """Integrate thrust along the body's z axis and gravity; drag does not matter in so short a time."""
+        ahead = plan[1:]
+        phi, theta, psi = (ahead[:, column] for column in prediction.ANGLES)
+        x = cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi)
+        y = cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi)
+        up = np.stack([x, y, cos(phi) * cos(theta)], axis=1)
+        acceleration = up * (matvec(squared, self._full_thrust_n) / self._mass_kg)[:, None]
+        acceleration[:, 2] -= self._gravity_m_s2
+        velocity = np.array(state.velocity_enu_m_s) + self._interval_s * np.cumsum(acceleration, axis=0)
+        position = np.array(state.position_enu_m) + self._interval_s * np.cumsum(velocity, axis=0)
+        return self._points(position, velocity, acceleration, psi, ahead[:, prediction.R])
+
+    def _points(self, p: Array, v: Array, a: Array, yaw: Array, rate: Array) -> tuple[Forecast, ...]:
+        last = len(p) - 1
+        chosen = [round((point + 1) * last / POINTS) for point in range(POINTS)]
+        return tuple(
+            Forecast(
+                (k + 1) * self._interval_s,
+                tuple(p[k].tolist()),
+                tuple(v[k].tolist()),
+                tuple(a[k].tolist()),
+                float(yaw[k]),
+                float(rate[k]),
+            )
+            for k in chosen
+        )

@@ -1,0 +1,197 @@
+"""Snapshots for telemetry: what the flight is like at a control sample."""
+
+from math import nan
+
+from colibri.autopilot.commander.pilot import Guidance, Pilot
+from colibri.autopilot.commander.rules.failsafe_table import Action
+from colibri.autopilot.commander.rules.modes import ROWS, Mode, custom_mode
+from colibri.autopilot.control.interface import (
+    FALLBACK_CODES,
+    STATUS_CODES,
+    AttitudeDemand,
+    Decision,
+    Horizon,
+    VehicleState,
+)
+from colibri.autopilot.estimation.health import told
+from colibri.autopilot.estimation.state_source import Senses
+from colibri.autopilot.ground.forecast import Forecaster
+from colibri.autopilot.ground.stations import Stations
+from colibri.common.compiled_rotations import quaternion_from_euler
+from colibri.common.types import Array, FourRotors, Vector
+from colibri.mavlink.telemetry.snapshot import (
+    NO_SETPOINT,
+    NOT_SOLVED,
+    BatteryState,
+    Home,
+    Setpoint,
+    Snapshot,
+    SolverState,
+)
+from colibri.mavlink.wire.dialect import mav
+from colibri.plant.vehicle.description import Vehicle
+
+FORECAST_EVERY_US = 200_000
+_CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+_MANUAL = _CUSTOM | mav.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED | mav.MAV_MODE_FLAG_STABILIZE_ENABLED
+_AUTO = (
+    _CUSTOM | mav.MAV_MODE_FLAG_AUTO_ENABLED | mav.MAV_MODE_FLAG_GUIDED_ENABLED | mav.MAV_MODE_FLAG_STABILIZE_ENABLED
+)
+_NEAR_GROUND_M = 1.0
+
+
+class Photographer:
+    """Takes the snapshots of one vehicle."""
+
+    def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
+        """Expect a control sample every `interval_s`."""
+        self._vehicle = vehicle
+        self._interval_s = interval_s
+        self._forecaster = Forecaster(vehicle, interval_s)
+        self._velocity: Vector | None = None
+        self._solver = NOT_SOLVED
+
+    def take(
+        self,
+        now_us: int,
+        state: VehicleState,
+        pilot: Pilot,
+        guidance: Guidance,
+        decision: Decision | None,
+        duration_s: float,
+        controls: FourRotors,
+        battery: BatteryState | None,
+        stations: Stations,
+        senses: Senses,
+    ) -> Snapshot:
+        """Return the vehicle as it is now.
+
+        Args:
+            now_us: Simulated time.
+            state: The vehicle.
+            pilot: Who flies it.
+            guidance: What the control law was given.
+            decision: What it made of that; None while the rotors stand or idle.
+            duration_s: How long it took.
+            controls: Rotor commands, parts of the largest speed.
+            battery: Its battery; None without one.
+            stations: What ground stations say.
+            senses: How the state is known.
+        """
+        sticks = pilot.scene().steered.sticks
+        mode, armed = pilot.state
+        before, self._velocity = self._velocity or state.velocity_enu_m_s, state.velocity_enu_m_s
+        ax, ay, az = ((new - old) / self._interval_s for new, old in zip(state.velocity_enu_m_s, before, strict=True))
+        speed = self._vehicle.rotors.max_speed * self._vehicle.rad_s_per_speed_unit
+        c1, c2, c3, c4 = controls
+        return Snapshot(
+            time_us=now_us,
+            armed=armed,
+            base_mode=_MANUAL if sticks is not None and mode in _BY_STICKS else _AUTO,
+            custom_mode=custom_mode(mode),
+            intended_custom_mode=custom_mode(mode),
+            standard_mode=ROWS[mode].standard,
+            landed_state=landed_state(pilot, state),
+            failsafe=pilot.saving is not Action.NONE,
+            emergency=pilot.saving >= Action.LAND,
+            terminated=pilot.terminated,
+            armable=not pilot.refusals(),
+            position_enu_m=state.position_enu_m,
+            velocity_enu_m_s=state.velocity_enu_m_s,
+            acceleration_enu_m_s2=(ax, ay, az),
+            attitude=state.attitude,
+            rate_flu_rad_s=state.rate_flu_rad_s,
+            origin=stations.commands.origin,
+            gps_ok=senses.has_gps(now_us),
+            fence_enabled=stations.missions.has_fence,
+            fence_breached=bool(stations.missions.breach(state.position_enu_m, now_us)),
+            home=Home(pilot.home_enu_m, pilot.home_yaw_rad),
+            rotor_speeds_rad_s=(c1 * speed, c2 * speed, c3 * speed, c4 * speed),
+            controls=controls,
+            battery=battery,
+            setpoint=setpoint(guidance, decision, controls),
+            solver=self._solver_state(now_us, state, guidance.horizon, decision, duration_s),
+            sticks=None if sticks is None else (sticks.pitch, sticks.roll, sticks.thrust, sticks.yaw),
+            flight_started_us=pilot.armed_us,
+            takeoff_us=pilot.takeoff_us,
+            landing_us=pilot.landing_us,
+            flights=pilot.flights,
+            ground_m=pilot.home_enu_m[2],
+            load=min(duration_s / self._interval_s, 1.0),
+            sensed=senses.sensed,
+            fix=senses.fix,
+            estimator=None if senses.estimate is None else told(senses.estimate),
+        )
+
+    def _solver_state(
+        self, now_us: int, state: VehicleState, horizon: Horizon | None, decision: Decision | None, duration_s: float
+    ) -> SolverState:
+        if decision is None:
+            return NOT_SOLVED
+        how = decision.diagnostics
+        forecast = self._solver.horizon
+        squared = self._solver.planned_squared
+        if now_us % FORECAST_EVERY_US == 0:
+            forecast = self._forecaster.forecast(state, horizon, how)
+            squared = () if how.planned_squared is None else tuple(map(tuple, how.planned_squared.tolist()))
+        self._solver = SolverState(
+            status=STATUS_CODES[how.qp_status],
+            fallback=FALLBACK_CODES[how.fallback],
+            solve_time_s=how.solve_time_s,
+            step_time_s=duration_s,
+            cost=how.cost,
+            slack=how.slack,
+            active=how.active,
+            planned_squared=squared,
+            horizon=forecast,
+        )
+        return self._solver
+
+
+_BY_STICKS = (Mode.STABILIZED, Mode.ALTITUDE, Mode.POSITION)
+
+
+def landed_state(pilot: Pilot, state: VehicleState) -> int:
+    """Return the MAV_LANDED_STATE."""
+    if pilot.standing:
+        return int(mav.MAV_LANDED_STATE_ON_GROUND)
+    mode = pilot.state.mode
+    if mode is Mode.TAKEOFF:
+        return int(mav.MAV_LANDED_STATE_TAKEOFF)
+    sinking = pilot.reference is not None and float(pilot.reference.motion[1, 2]) < -0.1
+    near = state.position_enu_m[2] - pilot.home_enu_m[2] < _NEAR_GROUND_M
+    if mode is Mode.LAND or (mode is Mode.RETURN and sinking and near):
+        return int(mav.MAV_LANDED_STATE_LANDING)
+    return int(mav.MAV_LANDED_STATE_IN_AIR)
+
+
+def setpoint(guidance: Guidance, decision: Decision | None, controls: FourRotors) -> Setpoint:
+    """Return what the control law steers to."""
+    if decision is None:
+        return NO_SETPOINT
+    thrust = sum(control * control for control in controls) / len(controls)
+    attitude = quaternion_from_euler(*decision.attitude_reference)
+    if guidance.horizon is None:
+        return Setpoint(attitude=attitude, rate_flu_rad_s=rates_of(guidance.attitude), thrust=thrust)
+    h = guidance.horizon
+    return Setpoint(
+        position_enu_m=first(h.position_enu_m),
+        velocity_enu_m_s=first(h.velocity_enu_m_s),
+        acceleration_enu_m_s2=first(h.acceleration_enu_m_s2),
+        yaw_rad=float(h.yaw_rad[0]),
+        yaw_rate_rad_s=float(h.yaw_rate_rad_s[0]),
+        attitude=attitude,
+        rate_flu_rad_s=(nan, nan, nan),
+        thrust=thrust,
+    )
+
+
+def rates_of(demand: AttitudeDemand | None) -> Vector:
+    """Return the angular rates demanded now, rad/s; for small tilt they are the body's."""
+    return (nan, nan, nan) if demand is None else first(demand.angle_rates_rad_s)
+
+
+def first(column: Array) -> Vector:
+    """Return the first row of (n, 3)."""
+    x, y, z = column[0].tolist()
+    return (x, y, z)

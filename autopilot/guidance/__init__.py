@@ -1,0 +1,1 @@
+"""References shaped within limits: position chain, attitude slew, landing detection."""

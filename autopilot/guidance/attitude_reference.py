@@ -1,0 +1,197 @@
+"""From sticks, or a client's attitude or body rates, to a smooth attitude demand over the control law's preview.
+
+Each angle is slewed like a critically damped second-order system, its rate and acceleration bounded: what is demanded
+can be followed, and the MPC sees it coming. A pose is followed by where its thrust points first: roll and pitch are
+those about the yaw that has been reached. Body rates are integrated by THESIS [2.7], the tilt limited. Nothing runs
+away from the vehicle: the yaw demanded stays near its own.
+"""
+
+from math import isnan, nan, radians
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import AttitudeDemand, Preview, VehicleState
+from colibri.autopilot.guidance.attitude_slew import LEAN, POSE, SPIN, Slew, limit_tilt, slew_on
+from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.common.compiled_rotations import euler_from_quaternion
+from colibri.common.elementary import square
+from colibri.common.rotations import nearest_turn, rotation_matrix
+from colibri.common.types import Array, Quaternion, Vector
+from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, Sticks
+from colibri.plant.vehicle.description import Vehicle
+
+STICK_MIDDLE = 0.5
+_NOWHERE: Vector = (0.0, 0.0, 0.0)
+
+
+class AttitudeLimits(NamedTuple):
+    """How far an attitude may be asked for; how fast, says `slew`.
+
+    Attributes:
+        stick_tilt_rad: Of roll and pitch at a full stick.
+        stick_yaw_rate_rad_s: At a full stick.
+        yaw_ahead_rad: Furthest that the yaw demanded gets from the vehicle's.
+        slew: Of the angles and the thrust.
+    """
+
+    stick_tilt_rad: float = radians(35.0)
+    stick_yaw_rate_rad_s: float = radians(100.0)
+    yaw_ahead_rad: float = radians(30.0)
+    slew: Slew = Slew(
+        largest_tilt_rad=radians(60.0),
+        tilt_frequency_rad_s=14.0,
+        tilt_rate_rad_s=4.0,
+        tilt_acceleration_rad_s2=60.0,
+        yaw_frequency_rad_s=4.0,
+        yaw_rate_rad_s=2.0,
+        yaw_acceleration_rad_s2=8.0,
+        thrust_rate_n_s=200.0,
+    )
+
+
+DEFAULT_LIMITS = AttitudeLimits()
+
+
+def attitude_limits(behaviour: Behaviour) -> AttitudeLimits:
+    """Return the limits that the parameters say."""
+    yaw_rate_rad_s = behaviour.stick_yaw_rate_rad_s
+    slew = DEFAULT_LIMITS.slew
+    return DEFAULT_LIMITS._replace(
+        stick_tilt_rad=radians(behaviour.largest_tilt_deg),
+        stick_yaw_rate_rad_s=yaw_rate_rad_s,
+        slew=slew._replace(yaw_rate_rad_s=max(slew.yaw_rate_rad_s, yaw_rate_rad_s)),
+    )
+
+
+class Wish(NamedTuple):
+    """What is asked for: made by `lean`, `pose` and `spin`.
+
+    Attributes:
+        kind: LEAN, POSE or SPIN.
+        vector: LEAN: phi, theta, rad, and nothing. POSE: where the thrust is to point, ENU. SPIN: p, q, r, rad/s.
+        yaw_rad: POSE: to reach.
+        yaw_rate_rad_s: LEAN: to turn at. POSE: feed-forward.
+        thrust_n: nan for what carries the weight, whatever the tilt.
+    """
+
+    kind: int
+    vector: Vector
+    yaw_rad: float
+    yaw_rate_rad_s: float
+    thrust_n: float
+
+
+class ReferenceMemory(NamedTuple):
+    """What the generator carries from one control sample to the next.
+
+    Attributes:
+        angles: phi, theta, psi demanded now, rad, (3,).
+        rates: Their derivatives, rad/s, (3,).
+        thrust_n: Demanded now, N.
+    """
+
+    angles: Array
+    rates: Array
+    thrust_n: float
+
+
+class AttitudeReference:
+    """The generator for one vehicle and one control law's preview.
+
+    Attributes:
+        weight_n: Of the vehicle.
+        limits: How far; whoever changes them replaces all of it.
+        most_thrust_n: Of all rotors at their top speed.
+    """
+
+    def __init__(self, vehicle: Vehicle, preview: Preview, limits: AttitudeLimits = DEFAULT_LIMITS) -> None:
+        """Demand what `limits` allow at the samples of `preview`; what is compiled is loaded here."""
+        self.adopt(vehicle)
+        self._interval_s = preview.interval_us * 1e-6
+        self._samples = preview.samples
+        self.limits = limits
+        level = VehicleState(_NOWHERE, _NOWHERE, (1.0, 0.0, 0.0, 0.0), _NOWHERE, _NOWHERE)
+        self.step(self.initial(level), level, lean(0.0, 0.0, 0.0, self.weight_n))
+
+    def adopt(self, vehicle: Vehicle) -> None:
+        """Go on for a vehicle of other numbers."""
+        self.weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
+        self.most_thrust_n = float(vehicle.allocation()[0].sum()) * square(vehicle.rotors.max_speed)
+
+    def initial(self, state: VehicleState, thrust_n: float | None = None) -> ReferenceMemory:
+        """Begin with the attitude that the vehicle has, and the thrust that it makes, N: its weight if None."""
+        angles, rates = np.array(state.euler), np.zeros(3)
+        limit_tilt(angles, rates, self.limits.slew.largest_tilt_rad)
+        return ReferenceMemory(angles, rates, self.weight_n if thrust_n is None else thrust_n)
+
+    def step(self, memory: ReferenceMemory, state: VehicleState, wish: Wish) -> tuple[ReferenceMemory, AttitudeDemand]:
+        """Return the memory for the next control sample, and the demand from now on if `wish` stays."""
+        angles, rates = np.empty((self._samples + 1, 3)), np.empty((self._samples + 1, 3))
+        thrusts = np.empty(self._samples + 1)
+        angles[0], rates[0], thrusts[0] = memory.angles, memory.rates, memory.thrust_n
+        angles[0, 2] = self._near(memory.angles[2].item(), state.euler[2])
+        slew_on(
+            wish.kind,
+            np.array(wish.vector),
+            wish.yaw_rad,
+            wish.yaw_rate_rad_s,
+            wish.thrust_n,
+            self.weight_n,
+            self.limits.slew,
+            self._interval_s,
+            angles,
+            rates,
+            thrusts,
+        )
+        after = ReferenceMemory(angles[1].copy(), rates[1].copy(), thrusts[1].item())
+        return after, AttitudeDemand(angles[:-1], rates[:-1], thrusts[:-1])
+
+    def from_sticks(self, sticks: Sticks) -> Wish:
+        """Return what stabilized flight makes of sticks."""
+        tilt = self.limits.stick_tilt_rad
+        yaw_rate = -self.limits.stick_yaw_rate_rad_s * sticks.yaw
+        return lean(tilt * sticks.roll, tilt * sticks.pitch, yaw_rate, self.thrust_for_stick(sticks.thrust))
+
+    def from_setpoint(self, setpoint: AttitudeSetpoint) -> Wish:
+        """Return what a client's setpoint asks for, its thrust as a stick's: half of it hovers.
+
+        An attitude goes before body rates, of which yaw's alone is then fed forward. A rate that is not given beside
+        others is zero.
+        """
+        thrust_n = nan if isnan(setpoint.thrust) else self.thrust_for_stick(setpoint.thrust)
+        p, q, r = (0.0 if isnan(rate) else rate for rate in setpoint.rate_flu_rad_s)
+        if setpoint.attitude is None:
+            return spin((p, q, r), thrust_n)
+        return pose(setpoint.attitude, thrust_n, r)
+
+    def thrust_for_stick(self, stick: float) -> float:
+        """Return the thrust, N, of a stick at 0..1: none at the bottom, hover in the middle, all there is at the top.
+
+        With half for hover it is what ground stations for PX4 expect, whose normalised thrust hovers near 0.5.
+        """
+        if stick <= STICK_MIDDLE:
+            return self.weight_n * max(stick, 0.0) / STICK_MIDDLE
+        part = (min(stick, 1.0) - STICK_MIDDLE) / (1.0 - STICK_MIDDLE)
+        return self.weight_n + (self.most_thrust_n - self.weight_n) * part
+
+    def _near(self, psi: float, yaw_rad: float) -> float:
+        """Return the demanded yaw in the vehicle's own full turn, no further from its yaw than allowed."""
+        furthest = self.limits.yaw_ahead_rad
+        return min(max(nearest_turn(psi, yaw_rad), yaw_rad - furthest), yaw_rad + furthest)
+
+
+def lean(phi: float, theta: float, yaw_rate_rad_s: float, thrust_n: float) -> Wish:
+    """Roll and pitch, rad, about the heading that there is, turning at a rate counter-clockwise."""
+    return Wish(LEAN, (phi, theta, 0.0), 0.0, yaw_rate_rad_s, thrust_n)
+
+
+def pose(attitude: Quaternion, thrust_n: float, yaw_rate_rad_s: float = 0.0) -> Wish:
+    """An attitude, FLU to ENU; its yaw is reached more slowly than its thrust's direction."""
+    (_, _, x), (_, _, y), (_, _, z) = rotation_matrix(attitude)
+    return Wish(POSE, (x, y, z), euler_from_quaternion(attitude)[2], yaw_rate_rad_s, thrust_n)
+
+
+def spin(rate_flu_rad_s: Vector, thrust_n: float) -> Wish:
+    """Body rates."""
+    return Wish(SPIN, rate_flu_rad_s, 0.0, 0.0, thrust_n)

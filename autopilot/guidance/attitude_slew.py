@@ -1,0 +1,173 @@
+"""How an attitude demand goes on from sample to sample towards what is asked for, as compiled kernels.
+
+An angle x with rate v goes by v' = w² (target - x) + 2 w (target' - v), bounded in acceleration and rate; one of which
+only the rate is asked for by v' = 2 w (target' - v). A largest acceleration of w times the largest rate or more leaves
+the braking to the first of them, so that nothing overshoots.
+"""
+
+from math import floor, isnan, pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.common.jit import compiled
+from colibri.common.kernels import atan2, cos, sin
+from colibri.common.types import Array
+
+LEAN, POSE, SPIN = 0, 1, 2
+_NO_DIRECTION = 1e-9
+
+
+class Slew(NamedTuple):
+    """How far and how fast a demand goes.
+
+    Attributes:
+        largest_tilt_rad: Of the thrust axis, whoever asks.
+        tilt_frequency_rad_s: w of roll and pitch.
+        tilt_rate_rad_s: Their largest rate.
+        tilt_acceleration_rad_s2: Their largest acceleration.
+        yaw_frequency_rad_s: w of yaw.
+        yaw_rate_rad_s: Its largest rate.
+        yaw_acceleration_rad_s2: Its largest acceleration.
+        thrust_rate_n_s: Fastest change of thrust.
+    """
+
+    largest_tilt_rad: float
+    tilt_frequency_rad_s: float
+    tilt_rate_rad_s: float
+    tilt_acceleration_rad_s2: float
+    yaw_frequency_rad_s: float
+    yaw_rate_rad_s: float
+    yaw_acceleration_rad_s2: float
+    thrust_rate_n_s: float
+
+
+@compiled
+def slew_on(
+    kind: int,
+    vector: Array,
+    yaw_rad: float,
+    yaw_rate_rad_s: float,
+    thrust_n: float,
+    weight_n: float,
+    slew: Slew,
+    interval_s: float,
+    angles: Array,
+    rates: Array,
+    thrusts: Array,
+) -> None:
+    """Fill angles, rates and thrusts from their first rows on.
+
+    Args:
+        kind: LEAN, POSE or SPIN.
+        vector: LEAN: phi, theta, rad. POSE: where the thrust is to point, ENU. SPIN: p, q, r, rad/s. (3,).
+        yaw_rad: POSE: to reach.
+        yaw_rate_rad_s: LEAN: to turn at. POSE: feed-forward.
+        thrust_n: To reach, N; nan for what carries the weight.
+        weight_n: N.
+        slew: How far and how fast.
+        interval_s: Between two rows.
+        angles: phi, theta, psi, rad, (n, 3).
+        rates: Their derivatives, rad/s, (n, 3).
+        thrusts: N, (n,).
+    """
+    wanted, wanted_rate = np.zeros(3), np.zeros(3)
+    for n in range(angles.shape[0] - 1):
+        here, there = angles[n], angles[n + 1]
+        there[:] = here
+        rates[n + 1] = rates[n]
+        if kind == SPIN:
+            _euler_rates(here, vector, wanted_rate)
+        else:
+            wanted_rate[2] = yaw_rate_rad_s
+        towards = here[2] if kind != POSE else yaw_rad - 2.0 * pi * floor((yaw_rad - here[2]) / (2.0 * pi) + 0.5)
+        w, fastest, hardest = slew.yaw_frequency_rad_s, slew.yaw_rate_rad_s, slew.yaw_acceleration_rad_s2
+        _move(2, w * w * (towards - here[2]), wanted_rate[2], w, fastest, hardest, interval_s, there, rates[n + 1])
+        if kind == LEAN:
+            wanted[:2] = vector[:2]
+        elif kind == POSE:
+            _point(vector, there[2], slew.largest_tilt_rad, wanted)
+            after = wanted[:2].copy()
+            _point(vector, here[2], slew.largest_tilt_rad, wanted)
+            wanted_rate[:2] = (after - wanted[:2]) / interval_s
+        w, fastest, hardest = slew.tilt_frequency_rad_s, slew.tilt_rate_rad_s, slew.tilt_acceleration_rad_s2
+        for i in range(2):
+            pull = 0.0 if kind == SPIN else w * w * (wanted[i] - here[i])
+            _move(i, pull, wanted_rate[i], w, fastest, hardest, interval_s, there, rates[n + 1])
+        limit_tilt(there, rates[n + 1], slew.largest_tilt_rad)
+        thrust = weight_n / (cos(there[0]) * cos(there[1])) if isnan(thrust_n) else thrust_n
+        most = slew.thrust_rate_n_s * interval_s
+        thrusts[n + 1] = thrusts[n] + min(max(thrust - thrusts[n], -most), most)
+
+
+@compiled
+def _move(
+    i: int,
+    pull: float,
+    wanted_rate: float,
+    w: float,
+    fastest: float,
+    hardest: float,
+    interval_s: float,
+    angles: Array,
+    rates: Array,
+) -> None:
+    """Move angle i and its rate on by one interval, in place."""
+    acceleration = min(max(pull + 2.0 * w * (wanted_rate - rates[i]), -hardest), hardest)
+    rate = min(max(rates[i] + interval_s * acceleration, -fastest), fastest)
+    angles[i] += 0.5 * interval_s * (rates[i] + rate)
+    rates[i] = rate
+
+
+@compiled
+def _euler_rates(angles: Array, rate: Array, out: Array) -> None:
+    """Write T(phi, theta) [p q r], THESIS [2.7]."""
+    s, c = sin(angles[0]), cos(angles[0])
+    swing = s * rate[1] + c * rate[2]
+    out[0] = rate[0] + sin(angles[1]) / cos(angles[1]) * swing
+    out[1] = c * rate[1] - s * rate[2]
+    out[2] = swing / cos(angles[1])
+
+
+@compiled
+def _point(direction: Array, psi: float, largest_tilt_rad: float, angles: Array) -> None:
+    """Write roll and pitch, rad, that point body z along `direction`, ENU, (3,), at yaw `psi`; less where too steep."""
+    x, y, z = direction[0], direction[1], direction[2]
+    horizontal = sqrt(x * x + y * y)
+    if horizontal < _NO_DIRECTION:
+        x, y, z = 0.0, 0.0, 1.0
+    elif z < cos(largest_tilt_rad) * sqrt(horizontal * horizontal + z * z):
+        x, y, z = x / horizontal * sin(largest_tilt_rad), y / horizontal * sin(largest_tilt_rad), cos(largest_tilt_rad)
+    c, s = cos(psi), sin(psi)
+    ahead = x * c + y * s
+    angles[0] = atan2(x * s - y * c, sqrt(ahead * ahead + z * z))
+    angles[1] = atan2(ahead, z)
+
+
+@compiled
+def limit_tilt(angles: Array, rates: Array, largest_tilt_rad: float) -> None:
+    """Bring the thrust axis back to the largest tilt, in place, and take from the rates what leads beyond.
+
+    Args:
+        angles: phi, theta, psi, rad, (3,).
+        rates: Their derivatives, rad/s, (3,).
+        largest_tilt_rad: Of the thrust axis.
+    """
+    s, c, st, ct = sin(angles[0]), cos(angles[0]), sin(angles[1]), cos(angles[1])
+    if c * ct >= cos(largest_tilt_rad):
+        return
+    across = sqrt(s * s + c * c * st * st)
+    if across < _NO_DIRECTION:
+        angles[0], angles[1] = 0.0, 0.0
+    else:
+        scale = sin(largest_tilt_rad) / across
+        left, ahead = -s * scale, c * st * scale
+        angles[0] = atan2(-left, sqrt(ahead * ahead + cos(largest_tilt_rad) ** 2))
+        angles[1] = atan2(ahead, cos(largest_tilt_rad))
+    s, c, st, ct = sin(angles[0]), cos(angles[0]), sin(angles[1]), cos(angles[1])
+    outwards, steeper = s * ct, c * st
+    squared = outwards * outwards + steeper * steeper
+    leaving = outwards * rates[0] + steeper * rates[1]
+    if leaving > 0.0 and squared > 0.0:
+        rates[0] -= leaving / squared * outwards
+        rates[1] -= leaving / squared * steeper

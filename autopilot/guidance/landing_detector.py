@@ -1,0 +1,63 @@
+"""Whether the vehicle stands: told from a reference that sinks on while the vehicle does not."""
+
+from typing import NamedTuple
+
+from colibri.autopilot.control.interface import VehicleState
+from colibri.autopilot.guidance.reference import Reference
+
+_BELOW_M = 0.15
+_STILL_M_S = 0.15
+_LEVEL_RAD_S = 0.5
+_FOR_US = 400_000
+_DRIFTING_FOR_US = 600_000
+CARRIED = 0.5
+"""Thrust in parts of the weight, below which a vehicle whose velocity nobody knows must be falling, or stand."""
+
+STANDING_BELOW_M = 0.5
+STANDING_SLOWER_M_S = 0.3
+
+
+class Landing(NamedTuple):
+    """What the detector remembers.
+
+    Attributes:
+        since_us: Since when all signs have said that the vehicle stands; None if they do not.
+        climb_m_s: Its climb then.
+    """
+
+    since_us: int | None = None
+    climb_m_s: float = 0.0
+
+
+def watch(
+    landing: Landing, now_us: int, state: VehicleState, sinks: bool, *, drifts: bool = False
+) -> tuple[Landing, bool]:
+    """Return what to remember, and whether the vehicle stands: its signs have lasted.
+
+    Only the ground can hold a vehicle that `sinks`: that is told to, or whose rotors do not turn, and yet is still.
+
+    Where the estimate of the velocity `drifts`, as without GPS, it says nothing, and less after the blow of the ground;
+    but it still follows the accelerometer. Such a vehicle sinks where its thrust carries half of it, and would fall
+    faster and faster: the ground holds one whose climb does not change.
+    """
+    climb_m_s = state.velocity_enu_m_s[2]
+    if drifts:
+        still, for_us = abs(climb_m_s - landing.climb_m_s) < _STILL_M_S, _DRIFTING_FOR_US
+    else:
+        still, for_us = max(map(abs, state.velocity_enu_m_s)) < _STILL_M_S, _FOR_US
+    if not sinks or max(map(abs, state.rate_flu_rad_s)) >= _LEVEL_RAD_S:
+        return Landing(), False
+    if landing.since_us is None or not still:
+        return (Landing(now_us, climb_m_s) if still or drifts else Landing()), False
+    return landing, now_us - landing.since_us >= for_us
+
+
+def is_below(reference: Reference, state: VehicleState) -> bool:
+    """Whether the reference is so far below the vehicle that it must sink."""
+    return float(reference.motion[0, 2]) < state.position_enu_m[2] - _BELOW_M
+
+
+def stands_at_first(state: VehicleState, home_z_m: float) -> bool:
+    """Guess whether a vehicle that is seen for the first time stands: low and still."""
+    still = max(map(abs, state.velocity_enu_m_s)) < STANDING_SLOWER_M_S
+    return still and abs(state.position_enu_m[2] - home_z_m) < STANDING_BELOW_M

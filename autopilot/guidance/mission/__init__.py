@@ -1,0 +1,1 @@
+"""A mission flown: item rules, legs, executor, geofence."""

@@ -1,0 +1,310 @@
+"""Flies a mission: which item is current, what it asks for now, what was reached.
+
+A state machine: the situation and the time in, an order and events out. States are those of MISSION_STATE
+(https://mavlink.io/en/messages/common.html#MISSION_STATE). Items follow each other whatever their autocontinue says, as
+on ArduPilot: DroneKit tells its users to leave that 0.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
+
+from colibri.autopilot.guidance.mission.items import place_of
+from colibri.autopilot.guidance.mission.legs import Context, Defaults, Phase, Situation, phases_of
+from colibri.autopilot.guidance.tasks.orders import Hold, Order, OrderRecord, order_of, record_of
+from colibri.common.types import Vector
+from colibri.mavlink.mission.items import MissionItem
+from colibri.mavlink.mission.service import Progress
+from colibri.mavlink.wire.dialect import mav
+
+NO_MISSION: int = mav.MISSION_STATE_NO_MISSION
+NOT_STARTED: int = mav.MISSION_STATE_NOT_STARTED
+ACTIVE: int = mav.MISSION_STATE_ACTIVE
+PAUSED: int = mav.MISSION_STATE_PAUSED
+COMPLETE: int = mav.MISSION_STATE_COMPLETE
+
+MOST_ITEMS_A_STEP = 16
+"""A step looks at no more items than this; the next one goes on."""
+REST_US = 1_000_000
+"""A mission that jumps again without having flown in between goes in a circle: it does so once in this time."""
+_HOLD = Hold()
+_DEFAULTS = Defaults()
+_FLYING, _SUSPENDED = 1, 2
+
+
+class Reached(NamedTuple):
+    """An item is reached; one that takes no time is done.
+
+    Attributes:
+        seq: Which.
+    """
+
+    seq: int
+
+
+class SetHome(NamedTuple):
+    """The mission sets home.
+
+    Attributes:
+        position_enu_m: Where, m; None: here.
+    """
+
+    position_enu_m: Vector | None
+
+
+MissionEvent: TypeAlias = Reached | SetHome
+
+
+class Step(NamedTuple):
+    """What the mission asks for.
+
+    Attributes:
+        order: To fly; the same object while it is the same order.
+        events: Since the step before.
+        flying: Whether the mission goes on; not once it is complete, paused or gone.
+    """
+
+    order: Order
+    events: tuple[MissionEvent, ...]
+    flying: bool
+
+
+class MissionRecord(NamedTuple):
+    """Where a mission stands, as plain data: what the executor needs to go on after a restart.
+
+    Attributes:
+        seq: The current item.
+        state: MISSION_STATE.
+        order: What it asks for now.
+        speed_m_s: That the mission asked for; None for the cruise speed.
+        jumps: How often each jump is still to be made.
+        situation: When the current item began; None where it has not.
+        defaults: Of then.
+        order_before: Of then.
+        phases: How many of the item's are left.
+        since_us: When the phase began.
+        fresh: Whether it has just begun.
+        jumped: Whether nothing was flown since the last jump.
+        rest_until_us: When a mission that goes in a circle goes on.
+    """
+
+    seq: int
+    state: int
+    order: OrderRecord
+    speed_m_s: float | None
+    jumps: dict[int, int]
+    situation: Situation | None
+    defaults: Defaults
+    order_before: OrderRecord
+    phases: int
+    since_us: int
+    fresh: bool
+    jumped: bool
+    rest_until_us: int
+
+
+class MissionExecutor:
+    """Flies one plan.
+
+    Attributes:
+        progress: State, current item; a new object whenever that changes.
+        defaults: Where items do not say; whoever changes them replaces all of it.
+    """
+
+    def __init__(self, items: Sequence[MissionItem] = (), defaults: Defaults = _DEFAULTS) -> None:
+        """Begin with a plan of valid items, not started."""
+        self.defaults = defaults
+        self._items: tuple[MissionItem, ...] = ()
+        self.progress = Progress()
+        self._order: Order = _HOLD
+        self._speed_m_s: float | None = None
+        self._jumps: dict[int, int] = {}
+        self._phases: list[Phase] | None = None
+        self._context: Context | None = None
+        self._since_us = 0
+        self._fresh = True
+        self._jumped = False
+        self._rest_until_us = 0
+        self.load(items)
+
+    @property
+    def items(self) -> tuple[MissionItem, ...]:
+        """The plan."""
+        return self._items
+
+    @property
+    def active(self) -> bool:
+        """Whether the mission is being flown."""
+        return self.progress.state == ACTIVE
+
+    def load(self, items: Sequence[MissionItem]) -> None:
+        """Take another plan of valid items; one that is being flown goes on with its first item."""
+        flying = self.active
+        self._items = tuple(items)
+        self._reset()
+        self._show(0, NO_MISSION if not items else ACTIVE if flying else NOT_STARTED)
+
+    def start(self) -> str:
+        """Fly the mission: go on at the current item, from the first if it is complete. Return why not."""
+        if not self._items:
+            return "mission: there is none"
+        if self.progress.state == COMPLETE:
+            self._reset()
+            self._show(0, ACTIVE)
+        elif not self.active:
+            self._leave()
+            self._order = _HOLD
+            self._show(self.progress.seq, ACTIVE)
+        return ""
+
+    def pause(self, *, item_flown: bool = False) -> tuple[MissionEvent, ...]:
+        """Stop flying it; `start` goes on with the current item, or after it if it is a return that another flies."""
+        if not self.active:
+            return ()
+        seq = self.progress.seq
+        self._leave()
+        if not item_flown or self._items[seq].command != mav.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+            self._show(seq, PAUSED)
+            return ()
+        self._advance()
+        if self.active:
+            self._show(self.progress.seq, PAUSED)
+        return (Reached(seq),)
+
+    def set_current(self, seq: int, reset: bool = False) -> str:
+        """Go to an item, -1 for the current one; `reset` counts jumps anew. Return why not."""
+        if not self._items:
+            return "mission: there is none"
+        seq = self.progress.seq if seq == -1 else seq
+        if not 0 <= seq < len(self._items):
+            return f"mission: there is no item {seq}"
+        if reset:
+            self._jumps.clear()
+        self._leave()
+        self._show(seq, PAUSED if self.progress.state == COMPLETE else self.progress.state)
+        return ""
+
+    def step(self, situation: Situation, now_us: int) -> Step:
+        """Return what to fly now."""
+        events: list[MissionEvent] = []
+        for _ in range(MOST_ITEMS_A_STEP):
+            if not self.active or now_us < self._rest_until_us or not self._fly(situation, now_us, events):
+                break
+        if not self.active and self.progress.state != COMPLETE:
+            self._order = _HOLD
+        return Step(self._order, tuple(events), self.active)
+
+    def record(self) -> MissionRecord:
+        """Return where the mission stands."""
+        context = self._context if self._phases else None
+        return MissionRecord(
+            self.progress.seq,
+            self.progress.state,
+            record_of(self._order),
+            self._speed_m_s,
+            self._jumps,
+            context.situation if context else None,
+            context.defaults if context else self.defaults,
+            record_of(context.order if context else self._order),
+            len(self._phases or ()),
+            self._since_us,
+            self._fresh,
+            self._jumped,
+            self._rest_until_us,
+        )
+
+    def resume(self, record: MissionRecord) -> None:
+        """Go on where a mission of the same items stood."""
+        if not 0 <= record.seq < len(self._items):
+            return
+        self._order, self._speed_m_s, self._jumps = order_of(record.order), record.speed_m_s, dict(record.jumps)
+        self._leave()
+        self._show(record.seq, record.state)
+        self._jumped, self._rest_until_us = record.jumped, record.rest_until_us
+        if record.situation is None:
+            return
+        order = order_of(record.order_before)
+        self._context = Context(record.situation, record.defaults, order, record.speed_m_s)
+        phases = list(phases_of(self._items[record.seq], self._context))
+        self._phases = phases[max(len(phases) - record.phases, 0) :]
+        self._since_us, self._fresh = record.since_us, record.fresh
+
+    def _fly(self, situation: Situation, now_us: int, events: list[MissionEvent]) -> bool:
+        """Fly the current item; return whether it is done and another is current."""
+        seq = self.progress.seq
+        item = self._items[seq]
+        if self._phases is None:
+            self._context = Context(situation, self.defaults, self._order, self._speed_m_s)
+            self._phases = list(phases_of(item, self._context))
+            if not self._phases:
+                self._do(item, situation, now_us, events)
+                return True
+            self._begin(now_us)
+        while self._phases:
+            phase = self._phases[0]
+            seen = situation._replace(arrived=False, turns=0.0) if self._fresh else situation
+            if not phase.ends(seen, (now_us - self._since_us) * 1e-6):
+                self._fresh = self._jumped = False
+                return False
+            if phase.reaches:
+                events.append(Reached(seq))
+            self._phases.pop(0)
+            self._begin(now_us)
+        self._advance()
+        return True
+
+    def _begin(self, now_us: int) -> None:
+        """Begin the next phase: what the situation says of an order is of the one before."""
+        self._since_us = now_us
+        if self._phases and self._phases[0].order is not None:
+            self._order = self._phases[0].order
+        self._fresh = True
+
+    def _do(self, item: MissionItem, situation: Situation, now_us: int, events: list[MissionEvent]) -> None:
+        """Do what takes no time."""
+        events.append(Reached(self.progress.seq))
+        if item.command == mav.MAV_CMD_DO_CHANGE_SPEED and item.p1 not in (2.0, 3.0):
+            if item.p2 > 0.0:
+                self._speed_m_s = item.p2
+            elif item.p2 == -2.0:
+                self._speed_m_s = None
+        elif item.command == mav.MAV_CMD_DO_SET_HOME:
+            here = item.p1 == 1.0
+            events.append(SetHome(None if here else place_of(item, situation.home_enu_m, situation.origin)))
+        elif item.command == mav.MAV_CMD_DO_JUMP and self._jump(item, now_us):
+            return
+        self._advance()
+
+    def _jump(self, item: MissionItem, now_us: int) -> bool:
+        """Jump if the item says so once more; a count of -1 says so for ever."""
+        seq = self.progress.seq
+        left = self._jumps.get(seq, int(item.p2))
+        if left == 0:
+            return False
+        self._jumps[seq] = max(left - 1, -1)
+        self._leave()
+        self._show(int(item.p1), ACTIVE)
+        if self._jumped:
+            self._rest_until_us = now_us + REST_US
+        self._jumped = True
+        return True
+
+    def _advance(self) -> None:
+        self._leave()
+        seq = self.progress.seq + 1
+        if seq < len(self._items):
+            self._show(seq, ACTIVE)
+        else:
+            self._show(len(self._items) - 1, COMPLETE)
+
+    def _leave(self) -> None:
+        self._phases = None
+        self._rest_until_us = 0
+
+    def _reset(self) -> None:
+        self._leave()
+        self._jumps.clear()
+        self._speed_m_s = None
+        self._order = _HOLD
+
+    def _show(self, seq: int, state: int) -> None:
+        self.progress = Progress(seq, state, _FLYING if state == ACTIVE else _SUSPENDED)

@@ -1,0 +1,214 @@
+"""The geofence: polygons and circles that the vehicle must stay inside or outside of.
+
+Items: https://mavlink.io/en/messages/common.html#MAV_CMD_NAV_FENCE_RETURN_POINT and those after it. The vehicle must
+be inside all inclusion zones of a group, of at least one group (their parameter 2), and outside every exclusion zone.
+Zones reach from the ground to the sky. A circle of radius 0 is none: clients that must send some circle send that one.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import hypot, inf, isfinite, isnan
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from colibri.autopilot.guidance.mission.items import FARTHEST_M, check_place
+from colibri.common.earth.geodesy import Geodetic, enu_of
+from colibri.common.types import Array, Vector
+from colibri.mavlink.mission.items import ACCEPTED, DEGREES, GLOBAL_FRAMES, MissionItem
+from colibri.mavlink.mission.upload import Rules
+from colibri.mavlink.wire.dialect import mav
+
+RETURN_POINT: int = mav.MAV_CMD_NAV_FENCE_RETURN_POINT
+POLYGONS: tuple[int, ...] = (
+    mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+    mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
+)
+CIRCLES: tuple[int, ...] = (mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION)
+INCLUSIONS: tuple[int, ...] = (POLYGONS[0], CIRCLES[0])
+FEWEST_VERTICES = 3
+EDGE_M = 1e-6
+"""So close to an edge counts as inside: what rounding leaves of a point that lies on it."""
+
+
+def check_fence_item(item: MissionItem) -> int:
+    """Return the MAV_MISSION_RESULT of an item of a geofence."""
+    if item.command not in (RETURN_POINT, *POLYGONS, *CIRCLES):
+        return int(mav.MAV_MISSION_UNSUPPORTED)
+    if item.frame not in GLOBAL_FRAMES:
+        return int(mav.MAV_MISSION_UNSUPPORTED_FRAME)
+    if item.command in POLYGONS and not (item.p1 >= FEWEST_VERTICES and isfinite(item.p1) and item.p1 == int(item.p1)):
+        return int(mav.MAV_MISSION_INVALID_PARAM1)
+    if item.command in CIRCLES and not 0.0 <= item.p1 <= FARTHEST_M:
+        return int(mav.MAV_MISSION_INVALID_PARAM1)
+    if item.command in INCLUSIONS and not (isnan(item.p2) or isfinite(item.p2)):
+        return int(mav.MAV_MISSION_INVALID_PARAM2)
+    return check_place(item)
+
+
+def check_fence(items: Sequence[MissionItem]) -> int:
+    """Return the MAV_MISSION_RESULT of valid items together: each polygon must be whole, and of one mind."""
+    at = 0
+    while at < len(items):
+        first = items[at]
+        length = int(first.p1) if first.command in POLYGONS else 1
+        vertices = items[at : at + length]
+        if len(vertices) < length or any((v.command, v.p1) != (first.command, first.p1) for v in vertices[1:]):
+            return int(mav.MAV_MISSION_INVALID_PARAM1)
+        if first.command == POLYGONS[0] and any(_group(v) != _group(first) for v in vertices):
+            return int(mav.MAV_MISSION_INVALID_PARAM2)
+        at += length
+    return ACCEPTED
+
+
+FENCE_RULES = Rules(check_fence_item, check_fence)
+
+
+class Zone(Protocol):
+    """An area of the ground."""
+
+    def depth_m(self, east_m: float, north_m: float) -> float:
+        """Return how far a point is inside, m; negative outside."""
+        ...
+
+
+class Disc(NamedTuple):
+    """A circle's inside.
+
+    Attributes:
+        east_m: Of its centre.
+        north_m: Of its centre.
+        radius_m: m.
+    """
+
+    east_m: float
+    north_m: float
+    radius_m: float
+
+    def depth_m(self, east_m: float, north_m: float) -> float:
+        """Return how far a point is inside, m; negative outside."""
+        return self.radius_m - hypot(east_m - self.east_m, north_m - self.north_m)
+
+
+class Polygon:
+    """A polygon's inside: where a ray to infinity crosses its edges an odd number of times, whichever way they turn."""
+
+    def __init__(self, vertices_m: Iterable[tuple[float, float]]) -> None:
+        """Take the corners, east and north, m."""
+        self._from: Array = np.array(list(vertices_m), dtype=float)
+        self._to = np.roll(self._from, -1, axis=0)
+        self._along = self._to - self._from
+        squared = (self._along * self._along).sum(axis=1)
+        self._squared = np.where(squared > 0.0, squared, 1.0)
+
+    def depth_m(self, east_m: float, north_m: float) -> float:
+        """Return how far a point is inside, m; negative outside."""
+        to = np.array((east_m, north_m)) - self._from  # each edge's start to the point
+        part = np.clip((to * self._along).sum(axis=1) / self._squared, 0.0, 1.0)
+        away = to - part[:, None] * self._along
+        nearest = float(np.sqrt((away * away).sum(axis=1).min()))
+        # An edge is crossed where just one of its ends is north of the point. Both edges of a corner compare the same
+        # two numbers, so that a ray through it crosses once or not at all, however they round.
+        starts, ends = self._from[:, 1] > north_m, self._to[:, 1] > north_m
+        side = self._along[:, 0] * to[:, 1] - self._along[:, 1] * to[:, 0]
+        crossed = (starts != ends) & ((side > 0.0) == (self._along[:, 1] > 0.0))
+        return nearest if np.count_nonzero(crossed) % 2 else -nearest
+
+
+class Geofence:
+    """A fence, seen from the origin of the ENU frame.
+
+    Attributes:
+        return_point_enu_m: East and north of where to fly after a breach, m; None where the fence names no such place.
+        highest_m: No higher than this, z of ENU; infinite without limit.
+    """
+
+    def __init__(self, items: Sequence[MissionItem], origin: Geodetic, *, highest_m: float = inf) -> None:
+        """Build the fence of valid items; without any it holds nothing back."""
+        self.highest_m = highest_m
+        self.return_point_enu_m: tuple[float, float] | None = None
+        self._groups: dict[float, list[Zone]] = {}
+        self._exclusions: list[Zone] = []
+        at = 0
+        while at < len(items):
+            first = items[at]
+            length = int(first.p1) if first.command in POLYGONS else 1
+            self._add(first, [_place(item, origin) for item in items[at : at + length]])
+            at += length
+
+    def _add(self, item: MissionItem, places: Sequence[tuple[float, float]]) -> None:
+        if item.command == RETURN_POINT:
+            self.return_point_enu_m = places[0]
+            return
+        if item.command in CIRCLES and item.p1 == 0.0:
+            return
+        zone: Zone = Polygon(places) if item.command in POLYGONS else Disc(*places[0], item.p1)
+        if item.command in INCLUSIONS:
+            self._groups.setdefault(_group(item), []).append(zone)
+        else:
+            self._exclusions.append(zone)
+
+    def margin_m(self, position_enu_m: Vector) -> float:
+        """Return how far a position is from the nearest breach, m; negative by how much it breaches the fence."""
+        east, north, up = position_enu_m
+        if not (isfinite(east) and isfinite(north) and isfinite(up)):
+            return -inf
+        margin = self.highest_m - up
+        if self._groups:
+            groups: Mapping[float, list[Zone]] = self._groups
+            margin = min(margin, max(min(zone.depth_m(east, north) for zone in zones) for zones in groups.values()))
+        return min(margin, *(-zone.depth_m(east, north) for zone in self._exclusions), inf)
+
+    def inside(self, position_enu_m: Vector) -> bool:
+        """Whether a position is within the fence; its edge is."""
+        return self.margin_m(position_enu_m) >= -EDGE_M
+
+    def refusal(self, position_enu_m: Vector) -> str:
+        """Return why the vehicle may not fly to a position; empty if it may."""
+        if position_enu_m[2] > self.highest_m + EDGE_M:
+            return f"higher than the {self.highest_m:g} m of the geofence"
+        return "" if self.inside(position_enu_m) else "outside the geofence"
+
+
+class AroundHome(NamedTuple):
+    """The fence that needs no upload: a circle around home, and a height above it.
+
+    Attributes:
+        home_enu_m: Where home is, m.
+        farthest_m: Radius of the circle; 0: none.
+        highest_m: Above home; 0: no limit.
+    """
+
+    home_enu_m: Vector
+    farthest_m: float
+    highest_m: float
+
+    @property
+    def exists(self) -> bool:
+        """Whether there is any."""
+        return self.farthest_m > 0.0 or self.highest_m > 0.0
+
+    def margin_m(self, position_enu_m: Vector) -> float:
+        """Return how far a position is inside, m; negative outside."""
+        east, north, up = (place - home for place, home in zip(position_enu_m, self.home_enu_m, strict=True))
+        if not (isfinite(east) and isfinite(north) and isfinite(up)):
+            return -inf
+        away_m = self.farthest_m - hypot(east, north) if self.farthest_m > 0.0 else inf
+        return min(away_m, self.highest_m - up) if self.highest_m > 0.0 else away_m
+
+    def refusal(self, position_enu_m: Vector) -> str:
+        """Return why the vehicle may not fly to a position; empty if it may."""
+        if self.margin_m(position_enu_m) >= -EDGE_M:
+            return ""
+        too_high = 0.0 < self.highest_m < position_enu_m[2] - self.home_enu_m[2]
+        return (
+            f"more than {self.highest_m:g} m above home" if too_high else f"more than {self.farthest_m:g} m from home"
+        )
+
+
+def _group(item: MissionItem) -> float:
+    return 0.0 if isnan(item.p2) else item.p2
+
+
+def _place(item: MissionItem, origin: Geodetic) -> tuple[float, float]:
+    east, north, _ = enu_of(Geodetic(item.x * DEGREES, item.y * DEGREES, 0.0), origin)
+    return east, north

@@ -1,0 +1,229 @@
+"""Which mission items this vehicle flies, which it skips, and what their parameters may be.
+
+Parameters: https://mavlink.io/en/messages/common.html#mav_commands; answers: MAV_MISSION_RESULT of the same page.
+A parameter that is nan means the default; a value that the command has no use for is refused, never guessed.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from math import isfinite, isnan
+from typing import NamedTuple, TypeAlias
+
+from colibri.common.earth.geodesy import LARGEST_LATITUDE_DEG, LARGEST_LONGITUDE_DEG, Geodetic, enu_of
+from colibri.common.types import Vector
+from colibri.mavlink.mission.items import ACCEPTED, DEGREES, GLOBAL_FRAMES, NOT_GIVEN, MissionItem
+from colibri.mavlink.mission.upload import Rules
+from colibri.mavlink.wire.dialect import mav
+
+HIGHEST_M = 10_000.0
+FARTHEST_M = 100_000.0
+
+_ABOVE_SEA = (mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT)
+"""Altitudes of the other global frames are above home; above terrain is taken as that: there is no terrain map."""
+
+SKIPPED: frozenset[int] = frozenset(
+    getattr(mav, f"MAV_CMD_{name}")
+    for name in (
+        "NAV_ROI",
+        "CONDITION_DISTANCE",
+        "DO_SET_RELAY",
+        "DO_REPEAT_RELAY",
+        "DO_SET_SERVO",
+        "DO_REPEAT_SERVO",
+        "DO_SET_ACTUATOR",
+        "DO_RETURN_PATH_START",
+        "DO_LAND_START",
+        "DO_SET_ROI_LOCATION",
+        "DO_SET_ROI_WPNEXT_OFFSET",
+        "DO_SET_ROI_NONE",
+        "DO_SET_ROI_SYSID",
+        "DO_SET_ROI",
+        "DO_CONTROL_VIDEO",
+        "DO_DIGICAM_CONFIGURE",
+        "DO_DIGICAM_CONTROL",
+        "DO_MOUNT_CONFIGURE",
+        "DO_MOUNT_CONTROL",
+        "DO_MOUNT_CONTROL_QUAT",
+        "DO_SET_CAM_TRIGG_DIST",
+        "DO_SET_CAM_TRIGG_INTERVAL",
+        "DO_TRIGGER_CONTROL",
+        "DO_GRIPPER",
+        "DO_WINCH",
+        "DO_GIMBAL_MANAGER_PITCHYAW",
+        "DO_GIMBAL_MANAGER_CONFIGURE",
+        "ILLUMINATOR_ON_OFF",
+        "DO_ILLUMINATOR_CONFIGURE",
+        "OBLIQUE_SURVEY",
+        "SET_CAMERA_MODE",
+        "SET_CAMERA_ZOOM",
+        "SET_CAMERA_FOCUS",
+        "SET_CAMERA_SOURCE",
+        "IMAGE_START_CAPTURE",
+        "IMAGE_STOP_CAPTURE",
+        "CAMERA_TRACK_POINT",
+        "CAMERA_TRACK_RECTANGLE",
+        "CAMERA_STOP_TRACKING",
+        "VIDEO_START_CAPTURE",
+        "VIDEO_STOP_CAPTURE",
+        "VIDEO_START_STREAMING",
+        "VIDEO_STOP_STREAMING",
+        "PANORAMA_CREATE",
+    )
+)
+"""For cameras, gimbals and other payload that this vehicle does not carry: accepted, whatever they say, and passed."""
+
+_Check: TypeAlias = Callable[[float], bool]
+
+
+def _anything(value: float) -> bool:
+    del value
+    return True
+
+
+def _finite(value: float) -> bool:
+    return isfinite(value)
+
+
+def _not_infinite(value: float) -> bool:
+    return isnan(value) or isfinite(value)
+
+
+def _not_negative(value: float) -> bool:
+    return isnan(value) or (value >= 0.0 and isfinite(value))
+
+
+def _a_radius(value: float) -> bool:
+    return isnan(value) or abs(value) <= FARTHEST_M
+
+
+def _one_of(*allowed: float) -> _Check:
+    return lambda value: isnan(value) or value in allowed
+
+
+def _whole(least: int, most: int) -> _Check:
+    return lambda value: isfinite(value) and least <= value <= most and value == int(value)
+
+
+def _a_speed(value: float) -> bool:
+    """-1 is no change, -2 the default."""
+    return isnan(value) or value in (-1.0, -2.0) or (value > 0.0 and isfinite(value))
+
+
+class _Allowed(NamedTuple):
+    """What an item of one command may say.
+
+    Attributes:
+        place: Whether x and y must be a latitude and a longitude.
+        height: Whether z must be an altitude.
+        p1: Of the first parameter, and so on.
+        here: Whether x and y may also be 0, 0 or not given.
+    """
+
+    place: bool = False
+    height: bool = False
+    p1: _Check = _anything
+    p2: _Check = _anything
+    p3: _Check = _anything
+    p4: _Check = _anything
+    here: bool = False
+
+
+_ALLOWED: Mapping[int, _Allowed] = {
+    mav.MAV_CMD_NAV_WAYPOINT: _Allowed(True, True, p1=_not_negative, p2=_not_negative, p4=_not_infinite),
+    mav.MAV_CMD_NAV_LOITER_UNLIM: _Allowed(True, True, p4=_not_infinite),
+    mav.MAV_CMD_NAV_LOITER_TURNS: _Allowed(True, True, p1=_not_negative, p3=_a_radius),
+    mav.MAV_CMD_NAV_LOITER_TIME: _Allowed(True, True, p1=_not_negative, p4=_not_infinite),
+    mav.MAV_CMD_NAV_LOITER_TO_ALT: _Allowed(True, True),
+    mav.MAV_CMD_NAV_TAKEOFF: _Allowed(True, True, p4=_not_infinite, here=True),
+    mav.MAV_CMD_NAV_LAND: _Allowed(True, False, p4=_not_infinite, here=True),
+    mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: _Allowed(),
+    mav.MAV_CMD_NAV_DELAY: _Allowed(p1=_not_negative),
+    mav.MAV_CMD_CONDITION_DELAY: _Allowed(p1=_not_negative),
+    mav.MAV_CMD_CONDITION_YAW: _Allowed(p1=_finite, p3=_one_of(-1.0, 0.0, 1.0), p4=_one_of(0.0, 1.0)),
+    mav.MAV_CMD_DO_JUMP: _Allowed(p1=_whole(0, 0xFFFF), p2=_whole(-1, 0xFFFF)),
+    mav.MAV_CMD_DO_CHANGE_SPEED: _Allowed(p1=_one_of(0.0, 1.0, 2.0, 3.0), p2=_a_speed),
+    mav.MAV_CMD_DO_SET_HOME: _Allowed(p1=_one_of(0.0, 1.0)),
+}
+FLOWN: frozenset[int] = frozenset(_ALLOWED)
+
+
+def check_item(item: MissionItem) -> int:
+    """Return the MAV_MISSION_RESULT of an item of a mission."""
+    allowed = _ALLOWED.get(item.command)
+    if allowed is None:
+        return int(ACCEPTED if item.command in SKIPPED else mav.MAV_MISSION_UNSUPPORTED)
+    if item.command == mav.MAV_CMD_DO_SET_HOME and item.p1 != 1.0:
+        allowed = allowed._replace(place=True, height=True)
+    here = allowed.here and is_here(item)
+    placeless = not allowed.height and (here or not allowed.place)
+    if item.frame not in GLOBAL_FRAMES and not (placeless and item.frame == mav.MAV_FRAME_MISSION):
+        return int(mav.MAV_MISSION_UNSUPPORTED_FRAME)
+    checks = (allowed.p1, allowed.p2, allowed.p3, allowed.p4)
+    for index, (check, value) in enumerate(zip(checks, (item.p1, item.p2, item.p3, item.p4), strict=True)):
+        if not check(value):
+            return int(mav.MAV_MISSION_INVALID_PARAM1) + index
+    if allowed.place and not here:
+        result = check_place(item)
+        if result != ACCEPTED:
+            return result
+    return check_height(item) if allowed.height else ACCEPTED
+
+
+def check_mission(items: Sequence[MissionItem]) -> int:
+    """Return the MAV_MISSION_RESULT of a mission whose items are valid: no jump may lead out of it."""
+    outside = any(item.command == mav.MAV_CMD_DO_JUMP and item.p1 >= len(items) for item in items)
+    return int(mav.MAV_MISSION_INVALID_PARAM1 if outside else ACCEPTED)
+
+
+def check_rally_item(item: MissionItem) -> int:
+    """Return the MAV_MISSION_RESULT of a rally point."""
+    if item.command != mav.MAV_CMD_NAV_RALLY_POINT:
+        return int(mav.MAV_MISSION_UNSUPPORTED)
+    if item.frame not in GLOBAL_FRAMES:
+        return int(mav.MAV_MISSION_UNSUPPORTED_FRAME)
+    return check_place(item) or check_height(item)
+
+
+def check_place(item: MissionItem) -> int:
+    """Return the MAV_MISSION_RESULT of a latitude and a longitude."""
+    if abs(item.x * DEGREES) > LARGEST_LATITUDE_DEG:
+        return int(mav.MAV_MISSION_INVALID_PARAM5_X)
+    return int(mav.MAV_MISSION_INVALID_PARAM6_Y if abs(item.y * DEGREES) > LARGEST_LONGITUDE_DEG else ACCEPTED)
+
+
+def check_height(item: MissionItem) -> int:
+    """Return the MAV_MISSION_RESULT of an altitude."""
+    return int(ACCEPTED if abs(item.z) <= HIGHEST_M else mav.MAV_MISSION_INVALID_PARAM7)
+
+
+def is_here(item: MissionItem) -> bool:
+    """Whether a take-off or a landing names no place: 0, 0 is what ground stations send that know none."""
+    return (item.x == 0 and item.y == 0) or NOT_GIVEN in (item.x, item.y)
+
+
+def place_of(item: MissionItem, home_enu_m: Vector, origin: Geodetic) -> Vector:
+    """Return where an item with a valid place is, m, ENU; at home's height where it gives no altitude."""
+    x, y, _ = enu_of(Geodetic(item.x * DEGREES, item.y * DEGREES, 0.0), origin)
+    return (x, y, height_of(item, home_enu_m, origin))
+
+
+def height_of(item: MissionItem, home_enu_m: Vector, origin: Geodetic) -> float:
+    """Return the height of an item, m, ENU; home's where it gives none."""
+    if not isfinite(item.z):
+        return home_enu_m[2]
+    return item.z - origin.altitude_m if item.frame in _ABOVE_SEA else home_enu_m[2] + item.z
+
+
+def places(items: Sequence[MissionItem], home_enu_m: Vector, origin: Geodetic) -> Iterator[tuple[int, Vector]]:
+    """Yield the sequence number and the place, m, ENU, of every item that the vehicle would fly to."""
+    for seq, item in enumerate(items):
+        allowed = _ALLOWED.get(item.command)
+        if allowed is None or not allowed.place:
+            continue
+        if not (allowed.here and is_here(item)):
+            yield seq, place_of(item, home_enu_m, origin)
+        elif allowed.height:
+            yield seq, (home_enu_m[0], home_enu_m[1], height_of(item, home_enu_m, origin))
+
+
+MISSION_RULES = Rules(check_item, check_mission)
+RALLY_RULES = Rules(check_rally_item, lambda _: ACCEPTED)

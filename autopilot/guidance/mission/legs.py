@@ -1,0 +1,231 @@
+"""How each mission item is flown: as phases, each an order and what ends it."""
+
+from collections.abc import Callable, Mapping
+from math import dist, inf, isfinite, isnan, nan, pi, radians, remainder, tau
+from typing import NamedTuple, TypeAlias
+
+from colibri.autopilot.guidance.mission.items import height_of, is_here, place_of
+from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Land, Order, Return, TakeOff
+from colibri.common.earth.geodesy import Geodetic
+from colibri.common.types import Vector
+from colibri.mavlink.mission.items import MissionItem
+from colibri.mavlink.wire.dialect import mav
+
+SMALLEST_RADIUS_M = 1.0
+_TURNED_RAD = radians(5.0)
+_TURN_WITHIN_S = 30.0
+"""A turn that takes longer is not waited for."""
+
+
+class Situation(NamedTuple):
+    """What the mission sees of the flight.
+
+    Attributes:
+        position_enu_m: m.
+        velocity_enu_m_s: m/s.
+        yaw_rad: Counter-clockwise from east.
+        landed: Whether the vehicle stands on the ground.
+        arrived: Whether the order of the step before is fulfilled.
+        turns: How often the vehicle went around, of the Circle of the step before.
+        home_enu_m: m.
+        origin: Of the ENU frame.
+    """
+
+    position_enu_m: Vector
+    velocity_enu_m_s: Vector
+    yaw_rad: float
+    landed: bool
+    arrived: bool
+    turns: float
+    home_enu_m: Vector
+    origin: Geodetic
+
+
+class Defaults(NamedTuple):
+    """What holds where an item does not say.
+
+    Attributes:
+        acceptance_m: Closer to a place than this it is reached.
+        takeoff_height_m: Above the ground, where a mission begins there without a take-off.
+        orbit_radius_m: Of LOITER_TURNS.
+    """
+
+    acceptance_m: float = 0.5
+    takeoff_height_m: float = 2.5
+    orbit_radius_m: float = 10.0
+
+
+class Context(NamedTuple):
+    """What an item begins with.
+
+    Attributes:
+        situation: Now.
+        defaults: Where it does not say.
+        order: The last one.
+        speed_m_s: That the mission asked for; None for the cruise speed.
+    """
+
+    situation: Situation
+    defaults: Defaults
+    order: Order
+    speed_m_s: float | None
+
+
+class Phase(NamedTuple):
+    """A part of flying an item.
+
+    Attributes:
+        order: What to do; None for what was done before.
+        ends: (situation, seconds since the phase began) -> whether it is over.
+        reaches: Whether the item counts as reached then.
+    """
+
+    order: Order | None
+    ends: Callable[[Situation, float], bool]
+    reaches: bool = False
+
+
+Leg: TypeAlias = Callable[[MissionItem, Context], tuple[Phase, ...]]
+
+
+def phases_of(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+    """Return how an item is flown; nothing where that takes no time."""
+    leg = _LEGS.get(item.command)
+    return () if leg is None else leg(item, context)
+
+
+def _waypoint(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+    radius = item.p2 if item.p2 > 0.0 else context.defaults.acceptance_m
+    return _there(item, context, radius, _or_zero(item.p1))
+
+
+def _loiter_forever(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+    return _there(item, context, context.defaults.acceptance_m, inf)
+
+
+def _loiter_time(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+    return _there(item, context, context.defaults.acceptance_m, _or_zero(item.p1))
+
+
+def _loiter_to_height(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+    """A multicopter climbs on the way: it is at the height when it is there."""
+    return _there(item._replace(p4=nan), context, context.defaults.acceptance_m, 0.0)
+
+
+def _there(item: MissionItem, context: Context, radius_m: float, stay_s: float) -> tuple[Phase, ...]:
+    """Fly to a place, heading as p4 says, and stay; stay_s 0 flies through."""
+    situation = context.situation
+    place = place_of(item, situation.home_enu_m, situation.origin)
+    go = GoTo(place, _yaw(item.p4), context.speed_m_s)
+    climb = _off_the_ground(place[2], context)
+    stay = (Phase(None, _after(stay_s)),) if stay_s > 0.0 else ()
+    return (*climb, Phase(go, _within(place, radius_m), reaches=True), *stay)
+
+
+def _circle(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+    situation = context.situation
+    center = place_of(item, situation.home_enu_m, situation.origin)
+    radius = item.p3 if abs(item.p3) > 0.0 else context.defaults.orbit_radius_m
+    radius = max(radius, SMALLEST_RADIUS_M) if radius > 0.0 else min(radius, -SMALLEST_RADIUS_M)
+    turns = 1.0 if isnan(item.p1) else item.p1
+    order = Circle(center, radius, context.speed_m_s, mav.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER)
+    around = Phase(order, lambda now, _: abs(now.turns) >= turns, reaches=True)
+    return (*_off_the_ground(center[2], context), around)
+
+
+def _take_off(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+    """Straight up, then to the place if it names one."""
+    situation, defaults = context.situation, context.defaults
+    height = height_of(item, situation.home_enu_m, situation.origin)
+    yaw = _yaw(item.p4)
+    high = situation.position_enu_m[2] >= height - defaults.acceptance_m and not situation.landed
+    up = () if high else (Phase(TakeOff(height, yaw), _above(height - defaults.acceptance_m)),)
+    if is_here(item):
+        return (*up[:-1], *(phase._replace(reaches=True) for phase in up[-1:]))
+    place = place_of(item, situation.home_enu_m, situation.origin)
+    go = GoTo(place, yaw, context.speed_m_s)
+    return (*up, Phase(go, _within(place, defaults.acceptance_m), reaches=True))
+
+
+def _land(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+    situation = context.situation
+    place = None if is_here(item) else place_of(item, situation.home_enu_m, situation.origin)
+    return (Phase(Land(place, _yaw(item.p4)), _landed, reaches=True),)
+
+
+def _return(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+    del item, context
+    return (Phase(Return(), _landed, reaches=True),)
+
+
+def _delay(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+    del context
+    return (Phase(None, _after(_or_zero(item.p1)), reaches=True),)
+
+
+def _turn(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+    """Turn on the spot; p1 counts clockwise from north, or from the heading now where p4 is 1."""
+    situation = context.situation
+    if situation.landed:
+        return ()
+    angle = radians(item.p1)
+    yaw = remainder(0.5 * pi - angle, tau)
+    if item.p4 == 1.0:
+        yaw = remainder(situation.yaw_rad - (-angle if item.p3 < 0.0 else angle), tau)
+    place = context.order.position_enu_m if isinstance(context.order, GoTo) else situation.position_enu_m
+
+    def turned(now: Situation, since_s: float) -> bool:
+        return abs(remainder(now.yaw_rad - yaw, tau)) <= _TURNED_RAD or now.arrived or since_s >= _TURN_WITHIN_S
+
+    return (Phase(GoTo(place, yaw, context.speed_m_s), turned, reaches=True),)
+
+
+_LEGS: Mapping[int, Leg] = {
+    mav.MAV_CMD_NAV_WAYPOINT: _waypoint,
+    mav.MAV_CMD_NAV_LOITER_UNLIM: _loiter_forever,
+    mav.MAV_CMD_NAV_LOITER_TIME: _loiter_time,
+    mav.MAV_CMD_NAV_LOITER_TURNS: _circle,
+    mav.MAV_CMD_NAV_LOITER_TO_ALT: _loiter_to_height,
+    mav.MAV_CMD_NAV_TAKEOFF: _take_off,
+    mav.MAV_CMD_NAV_LAND: _land,
+    mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: _return,
+    mav.MAV_CMD_NAV_DELAY: _delay,
+    mav.MAV_CMD_CONDITION_DELAY: _delay,
+    mav.MAV_CMD_CONDITION_YAW: _turn,
+}
+
+
+def _off_the_ground(height_m: float, context: Context) -> tuple[Phase, ...]:
+    """Take off first where the vehicle stands: a mission may begin with a waypoint, as MAVSDK's do."""
+    situation, defaults = context.situation, context.defaults
+    if not situation.landed:
+        return ()
+    up = max(height_m, situation.position_enu_m[2] + defaults.takeoff_height_m)
+    return (Phase(TakeOff(up), _above(up - defaults.acceptance_m)),)
+
+
+def _yaw(clockwise_from_north_deg: float) -> float | None:
+    if not isfinite(clockwise_from_north_deg):
+        return None
+    return remainder(0.5 * pi - radians(clockwise_from_north_deg), tau)
+
+
+def _or_zero(value: float) -> float:
+    return 0.0 if isnan(value) else value
+
+
+def _within(place: Vector, radius_m: float) -> Callable[[Situation, float], bool]:
+    return lambda now, _: now.arrived or dist(now.position_enu_m, place) <= radius_m
+
+
+def _above(height_m: float) -> Callable[[Situation, float], bool]:
+    return lambda now, _: now.arrived or now.position_enu_m[2] >= height_m
+
+
+def _after(wait_s: float) -> Callable[[Situation, float], bool]:
+    return lambda _, since_s: since_s >= wait_s
+
+
+def _landed(now: Situation, since_s: float) -> bool:
+    del since_s
+    return now.landed

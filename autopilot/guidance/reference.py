@@ -1,0 +1,162 @@
+"""The reference that leads the vehicle from wherever it is to whatever it shall do: smooth, within limits.
+
+The chain of integrators of `reference_chain` follows a target that may itself move; once on it, the target itself is
+the reference, to the last bit, until it jumps. An axis may have no target position, or neither position nor velocity:
+then the chain begins where the target does.
+"""
+
+from collections.abc import Sequence
+from enum import IntEnum
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import Horizon, VehicleState
+from colibri.autopilot.guidance.integrator_chain import Limits, advance
+from colibri.common.rotations import nearest_turn
+from colibri.common.types import Array
+
+_REACHED = 1e-5
+"""Nobody feels a step so small; the chain, whose snap changes once a sample, stays no further off a moving target."""
+_IN_ITS_SCALE = np.array([[1.0], [1.0], [1.0], [1e-2]])
+"""Jerk is the last of the chain to settle, and the largest number of it."""
+
+
+class Kind(IntEnum):
+    """What of a target binds an axis."""
+
+    POSITION = 0
+    VELOCITY = 1
+    ACCELERATION = 2
+
+
+ALL_BOUND = (Kind.POSITION, Kind.POSITION, Kind.POSITION)
+
+
+class Reference(NamedTuple):
+    """Where the chain of integrators stands.
+
+    Attributes:
+        motion: Position, velocity, acceleration, jerk, ENU, (4, 3).
+        heading: Yaw, rad, unwrapped, and its rate, (2,).
+    """
+
+    motion: Array
+    heading: Array
+
+
+class Target(NamedTuple):
+    """What the reference shall become, at every instant of the preview.
+
+    Attributes:
+        motion: Position, velocity, acceleration, jerk, snap, ENU, (n, 5, 3).
+        kinds: What of it binds, for x, y and z.
+        heading: Yaw, rate, acceleration, (n, 3).
+        turns: Whether yaw itself binds; otherwise its rate.
+    """
+
+    motion: Array
+    kinds: tuple[Kind, Kind, Kind]
+    heading: Array
+    turns: bool = True
+
+
+def at_rest(state: VehicleState) -> Reference:
+    """Return a reference that stands still where the vehicle is."""
+    motion = np.zeros((4, 3))
+    motion[0] = state.position_enu_m
+    return Reference(motion, np.array([state.euler[2], 0.0]))
+
+
+def moving_with(state: VehicleState) -> Reference:
+    """Return a reference that takes over the vehicle's motion."""
+    motion = np.zeros((4, 3))
+    motion[0], motion[1] = state.position_enu_m, state.velocity_enu_m_s
+    return Reference(motion, np.array([state.euler[2], 0.0]))
+
+
+def still_target(
+    position_enu_m: Sequence[float], yaw_rad: float, samples: int, kinds: tuple[Kind, Kind, Kind] | None = None
+) -> Target:
+    """Return a target that stays at a place."""
+    motion, heading = np.zeros((samples, 5, 3)), np.zeros((samples, 3))
+    motion[:, 0] = position_enu_m
+    heading[:, 0] = yaw_rad
+    return Target(motion, kinds or ALL_BOUND, heading)
+
+
+def target_of(horizon: Horizon) -> Target:
+    """Return a planned horizon as a target."""
+    motion = np.stack(horizon[:5], axis=1)
+    return Target(motion, ALL_BOUND, np.stack(horizon[5:], axis=1))
+
+
+def lead(reference: Reference, target: Target, limits: Limits, interval_s: float) -> tuple[Horizon, Reference]:
+    """Return the references from now on, and where the chain stands at the second of them.
+
+    Args:
+        reference: Where it stands now.
+        target: From now on, as many instants as there shall be references.
+        limits: Of the approach.
+        interval_s: Between two instants.
+    """
+    if target.turns and target.kinds == ALL_BOUND and _is_at(reference, target.motion[0, :4], target.heading[0]):
+        return _on_target(reference, target)
+    count = len(target.motion)
+    motion, heading = np.empty((count, 5, 3)), np.empty((count, 3))
+    kinds = np.array(target.kinds, dtype=np.int64)
+    advance(
+        reference.motion,
+        reference.heading,
+        target.motion,
+        kinds,
+        target.heading,
+        target.turns,
+        limits,
+        interval_s,
+        motion,
+        heading,
+    )
+    return _horizon(motion, heading), Reference(motion[1, :4].copy(), heading[1, :2].copy())
+
+
+def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference]:
+    """Return the target itself, its yaw turned in full turns to where the reference's is."""
+    heading = target.heading
+    turns = round(float(reference.heading[0] - heading[0, 0]) / (2.0 * pi))
+    if turns:
+        heading = heading.copy()
+        heading[:, 0] += 2.0 * pi * turns
+    after = Reference(target.motion[1, :4].copy(), heading[1, :2].copy())
+    return _horizon(target.motion, heading), after
+
+
+def lead_along(reference: Reference, plan: Horizon, limits: Limits, interval_s: float) -> tuple[Horizon, Reference]:
+    """Do the same for a plan, without the arrays of a target once it is reached: tracks are in a hurry every sample."""
+    if not _is_at(reference, _motion_at(plan, 0), (plan.yaw_rad[0], plan.yaw_rate_rad_s[0])):
+        return lead(reference, target_of(plan), limits, interval_s)
+    turns = round(float(reference.heading[0] - plan.yaw_rad[0]) / (2.0 * pi))
+    if turns:
+        plan = plan._replace(yaw_rad=plan.yaw_rad + 2.0 * pi * turns)
+    return plan, Reference(_motion_at(plan, 1), np.array([plan.yaw_rad[1], plan.yaw_rate_rad_s[1]]))
+
+
+def _motion_at(plan: Horizon, sample: int) -> Array:
+    return np.array([column[sample] for column in plan[:4]])
+
+
+def _horizon(motion: Array, heading: Array) -> Horizon:
+    p, v, a, j, s = (np.ascontiguousarray(motion[:, order]) for order in range(5))
+    yaw, rate, acceleration = (np.ascontiguousarray(heading[:, order]) for order in range(3))
+    return Horizon(p, v, a, j, s, yaw, rate, acceleration)
+
+
+def _is_at(reference: Reference, motion: Array, heading: Sequence[float] | Array) -> bool:
+    """Whether the reference has reached a target, or still is on it: a target may jump, a reference may not."""
+    yaw = nearest_turn(float(heading[0]), float(reference.heading[0]))
+    if max(abs(float(reference.heading[0]) - yaw), abs(float(reference.heading[1]) - heading[1])) >= _REACHED:
+        return False
+    if reference.motion.tobytes() == motion.tobytes():  # as it is every time but the first, and quickly told
+        return True
+    return bool((np.abs(reference.motion - motion) * _IN_ITS_SCALE).max() < _REACHED)

@@ -1,0 +1,84 @@
+"""The course of an offboard companion: its setpoints, from moment to moment, no faster than anything else flies."""
+
+from math import hypot, isnan
+
+import numpy as np
+
+from colibri.autopilot.guidance.attitude_reference import AttitudeReference
+from colibri.autopilot.guidance.reference import Kind, Target, still_target
+from colibri.autopilot.guidance.tasks.attitude import Leaning
+from colibri.autopilot.guidance.tasks.position import Stop
+from colibri.autopilot.guidance.tasks.task import Endless, Lean, Motion, Scene
+from colibri.common.types import Vector
+from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, PositionSetpoint
+
+UP = 2
+_BRAKE_1_S = 2.0
+"""How fast an acceleration fades where the speed comes near what is allowed."""
+
+
+class Companion(Endless):
+    """The setpoints of an offboard companion; where they end, stop."""
+
+    def __init__(self, attitude: AttitudeReference | None) -> None:
+        """Follow setpoints; of attitude if there is a generator of demands for it."""
+        self._leaning = Leaning(attitude) if attitude else None
+        self._hold = Stop()
+
+    def ask(self, scene: Scene) -> Motion | Lean:
+        """Return what the latest setpoint asks for."""
+        setpoint = scene.steered.setpoint
+        if isinstance(setpoint, PositionSetpoint):
+            if self._leaning:
+                self._leaning.forget()
+            self._hold = Stop()
+            return Motion(position_target(setpoint.in_enu(scene.state.euler[2]), scene), scene.behaviour.limits)
+        if isinstance(setpoint, AttitudeSetpoint) and self._leaning:
+            self._hold = Stop()
+            return self._leaning.by_setpoint(setpoint, scene)
+        return self._hold.ask(scene)
+
+
+def position_target(setpoint: PositionSetpoint, scene: Scene) -> Target:
+    """Return a setpoint as a target: each axis bound by the lowest derivative that is given."""
+    target = still_target(scene.place, scene.yaw_rad, scene.samples)
+    velocity = allowed_velocity(setpoint.velocity_m_s, scene)
+    ahead_s = (scene.now_us - setpoint.time_us) * 1e-6 + scene.interval_s * np.arange(scene.samples)
+    kinds = []
+    for axis in range(3):
+        p, v, a = setpoint.position_enu_m[axis], velocity[axis], setpoint.acceleration_m_s2[axis]
+        v_or_0 = 0.0 if isnan(v) else v
+        if not isnan(p):
+            kinds.append(Kind.POSITION)
+            target.motion[:, 0, axis] = p + v_or_0 * ahead_s
+        elif not isnan(v) or isnan(a):
+            kinds.append(Kind.VELOCITY)
+        else:
+            kinds.append(Kind.ACCELERATION)
+        target.motion[:, 1, axis] = v_or_0
+        if not isnan(a):
+            target.motion[:, 2, axis] = allowed_acceleration(a, axis, scene)
+    x, y, z = kinds
+    target.heading[:, 1] = 0.0 if isnan(setpoint.yaw_rate_rad_s) else setpoint.yaw_rate_rad_s
+    if not isnan(setpoint.yaw_rad):
+        target.heading[:, 0] = setpoint.yaw_rad
+    return target._replace(kinds=(x, y, z), turns=not isnan(setpoint.yaw_rad))
+
+
+def allowed_velocity(velocity: Vector, scene: Scene) -> Vector:
+    """Return a velocity, or the part of it that may be flown; nan stays nan."""
+    x, y, z = velocity
+    fast = hypot(*(0.0 if isnan(v) else v for v in (x, y)))
+    share = min(1.0, scene.behaviour.fastest_m_s / fast) if fast > 0.0 else 1.0
+    limits = scene.behaviour.limits
+    return (share * x, share * y, z if isnan(z) else min(max(z, -limits.sink_m_s), limits.climb_m_s))
+
+
+def allowed_acceleration(acceleration: float, axis: int, scene: Scene) -> float:
+    """Return an acceleration, or the part of it that leads to no forbidden speed and that may be flown."""
+    limits, speed = scene.behaviour.limits, scene.velocity[axis]
+    up, down, most = scene.behaviour.fastest_m_s, scene.behaviour.fastest_m_s, limits.acceleration_m_s2
+    if axis == UP:
+        up, down, most = limits.climb_m_s, limits.sink_m_s, limits.lift_m_s2
+    least = max(-most, _BRAKE_1_S * (-down - speed))
+    return min(max(acceleration, least), min(most, _BRAKE_1_S * (up - speed)))

@@ -1,0 +1,104 @@
+"""The course around a centre: to the circle, then along it."""
+
+from math import copysign, hypot, pi, sqrt
+
+import numpy as np
+
+from colibri.autopilot.guidance.reference import ALL_BOUND, Target
+from colibri.autopilot.guidance.tasks.orders import Circle, GoTo
+from colibri.autopilot.guidance.tasks.position import Way
+from colibri.autopilot.guidance.tasks.task import Endless, Motion, Scene
+from colibri.common import elementwise
+from colibri.common.kernels import atan2, cos, sin
+from colibri.common.types import Array, Vector
+from colibri.mavlink.wire.dialect import mav
+
+_SHARE = 0.8
+"""Part of the horizontal acceleration that a circle may need."""
+_ON_IT_M, _ON_IT_M_S = 0.3, 0.5
+"""So close to the circle's line, and crossing it no faster, the reference goes on along it."""
+
+
+class Round(Endless):
+    """Around a centre: to the nearest point of the circle, then along it. On the circle already, it goes on at once.
+
+    Attributes:
+        order: What it flies: by this it can begin again.
+        turns: How often it went around.
+    """
+
+    def __init__(self, order: Circle, scene: Scene) -> None:
+        """Begin where the reference is."""
+        self.order = order
+        self._radius_m = abs(order.radius_m)
+        self._turn = -copysign(1.0, order.radius_m)
+        self._first_yaw_rad = scene.yaw_rad
+        self._angle = self._angle_of(scene.place)
+        x, y, z = order.center_enu_m
+        entry = (x + self._radius_m * cos(self._angle), y + self._radius_m * sin(self._angle), z)
+        yaw_rad = float(self._heading(np.array([self._angle]), 0.0)[0, 0])
+        self._way = Way(GoTo(entry, yaw_rad, order.speed_m_s), scene)
+        self._circles, self._rate = False, 0.0
+        self.turns = 0.0
+
+    def ask(self, scene: Scene) -> Motion:
+        """Return the way to the circle, then the motion along it."""
+        if not self._circles:
+            if not self._joins(scene):
+                return self._way.ask(scene)
+            self._circles, self._angle = True, self._angle_of(scene.place)
+            self._rate = self._rate_of(scene)
+        rate = self._rate = self._towards(self._turn * self._speed_m_s(scene) / self._radius_m, scene)
+        angles: Array = self._angle + rate * scene.interval_s * np.arange(scene.samples, dtype=np.float64)
+        self._angle = float(angles[1])
+        self.turns += abs(rate) * scene.interval_s / (2.0 * pi)
+        target = Target(self._motion(angles, rate), ALL_BOUND, self._heading(angles, rate))
+        return Motion(target, scene.behaviour.limits)
+
+    def _angle_of(self, place: Vector) -> float:
+        """Return where a place is seen from the centre, counter-clockwise from east; its own place counts as east."""
+        return atan2(place[1] - self.order.center_enu_m[1], place[0] - self.order.center_enu_m[0])
+
+    def _rate_of(self, scene: Scene) -> float:
+        """Return how fast the reference goes around, rad/s, counter-clockwise."""
+        (vx, vy, _), angle = scene.velocity, self._angle
+        return (vy * cos(angle) - vx * sin(angle)) / self._radius_m
+
+    def _towards(self, wanted: float, scene: Scene) -> float:
+        """Return the rate of now, rad/s: no sooner the one that is wanted than the vehicle can gain that speed."""
+        most = _SHARE * scene.behaviour.limits.acceleration_m_s2 * scene.interval_s / self._radius_m
+        return min(max(wanted, self._rate - most), self._rate + most)
+
+    def _joins(self, scene: Scene) -> bool:
+        """Whether the reference is on the circle, and not about to leave it but along it."""
+        east, north, above = (p - c for p, c in zip(scene.place, self.order.center_enu_m, strict=True))
+        away = hypot(east, north)
+        if abs(away - self._radius_m) > _ON_IT_M or abs(above) > _ON_IT_M:
+            return False
+        vx, vy, vz = scene.velocity
+        return abs(vx * east + vy * north) < _ON_IT_M_S * away and abs(vz) < _ON_IT_M_S
+
+    def _speed_m_s(self, scene: Scene) -> float:
+        behaviour, asked = scene.behaviour, self.order.speed_m_s
+        wanted = behaviour.limits.speed_m_s if asked is None else asked
+        return min(wanted, behaviour.fastest_m_s, sqrt(_SHARE * behaviour.limits.acceleration_m_s2 * self._radius_m))
+
+    def _motion(self, angles: Array, rate: float) -> Array:
+        motion = np.zeros((len(angles), 5, 3))
+        east, north = self._radius_m * elementwise.cos(angles), self._radius_m * elementwise.sin(angles)
+        for order in range(5):
+            motion[:, order, 0], motion[:, order, 1] = east, north
+            east, north = -rate * north, rate * east
+        motion[:, 0] += self.order.center_enu_m
+        return motion
+
+    def _heading(self, angles: Array, rate: float) -> Array:
+        heading = np.zeros((len(angles), 3))
+        behaviour = self.order.yaw_behaviour
+        if behaviour in (mav.ORBIT_YAW_BEHAVIOUR_HOLD_INITIAL_HEADING, mav.ORBIT_YAW_BEHAVIOUR_UNCHANGED):
+            heading[:, 0] = self._first_yaw_rad
+        elif behaviour == mav.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TANGENT_TO_CIRCLE:
+            heading[:, 0], heading[:, 1] = angles + self._turn * 0.5 * pi, rate
+        else:
+            heading[:, 0], heading[:, 1] = angles + pi, rate
+        return heading

@@ -1,0 +1,93 @@
+"""Sticks to velocity, for a pilot who flies by place."""
+
+from math import hypot
+
+from colibri.autopilot.guidance.reference import Kind, Target, still_target
+from colibri.autopilot.guidance.tasks.task import Endless, Motion, Scene
+from colibri.mavlink.setpoints.setpoints import Sticks, turned
+
+_DEADZONE = 0.05
+_SLOW_M_S, _SLOW_RAD_S = 0.1, 0.05
+_MIDDLE = Sticks(0.0, 0.0, 0.5, 0.0)
+
+
+class PositionSticks(Endless):
+    """Sticks to velocity; what is not asked to move is held where it came to rest."""
+
+    def __init__(self) -> None:
+        """Hold nothing yet."""
+        self._xy: tuple[float, float] | None = None
+        self._z: float | None = None
+        self._yaw_rad: float | None = None
+
+    def ask(self, scene: Scene) -> Motion:
+        """Return velocities along the heading, or places."""
+        sticks = scene.steered.sticks or _MIDDLE
+        target = still_target(scene.place, scene.yaw_rad, scene.samples)
+        horizontally = self._move(target, stick_velocity(sticks, scene), scene)
+        vertically = self._climb(target, stick_climb(sticks, scene), scene)
+        self._turn(target, stick_yaw_rate(sticks, scene), scene)
+        kinds = (horizontally, horizontally, vertically)
+        return Motion(target._replace(kinds=kinds, turns=self._yaw_rad is not None), scene.behaviour.limits)
+
+    def _move(self, target: Target, velocity: tuple[float, float], scene: Scene) -> Kind:
+        if velocity != (0.0, 0.0):
+            self._xy = None
+        elif self._xy is None and hypot(*scene.velocity[:2]) < _SLOW_M_S:
+            self._xy = scene.place[:2]
+        target.motion[:, 1, :2] = velocity
+        if self._xy is None:
+            return Kind.VELOCITY
+        target.motion[:, 0, :2] = self._xy
+        return Kind.POSITION
+
+    def _climb(self, target: Target, climb_m_s: float, scene: Scene) -> Kind:
+        if climb_m_s != 0.0:
+            self._z = None
+        elif self._z is None and abs(scene.velocity[2]) < _SLOW_M_S:
+            self._z = scene.place[2]
+        target.motion[:, 1, 2] = climb_m_s
+        if self._z is None:
+            return Kind.VELOCITY
+        target.motion[:, 0, 2] = self._z
+        return Kind.POSITION
+
+    def _turn(self, target: Target, yaw_rate: float, scene: Scene) -> None:
+        if yaw_rate != 0.0:
+            self._yaw_rad = None
+        elif self._yaw_rad is None and abs(float(scene.reference.heading[1])) < _SLOW_RAD_S:
+            self._yaw_rad = scene.yaw_rad
+        target.heading[:, 1] = yaw_rate
+        if self._yaw_rad is not None:
+            target.heading[:, 0] = self._yaw_rad
+
+
+def stick_velocity(sticks: Sticks, scene: Scene) -> tuple[float, float]:
+    """Return the velocity east and north, m/s, that sticks ask for: of full sticks, in any direction, the largest."""
+    ahead, left = dead(sticks.pitch), -dead(sticks.roll)
+    behaviour = scene.behaviour
+    speed = min(behaviour.stick_speed_m_s, behaviour.fastest_m_s) / max(1.0, hypot(ahead, left))
+    east, north, _ = turned((speed * ahead, speed * left, 0.0), scene.state.euler[2])
+    return east, north
+
+
+def stick_climb(sticks: Sticks, scene: Scene) -> float:
+    """Return the speed upwards, m/s, that sticks ask for."""
+    up = dead(2.0 * sticks.thrust - 1.0)
+    return up * (scene.behaviour.limits.climb_m_s if up > 0.0 else scene.behaviour.limits.sink_m_s)
+
+
+def stick_yaw_rate(sticks: Sticks, scene: Scene) -> float:
+    """Return the yaw rate, rad/s, that sticks ask for."""
+    return -dead(sticks.yaw) * scene.behaviour.stick_yaw_rate_rad_s
+
+
+def without_play(sticks: Sticks) -> Sticks:
+    """Return sticks whose play around the middle does nothing; thrust has none."""
+    return sticks._replace(pitch=dead(sticks.pitch), roll=dead(sticks.roll), yaw=dead(sticks.yaw))
+
+
+def dead(stick: float) -> float:
+    """Return a stick's deflection, -1..1, without the play around its middle."""
+    beyond = max(abs(stick) - _DEADZONE, 0.0) / (1.0 - _DEADZONE)
+    return beyond if stick > 0.0 else -beyond

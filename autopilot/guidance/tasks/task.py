@@ -1,0 +1,152 @@
+"""What a course is: it sees the scene, sample after sample, and asks for a motion, or for an attitude and a thrust."""
+
+from typing import NamedTuple, Protocol, TypeAlias
+
+from colibri.autopilot.control.interface import AttitudeDemand, Horizon, VehicleState
+from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.integrator_chain import Limits
+from colibri.autopilot.guidance.reference import Kind, Reference, Target, target_of
+from colibri.common.types import Vector
+from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
+
+_LIFT_M, _LIFT_M_S = 0.15, 0.05
+
+
+class Steered(NamedTuple):
+    """What clients ask for from moment to moment; None where nobody does.
+
+    Attributes:
+        sticks: Of a pilot.
+        setpoint: Of an offboard companion, in ENU.
+        leader: What is to be followed.
+    """
+
+    sticks: Sticks | None = None
+    setpoint: OffboardSetpoint | None = None
+    leader: TargetState | None = None
+
+
+NOT_STEERED = Steered()
+
+
+class Scene(NamedTuple):
+    """What a course sees.
+
+    Attributes:
+        now_us: Simulated time.
+        state: The vehicle.
+        reference: Where the reference stands.
+        home_enu_m: Where the vehicle took off.
+        behaviour: The numbers that it flies by.
+        interval_s: Between two instants of a target.
+        samples: How many instants a target has.
+        steered: What clients ask for from moment to moment.
+    """
+
+    now_us: int
+    state: VehicleState
+    reference: Reference
+    home_enu_m: Vector
+    behaviour: Behaviour
+    interval_s: float
+    samples: int
+    steered: Steered = NOT_STEERED
+
+    @property
+    def yaw_rad(self) -> float:
+        """Heading of the reference."""
+        return float(self.reference.heading[0])
+
+    @property
+    def place(self) -> Vector:
+        """Position of the reference."""
+        x, y, z = self.reference.motion[0].tolist()
+        return (x, y, z)
+
+    @property
+    def velocity(self) -> Vector:
+        """Velocity of the reference."""
+        x, y, z = self.reference.motion[1].tolist()
+        return (x, y, z)
+
+
+class Motion(NamedTuple):
+    """A course by position and yaw.
+
+    Attributes:
+        target: What the reference is to become.
+        limits: How fast.
+    """
+
+    target: Target
+    limits: Limits
+
+
+class Planned(NamedTuple):
+    """A course along a plan.
+
+    Attributes:
+        horizon: What the reference is to become.
+        limits: How fast, until it is that.
+        for_law: The same as the control law previews it, where that is something else.
+    """
+
+    horizon: Horizon
+    limits: Limits
+    for_law: Horizon | None = None
+
+    @property
+    def target(self) -> Target:
+        """The plan as a target."""
+        return target_of(self.horizon)
+
+
+class Lean(NamedTuple):
+    """A course by attitude and thrust.
+
+    Attributes:
+        demand: What the control law is to hold.
+        reference: Where the reference stands meanwhile.
+        lifts: Whether a vehicle that stands must leave the ground for it.
+        sinks: Whether a vehicle in the air must sink.
+        drifts: Whether the velocity is not to be believed: see `landing.watch`.
+    """
+
+    demand: AttitudeDemand
+    reference: Reference
+    lifts: bool
+    sinks: bool
+    drifts: bool = False
+
+
+Asked: TypeAlias = Motion | Planned | Lean
+
+
+class Course(Protocol):
+    """A way to fly."""
+
+    def ask(self, scene: Scene) -> Asked:
+        """Return what is to be flown from now on. Called once a control sample."""
+        ...
+
+    def arrived(self, scene: Scene) -> bool:
+        """Whether it is flown to its end."""
+        ...
+
+
+class Endless:
+    """A course that something else ends: the ground, a command, silence."""
+
+    def arrived(self, scene: Scene) -> bool:
+        """Never by itself."""
+        del scene
+        return False
+
+
+def lifts(target: Target, state: VehicleState) -> bool:
+    """Whether a vehicle that stands must leave the ground for this target."""
+    end = target.motion[-1, :, 2]
+    kind = target.kinds[2]
+    if kind is Kind.POSITION:
+        return bool(end[0] > state.position_enu_m[2] + _LIFT_M)
+    return bool(end[1 if kind is Kind.VELOCITY else 2] > _LIFT_M_S)

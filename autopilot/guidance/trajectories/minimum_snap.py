@@ -1,0 +1,133 @@
+"""The smoothest way through points at given times: piecewise polynomials that minimise the integral of a derivative.
+
+Sources: D. Mellinger and V. Kumar, "Minimum snap trajectory generation and control for quadrotors", ICRA 2011, for the
+problem: snap for the position, acceleration for yaw. C. Richter, A. Bry and N. Roy, "Polynomial trajectory planning for
+aggressive quadrotor flight", ISRR 2013, for its solution: the unknowns are the derivatives at the inner points, so that
+every equality constraint holds by construction and the KKT system becomes symmetric positive definite. It couples only
+neighbours, and each segment is written in its own time from 0 to 1.
+"""
+
+from dataclasses import dataclass
+from math import factorial, perm
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.autopilot.guidance.trajectories.taylor import Jet
+from colibri.common.matrices import inverse, matmul, solve
+from colibri.common.types import Array
+
+SNAP = 4
+ACCELERATION = 2
+
+
+@dataclass(frozen=True, slots=True)
+class PiecewisePolynomial:
+    """Polynomials that follow one another in time.
+
+    Attributes:
+        times_s: Where they meet, with both ends, s, strictly increasing, (n,).
+        coefficients: Of each in its own time from 0 to 1, lowest power first, (n - 1, powers, axes).
+    """
+
+    times_s: Array
+    coefficients: Array
+
+    def __call__(self, t: Jet) -> tuple[Jet, ...]:
+        """Return each axis at time `t`, s; the first and the last polynomial go on beyond the ends."""
+        piece = self._piece(t.coefficients[0])
+        tau = (t - self.times_s[piece]) * (1.0 / np.diff(self.times_s)[piece])
+        return tuple(_horner(self.coefficients[piece, :, axis], tau) for axis in range(self.coefficients.shape[2]))
+
+    def _piece(self, t: Array) -> NDArray[np.intp]:
+        return np.clip(np.searchsorted(self.times_s, t, side="right") - 1, 0, len(self.times_s) - 2)
+
+
+def minimise(order: int, times_s: Array, points: Array) -> PiecewisePolynomial:
+    """Return the curve through `points` with the least integral of its squared derivative of that order.
+
+    It is at rest at both ends: its derivatives from the first to that below `order` are zero. Between polynomials
+    those derivatives are continuous because they are shared, and those up to 2 order - 2 because it is the minimum.
+
+    Args:
+        order: Which derivative: `SNAP` or `ACCELERATION`.
+        times_s: When it passes the points, s, strictly increasing, (n,), n >= 2.
+        points: What it passes, (n, axes).
+    """
+    durations = np.diff(times_s)
+    from_ends = inverse(_ends(order))
+    elements = _elements(durations, matmul(matmul(from_ends.T, _cost(order)), from_ends))
+    knots = np.zeros((len(times_s), order, points.shape[1]))
+    knots[:, 0] = points
+    if len(times_s) > 2:
+        knots[1:-1, 1:] = _free_derivatives(elements, points)
+    both = np.concatenate([knots[:-1], knots[1:]], axis=1)
+    in_own_time = both * np.tile(_powers(durations, order), 2)[:, :, None]
+    coefficients = matmul(from_ends, np.moveaxis(in_own_time, 0, 1).reshape(2 * order, -1))
+    return PiecewisePolynomial(times_s, np.moveaxis(coefficients.reshape(2 * order, *points[1:].shape), 1, 0))
+
+
+def _ends(order: int) -> Array:
+    """Return the matrix from a polynomial's coefficients to its derivatives at 0, then at 1."""
+    powers = range(2 * order)
+    at_0 = [[float(factorial(k)) if power == k else 0.0 for power in powers] for k in range(order)]
+    at_1 = [[float(perm(power, k)) for power in powers] for k in range(order)]
+    return np.array(at_0 + at_1)
+
+
+def _cost(order: int) -> Array:
+    """Return H of the integral from 0 to 1 of the squared derivative, cᵀ H c."""
+    powers = range(2 * order)
+
+    def entry(i: int, j: int) -> float:
+        return perm(i, order) * perm(j, order) / (i + j - 2 * order + 1) if min(i, j) >= order else 0.0
+
+    return np.array([[entry(i, j) for j in powers] for i in powers])
+
+
+def _powers(durations: Array, order: int) -> Array:
+    """Return what turns derivatives per second into those per segment, (segments, order)."""
+    powers = np.ones((len(durations), order))
+    powers[:, 1:] = durations[:, None]
+    return np.cumprod(powers, axis=1, dtype=np.float64)
+
+
+def _elements(durations: Array, stiffness: Array) -> Array:
+    """Return each segment's cost as a form of the derivatives at its ends: (segments, end, order, end, order)."""
+    order = len(stiffness) // 2
+    scale = np.tile(_powers(durations, order), 2)
+    elements = stiffness * scale[:, :, None] * scale[:, None, :] / _powers(durations, 2 * order)[:, -1:, None]
+    return elements.reshape(-1, 2, order, 2, order)
+
+
+def _free_derivatives(elements: Array, points: Array) -> Array:
+    """Return the derivatives at the inner points where the cost is least, (n - 2, order - 1, axes).
+
+    The blocks of the cost's curvature couple only neighbours: block elimination forwards, then backwards.
+    """
+    before, after = elements[:-1], elements[1:]
+    pull = (
+        before[:, 1, 1:, 0, :1] * points[:-2, None]
+        + (before[:, 1, 1:, 1, :1] + after[:, 0, 1:, 0, :1]) * points[1:-1, None]
+        + after[:, 0, 1:, 1, :1] * points[2:, None]
+    )
+    curvature = before[:, 1, 1:, 1, 1:] + after[:, 0, 1:, 0, 1:]
+    coupling = after[:-1, 0, 1:, 1, 1:]
+    free = -pull
+    through = np.empty_like(coupling)
+    for k, block in enumerate(coupling):
+        through[k], free[k] = solve(curvature[k], block), solve(curvature[k], free[k])
+        curvature[k + 1] -= matmul(block.T, through[k])
+        free[k + 1] -= matmul(block.T, free[k])
+    free[-1] = solve(curvature[-1], free[-1])
+    for k in range(len(coupling) - 1, -1, -1):
+        free[k] -= matmul(through[k], free[k + 1])
+    return free
+
+
+def _horner(coefficients: Array, x: Jet) -> Jet:
+    """Return a polynomial of a jet, coefficients (n, powers) of its own at each time."""
+    value = x * 0.0 + coefficients[:, -1]
+    for coefficient in coefficients[:, -2::-1].T:
+        value = value * x + coefficient
+    return value

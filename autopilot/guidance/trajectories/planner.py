@@ -1,0 +1,143 @@
+"""Setpoints: a track, tabulated at equal intervals, handed out as a horizon."""
+
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.autopilot.control.interface import Horizon, Preview
+from colibri.autopilot.control.profile import References
+from colibri.autopilot.guidance.trajectories.taylor import Jet, atan2
+from colibri.autopilot.guidance.trajectories.tracks import Track, position
+from colibri.common import elementary, elementwise
+from colibri.common.types import Array
+
+_VERTICAL_SPEED_DECIMALS = 8
+_SNAP, _YAW_ACCELERATION = 4, 2
+_STILL = 1e-3
+"""Slower than this, in m/s (and so on for higher derivatives), there is no direction to look along."""
+_BLOCK_SAMPLES = 512
+_START = Preview(interval_us=100_000, samples=1)
+
+
+class Planner:
+    """References at equal intervals along a track; after its end the last point is held.
+
+    A track that ends is tabulated once. One that does not is tabulated block by block when a horizon asks for it: what
+    is handed out depends on the time alone, not on what was asked before.
+
+    Attributes:
+        preview: What a horizon is made of.
+        table: The block that the last horizon began in, and as many references as a horizon may reach beyond it.
+    """
+
+    def __init__(self, track: Track, references: References, preview: Preview) -> None:
+        """Tabulate `track` as often as `preview` asks, by its formula or by differences."""
+        self.preview = preview
+        self._track = track
+        self._references = references
+        self._rest = _rest(track, preview.interval_us)
+        self._length = _BLOCK_SAMPLES if self._rest is None else self._rest + 1
+        self._block = 0
+        self.table = self._tabulate(0)
+
+    def horizon(self, time_us: int) -> Horizon:
+        """Return the reference of the sample that `time_us` lies in, and those that follow it."""
+        sample = time_us // self.preview.interval_us
+        block, first = divmod(sample if self._rest is None else min(sample, self._rest), self._length)
+        if block != self._block:
+            self._block, self.table = block, self._tabulate(block)
+        ahead = slice(first, first + self.preview.samples)
+        return Horizon(*(column[ahead] for column in self.table))
+
+    def _tabulate(self, block: int) -> Horizon:
+        """Tabulate a block and what follows; for the differences from one sample before, if there is one."""
+        first, lead = block * self._length, min(block, 1)
+        samples = np.arange(first - lead, first + self._length + self.preview.samples, dtype=np.float64)
+        interval_s = self.preview.interval_us * 1e-6
+        by = _by_differences if self._references == "by-differences" else _by_formula
+        return Horizon(*(column[lead:] for column in by(self._track, interval_s * samples, interval_s)))
+
+
+def plan(track: Track, references: References, preview: Preview) -> Planner:
+    """Return the planner of a track, which samples it as often as `preview` asks, by its formula or by differences."""
+    return Planner(track, references, preview)
+
+
+def start_yaw(track: Track, references: References) -> float:
+    """Return the first yaw reference, rad: with it a flight starts."""
+    return float(plan(track, references, _START).horizon(0).yaw_rad[0])
+
+
+def _rest(track: Track, interval_us: int) -> int | None:
+    """Return the first sample after the end of a track, from which on nothing changes; None if it has no end."""
+    return None if np.isinf(track.duration_s) else round(track.duration_s * 1e6) // interval_us + 1
+
+
+def _by_formula(track: Track, t: Array, interval_s: float) -> Horizon:
+    """Every derivative exactly."""
+    del interval_s
+    x, y, z = track.position(track.clock(t, _SNAP))
+    derivatives = [np.stack([axis.derivative(order) for axis in (x, y, z)], axis=-1) for order in range(_SNAP + 1)]
+    if track.yaw is None:
+        looks = _along(x, y)
+    else:
+        yaw = track.yaw(track.clock(t, _YAW_ACCELERATION))
+        looks = [yaw.derivative(order) for order in range(_YAW_ACCELERATION + 1)]
+    columns = derivatives + looks
+    return Horizon(*columns)
+
+
+def _along(x: Jet, y: Jet) -> list[Array]:
+    """Return yaw along the horizontal velocity, its rate and acceleration; held, both zero, where it is still."""
+    vx, vy = (axis.rate().coefficients[: _YAW_ACCELERATION + 1] for axis in (x, y))
+    moving = np.sqrt(vx[0] * vx[0] + vy[0] * vy[0]) >= _STILL
+    direction = atan2(Jet(np.where(moving, vy, 0.0)), Jet(np.where(moving, vx, 0.0)))
+    yaw, known = direction.derivative(0), moving.copy()
+    departure = _departure(x, y)
+    if departure is not None:
+        yaw[0], known[0] = departure, True
+    return [_unwrapped(yaw, known), direction.derivative(1), direction.derivative(2)]
+
+
+def _departure(x: Jet, y: Jet) -> float | None:
+    """Return which way the first sample leaves, rad: along its first derivative that is not still; None if all are."""
+    for order in range(1, len(x.coefficients)):
+        ahead, left = float(x.derivative(order)[0]), float(y.derivative(order)[0])
+        if hypot(ahead, left) >= _STILL:
+            return elementary.atan2(left, ahead)
+    return None
+
+
+def _unwrapped(yaw: Array, known: NDArray[np.bool_]) -> Array:
+    """Return yaw without jumps; where unknown the last one known, before there is any the first, and 0 if none is."""
+    if not known.any():
+        return np.zeros_like(yaw)
+    latest = np.maximum.accumulate(np.where(known, np.arange(len(yaw)), np.argmax(known)))
+    unwrapped: Array = np.unwrap(np.mod(yaw[latest], 2.0 * np.pi))
+    return unwrapped
+
+
+def _by_differences(track: Track, t: Array, interval_s: float) -> Horizon:
+    """Velocity and yaw from the step before, as the thesis has them.
+
+    Velocity is the backward difference (the first sample's the forward one); yaw points along the horizontal one, but
+    for the first sample's, which is the tangent of a circle about the origin. There are no higher derivatives. A track
+    that says its yaw has that one.
+    """
+    points = position(track, t)
+    backward = np.diff(points, axis=0) / interval_s
+    velocity = np.concatenate([backward[:1], backward])
+    velocity[:, 2] = np.round(velocity[:, 2], _VERTICAL_SPEED_DECIMALS)
+    velocity[track.ended(t)] = 0.0
+    yaw = _along_differences(points, interval_s) if track.yaw is None else track.yaw(track.clock(t, 0)).derivative(0)
+    none = np.zeros_like(points)
+    return Horizon(points, velocity, none, none, none, yaw, np.zeros_like(yaw), np.zeros_like(yaw))
+
+
+def _along_differences(points: Array, interval_s: float) -> Array:
+    x, y = points[:, 0], points[:, 1]
+    first = elementwise.atan2(y[:1], x[:1]) + np.pi / 2.0
+    dx, dy = np.diff(x), np.diff(y)
+    known = np.concatenate([[True], np.sqrt(dx * dx + dy * dy) >= _STILL * interval_s])
+    return _unwrapped(np.concatenate([first, elementwise.atan2(dy, dx)]), known)

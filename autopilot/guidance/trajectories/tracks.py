@@ -1,0 +1,328 @@
+"""The tracks: position and yaw as formulas of time, from which every derivative follows; found by name and options.
+
+A name may carry options: `NAME[:KEY=VALUE[,KEY=VALUE…]]`. Those of the thesis take none.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, pi, radians
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal, TypeAlias, get_args
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.autopilot.guidance.trajectories.taylor import Jet, atan2, cos, sin
+from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, WaypointsError, read_waypoints
+from colibri.common.config import Table
+from colibri.common.types import Array
+
+Place: TypeAlias = tuple[Jet, Jet, Jet]
+"""x, y, z in m, ENU."""
+Length: TypeAlias = Annotated[float, msgspec.Meta(ge=0.01, le=1000.0)]
+Coordinate: TypeAlias = Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)]
+Speed: TypeAlias = Annotated[float, msgspec.Meta(ge=0.01, le=100.0)]
+Lap: TypeAlias = Annotated[float, msgspec.Meta(ge=0.1, le=3600.0)]
+Angle: TypeAlias = Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
+YawChoice: TypeAlias = Literal["path", "fixed"]
+
+DURATION_S = 100.0
+
+_RADIUS_M = 2.0
+_TURNS_PER_S = 0.025
+_CLIMB_M_S = 0.03
+_START_HEIGHT_M = 2.0
+_INSTANT_S = 1e-9
+"""Times are whole microseconds: what differs by less than this is rounding."""
+
+
+class TrackError(Exception):
+    """There is no such track, or it cannot be flown; one line says what there is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """Where to be and which way to look, as formulas of time.
+
+    Attributes:
+        position: Time in s -> x, y, z in m, ENU.
+        yaw: Time in s -> yaw in rad, counter-clockwise from east, unwrapped; None to look along the horizontal
+            velocity. A track without end must have it, so that its yaw at any time follows from that time alone.
+        duration_s: Afterwards it rests at its last point; infinite for a track without end.
+    """
+
+    position: Callable[[Jet], Place]
+    yaw: Callable[[Jet], Jet] | None = None
+    duration_s: float = DURATION_S
+
+    def __post_init__(self) -> None:
+        """Check that its yaw is known at any time."""
+        if self.yaw is None and self.duration_s == inf:
+            raise ValueError("a track without end needs a formula for its yaw")
+
+    def clock(self, t: Array, order: int) -> Jet:
+        """Return the time that the formulas are given at `t` (n,), s: it stands still once the track has ended."""
+        ended = self.ended(t)
+        time = Jet.time(np.where(ended, self.duration_s, t), order)
+        time.coefficients[1:2, ended] = 0.0
+        return time
+
+    def ended(self, t: Array) -> NDArray[np.bool_]:
+        """Tell at which of the times `t` (n,), s, the track has ended."""
+        ended: NDArray[np.bool_] = t > self.duration_s + _INSTANT_S
+        return ended
+
+
+def spiral(t: Jet) -> Place:
+    """Climb on a circle."""
+    alpha = _alpha(t)
+    return _RADIUS_M * cos(alpha), _RADIUS_M * sin(alpha), _climb(t)
+
+
+def expanding_spiral(t: Jet) -> Place:
+    """Climb on a circle that widens by 0.2 m/s."""
+    alpha, radius = _alpha(t), _RADIUS_M * 0.1 * t + _RADIUS_M
+    return radius * cos(alpha), radius * sin(alpha), _climb(t)
+
+
+def line(t: Jet) -> Place:
+    """Climb along a straight line."""
+    return 0.1 * t + 1.0, 0.1 * t - 2.0, _climb(t)
+
+
+def wave(t: Jet) -> Place:
+    """Swing in x while flying along y at 2 m/s."""
+    return _RADIUS_M * cos(_alpha(t)), 2.0 * t, _climb(t)
+
+
+def crown(t: Jet) -> Place:
+    """Circle while the height swings by 1.5 m."""
+    alpha = _alpha(t)
+    return _RADIUS_M * cos(alpha), _RADIUS_M * sin(alpha), 1.5 * sin(t) + _START_HEIGHT_M
+
+
+THESIS_TRACKS: dict[str, Track] = {
+    "spiral": Track(spiral),
+    "expanding-spiral": Track(expanding_spiral),
+    "line": Track(line),
+    "wave": Track(wave),
+    "crown": Track(crown),
+}
+
+
+class Options(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The options of a track, each a field with its range and default; lengths in m, times in s, angles in degrees.
+
+    Attributes:
+        lone: The option that a value without a key is for.
+    """
+
+    lone: ClassVar[str | None] = None
+
+    def track(self) -> Track:
+        """Return the track with these options.
+
+        Raises:
+            WaypointsError: Its file cannot be flown.
+        """
+        raise NotImplementedError
+
+
+class Hover(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Stay at one point."""
+
+    x: Coordinate = 0.0
+    y: Coordinate = 0.0
+    height: Coordinate = 2.0
+    yaw: Angle = 0.0
+
+    def track(self) -> Track:
+        """Return the track."""
+        return Track(lambda t: (_held(t, self.x), _held(t, self.y), _held(t, self.height)), self._yaw, inf)
+
+    def _yaw(self, t: Jet) -> Jet:
+        return _held(t, radians(self.yaw))
+
+
+class Lemniscate(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Fly a figure of eight around the origin: Gerono's lemniscate, x = size sin ωt, y = size sin ωt cos ωt."""
+
+    size: Length = 4.0
+    height: Coordinate = 3.0
+    lap: Lap = 6.0
+    yaw: YawChoice = "path"
+
+    def track(self) -> Track:
+        """Return the track."""
+        return Track(self._position, _east if self.yaw == "fixed" else self._along, inf)
+
+    def _position(self, t: Jet) -> Place:
+        alpha = self._alpha(t)
+        x = self.size * sin(alpha)
+        return x, x * cos(alpha), _held(t, self.height)
+
+    def _along(self, t: Jet) -> Jet:
+        """Yaw along (cos α, cos 2α): seen from -90°, it never turns as far as 180° to either side, so never wraps."""
+        alpha = self._alpha(t)
+        return atan2(cos(alpha), -1.0 * cos(2.0 * alpha)) - 0.5 * pi
+
+    def _alpha(self, t: Jet) -> Jet:
+        return 2.0 * pi / self.lap * t
+
+
+class Circle(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Fly round the origin, counter-clockwise from the east."""
+
+    radius: Length = 2.0
+    speed: Speed = 2.0
+    height: Coordinate = 2.0
+    yaw: YawChoice = "path"
+
+    def track(self) -> Track:
+        """Return the track."""
+        return Track(self._position, _east if self.yaw == "fixed" else self._along, inf)
+
+    def _position(self, t: Jet) -> Place:
+        alpha = self._alpha(t)
+        return self.radius * cos(alpha), self.radius * sin(alpha), _held(t, self.height)
+
+    def _along(self, t: Jet) -> Jet:
+        return self._alpha(t) + 0.5 * pi
+
+    def _alpha(self, t: Jet) -> Jet:
+        return self.speed / self.radius * t
+
+
+class WaypointFile(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Fly through the points of a CSV file with the least snap."""
+
+    lone: ClassVar[str | None] = "file"
+
+    file: str
+    speed: Speed | None = None
+
+    def track(self) -> Track:
+        """Return the track."""
+        return through(read_waypoints(Path(self.file), self.speed))
+
+
+OPTIONS: dict[str, type[Options]] = {
+    "hover": Hover,
+    "lemniscate": Lemniscate,
+    "circle": Circle,
+    "waypoints": WaypointFile,
+}
+
+
+def through(waypoints: Waypoints) -> Track:
+    """Return the track through waypoints with the least snap, and the least yaw acceleration if they say which yaw."""
+    from colibri.autopilot.guidance.trajectories.minimum_snap import (
+        ACCELERATION,
+        SNAP,
+        minimise,  # slow to load: most tracks do without
+    )
+
+    times_s = waypoints.times_s
+    places = minimise(SNAP, times_s, waypoints.points_enu_m)
+
+    def position(t: Jet) -> Place:
+        x, y, z = places(t)
+        return x, y, z
+
+    if waypoints.yaw_rad is None:
+        return Track(position, None, float(times_s[-1]))
+    looks = minimise(ACCELERATION, times_s, waypoints.yaw_rad[:, None])
+    return Track(position, lambda t: looks(t)[0], float(times_s[-1]))
+
+
+def track(name: str) -> Track:
+    """Return the track of that name, `NAME[:KEY=VALUE[,KEY=VALUE…]]`. One through waypoints reads its file.
+
+    Raises:
+        TrackError: There is no such track or option, a value is impossible, or its file cannot be flown.
+    """
+    base, colon, text = name.partition(":")
+    if base in THESIS_TRACKS and not colon:
+        return THESIS_TRACKS[base]
+    if base in THESIS_TRACKS:
+        raise TrackError(f"track {base} takes no options, but these do: {', '.join(OPTIONS)}")
+    if base not in OPTIONS:
+        raise TrackError(f"unknown track {base}: choose {', '.join([*THESIS_TRACKS, *OPTIONS])}")
+    try:
+        return _options(base, text if colon else None).track()
+    except WaypointsError as error:
+        raise TrackError(str(error)) from error
+
+
+def position(track: Track, t: Array, derivative: int = 0) -> Array:
+    """Return a derivative of the position on a track, (n, 3), in m / s^derivative, ENU; at rest after its end.
+
+    Args:
+        track: The track.
+        t: Times, s, (n,).
+        derivative: 0 for the position itself.
+    """
+    time = track.clock(np.asarray(t, dtype=np.float64), derivative)
+    return np.stack([axis.derivative(derivative) for axis in track.position(time)], axis=-1)
+
+
+def _options(name: str, text: str | None) -> Options:
+    """Read the options of a track strictly."""
+    kind = OPTIONS[name]
+    fields = {field.name: field for field in msgspec.structs.fields(kind)}
+    given = _pairs(name, kind, text)
+    for key in given:
+        if key not in fields:
+            raise TrackError(f"track {name} has no option {key}: choose {', '.join(fields)}")
+    for key, field in fields.items():
+        if field.required and key not in given:
+            raise TrackError(f"track {name} needs {key}: {name}:{key}={key.upper()}")
+    try:
+        return msgspec.convert(given, type=kind, strict=False)
+    except msgspec.ValidationError as reason:
+        raise TrackError(f"track {name}: {_explained(str(reason), fields, given)}") from reason
+
+
+def _pairs(name: str, kind: type[Options], text: str | None) -> dict[str, str]:
+    """Take options apart; the first may be a value alone, if the track says what for."""
+    given: dict[str, str] = {}
+    for number, item in enumerate([] if text is None else text.split(",")):
+        key, equals, value = item.partition("=")
+        if not equals and item and number == 0 and kind.lone:
+            key, equals, value = kind.lone, "=", item
+        if not equals or not key or not value:
+            raise TrackError(f"track {name}: options are KEY=VALUE[,KEY=VALUE…], not {text!r}: {_keys(kind)}")
+        if key in given:
+            raise TrackError(f"track {name}: {key} is given twice")
+        given[key] = value
+    return given
+
+
+def _keys(kind: type[Options]) -> str:
+    return f"choose {', '.join(kind.__struct_fields__)}"
+
+
+def _explained(reason: str, fields: dict[str, msgspec.structs.FieldInfo], given: dict[str, str]) -> str:
+    """Say which value is impossible, and what there is."""
+    what, _, key = reason.rstrip("`").partition(" - at `$.")
+    if key not in fields:
+        return what
+    choices = get_args(fields[key].type) if fields[key].type == YawChoice else ()
+    return f"{key}={given[key]}: {'choose ' + ', '.join(choices) if choices else what}"
+
+
+def _alpha(t: Jet) -> Jet:
+    return 2.0 * np.pi * _TURNS_PER_S * t
+
+
+def _climb(t: Jet) -> Jet:
+    return _CLIMB_M_S * t + _START_HEIGHT_M
+
+
+def _held(t: Jet, value: float) -> Jet:
+    return 0.0 * t + value
+
+
+def _east(t: Jet) -> Jet:
+    return _held(t, 0.0)

@@ -1,0 +1,251 @@
+"""How the vehicle behaves, as parameters: under PX4's names where they mean what PX4 means by them."""
+
+from dataclasses import fields
+from math import radians
+from typing import Any, NamedTuple
+
+from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.integrator_chain import Limits
+from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
+from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
+
+TRACKS = (*THESIS_TRACKS, "lemniscate", "circle")
+"""What the numbers of TRACK stand for."""
+_BEHAVIOUR = Behaviour()
+_DEG = radians(1.0)
+_YES_OR_NO = ((0, "Disabled"), (1, "Enabled"))
+
+
+class Row(NamedTuple):
+    """A parameter that is a field of `Behaviour` or of its limits.
+
+    Attributes:
+        name: Of the parameter.
+        field: Of the structure.
+        unit: Of the parameter.
+        minimum: Of the parameter.
+        maximum: Of the parameter.
+        description: In a few words.
+        details: The rest.
+        scale: The field is so many times the parameter.
+        decimals: To be shown.
+        values: What an integer may be.
+    """
+
+    name: str
+    field: str
+    unit: str
+    minimum: float
+    maximum: float
+    description: str
+    details: str = ""
+    scale: float = 1.0
+    decimals: int = 2
+    values: tuple[tuple[int, str], ...] = ()
+
+    def parameter(self) -> Parameter:
+        """Return the parameter."""
+        value = _field(self.field)
+        kind = Kind.REAL if isinstance(value, float) else Kind.INT
+        return Parameter(
+            name=self.name,
+            kind=kind,
+            default=value / self.scale if isinstance(value, float) else _number(value),
+            minimum=self.minimum,
+            maximum=self.maximum,
+            unit=self.unit,
+            decimals=self.decimals,
+            description=self.description,
+            details=self.details,
+            group=_group(self.name),
+            values=self.values,
+        )
+
+
+ROWS = (
+    Row("MIS_TAKEOFF_ALT", "takeoff_height_m", "m", 0.5, 1000.0, "Height of a takeoff", "Above where it stands."),
+    Row("MPC_XY_CRUISE", "speed_m_s", "m/s", 0.1, 25.0, "Horizontal speed", "Of what flies by itself."),
+    Row("MPC_XY_VEL_MAX", "fastest_m_s", "m/s", 0.1, 25.0, "Largest horizontal speed", "No command may ask for more."),
+    Row("MPC_Z_VEL_MAX_UP", "climb_m_s", "m/s", 0.1, 10.0, "Speed of climbs"),
+    Row("MPC_Z_VEL_MAX_DN", "sink_m_s", "m/s", 0.1, 6.0, "Speed of descents"),
+    Row("MPC_ACC_HOR", "acceleration_m_s2", "m/s^2", 0.5, 12.0, "Horizontal acceleration"),
+    Row("MPC_ACC_UP_MAX", "lift_m_s2", "m/s^2", 0.5, 8.0, "Vertical acceleration", "Up and down alike."),
+    Row("MPC_JERK_MAX", "jerk_m_s3", "m/s^3", 1.0, 100.0, "Jerk", "Less is smoother."),
+    Row("MPC_YAWRAUTO_MAX", "yaw_rate_rad_s", "deg/s", 5.0, 360.0, "Rate of turns", "", _DEG, 1),
+    Row("MPC_YAWRAUTO_ACC", "yaw_acceleration_rad_s2", "deg/s^2", 10.0, 720.0, "Acceleration of turns", "", _DEG, 1),
+    Row("MPC_TKO_SPEED", "takeoff_speed_m_s", "m/s", 0.2, 5.0, "Speed of a takeoff"),
+    Row("MPC_LAND_SPEED", "land_speed_m_s", "m/s", 0.2, 2.0, "Speed of a landing", "Close to the ground."),
+    Row("MPC_MAN_TILT_MAX", "largest_tilt_deg", "deg", 1.0, 60.0, "Tilt of full sticks", "Stabilized.", 1.0, 1),
+    Row("MPC_MAN_Y_MAX", "stick_yaw_rate_rad_s", "deg/s", 1.0, 400.0, "Turn rate of full sticks", "", _DEG, 1),
+    Row("MPC_VEL_MANUAL", "stick_speed_m_s", "m/s", 0.1, 20.0, "Horizontal speed of full sticks", "Position mode."),
+    Row("RTL_RETURN_ALT", "return_height_m", "m", 0.0, 1000.0, "Height of a return", "Above home, on the way there."),
+    Row(
+        "RTL_MIN_DIST",
+        "return_radius_m",
+        "m",
+        0.0,
+        1000.0,
+        "Radius without a climb",
+        "Closer to home it does not climb.",
+    ),
+    Row("NAV_ACC_RAD", "acceptance_m", "m", 0.05, 200.0, "Acceptance radius", "Closer to a place than this: arrived."),
+    Row("COM_DISARM_LAND", "disarm_after_landing_s", "s", 0.0, 300.0, "Disarm so long after a landing", "0: never."),
+    Row("COM_DISARM_PRFLT", "disarm_on_ground_s", "s", 0.0, 3600.0, "Disarm if not flying so long", "0: never."),
+    Row(
+        "COM_OF_LOSS_T",
+        "setpoints_lost_s",
+        "s",
+        0.1,
+        60.0,
+        "Offboard loss timeout",
+        "A companion may be silent so long.",
+    ),
+    Row("COM_RC_LOSS_T", "sticks_lost_s", "s", 0.1, 35.0, "Pilot loss timeout", "Sticks may be silent so long."),
+    Row("GF_MAX_HOR_DIST", "farthest_m", "m", 0.0, 100e3, "Fence around home", "Horizontal distance; 0: none."),
+    Row("GF_MAX_VER_DIST", "highest_m", "m", 0.0, 10e3, "Fence above home", "Height; 0: none."),
+    Row("ORBIT_RADIUS", "orbit_radius_m", "m", 1.0, 1000.0, "Radius of an orbit", "Where the command does not say."),
+    Row("FLW_TGT_HT", "follow_height_m", "m", 1.0, 1000.0, "Follow: height", "Above home."),
+    Row("FLW_TGT_DST", "follow_distance_m", "m", 1.0, 1000.0, "Follow: distance to the target"),
+    Row(
+        *("FLW_TGT_FA", "follow_angle_deg", "deg", -180.0, 180.0, "Follow: side of the target"),
+        *("Clockwise from ahead of it: 180 is behind.", 1.0, 1),
+    ),
+    Row(
+        *("FLW_TGT_ALT_M", "follow_altitude_mode", "", 0, 2, "Follow: what the height is above"),
+        values=((0, "Home"), (1, "Ground below"), (2, "Target")),
+    ),
+    Row(
+        *("CA_FAILURE_MODE", "land_on_three", "", 0, 1, "Failure of a rotor"),
+        *("Whether it is noticed. Set to 0 it also forgets one that has failed.",),
+        values=((0, "Ignore"), (1, "Land on three rotors")),
+    ),
+    Row(
+        *("SYS_FAILURE_EN", "inject_failures", "", 0, 1, "Failure injection"),
+        *("Whether MAV_CMD_INJECT_FAILURE is obeyed.",),
+        values=_YES_OR_NO,
+    ),
+    Row(
+        *("SIM_SOLVE_MS", "solve_time_s", "ms", 0.0, 100.0, "Declared solve time"),
+        "Simulated: what the control law decides takes effect so much later; samples due meanwhile are skipped.",
+        *(1e-3, 1),
+    ),
+    Row(
+        *("TRACK", "track", "", 0, len(TRACKS) - 1, "Track", "Which track mode Track flies."),
+        values=tuple(enumerate(TRACKS)),
+    ),
+)
+"""One for each number of `Behaviour` and `Limits`."""
+
+_ANSWERS = "Only answers ground stations that ask for it: changes nothing."
+ANSWERS = (
+    ("SYS_AUTOSTART", 4001, "Airframe", True, ()),
+    ("SYS_AUTOCONFIG", 0, "Reset of the airframe", False, ()),
+    ("CAL_GYRO0_ID", 1, "Gyroscope that is calibrated", True, ()),
+    ("CAL_ACC0_ID", 1, "Accelerometer that is calibrated", True, ()),
+    ("CAL_MAG0_ID", 1, "Magnetometer that is calibrated", True, ()),
+    ("COM_RC_IN_MODE", 1, "Source of the sticks", False, ((1, "Joystick"),)),
+)
+"""Integers that PX4's setup pages ask for: name, default, description, whether read-only, what it may be."""
+
+
+def behaviour_parameters(system_id: int) -> list[Parameter]:
+    """Return the parameters of behaviour, and those that ground stations expect of a PX4."""
+    return [*(row.parameter() for row in ROWS), *_answers(), *_follow_answers(), _system(system_id)]
+
+
+def behaviour(parameters: Parameters) -> Behaviour:
+    """Return the behaviour that the parameters say; numbers that nobody changed keep their 64 bits."""
+    changed: dict[str, Any] = {}
+    for row in ROWS:
+        value = parameters[row.name]
+        if value == parameters.default(row.name):
+            continue
+        if row.field == "track":
+            changed[row.field] = TRACKS[int(value)]
+        elif isinstance(_field(row.field), bool):
+            changed[row.field] = bool(value)
+        else:
+            changed[row.field] = value * row.scale if isinstance(value, float) else value
+    limits = {field: changed.pop(field) for field in Limits._fields if field in changed}
+    whole = {field.name: getattr(_BEHAVIOUR, field.name) for field in fields(Behaviour)}
+    return Behaviour(**{**whole, **changed, "limits": _BEHAVIOUR.limits._replace(**limits)})
+
+
+def _answers() -> list[Parameter]:
+    return [
+        Parameter(
+            name=name,
+            kind=Kind.INT,
+            default=default,
+            description=description,
+            details=_ANSWERS,
+            group=_group(name),
+            read_only=read_only,
+            values=values,
+        )
+        for name, default, description, read_only, values in ANSWERS
+    ]
+
+
+def _follow_answers() -> list[Parameter]:
+    """Return what MAVSDK sets before it follows, and the reference chain has limits of its own in place of."""
+    what = (("FLW_TGT_RS", 0.1, 1.0, "norm", "Follow: filter"), ("FLW_TGT_MAX_VEL", 5.0, 20.0, "m/s", "Follow: speed"))
+    return [
+        Parameter(
+            name=name,
+            kind=Kind.REAL,
+            default=default,
+            minimum=0.0,
+            maximum=most,
+            unit=unit,
+            description=description,
+            details=_ANSWERS,
+            group=_group(name),
+        )
+        for name, default, most, unit, description in what
+    ]
+
+
+def _system(system_id: int) -> Parameter:
+    return Parameter(
+        name="MAV_SYS_ID",
+        kind=Kind.INT,
+        default=system_id,
+        minimum=1,
+        maximum=255,
+        description="System id",
+        details="The instance chooses it.",
+        group=_group("MAV_SYS_ID"),
+        read_only=True,
+    )
+
+
+def _field(name: str) -> Any:
+    return getattr(_BEHAVIOUR.limits if name in Limits._fields else _BEHAVIOUR, name)
+
+
+def _number(value: Any) -> int:
+    return TRACKS.index(value) if isinstance(value, str) else int(value)
+
+
+def _group(name: str) -> str:
+    """Return a group that says what the prefix stands for."""
+    return _GROUPS[name.partition("_")[0]]
+
+
+_GROUPS = {
+    "MIS": "Flight",
+    "MPC": "Flight",
+    "RTL": "Return",
+    "NAV": "Flight",
+    "COM": "Safety",
+    "CA": "Safety",
+    "ORBIT": "Flight",
+    "FLW": "Follow",
+    "SYS": "System",
+    "SIM": "System",
+    "TRACK": "Flight",
+    "CAL": "System",
+    "GF": "Failsafes",
+    "MAV": "System",
+}

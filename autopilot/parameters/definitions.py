@@ -1,0 +1,95 @@
+"""The parameters of this autopilot: the numbers of its control law, of its vehicle model, and of its behaviour."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+
+from colibri.autopilot.commander.rules.failsafe_parameters import failsafe_parameters
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.parameters.behaviour import behaviour, behaviour_parameters
+from colibri.autopilot.parameters.control_law import law_numbers
+from colibri.autopilot.parameters.number_paths import changed, described
+from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
+from colibri.mavlink.parameters.store import Parameter, Value
+from colibri.plant.vehicle.description import Vehicle
+
+__all__ = ["ImpossibleError", "Numbers", "applied", "behaviour", "definitions"]
+
+
+class ImpossibleError(Exception):
+    """Values that no vehicle can have together; the message names the key."""
+
+
+class Numbers:
+    """The numbers of a profile's control law and of a vehicle model that are parameters.
+
+    Attributes:
+        definitions: The parameters, whose defaults are the numbers.
+        defaults: Name -> default.
+    """
+
+    def __init__(self, profile: Profile, vehicle: Vehicle) -> None:
+        """Take them from `profile` and `vehicle` as their files have them."""
+        self._profile = profile
+        self._vehicle = vehicle
+        self._table = profile.table(profile.controller)
+        self._tree: dict[str, Any] = msgspec.to_builtins(vehicle)
+        self._law = law_numbers(profile.controller, self._table)
+        self._model = vehicle_numbers(self._tree)
+        self.definitions = [*self._law_definitions(), *self._model_definitions()]
+        self.defaults = {parameter.name: parameter.default for parameter in self.definitions}
+
+    def applied(self, values: Mapping[str, Value]) -> tuple[Profile, Vehicle]:
+        """Return profile and vehicle with the values of the parameters in.
+
+        The vehicle is checked as its file would be; the control law's table is checked when the law is built from it.
+
+        Raises:
+            ImpossibleError: There is no such vehicle.
+        """
+        profile, vehicle = self._profile, self._vehicle
+        table = changed(self._table, self._law, values, self.defaults)
+        if table is not self._table:
+            controllers = {**profile.controllers, profile.controller: table}
+            profile = msgspec.structs.replace(profile, controllers=controllers)
+        tree = changed(self._tree, self._model, values, self.defaults)
+        return profile, vehicle if tree is self._tree else _vehicle(tree)
+
+    def _law_definitions(self) -> list[Parameter]:
+        name = self._profile.controller
+        return [
+            number.parameter(
+                self._table, f"Control law {name}", f"controllers.{name}.{described(number.path)} of the profile."
+            )
+            for number in self._law
+        ]
+
+    def _model_definitions(self) -> list[Parameter]:
+        return [
+            number.parameter(
+                self._tree, "Vehicle model", f"{described(number.path)} of the vehicle, as the autopilot believes it."
+            )
+            for number in self._model
+        ]
+
+
+def definitions(profile: Profile, vehicle: Vehicle, system_id: int = 1) -> list[Parameter]:
+    """Return all parameters of an autopilot that flies `vehicle` by `profile`: their defaults are the files'."""
+    return [*Numbers(profile, vehicle).definitions, *behaviour_parameters(system_id), *failsafe_parameters()]
+
+
+def applied(profile: Profile, vehicle: Vehicle, values: Mapping[str, Value]) -> tuple[Profile, Vehicle]:
+    """Return profile and vehicle, as their files have them, with the values of the parameters in.
+
+    Raises:
+        ImpossibleError: There is no such vehicle.
+    """
+    return Numbers(profile, vehicle).applied(values)
+
+
+def _vehicle(tree: dict[str, Any]) -> Vehicle:
+    try:
+        return msgspec.convert(tree, type=Vehicle)
+    except (msgspec.ValidationError, ArithmeticError) as reason:
+        raise ImpossibleError(str(reason)) from reason

@@ -1,0 +1,193 @@
+"""Numbers of a table of tables, as parameters: where each lies, what it is called, and back."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import count
+from math import isfinite
+from typing import Any, NamedTuple, TypeAlias
+
+from colibri.mavlink.parameters.store import LARGEST_INT, LARGEST_REAL, LEAST_INT, Kind, Parameter, Value
+
+Path: TypeAlias = tuple[str | int, ...]
+"""Keys, and places in lists, from the outside in."""
+Tree: TypeAlias = dict[str, Any]
+
+_UNITS = {
+    "_rad_s": "rad/s",
+    "_m_s2": "m/s^2",
+    "_m_s": "m/s",
+    "_1_s": "1/s",
+    "_n_m": "N m",
+    "_deg": "deg",
+    "_rad": "rad",
+    "_kg": "kg",
+    "_s": "s",
+    "_m": "m",
+    "_n": "N",
+}
+"""Endings of keys, longer ones first."""
+_LONGEST = 16
+_LONGEST_WORD = 8
+
+
+class Number(NamedTuple):
+    """A number that is a parameter.
+
+    Attributes:
+        name: Of the parameter.
+        path: Where the number lies.
+        unit: Of the parameter.
+        minimum: Of the parameter.
+        maximum: Of the parameter.
+        description: In a few words.
+        scale: The number is so many times the parameter.
+        decimals: To be shown of the parameter.
+    """
+
+    name: str
+    path: Path
+    unit: str = ""
+    minimum: float = -LARGEST_REAL
+    maximum: float = LARGEST_REAL
+    description: str = ""
+    scale: float = 1.0
+    decimals: int = 3
+
+    def parameter(self, tree: Mapping[str, Any], group: str, details: str) -> Parameter:
+        """Return the parameter, whose default is what the tree holds: bounds give way to it."""
+        value = read(tree, self.path)
+        kind = Kind.INT if isinstance(value, int) else Kind.REAL
+        default = value if kind == Kind.INT else value / self.scale
+        return Parameter(
+            name=self.name,
+            kind=kind,
+            default=default,
+            minimum=min(self.minimum, default),
+            maximum=max(self.maximum, default),
+            unit=self.unit,
+            decimals=self.decimals,
+            description=self.description,
+            details=details,
+            group=group,
+        )
+
+    def applied(self, value: Value) -> Value:
+        """Return the number that a value of the parameter stands for."""
+        return value if isinstance(value, int) else value * self.scale
+
+
+def read(tree: Mapping[str, Any], path: Path) -> Any:
+    """Return what lies at `path`.
+
+    Raises:
+        KeyError: Nothing does.
+    """
+    here: Any = tree
+    for key in path:
+        try:
+            here = here[key]
+        except (LookupError, TypeError):
+            raise KeyError(path) from None
+    return here
+
+
+def has(tree: Mapping[str, Any], path: Path) -> bool:
+    """Whether there is a number at `path`."""
+    try:
+        return is_number(read(tree, path))
+    except KeyError:
+        return False
+
+
+def changed(tree: Tree, numbers: Iterable[Number], values: Mapping[str, Value], defaults: Mapping[str, Value]) -> Tree:
+    """Return the tree with the values that are not at their defaults in; the same one if all are.
+
+    A parameter holds 32 bits: numbers that nobody changed keep their 64.
+    """
+    for number in numbers:
+        if values[number.name] != defaults[number.name]:
+            tree = _with(tree, number.path, number.applied(values[number.name]))
+    return tree
+
+
+def _with(tree: Any, path: Path, value: Value) -> Any:
+    """Return a tree with another number at `path`; the one given stays as it is."""
+    if not path:
+        return value
+    key, *rest = path
+    inner = _with(tree[key], tuple(rest), value)
+    if isinstance(key, str):
+        return {**tree, key: inner}
+    return [*tree[:key], inner, *tree[key + 1 :]]
+
+
+def is_number(value: Any) -> bool:
+    """Whether this is a number that a parameter can hold."""
+    if isinstance(value, bool):
+        return False
+    if isinstance(value, int):
+        return LEAST_INT <= value <= LARGEST_INT
+    return isinstance(value, float) and isfinite(value) and abs(value) <= LARGEST_REAL
+
+
+def paths(tree: Any, before: Path = ()) -> Iterator[Path]:
+    """Yield where numbers lie, in the order of the keys."""
+    if is_number(tree):
+        yield before
+    elif isinstance(tree, Mapping):
+        for key in sorted(tree):
+            yield from paths(tree[key], (*before, key))
+    elif isinstance(tree, list | tuple):
+        for place, inner in enumerate(tree):
+            yield from paths(inner, (*before, place))
+
+
+def named(prefix: str, tree: Mapping[str, Any], excluded: frozenset[str]) -> list[Number]:
+    """Return the numbers of a table that nobody described, but those below an excluded key.
+
+    Each is called by a prefix and the words of its keys, shortened alike until they fit.
+    """
+    taken: set[str] = set()
+    numbers = []
+    for path in paths(tree):
+        if path[0] in excluded:
+            continue
+        plain, unit = _without_unit(path)
+        name = next(name for name in _names(prefix, plain) if name not in taken)
+        taken.add(name)
+        numbers.append(Number(name, path, unit, description=described(path)))
+    return numbers
+
+
+def described(path: Path) -> str:
+    """Return a path as it would be written: a.b[1]."""
+    text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
+    return text.removeprefix(".")
+
+
+def _without_unit(path: Path) -> tuple[Path, str]:
+    """Return a path whose last key does not end in its unit, and the unit."""
+    place = max(place for place, key in enumerate(path) if isinstance(key, str))
+    key = str(path[place])
+    for ending, unit in _UNITS.items():
+        if key.endswith(ending) and key != ending:
+            return (*path[:place], key.removesuffix(ending), *path[place + 1 :]), unit
+    return path, ""
+
+
+def _names(prefix: str, path: Path) -> Iterator[str]:
+    """Yield names for a path, the most telling first."""
+    words = [_plain(word) for key in path if isinstance(key, str) for word in key.split("_")]
+    places = "".join(str(key + 1) for key in path if isinstance(key, int))
+    room = _LONGEST - len(prefix) - 1 - len(places)
+    for length in range(_LONGEST_WORD, 0, -1):
+        text = "_".join(filter(None, (word[:length] for word in words)))
+        if len(text) <= room:
+            yield f"{prefix}_{text}{places}"
+    text = "_".join(filter(None, words))
+    for number in count(1):
+        end = f"_{number}"
+        yield f"{prefix}_{text[: max(_LONGEST - len(prefix) - 1 - len(end), 0)].rstrip('_')}{end}"
+
+
+def _plain(word: str) -> str:
+    return "".join(letter for letter in word.upper() if letter.isascii() and letter.isalnum())

@@ -1,0 +1,128 @@
+"""The control law, built anew whenever a number of its own or of its vehicle changes in flight."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol, TypeAlias
+
+import numpy as np
+
+from colibri.autopilot.control.interface import Clock, Controller, Horizon, Preview, VehicleState
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.registry import (
+    ControllerError,
+    DecisionError,
+    check_controller,
+    check_rotor_speeds,
+    load_controller,
+)
+from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers
+from colibri.common.config import SettingsError
+from colibri.mavlink.parameters.store import Refusal, Value
+from colibri.plant.vehicle.description import Vehicle
+
+Build: TypeAlias = Callable[[Profile, Vehicle], Controller[Any]]
+
+
+class Rhythm(Protocol):
+    """What a control law cannot change in flight.
+
+    Attributes:
+        control_interval_us: Its sample.
+        preview: The references that it wants.
+    """
+
+    control_interval_us: int
+    preview: Preview
+
+
+class Tuned(NamedTuple):
+    """A control law with the numbers it was built from."""
+
+    profile: Profile
+    vehicle: Vehicle
+    controller: Controller[Any]
+
+
+class Tuning:
+    """Tries every change before it is made: what no control law can be built from, or fly by, is refused."""
+
+    def __init__(self, numbers: Numbers, build: Build, running: Rhythm, say: Callable[[str], None]) -> None:
+        """Tune `numbers` while a law flies in the rhythm of `running`; `say` tells what a law says of its refusal."""
+        self._numbers = numbers
+        self._build = build
+        self._say = say
+        self._rhythm = _rhythm(running)
+        self._tuned: Tuned | None = None
+
+    def check(self, name: str, values: Mapping[str, Value]) -> Refusal | None:
+        """Return why a parameter cannot change so; for `colibri.mavlink.parameters.store.Parameters.check`.
+
+        Args:
+            name: The parameter that is to change.
+            values: Of all of them, the new one in.
+        """
+        if name not in self._numbers.defaults:
+            return None
+        try:
+            profile, vehicle = self._numbers.applied(values)
+        except ImpossibleError:
+            return Refusal.VALUE_OUT_OF_RANGE
+        try:
+            controller = self._build(profile, vehicle)
+            _try(profile.controller, controller, vehicle)
+        except Exception as error:  # whatever somebody else's law raises, the flight goes on with the old one
+            self._say(f"{name} not changed: {_in_words(error)}")
+            return Refusal.VALUE_OUT_OF_RANGE
+        if _rhythm(controller) != self._rhythm:
+            return Refusal.PERMISSION_DENIED
+        self._tuned = Tuned(profile, vehicle, controller)
+        return None
+
+    def take(self) -> Tuned | None:
+        """Return the newest control law, if there is one since this was last asked."""
+        tuned, self._tuned = self._tuned, None
+        return tuned
+
+
+def builder(controller: str, clock: Clock) -> Build:
+    """Return what builds a control law again and again: to find it among what is installed takes longer than that.
+
+    Raises:
+        ControllerError: There is none of that name.
+    """
+    factory = load_controller(controller)
+
+    def build(profile: Profile, vehicle: Vehicle) -> Controller[Any]:
+        law = factory(profile.table(controller), vehicle, clock)
+        check_controller(controller, law)
+        return law
+
+    return build
+
+
+def _in_words(error: Exception) -> str:
+    """Return one line: a refusal is its own words, of anything else the words may not say what it is."""
+    words = " ".join(str(error).split())
+    if words and isinstance(error, ControllerError | DecisionError | SettingsError):
+        return words
+    return f"{type(error).__name__}: {words}" if words else type(error).__name__
+
+
+def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
+    """Return what cannot change in flight."""
+    return controller.control_interval_us, controller.preview
+
+
+def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
+    """Hover for two control samples, the second one a metre away from the reference.
+
+    Raises:
+        DecisionError: No rotor can follow what the law decides.
+    """
+    nothing = (0.0, 0.0, 0.0)
+    still, straight = np.zeros((controller.preview.samples, 3)), np.zeros(controller.preview.samples)
+    references = Horizon(still, still, still, still, still, straight, straight, straight)
+    memory = controller.initial(vehicle.hover_speed)
+    for sample, place in enumerate((nothing, (1.0, 1.0, 1.0))):
+        state = VehicleState(place, nothing, (1.0, 0.0, 0.0, 0.0), nothing, nothing)
+        memory, decision = controller.step(memory, sample * controller.control_interval_us, state, references)
+        check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)

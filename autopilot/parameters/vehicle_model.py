@@ -1,0 +1,64 @@
+"""The numbers of the vehicle model that are parameters: what the autopilot believes, not what the plant flies."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from colibri.autopilot.parameters.number_paths import Number, Path, has
+
+_SPEED = "{speed}"
+"""Stands for the unit of the vehicle's rotor speeds."""
+_AXES = "XYZ"
+
+
+def vehicle_numbers(tree: Mapping[str, Any]) -> list[Number]:
+    """Return the numbers of a vehicle given as a table of tables; of parts that it does not model, none."""
+    speed = tree["rotors"]["speed_unit"]
+    inside = f"({speed})" if "/" in speed else speed
+    return [
+        number._replace(unit=speed if number.unit == _SPEED else number.unit.replace(_SPEED, inside))
+        for number in _VEHICLE
+        if has(tree, number.path)
+    ]
+
+
+def _axes(name: str, key: Path, unit: str, most: float, what: str, scale: float, least: float = 0.0) -> list[Number]:
+    return [
+        Number(name.format(axis), (*key, place), unit, least, most, what.format(axis.lower()), scale, 4)
+        for place, axis in enumerate(_AXES)
+    ]
+
+
+def _rotors() -> list[Number]:
+    numbers = []
+    for rotor in range(4):
+        for place, (axis, where) in enumerate((("X", "forward"), ("Y", "left"))):
+            path = ("rotors", "position_m", rotor, place)
+            what = f"Rotor {rotor + 1}: distance {where}"
+            numbers.append(Number(f"VEH_ROT{rotor + 1}_{axis}", path, "m", -5.0, 5.0, what, decimals=4))
+        part = f"Rotor {rotor + 1}: part of its thrust that it has"
+        numbers.append(Number(f"VEH_ROT{rotor + 1}_PART", ("rotors", "strength", rotor), "norm", 0.05, 1.0, part))
+    return numbers
+
+
+_VEHICLE = [
+    Number("VEH_GRAVITY", ("gravity_m_s2",), "m/s^2", 1.0, 30.0, "Gravity", decimals=4),
+    Number("VEH_MASS", ("body", "mass_kg"), "kg", 0.01, 100.0, "Mass", decimals=4),
+    *_axes("VEH_I{0}{0}", ("body", "inertia_kg_m2"), "g m^2", 1e4, "Moment of inertia about {}", 1e-3, 1e-3),
+    Number("VEH_CT", ("rotors", "thrust_coefficient"), f"uN/{_SPEED}^2", 1e-6, 1e6, "Thrust of a rotor", 1e-6, 6),
+    Number("VEH_CQ", ("rotors", "torque_coefficient"), f"nN m/{_SPEED}^2", 1e-6, 1e6, "Drag of a rotor", 1e-9, 6),
+    Number("VEH_ROT_J", ("rotors", "inertia_kg_m2"), "mg m^2", 1e-6, 1e6, "Moment of inertia of a rotor", 1e-6, 4),
+    Number("VEH_ROT_MAX", ("rotors", "max_speed"), _SPEED, 1.0, 1e5, "Largest speed of a rotor", 1.0, 1),
+    Number("VEH_ROT_IDLE", ("rotors", "idle_speed"), _SPEED, 0.0, 1e5, "Least speed of a rotor that turns", 1.0, 1),
+    *_rotors(),
+    Number("VEH_LAG_UP", ("rotors", "lag", "time_constant_up_s"), "ms", 1.0, 1e3, "Lag of a faster rotor", 1e-3),
+    Number("VEH_LAG_DOWN", ("rotors", "lag", "time_constant_down_s"), "ms", 1.0, 1e3, "Lag of a slower rotor", 1e-3),
+    *_axes("VEH_DRAG_{0}", ("drag", "linear_n_s_m"), "N s/m", 10.0, "Drag of the airframe along {}", 1.0),
+    Number(
+        "VEH_DRAG_ROT", ("drag", "rotor_coefficient"), f"uN s/(m {_SPEED})", 0.0, 1e6, "Drag of a rotor's disc", 1e-6, 4
+    ),
+    Number("VEH_BAT_FULL", ("battery", "full_voltage_v"), "V", 1.0, 100.0, "Voltage of the full battery", decimals=2),
+    Number("VEH_BAT_EMPTY", ("battery", "empty_voltage_v"), "V", 1.0, 100.0, "Voltage of the empty battery", 1.0, 2),
+    Number("VEH_BAT_OHM", ("battery", "resistance_ohm"), "mOhm", 0.0, 1e3, "Resistance of the battery", 1e-3, 2),
+    Number("VEH_BAT_AH", ("battery", "capacity_ah"), "mAh", 10.0, 1e6, "Capacity of the battery", 1e-3, 0),
+    Number("VEH_BAT_EFF", ("battery", "efficiency"), "norm", 0.05, 1.0, "Rotor power of battery power"),
+]

@@ -1,0 +1,108 @@
+"""The autopilot's end of the link to a plant: frames received, answered, waited for."""
+
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from colibri.autopilot.core.step import Step
+from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.common.process.lifecycle import Stop
+from colibri.common.process.status import Status
+from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
+from colibri.mavlink.hil.px4_autopilot import FlierEnd
+from colibri.mavlink.links.link import OneByOne
+from colibri.mavlink.links.udp import UdpLink
+from colibri.mavlink.wire.dialect import RESULT_UNSUPPORTED
+
+if TYPE_CHECKING:
+    from colibri.autopilot.core.copter import Copter
+    from colibri.autopilot.process.ground import Ground
+from colibri.autopilot.process.logs import AutopilotLog
+
+_SILENCE_SAID_AFTER_S = 2.0
+_WAIT_AT_MOST_S = 0.1
+_UNKNOWN_SAID_AFTER_US = 3_000_000
+"""Of simulated time: who rests is known after a second."""
+_UNKNOWN = "no estimate yet: the vehicle must rest for a second, with a GPS fix; until then the rotors stand"
+
+
+def _refusal(result: int) -> str:
+    if result == RESULT_UNSUPPORTED:
+        return "the plant's vehicle has no sensors"
+    return "the plant flies at another frame rate or feedback, and will not change it in mid-flight"
+
+
+class Client:
+    """Drives the autopilot's end of the conversation over a link."""
+
+    def __init__(
+        self,
+        link: UdpLink | OneByOne,
+        end: AutopilotEnd | FlierEnd,
+        status: Status,
+        stop: Stop,
+        log: AutopilotLog | None,
+        ground: "Ground | None" = None,
+    ) -> None:
+        """Serve `end` on `link` until `stop`, and `ground` beside it."""
+        self._link = link
+        self._end = end
+        self._status = status
+        self._stop = stop
+        self._log = log
+        self._ground = ground
+        self._frame_came = self._heard = False
+        self._refusal_said = self._unknown_said = False
+        self._unknown_since_us: int | None = None
+
+    def fly(self, autopilot: "Autopilot | Copter") -> None:
+        """Answer every frame until told to stop."""
+        self._status.say("calling", "waiting for the plant at " + self._link.url.partition(":")[2])
+        due_s = 0.0
+        while not self._stop:
+            received = self._link.receive(min(max(0.0, due_s - perf_counter()), _WAIT_AT_MOST_S))
+            step = self._answer(autopilot, received[0]) if received else None
+            due_s = self._end.poll(perf_counter())
+            for datagram in self._end.take_outbox():
+                self._link.send(datagram)
+            if step and self._log:
+                self._log.write(step)  # while the plant integrates
+            if step and self._ground:
+                autopilot = self._ground.serve(perf_counter())
+                if self._ground.shut_down:
+                    break
+            self._say_what_changed()
+        self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
+
+    def _answer(self, autopilot: "Autopilot | Copter", datagram: bytes) -> Step | None:
+        frame = self._end.receive(datagram, perf_counter())
+        if frame is None:
+            return None
+        self._frame_came = True
+        autopilot.hear(self._end.aside)
+        step = autopilot.step(frame)
+        self._end.answer(step.command, step.faults)
+        self._say_if_unknown(step)
+        return step
+
+    def _say_if_unknown(self, step: Step) -> None:
+        """Say, once, why a vehicle lies there disarmed, or falls."""
+        now_us = step.command.time_us
+        if step.known:
+            self._unknown_since_us = None
+        elif self._unknown_since_us is None or now_us < self._unknown_since_us:
+            self._unknown_since_us, self._unknown_said = now_us, False
+        elif now_us - self._unknown_since_us >= _UNKNOWN_SAID_AFTER_US and not self._unknown_said:
+            self._unknown_said = True
+            self._status.say("unknown", _UNKNOWN)
+
+    def _say_what_changed(self) -> None:
+        silent = self._end.silence_s(perf_counter()) > _SILENCE_SAID_AFTER_S
+        if not self._heard and self._frame_came and not silent:
+            self._heard = True
+            self._status.say("flying", "the plant sends frames")
+        elif self._heard and silent:
+            self._frame_came = self._heard = False
+            self._status.say("silence", f"no frame for {_SILENCE_SAID_AFTER_S:.0f} s, waiting for a plant")
+        if self._end.refused is not None and not self._refusal_said:
+            self._refusal_said = True
+            self._status.say("refused", _refusal(self._end.refused))

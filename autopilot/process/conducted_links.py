@@ -1,0 +1,104 @@
+"""Ground stations that a conductor speaks for: it holds simulated time still, so no clock says what is heard when."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Protocol
+
+from colibri.autopilot.commander.rules.modes import State, custom_mode
+from colibri.autopilot.core.step import Received
+from colibri.autopilot.ground.stations import Stations
+from colibri.mavlink.hil.conductor import Gathering, Parcel, Turn, packets
+from colibri.mavlink.links.udp import UdpLink
+from colibri.mavlink.node.hub import Outgoing
+
+HOST = "127.0.0.1"
+"""Ground stations of a conductor have their number for a port here."""
+_WAIT_AT_MOST_S = 0.1
+
+
+class Conductor(Protocol):
+    """Whoever speaks for the ground stations."""
+
+    def hear(self) -> Turn | None:
+        """Return what they say at this instant; None where there will be nothing more."""
+        ...
+
+    def tell(self, turn: Turn) -> None:
+        """Tell them what the vehicle says."""
+        ...
+
+    def close(self) -> None:
+        """Let go."""
+        ...
+
+
+class UdpConductor:
+    """A conductor in another process."""
+
+    def __init__(self, link: UdpLink, ended: Callable[[], object]) -> None:
+        """Speak with it on `link`, which it learns from an empty packet, until this process has `ended`."""
+        self._link = link
+        self._ended = ended
+        self._gathering = Gathering()
+        link.send(b"")
+
+    def hear(self) -> Turn | None:
+        """Wait for its turn."""
+        while not self._ended():
+            received = self._link.receive(_WAIT_AT_MOST_S)
+            turn = None if received is None else self._gathering.take(received[0])
+            if turn is not None:
+                return turn
+        return None
+
+    def tell(self, turn: Turn) -> None:
+        """Send a turn."""
+        for packet in packets(turn):
+            self._link.send(packet)
+
+    def close(self) -> None:
+        """Close the link."""
+        self._link.close()
+
+
+class ConductedLinks:
+    """Carries datagrams between a conductor and a vehicle's hub."""
+
+    def __init__(self, conductor: Conductor, state: Callable[[], State]) -> None:
+        """Serve the ground stations of `conductor`, which is told the vehicle's `state` with each turn."""
+        self._conductor = conductor
+        self._state = state
+        self._time_us = 0
+        self._waiting: deque[Parcel] = deque()
+
+    def introduce(self, stations: Stations) -> None:
+        """Open nothing: each channel opens with the first message on it."""
+
+    def receive(self, stations: Stations) -> Iterator[Received]:
+        """Wait for what is said at this instant, then yield it; what is not taken is yielded the next time."""
+        del stations
+        turn = self._conductor.hear()
+        if turn is not None:
+            self._time_us = turn.time_us
+            self._waiting.extend(turn.parcels)
+        return self._taken()
+
+    def send(self, outbox: Iterable[Outgoing]) -> None:
+        """Tell the conductor what the vehicle says."""
+        parcels = [Parcel(address[1], datagram) for _, address, datagram in outbox if address is not None]
+        mode, armed = self._state()
+        self._conductor.tell(Turn(self._time_us, parcels, custom_mode(mode), armed))
+
+    def facts(self, stations: Stations, interval_s: float) -> list[dict[str, Any]]:
+        """Return nothing: nobody watches a terminal."""
+        del stations, interval_s
+        return []
+
+    def close(self) -> None:
+        """Let go of the conductor."""
+        self._conductor.close()
+
+    def _taken(self) -> Iterator[Received]:
+        while self._waiting:
+            station, datagram = self._waiting.popleft()
+            yield Received(datagram, 0, (HOST, station))

@@ -1,0 +1,171 @@
+"""The links to ground stations: what came on any of them, and where each answer goes."""
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from ipaddress import ip_address
+from typing import Any
+
+from colibri.autopilot.control.interface import Clock
+from colibri.autopilot.core.step import Received
+from colibri.autopilot.ground.stations import Stations
+from colibri.common.types import Address
+from colibri.mavlink.links.link import GroundLink, LinkError
+from colibri.mavlink.links.open import beyond_loopback, open_ground_link, unsigned_refusal
+from colibri.mavlink.node.hub import Outgoing
+from colibri.mavlink.streaming.rates import GCS, SDK
+
+SDK_PORTS = range(14540, 14550)
+"""Where SDKs wait for a PX4, and so for us: they ask for nothing, and expect everything."""
+SHARE = 0.25
+"""Part of all time that hearing others may take: at real time a frame leaves more than half of its time to that."""
+MOST_SAVED_S = 0.005
+
+
+def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[GroundLink]:
+    """Open the links that `urls` name.
+
+    Raises:
+        LinkError: One cannot be opened, or would let anybody on the network fly the vehicle.
+    """
+    for url in urls:
+        if beyond_loopback(url) and not (signed or insecure):
+            raise LinkError(unsigned_refusal(url))
+    links: list[GroundLink] = []
+    try:
+        for url in urls:
+            links.append(open_ground_link(url))
+    except LinkError:
+        for link in links:
+            link.close()
+        raise
+    return links
+
+
+class Allowance:
+    """How much time is left for what others send: a share of all time that passes, whatever they do.
+
+    Who takes more than that is heard less often, and the control law not a moment later. What other processes take of
+    a busy computer meanwhile is no sender's doing: only the processor's time is counted.
+    """
+
+    def __init__(self, clock: Clock, processor_clock: Clock) -> None:
+        """Begin with all that can be saved up; one clock runs always, the other while this process does."""
+        self._clock = clock
+        self._processor_clock = processor_clock
+        self._earned_s = clock()
+        self._began_s = 0.0
+        self._left_s = MOST_SAVED_S
+
+    def earn(self) -> None:
+        """Take in the share of the time that has passed."""
+        now_s = self._clock()
+        self._left_s = min(self._left_s + SHARE * (now_s - self._earned_s), MOST_SAVED_S)
+        self._earned_s = now_s
+
+    def begin(self) -> bool:
+        """Begin to spend time, if there is any left."""
+        self._began_s = self._processor_clock()
+        return self._left_s > 0.0
+
+    def end(self) -> None:
+        """End to spend time; what was too much is owed."""
+        self._left_s -= self._processor_clock() - self._began_s
+
+
+class GroundLinks:
+    """Carries datagrams between links and a vehicle's hub."""
+
+    def __init__(self, links: Sequence[GroundLink], clock: Clock, processor_clock: Clock) -> None:
+        """Serve `links`; those with a target are called, whether anybody hears it or not.
+
+        Args:
+            links: All there are.
+            clock: Runs always, s.
+            processor_clock: Runs while this process does, s.
+        """
+        self._links = tuple(links)
+        self._waiting: list[deque[tuple[bytes, Address]]] = [deque() for _ in links]
+        self._allowance = Allowance(clock, processor_clock)
+        self._loopback = [not beyond_loopback(link.url) for link in links]
+        self._opened: list[tuple[int, Address]] = []
+        self._counts: dict[int, tuple[int, int]] = {}
+
+    def introduce(self, stations: Stations) -> None:
+        """Open a channel to everybody that is connected already."""
+        for number, address in self._opened:
+            self._open(stations, number, address)
+
+    def _open(self, stations: Stations, number: int, address: Address) -> None:
+        channel = stations.hub.open(number, address)
+        stations.use(channel, SDK if address[1] in SDK_PORTS else GCS)
+
+    def receive(self, stations: Stations) -> Iterator[Received]:
+        """Yield what has come, as much of it as there is time for; forget connections that have ended.
+
+        What there is no time for waits, first here, then in the system, which in the end drops it.
+        """
+        self._allowance.earn()
+        for number, link in enumerate(self._links):
+            if not self._waiting[number]:
+                self._waiting[number].extend(link.receive_now())
+            for address in link.take_opened():
+                self._opened.append((number, address))
+                self._open(stations, number, address)
+        yield from self._in_turn()
+        for number, link in enumerate(self._links):
+            for address in link.take_closed():
+                self._forget(stations, number, address)
+
+    def _in_turn(self) -> Iterator[Received]:
+        """Yield a datagram of each link after the other, so that none has to wait for one that is flooded."""
+        while any(self._waiting):
+            for number, waiting in enumerate(self._waiting):
+                if not waiting:
+                    continue
+                if not self._allowance.begin():
+                    return
+                datagram, address = waiting.popleft()
+                yield Received(datagram, number, address, self._is_loopback(number, address))
+                self._allowance.end()
+
+    def _forget(self, stations: Stations, number: int, address: Address) -> None:
+        self._opened = [opened for opened in self._opened if opened != (number, address)]
+        self._waiting[number] = deque(each for each in self._waiting[number] if each[1] != address)
+        stations.hub.close(number, address)
+
+    def send(self, outbox: Iterable[Outgoing]) -> None:
+        """Send each datagram on its link; what cannot be sent is lost, as on any network."""
+        self._allowance.begin()
+        for number, address, datagram in outbox:
+            try:
+                self._links[number].send(datagram, address)
+            except LinkError:
+                continue
+        self._allowance.end()
+
+    def facts(self, stations: Stations, interval_s: float) -> list[dict[str, Any]]:
+        """Return, for each link, who is heard and how many messages a second come and go."""
+        facts = []
+        for number, link in enumerate(self._links):
+            channels = [channel for channel in stations.hub.channels if channel.link == number]
+            received, sent = (sum(getattr(channel, kind) for channel in channels) for kind in ("received", "sent"))
+            before = self._counts.get(number, (0, 0))
+            self._counts[number] = (received, sent)
+            facts.append(
+                {
+                    "url": link.url,
+                    "heard": [f"{system}/{component}" for channel in channels for system, component in channel.sources],
+                    "received_hz": max(received - before[0], 0) / interval_s,
+                    "sent_hz": max(sent - before[1], 0) / interval_s,
+                    "lost": sum(channel.lost for channel in channels),
+                }
+            )
+        return facts
+
+    def close(self) -> None:
+        """Close every link."""
+        for link in self._links:
+            link.close()
+
+    def _is_loopback(self, number: int, address: Address) -> bool:
+        return self._loopback[number] or ip_address(address[0]).is_loopback

@@ -1,0 +1,105 @@
+"""The autopilot's own logs of a flight."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Active
+from colibri.autopilot.core.step import Step
+from colibri.autopilot.estimation.estimate import Estimate, Tests
+from colibri.autopilot.process.recorded_inputs import Heard, Setup, line
+from colibri.common.process.log_files import CsvLog, LineLog
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.parameters.store import Value
+
+if TYPE_CHECKING:
+    from colibri.autopilot.core.step import Received
+
+
+DECISION_COLUMNS = (
+    *("t", "phi_ref", "theta_ref", "psi_ref"),
+    *("qp_status", "fallback", "solve_time_us", "control_step_us", "cost", "slack"),
+    *(f"active_{kind}" for kind in Active._fields),
+)
+
+ESTIMATE_COLUMNS = (
+    *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r"),
+    *(f"sd_{name}" for name in ("x", "y", "z", "vx", "vy", "vz", "east", "north", "up")),
+    *("gyro_bias_x", "gyro_bias_y", "gyro_bias_z", "accel_bias_x", "accel_bias_y", "accel_bias_z"),
+    *("flags", "rejected", "resets"),
+)
+CHECK_COLUMNS = (
+    *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz"),
+    *(f"P{row}{column}" for row in range(9) for column in range(row, 9)),
+    *(f"nis_{kind}" for kind in Tests._fields),
+    *(f"believed_{kind}" for kind in Tests._fields),
+)
+
+
+class AutopilotLog:
+    """What the autopilot writes: what it began with and heard, one row a control sample, and what it estimates then."""
+
+    def __init__(self, folder: Path, setup: Setup) -> None:
+        """Create `autopilot.csv` and `inputs.jsonl` in `folder`; on sensors also `estimate.csv` and `filter.csv`.
+
+        What was heard goes to the end of what the process before heard: it may have died in mid-flight.
+        """
+        self._setup = setup
+        self._begins = True
+        self._time_us = 0
+        self._inputs = LineLog(folder / "inputs.jsonl")
+        self._decisions = CsvLog(folder / "autopilot.csv", DECISION_COLUMNS)
+        self._estimates = self._checks = None
+        if setup.feedback is Feedback.SENSORS:
+            self._estimates = CsvLog(folder / "estimate.csv", ESTIMATE_COLUMNS)
+            self._checks = CsvLog(folder / "filter.csv", CHECK_COLUMNS)
+
+    def write(self, step: Step) -> None:
+        """Append a control sample; a frame between two of them has nothing to tell but how the filter stands."""
+        self._time_us = step.command.time_us
+        if self._begins:
+            self._begins = False
+            self._inputs.write(line(msgspec.structs.replace(self._setup, first_us=self._time_us)))
+        if self._checks is not None and step.estimate is not None and step.estimate.check is not None:
+            check = step.estimate.check
+            self._checks.write((check.time_us / 1e6, *check.state, *check.covariance, *check.nis, *check.believed))
+        if step.decision is None:
+            return
+        if self._estimates is not None and step.estimate is not None:
+            self._write_estimate(self._estimates, step.estimate)
+        how = step.decision.diagnostics
+        codes = (STATUS_CODES[how.qp_status], FALLBACK_CODES[how.fallback])
+        times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
+        time_s = step.command.time_us / 1e6
+        self._decisions.write(
+            (time_s, *step.decision.attitude_reference, *codes, *times_us, how.cost, how.slack, *how.active)
+        )
+
+    def begin_again(self, values: Mapping[str, Value], past: bytes) -> None:
+        """Note that the next frame is answered by a vehicle that begins with these parameters, and with this past."""
+        self._setup = msgspec.structs.replace(self._setup, values=dict(values), past=past)
+        self._begins = True
+
+    def hear(self, datagrams: Iterable["Received"]) -> Iterator["Received"]:
+        """Pass on what ground stations sent, and note it."""
+        for received in datagrams:
+            datagram, link, address, loopback = received
+            heard = Heard(time_us=self._time_us, link=link, address=address, loopback=loopback, datagram=datagram)
+            self._inputs.write(line(heard))
+            yield received
+
+    def close(self) -> None:
+        """Close the files."""
+        for log in (self._inputs, self._decisions, self._estimates, self._checks):
+            if log is not None:
+                log.close()
+
+    def _write_estimate(self, log: CsvLog, estimate: Estimate) -> None:
+        frame = estimate.frame
+        state = (*frame.position_enu_m, *frame.velocity_enu_m_s, *frame.attitude, *frame.rate_flu_rad_s)
+        deviations = (*estimate.position_std_m, *estimate.velocity_std_m_s, *estimate.attitude_std_rad)
+        biases = (*estimate.gyro_bias_rad_s, *estimate.accel_bias_m_s2)
+        counts = (int(estimate.health.flags), sum(estimate.rejected.values()), estimate.resets)
+        log.write((frame.time_us / 1e6, *state, *deviations, *biases, *counts))

@@ -1,0 +1,104 @@
+"""What an autopilot was started with and heard, beside the plant's frames: enough to fly a recorded flight again.
+
+A log of lines of JSON: how it began, then each datagram of a ground station with the frame after which it was served.
+One that was restarted in mid-flight begins anew in it.
+"""
+
+from collections.abc import Iterable
+from typing import TypeAlias
+
+import msgspec
+
+from colibri.common.earth.geodesy import Geodetic
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.parameters.store import Value
+
+
+class InputsError(Exception):
+    """What is no such log; the message says where."""
+
+
+class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="began", tag_field="what"):
+    """How an autopilot began.
+
+    Attributes:
+        profile: Name or file.
+        controller: Of the profile's control laws.
+        solver: QP solver asked for; None for the profile's.
+        vehicle: That it controls, name or file.
+        feedback: What frames told it.
+        track: What it flew from the start; None where ground stations say what to fly.
+        origin: Of the ENU frame.
+        system_id: MAVLink system.
+        identity: Towards ground stations.
+        ground: Whether it served ground stations.
+        values: Of parameters that were changed before.
+        past: What had been kept of the same flight, where it was killed in it; else empty.
+        first_us: The first frame that it answered.
+    """
+
+    profile: str
+    controller: str
+    solver: str | None
+    vehicle: str
+    feedback: Feedback
+    track: str | None
+    origin: Geodetic
+    system_id: int
+    identity: str
+    ground: bool
+    values: dict[str, Value] = {}
+    past: bytes = b""
+    first_us: int = 0
+
+
+class Heard(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="heard", tag_field="what"):
+    """A datagram of a ground station.
+
+    Attributes:
+        time_us: Of the frame after which it was served.
+        link: Number of the link.
+        address: Where from.
+        loopback: Whether from this computer.
+        datagram: The bytes; in base 64 in the log.
+    """
+
+    time_us: int
+    link: int
+    address: tuple[str, int] | None
+    loopback: bool
+    datagram: bytes
+
+
+Input: TypeAlias = Setup | Heard
+_DECODER = msgspec.json.Decoder(Input)
+
+
+def line(what: Input) -> bytes:
+    """Return a line of the log."""
+    return msgspec.json.encode(what) + b"\n"
+
+
+def read(log: bytes) -> list[Input]:
+    """Return the inputs of the last flight of a log; of a process that was killed, the last line may be cut off.
+
+    Raises:
+        InputsError: This is no such log.
+    """
+    *lines, _ = log.split(b"\n")
+    inputs: list[Input] = []
+    for number, text in enumerate(lines, 1):
+        try:
+            what = _DECODER.decode(text)
+        except msgspec.MsgspecError as error:
+            raise InputsError(f"line {number}: {error}") from error
+        if isinstance(what, Setup) and what.first_us <= max(_beginnings(inputs), default=-1):
+            inputs.clear()  # of a flight before
+        inputs.append(what)
+    if not _beginnings(inputs):
+        raise InputsError("nothing has begun")
+    return inputs
+
+
+def _beginnings(inputs: Iterable[Input]) -> list[int]:
+    return [what.first_us for what in inputs if isinstance(what, Setup)]

@@ -1,0 +1,120 @@
+"""The autopilot as a process: calls a plant over a link, answers its frames, logs what it decided."""
+
+import argparse
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from colibri.autopilot.control.profile import Profile, ProfileError, load_profile
+from colibri.autopilot.control.qp import SolverError
+from colibri.autopilot.control.registry import ControllerError, DecisionError
+from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.estimation.state_source import Estimator, estimator_for
+from colibri.autopilot.guidance.trajectories.tracks import TrackError, track
+from colibri.autopilot.process.recorded_inputs import Setup
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, undisturbed
+from colibri.common.process.status import Status
+from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
+from colibri.mavlink.hil.px4_autopilot import FlierEnd
+from colibri.mavlink.links.link import LinkError, OneByOne
+from colibri.mavlink.links.open import open_link
+from colibri.mavlink.links.udp import UdpLink
+from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicle
+
+if TYPE_CHECKING:
+    from colibri.autopilot.process.ground import Ground
+from colibri.autopilot.process.client import Client
+from colibri.autopilot.process.logs import AutopilotLog
+
+TRACK = "spiral"
+"""What flies where nothing else is said."""
+
+
+def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop: Stop) -> int:
+    """Fly the plant at the other end of `link` as the command line says; return the exit code."""
+    try:
+        profile = load_profile(args.profile).with_choices(args.controller, args.solver)
+        vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
+        estimator = estimator_for(args.feedback, vehicle, args.home.origin)
+        served = args.gcs or args.conducted
+        ground = _ground(args, profile, vehicle, estimator, status, stop) if served else None
+        autopilot = ground.copter if ground else _alone(args, profile, vehicle, estimator)
+        end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
+    except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
+        fail(str(error))
+    log = AutopilotLog(args.out, _setup(args, profile)) if args.out else None
+    if ground and log:
+        ground.record(log)
+    if args.conducted and isinstance(link, UdpLink):  # several flights share the cores: who waits gives way at once
+        link.spin_s = 0.0
+    try:
+        with undisturbed():
+            Client(link, end, status, stop, log, ground).fly(autopilot)
+    except (LinkError, DecisionError) as error:
+        fail(str(error), EXIT_FAILED)
+    finally:
+        link.close()
+        if ground:
+            ground.close()
+        if log:
+            log.close()
+    return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
+
+
+def _setup(args: argparse.Namespace, profile: Profile) -> Setup:
+    served = bool(args.gcs or args.conducted)
+    return Setup(
+        profile=args.profile,
+        controller=profile.controller,
+        solver=args.solver,
+        vehicle=args.vehicle or profile.simulation.vehicle,
+        feedback=args.feedback,
+        track=args.track if served else args.track or TRACK,
+        origin=args.home.origin,
+        system_id=args.system_id,
+        identity=args.identity,
+        ground=served,
+    )
+
+
+def _end(args: argparse.Namespace, frame_interval_us: int) -> AutopilotEnd:
+    return AutopilotEnd(
+        system_id=args.system_id, frame_interval_us=frame_interval_us, now_s=perf_counter(), feedback=args.feedback
+    )
+
+
+def _flier(args: argparse.Namespace, vehicle: Vehicle) -> FlierEnd:
+    """Return what flies a simulator that counts the rotors as PX4 does.
+
+    Raises:
+        VehicleError: PX4 cannot count them.
+    """
+    rotors, order = vehicle.rotors, vehicle.rotors.numbering()
+    return FlierEnd(
+        system_id=args.system_id,
+        now_s=perf_counter(),
+        to_motors=lambda speeds: rotors.controls_of(order.to_motors(speeds)),
+    )
+
+
+def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None) -> Autopilot:
+    return Autopilot(profile, vehicle, track(args.track or TRACK), perf_counter, estimator=estimator)
+
+
+def _ground(
+    args: argparse.Namespace,
+    profile: Profile,
+    vehicle: Vehicle,
+    estimator: Estimator | None,
+    status: Status,
+    stop: Stop,
+) -> "Ground":
+    """Load what serves ground stations only where there are any: it is as much as all the rest."""
+    from colibri.autopilot.process.conducted_links import UdpConductor
+    from colibri.autopilot.process.ground import open_ground
+
+    conductor = None
+    if args.conducted:
+        link = open_link(args.conducted)
+        link.spin_s = 0.0
+        conductor = UdpConductor(link, lambda: stop)
+    return open_ground(args, profile, vehicle, estimator, status, conductor)

@@ -1,0 +1,1 @@
+"""Colibri: a quadrotor autopilot by LPV model predictive control, and the plant it flies, over MAVLink."""

@@ -1,0 +1,7 @@
+"""`colibri` is `colibri`."""
+
+import sys
+
+from colibri.cli.main import main
+
+sys.exit(main())

@@ -1,0 +1,1 @@
+"""What a flight left behind, joined, judged, drawn, tabled."""

@@ -1,0 +1,308 @@
+"""The figures of a flight: what they show as data, and one function for each kind of plot."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from colibri.analysis.recording import ATTITUDE_REFERENCE, COLUMNS, INPUT, POSITION_REFERENCE, ROTORS, Recording
+from colibri.analysis.report import SETTLED_AFTER_S
+from colibri.common.rotations import earth_from_body, quaternion_from_euler
+from colibri.common.types import Array
+from colibri.flights.plan import FlightPlan
+
+Series: TypeAlias = dict[str, Array]
+"""Name -> values, (n,); `t` holds their times, s."""
+
+POSITION = ("x", "y", "z")
+VELOCITY = ("vx", "vy", "vz")
+ATTITUDE = ("phi", "theta", "psi")
+START_S = 10.0
+
+_WIDTH_IN, _DPI = 8.6, 150
+TOP_IN = 0.8
+"""Room above the axes for a title and one row of a legend."""
+_LEFT_IN, _RIGHT_IN, _BOTTOM_IN = 0.85, 0.25, 0.5
+_ROW_IN, _ROW_GAP_IN, _COLUMN_GAP_IN = 1.4, 0.2, 0.95
+_TITLE_IN, _LABEL_IN = 0.45, 0.6
+_TIME_MARGIN = 0.015
+_FLATTEST = 0.4
+_NOTHING = 1e-12
+_LONGEST_NAME = 36
+_ROOM_FOR_TALL = 0.8
+
+
+class Style(NamedTuple):
+    """How a curve is drawn: colour, width in points, dashes of matplotlib."""
+
+    color: str
+    width_pt: float
+    dashes: str = "-"
+
+
+# Okabe and Ito's colours. What lies lower is wider, so that it shows on both sides of a curve that coincides with it.
+FLOWN = Style("#000000", 1.1)
+REFERENCE = Style("#56B4E9", 4.5)
+LIMIT = Style("#D55E00", 1.4, "--")
+START_COLOR = "#D55E00"
+AXES = (Style("#0072B2", 4.0), Style("#E69F00", 2.4), Style("#000000", 1.0))
+
+
+class Curve(NamedTuple):
+    """One series in a panel, named in the legend if it has a label.
+
+    A held one keeps each value from the sample before to its own, as a recording's inputs do.
+    """
+
+    series: str
+    label: str
+    style: Style = FLOWN
+    held: bool = False
+
+
+class Panel(NamedTuple):
+    """Curves over time: the quantity and its unit, what is drawn (the first lowest), and from when to when.
+
+    A quantity that cannot be negative is drawn from zero, so that a ripple does not look like more than it is.
+    """
+
+    quantity: str
+    curves: tuple[Curve, ...]
+    span_s: tuple[float, float] | None = None
+    from_zero: bool = False
+
+
+class TimeFigure(NamedTuple):
+    """Panels over time, row by row; file name without suffix, and what the title calls it."""
+
+    name: str
+    subject: str
+    rows: tuple[tuple[Panel, ...], ...]
+
+
+def draw_flight(recording: Recording, plan: FlightPlan) -> list[Path]:
+    """Draw all figures of a flight as PNG into the plan's folder; return their paths."""
+    series = flight_series(recording, plan)
+    flight = f"{shortened(plan.track_name)}, profile {plan.profile.name}"
+    paths = write_figure(draw_trajectory(series, f"{flight}: trajectory"), plan.out / "trajectory")
+    for figure in flight_figures(series, plan):
+        paths += write_figure(draw_times(series, figure, f"{flight}: {figure.subject}"), plan.out / figure.name)
+    return paths
+
+
+def flight_series(recording: Recording, plan: FlightPlan) -> Series:
+    """Return all that the figures show: the columns of the recording, angles in degrees, and what follows from them.
+
+    `vx` to `vz` are earth velocities, ENU, m/s, and `vx_ref` to `vz_ref` those of the reference; `ex` to `ez` are
+    errors, m, and `distance` their norm; `rms` is its RMS once settled, not a number before; `stopped` and `fastest`
+    are the limits of the rotors.
+    """
+    series = {name: recording[name] for name in COLUMNS}
+    t, distance = series["t"], recording.position_error_m
+    series |= dict(zip(VELOCITY, _earth_velocity(recording).T, strict=True))
+    for axis, reference in zip(POSITION, POSITION_REFERENCE, strict=True):
+        series[f"v{axis}_ref"] = np.gradient(series[reference], t)
+        series[f"e{axis}"] = series[axis] - series[reference]
+    for angle in (*ATTITUDE, *ATTITUDE_REFERENCE):
+        series[angle] = np.degrees(series[angle])
+    settled = t >= SETTLED_AFTER_S
+    rms = np.sqrt(np.mean(distance[settled] ** 2)) if t[-1] > SETTLED_AFTER_S else np.nan
+    fastest = np.full_like(t, plan.plant_vehicle.rotors.max_speed)
+    return series | {
+        "distance": distance,
+        "rms": np.where(settled, rms, np.nan),
+        "stopped": np.zeros_like(t),
+        "fastest": fastest,
+    }
+
+
+def flight_figures(series: Series, plan: FlightPlan) -> tuple[TimeFigure, ...]:
+    """Return the figures over time that every flight gets."""
+    end_s = float(series["t"][-1])
+    start = (0.0, START_S) if end_s >= 2.0 * START_S else None
+    settled = (SETTLED_AFTER_S, end_s) if end_s > SETTLED_AFTER_S else None
+    position = tuple((followed(axis, f"{axis} (m)"), followed(f"v{axis}", f"v{axis} (m/s)")) for axis in POSITION)
+    angles = [followed(name, f"{sign} (°)", held_reference=True) for name, sign in zip(ATTITUDE, "φθψ", strict=True)]
+    inputs = [Panel(f"{name} ({'N' if name == 'U1' else 'N m'})", (Curve(name, "", held=True),)) for name in INPUT]
+    return (
+        TimeFigure("position", "position and velocity", position),
+        TimeFigure("attitude", "attitude", beside(angles, start)),
+        TimeFigure("inputs", "thrust and moments", beside(inputs, start)),
+        TimeFigure("rotors", "rotor speeds", beside(_rotor_panels(plan), start)),
+        TimeFigure("error", "position error", beside(_error_panels(series), settled)),
+    )
+
+
+def followed(name: str, quantity: str, *, held_reference: bool = False) -> Panel:
+    """Return the panel of a series with its reference, named `<name>_ref`, underneath."""
+    return Panel(quantity, (Curve(f"{name}_ref", "reference", REFERENCE, held_reference), Curve(name, "flown")))
+
+
+def beside(panels: Iterable[Panel], span_s: tuple[float, float] | None) -> tuple[tuple[Panel, ...], ...]:
+    """Return one row a panel, with its enlargement of `span_s` beside it if there is one."""
+    return tuple((panel, panel._replace(span_s=span_s)) if span_s else (panel,) for panel in panels)
+
+
+def draw_times(series: Series, description: TimeFigure, title: str) -> Figure:
+    """Draw panels over time; the legend stands above them."""
+    labelled = any(curve.label for row in description.rows for panel in row for curve in panel.curves)
+    figure, grid = axes_grid(len(description.rows), len(description.rows[0]), TOP_IN if labelled else _TITLE_IN)
+    for axes_row, panels in zip(grid, description.rows, strict=True):
+        for axes, panel in zip(axes_row, panels, strict=True):
+            _draw_panel(axes, series, panel)
+    for axes in grid[-1]:
+        axes.set_xlabel("t (s)")
+    put_head(figure, title)
+    return figure
+
+
+def draw_trajectory(series: Series, title: str) -> Figure:
+    """Draw position and reference in space, to scale unless an axis would be too short to read."""
+    figure = Figure(figsize=(_WIDTH_IN, 6.8), dpi=_DPI)
+    # Depth sorting would draw the reference over the path in places.
+    axes = figure.add_subplot(projection="3d", computed_zorder=False)
+    figure.subplots_adjust(left=0.0, right=0.97, bottom=0.03, top=0.93)
+    axes.plot(*(series[name] for name in POSITION_REFERENCE), label="reference", **line_style(REFERENCE))
+    axes.plot(*(series[name] for name in POSITION), label="flown", **line_style(FLOWN))
+    axes.plot(*(series[name][:1] for name in POSITION), "o", label="start", color=START_COLOR, markersize=8)
+    to_scale = _scale(axes)
+    put_head(figure, title if to_scale else f"{title}, axes not to scale")
+    return figure
+
+
+def shortened(name: str) -> str:
+    """Return a name that fits into a title: of one that is too long, its beginning and its end."""
+    half = _LONGEST_NAME // 2
+    return name if len(name) <= _LONGEST_NAME else f"{name[:half]}…{name[-half:]}"
+
+
+def write_figure(figure: Figure, path: Path, formats: Iterable[str] = ("png",)) -> list[Path]:
+    """Write a figure to `path` with the suffix of each format; return what was written."""
+    paths = [path.with_name(f"{path.name}.{suffix}") for suffix in formats]
+    for written in paths:
+        figure.savefig(written)
+    return paths
+
+
+def _earth_velocity(recording: Recording) -> Array:
+    rows = recording.columns((*ATTITUDE, "u", "v", "w")).tolist()
+    return np.array([earth_from_body(quaternion_from_euler(*row[:3]), (row[3], row[4], row[5])) for row in rows])
+
+
+def _rotor_panels(plan: FlightPlan) -> list[Panel]:
+    limits = (Curve("stopped", "limits", LIMIT), Curve("fastest", "limits", LIMIT))
+    unit = plan.plant_vehicle.rotors.speed_unit
+    return [
+        Panel(f"Ω{number} ({unit})", (*limits, Curve(name, "rotor speed", held=True)))
+        for number, name in enumerate(ROTORS, start=1)
+    ]
+
+
+def _error_panels(series: Series) -> list[Panel]:
+    rms = series["rms"][-1]
+    settled = (Curve("rms", f"RMS after {SETTLED_AFTER_S:.0f} s: {rms:.4f} m", REFERENCE),) if np.isfinite(rms) else ()
+    axes = tuple(Curve(f"e{axis}", f"error in {axis}", style) for axis, style in zip(POSITION, AXES, strict=True))
+    distance = (*settled, Curve("distance", ""))
+    return [Panel("distance (m)", distance, from_zero=True), Panel("error (m)", axes)]
+
+
+def axes_grid(
+    rows: int, columns: int, top_in: float, row_in: float = _ROW_IN, *, share: bool = True
+) -> tuple[Figure, list[list[Axes]]]:
+    """Return a figure with axes that `share` the abscissa of their column.
+
+    Fixed margins draw twice as fast as a layout.
+    """
+    height_in = top_in + rows * row_in + (rows - 1) * _ROW_GAP_IN + _BOTTOM_IN
+    figure = Figure(figsize=(_WIDTH_IN, height_in), dpi=_DPI)
+    column_in = (_WIDTH_IN - _LEFT_IN - _RIGHT_IN - (columns - 1) * _COLUMN_GAP_IN) / columns
+    grid = figure.subplots(rows, columns, sharex="col" if share else "none", squeeze=False)
+    figure.subplots_adjust(
+        left=_LEFT_IN / _WIDTH_IN,
+        right=1.0 - _RIGHT_IN / _WIDTH_IN,
+        bottom=_BOTTOM_IN / height_in,
+        top=1.0 - top_in / height_in,
+        wspace=_COLUMN_GAP_IN / column_in,
+        hspace=_ROW_GAP_IN / row_in,
+    )
+    return figure, [list(axes_row) for axes_row in grid]
+
+
+def _draw_panel(axes: Axes, series: Series, panel: Panel) -> None:
+    t = series["t"]
+    begin_s, end_s = panel.span_s or (t[0], t[-1])
+    shown = (t >= begin_s) & (t <= end_s)
+    for curve in panel.curves:
+        steps = "steps-pre" if curve.held else "default"
+        axes.plot(t[shown], series[curve.series][shown], label=curve.label, drawstyle=steps, **line_style(curve.style))
+    margin_s = _TIME_MARGIN * (end_s - begin_s)
+    axes.set_xlim(begin_s - margin_s, end_s + margin_s)
+    axes.set_ylabel(panel.quantity)
+    axes.yaxis.set_label_coords(-_LABEL_IN / _width_in(axes), 0.5)
+    axes.grid(color="#DDDDDD", linewidth=0.6)
+    axes.yaxis.set_major_locator(round_ticks(6))
+    if np.ptp(axes.dataLim.intervaly) < _NOTHING:
+        axes.set_ylim(-1.0, 1.0)  # otherwise rounding errors fill the panel
+    if panel.from_zero:
+        axes.set_ylim(0.0, 1.1 * axes.dataLim.y1)
+
+
+def round_ticks(intervals: int) -> MaxNLocator:
+    """Return a locator of round numbers, which take less room than those between them."""
+    return MaxNLocator(intervals, steps=[1, 2, 5, 10])
+
+
+def _width_in(axes: Axes) -> float:
+    return axes.get_position().width * _WIDTH_IN
+
+
+def line_style(style: Style) -> dict[str, Any]:
+    """Return the arguments of matplotlib's `plot` that draw a line so."""
+    # Wide lines would otherwise reach past their first and last sample.
+    ends = {"solid_capstyle": "butt"}
+    return {"color": style.color, "linewidth": style.width_pt, "linestyle": style.dashes} | ends
+
+
+def put_head(figure: Figure, title: str, columns: int | None = None) -> None:
+    """Put title and legend, in one row or in so many columns, above the axes, where they hide no data; each label once.
+
+    Legends fill column by column.
+    """
+    pairs = (axes.get_legend_handles_labels() for axes in figure.axes)
+    labelled = {label: handle for handles, labels in pairs for label, handle in zip(labels, handles, strict=True)}
+    put_title(figure, title)
+    height_in = figure.get_figheight()
+    figure.legend(
+        labelled.values(),
+        labelled.keys(),
+        loc="upper left",
+        bbox_to_anchor=(0.2 / _WIDTH_IN, 1.0 - 0.38 / height_in),
+        ncols=columns or len(labelled),
+        frameon=False,
+        borderaxespad=0.0,
+    )
+
+
+def put_title(figure: Figure, title: str) -> None:
+    """Put a title above the axes."""
+    top = 1.0 - 0.1 / figure.get_figheight()
+    figure.text(0.2 / _WIDTH_IN, top, title, va="top", fontsize="large", fontweight="bold", parse_math=False)
+
+
+def _scale(axes: Any) -> bool:
+    """Make the axes as long as their ranges, but none shorter than a part of the longest; tell whether none was."""
+    ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
+    ranges /= ranges.max()
+    lengths = np.maximum(ranges, _FLATTEST)
+    tall = lengths[2] > max(lengths[:2])
+    axes.set_box_aspect(lengths, zoom=_ROOM_FOR_TALL if tall else 1.0)
+    axes.zaxis.set_tick_params(pad=18 if tall else 8)
+    for name, axis, length in zip(POSITION, (axes.xaxis, axes.yaxis, axes.zaxis), lengths, strict=True):
+        axis.set_label_text(f"{name} (m)")
+        axis.set_major_locator(round_ticks(3 if length < 0.7 else 6))
+        axis.labelpad = 32.0 if tall and name == "z" else 18.0
+    return bool(ranges.min() >= _FLATTEST)

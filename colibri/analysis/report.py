@@ -1,0 +1,148 @@
+"""How well a flight went: `report.json`, and the table that a person reads."""
+
+import json
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.analysis.estimation import FIGURES, read_estimation
+from colibri.analysis.recording import INPUT, Recording
+from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Active, Fallback
+from colibri.autopilot.control.qp import QpStatus
+from colibri.common.types import Array
+from colibri.flights.plan import FlightPlan, Summary
+from colibri.mavlink.hil.feedback import Feedback
+
+Report: TypeAlias = dict[str, Any]
+
+SETTLED_AFTER_S = 20.0
+_SMALL_M = 0.01
+
+
+def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
+    """Return the figures of a flight.
+
+    Errors are distances to the reference of the same instant; effort is the RMS of the moment U2..U4, N m.
+    """
+    error, t = recording.position_error_m, recording["t"]
+    sim_time_s = float(t[-1])
+    settled = error[t >= SETTLED_AFTER_S]
+    return {
+        "track": plan.track_name,
+        "profile": plan.profile.name,
+        "controller": plan.profile.controller,
+        "link": plan.link,
+        "seed": plan.seed,
+        "feedback": plan.feedback,
+        "solver": plan.profile.table(plan.profile.controller).get("qp", {}).get("solver"),
+        "vehicle": plan.vehicle_name,
+        "plant_vehicle": plan.plant_vehicle_name,
+        "integrator": plan.integrator,
+        "wind": str(plan.weather.wind),
+        "gusts": [str(gust) for gust in plan.weather.gusts],
+        "turbulence": plan.weather.turbulence,
+        "without": list(plan.without),
+        "start": plan.start._asdict(),
+        "sim_time_s": sim_time_s,
+        "wall_time_s": summary.wall_time_s,
+        "real_time_factor": sim_time_s / summary.wall_time_s,
+        "rmse_m": _rms(error),
+        "max_error_m": float(error.max()),
+        "rmse_after_20s_m": _rms(settled) if len(settled) else None,
+        "max_error_after_20s_m": float(settled.max()) if len(settled) else None,
+        **_estimation_figures(plan, settled),
+        "effort_n_m": _rms(np.linalg.norm(recording.columns(INPUT[1:]), axis=1)),
+        "solve_time_us": _quantiles(recording.solve_time_us),
+        "control_step_us": _quantiles(recording.control_step_us),
+        "frames": summary.frames,
+        "resent": summary.resent,
+        "qp_failures": int(np.count_nonzero(recording.qp_status > STATUS_CODES[QpStatus.SOLVED])),
+        "qp_status": _counts(recording.qp_status, {str(status): STATUS_CODES[status] for status in QpStatus}),
+        "fallbacks": _counts(recording.fallback, {str(fallback): FALLBACK_CODES[fallback] for fallback in Fallback}),
+        "constrained_samples": dict(
+            zip(Active._fields, np.count_nonzero(recording.active, axis=0).tolist(), strict=True)
+        ),
+        "max_slack": float(recording.slack.max()),
+        "trajectory_sha256": recording.trajectory_sha256,
+    }
+
+
+def _estimation_figures(plan: FlightPlan, settled: Array) -> Report:
+    """Return how far estimate and reference, estimate and truth are apart; a state that is told is the truth."""
+    if plan.feedback is Feedback.SENSORS:
+        return read_estimation(plan).after(SETTLED_AFTER_S).figures()
+    return dict.fromkeys(FIGURES) | {FIGURES[0]: _rms(settled) if len(settled) else None}
+
+
+def write_report(figures: Report, path: Path) -> None:
+    """Write the report as JSON."""
+    path.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+
+
+def print_report(figures: Report, out: Path) -> None:
+    """Show the report as a table on standard output."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    def times(name: str) -> str:
+        return f"{figures[name]['p50']:.0f} / {figures[name]['p99']:.0f} µs"
+
+    settled = figures["rmse_after_20s_m"]
+    fallbacks = [f"{count} {name}" for name, count in figures["fallbacks"].items() if count]
+    title = escape(f"{figures['track']}, profile {figures['profile']}")
+    table = Table(title=title, show_header=False, title_justify="left")
+    rows = {
+        "position error, RMS": length(figures["rmse_m"]),
+        f"position error, RMS after {SETTLED_AFTER_S:.0f} s": "-" if settled is None else length(settled),
+        **_estimation_rows(figures),
+        "position error, maximum": length(figures["max_error_m"]),
+        "QP solve time, p50 / p99": times("solve_time_us"),
+        "control step, p50 / p99": times("control_step_us"),
+        "flown": f"{figures['sim_time_s']:.1f} s in {figures['wall_time_s']:.2f} s",
+        "real-time factor": f"{figures['real_time_factor']:.0f}",
+        "frames, sent again": f"{figures['frames']}, {figures['resent']}",
+        "QPs not solved": f"{figures['qp_failures']}",
+        "samples flown by a fallback": ", ".join(fallbacks) or "0",
+        "trajectory": figures["trajectory_sha256"][:16],
+        "written to": str(out),
+    }
+    for name, value in rows.items():
+        table.add_row(name, value)
+    Console().print(table)
+
+
+def _estimation_rows(figures: Report) -> dict[str, str]:
+    """Return the rows that only a flight on sensors has."""
+    if figures["estimation_rmse_m"] is None:
+        return {}
+    off, turned = figures["estimation_rmse_m"], figures["attitude_rmse_deg"]
+    return {
+        "estimate from reference, RMS": length(figures["control_rmse_m"]),
+        "estimate from truth, RMS": f"{length(off['horizontal'])} horizontal, {length(off['vertical'])} vertical",
+        "attitude, RMS": f"roll {turned['roll']:.2f}°, pitch {turned['pitch']:.2f}°, yaw {turned['yaw']:.2f}°",
+        "NEES, mean of 9 numbers": f"{figures['nees_mean']:.2f}",
+        "NIS, in parts of what is right": ", ".join(
+            f"{kind} {nis['mean']:.2f}" for kind, nis in figures["nis_mean"].items() if nis["innovations"]
+        ),
+    }
+
+
+def length(metres: float) -> str:
+    """Return a length as a person reads it: small ones in mm."""
+    return f"{metres:.4f} m" if metres >= _SMALL_M else f"{1e3 * metres:.3f} mm"
+
+
+def _counts(codes: NDArray[np.int64], names: dict[str, int]) -> dict[str, int]:
+    return {name: int(np.count_nonzero(codes == code)) for name, code in names.items()}
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _quantiles(values: Array) -> dict[str, float]:
+    p50, p99 = np.quantile(values, [0.5, 0.99])
+    return {"p50": float(p50), "p99": float(p99), "max": float(values.max())}

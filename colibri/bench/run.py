@@ -1,0 +1,197 @@
+"""`colibri bench`: how long each stage takes, and how much faster than real time it flies, beside a peer."""
+
+import argparse
+import json
+import os
+import platform
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.qp import installed_solvers
+from colibri.bench.sensing import FLIGHTS_A_RUN, sensing_figures
+from colibri.bench.serving import ALONE, CHANNELS, WATCHED, serving_figures
+from colibri.bench.speed import CONTROL_S, LINKS, THESIS_LINKS, Tell, rate_figures, thesis_figures
+from colibri.bench.stages import MOVES, STAGES, stage_figures
+from colibri.common.process.lifecycle import fail
+from tools.bench import rotorpy_peer
+
+PROFILE = "flight"
+SHORTEST_S, LONGEST_S = 0.1, 1000.0
+_SERVED = ("p50 µs", "p99 µs", "messages a second")
+
+
+def bench(args: argparse.Namespace) -> int:
+    """Measure what the command line says, print tables, write JSON; return the exit code."""
+    wanted = args.only or ["stages", "flights", "sensors", "ground", "thesis"]
+    if not SHORTEST_S <= args.duration <= LONGEST_S:
+        fail(f"--duration: {SHORTEST_S:g} to {LONGEST_S:g} s, not {args.duration:g}")
+    if args.out:
+        _check_writable(args.out)
+    beside = "flights" in wanted and rotorpy_peer.installed()
+    if "flights" in wanted and not beside:
+        _note(rotorpy_peer.MISSING)
+    figures: dict[str, Any] = {"settings": _settings(args)}
+    with _progress(parts(wanted, args.runs, beside=beside)) as tell, TemporaryDirectory() as folder:
+        profile = load_profile(PROFILE)
+        if "stages" in wanted:
+            figures["stages"] = stage_figures(profile, Path(folder), args.duration, tell)
+        if "flights" in wanted:
+            figures["flights"] = rate_figures(profile, Path(folder), args.duration, args.runs, tell, beside=beside)
+        if "sensors" in wanted:
+            figures["sensors"] = sensing_figures(profile, Path(folder), args.duration, args.runs, tell)
+        if "ground" in wanted:
+            figures["ground"] = serving_figures(profile, Path(folder), args.duration, args.runs, tell)
+        if "thesis" in wanted:
+            figures["thesis"] = thesis_figures(args.runs, tell)
+    if args.out:
+        _write(figures, args.out)
+    _print(figures)
+    return 0
+
+
+def _settings(args: argparse.Namespace) -> dict[str, Any]:
+    machine = {"python": platform.python_version(), "machine": platform.machine(), "cpus": os.cpu_count()}
+    return {"profile": PROFILE, "runs": args.runs, "duration_s": args.duration, **machine}
+
+
+def parts(wanted: list[str], runs: int, *, beside: bool) -> int:
+    """Return how often `tell` will be called."""
+    stages = 1 + len(MOVES) * (1 + len(installed_solvers()))
+    flights = 1 + runs * len(CONTROL_S) * (len(LINKS) + beside)
+    ground = len(CHANNELS) + 2 * runs
+    sensors = 1 + runs * FLIGHTS_A_RUN
+    thesis = runs * len(THESIS_LINKS)
+    parts = {"stages": stages, "flights": flights, "sensors": sensors, "ground": ground, "thesis": thesis}
+    return sum(parts[section] for section in set(wanted))
+
+
+@contextmanager
+def _progress(parts: int) -> Iterator[Tell]:
+    """Show on standard error what is being measured."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=parts)
+
+        def tell(what: str) -> None:
+            bar.update(task, description=what, advance=1)
+
+        yield tell
+
+
+def _print(figures: Mapping[str, Any]) -> None:
+    console = Console()
+    settings = figures["settings"]
+    if "stages" in figures:
+        for table in _stage_tables(figures["stages"]):
+            console.print(table)
+    if "flights" in figures:
+        title = f"{figures['flights']['track']}, profile {PROFILE}, times real time (min, median, max)"
+        rows = {
+            f"{frames_hz} Hz: {name}": figure
+            for frames_hz, rate in figures["flights"]["rates_hz"].items()
+            for name, figure in rate.items()
+        }
+        console.print(_spread(f"{title}, {settings['runs']} runs", rows))
+    if "sensors" in figures:
+        for table in _sensor_tables(figures["sensors"], settings["runs"]):
+            console.print(table)
+    if "ground" in figures:
+        for table in _ground_tables(figures["ground"]):
+            console.print(table)
+    if "thesis" in figures:
+        console.print(_spread(f"spiral, profile thesis, {settings['runs']} flights a link", figures["thesis"]))
+
+
+def _stage_tables(stages: Mapping[str, Any]) -> Iterator[Table]:
+    horizons = stages["horizons"]
+    of = {
+        horizon: {stage.name: measured["us"][stage.name] for stage in STAGES} for horizon, measured in horizons.items()
+    }
+    yield _by_horizon(f"{stages['track']}, profile {PROFILE}: stages of a control step, p50 / p99 µs", of)
+    yield _by_horizon("QP by solver, p50 / p99 µs, part solved", stages["solvers"])
+    link = _table("link, µs", ("p50", "p99"))
+    for name, figure in stages["link"].items():
+        link.add_row(name, _number(figure["p50"]), _number(figure["p99"]))
+    yield link
+
+
+def _sensor_tables(sensors: Mapping[str, Any], runs: int) -> Iterator[Table]:
+    steps = _table("step of the estimator, µs", ("p50", "p99"))
+    for name, figure in sensors["estimator_us"].items():
+        steps.add_row(name, _number(figure["p50"]), _number(figure["p99"]))
+    yield steps
+    title = f"{sensors['track']}, profile {PROFILE}, frames at 250 Hz, times real time, {runs} runs"
+    yield _spread(title, sensors["real_time_factor"])
+
+
+def _ground_tables(ground: Mapping[str, Any]) -> Iterator[Table]:
+    serve = _table(f"{ground['track']}, profile {PROFILE}: to serve ground stations after a frame", _SERVED)
+    for channels, figure in ground["serve"].items():
+        serve.add_row(f"{channels} connected", *(_number(figure[name]) for name in ("p50", "p99", "messages_hz")))
+    yield serve
+    steps = _table("control step at real time, µs", ("p50", "p99"))
+    for name in (ALONE, WATCHED):
+        figure = ground["control_step_us"][name]
+        steps.add_row(name, _number(figure["p50"]), _number(figure["p99"]))
+    yield steps
+
+
+def _by_horizon(title: str, figures: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
+    table = _table(title, [f"N = {horizon}" for horizon in figures])
+    for name in next(iter(figures.values())):
+        table.add_row(name, *(_of_stage(measured[name]) for measured in figures.values()))
+    return table
+
+
+def _of_stage(figure: Mapping[str, float]) -> str:
+    times = f"{_number(figure['p50'])} / {_number(figure['p99'])}"
+    return times if figure.get("solved", 1.0) == 1.0 else f"{times}, {100.0 * figure['solved']:.0f} %"
+
+
+def _spread(title: str, rows: Mapping[str, Mapping[str, float]]) -> Table:
+    table = _table(title, ("min", "median", "max"))
+    for name, figure in rows.items():
+        table.add_row(name, *map(_number, figure.values()))
+    return table
+
+
+def _table(title: str, columns: list[str] | tuple[str, ...]) -> Table:
+    table = Table(title=title, title_justify="left")
+    table.add_column("")
+    for column in columns:
+        table.add_column(column, justify="right")
+    return table
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}" if value < 100 else f"{value:.0f}"
+
+
+def _note(text: str) -> None:
+    sys.stderr.write(f"colibri: {text}\n")
+
+
+def _check_writable(path: Path) -> None:
+    """End now rather than after minutes where the figures could not be written."""
+    try:
+        with path.open("a", encoding="utf-8"):
+            pass
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror}")
+
+
+def _write(figures: Mapping[str, Any], path: Path) -> None:
+    try:
+        path.write_text(json.dumps(figures, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror}")

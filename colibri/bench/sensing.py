@@ -1,0 +1,112 @@
+"""What sensors cost: a step of the estimator, and a flight on them beside one on the state."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.estimation.estimator import Estimator
+from colibri.bench.speed import Samples, Tell, summarised
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.common.process.lifecycle import EXIT_FAILED, fail
+from colibri.flights.in_process import SYSTEM_ID, fly_locally
+from colibri.flights.plan import FlightPlan
+from colibri.flights.processes import FlightError, fly_processes
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.sensors import SensorFrame, decode_sensors
+from colibri.mavlink.wire import dialect
+from colibri.mavlink.wire.dialect import Codec, Message
+from colibri.mavlink.wire.tlog import decode
+from colibri.plant.vehicle.description import load_vehicle
+
+TRACK = "spiral"
+FRAME_US, CONTROL_US = 4_000, 8_000
+LINKS = ("memory", "udp")
+ALWAYS, IN_FLIGHT = "asked at every frame", "asked at every control sample"
+_LEAST_S = 4.0
+"""A flight on sensors begins with a second of standing; the estimator then is still loading what it needs."""
+_SETTLED = 500
+"""Frames that are not counted: the estimator aligns itself, and meets everything for the first time."""
+FLIGHTS_A_RUN = len(LINKS) * len(Feedback)
+
+
+def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int, tell: Tell) -> dict[str, Any]:
+    """Time the estimator on the frames of a flight; fly on sensors and on the state, in turn, in every run."""
+    duration_s = max(duration_s, _LEAST_S)
+    tell("estimator")
+    fly_locally(_plan(profile, folder, duration_s, "memory", Feedback.SENSORS), _unseen)
+    frames = list(sensor_frames((folder / "flight.tlog").read_bytes()))
+    steps = {
+        ALWAYS: _quantiles(_timed(profile, frames, lambda _time_us: True)),
+        IN_FLIGHT: _quantiles(_timed(profile, frames, lambda time_us: time_us % CONTROL_US == 0)),
+    }
+    samples: Samples = {}
+    for run in range(runs):
+        for link in LINKS:
+            for feedback in Feedback:
+                name = f"{link}, {feedback}"
+                tell(f"{name}, {run + 1} of {runs}")
+                factor = _real_time_factor(_plan(profile, folder, duration_s, link, feedback))
+                samples.setdefault(name, []).append(factor)
+    return {
+        "track": TRACK,
+        "estimator_us": steps,
+        "real_time_factor": {name: summarised(values) for name, values in samples.items()},
+    }
+
+
+def sensor_frames(tlog: bytes) -> Iterator[SensorFrame]:
+    """Read the sensors' frames of a telemetry log, in order."""
+    codec = Codec(SYSTEM_ID, dialect.AUTOPILOT_COMPONENT)
+    sensor: Message | None = None
+    for _, frame in decode(tlog):
+        for message in codec.decode(frame):
+            if message.name == "HIL_SENSOR":
+                if sensor is not None:
+                    yield decode_sensors(sensor)
+                sensor = message
+            elif message.name == "HIL_GPS" and sensor is not None:
+                yield decode_sensors(sensor, message)
+                sensor = None
+    if sensor is not None:
+        yield decode_sensors(sensor)
+
+
+def _timed(profile: Profile, frames: list[SensorFrame], asked: Callable[[int], bool]) -> list[float]:
+    """Return how long the estimator takes for each frame, s."""
+    vehicle = load_vehicle(profile.simulation.vehicle)
+    assert vehicle.sensors is not None, "the profile's vehicle has sensors"
+    estimator = Estimator(vehicle.sensors, vehicle.gravity_m_s2, DEFAULT_ORIGIN, FRAME_US)
+    times_s = []
+    for frame in frames:
+        wanted = asked(frame.time_us)
+        began_s = perf_counter()
+        estimator.step(frame, asked=wanted)
+        times_s.append(perf_counter() - began_s)
+    return times_s[_SETTLED:]
+
+
+def _plan(profile: Profile, folder: Path, duration_s: float, link: str, feedback: Feedback) -> FlightPlan:
+    plan = FlightPlan.of_options(folder, track=TRACK, profile=profile.name, link=link, feedback=feedback)
+    return replace(plan, duration_s=duration_s)
+
+
+def _real_time_factor(plan: FlightPlan) -> float:
+    try:
+        summary = fly_processes(plan, _unseen) if plan.link == "udp" else fly_locally(plan, _unseen)
+    except FlightError as error:
+        fail(str(error), EXIT_FAILED)
+    return plan.duration_s / summary.wall_time_s
+
+
+def _quantiles(times_s: list[float]) -> dict[str, float]:
+    p50, p99 = np.quantile(np.array(times_s) * 1e6, [0.5, 0.99])
+    return {"p50": float(p50), "p99": float(p99), "samples": len(times_s)}
+
+
+def _unseen(_sim_time_s: float) -> None:
+    """Show no progress within a flight."""

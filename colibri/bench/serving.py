@@ -1,0 +1,97 @@
+"""What ground stations cost: the time to serve them after a frame, and what is left of it in the control step."""
+
+import socket
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any, TypeAlias
+
+from colibri.analysis.recording import read_recording
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.core.copter import Copter
+from colibri.autopilot.ground.stations import StationSettings
+from colibri.bench.stages import Figures, summary
+from colibri.bench.variants import TRACK, plan_of
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, undisturbed
+from colibri.flights.plan import FlightPlan, GroundAccess
+from colibri.flights.processes import FlightError, fly_processes
+from colibri.mavlink.streaming.rates import GCS, SDK
+from colibri.plant.physics.world import Physics, starting_world, state_frame
+from colibri.plant.process.options import nudged
+
+Tell: TypeAlias = Callable[[str], None]
+
+CHANNELS = (0, 1, 2, 4, 8)
+"""Every other one is a ground station's, the others are an SDK's, with the streams that each gets unasked."""
+KINDS = (GCS, SDK)
+STATIONS = 2
+ALONE, WATCHED = "alone", f"{STATIONS} stations"
+
+_LEAST_FRAMES = 4
+"""Before these all is loaded."""
+
+
+def serving_figures(profile: Profile, folder: Path, duration_s: float, runs: int, tell: Tell) -> dict[str, Any]:
+    """Measure both: serving in memory, control steps of two processes at real time; `tell` is told what comes next."""
+    plan = plan_of(profile, folder, duration_s, "udp")
+    serve: dict[str, Figures] = {}
+    for channels in CHANNELS:
+        tell(f"serving {channels} ground stations")
+        serve[str(channels)] = served(plan, channels)
+    steps: dict[str, list[Figures]] = {ALONE: [], WATCHED: []}
+    for run in range(runs):
+        for name, flown in steps.items():
+            tell(f"control steps, {name}, {run + 1} of {runs}")
+            flown.append(control_steps_us(plan, STATIONS if name == WATCHED else 0))
+    return {"track": TRACK, "serve": serve, "control_step_us": {name: _median(flown) for name, flown in steps.items()}}
+
+
+def served(plan: FlightPlan, channels: int) -> Figures:
+    """Fly in memory with so many channels open; return the time to serve them after a frame, µs, and messages a second.
+
+    The log of the flight is a listener like any other, and is there even where nobody else is.
+    """
+    settings = StationSettings(system_id=1, identity="px4", origin=DEFAULT_ORIGIN)
+    copter = Copter(plan.profile, plan.vehicle, settings, perf_counter, first=plan.track)
+    for link in range(channels):
+        copter.stations.use(copter.stations.hub.open(link, ("127.0.0.1", link)), KINDS[link % len(KINDS)])
+    physics = Physics(plan.plant_vehicle, "rk4")
+    world = starting_world(nudged(plan.start), plan.plant_vehicle)
+    times_us = []
+    with undisturbed():
+        while world.time_us < plan.duration_s * 1e6:
+            command = copter.step(state_frame(world)).command
+            world = physics.step(world, command, copter.frame_interval_us)
+            began_s = perf_counter()
+            copter.serve(())
+            times_us.append((perf_counter() - began_s) * 1e6)
+    sent = sum(channel.sent for channel in copter.stations.hub.channels if channel.link >= 0)
+    return {**summary(times_us[_LEAST_FRAMES:]), "messages_hz": sent / plan.duration_s}
+
+
+def control_steps_us(plan: FlightPlan, stations: int) -> Figures:
+    """Fly as two processes, paced to the wall clock, so many ground stations connected; return the control step, µs."""
+    with ExitStack() as stack:
+        ports = [stack.enter_context(_listening()).getsockname()[1] for _ in range(stations)]
+        ground = GroundAccess(tuple(f"udpout:127.0.0.1:{port}" for port in ports))
+        watched = replace(plan, speed=1.0, ground=ground)
+        try:
+            fly_processes(watched, lambda _sim_time_s: None)
+        except FlightError as error:
+            fail(str(error), EXIT_FAILED)
+        return summary(read_recording(watched).control_step_us[1:].tolist())
+
+
+def _listening() -> socket.socket:
+    """Return a port that takes what is sent to it, and does nothing about it."""
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.bind(("127.0.0.1", 0))
+    return sock
+
+
+def _median(flown: list[Figures]) -> Figures:
+    """Return, of each figure of several flights, the one in the middle."""
+    return {name: sorted(figures[name] for figures in flown)[len(flown) // 2] for name in flown[0]}

@@ -1,0 +1,115 @@
+"""Real-time factors: profile `flight` at several frame rates with its peer beside it, and the thesis's spiral."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any, TypeAlias
+
+from colibri.autopilot.control.profile import Profile
+from colibri.bench.variants import TRACK, plan_of, with_intervals
+from colibri.common.process.lifecycle import EXIT_FAILED, fail
+from colibri.flights.in_process import fly_locally
+from colibri.flights.plan import Summary
+from colibri.flights.processes import FlightError, fly_processes
+from tools.bench import rotorpy_peer
+
+Tell: TypeAlias = Callable[[str], None]
+Samples: TypeAlias = dict[str, list[float]]
+
+CONTROL_S: Mapping[int, float] = {100: 0.01, 250: 0.008, 500: 0.008}
+"""Control interval at each frame rate, Hz."""
+LINKS = ("memory", "udp")
+THESIS_LINKS = ("udp", "memory")
+PEER = "rotorpy"
+
+_PEER_LONGEST_S = 2.0
+"""It takes longer than the time that it simulates."""
+_WARM_UP_S = 0.5
+
+
+def rate_figures(
+    profile: Profile, folder: Path, duration_s: float, runs: int, tell: Tell, *, beside: bool
+) -> dict[str, Any]:
+    """Fly at every rate over every link, and the peer if it shall be `beside`, one after the other in every run.
+
+    Ratios are taken within a run, so that what else the machine does weighs on both sides.
+    """
+    tell("warm up")
+    plan = plan_of(profile, folder, _WARM_UP_S, "memory")
+    fly_locally(plan, _unseen)
+    samples: dict[int, Samples] = {frames_hz: {} for frames_hz in CONTROL_S}
+    for run in range(runs):
+        for frames_hz, control_s in CONTROL_S.items():
+            chosen = with_intervals(profile, frame_s=1.0 / frames_hz, control_s=control_s)
+            flown = samples[frames_hz]
+            for link in LINKS:
+                tell(f"{frames_hz} Hz, {link}, {run + 1} of {runs}")
+                flown.setdefault(link, []).append(_real_time_factor(chosen, folder, duration_s, link))
+            if beside:
+                tell(f"{frames_hz} Hz, RotorPy, {run + 1} of {runs}")
+                factor = rotorpy_peer.real_time_factor(frames_hz, min(duration_s, _PEER_LONGEST_S))
+                flown.setdefault(PEER, []).append(factor)
+    rates = {str(frames_hz): _with_ratios(flown) for frames_hz, flown in samples.items()}
+    return {"track": TRACK, "control_interval_s": {str(hz): s for hz, s in CONTROL_S.items()}, "rates_hz": rates}
+
+
+def thesis_figures(runs: int, tell: Tell) -> dict[str, Any]:
+    """Fly the thesis's spiral through the whole command, as a user would."""
+    samples: Samples = {}
+    for run in range(runs):
+        for link in THESIS_LINKS:
+            tell(f"spiral, {link}, {run + 1} of {runs}")
+            for name, value in _command(link).items():
+                samples.setdefault(name, []).append(value)
+    return {name: summarised(values) for name, values in samples.items()}
+
+
+def summarised(values: Iterable[float]) -> dict[str, float]:
+    """Return minimum, median and maximum."""
+    ordered = sorted(values)
+    return {"min": ordered[0], "median": median(ordered), "max": ordered[-1]}
+
+
+def _with_ratios(flown: Samples) -> dict[str, dict[str, float]]:
+    figures = {name: summarised(values) for name, values in flown.items()}
+    for link in LINKS if PEER in flown else ():
+        pairs = zip(flown[link], flown[PEER], strict=True)
+        figures[f"{link} / {PEER}"] = summarised(ours / theirs for ours, theirs in pairs)
+    return figures
+
+
+def _real_time_factor(profile: Profile, folder: Path, duration_s: float, link: str) -> float:
+    plan = plan_of(profile, folder, duration_s, link)
+    try:
+        summary: Summary = fly_processes(plan, _unseen) if link == "udp" else fly_locally(plan, _unseen)
+    except FlightError as error:
+        fail(str(error), EXIT_FAILED)
+    return duration_s / summary.wall_time_s
+
+
+def _command(link: str) -> dict[str, float]:
+    """Run the command in a process of its own."""
+    with TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "colibri", "fly", "spiral", "--profile", "thesis", "--link", link]
+        started_s = perf_counter()
+        done = subprocess.run([*command, "--quiet", "--no-figures", "--out", folder], check=False)
+        command_s = perf_counter() - started_s
+        if done.returncode:
+            fail(f"a flight ended with exit code {done.returncode}", EXIT_FAILED)
+        report = json.loads((Path(folder) / "report.json").read_text(encoding="utf-8"))
+    return {
+        f"{link}: real-time factor": report["real_time_factor"],
+        f"{link}: whole command, s": command_s,
+        f"{link}: QP solve time p50, µs": report["solve_time_us"]["p50"],
+        f"{link}: control step p50, µs": report["control_step_us"]["p50"],
+        f"{link}: control step p99, µs": report["control_step_us"]["p99"],
+    }
+
+
+def _unseen(_sim_time_s: float) -> None:
+    """Show no progress within a flight."""

@@ -1,0 +1,222 @@
+"""How long each stage of a control step takes, measured on the very methods that fly, in a flight."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from copy import deepcopy
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from time import perf_counter
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc
+from colibri.autopilot.control.lpv_mpc.law import LpvMpc
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus, installed_solvers
+from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.bench.variants import CONTROLLER, TRACK, plan_of, with_moves
+from colibri.flights.in_process import fly_locally
+from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
+from colibri.mavlink.hil.lockstep_plant import PlantEnd
+from colibri.mavlink.links.open import open_link
+from colibri.mavlink.links.udp import UdpLink
+
+Figures: TypeAlias = dict[str, float]
+
+MOVES: Mapping[int, tuple[int, ...]] = {
+    4: (1, 1, 2),
+    10: (1, 1, 2, 3, 3),
+    20: (1, 1, 2, 4, 5, 7),
+    40: (1, 1, 2, 4, 5, 7, 9, 11),
+}
+"""For each horizon, how many steps each planned moment is held for: the profile's, cut short or gone on with."""
+PROFILE_HORIZON = 20
+
+_QPS = 100
+"""How many QPs of a flight each solver solves."""
+_QPS_TO_WARM_UP = 5
+_LEAST_SAMPLES = 50
+_REPLY_WITHIN_S = 1.0
+_ECHO_ENDS_AFTER_S = 10.0
+
+
+class Stage(NamedTuple):
+    """A stage: what it is called, and the method that is it."""
+
+    name: str
+    owner: type
+    method: str
+
+
+CONTROL_STEP = Stage("control step", Autopilot, "step")
+STAGES = (
+    Stage("estimate", LpvMpc, "estimate"),
+    Stage("position", LpvMpc, "position"),
+    Stage("LPV", AttitudeMpc, "predict"),
+    Stage("condense", AttitudeMpc, "condense"),
+    Stage("QP", QpSolver, "solve"),
+    Stage("read plan", AttitudeMpc, "read"),
+    Stage("mixer", LpvMpc, "mix"),
+    CONTROL_STEP,
+)
+FRAME_SENT = Stage("encode frame", PlantEnd, "offer")
+FRAME_HEARD = Stage("decode frame", AutopilotEnd, "receive")
+COMMAND_SENT = Stage("encode command", AutopilotEnd, "answer")
+COMMAND_HEARD = Stage("decode command", PlantEnd, "receive")
+LINK_STAGES = (FRAME_SENT, FRAME_HEARD, COMMAND_SENT, COMMAND_HEARD)
+EXCHANGE = "exchange"
+
+
+class Flight(NamedTuple):
+    """What a flight showed.
+
+    Attributes:
+        times_us: Of each call of each stage, by the stage's name.
+        qps: Some of the QPs that it solved.
+        frames: Every datagram that reached the autopilot.
+        commands: Every datagram that reached the plant.
+    """
+
+    times_us: dict[str, list[float]]
+    qps: list[Qp]
+    frames: list[bytes]
+    commands: list[bytes]
+
+
+def measured_flight(profile: Profile, folder: Path, duration_s: float) -> Flight:
+    """Fly the lemniscate in memory, with every stage timed from the second frame on: before that all is loaded."""
+    flight = Flight({stage.name: [] for stage in (*STAGES, *LINK_STAGES)}, [], [], [])
+    every = max(1, round(duration_s * 1e6 / _control_interval_us(profile) / _QPS))
+    seen, flying = 0, False
+
+    def keep_qp(_result: Any, qp: Qp) -> None:
+        nonlocal seen
+        if seen % every == 0:
+            flight.qps.append(deepcopy(qp))
+        seen += 1
+
+    def begun(_sim_time_s: float) -> None:
+        nonlocal flying
+        flying = True
+
+    keepers: dict[str, Callable[..., object]] = {
+        "QP": keep_qp,
+        FRAME_HEARD.name: lambda _result, datagram, *_: flight.frames.append(datagram),
+        COMMAND_HEARD.name: lambda _result, datagram, *_: flight.commands.append(datagram),
+    }
+    with ExitStack() as stack:
+        for stage in (*STAGES, *LINK_STAGES):
+            keeper = keepers.get(stage.name, lambda *_: None)
+            stack.enter_context(_timed(stage, flight.times_us[stage.name], keeper, lambda: flying))
+        fly_locally(plan_of(profile, folder, duration_s, "memory"), begun)
+    return flight
+
+
+def summary(times_us: Sequence[float]) -> Figures:
+    """Return median and 99th percentile, µs, and how many there were."""
+    p50, p99 = np.percentile(times_us, (50, 99))
+    return {"p50": float(p50), "p99": float(p99), "samples": len(times_us)}
+
+
+def stage_figures(profile: Profile, folder: Path, duration_s: float, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Measure all: stages over horizons, solvers over horizons, and the link; `tell` is told what comes next."""
+    horizons: dict[str, Any] = {}
+    solvers: dict[str, dict[str, Figures]] = {}
+    link: dict[str, Figures] = {}
+    for horizon, moves in MOVES.items():
+        chosen = with_moves(profile, moves)
+        tell(f"stages, N = {horizon}")
+        measured_flight(chosen, folder, min(duration_s, 0.5))
+        flight = measured_flight(chosen, folder, duration_s)
+        us = {stage.name: summary(flight.times_us[stage.name]) for stage in STAGES}
+        horizons[str(horizon)] = {"moves": list(moves), "us": us}
+        solvers[str(horizon)] = {}
+        for solver in installed_solvers():
+            tell(f"QP by {solver}, N = {horizon}")
+            solvers[str(horizon)][solver] = solver_figures(chosen, solver, flight.qps)
+        if horizon == PROFILE_HORIZON:
+            tell("datagrams")
+            link = {stage.name: summary(flight.times_us[stage.name]) for stage in LINK_STAGES}
+            link[EXCHANGE] = summary(exchange_times_us(flight.frames, flight.commands))
+    return {"track": TRACK, "horizons": horizons, "solvers": solvers, "link": link}
+
+
+def solver_figures(profile: Profile, name: str, qps: Sequence[Qp]) -> Figures:
+    """Solve a flight's QPs by another solver; return its times, and the part of them that it solved."""
+    settings = profile.table(CONTROLLER)["qp"]
+    solver = QpSolver(name, settings["tolerance"], settings["max_iterations"])
+    for qp in qps[:_QPS_TO_WARM_UP]:
+        solver.solve(qp)
+    times_us, solved = [], 0
+    for qp in qps:
+        began_s = perf_counter()
+        status, _ = solver.solve(qp)
+        times_us.append((perf_counter() - began_s) * 1e6)
+        solved += status is QpStatus.SOLVED
+    return {**summary(times_us), "solved": solved / len(qps)}
+
+
+def exchange_times_us(frames: Sequence[bytes], commands: Sequence[bytes]) -> list[float]:
+    """Send each frame to another process, which answers it with its command; return the round trips, µs."""
+    here, there = Pipe()
+    answering = get_context("spawn").Process(target=_answer_datagrams, args=(there, list(commands)), daemon=True)
+    answering.start()
+    try:
+        link = open_link(here.recv())
+        times_us = _round_trips_us(link, [*frames[:_LEAST_SAMPLES], *frames])[_LEAST_SAMPLES:]
+        link.close()
+    finally:
+        answering.terminate()
+        answering.join()
+        here.close()
+    return times_us
+
+
+def _round_trips_us(link: UdpLink, datagrams: Sequence[bytes]) -> list[float]:
+    times_us = []
+    for datagram in datagrams:
+        began_s = perf_counter()
+        link.send(datagram)
+        if link.receive(_REPLY_WITHIN_S) is not None:
+            times_us.append((perf_counter() - began_s) * 1e6)
+    return times_us
+
+
+def _answer_datagrams(pipe: Connection, answers: Sequence[bytes]) -> None:
+    """Answer whatever comes with one answer after another, until nothing comes any more."""
+    link = open_link("udpin:127.0.0.1:0")
+    pipe.send(link.url.replace("udpin", "udpout"))
+    count = 0
+    while (received := link.receive(_ECHO_ENDS_AFTER_S)) is not None:
+        link.send(answers[count % len(answers)], received[1])
+        count += 1
+
+
+@contextmanager
+def _timed(
+    stage: Stage, times_us: list[float], keep: Callable[..., object], flying: Callable[[], bool]
+) -> Iterator[None]:
+    """Time every call of a method in flight, µs, but steps without a decision; `keep` gets result and arguments."""
+    untimed = getattr(stage.owner, stage.method)
+
+    def timed(self: Any, *args: Any, **kwargs: Any) -> Any:
+        began_s = perf_counter()
+        result = untimed(self, *args, **kwargs)
+        took_s = perf_counter() - began_s
+        if flying():
+            keep(result, *args)
+            if stage is not CONTROL_STEP or result.decision is not None:
+                times_us.append(took_s * 1e6)
+        return result
+
+    setattr(stage.owner, stage.method, timed)
+    try:
+        yield
+    finally:
+        setattr(stage.owner, stage.method, untimed)
+
+
+def _control_interval_us(profile: Profile) -> float:
+    return float(profile.table(CONTROLLER)["control_interval_s"]) * 1e6

@@ -1,0 +1,28 @@
+"""Options of `colibri bench`."""
+
+from pathlib import Path
+
+from colibri.common.process.arguments import ArgumentParser, positive
+
+
+def add_bench_options(parser: ArgumentParser) -> None:
+    """Add the options of `colibri bench`."""
+    add = parser.add_argument
+    add(
+        "--only",
+        action="append",
+        choices=("stages", "flights", "sensors", "ground", "thesis"),
+        help="stages: each stage of a control step; flights: times real time at several rates, beside RotorPy if it is "
+        "installed; sensors: the estimator, and flights on sensors beside those on the state; ground: serving ground "
+        "stations, and the control step beside it; thesis: its spiral through the whole command; may be repeated "
+        "(default: all)",
+    )
+    add("--runs", type=int, default=3, choices=range(1, 101), metavar="N", help="flights of each kind (default 3)")
+    add(
+        "--duration",
+        type=positive,
+        default=10.0,
+        metavar="S",
+        help="simulated time of a flight, but of the spiral's (default %(default)s)",
+    )
+    add("--out", type=Path, metavar="FILE", help="write the figures as JSON there")

@@ -1,0 +1,57 @@
+"""Options of `colibri fly`."""
+
+from pathlib import Path
+
+from colibri.cli.shared_options import add_feedback, add_signing
+from colibri.common.process.arguments import ArgumentParser, natural, positive, speed
+from colibri.plant.process.options import LATENCY_HELP, add_world_arguments, latency
+
+TRACK_HELP = (
+    "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
+    "hover[:x=0,y=0,height=2,yaw=0], lemniscate[:size=4,height=3,lap=6,yaw=path|fixed], "
+    "circle[:radius=2,speed=2,height=2,yaw=path|fixed], waypoints:FILE[,speed=2]; m, s, degrees"
+)
+
+
+def add_fly_options(parser: ArgumentParser) -> None:
+    """Add the options of `colibri fly`."""
+    add = parser.add_argument
+    add("track", metavar="TRACK", help=TRACK_HELP)
+    add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
+    add("--controller", metavar="NAME", help="control law, also of another package (default: the profile's)")
+    add(
+        "--link",
+        default="udp",
+        choices=("udp", "memory", "direct"),
+        help="udp: two processes (default); memory: one process, same codec, same flight; direct: without the codec",
+    )
+    add(
+        "--gcs",
+        action="append",
+        default=[],
+        metavar="URL",
+        help="a ground station that may watch and command: udpout:, udpin:, tcp: or tcpin:HOST:PORT; may be repeated",
+    )
+    add_signing(add)
+    add(
+        "--speed",
+        type=speed,
+        metavar="N",
+        help="times real time, or max (default: max; 1 where a ground station is invited by --gcs)",
+    )
+    add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
+    add_feedback(add)
+    add("--latency", type=latency, default=0.0, metavar="MS", help=f"between plant and autopilot, {LATENCY_HELP}")
+    add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
+    add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
+    add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
+    add("--integrator", choices=("rk4", "adaptive"), help="of the plant (default: the profile's)")
+    add_world_arguments(
+        parser, start="the profile's, and the track's first yaw", of_whom=" of the plant; the autopilot keeps its own"
+    )
+    add("--duration", type=positive, default=100.0, metavar="S", help="simulated time (default %(default)s)")
+    add(
+        "--out", type=Path, default=Path("out"), metavar="DIR", help="folder for logs and figures (default %(default)s)"
+    )
+    add("--quiet", action="store_true", help="say nothing but errors")
+    add("--no-figures", action="store_true", help="draw no PNG figures")

@@ -1,0 +1,96 @@
+"""`colibri fly`: fly one track, show how far it is, report how well it went."""
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from colibri.analysis.outcome import keep_flight, keep_what_there_is
+from colibri.analysis.report import print_report
+from colibri.autopilot.control.profile import ProfileError
+from colibri.autopilot.control.qp import SolverError
+from colibri.autopilot.control.registry import ControllerError, DecisionError
+from colibri.autopilot.guidance.trajectories.tracks import TrackError
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
+from colibri.flights.fly import fly_plan, prepare
+from colibri.flights.plan import FlightPlan, PlanError
+from colibri.flights.processes import FlightError
+from colibri.plant.physics.start import IntegrationError
+from colibri.plant.vehicle.description import VehicleError
+
+_UPDATES = 500
+
+
+def fly(args: argparse.Namespace) -> int:
+    """Fly as the command line says; return the exit code."""
+    try:
+        plan = FlightPlan.from_arguments(args)
+    except (PlanError, ProfileError, VehicleError, TrackError) as error:
+        fail(str(error))
+    prepare(plan.out)
+    try:
+        with _progress(plan, quiet=args.quiet) as (progress, say):
+            summary = fly_plan(plan, progress, say)
+    except (ControllerError, ProfileError, SolverError) as error:
+        fail(str(error))
+    except (IntegrationError, DecisionError) as error:
+        keep_what_there_is(plan)
+        fail(f"{error}; what was logged is in {plan.out}", EXIT_FAILED)
+    except FlightError as error:
+        keep_what_there_is(plan)
+        if error.said:
+            return error.code
+        fail(f"{error}; what was logged is in {plan.out}", error.code)
+    except KeyboardInterrupt:
+        keep_what_there_is(plan)
+        fail(f"interrupted; what was logged is in {plan.out}", EXIT_INTERRUPTED)
+    recording, figures = keep_flight(plan, summary)
+    if not args.no_figures:
+        from colibri.analysis.figures import draw_flight
+
+        draw_flight(recording, plan)
+    if not args.quiet:
+        print_report(figures, plan.out)
+    return 0
+
+
+@contextmanager
+def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
+    """Show on standard error a bar with simulated time and speed, and above it what there is to say."""
+    if quiet:
+        yield lambda _sim_time_s: None, lambda _text: None
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:6.1f} / {task.total:.1f} s"),
+        TextColumn("{task.fields[speed]}"),
+        TimeElapsedColumn(),
+    )
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    bar = Progress(*columns, console=console, disable=not console.is_terminal)
+    task = bar.add_task(escape(plan.track_name), total=plan.duration_s, speed="", start=False)
+    first_s: list[float] = []
+    due_s = 0.0
+
+    def show(sim_time_s: float) -> None:
+        nonlocal due_s
+        if sim_time_s < due_s:
+            return
+        due_s = sim_time_s + plan.duration_s / _UPDATES
+        if not first_s:
+            bar.start()  # not before something flies: an error of the start stands alone
+            bar.start_task(task)
+            first_s.append(sim_time_s)
+        elapsed_s = bar.tasks[task].elapsed or 0.0
+        speed = f"{(sim_time_s - first_s[0]) / elapsed_s:.0f} × real time" if elapsed_s else ""
+        bar.update(task, completed=sim_time_s, speed=speed)
+
+    try:
+        yield show, lambda text: console.print(text, markup=False)
+        bar.update(task, completed=plan.duration_s)
+    finally:
+        bar.stop()

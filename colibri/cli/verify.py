@@ -1,0 +1,27 @@
+"""Options of `colibri verify`."""
+
+from pathlib import Path
+
+from colibri.common.process.arguments import ArgumentParser, positive
+
+GOLDEN_HASHES = Path("tests/golden/hashes.json")
+
+
+def add_verify_options(parser: ArgumentParser) -> None:
+    """Add the options of `colibri verify`."""
+    add = parser.add_argument
+    add("--link", default="udp", choices=("udp", "memory"), help="of the flights (default %(default)s)")
+    add("--duration", type=positive, metavar="S", help="simulated time of each flight (default 20; golden: its own)")
+    add(
+        "--golden",
+        type=Path,
+        nargs="?",
+        const=GOLDEN_HASHES,
+        metavar="FILE",
+        help="fly the golden flights instead, once each, and compare their hashes with those in FILE "
+        f"(default {GOLDEN_HASHES})",
+    )
+    add("--renew", action="store_true", help="with --golden: write the hashes to FILE, and show which have changed")
+    add("--only", action="append", default=[], metavar="NAME", help="with --golden: only this flight; may be repeated")
+    add("--out", type=Path, default=Path("out/verify"), metavar="DIR", help="folder for the logs (default %(default)s)")
+    add("--quiet", action="store_true", help="say nothing but errors")

@@ -1,0 +1,252 @@
+"""`colibri sitl`: vehicles that ground stations connect to, each a plant and an autopilot, until told to stop."""
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from select import select
+from time import perf_counter
+from typing import IO, Any
+
+from colibri.autopilot.control.profile import ProfileError, load_profile
+from colibri.common.earth.home import HomePlace
+from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
+from colibri.flights.fleet_status import StatusLines
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.links.link import LinkError
+from colibri.mavlink.links.open import beyond_loopback, open_link, unsigned_refusal
+from colibri.plant.physics.start import Start
+from colibri.plant.process.options import weather_of
+from colibri.plant.vehicle.description import VehicleError, load_vehicle
+
+PLANT_PORT = 14560
+GROUND_PORT = 14550
+SDK_PORT = 14540
+LARGEST_FLEET = 100
+
+_LOOK_EVERY_S = 0.1
+_GRACE_S = 5.0
+
+
+@dataclass(slots=True)
+class Member:
+    """One vehicle of the fleet.
+
+    Attributes:
+        instance: Its number; its ports and system id follow from it.
+        links: The URLs that its autopilot serves.
+        plant: The plant's process.
+        autopilot: The autopilot's process.
+        rest: What each process has said of a line that is not whole yet.
+    """
+
+    instance: int
+    links: list[str]
+    plant: subprocess.Popen[bytes] | None = None
+    autopilot: subprocess.Popen[bytes] | None = None
+    rest: dict[int, bytes] = field(default_factory=dict)
+
+    @property
+    def system_id(self) -> int:
+        """MAVLink system id."""
+        return self.instance + 1
+
+    def processes(self) -> list[tuple[str, subprocess.Popen[bytes]]]:
+        """Return what runs."""
+        both = (("autopilot", self.autopilot), ("plant", self.plant))
+        return [(name, process) for name, process in both if process is not None]
+
+
+def ground_links(args: argparse.Namespace, instance: int) -> list[str]:
+    """Return the URLs that instance `instance` serves: those asked for, or the two that clients wait on."""
+    if args.gcs:
+        return list(args.gcs)
+    return [f"udpout:127.0.0.1:{GROUND_PORT}", f"udpout:127.0.0.1:{SDK_PORT + instance}"]
+
+
+def sitl(args: argparse.Namespace) -> int:
+    """Fly as the command line says, until told to stop; return the exit code."""
+    _check(args)
+    if args.out:
+        from colibri.flights.fly import prepare
+
+        for instance in range(args.instance, args.instance + args.count):
+            prepare(args.out / str(instance))
+    fleet = [Member(i, ground_links(args, i)) for i in range(args.instance, args.instance + args.count)]
+    stop = Stop()
+    lines = StatusLines(quiet=args.quiet)
+    try:
+        for member in fleet:
+            _start_plant(member, args)
+        return _watch(fleet, args, stop, lines)
+    finally:
+        _end([process for member in fleet for _, process in member.processes()])
+        lines.close()
+
+
+def _check(args: argparse.Namespace) -> None:
+    """End with one line where what is asked for cannot fly."""
+    try:
+        profile = load_profile(args.profile).with_choices(args.controller, None)
+        name = args.plant_vehicle or args.vehicle or profile.simulation.vehicle
+        vehicle = load_vehicle(name).without(args.without)
+        believed = load_vehicle(args.vehicle or profile.simulation.vehicle)
+        urls = ground_links(args, args.instance)
+        exposed = [url for url in urls if beyond_loopback(url)]
+    except (ProfileError, VehicleError, LinkError) as error:
+        fail(str(error))
+    if exposed and not (args.signing_key or args.insecure):
+        fail(unsigned_refusal(exposed[0]))
+    if args.feedback is Feedback.SENSORS and (vehicle.sensors is None or believed.sensors is None):
+        fail(f"--feedback sensors: vehicle {(believed if vehicle.sensors else vehicle).name} has no table sensors")
+    if vehicle.ground is None and "z" not in args.start:
+        fail(f"vehicle {name} has no ground to stand on: fly a vehicle with a table ground, or give --start z=...")
+    if not 1 <= args.count <= LARGEST_FLEET - args.instance:
+        fail(f"--instance and --count: at least one vehicle, instances from 0 to {LARGEST_FLEET - 1}")
+    if args.count > 1 and any(url.startswith(("udpin:", "tcpin:")) and not url.endswith(":0") for url in args.gcs):
+        fail("--gcs: several vehicles cannot wait on one port; let them call, by udpout: or tcp:, or fly one")
+    for instance in range(args.instance, args.instance + args.count):
+        _check_port(_plant_url(args, instance))
+
+
+def _check_port(url: str) -> None:
+    try:
+        open_link(url).close()
+    except LinkError as error:
+        fail(str(error))
+
+
+def _plant_url(args: argparse.Namespace, instance: int) -> str:
+    port = PLANT_PORT + instance
+    if args.plant_port is not None:
+        port = args.plant_port + instance - args.instance if args.plant_port else 0
+    return f"udpin:127.0.0.1:{port}"
+
+
+def _start_plant(member: Member, args: argparse.Namespace) -> None:
+    home: HomePlace = args.home
+    start = Start(psi=home.yaw_enu_deg)._replace(**args.start)
+    vehicle = args.plant_vehicle or args.vehicle or load_profile(args.profile).simulation.vehicle
+    member.plant = _process(
+        "plant",
+        *("--link", _plant_url(args, member.instance)),
+        *("--vehicle", vehicle),
+        *(f"--without={part}" for part in args.without),
+        *weather_of(args).options(),
+        *("--start", str(start)),
+        *(("--duration", repr(args.duration)) if isfinite(args.duration) else ()),
+        *("--speed", repr(args.speed) if isfinite(args.speed) else "max"),
+        *("--seed", str(args.seed + member.instance)),
+        *("--home", str(home)),
+        *("--system-id", str(member.system_id)),
+        *_logs(member, args),
+    )
+
+
+def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -> None:
+    folder: Path = args.state / str(member.instance)
+    member.autopilot = _process(
+        "autopilot",
+        *("--plant", plant_url.replace("udpin", "udpout")),
+        *(f"--gcs={url}" for url in member.links),
+        *("--profile", args.profile),
+        *(("--vehicle", args.vehicle) if args.vehicle else ()),
+        *(("--controller", args.controller) if args.controller else ()),
+        *("--feedback", args.feedback),
+        *("--home", str(args.home)),
+        *("--identity", args.identity),
+        *("--state", str(folder)),
+        *(("--signing-key", str(args.signing_key)) if args.signing_key else ()),
+        *(("--insecure",) if args.insecure else ()),
+        *("--system-id", str(member.system_id)),
+        *_logs(member, args),
+    )
+
+
+def _logs(member: Member, args: argparse.Namespace) -> tuple[str, ...]:
+    return ("--out", str(args.out / str(member.instance))) if args.out else ()
+
+
+def _process(package: str, *options: str) -> subprocess.Popen[bytes]:
+    """Start it out of reach of the terminal's Ctrl-C: that is for this process, which ends the others."""
+    command = [sys.executable, "-m", f"colibri.{package}", "--json", "--parent", str(os.getpid()), *options]
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, process_group=0)
+
+
+def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines: StatusLines) -> int:
+    """Hear what the processes say until the last vehicle ends or the user has had enough."""
+    flying = list(fleet)
+    while flying and not stop:
+        over = [member for member in flying if _has_ended(member)]
+        _hear(flying, args, lines)
+        lines.show(perf_counter())
+        for member in over:
+            _finish(member)
+            lines.forget(member.instance)
+            flying.remove(member)
+    return 0
+
+
+def _hear(fleet: Sequence[Member], args: argparse.Namespace, lines: StatusLines) -> None:
+    """Take in what the processes of `fleet` have said."""
+    streams = {
+        process.stdout: (member, name)
+        for member in fleet
+        for name, process in member.processes()
+        if process.stdout is not None
+    }
+    ready, _, _ = select(list(streams), [], [], _LOOK_EVERY_S)
+    for stream in ready:
+        member, name = streams[stream]
+        for event in _events(member, stream):
+            if name == "plant" and event["event"] == "listening":
+                _start_autopilot(member, args, event["url"])
+            lines.hear(member.instance, name, event)
+
+
+def _events(member: Member, stream: IO[bytes]) -> list[dict[str, Any]]:
+    chunk = os.read(stream.fileno(), 65536)
+    *whole, member.rest[stream.fileno()] = (member.rest.get(stream.fileno(), b"") + chunk).split(b"\n")
+    return [json.loads(line) for line in whole]
+
+
+def _has_ended(member: Member) -> bool:
+    return any(process.poll() is not None for _, process in member.processes())
+
+
+def _finish(member: Member) -> None:
+    """End what is left of a vehicle whose time is over, or that a ground station has shut down.
+
+    Where a process came to another end, everything ends, with its exit code.
+    """
+    for name, process in member.processes():
+        code = process.poll()
+        if not code:
+            continue
+        if code < 0:
+            fail(f"the {name} of instance {member.instance} was killed by {signal.Signals(-code).name}", EXIT_FAILED)
+        if code not in (EXIT_FAILED, EXIT_BAD_INPUT):  # of these it has said why
+            fail(f"the {name} of instance {member.instance} ended with exit code {code}", EXIT_FAILED)
+        raise SystemExit(code)
+    _end([process for _, process in member.processes()])
+
+
+def _end(processes: list[subprocess.Popen[bytes]]) -> None:
+    """Ask each process to end, then make it."""
+    for process in processes:
+        if process.poll() is None:
+            process.terminate()
+    for process in processes:
+        try:
+            process.wait(_GRACE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        if process.stdout:
+            process.stdout.close()

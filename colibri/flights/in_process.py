@@ -1,0 +1,160 @@
+"""A flight within this process: through the codec but without sockets (`memory`), or without either (`direct`)."""
+
+from collections.abc import Callable
+from math import isfinite
+from time import perf_counter, sleep
+from typing import Protocol
+
+from colibri.autopilot.core.step import Step
+from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.estimation.state_source import estimator_for
+from colibri.autopilot.process.logs import AutopilotLog
+from colibri.autopilot.process.recorded_inputs import Setup
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.common.process.lifecycle import undisturbed
+from colibri.common.types import Address
+from colibri.flights.plan import FlightPlan, Summary
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
+from colibri.mavlink.hil.lockstep_plant import PlantEnd
+from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.plant.physics.integrators import Integrator
+from colibri.plant.physics.world import Physics, starting_world
+from colibri.plant.process.logs import PlantLogs
+from colibri.plant.process.options import nudged
+from colibri.plant.simulation.plant import Plant
+
+SYSTEM_ID = 1
+DEFAULT_IDENTITY = "px4"
+_ADDRESS: Address = ("memory", 0)
+_NEVER_LATE_S = 0.0
+
+
+class Exchange(Protocol):
+    """How what the plant tells gets to the autopilot, and its command back."""
+
+    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
+        """Return the autopilot's step and the command that reached the plant."""
+
+
+def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
+    """Fly `plan` in this process; `progress` is told the simulated time in s.
+
+    Raises:
+        ControllerError: The control law cannot be used.
+        DecisionError: The control law decided what no rotor can follow.
+        ProfileError: The control law's table in the profile is wrong.
+        SolverError: The solver cannot be used.
+        IntegrationError: The state cannot be integrated any further.
+    """
+    estimator = estimator_for(plan.feedback, plan.vehicle, DEFAULT_ORIGIN)
+    autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, perf_counter, estimator=estimator)
+    integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
+    physics = Physics(plan.plant_vehicle, integrator, plan.weather)
+    interval_us = autopilot.frame_interval_us
+    plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out, _setup(plan))
+    plant = Plant(
+        starting_world(nudged(plan.start), plan.plant_vehicle, plan.weather),
+        plan.plant_vehicle,
+        physics,
+        plan.feedback,
+        DEFAULT_ORIGIN,
+        seed=plan.seed,
+        interval_us=interval_us,
+        latency_us=plan.latency_us,
+    )
+    exchange: Exchange = Direct(autopilot)
+    if plan.link == "memory":
+        exchange = InMemory(autopilot, interval_us, plan.feedback, plant_logs)
+    try:
+        plant_logs.write_world(plant.world)
+        with undisturbed():
+            began_s = perf_counter()
+            while plant.world.time_us + interval_us <= plan.duration_s * 1e6:
+                if isfinite(plan.speed):
+                    sleep(max(0.0, began_s + plant.world.time_us / 1e6 / plan.speed - perf_counter()))
+                step, command = exchange(plant)
+                plant.answer(command)
+                log.write(step)
+                plant_logs.write_world(plant.world)
+                progress(plant.world.time_us / 1e6)
+            wall_time_s = perf_counter() - began_s
+    finally:
+        plant_logs.close()
+        log.close()
+    return Summary(wall_time_s, frames=plant.world.time_us // interval_us, resent=0)
+
+
+def _setup(plan: FlightPlan) -> Setup:
+    return Setup(
+        profile=plan.profile_name,
+        controller=plan.profile.controller,
+        solver=plan.solver,
+        vehicle=plan.vehicle_name,
+        feedback=plan.feedback,
+        track=plan.track_name,
+        origin=DEFAULT_ORIGIN,
+        system_id=SYSTEM_ID,
+        identity=DEFAULT_IDENTITY,
+        ground=False,
+    )
+
+
+class Direct:
+    """Hands frame and command over in double precision, without the codec."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        """Ask `autopilot`."""
+        self._autopilot = autopilot
+
+    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
+        """Return the autopilot's step and its command as it is."""
+        frame, aside = plant.tell()
+        self._autopilot.hear(aside)
+        step = self._autopilot.step(frame)
+        return step, step.command
+
+
+class InMemory:
+    """Carries the datagrams that the two processes would send, in the same conversation."""
+
+    def __init__(self, autopilot: Autopilot, frame_interval_us: int, feedback: Feedback, logs: PlantLogs) -> None:
+        """Let `autopilot` call the plant and ask for `feedback`."""
+        self._autopilot = autopilot
+        self._logs = logs
+        self._plant_end = PlantEnd(system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, serves=[feedback])
+        self._autopilot_end = AutopilotEnd(
+            system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, now_s=_NEVER_LATE_S, feedback=feedback
+        )
+        self._autopilot_end.poll(_NEVER_LATE_S)
+        self._to_plant(time_us=0)
+
+    def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
+        """Return the autopilot's step and the command as the plant decoded it."""
+        frame, aside = plant.tell()
+        self._plant_end.offer(frame, _NEVER_LATE_S, aside)
+        step = self._to_autopilot(frame.time_us)
+        command = self._to_plant(frame.time_us)
+        assert step is not None, "the autopilot answers every new frame"
+        assert command is not None, "the answer names the frame awaited"
+        return step, command
+
+    def _to_autopilot(self, time_us: int) -> Step | None:
+        step = None
+        sent = self._plant_end.take_outbox()
+        self._logs.write_traffic(time_us, [], sent)
+        for outgoing in sent:
+            frame = self._autopilot_end.receive(outgoing.datagram, _NEVER_LATE_S)
+            if frame is not None:
+                self._autopilot.hear(self._autopilot_end.aside)
+                step = self._autopilot.step(frame)
+                self._autopilot_end.answer(step.command)
+        return step
+
+    def _to_plant(self, time_us: int) -> ActuatorCommand | None:
+        command = None
+        for datagram in self._autopilot_end.take_outbox():
+            command = self._plant_end.receive(datagram, _ADDRESS, _NEVER_LATE_S) or command
+        self._logs.write_traffic(time_us, self._plant_end.received, [])
+        self._plant_end.received.clear()
+        return command

@@ -1,0 +1,211 @@
+"""What to fly: the command line of `colibri fly`, resolved and checked before anything starts."""
+
+import argparse
+from dataclasses import dataclass
+from math import degrees, inf
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.guidance.trajectories.planner import start_yaw
+from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, track
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.plant.environment.weather import NO_WIND, Weather
+from colibri.plant.physics.start import Start, check_start
+from colibri.plant.process.options import weather_of
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
+
+
+class Summary(NamedTuple):
+    """What only the run itself knows: wall-clock time of the flight, frames exchanged and sent again."""
+
+    wall_time_s: float
+    frames: int
+    resent: int
+
+
+@dataclass(frozen=True, slots=True)
+class GroundAccess:
+    """Which ground stations may watch and command a flight.
+
+    Attributes:
+        links: URLs to call or to wait on; none where nobody is invited.
+        signing_key: File of the key that both sides sign with.
+        insecure: Whether links may leave this computer without one.
+    """
+
+    links: tuple[str, ...] = ()
+    signing_key: Path | None = None
+    insecure: bool = False
+
+
+class PlanError(Exception):
+    """What was asked for does not go together; the message is the one line that a user needs."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightPlan:
+    """A flight as it was asked for.
+
+    Attributes:
+        track_name: The track, with its options.
+        profile_name: Profile name or file.
+        vehicle_name: Vehicle that the autopilot controls, name or file.
+        plant_vehicle_name: Vehicle that the plant flies, name or file.
+        without: Parts that the plant's vehicle is flown without.
+        weather: In which the plant flies.
+        start: How the plant begins.
+        integrator: `rk4` or `adaptive`.
+        link: `udp`, `memory` or `direct`.
+        speed: Times real time; infinite for flat out.
+        seed: Seed of everything random.
+        feedback: What the plant tells the autopilot.
+        latency_us: Between plant and autopilot, one way, simulated.
+        duration_s: Simulated time to fly.
+        out: Folder for all that the flight leaves.
+        solver: QP solver asked for; None for the profile's.
+        ground: Who may watch and command.
+        track: The track to fly.
+        profile: The profile, with controller and solver as asked for.
+        vehicle: The vehicle that the autopilot controls.
+        plant_vehicle: The vehicle that the plant flies, its parts left out.
+    """
+
+    track_name: str
+    profile_name: str
+    vehicle_name: str
+    plant_vehicle_name: str
+    without: tuple[str, ...]
+    weather: Weather
+    start: Start
+    integrator: str
+    link: str
+    speed: float
+    seed: int
+    feedback: Feedback
+    latency_us: int
+    duration_s: float
+    out: Path
+    solver: str | None
+    ground: GroundAccess
+    track: Track
+    profile: Profile
+    vehicle: Vehicle
+    plant_vehicle: Vehicle
+
+    @classmethod
+    def from_arguments(cls, args: argparse.Namespace) -> "FlightPlan":
+        """Resolve the command line.
+
+        Raises:
+            PlanError: Ground stations are invited to a flight that has no links to them; or sensors are to be flown by
+                that the vehicle has not, or without ground to stand on.
+            ProfileError: The profile cannot be read.
+            VehicleError: A vehicle cannot be read, or cannot start as the profile says.
+            TrackError: There is no such track, or its file cannot be flown.
+        """
+        ground = GroundAccess(tuple(args.gcs), args.signing_key, args.insecure)
+        if ground.links and args.link != "udp":
+            raise PlanError(f"--gcs needs --link udp: over {args.link} there is no autopilot to connect to")
+        to_fly = track(args.track)
+        profile = load_profile(args.profile).with_choices(args.controller, args.solver)
+        vehicle_name = args.vehicle or profile.simulation.vehicle
+        plant_vehicle_name = args.plant_vehicle or vehicle_name
+        plant_vehicle = load_vehicle(plant_vehicle_name).without(args.without)
+        vehicle = load_vehicle(vehicle_name)
+        if args.feedback is Feedback.SENSORS:
+            _check_sensors(vehicle_name, vehicle)
+            _check_sensors(plant_vehicle_name, plant_vehicle)
+        start = _start_of(profile, to_fly, args.feedback)._replace(**args.start)
+        check_start(start, plant_vehicle)
+        return cls(
+            track_name=args.track,
+            profile_name=args.profile,
+            vehicle_name=vehicle_name,
+            plant_vehicle_name=plant_vehicle_name,
+            without=tuple(args.without),
+            weather=weather_of(args),
+            start=start,
+            integrator=args.integrator or profile.simulation.integrator,
+            link=args.link,
+            speed=args.speed or (1.0 if ground.links else inf),
+            seed=args.seed,
+            feedback=args.feedback,
+            latency_us=round(args.latency * 1e3),
+            duration_s=args.duration,
+            out=args.out,
+            solver=args.solver,
+            ground=ground,
+            track=to_fly,
+            profile=profile,
+            vehicle=vehicle,
+            plant_vehicle=plant_vehicle,
+        )
+
+    @classmethod
+    def of_track(
+        cls, track_name: str, out: Path, *, profile: str, controller: str | None = None, link: str = "direct"
+    ) -> "FlightPlan":
+        """Return the plan of a track flown flat out for 100 s, everything else as the profile has it.
+
+        Raises:
+            ProfileError: The profile cannot be read.
+            VehicleError: Its vehicle cannot be read.
+            TrackError: There is no such track, or its file cannot be flown.
+        """
+        return cls.of_options(out, track=track_name, profile=profile, controller=controller, link=link)
+
+    @classmethod
+    def of_options(cls, out: Path, **options: Any) -> "FlightPlan":
+        """Return the plan of a flight flat out for 100 s with some options of `colibri fly`, by their names there.
+
+        Raises:
+            PlanError: They do not go together.
+            ProfileError: The profile cannot be read.
+            VehicleError: A vehicle cannot be read, or cannot start as the profile says.
+            TrackError: There is no such track, or its file cannot be flown.
+        """
+        unset = dict.fromkeys(("controller", "solver", "vehicle", "plant_vehicle", "integrator", "turbulence"))
+        none: dict[str, Any] = {
+            "gcs": (),
+            "gust": (),
+            "without": (),
+            "start": {},
+            "signing_key": None,
+            "insecure": False,
+        }
+        usual = {
+            "wind": NO_WIND,
+            "feedback": Feedback.STATE,
+            "seed": 0,
+            "latency": 0.0,
+            "speed": inf,
+            "duration": DURATION_S,
+        }
+        return cls.from_arguments(argparse.Namespace(**(unset | none | usual | options), out=out))
+
+    @property
+    def start_yaw_rad(self) -> float:
+        """The first yaw reference, with which the vehicle starts unless told otherwise."""
+        return start_yaw(self.track, self.profile.references)
+
+
+def _check_sensors(name: str, vehicle: Vehicle) -> None:
+    """Check that a flight on sensors can begin, at rest.
+
+    Raises:
+        PlanError: It cannot.
+    """
+    if vehicle.sensors is None:
+        raise PlanError(f"--feedback sensors: vehicle {name} has no table sensors")
+    if vehicle.ground is None:
+        raise PlanError(f"--feedback sensors: vehicle {name} has no ground to stand on while it finds its bearings")
+
+
+def _start_of(profile: Profile, flown: Track, feedback: Feedback) -> Start:
+    """Return how the flights of a profile begin: at rest, with the first yaw of the track; on sensors on the ground."""
+    x, y, z = profile.simulation.position_enu_m
+    yaw_deg = degrees(start_yaw(flown, profile.references))
+    if feedback is Feedback.SENSORS:
+        return Start(x=x, y=y, psi=yaw_deg)
+    return Start(x=x, y=y, z=z, psi=yaw_deg, rotors=profile.simulation.rotor_speed_rpm)

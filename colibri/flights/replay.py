@@ -1,0 +1,270 @@
+"""`colibri replay`: the frames of a recorded flight, fed to the autopilot alone: is each command what it was?"""
+
+import argparse
+from collections.abc import Iterable, Iterator, Sequence
+from math import degrees
+from pathlib import Path
+from typing import NamedTuple
+
+from colibri.autopilot.control.profile import ProfileError, load_profile
+from colibri.autopilot.control.qp import SolverError
+from colibri.autopilot.control.registry import ControllerError, DecisionError
+from colibri.autopilot.core.checkpoint import Past
+from colibri.autopilot.core.copter import Copter
+from colibri.autopilot.core.step import Received, Step
+from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.estimation.state_source import estimator_for
+from colibri.autopilot.ground.stations import StationSettings
+from colibri.autopilot.guidance.trajectories.tracks import TrackError, track
+from colibri.autopilot.parameters.definitions import ImpossibleError
+from colibri.autopilot.process.recorded_inputs import Heard, Input, InputsError, Setup, read
+from colibri.common.process.lifecycle import EXIT_FAILED, fail
+from colibri.common.rotations import euler_from_quaternion
+from colibri.common.serialization import of_bytes
+from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
+from colibri.mavlink.hil.sensors import Frame
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_actuators, encode_actuators
+from colibri.mavlink.wire import dialect
+from colibri.mavlink.wire.dialect import Codec
+from colibri.mavlink.wire.tlog import Logged, TlogError, decode
+from colibri.plant.vehicle.description import VehicleError, load_vehicle
+
+INPUTS = "inputs.jsonl"
+_NO_CLOCK_S = 0.0
+"""What is decided must not depend on it."""
+
+
+class Recorded(NamedTuple):
+    """A frame of the plant, and the command that answered it.
+
+    Attributes:
+        time_us: Simulated time.
+        datagram: What the autopilot was told.
+        command: What it answered; None where nothing of it was recorded.
+    """
+
+    time_us: int
+    datagram: bytes
+    command: ActuatorCommand | None
+
+
+class Difference(NamedTuple):
+    """The first command that is not what it was.
+
+    Attributes:
+        recorded: What it was.
+        replayed: What it is.
+        mode: Of the autopilot, at that moment.
+        known: What it knew of its vehicle; None before the first estimate.
+    """
+
+    recorded: ActuatorCommand
+    replayed: ActuatorCommand
+    mode: str
+    known: StateFrame | None
+
+    def __str__(self) -> str:
+        """Say it to a person."""
+        return "\n".join(
+            (
+                f"first difference at t = {self.recorded.time_us * 1e-6:.3f} s, in mode {self.mode}",
+                f"  recorded: {_told(self.recorded)}",
+                f"  replayed: {_told(self.replayed)}",
+                f"  vehicle:  {_state(self.known)}",
+            )
+        )
+
+
+class Replayed(NamedTuple):
+    """What came of a replay.
+
+    Attributes:
+        commands: How many were compared, up to the difference if there is one.
+        last_us: Time of the last of them.
+        difference: The first; None if all are what they were.
+    """
+
+    commands: int
+    last_us: int
+    difference: Difference | None
+
+
+class ReplayError(Exception):
+    """A recording that cannot be replayed; the message is the one line that a user needs."""
+
+
+def replay(args: argparse.Namespace) -> int:
+    """Replay as the command line says; return the exit code."""
+    try:
+        outcome = replay_flight(args.tlog)
+    except ReplayError as error:
+        fail(str(error))
+    if outcome.difference is not None:
+        print(outcome.difference)  # noqa: T201
+        fail(f"{args.tlog}: the autopilot does not answer as it did, after {outcome.commands} commands", EXIT_FAILED)
+    if not args.quiet:
+        print(f"{outcome.commands} commands up to t = {outcome.last_us * 1e-6:.3f} s, all identical")  # noqa: T201
+    return 0
+
+
+def replay_flight(tlog: Path) -> Replayed:
+    """Replay a flight from its telemetry log and the autopilot's log of inputs beside it.
+
+    Raises:
+        ReplayError: They cannot be replayed.
+    """
+    inputs = _inputs(tlog.parent / INPUTS, tlog)
+    setups = [what for what in inputs if isinstance(what, Setup)]
+    try:
+        recorded = list(recorded_frames(decode(_bytes(tlog)), setups[0]))
+    except TlogError as error:
+        raise ReplayError(f"{tlog}: {error}: expected the flight.tlog of a flight") from error
+    if not any(each.command for each in recorded):
+        raise ReplayError(f"{tlog}: no frame of {setups[0].feedback} feedback is answered in it: nothing to replay")
+    try:
+        return _compare(recorded, inputs)
+    except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, ImpossibleError) as error:
+        raise ReplayError(f"{tlog.parent / INPUTS}: {error}") from error
+
+
+def recorded_frames(log: Iterable[Logged], setup: Setup) -> Iterator[Recorded]:
+    """Yield each frame of the plant once, in order, with the command that answered it."""
+    codec = Codec(setup.system_id, dialect.AUTOPILOT_COMPONENT)
+    plant = (setup.system_id, dialect.PLANT_COMPONENT)
+    told: dict[int, dict[bytes, None]] = {}
+    commands: dict[int, ActuatorCommand] = {}
+    for time_us, frame in log:
+        for message in codec.decode(frame):
+            if message.source == plant:
+                told.setdefault(time_us, {})[frame] = None  # once, however often it was sent
+            elif message.source == codec.source and message.name == "HIL_ACTUATOR_CONTROLS":
+                command = decode_actuators(message)
+                if command is not None:
+                    commands.setdefault(command.time_us, command)
+    for time_us in sorted(told):
+        yield Recorded(time_us, b"".join(told[time_us]), commands.get(time_us))
+
+
+def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
+    """Answer each frame as the autopilot did that was started last before it, until an answer differs."""
+    setups = {what.first_us: what for what in inputs if isinstance(what, Setup)}
+    heard: dict[int, list[Received]] = {}
+    for what in inputs:
+        if isinstance(what, Heard):
+            heard.setdefault(what.time_us, []).append(Received(what.datagram, what.link, what.address, what.loopback))
+    pilot: Autopilot | Copter | None = None
+    wire = Wire(next(iter(setups.values())).system_id)
+    known: StateFrame | None = None
+    commands = last_us = 0
+    for time_us, datagram, command in recorded:
+        if time_us in setups:
+            pilot = _begun(setups[time_us])
+            end = _end(setups[time_us], pilot)
+        if pilot is None:
+            continue
+        frame = end.receive(datagram, _NO_CLOCK_S)
+        if frame is None:
+            continue
+        pilot.hear(end.aside)
+        try:
+            step = pilot.step(frame)
+        except DecisionError as error:
+            raise ReplayError(f"at t = {frame.time_us * 1e-6:.3f} s: {error}") from error
+        known = _known(frame, step, known)
+        if command is not None:
+            replayed = wire.carried(step.command)
+            if replayed != command:
+                return Replayed(commands, last_us, Difference(command, replayed, _mode(pilot), known))
+            commands, last_us = commands + 1, frame.time_us
+        if isinstance(pilot, Copter):
+            pilot.serve(heard.get(frame.time_us, ()))
+    return Replayed(commands, last_us, None)
+
+
+class Wire:
+    """Rounds commands as the link does."""
+
+    def __init__(self, system_id: int) -> None:
+        """Speak as the autopilot of `system_id`."""
+        self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
+
+    def carried(self, command: ActuatorCommand) -> ActuatorCommand:
+        """Return what arrives of a command."""
+        (message,) = self._codec.decode(encode_actuators(self._codec, command))
+        arrived = decode_actuators(message)
+        assert arrived is not None, "what an autopilot commands can be flown"
+        return arrived
+
+
+def _begun(setup: Setup) -> Autopilot | Copter:
+    """Return an autopilot that begins as it did then."""
+    profile = load_profile(setup.profile).with_choices(setup.controller, setup.solver)
+    vehicle = load_vehicle(setup.vehicle)
+    estimator = estimator_for(setup.feedback, vehicle, setup.origin)
+    flown = track(setup.track) if setup.track else None
+    if not setup.ground:
+        assert flown is not None, "who serves no ground station flies a track"
+        return Autopilot(profile, vehicle, flown, _clock, estimator=estimator)
+    settings = StationSettings(
+        system_id=setup.system_id, identity=setup.identity, origin=setup.origin, feedback=setup.feedback
+    )
+    past = of_bytes(Past, setup.past) if setup.past else None
+    return Copter(profile, vehicle, settings, _clock, values=setup.values, first=flown, estimator=estimator, past=past)
+
+
+def _end(setup: Setup, pilot: Autopilot | Copter) -> AutopilotEnd:
+    return AutopilotEnd(
+        system_id=setup.system_id,
+        frame_interval_us=pilot.frame_interval_us,
+        now_s=_NO_CLOCK_S,
+        feedback=setup.feedback,
+    )
+
+
+def _clock() -> float:
+    return _NO_CLOCK_S
+
+
+def _inputs(path: Path, tlog: Path) -> list[Input]:
+    try:
+        return read(path.read_bytes())
+    except FileNotFoundError as error:
+        raise ReplayError(
+            f"{path} is missing: replay needs it beside {tlog.name}, as `colibri fly` leaves it"
+        ) from error
+    except OSError as error:
+        raise ReplayError(f"cannot read {path}: {error.strerror}") from error
+    except InputsError as error:
+        raise ReplayError(f"{path}: {error}") from error
+
+
+def _bytes(tlog: Path) -> bytes:
+    try:
+        return tlog.read_bytes()
+    except OSError as error:
+        raise ReplayError(f"cannot read {tlog}: {error.strerror}") from error
+
+
+def _known(frame: Frame, step: Step, before: StateFrame | None) -> StateFrame | None:
+    if isinstance(frame, StateFrame):
+        return frame
+    return before if step.estimate is None else step.estimate.frame
+
+
+def _mode(pilot: Autopilot | Copter) -> str:
+    return "track" if isinstance(pilot, Autopilot) else str(pilot.pilot.state.mode)
+
+
+def _told(command: ActuatorCommand) -> str:
+    speeds = " ".join(f"{control!r}" for control in command.controls)
+    return f"rotors {speeds} of the largest speed, {'armed' if command.armed else 'disarmed'}"
+
+
+def _state(known: StateFrame | None) -> str:
+    if known is None:
+        return "not known yet"
+    east, north, up = known.position_enu_m
+    speed = sum(axis * axis for axis in known.velocity_enu_m_s) ** 0.5
+    roll, pitch, yaw = map(degrees, euler_from_quaternion(known.attitude))
+    place = f"east {east:.3f} north {north:.3f} up {up:.3f} m, {speed:.2f} m/s"
+    return f"{place}, roll {roll:.1f}° pitch {pitch:.1f}° yaw {yaw:.1f}°"

@@ -1,0 +1,107 @@
+"""`python -m colibri.sitl.backends.fork_server`: loads what plant and autopilot need, then forks one or the other as asked.
+
+A request is a line on standard input, a JSON list: "start", the package, a file for what it says, and its options;
+"code" or "kill" and a process. The answer is a line on standard output: the process, or its exit code, or null.
+"""
+
+import gc
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NoReturn
+
+from colibri.common.process.lifecycle import use_one_thread
+
+_FLIGHTS = ({"feedback": "state"}, {"feedback": "sensors", "turbulence": "light"})
+
+
+def main() -> None:
+    """Serve until standard input ends."""
+    use_one_thread()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the tests, which then end this process
+    _load()
+    gc.collect()
+    gc.freeze()
+    living: set[int] = set()
+    for line in sys.stdin:
+        what, first, *rest = json.loads(line)
+        if what == "start":
+            pid = _fork(first, *rest)
+            living.add(pid)
+            answer: int | None = pid
+        else:
+            pid = int(first)
+            answer = _end(pid) if what == "kill" else _code(pid, os.WNOHANG)
+            if answer is not None:
+                living.discard(pid)
+        sys.stdout.write(json.dumps(answer) + "\n")
+        sys.stdout.flush()
+    for pid in living:
+        _end(pid)
+
+
+def _load() -> None:
+    """Load, and run once, all that is compiled."""
+    from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
+    from colibri.sitl.backends.setting import setting_of
+    from colibri.sitl.backends.stage import Stage
+
+    with TemporaryDirectory(prefix="sitl-") as folder:
+        for flight in _FLIGHTS:
+            setting = setting_of([flight])
+            autopilot = MemoryAutopilot(setting.autopilot_options(Path(folder)))
+            stage = Stage(MemoryPlant(setting.plant_options(0.0)), autopilot, setting.system)
+            stage.advance(())
+            autopilot.close()
+
+
+def _fork(package: str, said: str, *options: str) -> int:
+    nursery = os.getpid()
+    pid = os.fork()
+    if pid:
+        return pid
+    try:
+        out = os.open(said, os.O_WRONLY | os.O_APPEND)
+        nothing = os.open(os.devnull, os.O_RDONLY)
+        for to, of in ((0, nothing), (1, out), (2, out)):
+            os.dup2(of, to)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.argv = [package, "--parent", str(nursery), *options]
+        _be(package)
+    finally:
+        os._exit(1)
+
+
+def _be(package: str) -> NoReturn:
+    """Be `python -m package`, to the end of this process."""
+    from colibri.autopilot.__main__ import main as autopilot
+    from colibri.plant.__main__ import main as plant
+
+    code = 1
+    try:
+        code = {"autopilot": autopilot, "plant": plant}[package]()
+    except SystemExit as error:
+        code = error.code if isinstance(error.code, int) else 1
+    except BaseException:
+        sys.excepthook(*sys.exc_info())
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def _code(pid: int, options: int) -> int | None:
+    ended, status = os.waitpid(pid, options)
+    return os.waitstatus_to_exitcode(status) if ended else None
+
+
+def _end(pid: int) -> int | None:
+    os.kill(pid, signal.SIGKILL)
+    return _code(pid, 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,167 @@
+"""Starts plant and autopilot as processes: each from scratch, or forked from one that has loaded everything."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from colibri.sitl.backends.stage import StageError
+
+_LAST_WORDS_BYTES = 2000
+
+
+class Running(Protocol):
+    """A process that was started.
+
+    Attributes:
+        number: Of the process.
+    """
+
+    number: int
+
+    def code(self) -> int | None:
+        """Return its exit code, negative for a signal; None while it runs."""
+        ...
+
+    def kill(self) -> None:
+        """Kill it, and wait until it is gone."""
+        ...
+
+
+class Launcher(Protocol):
+    """Starts processes."""
+
+    def start(self, package: str, options: Sequence[str], said: Path) -> Running:
+        """Start `python -m package` with `options`; what it says goes into file `said`."""
+        ...
+
+    def close(self) -> None:
+        """End what is left."""
+        ...
+
+
+class Child:
+    """A flying process, with what it has said.
+
+    Attributes:
+        name: What it is.
+        number: Of the process.
+        said: The file of what it says.
+    """
+
+    def __init__(self, launcher: Launcher, package: str, options: Sequence[str], said: Path) -> None:
+        """Start it."""
+        self.name = package
+        self.said = said
+        self._running = launcher.start(package, options, said)
+        self.number = self._running.number
+
+    def check(self) -> None:
+        """See that it lives.
+
+        Raises:
+            StageError: It has died.
+        """
+        code = self._running.code()
+        if code is None:
+            return
+        how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+        words = self.last_words()
+        raise StageError(f"the {self.name} {how}" + (f": {words}" if words else ""))
+
+    def last_words(self) -> str:
+        """Return the last line that is not a status."""
+        text = self.said.read_bytes()[-_LAST_WORDS_BYTES:].decode(errors="replace")
+        lines = [line for line in text.splitlines() if line and not line.startswith("{")]
+        return lines[-1] if lines else ""
+
+    def kill(self) -> None:
+        """Kill it, and wait until it is gone."""
+        self._running.kill()
+
+
+class FromScratch:
+    """Starts each process from scratch, as a user does."""
+
+    def start(self, package: str, options: Sequence[str], said: Path) -> Running:
+        """Start `python -m package` with `options`; what it says goes into file `said`."""
+        command = [sys.executable, "-m", f"colibri.{package}", "--parent", str(os.getpid()), *options]
+        with said.open("wb") as out:
+            return _Popened(subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=out))
+
+    def close(self) -> None:
+        """Leave nothing: each flight ends its own."""
+
+
+class _Popened:
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self._process = process
+        self.number = process.pid
+
+    def code(self) -> int | None:
+        return self._process.poll()
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
+
+
+class Forked:
+    """Has a nursery fork each process: it has loaded what both need, which takes longer than most flights."""
+
+    def __init__(self) -> None:
+        """Start the nursery; it loads while this process goes on."""
+        command = [sys.executable, "-m", "colibri.sitl.backends.fork_server"]
+        self._nursery = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+    def start(self, package: str, options: Sequence[str], said: Path) -> Running:
+        """Start what `python -m package` with `options` is; what it says goes into file `said`."""
+        said.touch()
+        pid = self._ask("start", package, str(said), *options)
+        assert pid is not None, "whatever is forked has a number"
+        return _Nursling(pid, self._ask)
+
+    def close(self) -> None:
+        """End the nursery, and with it whatever it has started."""
+        assert self._nursery.stdin is not None, "it is piped"
+        self._nursery.stdin.close()
+        self._nursery.wait()
+        if self._nursery.stdout:
+            self._nursery.stdout.close()
+
+    def _ask(self, *words: str) -> int | None:
+        stdin, stdout = self._nursery.stdin, self._nursery.stdout
+        assert stdin is not None, "it is piped"
+        assert stdout is not None, "it is piped"
+        try:
+            stdin.write(json.dumps(words).encode() + b"\n")
+            stdin.flush()
+            answer: int | None = json.loads(stdout.readline())
+        except (OSError, ValueError) as error:
+            raise StageError("the process that starts others has died; try --sitl-from-scratch") from error
+        return answer
+
+
+class _Nursling:
+    def __init__(self, pid: int, ask: Callable[..., int | None]) -> None:
+        self.number = pid
+        self._ask = ask
+        self._code: int | None = None
+
+    def code(self) -> int | None:
+        if self._code is None:
+            self._code = self._ask("code", str(self.number))
+        return self._code
+
+    def kill(self) -> None:
+        if self._code is None:
+            self._code = self._ask("kill", str(self.number))
+
+
+def launcher(*, from_scratch: bool) -> Launcher:
+    """Return what starts processes; where nothing can be forked, each starts from scratch."""
+    return FromScratch() if from_scratch or not hasattr(os, "fork") else Forked()

@@ -1,0 +1,262 @@
+"""Plant and autopilot in this process: what their processes do, without sockets and without a clock."""
+
+import io
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr
+from time import perf_counter
+from typing import Any
+
+from colibri.autopilot.__main__ import command_line as autopilot_command_line
+from colibri.autopilot.control.profile import ProfileError, load_profile
+from colibri.autopilot.control.qp import SolverError
+from colibri.autopilot.control.registry import ControllerError, DecisionError
+from colibri.autopilot.estimation.state_source import estimator_for
+from colibri.autopilot.guidance.trajectories.tracks import TrackError
+from colibri.autopilot.process.ground import open_ground
+from colibri.common.process.arguments import ArgumentParser
+from colibri.common.process.status import Status
+from colibri.common.types import Address
+from colibri.mavlink.hil.conductor import Turn
+from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
+from colibri.mavlink.hil.lockstep_plant import PlantEnd
+from colibri.mavlink.links.link import LinkError
+from colibri.plant.__main__ import command_line as plant_command_line
+from colibri.plant.physics.start import DEFAULT_STARTS, IntegrationError
+from colibri.plant.physics.world import Physics, starting_world, state_frame
+from colibri.plant.process.options import nudged, weather_of
+from colibri.plant.sensors.suite import served_by
+from colibri.plant.simulation.plant import Plant
+from colibri.plant.vehicle.description import VehicleError, load_vehicle
+from colibri.sitl.backends.setting import SettingError
+from colibri.sitl.backends.stage import StageError
+
+NEVER_LATE_S = 0.0
+_ADDRESS: Address = ("memory", 0)
+
+
+class MemoryPlant:
+    """A plant in this process."""
+
+    process = None
+
+    def __init__(self, options: Sequence[str]) -> None:
+        """Begin as a command line says.
+
+        Raises:
+            SettingError: It cannot begin so.
+        """
+        args = parsed(plant_command_line, options)
+        try:
+            weather = weather_of(args)
+            self._vehicle = load_vehicle(args.vehicle).without(args.without)
+            serves = served_by(self._vehicle)
+            worlds = {
+                it: starting_world(nudged(DEFAULT_STARTS[it]._replace(**args.start)), self._vehicle, weather)
+                for it in serves
+            }
+        except VehicleError as error:
+            raise SettingError(str(error)) from error
+        self._args = args
+        self._worlds = worlds
+        self._world = worlds[served_by(self._vehicle)[0]]
+        self._answered = False
+        self._physics = Physics(self._vehicle, args.integrator, weather)
+        self._end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
+        self._plant: Plant | None = None
+        self._now_s = 0.0
+
+    def hear(self, datagram: bytes) -> None:
+        """Take in what an autopilot says, its call for one.
+
+        Raises:
+            StageError: The state cannot be integrated any further.
+        """
+        command = self._end.receive(datagram, _ADDRESS, self._now_s)
+        self._end.received.clear()
+        if command is None:
+            return
+        assert self._plant is not None, "it has told a frame"
+        try:
+            self._plant.answer(command, self._end.take_faults())
+        except IntegrationError as error:
+            raise StageError(str(error)) from error
+        self._answered = True
+
+    def frame(self) -> list[bytes]:
+        """Return what the plant says up to its next frame, which comes last."""
+        self._offer()
+        return [outgoing.datagram for outgoing in self._end.take_outbox()]
+
+    def take(self, answer: bytes) -> None:
+        """Take in the answer to that frame, and go on.
+
+        Raises:
+            StageError: The state cannot be integrated any further.
+        """
+        self.hear(answer)
+
+    def listen(self, timeout_s: float) -> list[bytes]:
+        """Return what it says up to `timeout_s` from now, the frame it waits with said again and again."""
+        if self._answered:
+            self._offer()
+        else:
+            self._now_s += timeout_s
+            self._end.poll(self._now_s)
+        return [outgoing.datagram for outgoing in self._end.take_outbox()]
+
+    def clock_s(self) -> float:
+        """Return the time that links are late by: it passes only while the plant waits."""
+        return self._now_s
+
+    def _offer(self) -> None:
+        end, args = self._end, self._args
+        if self._plant is None:
+            self._plant = Plant(
+                self._worlds[end.feedback],
+                self._vehicle,
+                self._physics,
+                end.feedback,
+                args.home.origin,
+                seed=args.seed,
+                interval_us=end.frame_interval_us,
+                latency_us=round(args.latency * 1e3),
+            )
+        self._answered = False
+        frame, aside = self._plant.tell()
+        end.offer(frame, self._now_s, aside, state_frame(self._plant.world))
+
+
+class MemoryAutopilot:
+    """An autopilot in this process, with its ground side as the process has it."""
+
+    process = None
+
+    def __init__(self, options: Sequence[str]) -> None:
+        """Begin as a command line says.
+
+        Raises:
+            SettingError: It cannot begin so.
+        """
+        self._args = parsed(autopilot_command_line, options)
+        self.start()
+
+    def start(self) -> None:
+        """Start it anew.
+
+        Raises:
+            SettingError: It cannot start.
+        """
+        args = self._args
+        try:
+            profile = load_profile(args.profile).with_choices(args.controller, args.solver)
+            vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
+            estimator = estimator_for(args.feedback, vehicle, args.home.origin)
+            self._desk = _Desk()
+            self._ground = open_ground(args, profile, vehicle, estimator, _Silence(), self._desk)
+        except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
+            raise SettingError(str(error)) from error
+        self._copter = self._ground.copter
+        self._end = AutopilotEnd(
+            system_id=args.system_id,
+            frame_interval_us=self._copter.frame_interval_us,
+            now_s=NEVER_LATE_S,
+            feedback=args.feedback,
+        )
+
+    def call(self) -> bytes:
+        """Return how it calls a plant."""
+        self._end.poll(NEVER_LATE_S)
+        (call,) = self._end.take_outbox()
+        return call
+
+    def tell(self, frame: bytes, turn: Turn) -> None:
+        """Tell it a frame of the plant, and what ground stations say then."""
+        self.expect(turn)
+        self.hear(frame)
+
+    def expect(self, turn: Turn) -> None:
+        """Tell it what ground stations say at the frame that comes next."""
+        self._desk.heard = turn
+
+    def hear(self, datagram: bytes) -> None:
+        """Give it a datagram of the plant's, sound or not."""
+        frame = self._end.receive(datagram, NEVER_LATE_S)
+        if frame is not None:
+            self._copter.hear(self._end.aside)
+            try:
+                step = self._copter.step(frame)
+            except DecisionError as error:
+                raise StageError(f"the autopilot ended: {error}") from error
+            self._end.answer(step.command, step.faults)
+
+    def listen(self) -> list[bytes]:
+        """Return what it has said to the plant."""
+        return self._end.take_outbox()
+
+    def answer(self) -> bytes:
+        """Return its answer to the frame.
+
+        Raises:
+            StageError: It was shut down.
+        """
+        if self._ground.shut_down:
+            raise StageError("the autopilot ended with exit code 0")
+        (answer,) = self._end.take_outbox()
+        return answer
+
+    def said(self) -> Turn:
+        """Return what it says to ground stations at that frame."""
+        self._copter = self._ground.serve(perf_counter())
+        assert self._desk.said is not None, "it has served them"
+        return self._desk.said
+
+    def kill(self) -> None:
+        """End it as a power cut does: nothing is written that was not."""
+
+    def close(self) -> None:
+        """End it."""
+        self._ground.close()
+
+
+class _Desk:
+    """The autopilot's conductor, who is in this process."""
+
+    def __init__(self) -> None:
+        self.heard: Turn | None = None
+        self.said: Turn | None = None
+
+    def hear(self) -> Turn | None:
+        """Return what ground stations say at this instant."""
+        return self.heard
+
+    def tell(self, turn: Turn) -> None:
+        """Take in what the vehicle says."""
+        self.said = turn
+
+    def close(self) -> None:
+        """Let go."""
+
+
+class _Silence(Status):
+    """Says nothing."""
+
+    def __init__(self) -> None:
+        super().__init__("", as_json=False)
+
+    def say(self, event: str, text: str, **facts: Any) -> None:
+        """Say nothing."""
+
+
+def parsed(command_line: Callable[[], ArgumentParser], options: Sequence[str]) -> Namespace:
+    """Read a command line.
+
+    Raises:
+        SettingError: It says something impossible.
+    """
+    said = io.StringIO()
+    try:
+        with redirect_stderr(said):
+            return command_line().parse_args(options)
+    except SystemExit as error:
+        raise SettingError(said.getvalue().strip().removeprefix("colibri: error: ")) from error

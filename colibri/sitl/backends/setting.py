@@ -1,0 +1,144 @@
+"""What a flight begins with, and the command lines of the two processes that say so.
+
+Nothing here loads what flies: pytest imports it in every run, whoever's tests these are.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from colibri.sitl.backends.link_faults import Trouble
+
+_STANDING = {"x": 0.0, "y": 0.0, "z": 0.0, "psi": 90.0, "rotors": 0.0}
+"""On its feet at the origin, its nose to the north."""
+
+
+class SettingError(Exception):
+    """A flight that cannot begin so; the message is the one line that a user needs."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """What a flight begins with; each is what the option of the same name of `colibri plant` or `autopilot` says.
+
+    Attributes:
+        vehicle: That the plant flies, name or .toml.
+        believed: That the autopilot controls; None for the same.
+        profile: Control profile, name or .toml.
+        controller: Control law; None for the profile's.
+        feedback: What the autopilot is told: "state" or "sensors".
+        wind: "5@270": 5 m/s from the west; or a .csv file.
+        gusts: "6@270:start=10,duration=2", each.
+        turbulence: "light", "moderate", "severe"; None for none.
+        seed: Of everything random, the links' faults among it.
+        start: How the vehicle begins: x, y, z (m, ENU, from where it stands), phi, theta, psi (degrees), vx, vy, vz
+            (m/s), p, q, r (rad/s), rotors (rpm). What is left out is that of a vehicle that stands, nose to the north.
+        airborne: Picked up in hold so many metres above the origin, its rotors at hover speed: no take-off needed.
+            With feedback "state" only: an estimator begins at rest.
+        params: Parameters that were changed before.
+        track: Flown from time 0 on; the vehicle must be in the air.
+        home: "LAT,LON,ALT,YAW": the origin of the ENU frame.
+        ground: What links to ground stations do: loss, delay_s, jitter_s, duplicate, reorder, corrupt, as in `Trouble`.
+        latency: One way between plant and autopilot, ms: commands act so much later, twice.
+        without: Parts that are left out of the vehicle: "drag", "ground", "battery", "rotor-lag".
+        identity: Towards ground stations: "px4" or "generic".
+        system: MAVLink system id.
+        ready: Whether the flight is handed over only when the vehicle says that it is there.
+    """
+
+    vehicle: str = "hummingbird"
+    believed: str | None = None
+    profile: str = "flight"
+    controller: str | None = None
+    feedback: str = "state"
+    wind: str | None = None
+    gusts: tuple[str, ...] = ()
+    turbulence: str | None = None
+    seed: int = 0
+    start: Mapping[str, float] = field(default_factory=dict)
+    airborne: float | None = None
+    params: Mapping[str, float] = field(default_factory=dict)
+    track: str | None = None
+    home: str | None = None
+    ground: Mapping[str, float] = field(default_factory=dict)
+    latency: float = 0.0
+    without: tuple[str, ...] = ()
+    identity: str = "px4"
+    system: int = 1
+    ready: bool = True
+
+    def plant_options(self, hover_rpm: float) -> list[str]:
+        """Return the command line of the plant, whose rotors hover at `hover_rpm`."""
+        start = dict(_STANDING)
+        if self.airborne is not None:
+            start |= {"z": self.airborne, "rotors": hover_rpm}
+        start |= self.start
+        return [
+            *("--vehicle", self.vehicle),
+            *("--start", ",".join(f"{key}={value!r}" for key, value in start.items())),
+            *("--seed", str(self.seed)),
+            *("--system-id", str(self.system)),
+            *(("--latency", repr(self.latency)) if self.latency else ()),
+            *_given("--wind", self.wind),
+            *_given("--turbulence", self.turbulence),
+            *_given("--home", self.home),
+            *(f"--gust={gust}" for gust in self.gusts),
+            *(f"--without={part}" for part in self.without),
+            "--truth",
+        ]
+
+    def autopilot_options(self, state: Path) -> list[str]:
+        """Return the command line of an autopilot that keeps its files in folder `state`."""
+        return [
+            *("--vehicle", self.believed or self.vehicle),
+            *("--profile", self.profile),
+            *("--feedback", self.feedback),
+            *("--system-id", str(self.system)),
+            *("--identity", self.identity),
+            *("--state", str(state)),
+            *_given("--controller", self.controller),
+            *_given("--track", self.track),
+            *_given("--home", self.home),
+        ]
+
+
+KEYS = frozenset(each.name for each in fields(Setting))
+DOES = frozenset(each.name for each in fields(Trouble)) - {"down"}
+
+
+def setting_of(said: Iterable[Mapping[str, Any]]) -> Setting:
+    """Return the setting that several marks describe together, of which a later one has the last word; params add up.
+
+    Raises:
+        SettingError: One says what a flight has not, or says it wrongly.
+    """
+    values: dict[str, Any] = {}
+    params: dict[str, float] = {}
+    for mark in said:
+        unknown = sorted(set(mark) - KEYS)
+        if unknown:
+            raise SettingError(f"a flight has no {unknown[0]}: choose {', '.join(sorted(KEYS))}")
+        values |= mark
+        params |= mark.get("params", {})
+    for name in ("gusts", "without"):
+        if isinstance(values.get(name), str):
+            values[name] = (values[name],)
+    for name in ("start", "ground"):
+        if isinstance(values.get(name), str):
+            values[name] = _numbers(name, values[name])
+    unknown = sorted(set(values.get("ground", ())) - DOES)
+    if unknown:
+        raise SettingError(f"a link does no {unknown[0]}: choose {', '.join(sorted(DOES))}")
+    return Setting(**{**values, "params": params})
+
+
+def _numbers(name: str, text: str) -> dict[str, float]:
+    try:
+        return {key: float(value) for key, value in (pair.split("=", 1) for pair in text.split(","))}
+    except ValueError:
+        raise SettingError(f"{name} is KEY=VALUE,..., not {text!r}") from None
+
+
+def _given(option: str, value: str | None) -> tuple[str, ...]:
+    return () if value is None else (f"{option}={value}",)

@@ -1,0 +1,279 @@
+"""A flight one frame at a time: who conducts it stands between plant and autopilot, and holds simulated time still.
+
+The two may be in this process or in others: see `memory` and `udp`. Either way the same bytes pass.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Protocol
+
+from colibri.mavlink.hil.conductor import Parcel, Turn
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_actuators, decode_state
+from colibri.mavlink.wire.dialect import (
+    AUTOPILOT_COMPONENT,
+    CMD_SET_MESSAGE_INTERVAL,
+    PLANT_COMPONENT,
+    RESULT_ACCEPTED,
+    TRUTH_COMPONENT,
+    Codec,
+    mav,
+)
+from colibri.sitl.backends.link_faults import Pipe, Trouble
+
+_HEADER_BYTES, _CRC_BYTES, _COMPONENT_AT = 10, 2, 6
+
+
+_ANSWER: int = mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
+_GLANCE_S = 0.002
+_GIVE_UP_S = 20.0
+"""Of the clock that a link is late by. No flight depends on it."""
+
+
+class StageError(Exception):
+    """A flight that cannot go on: a process has died, or does not answer; the message says which and why."""
+
+
+class Plant(Protocol):
+    """The plant's side."""
+
+    @property
+    def process(self) -> int | None:
+        """The number of its process; None where it has none of its own."""
+        ...
+
+    def hear(self, datagram: bytes) -> None:
+        """Take in a datagram of an autopilot's, sound or not."""
+        ...
+
+    def frame(self) -> list[bytes]:
+        """Return what the plant says up to its next frame, which comes last."""
+        ...
+
+    def take(self, answer: bytes) -> None:
+        """Take in the answer to that frame, and go on."""
+        ...
+
+    def listen(self, timeout_s: float) -> list[bytes]:
+        """Return what it says up to `timeout_s` from now, the frame it waits with said again and again."""
+        ...
+
+    def clock_s(self) -> float:
+        """Return the time that links are late by."""
+        ...
+
+
+class Autopilot(Protocol):
+    """The autopilot's side."""
+
+    @property
+    def process(self) -> int | None:
+        """The number of its process; None where it has none of its own."""
+        ...
+
+    def call(self) -> bytes:
+        """Return how it calls a plant."""
+        ...
+
+    def tell(self, frame: bytes, turn: Turn) -> None:
+        """Tell it a frame of the plant, and what ground stations say then."""
+        ...
+
+    def expect(self, turn: Turn) -> None:
+        """Tell it what ground stations say at the frame that comes next."""
+        ...
+
+    def hear(self, datagram: bytes) -> None:
+        """Give it a datagram of the plant's, sound or not."""
+        ...
+
+    def listen(self) -> list[bytes]:
+        """Return what it has said to the plant."""
+        ...
+
+    def answer(self) -> bytes:
+        """Return its answer to the frame."""
+        ...
+
+    def said(self) -> Turn:
+        """Return what it says to ground stations at that frame."""
+        ...
+
+    def kill(self) -> None:
+        """End it as a power cut does."""
+        ...
+
+    def start(self) -> None:
+        """Start it anew."""
+        ...
+
+    def close(self) -> None:
+        """End it."""
+        ...
+
+
+class Instant(NamedTuple):
+    """A frame that was flown.
+
+    Attributes:
+        began: How the vehicle was, in truth.
+        command: What the autopilot answered.
+        said: What it said to ground stations.
+        frame: What the plant told the autopilot, as bytes.
+        answer: The answer, as bytes.
+    """
+
+    began: StateFrame
+    command: ActuatorCommand
+    said: Turn
+    frame: bytes
+    answer: bytes
+
+
+class Stage:
+    """Conducts a flight.
+
+    Attributes:
+        truth: How the vehicle is now.
+        acks: Answers of the plant to commands: number and MAV_RESULT.
+        trouble: What the link between plant and autopilot does.
+    """
+
+    def __init__(self, plant: Plant, autopilot: Autopilot, system: int, seed: int = 0) -> None:
+        """Bring the two together; the vehicle is system `system`, and `seed` that of what goes wrong between them."""
+        self._plant = plant
+        self._autopilot = autopilot
+        self._codec = Codec(system, AUTOPILOT_COMPONENT)
+        self.acks: list[tuple[int, int]] = []
+        self.trouble = Trouble()
+        self._up, self._down = (Pipe(self.trouble, f"{seed} plant {way}") for way in ("up", "down"))
+        plant.hear(autopilot.call())
+        self._frame, self.truth = self._taken_in(plant.frame())
+
+    def advance(self, parcels: Sequence[Parcel], injected: bytes = b"") -> Instant:
+        """Fly one frame.
+
+        Args:
+            parcels: What ground stations say now.
+            injected: Frames that go to the plant with the autopilot's answer.
+
+        Raises:
+            StageError: The flight cannot go on.
+        """
+        frame, began = self._frame, self.truth
+        turn = Turn(began.time_us, parcels)
+        if self.trouble.any:
+            answer, said, heard = self._struggle(frame, turn, injected)
+        else:
+            self._autopilot.tell(frame, turn)
+            answer = self._autopilot.answer()
+            self._plant.take(answer + injected)
+            said = self._autopilot.said()
+            heard = self._plant.frame()
+        self._frame, self.truth = self._taken_in(heard)
+        if injected:
+            self._hear(self._frame)
+        return Instant(began, self._command(answer), said, frame, answer)
+
+    def _struggle(self, frame: bytes, turn: Turn, injected: bytes) -> tuple[bytes, Turn, list[bytes]]:
+        """Carry a frame and its answer over a bad link, until the plant has gone on.
+
+        Returns the answer, what is said to ground stations, and what the plant said up to its next frame.
+        """
+        plant, autopilot, up, down = self._plant, self._autopilot, self._up, self._down
+        began_s = plant.clock_s()
+        autopilot.expect(turn)
+        up.put(frame, _us(began_s))
+        answer, said, heard = b"", None, list[bytes]()
+        while True:
+            now_us = _us(plant.clock_s())
+            for datagram in up.due(now_us):
+                autopilot.hear(datagram)
+            for datagram in autopilot.listen():
+                if not answer and answers(datagram, turn.time_us):
+                    answer, said = datagram, autopilot.said()
+                down.put(datagram + injected, now_us)
+            for datagram in down.due(now_us):
+                plant.hear(datagram)
+            for datagram in plant.listen(_GLANCE_S):
+                is_frame = bool(parted(datagram)[1])
+                if is_frame and parted(datagram)[0] == frame:
+                    up.put(frame, now_us)
+                    continue
+                heard.append(datagram)
+                if is_frame and said is not None:
+                    return answer, said, heard
+            if plant.clock_s() > began_s + _GIVE_UP_S:
+                raise StageError(f"nothing has passed between plant and autopilot for {_GIVE_UP_S:.0f} s")
+
+    def command_to_plant(self, number: int, *params: float) -> bytes:
+        """Return a COMMAND_LONG as the autopilot would send it to the plant."""
+        values = (*params, *(0.0,) * (7 - len(params)))
+        return self._codec.encode("COMMAND_LONG", self._codec.source[0], PLANT_COMPONENT, number, 0, *values)
+
+    def processes(self) -> dict[str, int]:
+        """Return the number of each process that flies."""
+        sides = {"plant": self._plant.process, "autopilot": self._autopilot.process}
+        return {name: number for name, number in sides.items() if number is not None}
+
+    def kill_autopilot(self) -> None:
+        """End the autopilot as a power cut does, and start it anew: the plant has waited."""
+        self._autopilot.kill()
+        self._autopilot.start()
+        self._autopilot.call()
+
+    def _taken_in(self, said: list[bytes]) -> tuple[bytes, StateFrame]:
+        *others, datagram = said
+        for other in others:
+            self._hear(other)
+        frame, told = parted(datagram)
+        messages = {message.name: message for message in self._codec.decode(told)}
+        truth = decode_state(messages["ATTITUDE_QUATERNION"], messages["LOCAL_POSITION_NED"])
+        if truth is None:
+            raise StageError("the vehicle has left what can be told: its state is not finite")
+        return frame, truth
+
+    def _hear(self, datagram: bytes) -> None:
+        for message in self._codec.decode(datagram):
+            if message.name != "COMMAND_ACK":
+                continue
+            number, result = message.fields.command, message.fields.result
+            if number == CMD_SET_MESSAGE_INTERVAL and result != RESULT_ACCEPTED:
+                raise StageError("the plant cannot give the feedback that is asked for: fly a vehicle with sensors")
+            self.acks.append((number, result))
+
+    def _command(self, answer: bytes) -> ActuatorCommand:
+        for message in self._codec.decode(answer):
+            command = decode_actuators(message) if message.name == "HIL_ACTUATOR_CONTROLS" else None
+            if command is not None:
+                return command
+        raise StageError("the autopilot answered with what no rotor can follow")
+
+
+def frames_of(datagram: bytes) -> Iterator[bytes]:
+    """Yield the frames of a datagram of whole MAVLink 2 frames that nobody has signed."""
+    at = 0
+    while at < len(datagram):
+        end = at + _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES
+        yield datagram[at:end]
+        at = end
+
+
+def answers(datagram: bytes, time_us: int) -> bool:
+    """Whether a datagram holds the answer to the frame of a time."""
+    return any(
+        int.from_bytes(frame[7:_HEADER_BYTES], "little") == _ANSWER
+        and int.from_bytes(frame[10:18], "little") == time_us
+        for frame in frames_of(datagram)
+    )
+
+
+def parted(datagram: bytes) -> tuple[bytes, bytes]:
+    """Return what of a plant's datagram is for the autopilot, and the truth behind it."""
+    told: list[bytes] = []
+    truth: list[bytes] = []
+    for frame in frames_of(datagram):
+        (truth if frame[_COMPONENT_AT] == TRUTH_COMPONENT else told).append(frame)
+    return b"".join(told), b"".join(truth)
+
+
+def _us(time_s: float) -> int:
+    return round(time_s * 1e6)

@@ -1,0 +1,201 @@
+"""Plant and autopilot as two processes over UDP, this process in between."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter, sleep
+
+from colibri.common.types import Address
+from colibri.mavlink.hil.conductor import Gathering, Turn, packets
+from colibri.mavlink.links.open import open_link
+from colibri.mavlink.links.udp import UdpLink
+from colibri.sitl.backends.launcher import Child, Launcher
+from colibri.sitl.backends.stage import StageError, answers, parted
+
+SILENCE_S = 60.0
+"""Of the wall clock: whoever says nothing for so long will say nothing more. No flight depends on it."""
+_LOOK_EVERY_S = 0.1
+_HERE = "udpin:127.0.0.1:0"
+
+
+class UdpPlant:
+    """A plant in another process."""
+
+    def __init__(self, launcher: Launcher, options: Sequence[str], folder: Path) -> None:
+        """Start it; `folder` takes what it says."""
+        self._child = Child(launcher, "plant", ["--json", "--link", _HERE, *options], folder / "plant.said")
+        self._link: UdpLink | None = None
+        self._last = self._answer = b""
+
+    @property
+    def process(self) -> int:
+        """The number of its process."""
+        return self._child.number
+
+    def hear(self, datagram: bytes) -> None:
+        """Take in what an autopilot says that answers no frame: its call."""
+        if self._link is None:
+            self._link = opened(self._url().replace("udpin", "udpout"))
+        self._link.send(datagram)
+
+    def frame(self) -> list[bytes]:
+        """Return what the plant says up to its next frame, which comes last."""
+        assert self._link is not None, "it was called"
+        said = []
+        while True:
+            datagram, _ = received(self._link, (self._child,), "plant")
+            if datagram == self._last:  # it has not heard the answer
+                if self._answer:
+                    self._link.send(self._answer)
+                continue
+            said.append(datagram)
+            if parted(datagram)[1]:
+                self._last, self._answer = datagram, b""
+                return said
+
+    def take(self, answer: bytes) -> None:
+        """Send the answer to that frame."""
+        assert self._link is not None, "it was called"
+        self._answer = answer
+        self._link.send(answer)
+
+    def listen(self, timeout_s: float) -> list[bytes]:
+        """Return what it says up to `timeout_s` from now, the frame it waits with said again and again."""
+        assert self._link is not None, "it was called"
+        self._link.wait(timeout_s)
+        said = [datagram for datagram, _ in self._link.receive_now()]
+        if not said:
+            self._child.check()
+        self._last = next((datagram for datagram in reversed(said) if parted(datagram)[1]), self._last)
+        return said
+
+    def clock_s(self) -> float:
+        """Return the time that links are late by."""
+        return perf_counter()
+
+    def close(self) -> None:
+        """End it."""
+        self._child.kill()
+        if self._link is not None:
+            self._link.close()
+
+    def _url(self) -> str:
+        """Return where it listens."""
+        began_s = perf_counter()
+        while perf_counter() < began_s + SILENCE_S:
+            for line in self._child.said.read_text(encoding="utf-8").split("\n")[:-1]:
+                if line.startswith('{"event": "listening"'):
+                    url: str = json.loads(line)["url"]
+                    return url
+            self._child.check()
+            sleep(0.005)
+        raise StageError(f"the plant said nothing for {SILENCE_S:.0f} s")
+
+
+class UdpAutopilot:
+    """An autopilot in another process."""
+
+    def __init__(self, launcher: Launcher, options: Sequence[str], folder: Path) -> None:
+        """Start it; `folder` takes what it says."""
+        self._launcher = launcher
+        self._folder = folder
+        self._link, self._desk = opened(_HERE), opened(_HERE)
+        plant, desk = (link.url.replace("udpin", "udpout") for link in (self._link, self._desk))
+        self._options = ["--plant", plant, "--conducted", desk, *options]
+        self._starts = 0
+        self.start()
+
+    @property
+    def process(self) -> int:
+        """The number of its process."""
+        return self._child.number
+
+    def start(self) -> None:
+        """Start it anew."""
+        self._starts += 1
+        said = self._folder / f"autopilot-{self._starts}.said"
+        self._child = Child(self._launcher, "autopilot", self._options, said)
+        self._gathering = Gathering()
+        self._time_us = 0
+        self._address: Address | None = None
+        self._desk_address: Address | None = None
+
+    def call(self) -> bytes:
+        """Return how it calls a plant."""
+        _, self._desk_address = received(self._desk, (self._child,), "autopilot")
+        call, self._address = received(self._link, (self._child,), "autopilot")
+        return call
+
+    def tell(self, frame: bytes, turn: Turn) -> None:
+        """Tell it a frame of the plant, and what ground stations say then."""
+        self.expect(turn)
+        self.hear(frame)
+
+    def expect(self, turn: Turn) -> None:
+        """Tell it what ground stations say at the frame that comes next."""
+        self._time_us = turn.time_us
+        for packet in packets(turn):
+            self._desk.send(packet, self._desk_address)
+
+    def hear(self, datagram: bytes) -> None:
+        """Give it a datagram of the plant's, sound or not."""
+        self._link.send(datagram, self._address)
+
+    def listen(self) -> list[bytes]:
+        """Return what it has said to the plant."""
+        said = [datagram for datagram, _ in self._link.receive_now()]
+        if not said:
+            self._child.check()
+        return said
+
+    def answer(self) -> bytes:
+        """Return its answer to the frame; what else it says is for a plant that it misses."""
+        while True:
+            datagram, _ = received(self._link, (self._child,), "autopilot")
+            if answers(datagram, self._time_us):
+                return datagram
+
+    def said(self) -> Turn:
+        """Return what it says to ground stations at that frame."""
+        while True:
+            packet, _ = received(self._desk, (self._child,), "autopilot")
+            turn = self._gathering.take(packet)
+            if turn is not None:
+                return turn
+
+    def kill(self) -> None:
+        """End it as a power cut does, and forget what is still on its way."""
+        self._child.kill()
+        for link in (self._link, self._desk):
+            while link.receive_now():
+                pass
+
+    def close(self) -> None:
+        """End it."""
+        self._child.kill()
+        self._link.close()
+        self._desk.close()
+
+
+def opened(url: str) -> UdpLink:
+    """Open a link on which nobody looks without a pause: flights share the cores."""
+    link = open_link(url)
+    link.spin_s = 0.0
+    return link
+
+
+def received(
+    link: UdpLink, children: Sequence[Child], name: str, silence_s: float = SILENCE_S
+) -> tuple[bytes, Address]:
+    """Return what comes next.
+
+    Raises:
+        StageError: Whoever should speak has died, or says nothing.
+    """
+    began_s = perf_counter()
+    while (datagram := link.receive(_LOOK_EVERY_S)) is None:
+        for child in children:
+            child.check()
+        if perf_counter() > began_s + silence_s:
+            raise StageError(f"the {name} has said nothing for {silence_s:.0f} s, and lives")
+    return datagram

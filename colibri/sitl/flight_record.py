@@ -1,0 +1,122 @@
+"""What a flight leaves: every frame with its command, every message; in memory, and in files only where it is asked."""
+
+from collections.abc import Callable
+from hashlib import sha256
+from math import degrees
+from pathlib import Path
+from struct import Struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.autopilot.commander.rules.modes import mode_of_custom
+from colibri.common.process.log_files import CsvLog
+from colibri.common.rotations import euler_from_quaternion
+from colibri.mavlink.files.flight_log import SUFFIX
+from colibri.mavlink.wire.framing import Framer
+from colibri.mavlink.wire.tlog import TlogWriter
+from colibri.sitl.backends.stage import Instant
+
+COLUMNS = (
+    *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r"),
+    *("control1", "control2", "control3", "control4", "armed", "custom_mode"),
+)
+"""Truth in SI, ENU and FLU; controls are parts of the largest rotor speed; the mode is HEARTBEAT's number."""
+PLANT_LOG, GROUND_LOG, TABLE, FIGURE = f"plant{SUFFIX}", f"ground{SUFFIX}", "flight.csv", "flight.png"
+
+_ROW = Struct(f"<{len(COLUMNS)}d")
+_FLOWN = Struct("<Q13d4d?")
+
+Columns = dict[str, NDArray[np.float64]]
+
+
+class Record:
+    """A flight as it was.
+
+    Attributes:
+        frames: How many were flown.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self.frames = 0
+        self._rows = bytearray()
+        self._plant: list[tuple[int, bytes]] = []
+        self._ground: list[tuple[int, bytes]] = []
+        self._hash = sha256()
+
+    def add(self, instant: Instant) -> None:
+        """Take in a frame."""
+        began, command, said = instant.began, instant.command, instant.said
+        place, moves = began.position_enu_m, began.velocity_enu_m_s
+        state = (*place, *moves, *began.attitude, *began.rate_flu_rad_s)
+        self._hash.update(_FLOWN.pack(began.time_us, *state, *command.controls, command.armed))
+        self._rows += _ROW.pack(began.time_us * 1e-6, *state, *command.controls, command.armed, said.custom_mode)
+        self._plant.append((began.time_us, instant.frame + instant.answer))
+        self.frames += 1
+
+    def note(self, time_us: int, datagram: bytes) -> None:
+        """Take in what passed on a link to a ground station."""
+        self._ground.append((time_us, datagram))
+
+    @property
+    def sha256(self) -> str:
+        """Of each frame's truth and the command that answered it; the same wherever the flight is flown."""
+        return self._hash.hexdigest()
+
+    def columns(self, since_s: float = 0.0) -> Columns:
+        """Return what `COLUMNS` names from a time on, one value a frame; also `mode` is there by number."""
+        table = np.frombuffer(bytes(self._rows), dtype="<f8").reshape(-1, len(COLUMNS))
+        return dict(zip(COLUMNS, table[table[:, 0] >= since_s - 1e-9].T, strict=True))
+
+    def keep(self, folder: Path, *, figure: bool = True) -> None:
+        """Write the table, both logs and, if asked for, the figure into `folder`."""
+        folder.mkdir(parents=True, exist_ok=True)
+        table = CsvLog(folder / TABLE, COLUMNS)
+        for row in _ROW.iter_unpack(bytes(self._rows)):
+            table.write(row)
+        table.close()
+        for name, passed in ((PLANT_LOG, self._plant), (GROUND_LOG, self._ground)):
+            framer = Framer()
+            log = TlogWriter(folder / name)
+            for time_us, datagram in passed:
+                log.write(time_us, framer.take(datagram))
+            log.close()
+        if figure and self.frames:
+            self._draw(folder / FIGURE)
+
+    def _draw(self, path: Path) -> None:
+        from matplotlib.figure import Figure
+
+        flown = self.columns()
+        figure = Figure(figsize=(9.0, 8.0), layout="constrained")
+        places, tilts, modes = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 1))
+        for name, label in (("x", "east"), ("y", "north"), ("z", "up")):
+            places.plot(flown["t"], flown[name], label=label)
+        places.set_ylabel("position, m")
+        places.legend()
+        tilts.plot(flown["t"], tilt_deg(flown))
+        tilts.set_ylabel("tilt, degrees")
+        numbers, which = np.unique(flown["custom_mode"], return_inverse=True)
+        modes.step(flown["t"], which, where="post")
+        modes.fill_between(flown["t"], -0.5, len(numbers) - 0.5, where=flown["armed"] > 0.0, alpha=0.15, label="armed")
+        modes.set_yticks(range(len(numbers)), [str(mode_of_custom(int(number)) or number) for number in numbers])
+        modes.legend()
+        modes.set_xlabel("simulated time, s")
+        figure.savefig(path, dpi=110)
+
+
+def tilt_deg(flown: Columns) -> NDArray[np.float64]:
+    """Return how far the thrust points from straight up, degrees, at each frame."""
+    upright = 1.0 - 2.0 * (flown["qx"] ** 2 + flown["qy"] ** 2)
+    return np.asarray(np.degrees(np.arccos(np.clip(upright, -1.0, 1.0))))
+
+
+Predicate = Callable[[], Any]
+
+
+def euler_deg(attitude: tuple[float, float, float, float]) -> tuple[float, float, float]:
+    """Return roll, pitch, yaw in degrees."""
+    roll, pitch, yaw = euler_from_quaternion(attitude)
+    return degrees(roll), degrees(pitch), degrees(yaw)

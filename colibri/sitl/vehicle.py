@@ -1,0 +1,402 @@
+"""A vehicle in flight as a test sees it: orders that wait for their answer, and time that passes only when told to."""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from math import dist, nan, pi
+from typing import Any, NamedTuple
+
+from colibri.autopilot.commander.rules.modes import Mode, custom_mode
+from colibri.autopilot.parameters.behaviour import TRACKS
+from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.common.types import Vector
+from colibri.mavlink.hil.conductor import Parcel, Turn
+from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
+from colibri.mavlink.parameters.store import Value
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
+from colibri.mavlink.wire.ned import ned_from_enu
+from colibri.sitl import mission_items as items
+from colibri.sitl.backends.link_faults import Trouble
+from colibri.sitl.backends.setting import Setting
+from colibri.sitl.backends.stage import Stage
+from colibri.sitl.flight_record import Record
+from colibri.sitl.ground_station import RefusedError, Station
+from colibri.sitl.inbox import Words
+from colibri.sitl.mission_items import Item, on_wire
+from colibri.sitl.view import View
+
+FORCE = 21196.0
+"""What a command to arm or disarm needs to pass over every check."""
+READY_WITHIN_S = 40.0
+STICKS_EVERY_US = 40_000
+"""25 times a second, as QGroundControl sends those of a joystick."""
+
+
+class NotInTimeError(AssertionError):
+    """What was waited for has not come about."""
+
+
+class Links(NamedTuple):
+    """What the links do.
+
+    Attributes:
+        ground: Between the vehicle and every ground station, by simulated time.
+        plant: Between plant and autopilot, while simulated time stands still: in lockstep the plant says its frame
+            again until it has heard the answer, and nothing of it changes a flight.
+    """
+
+    ground: Trouble
+    plant: Trouble
+
+
+class Sitl(View):
+    """A vehicle, its plant, its ground stations, and the links between them.
+
+    What it looks like is in `View`.
+
+    Attributes:
+        items: Items of missions and fences, `items.waypoint(3.0, 0.0, 5.0)` say.
+        Refused: What is raised where the vehicle refuses.
+        NotInTime: What is raised where something does not come about, an AssertionError.
+        gcs: The first ground station; what `Sitl` does itself it does through it.
+        link: What the links do.
+    """
+
+    items = items
+    Refused = RefusedError
+    NotInTime = NotInTimeError
+
+    def __init__(self, setting: Setting, stage: Stage, origin: Geodetic) -> None:
+        """Begin a flight on a stage; `origin` is that of the ENU frame."""
+        self.setting = setting
+        self.origin = origin
+        self.link = Links(Trouble(**dict[str, Any](setting.ground)), stage.trouble)
+        self.record = Record()
+        self._stage = stage
+        self._said = Turn(0, ())
+        self._injected = b""
+        self._sticks: dict[str, float] | None = None
+        self._sticks_at_us = 0
+        self._stations: list[Station] = []
+        self.gcs = self.client(255, 190)
+        self._words = Words()
+        self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
+
+    def begin(self) -> None:
+        """Fly until the vehicle says that it is there, if that is asked for."""
+        if self.setting.ready:
+            self.wait_until(lambda: self.gcs.heard["HEARTBEAT"], within=READY_WITHIN_S, what="the vehicle's HEARTBEAT")
+
+    # Time.
+
+    def step(self) -> None:
+        """Fly one frame."""
+        now_us = self.time_us
+        if self._sticks is not None and now_us >= self._sticks_at_us:
+            self._sticks_at_us = now_us + STICKS_EVERY_US
+            self.stick(**self._sticks)
+        parcels = []
+        for station in self._stations:
+            for datagram in station.departing(now_us):
+                parcels.append(Parcel(station.number, datagram))
+                self.record.note(now_us, datagram)
+        injected, self._injected = self._injected, b""
+        instant = self._stage.advance(parcels, injected)
+        self.record.add(instant)
+        self._said, self.rotors = instant.said, instant.command
+        for number, datagram in instant.said.parcels:
+            self.record.note(now_us, datagram)
+            if number == self.gcs.number:
+                self._words.overhear(datagram)
+            self._stations[number - 1].arriving(datagram, now_us)
+        for station in self._stations:
+            station.listen(self.time_us)
+
+    def run(self, seconds: float, each_frame: Callable[[], object] | None = None) -> None:
+        """Let simulated time pass; call `each_frame` before each frame."""
+        end_us = self.time_us + round(seconds * 1e6)
+        while self.time_us < end_us:
+            if each_frame is not None:
+                each_frame()
+            self.step()
+
+    def wait_until(self, predicate: Callable[[], object], *, within: float, what: str = "") -> float:
+        """Fly until `predicate()`; return how long that took, s.
+
+        Raises:
+            NotInTimeError: It is not so `within` that many seconds of simulated time.
+        """
+        began_us = self.time_us
+        end_us = began_us + round(within * 1e6)
+        while not predicate():
+            if self.time_us >= end_us:
+                raise NotInTimeError(f"{what or 'what was waited for'} took longer than {within:g} s: {self}")
+            self.step()
+        return (self.time_us - began_us) * 1e-6
+
+    def hold(self, predicate: Callable[[], object], *, for_: float, what: str = "") -> None:
+        """Fly for so many seconds, at each frame of which `predicate()` must hold.
+
+        Raises:
+            NotInTimeError: It does not.
+        """
+        began_us = self.time_us
+        end_us = began_us + round(for_ * 1e6)
+        while True:
+            if not predicate():
+                after_s = (self.time_us - began_us) * 1e-6
+                raise NotInTimeError(f"{what or 'what was to hold'} did so for {after_s:.3f} of {for_:g} s: {self}")
+            if self.time_us >= end_us:
+                return
+            self.step()
+
+    # Orders.
+
+    def arm(self, *, force: bool = False) -> None:
+        """Let the rotors turn.
+
+        Raises:
+            RefusedError: The vehicle says why not.
+        """
+        self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE if force else 0.0, what="arming")
+
+    def disarm(self, *, force: bool = False) -> None:
+        """Stop the rotors; in the air only by force.
+
+        Raises:
+            RefusedError: The vehicle says why not.
+        """
+        self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE if force else 0.0, what="disarming")
+
+    def takeoff(self, height_m: float = 2.5, *, wait: bool = True, within: float | None = None) -> None:
+        """Arm, climb so high above home, and stay.
+
+        Raises:
+            RefusedError: The vehicle says why not.
+            NotInTimeError: It is not up there `within` s; where nothing is said, 5 s and 2 s a metre.
+        """
+        params = (0.0, 0.0, 0.0, nan, nan, nan, height_m)
+        high_m = self.position[2] + 0.9 * height_m
+        self.gcs.command(mav.MAV_CMD_NAV_TAKEOFF, *params, what="take-off")
+        if not self.armed:
+            self.arm()
+        if wait:
+            most_s = 5.0 + 2.0 * height_m if within is None else within
+            up = lambda: self.mode is Mode.HOLD and self.position[2] > high_m  # noqa: E731
+            self.wait_until(up, within=most_s, what="the climb")
+
+    def land(self, *, wait: bool = True, within: float | None = None) -> None:
+        """Land here, and wait until the rotors have stopped.
+
+        Raises:
+            RefusedError: The vehicle says why not.
+            NotInTimeError: They do not stop `within` s; where nothing is said, 8 s and 2 s a metre.
+        """
+        most_s = 8.0 + 2.0 * self.position[2] if within is None else within
+        self.select(Mode.LAND)
+        if wait:
+            self.wait_until(lambda: not self.armed, within=most_s, what="landing")
+
+    def goto(
+        self,
+        east: float,
+        north: float,
+        up: float,
+        *,
+        yaw: float = nan,
+        speed: float = -1.0,
+        wait: bool = True,
+        within: float | None = None,
+    ) -> None:
+        """Fly to a place, ENU, by a reposition command, and be there: see `is_at`.
+
+        Args:
+            east: m.
+            north: m.
+            up: m.
+            yaw: Counter-clockwise from east, rad; nan for as it is.
+            speed: m/s; -1 for the parameters'.
+            wait: Whether to fly until it is there.
+            within: Simulated seconds; where nothing is said, 10 s and 1 s a metre.
+
+        Raises:
+            RefusedError: The vehicle says why not.
+            NotInTimeError: It is not there in time.
+        """
+        there = geodetic_of((east, north, up), self.origin)
+        x, y = round(there.latitude_deg * 1e7), round(there.longitude_deg * 1e7)
+        heading = yaw if yaw != yaw else 0.5 * pi - yaw
+        said = len(self.gcs.texts)
+        result = self.gcs.order_int(
+            mav.MAV_CMD_DO_REPOSITION,
+            *(speed, 1.0, 0.0, heading),
+            frame=mav.MAV_FRAME_GLOBAL,
+            x=x,
+            y=y,
+            z=there.altitude_m,
+        )
+        self.gcs.check(result, said, "going there")
+        if wait:
+            goal = (east, north, up)
+            most_s = 10.0 + dist(goal, self.position) if within is None else within
+            self.wait_until(lambda: self.is_at(goal), within=most_s, what=f"the way to {goal}")
+
+    def fly_track(self, name: str) -> None:
+        """Fly a track of parameter TRACK: arm if need be, and go there first.
+
+        Raises:
+            RefusedError: The vehicle says why not.
+        """
+        self.set_param("TRACK", TRACKS.index(name))
+        self.select(Mode.TRACK)
+        if not self.armed:
+            self.arm()
+
+    def select(self, mode: Mode | str) -> None:
+        """Choose a mode.
+
+        Raises:
+            RefusedError: The vehicle says why not.
+        """
+        number = custom_mode(Mode(mode))
+        params = (1.0, number >> 16 & 0xFF, number >> 24 & 0xFF)
+        self.gcs.command(mav.MAV_CMD_DO_SET_MODE, *params, what=f"mode {mode}")
+
+    def command(self, number: int, *params: float) -> int:
+        """Send a COMMAND_LONG and return the MAV_RESULT, whatever it is; parameters that are left out are 0."""
+        return self.gcs.order(number, *params)
+
+    def start_mission(self) -> None:
+        """Begin the mission, or go on with it; arm if need be.
+
+        Raises:
+            RefusedError: The vehicle says why not.
+        """
+        self.select(Mode.MISSION)
+        if not self.armed:
+            self.arm()
+
+    def upload_mission(self, plan: Iterable[Item | MissionItem]) -> None:
+        """Upload a mission.
+
+        Raises:
+            RefusedError: The vehicle does not take it.
+        """
+        self.gcs.upload(on_wire(plan, self.origin), MISSION)
+
+    def upload_fence(self, plan: Iterable[Item | MissionItem]) -> None:
+        """Upload a geofence, of `items.polygon` and `items.circle`.
+
+        Raises:
+            RefusedError: The vehicle does not take it.
+        """
+        self.gcs.upload(on_wire(plan, self.origin), FENCE, what="fence")
+
+    def upload_rally(self, plan: Iterable[Item | MissionItem]) -> None:
+        """Upload rally points.
+
+        Raises:
+            RefusedError: The vehicle does not take them.
+        """
+        self.gcs.upload(on_wire(plan, self.origin), RALLY, what="rally points")
+
+    def get_param(self, name: str) -> Value:
+        """Ask for a parameter.
+
+        Raises:
+            RefusedError: There is no such.
+        """
+        return self.gcs.get_param(name)
+
+    def set_param(self, name: str, value: Value) -> Value:
+        """Set a parameter; return the value that it has then, which is one of 32 bits.
+
+        Raises:
+            RefusedError: There is no such, or it cannot have that value.
+        """
+        return self.gcs.set_param(name, value)
+
+    @contextmanager
+    def sticks_held(self, **axes: float) -> Iterator[None]:
+        """Hold the sticks so, see `stick`, whatever else is done meanwhile: they are sent 25 times a second."""
+        before, self._sticks, self._sticks_at_us = self._sticks, axes, self.time_us
+        try:
+            yield
+        finally:
+            self._sticks = before
+
+    # What is said once, and not answered.
+
+    def send(self, name: str, *fields: Any) -> None:
+        """Send a message from the first ground station."""
+        self.gcs.send(name, *fields)
+
+    def stick(self, pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: float = 0.0) -> None:
+        """Send sticks once: forward, right, up (0..1, the middle is 0.5), clockwise, each -1..1."""
+        axes = (pitch, roll, thrust, yaw)
+        self.send("MANUAL_CONTROL", self.system, *(round(1000.0 * axis) for axis in axes), 0)
+
+    def setpoint(
+        self,
+        position: Vector | None = None,
+        velocity: Vector | None = None,
+        acceleration: Vector | None = None,
+        yaw: float | None = None,
+        yaw_rate: float | None = None,
+    ) -> None:
+        """Send an offboard setpoint once, ENU, SI; what is None is masked."""
+        groups = (position, velocity, acceleration)
+        mask = sum(0b111 << 3 * place for place, group in enumerate(groups) if group is None)
+        mask |= (yaw is None) << 10 | (yaw_rate is None) << 11
+        ned = [value for group in groups for value in ned_from_enu(group or (0.0, 0.0, 0.0))]
+        heading = 0.0 if yaw is None else 0.5 * pi - yaw
+        target = (self.system, AUTOPILOT_COMPONENT, mav.MAV_FRAME_LOCAL_NED)
+        self.send("SET_POSITION_TARGET_LOCAL_NED", 0, *target, mask, *ned, heading, -(yaw_rate or 0.0))
+
+    # What goes wrong.
+
+    def inject(self, unit: str | int, kind: str | int, instance: int = 0, *values: float) -> None:
+        """Have the plant fail from the next frame on, as MAV_CMD_INJECT_FAILURE says it, whatever the autopilot thinks.
+
+        Args:
+            unit: FAILURE_UNIT by number, or by name: "motor", "gps", "battery".
+            kind: FAILURE_TYPE by number, or by name: "off", "stuck", "ok".
+            instance: Which one, from 1 on; 0 for all.
+            values: Parameters 4 to 7.
+
+        Raises:
+            RefusedError: This plant cannot fail so.
+        """
+        numbers = (_number("FAILURE_UNIT", unit), _number("FAILURE_TYPE", kind))
+        params = (*map(float, numbers), float(instance), *values)
+        self._injected += self._stage.command_to_plant(mav.MAV_CMD_INJECT_FAILURE, *params)
+        before = len(self._stage.acks)
+        self.step()
+        results = [result for number, result in self._stage.acks[before:] if number == mav.MAV_CMD_INJECT_FAILURE]
+        if results != [mav.MAV_RESULT_ACCEPTED]:
+            result = results[0] if results else mav.MAV_RESULT_FAILED
+            raise RefusedError(f"failure {unit} {kind}", result, "this plant cannot fail so")
+
+    def kill_autopilot(self) -> None:
+        """Kill the autopilot as `kill -9` does, and start it again at once, with the files that it has written."""
+        self._stage.kill_autopilot()
+
+    # Who else is there.
+
+    def client(self, system: int = 254, component: int = 190, *, beats: bool = True) -> Station:
+        """Connect another ground station, or companion, on a link of its own; one that `beats` sends a HEARTBEAT."""
+        number = len(self._stations) + 1
+        trouble, seed = self.link.ground, self.setting.seed
+        station = Station(self, number, system=system, component=component, trouble=trouble, seed=seed, beats=beats)
+        self._stations.append(station)
+        return station
+
+
+def _number(kind: str, of: str | int) -> int:
+    if isinstance(of, int):
+        return of
+    for part in ("", "SYSTEM_", "SENSOR_"):
+        number = getattr(mav, f"{kind}_{part}{of.upper()}", None)
+        if number is not None:
+            return int(number)
+    raise ValueError(f"MAVLink has no {kind}_{of.upper()}")

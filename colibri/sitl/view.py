@@ -1,0 +1,151 @@
+"""What a test sees of a vehicle: the truth, and what the autopilot says of itself."""
+
+from collections.abc import Sequence
+from math import dist, hypot
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.autopilot.commander.rules.modes import Mode, mode_of_custom
+from colibri.common.rotations import euler_from_quaternion, tilt_deg
+from colibri.common.types import Vector
+from colibri.mavlink.hil.conductor import Turn
+from colibri.mavlink.wire.ned import ned_from_enu
+from colibri.sitl.backends.setting import Setting
+from colibri.sitl.backends.stage import Stage
+from colibri.sitl.flight_record import Columns, Record
+from colibri.sitl.ground_station import Station
+from colibri.sitl.inbox import Words
+
+_NEAR_M = {"state": 0.3, "sensors": 2.0}
+"""Closer than this it is there: an estimate is as far from the truth as GPS is."""
+_SLOW_M_S = 0.3
+
+
+class View:
+    """A vehicle in flight, which this only looks at.
+
+    Positions and velocities are true, ENU, m and m/s; the origin is where the vehicle stood, or what `home` says.
+
+    Attributes:
+        setting: What the flight began with.
+        gcs: The first ground station.
+        record: All that was flown.
+    """
+
+    setting: Setting
+    gcs: Station
+    record: Record
+    _stage: Stage
+    _said: Turn
+    _words: Words
+
+    @property
+    def time_us(self) -> int:
+        """Simulated time, µs."""
+        return self._stage.truth.time_us
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time, s."""
+        return self.time_us * 1e-6
+
+    @property
+    def system(self) -> int:
+        """The vehicle's system id."""
+        return self.setting.system
+
+    @property
+    def position(self) -> Vector:
+        """Where the vehicle is."""
+        return self._stage.truth.position_enu_m
+
+    @property
+    def velocity(self) -> Vector:
+        """How fast it flies."""
+        return self._stage.truth.velocity_enu_m_s
+
+    @property
+    def speed_m_s(self) -> float:
+        """How fast, whatever the direction."""
+        return hypot(*self.velocity)
+
+    @property
+    def rates(self) -> Vector:
+        """Body rates p, q, r, FLU, rad/s."""
+        return self._stage.truth.rate_flu_rad_s
+
+    @property
+    def euler(self) -> Vector:
+        """Roll, pitch, yaw, FLU to ENU, rad."""
+        return euler_from_quaternion(self._stage.truth.attitude)
+
+    @property
+    def tilt_deg(self) -> float:
+        """How far its thrust points from straight up, degrees."""
+        return tilt_deg(self._stage.truth.attitude)
+
+    @property
+    def mode(self) -> Mode | None:
+        """The flight mode, as the autopilot has it at this frame, whatever the links do."""
+        return mode_of_custom(self._said.custom_mode)
+
+    @property
+    def armed(self) -> bool:
+        """Whether its rotors may turn, as the autopilot has it at this frame."""
+        return self._said.armed
+
+    @property
+    def home(self) -> Vector | None:
+        """Where home is, as HOME_POSITION said last; None before."""
+        if not self.gcs.heard["HOME_POSITION"]:
+            return None
+        told = self.gcs.latest("HOME_POSITION")
+        return ned_from_enu((told.x, told.y, told.z))
+
+    @property
+    def texts(self) -> list[str]:
+        """Every STATUSTEXT that the vehicle has sent to the first ground station, whatever the links do."""
+        return self._words.texts
+
+    def said(self, part: str) -> bool:
+        """Whether a STATUSTEXT has said so, whatever the links do; what was heard of it is in `gcs.texts`."""
+        return self._words.said(part)
+
+    def heard(self, name: str) -> list[Any]:
+        """Return all messages of a name that the first ground station has heard, as their fields."""
+        return self.gcs.heard[name]
+
+    def is_at(self, place: Sequence[float], near_m: float | None = None, slow_m_s: float = _SLOW_M_S) -> bool:
+        """Whether it is near a place, ENU, and hardly moves; near is 0.3 m, or 2 m on sensors."""
+        near_m = _NEAR_M[self.setting.feedback] if near_m is None else near_m
+        return dist(place, self.position) < near_m and self.speed_m_s < slow_m_s
+
+    def flown(self, since_s: float = 0.0) -> Columns:
+        """Return `record.COLUMNS` from a time on, an array each."""
+        return self.record.columns(since_s)
+
+    @property
+    def path(self) -> NDArray[np.float64]:
+        """Where it was at each frame, ENU, (n, 3)."""
+        flown = self.flown()
+        return np.stack([flown["x"], flown["y"], flown["z"]], axis=1)
+
+    @property
+    def processes(self) -> dict[str, int]:
+        """Numbers of the processes "plant" and "autopilot"; empty in memory."""
+        return self._stage.processes()
+
+    @property
+    def sha256(self) -> str:
+        """Of the whole flight: truth and command at each frame. The same on every machine of a kind, on every link."""
+        return self.record.sha256
+
+    def __str__(self) -> str:
+        """Return how it is, for who reads a failed test."""
+        east, north, up = self.position
+        words = f"t = {self.time_s:.3f} s, {self.mode or 'no mode'}, {'armed' if self.armed else 'disarmed'}"
+        where = f"at ({east:.2f}, {north:.2f}, {up:.2f}) m, {self.speed_m_s:.2f} m/s, tilt {self.tilt_deg:.1f} degrees"
+        last = f"; last said: {'; '.join(self.texts[-3:])}" if self.texts else ""
+        return f"{words}, {where}{last}"

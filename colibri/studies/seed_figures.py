@@ -1,0 +1,117 @@
+"""The figure of many flights by chance: how their errors are distributed, track by track."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from colibri.analysis.consistency import NAVIGATION, bounds
+from colibri.analysis.estimation import MEASURED
+from colibri.analysis.figures import TOP_IN, axes_grid, put_title, shortened, write_figure
+from colibri.analysis.report import SETTLED_AFTER_S
+from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, Flown
+
+_GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
+_LABEL_IN = 0.8
+_NIS_COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9")
+_PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
+    ("RMS (m)", {"control": ("#000000", "reference from estimate"), "true": ("#D55E00", "reference from truth")}),
+    ("RMS (m)", {"horizontal": ("#0072B2", "estimate, horizontal"), "vertical": ("#E69F00", "estimate, vertical")}),
+    ("RMS (°)", {"roll": ("#009E73", "roll"), "pitch": ("#56B4E9", "pitch"), "yaw": ("#CC79A7", "yaw")}),
+)
+
+
+def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
+    """Draw `seeds.png`: a dot a flight, a bar at the median; the mean NEES, and that of an honest filter."""
+    cases = list(dict.fromkeys((flown.contender, flown.track) for flown in flights))
+    estimated = not all(np.isnan(flown.values[2]) for flown in flights)
+    panels = _PANELS if estimated else _PANELS[:1]
+    rows = len(panels) + 2 * estimated
+    row_in = 0.35 + 0.42 * len(cases)
+    figure, grid = axes_grid(rows, 1, TOP_IN, row_in=row_in + _LABEL_IN, share=False)
+    figure.subplots_adjust(left=0.2, hspace=_LABEL_IN / row_in)
+    several = len({contender for contender, _ in cases}) > 1
+    names = [shortened(f"{track}, {contender}" if several else track) for contender, track in cases]
+    for (axes,), (label, quantities) in zip(grid, panels, strict=False):
+        for number, (quantity, (color, called)) in enumerate(quantities.items()):
+            _strips(axes, flights, cases, quantity, color, called, _shift(number, len(quantities)))
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.set_xlabel(label)
+    if estimated:
+        _draw_nees(grid[-2][0], flights, cases)
+        _draw_nis(grid[-1][0], flights, cases)
+    for (axes,) in grid:
+        axes.set_yticks([-place for place in range(len(cases))], names)
+        axes.set_ylim(-len(cases) + 0.45, 0.55)
+        axes.tick_params(labelbottom=True)
+        axes.grid(axis="x", **_GRID)
+        if axes.get_legend_handles_labels()[1]:
+            where: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+            axes.legend(**where, ncols=len(MEASURED), frameon=False)
+    put_title(figure, f"{len(flights)} flights, errors after {SETTLED_AFTER_S:.0f} s; bars: medians")
+    return write_figure(figure, out / "seeds")
+
+
+def _shift(number: int, of: int) -> float:
+    """Return how far below its track a quantity is drawn, one of so many."""
+    return min(0.26, 0.85 / of) * (number - 0.5 * (of - 1))
+
+
+def _draw_nees(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, str]]) -> None:
+    """Draw the mean NEES of each flight, and where the mean of all belongs."""
+    _strips(axes, flights, cases, "nees", "#000000", "", 0.0, np.mean)
+    within = bounds(NAVIGATION, max(1, len(flights) // len(cases)))
+    axes.axvspan(*within, color="#D55E00", alpha=0.15, linewidth=0)
+    axes.axvline(NAVIGATION, color="#D55E00", linewidth=1.2, label="right; shaded: 95 % of the means over flights")
+    axes.set_xlabel("NEES of position, velocity and attitude, mean of a flight; bar: mean of all")
+
+
+def _draw_nis(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, str]]) -> None:
+    """Draw the mean NIS of each flight in parts of how many numbers it has, and between which bounds 95 % belong."""
+    for number, (quantity, (kind, numbers)) in enumerate(zip(INNOVATIONS, MEASURED.items(), strict=True)):
+        shift = _shift(number, len(MEASURED))
+        _strips(axes, flights, cases, quantity, _NIS_COLORS[number], kind, shift)
+        for place, case in enumerate(cases):
+            of_case = [flown for flown in flights if (flown.contender, flown.track) == case and not flown.lost]
+            innovations = max((flown.innovations[number] for flown in of_case), default=0)
+            if innovations:
+                for bound in bounds(numbers * innovations, 1):
+                    at = [bound / (numbers * innovations)] * 2
+                    axes.plot(at, [-place - shift - 0.08, -place - shift + 0.08], color="#000000", linewidth=1.0)
+    axes.axvline(1.0, color="#D55E00", linewidth=1.2)
+    axes.set_xlabel("NIS in parts of its degrees of freedom, mean of a flight; black: bounds of 95 % of flights")
+
+
+def _strips(
+    axes: Axes,
+    flights: Sequence[Flown],
+    cases: Sequence[tuple[str, str]],
+    quantity: str,
+    color: str,
+    called: str,
+    shift: float,
+    middle: Callable[[Any], Any] = np.median,
+) -> None:
+    column = QUANTITIES.index(quantity)
+    for place, case in enumerate(cases):
+        of_case = [flown for flown in flights if (flown.contender, flown.track) == case]
+        values = np.array([flown.values[column] for flown in of_case if not flown.lost])
+        values = values[np.isfinite(values)]
+        if not len(values):
+            continue
+        at = np.full(len(values), -place - shift)
+        axes.plot(values, at, "o", color=color, markersize=3, alpha=0.45, markeredgewidth=0, label=called)
+        called = ""  # each label once
+        axes.plot([middle(values)] * 2, [-place - shift - 0.12, -place - shift + 0.12], color=color, linewidth=2.2)
+        lost = len(of_case) - len(values)
+        if lost and quantity == "true":
+            text = f"{lost} lost"
+            axes.text(
+                0.99, -place, text, transform=axes.get_yaxis_transform(), ha="right", va="center", color="#D00000"
+            )

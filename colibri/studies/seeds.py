@@ -1,0 +1,174 @@
+"""`colibri compare --seeds`: the same flights by many seeds, and how their errors are distributed."""
+
+import argparse
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colibri.analysis.estimation import MEASURED
+from colibri.analysis.outcome import keep_flight
+from colibri.analysis.parallel import side_by_side
+from colibri.analysis.recording import RecordingError
+from colibri.analysis.report import SETTLED_AFTER_S
+from colibri.analysis.tables import write_table
+from colibri.autopilot.control.profile import ProfileError
+from colibri.autopilot.control.registry import ControllerError, DecisionError, load_controller
+from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, TrackError
+from colibri.common.process.lifecycle import EXIT_FAILED, fail
+from colibri.common.types import Array
+from colibri.flights.fly import make_folder
+from colibri.flights.plan import FlightPlan, PlanError
+from colibri.flights.processes import FlightError, fly_processes
+from colibri.plant.physics.start import IntegrationError
+from colibri.plant.vehicle.description import VehicleError
+from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, FlightsLog, Flown, KeptError, kept_flights
+
+DEFAULT_PROFILE = "flight"
+LOST_M = 5.0
+"""A vehicle further off its reference once settled is lost."""
+HEADINGS = (
+    *("profile", "track", "flights", "lost"),
+    *("control (m)", "true (m)", "est. horizontal (m)", "est. vertical (m)", "roll (°)", "pitch (°)", "yaw (°)"),
+    "NEES",
+)
+
+
+class Job(NamedTuple):
+    """One flight.
+
+    Attributes:
+        contender: Profile, or profile:controller.
+        track: What it flies.
+        seed: Of everything random.
+        args: The command line.
+    """
+
+    contender: str
+    track: str
+    seed: int
+    args: argparse.Namespace
+
+    def plan(self, out: Path) -> FlightPlan:
+        """Return the flight as a plan."""
+        profile, _, controller = self.contender.partition(":")
+        chosen = {"profile": profile, "controller": controller or None, "track": self.track, "seed": self.seed}
+        asked = {name: getattr(self.args, name) for name in (*_COMMON, *_WEATHER)}
+        return FlightPlan.of_options(out, **chosen, **asked)
+
+
+_WIDEST = 400
+_COMMON = ("vehicle", "feedback", "link", "duration")
+_WEATHER = ("wind", "gust", "turbulence")
+_NO_INNOVATIONS = (0,) * len(MEASURED)
+
+
+def compare_seeds(args: argparse.Namespace) -> int:
+    """Fly every contender along every track by every seed; return 1 if one was lost."""
+    contenders, tracks = args.profile or [DEFAULT_PROFILE], args.track or list(THESIS_TRACKS)
+    jobs = [
+        Job(contender, track, seed, args) for contender in contenders for track in tracks for seed in args.seeds or (0,)
+    ]
+    try:
+        for job in jobs:
+            load_controller(job.plan(args.out).profile.controller)
+    except (PlanError, ProfileError, VehicleError, TrackError, ControllerError) as error:
+        fail(str(error))
+    make_folder(args.out)
+    try:
+        flown = kept_flights(args.out, _settings(args)) if args.resume else {}
+    except KeptError as error:
+        fail(str(error))
+    left = [job for job in jobs if (job.contender, job.track, job.seed) not in flown]
+    with FlightsLog(args.out, _settings(args), flown.values()) as log:
+        for each in side_by_side(fly_once, left, "flights", quiet=args.quiet, worth=lambda _job: 1, keep=log.add):
+            flown[each.contender, each.track, each.seed] = each
+    flights = [flown[job.contender, job.track, job.seed] for job in jobs]
+    with FlightsLog(args.out, _settings(args), flights):
+        pass  # once more, in their order
+    rows = [
+        _row([flown for flown in flights if (flown.contender, flown.track) == (contender, track)])
+        for contender in contenders
+        for track in tracks
+    ]
+    write_table(args.out / "seeds", HEADINGS, rows, names=2)
+    from colibri.studies.seed_figures import draw_seeds
+
+    draw_seeds(flights, args.out)
+    if not args.quiet:
+        _print(rows, args.out)
+    return EXIT_FAILED if any(flown.lost for flown in flights) else 0
+
+
+def fly_once(job: Job) -> Flown:
+    """Fly a job, keep its figures and forget its logs."""
+    with TemporaryDirectory() as folder:
+        plan = job.plan(Path(folder))
+        try:
+            _, figures = keep_flight(plan, _fly(plan))
+        except (IntegrationError, DecisionError, FlightError, RecordingError) as error:
+            return Flown(
+                job.contender, job.track, job.seed, str(error), (np.nan,) * len(QUANTITIES), _NO_INNOVATIONS, ""
+            )
+    values, sha256 = _values(figures), figures["trajectory_sha256"]
+    lost = f"{values[1]:.1f} m off" if values[1] > LOST_M or figures["max_error_after_20s_m"] > LOST_M else ""
+    nis = figures["nis_mean"]
+    innovations = _NO_INNOVATIONS if nis is None else tuple(kind["innovations"] for kind in nis.values())
+    return Flown(job.contender, job.track, job.seed, lost, values, innovations, sha256)
+
+
+def _fly(plan: FlightPlan) -> Any:
+    if plan.link == "udp":
+        return fly_processes(plan, lambda _sim_time_s: None, lambda _text: None)
+    from colibri.flights.in_process import fly_locally
+
+    return fly_locally(plan, lambda _sim_time_s: None)
+
+
+def _values(figures: dict[str, Any]) -> tuple[float, ...]:
+    off, turned = figures["estimation_rmse_m"], figures["attitude_rmse_deg"]
+    estimated = (np.nan,) * 5 if off is None else (*off.values(), *turned.values())
+    nees, nis = figures["nees_mean"], figures["nis_mean"]
+    means = (None,) * len(MEASURED) if nis is None else (kind["mean"] for kind in nis.values())
+    normalised = (np.nan if value is None else value for value in (nees, *means))
+    return (figures["control_rmse_m"], figures["rmse_after_20s_m"], *estimated, *normalised)
+
+
+def _row(flights: Sequence[Flown]) -> tuple[str, ...]:
+    """Return root mean squares over the flights, of NEES the mean, and the largest of one flight in brackets."""
+    values = np.array([flown.values for flown in flights if not flown.lost]).reshape(-1, len(QUANTITIES))
+    lost = sum(bool(flown.lost) for flown in flights)
+    *errors, nees = values.T[: -len(INNOVATIONS)]
+    cells = [*(_cell(column, _rms) for column in errors), _cell(nees, np.mean)]
+    return (flights[0].contender, flights[0].track, str(len(flights)), str(lost), *cells)
+
+
+def _cell(column: Array, middle: Callable[[Array], Any]) -> str:
+    if not len(column) or np.isnan(column).any():
+        return "-"
+    return f"{middle(column):.3g} ({column.max():.3g})"
+
+
+def _rms(column: Array) -> Any:
+    return np.sqrt(np.mean(column**2))
+
+
+def _settings(args: argparse.Namespace) -> str:
+    """Return what every flight of a comparison has in common."""
+    return " ".join(f"{name}={getattr(args, name)}" for name in (*_COMMON, *_WEATHER))
+
+
+def _print(rows: Sequence[tuple[str, ...]], out: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    title = f"after {SETTLED_AFTER_S:.0f} s, root mean squares over all flights (largest of one); written to {out}"
+    table = Table(title=title, title_justify="left")
+    for number, column in enumerate(HEADINGS):
+        table.add_column(column, justify="left" if number < 2 else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    needed = Console(width=_WIDEST).measure(table).maximum
+    Console(width=max(Console().width, needed)).print(table)

@@ -1,0 +1,279 @@
+"""`colibri study`: what profile `flight` reaches; of every study a table and figures.
+
+A study is data: cases to fly, each with its place in the table, and what is measured of each.
+"""
+
+import argparse
+from collections.abc import Callable, Iterable, Sequence
+from math import isnan, pi, sqrt
+from pathlib import Path
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+
+from colibri.analysis.figures import write_figure
+from colibri.analysis.parallel import side_by_side
+from colibri.analysis.tables import Row, write_table
+from colibri.autopilot.control.interface import Fallback
+from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
+from colibri.common.process.lifecycle import fail
+from colibri.flights.fly import make_folder
+from colibri.plant.environment.weather import Weather, Wind
+from colibri.studies import study_figures
+from colibri.studies.study_figures import Result
+from colibri.studies.study_flights import Flight, Flown, Perturbation, fly
+
+FORMATS = ("png", "svg")
+LPV_MPC, SE3, THESIS = "LPV-MPC", "SE(3)", "thesis"
+SPIRAL, LEMNISCATE = "spiral", "lemniscate"
+
+_LEVEL_DEG = 10.0
+_THERE_M = 0.1
+_SIZE_M = 4.0
+"""Of the lemniscate unless told otherwise."""
+
+
+class Measure(NamedTuple):
+    """A column of a table: its heading, and its cell."""
+
+    heading: str
+    cell: Callable[[Flown], str]
+
+
+class Case(NamedTuple):
+    """A flight with its place in the table: the names of its row, and the group of columns that it fills."""
+
+    row: Row
+    group: str
+    flight: Flight
+
+
+class Study(NamedTuple):
+    """A study.
+
+    Attributes:
+        name: What it is asked for by.
+        headings: Of the names of a row.
+        measures: What each group of columns shows.
+        cases: What to fly.
+        draw: Results in the order of the cases -> figures with their names.
+    """
+
+    name: str
+    headings: Row
+    measures: tuple[Measure, ...]
+    cases: tuple[Case, ...]
+    draw: Callable[[Sequence[Result]], dict[str, Figure]]
+
+
+def number(value: float) -> str:
+    """Return a number as a cell: three digits; a dash for what there is not."""
+    return "-" if isnan(value) else f"{value:.3g}"
+
+
+def unless_lost(of: Callable[[Flown], float]) -> Callable[[Flown], str]:
+    """Return the cell of what means nothing once the vehicle is lost."""
+    return lambda flown: "lost" if flown.lost else number(of(flown))
+
+
+def unless_crashed(of: Callable[[Flown], float]) -> Callable[[Flown], str]:
+    """Return the cell of what means nothing once the vehicle lies on the ground."""
+    return lambda flown: "crashed" if flown.crashed else number(of(flown))
+
+
+def decided(fallback: Fallback) -> Callable[[Flown], str]:
+    """Return the cell that counts the control samples decided by `fallback`."""
+    return lambda flown: str(int(flown.decided_by(fallback).sum()))
+
+
+def bound(column: int) -> Callable[[Flown], str]:
+    """Return the cell of the part of the settled control samples at which a kind of constraint binds, %."""
+
+    def cell(flown: Flown) -> str:
+        binds = flown.recording.active[flown.settled[:-1], column] > 0
+        return f"{100.0 * binds.mean():.1f}" if len(binds) else "-"
+
+    return cell
+
+
+RMS = Measure("RMS (m)", unless_lost(lambda flown: flown.rms_m))
+LARGEST = Measure("maximum (m)", unless_lost(lambda flown: flown.largest_m))
+
+
+def _tracks() -> Iterable[Case]:
+    contenders = (
+        (THESIS, Flight("", profile="thesis")),
+        (SE3, Flight("", controller="geometric-se3")),
+        (LPV_MPC, Flight("")),
+    )
+    for track in (*THESIS_TRACKS, LEMNISCATE):
+        for group, flight in contenders:
+            yield Case((track,), group, flight._replace(track=track))
+
+
+def _battery(without: tuple[str, ...]) -> str:
+    return "without" if without else "with"
+
+
+def _speed() -> Iterable[Case]:
+    # High up, so that what saturates falls short of its track rather than on the ground; begun on the track and as
+    # fast, so that no start decides. At its middle the lemniscate is straight and fastest, along both axes alike.
+    for lap_s in (6.0, 5.5, 5.0, 4.5, 4.25, 4.0, 3.75, 3.5, 3.0, 2.5, 2.0):
+        along_m_s = _SIZE_M * 2.0 * pi / lap_s
+        track = f"lemniscate:lap={lap_s:g},height=20"
+        start = (("y", 0.0), ("z", 20.0), ("vx", along_m_s), ("vy", along_m_s))
+        for group, controller in ((SE3, "geometric-se3"), (LPV_MPC, None)):
+            for without in ((), ("battery",)):
+                flight = Flight(track, controller=controller, without=without, start=start)
+                yield Case((f"{lap_s:g}", f"{sqrt(2.0) * along_m_s:.2f}", _battery(without)), group, flight)
+
+
+_STARTS: dict[str, tuple[tuple[str, float], ...]] = {
+    "inverted": (("phi", 170.0),),
+    "rolling": (("p", 10.0),),
+    "pitching": (("q", 10.0),),
+    "spinning": (("r", 10.0),),
+    "tumbling": (("p", 6.0), ("q", 6.0), ("r", 5.0)),
+    "inverted-tumbling": (("phi", 170.0), ("p", 6.0), ("q", 6.0), ("r", 5.0)),
+}
+
+
+def _recovery() -> Iterable[Case]:
+    for name, values in _STARTS.items():
+        text = ", ".join(f"φ = {value:g}°" if key == "phi" else f"{key} = {value:g} rad/s" for key, value in values)
+        start = (("y", 0.0), ("z", 20.0), *values)
+        yield Case((name, text), "", Flight("hover:height=20", start=start, duration_s=20.0))
+
+
+_WIND = Weather(Wind(5.0, 270.0))
+_UPSETS: dict[str, Flight] = {
+    "nominal": Flight(""),
+    "wind 5 m/s": Flight("", weather=_WIND),
+    "mass +20 %": Flight("", perturbation=Perturbation(mass=1.2)),
+    "mass −20 %": Flight("", perturbation=Perturbation(mass=0.8)),
+    "inertia +30 %": Flight("", perturbation=Perturbation(inertia=1.3)),
+    "inertia −30 %": Flight("", perturbation=Perturbation(inertia=0.7)),
+    "one rotor 15 % weak": Flight("", perturbation=Perturbation(front_rotor=0.85)),
+    "wind, mass +20 %, inertia +30 %, weak rotor": Flight("", perturbation=Perturbation(1.2, 1.3, 0.85), weather=_WIND),
+}
+
+
+def _robustness() -> Iterable[Case]:
+    for upset, flight in _UPSETS.items():
+        for track in (SPIRAL, LEMNISCATE):
+            yield Case((upset,), track, flight._replace(track=track, duration_s=60.0))
+
+
+def _limits() -> Iterable[Case]:
+    slow = (600.0, (SPIRAL, LEMNISCATE, "lemniscate:lap=5"))
+    for max_speed, tracks in ((838.0, (SPIRAL, "lemniscate:lap=5")), slow):
+        for track in tracks:
+            for without in ((), ("battery",)):
+                flight = Flight(track, max_speed=max_speed, without=without, duration_s=40.0)
+                yield Case((track, f"{max_speed:g}", _battery(without)), "", flight)
+
+
+def _scheduling() -> Iterable[Case]:
+    for lap_s in (10.0, 8.0, 7.0, 6.0, 5.5, 5.0):
+        for yaw in ("path", "fixed"):
+            for scheduling in ("frozen", "along-plan"):
+                flight = Flight(f"lemniscate:lap={lap_s:g},yaw={yaw}", scheduling=scheduling, duration_s=40.0)
+                yield Case((f"{lap_s:g}",), f"yaw {yaw}, {scheduling}", flight)
+
+
+_BINDING = tuple(
+    Measure(f"{kind} bind (%)", bound(column))
+    for column, kind in enumerate(("rotors", "increments", "angles", "rates"))
+)
+
+STUDIES = (
+    Study("tracks", ("track",), (RMS, LARGEST), tuple(_tracks()), study_figures.tracks),
+    Study(
+        "speed",
+        ("lap (s)", "top speed (m/s)", "battery"),
+        (
+            Measure("RMS (m)", unless_crashed(lambda flown: flown.rms_m)),
+            Measure("maximum (m)", unless_crashed(lambda flown: flown.largest_m)),
+            Measure("least cos tilt", unless_crashed(lambda flown: flown.least_upright)),
+        ),
+        tuple(_speed()),
+        study_figures.speed,
+    ),
+    Study(
+        "recovery",
+        ("start", "turned, turning"),
+        (
+            Measure("height lost (m)", unless_crashed(lambda flown: flown.height_lost_m)),
+            Measure("tilt < 10°, first (s)", lambda flown: number(flown.falls_below(flown.tilt_deg, _LEVEL_DEG))),
+            Measure("for good (s)", lambda flown: number(flown.stays_below(flown.tilt_deg, _LEVEL_DEG))),
+            Measure(
+                "error < 0.1 m for good (s)",
+                lambda flown: number(flown.stays_below(flown.recording.position_error_m, _THERE_M)),
+            ),
+            Measure("samples by recovery", decided(Fallback.RECOVERY)),
+        ),
+        tuple(_recovery()),
+        study_figures.recovery,
+    ),
+    Study("robustness", ("plant",), (RMS, LARGEST), tuple(_robustness()), study_figures.robustness),
+    Study(
+        "limits",
+        ("track", "largest rotor speed (rad/s)", "battery"),
+        (RMS, LARGEST, *_BINDING),
+        tuple(_limits()),
+        study_figures.limits,
+    ),
+    Study("scheduling", ("lap (s)",), (RMS,), tuple(_scheduling()), study_figures.scheduling),
+)
+
+
+def study(args: argparse.Namespace) -> int:
+    """Study as the command line says; return the exit code."""
+    wanted = _wanted(args.names)
+    make_folder(args.out)
+    flights = list(dict.fromkeys(case.flight for study in wanted for case in study.cases))
+    results = side_by_side(fly, flights, "flights", quiet=args.quiet, worth=lambda flight: round(flight.duration_s))
+    flown = dict(zip(flights, results, strict=True))
+    for one in wanted:
+        written = write(one, [flown[case.flight] for case in one.cases], args.out)
+        if not args.quiet:
+            _print(one, written)
+    return 0
+
+
+def write(study: Study, flown: Sequence[Flown], out: Path) -> list[Path]:
+    """Write table and figures of a study whose cases were flown; return what was written."""
+    paths = write_table(out / study.name, *table(study, flown), names=len(study.headings))
+    results = [Result(case.row, case.group, result) for case, result in zip(study.cases, flown, strict=True)]
+    for name, figure in study.draw(results).items():
+        paths += write_figure(figure, out / name, FORMATS)
+    return paths
+
+
+def table(study: Study, flown: Sequence[Flown]) -> tuple[Row, list[Row]]:
+    """Return headings and rows: one row for the cases of each name, in it the measures of each group."""
+    groups = list(dict.fromkeys(case.group for case in study.cases))
+    headings = [f"{group}: {measure.heading}".removeprefix(": ") for group in groups for measure in study.measures]
+    cells = {
+        (case.row, case.group): [measure.cell(result) for measure in study.measures]
+        for case, result in zip(study.cases, flown, strict=True)
+    }
+    rows = [
+        (*row, *(cell for group in groups for cell in cells[row, group]))
+        for row in dict.fromkeys(case.row for case in study.cases)
+    ]
+    return (*study.headings, *headings), rows
+
+
+def _wanted(names: Sequence[str]) -> list[Study]:
+    known = [study.name for study in STUDIES]
+    for name in names:
+        if name not in known:
+            fail(f"there is no study {name}: choose {', '.join(known)}")
+    return [study for study in STUDIES if not names or study.name in names]
+
+
+def _print(study: Study, written: Sequence[Path]) -> None:
+    from rich.console import Console
+
+    Console().print(f"{study.name}: {', '.join(path.name for path in written)} in {written[0].parent}")

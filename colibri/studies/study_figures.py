@@ -1,0 +1,270 @@
+"""The figures of the studies: one function a study, from its results to figures by name."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from colibri.analysis.figures import LIMIT, TOP_IN, Style, axes_grid, line_style, put_head, round_ticks
+from colibri.analysis.recording import ROTORS
+from colibri.analysis.report import SETTLED_AFTER_S
+from colibri.autopilot.control.interface import Active, Fallback
+from colibri.common.types import Array
+from colibri.studies.study_flights import Flown
+
+COLORS = ("#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7")
+"""Okabe's and Ito's."""
+WINDOW_S = 1.0
+RECOVERY_SHOWN_S = 3.0
+LIMITS_SHOWN_S = 6.0
+
+_GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
+_LEGEND_ROW_IN = 0.24
+_SHADE = "#E8E8E8"
+_CONTENDERS = {"thesis": "#D55E00", "SE(3)": "#0072B2", "LPV-MPC": "#000000"}
+_CALLED = {"thesis": "thesis, on its ideal vehicle"}
+
+
+class Result(NamedTuple):
+    """A case that was flown: the names of its row in the table, its group of columns there, and what came of it."""
+
+    row: tuple[str, ...]
+    group: str
+    flown: Flown
+
+
+def tracks(results: Sequence[Result]) -> dict[str, Figure]:
+    """Draw RMS and largest error of every contender on every track."""
+    names = list(dict.fromkeys(result.row[0] for result in results))
+    groups = list(dict.fromkeys(result.group for result in results))
+    figure, [[axes]] = axes_grid(1, 1, TOP_IN, row_in=0.62 * len(names))
+    figure.subplots_adjust(left=0.17)
+    for group in groups:
+        color = _CONTENDERS[group]
+        places, rms, largest, lost = [], [], [], []
+        for result in results:
+            if result.group != group:
+                continue
+            place = -names.index(result.row[0]) + 0.2 * (groups.index(group) - 1)
+            if result.flown.lost:
+                lost.append(place)
+            else:
+                places.append(place)
+                rms.append(result.flown.rms_m)
+                largest.append(result.flown.largest_m)
+        axes.hlines(places, rms, largest, color=color, linewidth=1.4)
+        axes.plot(rms, places, "o", color=color, markersize=7, label=f"{_CALLED.get(group, group)}: RMS")
+        axes.plot(largest, places, "|", color=color, markersize=10, markeredgewidth=1.8)
+        for place in lost:
+            axes.text(0.99, place, "lost", transform=axes.get_yaxis_transform(), ha="right", va="center", color=color)
+    axes.plot([], [], "k|", markersize=10, markeredgewidth=1.8, label="maximum")
+    axes.set_xscale("log")
+    axes.set_yticks([-place for place in range(len(names))], names)
+    axes.set_ylim(-len(names) + 0.5, 0.5)
+    axes.grid(axis="x", **_GRID)
+    axes.set_xlabel(f"position error after {SETTLED_AFTER_S:.0f} s (m)")
+    put_head(figure, "Position error, track by track")
+    return {"tracks": figure}
+
+
+def speed(results: Sequence[Result]) -> dict[str, Figure]:
+    """Draw error and tilt against the top speed of the lemniscate."""
+    figure, grid = axes_grid(3, 1, TOP_IN + _LEGEND_ROW_IN, row_in=1.7)
+    quantities: tuple[tuple[str, Callable[[Flown], float]], ...] = (
+        ("RMS (m)", lambda flown: flown.rms_m),
+        ("maximum (m)", lambda flown: flown.largest_m),
+        ("largest tilt (°)", lambda flown: float(flown.tilt_deg[flown.settled].max(initial=0.0))),
+    )
+    for (axes,), (quantity, of) in zip(grid, quantities, strict=True):
+        for group, battery in dict.fromkeys((result.group, result.row[2]) for result in results):
+            shown = [result for result in results if (result.group, result.row[2]) == (group, battery)]
+            label = group if battery == "with" else f"{group}, no battery"
+            for crashed, marker in ((False, "o-" if battery == "with" else "o:"), (True, "x")):
+                points = [(float(one.row[1]), of(one.flown)) for one in shown if one.flown.crashed == crashed]
+                if points:
+                    label = f"{group}, crashed" if crashed else label
+                    axes.plot(*zip(*points, strict=True), marker, label=label, color=_CONTENDERS[group], markersize=6)
+        _dress(axes, quantity)
+    for (axes,) in grid[:2]:
+        axes.set_yscale("log")
+    grid[2][0].set_ylim(0.0, 190.0)
+    grid[-1][0].set_xlabel("top speed of the reference (m/s)")
+    put_head(figure, f"Lemniscates ever faster, after {SETTLED_AFTER_S:.0f} s", columns=3)
+    return {"speed": figure}
+
+
+def scheduling(results: Sequence[Result]) -> dict[str, Figure]:
+    """Draw the error of both schedulings against the lap time."""
+    figure, [[axes]] = axes_grid(1, 1, TOP_IN + _LEGEND_ROW_IN, row_in=3.0)
+    for number, group in enumerate(dict.fromkeys(result.group for result in results)):
+        shown = [result for result in results if result.group == group]
+        color, dashes = COLORS[6 if "frozen" in group else 0], ("-", "--")[number // 2]
+        laps_s = [float(result.row[0]) for result in shown]
+        _dotted(axes, laps_s, [result.flown.rms_m for result in shown], group, color, dashes)
+    axes.set_yscale("log")
+    axes.invert_xaxis()
+    _dress(axes, "RMS (m)")
+    axes.set_xlabel("lap of the lemniscate (s)")
+    put_head(figure, f"Scheduling along the plan and frozen, error after {SETTLED_AFTER_S:.0f} s", columns=2)
+    return {"scheduling": figure}
+
+
+def robustness(results: Sequence[Result]) -> dict[str, Figure]:
+    """Draw the error over time under every perturbation, a row for each track."""
+    groups = list(dict.fromkeys(result.group for result in results))
+    names = list(dict.fromkeys(result.row[0] for result in results))
+    figure, grid = axes_grid(len(groups), 1, TOP_IN + 2 * _LEGEND_ROW_IN, row_in=2.6)
+    for group, (axes,) in zip(groups, grid, strict=True):
+        for result in results:
+            if result.group == group:
+                t, error = running_rms(result.flown)
+                number = names.index(result.row[0])
+                style = Style(COLORS[number % len(COLORS)], 3.6 - 0.3 * number)
+                axes.plot(t, error, label=result.row[0], **line_style(style))
+        axes.set_yscale("log")
+        _dress(axes, f"{group}: error (m)")
+    grid[-1][0].set_xlabel("t (s)")
+    put_head(figure, f"Position error, RMS over {WINDOW_S:.0f} s, with a plant that is not as planned", columns=3)
+    return {"robustness": figure}
+
+
+def recovery(results: Sequence[Result]) -> dict[str, Figure]:
+    """Draw the first seconds of every start: a figure each, and one of all."""
+    return {
+        "recovery": _recoveries(results),
+        **{f"recovery-{result.row[0]}": _recovery(result) for result in results},
+    }
+
+
+def limits(results: Sequence[Result]) -> dict[str, Figure]:
+    """Draw rotor speeds, active constraints and error of every flight."""
+    return {"-".join(("limits", *map(_file_name, result.row))): _limits(result) for result in results}
+
+
+def running_rms(flown: Flown) -> tuple[Array, Array]:
+    """Return times and the RMS of the position error over the window that ends then."""
+    t, squared = flown.t, flown.recording.position_error_m**2
+    samples = max(1, round(WINDOW_S / float(t[1] - t[0])))
+    total = np.concatenate([[0.0], np.cumsum(squared)])
+    mean = (total[samples:] - total[:-samples]) / samples
+    return t[samples - 1 :], np.sqrt(np.maximum(mean, 0.0))
+
+
+def _recoveries(results: Sequence[Result]) -> Figure:
+    figure, grid = axes_grid(3, 1, TOP_IN + _LEGEND_ROW_IN, row_in=1.7)
+    quantities: tuple[tuple[str, Callable[[Flown], Array]], ...] = (
+        ("height (m)", lambda flown: flown.recording["z"]),
+        ("tilt (°)", lambda flown: flown.tilt_deg),
+        ("error (m)", lambda flown: flown.recording.position_error_m),
+    )
+    for (axes,), (quantity, of) in zip(grid, quantities, strict=True):
+        for number, result in enumerate(results):
+            shown = result.flown.t <= RECOVERY_SHOWN_S
+            style = Style((*COLORS[:4], *COLORS[5:])[number % 7], 3.8 - 0.5 * number)
+            axes.plot(
+                result.flown.t[shown],
+                of(result.flown)[shown],
+                label=result.row[0].replace("-", ", "),
+                **line_style(style),
+            )
+        _dress(axes, quantity)
+    grid[-1][0].set_xlabel("t (s)")
+    put_head(figure, "Recovery at 20 m, from every start", columns=3)
+    return figure
+
+
+def _recovery(result: Result) -> Figure:
+    figure, grid = axes_grid(4, 1, TOP_IN + _LEGEND_ROW_IN)
+    flown = result.flown
+    shown = flown.t <= RECOVERY_SHOWN_S
+    t = flown.t[shown]
+    height, tilt, rates, rotors = (axes for (axes,) in grid)
+    _series(height, t, [("", flown.recording["z"][shown])])
+    _series(tilt, t, [("", flown.tilt_deg[shown])])
+    _series(rates, t, [(name, flown.recording[name][shown]) for name in "pqr"])
+    _rotors(rotors, flown, shown)
+    for axes, quantity in zip((height, tilt, rates, rotors), _RECOVERY_QUANTITIES, strict=True):
+        for begin_s, end_s in _spans(flown.t[:-1], flown.decided_by(Fallback.RECOVERY)):
+            axes.axvspan(begin_s, min(end_s, RECOVERY_SHOWN_S), color=_SHADE, linewidth=0.0, label="recovery law flies")
+        _dress(axes, quantity)
+    rotors.set_xlabel("t (s)")
+    put_head(figure, f"Recovery at 20 m: {result.row[0].replace('-', ', ')} ({result.row[1]})", columns=5)
+    return figure
+
+
+_RECOVERY_QUANTITIES = ("height (m)", "tilt (°)", "rates (rad/s)", "Ω (rad/s)")
+
+
+def _limits(result: Result) -> Figure:
+    figure, grid = axes_grid(3, 1, TOP_IN, row_in=1.8)
+    flown = result.flown
+    begin_s = 0.0 if result.row[0] == "spiral" else SETTLED_AFTER_S
+    end_s = begin_s + LIMITS_SHOWN_S
+    shown = (flown.t >= begin_s) & (flown.t <= end_s)
+    rotors, timeline, error = (axes for (axes,) in grid)
+    _rotors(rotors, flown, shown)
+    _dress(rotors, "Ω (rad/s)")
+    for number, color in enumerate(_KINDS):
+        spans = _spans(flown.t[:-1], flown.recording.active[:, number] > 0)
+        bars = [(begin, end - begin) for begin, end in spans if end > begin_s and begin < end_s]
+        timeline.broken_barh(bars, (-number - 0.35, 0.7), color=color)
+    timeline.set_yticks([-number for number in range(len(Active._fields))], Active._fields)
+    timeline.set_ylim(-len(Active._fields) + 0.4, 0.6)
+    timeline.grid(axis="x", **_GRID)
+    error.plot(flown.t[shown], flown.recording.position_error_m[shown], **line_style(Style("#000000", 1.2)))
+    if begin_s == 0.0:
+        error.set_yscale("log")
+    _dress(error, "error (m)")
+    figure.subplots_adjust(left=0.12)
+    error.set_xlim(begin_s, end_s)
+    error.set_xlabel("t (s)")
+    put_head(
+        figure, f"{result.row[0]}, rotors up to {result.row[1]} rad/s, {result.row[2]} battery: what binds", columns=5
+    )
+    return figure
+
+
+def _rotors(axes: Axes, flown: Flown, shown: Any) -> None:
+    least, most = flown.rotor_limits
+    axes.axhline(least, label="limits", **line_style(LIMIT))
+    axes.plot(flown.t[shown], most[shown], **line_style(LIMIT))
+    for number, name in enumerate(ROTORS):
+        style = Style(_FOUR[number], 1.2)
+        axes.plot(flown.t[shown], flown.recording[name][shown], label=f"Ω{number + 1}", **line_style(style))
+
+
+_KINDS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7")
+"""Of active constraints, in their order."""
+_FOUR = ("#000000", "#E69F00", "#0072B2", "#009E73")
+
+
+def _series(axes: Axes, t: Array, curves: Iterable[tuple[str, Array]]) -> None:
+    for number, (label, values) in enumerate(curves):
+        axes.plot(t, values, label=label or None, **line_style(Style(_FOUR[(0, 1, 2)[number]], 1.6)))
+
+
+def _dotted(axes: Axes, x: list[float], y: list[float], label: str, color: str, dashes: str = "-") -> None:
+    axes.plot(x, y, marker="o", markersize=5, label=label, **line_style(Style(color, 1.6, dashes)))
+
+
+def _dress(axes: Axes, quantity: str) -> None:
+    axes.set_ylabel(quantity)
+    axes.grid(**_GRID)
+    if axes.get_yscale() == "linear":
+        axes.yaxis.set_major_locator(round_ticks(5))
+    else:
+        axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _spans(t: Array, holds: Any) -> list[tuple[float, float]]:
+    """Return from when to when a condition holds, whose samples last until the next, s."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]])))
+    ends = np.append(t, 2.0 * t[-1] - t[-2])
+    return [(float(t[begin]), float(ends[end])) for begin, end in edges.reshape(-1, 2)]
+
+
+def _file_name(text: str) -> str:
+    return text.replace(":", "-").replace("=", "-")

@@ -1,0 +1,238 @@
+"""One flight of a study: what it changes, how it is flown, and the figures of merit of what came of it."""
+
+from dataclasses import dataclass, replace
+from math import isnan, nan
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.analysis.recording import Recording, read_recording
+from colibri.analysis.report import SETTLED_AFTER_S
+from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fallback
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.qp import QpStatus
+from colibri.autopilot.control.registry import DecisionError
+from colibri.autopilot.guidance.trajectories.tracks import DURATION_S
+from colibri.common.types import Array
+from colibri.flights.in_process import fly_locally
+from colibri.flights.plan import FlightPlan
+from colibri.plant.environment.weather import NO_WEATHER, Weather
+from colibri.plant.physics.start import IntegrationError
+from colibri.plant.process.logs import TRUTH_COLUMNS
+from colibri.plant.vehicle.description import Vehicle
+
+LOST_M = 5.0
+"""A vehicle further off its reference once settled is lost."""
+
+_GROUNDED_M = 0.1
+"""No study flies so low; a vehicle on its back lies as high as one on its feet, or a little lower."""
+_SAMPLE_TIME_S = 1e-6
+
+
+class Perturbation(NamedTuple):
+    """What the plant's vehicle is that the autopilot is not told: factors.
+
+    Attributes:
+        mass: On the mass.
+        inertia: On Ix, Iy and Iz.
+        front_rotor: On thrust and torque of the front rotor.
+    """
+
+    mass: float = 1.0
+    inertia: float = 1.0
+    front_rotor: float = 1.0
+
+    def of(self, vehicle: Vehicle) -> Vehicle:
+        """Return `vehicle` perturbed, and where it is, without ground: a lighter body would need a softer one."""
+        if self == Perturbation():
+            return vehicle
+        ix, iy, iz = (self.inertia * axis for axis in vehicle.body.inertia_kg_m2)
+        body = msgspec.structs.replace(
+            vehicle.body, mass_kg=self.mass * vehicle.body.mass_kg, inertia_kg_m2=(ix, iy, iz)
+        )
+        front, *others = vehicle.rotors.strength
+        rotors = msgspec.structs.replace(vehicle.rotors, strength=(self.front_rotor * front, *others))
+        return msgspec.structs.replace(vehicle, body=body, rotors=rotors, ground=None)
+
+
+class Flight(NamedTuple):
+    """A flight of a study; equal ones are flown once.
+
+    Attributes:
+        track: The track, with its options.
+        profile: Profile by name.
+        controller: Control law; None for the profile's.
+        scheduling: Of the attitude LPV-MPC; None for the profile's.
+        perturbation: Of the plant's vehicle.
+        without: Parts left out of the plant's vehicle, as in `Vehicle.without`.
+        max_speed: Largest rotor speed of plant and autopilot, in the vehicle's unit; None for the vehicle's.
+        weather: Wind, gusts, turbulence.
+        start: Keys and values as in `colibri.plant.physics.start.Start`, in place of the profile's.
+        duration_s: Simulated time.
+    """
+
+    track: str
+    profile: str = "flight"
+    controller: str | None = None
+    scheduling: str | None = None
+    perturbation: Perturbation = Perturbation()
+    without: tuple[str, ...] = ()
+    max_speed: float | None = None
+    weather: Weather = NO_WEATHER
+    start: tuple[tuple[str, float], ...] = ()
+    duration_s: float = DURATION_S
+
+    def plan(self, out: Path) -> FlightPlan:
+        """Return the flight as a plan that leaves its logs in `out`."""
+        plan = FlightPlan.of_track(self.track, out, profile=self.profile, controller=self.controller, link="memory")
+        vehicle = _limited(plan.vehicle, self.max_speed)
+        return replace(
+            plan,
+            profile=_scheduled(plan.profile, self.scheduling),
+            vehicle=vehicle,
+            plant_vehicle=self.perturbation.of(vehicle).without(self.without),
+            without=self.without,
+            weather=self.weather,
+            start=plan.start._replace(**dict(self.start)),
+            duration_s=self.duration_s,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """A flight that was flown.
+
+    Attributes:
+        flight: The flight.
+        recording: What it left behind.
+        rotor_limits: Least rotor speed, and the largest that the battery allows at each sample, (n,), both in the
+            vehicle's unit.
+        failure: Why it ended early; None if it did not.
+    """
+
+    flight: Flight
+    recording: Recording
+    rotor_limits: tuple[float, Array]
+    failure: str | None
+
+    @property
+    def t(self) -> Array:
+        """Times, s, (n,)."""
+        return self.recording["t"]
+
+    @property
+    def upright(self) -> Array:
+        """Upright part of the body's z axis, the cosine of the tilt, (n,)."""
+        cosine: Array = np.cos(self.recording["phi"]) * np.cos(self.recording["theta"])
+        return cosine
+
+    @property
+    def tilt_deg(self) -> Array:
+        """Angle between the body's z axis and the vertical, degrees, (n,)."""
+        angle: Array = np.degrees(np.arccos(np.clip(self.upright, -1.0, 1.0)))
+        return angle
+
+    @property
+    def settled(self) -> NDArray[np.bool_]:
+        """At which samples the start no longer counts, (n,)."""
+        after: NDArray[np.bool_] = self.t >= SETTLED_AFTER_S - _SAMPLE_TIME_S
+        return after
+
+    @property
+    def rms_m(self) -> float:
+        """RMS of the position error once settled, m; not a number for a flight too short."""
+        error = self.recording.position_error_m[self.settled]
+        return float(np.sqrt(np.mean(error**2))) if len(error) else nan
+
+    @property
+    def largest_m(self) -> float:
+        """Largest position error once settled, m; not a number for a flight too short."""
+        error = self.recording.position_error_m[self.settled]
+        return float(error.max()) if len(error) else nan
+
+    @property
+    def least_upright(self) -> float:
+        """Least upright part of the body's z axis once settled; not a number for a flight too short."""
+        upright = self.upright[self.settled]
+        return float(upright.min()) if len(upright) else nan
+
+    @property
+    def lost(self) -> bool:
+        """Whether it ended early, or ended up far off its reference."""
+        return self.failure is not None or (not isnan(self.largest_m) and self.largest_m > LOST_M)
+
+    @property
+    def crashed(self) -> bool:
+        """Whether it ended early, or came down to the ground."""
+        return self.failure is not None or float(self.recording["z"].min()) < _GROUNDED_M
+
+    @property
+    def height_lost_m(self) -> float:
+        """How far it sank below where it began, m."""
+        return float(self.recording["z"][0] - self.recording["z"].min())
+
+    @property
+    def unsolved(self) -> int:
+        """Control samples with a QP that was not solved."""
+        return int(np.count_nonzero(self.recording.qp_status > STATUS_CODES[QpStatus.SOLVED]))
+
+    def decided_by(self, fallback: Fallback) -> NDArray[np.bool_]:
+        """Return at which control samples `fallback` decided, (m,)."""
+        decided: NDArray[np.bool_] = self.recording.fallback == FALLBACK_CODES[fallback]
+        return decided
+
+    def falls_below(self, values: Array, bound: float) -> float:
+        """Return the time, s, at which `values` (n,) first are below `bound` after their largest; else not a number."""
+        largest = int(values.argmax())
+        below = np.flatnonzero(values[largest:] < bound)
+        return float(self.t[largest + below[0]]) if len(below) else nan
+
+    def stays_below(self, values: Array, bound: float) -> float:
+        """Return the time, s, from which `values` (n,) stay below `bound`; not a number if they do not."""
+        above = np.flatnonzero(values >= bound)
+        first = above[-1] + 1 if len(above) else 0
+        return float(self.t[first]) if first < len(values) else nan
+
+
+def fly(flight: Flight) -> Flown:
+    """Fly in memory and return what came of it, also when it ended early; leave no files."""
+    with TemporaryDirectory(prefix="colibri-") as folder:
+        plan = flight.plan(Path(folder))
+        failure = None
+        try:
+            fly_locally(plan, lambda _sim_time_s: None)
+        except (IntegrationError, DecisionError) as error:
+            failure = str(error)
+        recording = read_recording(plan)
+        limits = (plan.vehicle.rotors.idle_speed, _top_speed(plan, recording["t"]))
+        return Flown(flight, recording, limits, failure)
+
+
+def _top_speed(plan: FlightPlan, t: Array) -> Array:
+    """Return the largest rotor speed, which is proportional to the battery's voltage, at times `t` (n,)."""
+    vehicle = plan.plant_vehicle
+    if vehicle.battery is None:
+        return np.full_like(t, vehicle.rotors.max_speed)
+    columns = (TRUTH_COLUMNS.index("t"), TRUTH_COLUMNS.index("voltage_v"))
+    time_s, voltage_v = np.loadtxt(plan.out / "plant.csv", delimiter=",", skiprows=1, usecols=columns, unpack=True)
+    voltage_v[0] = vehicle.battery.full_voltage_v  # not known before the first step
+    speed: Array = vehicle.rotors.max_speed * np.interp(t, time_s, voltage_v) / vehicle.battery.full_voltage_v
+    return speed
+
+
+def _limited(vehicle: Vehicle, max_speed: float | None) -> Vehicle:
+    if max_speed is None:
+        return vehicle
+    return msgspec.structs.replace(vehicle, rotors=msgspec.structs.replace(vehicle.rotors, max_speed=max_speed))
+
+
+def _scheduled(profile: Profile, scheduling: str | None) -> Profile:
+    if scheduling is None:
+        return profile
+    table = profile.table(profile.controller)
+    changed: dict[str, Any] = {**table, "attitude": {**table["attitude"], "scheduling": scheduling}}
+    return msgspec.structs.replace(profile, controllers={**profile.controllers, profile.controller: changed})

@@ -1,0 +1,124 @@
+"""Flights that are named once and flown again: by the options of `colibri fly`, or by what a ground station orders."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from colibri.analysis.outcome import keep_flight
+from colibri.autopilot.control.profile import load_profile
+from colibri.common.process.lifecycle import fail
+from colibri.flights.fly import prepare
+from colibri.flights.plan import FlightPlan
+from colibri.flights.processes import fly_processes
+from colibri.plant.process.options import wind
+from colibri.sitl.backends.setting import setting_of
+
+if TYPE_CHECKING:
+    from colibri.sitl.vehicle import Sitl
+
+_WAYPOINTS_FILE = "waypoints.csv"
+
+
+class Case(NamedTuple):
+    """A flight along a track.
+
+    Attributes:
+        name: What it is called.
+        options: Of `colibri fly`, by their names there.
+        waypoints: Contents of the file of track `waypoints`, whose other options then are `track`.
+    """
+
+    name: str
+    options: dict[str, Any]
+    waypoints: str = ""
+
+    def plan(self, out: Path, **more: Any) -> FlightPlan:
+        """Return the plan of the flight with its logs in `out`, and with `more` options."""
+        options = self.options | ({"wind": wind(self.options["wind"])} if "wind" in self.options else {})
+        if self.waypoints:
+            options["track"] = f"waypoints:{out / _WAYPOINTS_FILE}"
+        return FlightPlan.of_options(out, **(options | more))
+
+    def controller(self) -> str:
+        """Return the name of the control law that flies."""
+        profile = load_profile(self.options["profile"])
+        return profile.with_choices(self.options.get("controller"), None).controller
+
+    def fly(self, out: Path, link: str, **more: Any) -> str:
+        """Fly; return the hash of the trajectory.
+
+        Args:
+            out: Folder of the logs.
+            link: `udp` or `memory`.
+            more: Other options of `colibri fly`.
+
+        Raises:
+            FlightError: A process ended before the flight did.
+            ControllerError, DecisionError, ProfileError, SolverError, IntegrationError: As `fly_locally`.
+        """
+        prepare(out)
+        if self.waypoints:
+            _write(out / _WAYPOINTS_FILE, self.waypoints)
+        plan = self.plan(out, **more, link=link)
+        if link == "udp":
+            summary = fly_processes(plan, lambda _sim_time_s: None)
+        else:
+            from colibri.flights.in_process import fly_locally
+
+            summary = fly_locally(plan, lambda _sim_time_s: None)
+        _, figures = keep_flight(plan, summary)
+        sha256: str = figures["trajectory_sha256"]
+        return sha256
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SitlCase:
+    """A flight that a ground station orders, as under `colibri sitl`.
+
+    Attributes:
+        name: What it is called.
+        orders: Orders it, and lets time pass.
+        setting: What it begins with: keys as of `colibri.sitl.backends.setting.Setting`.
+    """
+
+    name: str
+    orders: "Callable[[Sitl], object]"
+    setting: Mapping[str, Any] = field(default_factory=dict)
+
+    def controller(self) -> str:
+        """Return the name of the control law that flies."""
+        setting = setting_of([self.setting])
+        return load_profile(setting.profile).with_choices(setting.controller, None).controller
+
+    def fly(self, out: Path, link: str) -> str:
+        """Fly; return the hash of every frame's truth and command.
+
+        Args:
+            out: Folder of the logs.
+            link: `udp` or `memory`.
+
+        Raises:
+            SettingError: It cannot begin.
+            StageError: A process has died, or does not answer.
+            RefusedError: The vehicle refuses an order.
+            NotInTimeError: What was waited for has not come about.
+        """
+        from colibri.sitl.backends.launcher import launcher
+        from colibri.sitl.session import Flights
+
+        begun = launcher(from_scratch=True) if link == "udp" else None
+        with Flights(setting_of([self.setting]), begun) as flights:
+            try:
+                sitl = flights.begin()
+                self.orders(sitl)
+            finally:
+                flights.keep(out, figures=False)
+        return sitl.sha256
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror}")

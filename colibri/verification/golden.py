@@ -1,0 +1,186 @@
+"""`colibri verify --golden`: is every golden flight still the one that it was, on whatever computer?"""
+
+import argparse
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, NamedTuple, NoReturn
+
+import msgspec
+
+from colibri.analysis.recording import RecordingError
+from colibri.autopilot.control.profile import ProfileError
+from colibri.autopilot.control.qp import SolverError
+from colibri.autopilot.control.registry import ControllerError, DecisionError
+from colibri.autopilot.guidance.trajectories.tracks import TrackError
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
+from colibri.flights.fly import make_folder
+from colibri.flights.plan import PlanError
+from colibri.flights.processes import FlightError
+from colibri.plant.physics.start import IntegrationError
+from colibri.sitl.backends.setting import SettingError
+from colibri.sitl.backends.stage import StageError
+from colibri.sitl.ground_station import RefusedError
+from colibri.sitl.vehicle import NotInTimeError
+from colibri.verification.cases import Case, SitlCase
+from colibri.verification.golden_flights import FLIGHTS
+
+FOUND = "golden.json"
+"""File in the folder of the logs: what each flight came to."""
+_SHOWN = 16
+_NO_HASH = "-"
+_ERRORS = (
+    *(ControllerError, DecisionError, ProfileError, SolverError, TrackError, IntegrationError, PlanError, FlightError),
+    *(RecordingError, SettingError, StageError, RefusedError, NotInTimeError),
+)
+
+_Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
+
+
+class Outcome(NamedTuple):
+    """What came of a golden flight.
+
+    Attributes:
+        name: Of the flight.
+        sha256: Of what was flown; empty where the flight did not end.
+        wall_time_s: How long it took.
+        error: Why it did not end.
+    """
+
+    name: str
+    sha256: str
+    wall_time_s: float
+    error: str = ""
+
+
+def verify_golden(args: argparse.Namespace) -> int:
+    """Fly the golden flights as the command line says; compare their hashes, or write them anew; return the exit code.
+
+    The logs of each flight, and `FOUND` with all hashes and times, are in `args.out`.
+    """
+    if args.duration is not None:
+        fail("--duration does not go with --golden: each golden flight has its own")
+    path: Path = args.golden
+    flights = chosen(args.only)
+    known = read_hashes(path) if path.exists() or not args.renew else {}
+    if not args.renew:
+        _check_names(path, known)
+    make_folder(args.out)
+    try:
+        outcomes = [fly_golden(flight, args.out / flight.name, args.link) for flight in flights]
+    except KeyboardInterrupt:
+        fail(f"interrupted; what was logged is in {args.out}", EXIT_INTERRUPTED)
+    found = {outcome.name: outcome._asdict() for outcome in outcomes}
+    (args.out / FOUND).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    if args.renew:
+        return _renew(args, known, outcomes)
+    if not args.quiet:
+        _print(outcomes, known, args)
+    differing = [outcome.name for outcome in outcomes if outcome.sha256 != known[outcome.name]]
+    if differing:
+        fail(f"not as in {path}: {', '.join(differing)}; the logs are in {args.out}", EXIT_FAILED)
+    return 0
+
+
+def chosen(names: Sequence[str]) -> list[Case | SitlCase]:
+    """Return the flights of these names, in the set's order; without names all of them. Or end with one line."""
+    flights = {flight.name: flight for flight in FLIGHTS}
+    for name in names:
+        if name not in flights:
+            fail(f"--only {name}: there is no such golden flight; there are {', '.join(flights)}")
+    return [flight for flight in FLIGHTS if not names or flight.name in names]
+
+
+def fly_golden(flight: Case | SitlCase, out: Path, link: str) -> Outcome:
+    """Fly a golden flight with its logs in `out`; one that does not end is an outcome, too."""
+    began_s = perf_counter()
+    try:
+        sha256, error = flight.fly(out, link), ""
+    except _ERRORS as failure:
+        sha256, error = "", str(failure)
+    return Outcome(flight.name, sha256, perf_counter() - began_s, error)
+
+
+def read_hashes(path: Path) -> dict[str, str]:
+    """Return the hash of each flight that a file names, or end with one line."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=dict[str, _Hash])
+    except FileNotFoundError:
+        fail(f"there are no golden hashes in {path}: say which FILE has them, or write them with --renew")
+    except OSError as error:
+        fail(f"cannot read {path}: {error.strerror}")
+    except msgspec.MsgspecError as error:
+        fail(f"{path} holds no golden hashes, names and SHA-256 as one JSON object: {error}")
+
+
+def without_flight(controllers: Iterable[str]) -> list[str]:
+    """Return which control laws fly no golden flight."""
+    flown = {flight.controller() for flight in FLIGHTS}
+    return sorted(set(controllers) - flown)
+
+
+def _check_names(path: Path, known: Mapping[str, str]) -> None:
+    """See that a file names the flights of the set and no others, or end with one line."""
+    names = {flight.name for flight in FLIGHTS}
+    for name in sorted(known.keys() - names):
+        _not_of_the_set(path, f"names {name}, which is no golden flight")
+    for name in sorted(names - known.keys()):
+        _not_of_the_set(path, f"has no hash of golden flight {name}")
+
+
+def _not_of_the_set(path: Path, what: str) -> NoReturn:
+    fail(f"{path} {what}: write it anew with --renew")
+
+
+def _renew(args: argparse.Namespace, known: Mapping[str, str], outcomes: Iterable[Outcome]) -> int:
+    """Write the hashes of what was flown, keep those of what was not, and print what changes."""
+    path: Path = args.golden
+    lost = [outcome for outcome in outcomes if outcome.error]
+    if lost:
+        fail(f"{lost[0].name} did not end, and {path} stays as it is: {lost[0].error}", EXIT_FAILED)
+    latest = {**known, **{outcome.name: outcome.sha256 for outcome in outcomes}}
+    hashes = {flight.name: latest[flight.name] for flight in FLIGHTS if flight.name in latest}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(hashes, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror}")
+    if not args.quiet:
+        _print_changes(path, known, hashes)
+    return 0
+
+
+def _print(outcomes: Sequence[Outcome], known: Mapping[str, str], args: argparse.Namespace) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    took_s = sum(outcome.wall_time_s for outcome in outcomes)
+    title = f"{len(outcomes)} golden flights over {args.link} in {took_s:.0f} s; logs in {args.out}"
+    table = Table(title=escape(title), title_justify="left")
+    for column in ("flight", "took", "expected"):
+        table.add_column(column, no_wrap=True)
+    table.add_column("found", min_width=_SHOWN)
+    for outcome in outcomes:
+        expected = known[outcome.name]
+        found = "the same" if outcome.sha256 == expected else outcome.sha256[:_SHOWN] or escape(outcome.error)
+        table.add_row(outcome.name, f"{outcome.wall_time_s:.1f} s", expected[:_SHOWN], found)
+    Console().print(table)
+
+
+def _print_changes(path: Path, old: Mapping[str, str], new: Mapping[str, str]) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    changed = [name for name in {**new, **old} if old.get(name) != new.get(name)]
+    table = Table(title=escape(f"{path}: {len(changed)} of {len(new)} changed"), title_justify="left")
+    for column in ("flight", "was", "is"):
+        table.add_column(column, no_wrap=True)
+    for name in changed:
+        table.add_row(escape(name), *(hashes.get(name, _NO_HASH)[:_SHOWN] for hashes in (old, new)))
+    if changed:
+        Console().print(table)
+    else:
+        Console().print(escape(f"{path}: nothing changed"), soft_wrap=True)

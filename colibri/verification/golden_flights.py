@@ -1,0 +1,115 @@
+"""The golden flights: a fixed set that is sensitive on purpose, so that a single bit anywhere shows in some hash.
+
+What saturates, tumbles or flies by noise makes a difference of one bit large within a second; what tracks well hides
+it, as the wire carries 32-bit floats. Both are here: the former find a difference, the latter say where it matters.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.sitl import mission_items
+from colibri.verification.cases import Case, SitlCase
+
+if TYPE_CHECKING:
+    from colibri.sitl.vehicle import Sitl
+
+GUSTS: dict[str, Any] = {"wind": "8@270", "turbulence": "moderate", "seed": 7}
+SENSORS: dict[str, Any] = {"feedback": Feedback.SENSORS, "seed": 7}
+TUMBLING = {"x": 0.0, "y": 0.0, "z": 20.0, "phi": 170.0, "p": 6.0, "q": -6.0, "r": 5.0}
+UPSIDE_DOWN = {"x": 0.0, "y": 0.0, "z": 20.0, "phi": 180.0}
+WAYPOINTS = "x,y,z,t,yaw\n0,0,1,0,0\n3,0,2,2,90\n3,4,2,4,180\n0,0,1,7,270\n"
+TRACKS = ("spiral", "expanding-spiral", "line", "wave", "crown")
+
+
+def _flown(name: str, track: str, duration: float, profile: str = "flight", **options: Any) -> Case:
+    return Case(name, {"track": track, "profile": profile, "duration": duration, **options})
+
+
+def _mission(sitl: "Sitl") -> None:
+    """Take off, fly a corner at two speeds, come home and land."""
+    corner = [
+        mission_items.waypoint(8.0, 0.0, 4.0),
+        mission_items.change_speed(8.0),
+        mission_items.waypoint(8.0, 12.0, 5.0, stay_s=0.5),
+    ]
+    sitl.upload_mission([mission_items.takeoff(4.0), *corner, mission_items.land(4.0, 6.0)])
+    sitl.start_mission()
+    sitl.wait_until(lambda: not sitl.armed, within=60.0, what="the landing")
+
+
+def _rotor_lost(sitl: "Sitl") -> None:
+    """Lose a rotor at speed, and fly on with three."""
+    sitl.goto(30.0, 0.0, 12.0, speed=6.0, wait=False)
+    sitl.run(2.0)
+    sitl.inject("motor", "off", 2)
+    sitl.run(6.0)
+
+
+def _rotor_lost_on_sensors(sitl: "Sitl") -> None:
+    """Lose a rotor soon after the take-off, and land on three."""
+    sitl.takeoff(6.0)
+    sitl.inject("motor", "off", 4)
+    sitl.wait_until(lambda: not sitl.armed, within=30.0, what="the landing")
+
+
+def _restarted(sitl: "Sitl") -> None:
+    """Kill the autopilot in a turn, and fly on."""
+    sitl.goto(12.0, 9.0, 8.0, speed=6.0, wait=False)
+    sitl.run(2.5)
+    sitl.kill_autopilot()
+    sitl.run(4.0)
+
+
+def _sticks(sitl: "Sitl") -> None:
+    """Fly by hand: by attitude, by position, and home."""
+    with sitl.sticks_held(pitch=0.7, roll=-0.4, thrust=0.6, yaw=0.3):
+        sitl.run(0.2)
+        sitl.select(Mode.STABILIZED)
+        sitl.run(1.5)
+        sitl.select(Mode.POSITION)
+        sitl.run(1.5)
+    sitl.select(Mode.RETURN)
+    sitl.run(3.0)
+
+
+FLIGHTS: tuple[Case | SitlCase, ...] = (
+    # Beyond what the vehicle can do, and back from where no flight should be.
+    _flown("beyond-its-limits", "lemniscate:lap=1.0", 40.0),
+    _flown("at-its-limits-in-gusts", "lemniscate:lap=4.0", 20.0, **GUSTS),
+    _flown("tumbling", "hover:height=20", 5.0, start=TUMBLING),
+    _flown("upside-down-in-gusts", "hover:height=20", 5.0, start=UPSIDE_DOWN, **GUSTS),
+    # By sensors, in turbulence.
+    _flown("lemniscate-on-sensors", "lemniscate", 20.0, **GUSTS, feedback=Feedback.SENSORS),
+    _flown("hover-on-rtk", "hover", 8.0, vehicle="hummingbird-rtk", **SENSORS),
+    _flown("wave-late-on-sensors", "wave", 8.0, latency=8.0, **SENSORS),
+    # What the plant and the planner have beside.
+    _flown("lemniscate-adaptive", "lemniscate", 5.0, integrator="adaptive", wind="5@270"),
+    Case("waypoints", {"track": "waypoints", "profile": "flight", "duration": 9.0}, WAYPOINTS),
+    # Every control law.
+    _flown("circle-by-se3", "circle:radius=3,speed=4", 6.0, "se3", **GUSTS),
+    _flown("tumbling-by-se3", "hover:height=20", 5.0, "se3", start=TUMBLING),
+    _flown("wave-by-global-lpv-mpc", "wave", 20.0, "thesis", controller="global-lpv-mpc"),
+    _flown("thesis-euler-crown", "crown", 20.0, "thesis-euler"),
+    _flown("thesis-lemniscate-lost", "lemniscate", 10.0, "thesis"),
+    # Every track of the thesis.
+    *(_flown(f"thesis-{track}", track, 20.0, "thesis") for track in TRACKS),
+    *(_flown(track, track, 6.0) for track in TRACKS),
+    # By orders of a ground station.
+    SitlCase(name="mission", orders=_mission),
+    SitlCase(
+        name="mission-on-sensors",
+        orders=_mission,
+        setting={"feedback": "sensors", "wind": "5@270", "turbulence": "light", "seed": 4},
+    ),
+    SitlCase(name="rotor-lost", orders=_rotor_lost, setting={"airborne": 12.0, "wind": "5@200", "turbulence": "light"}),
+    SitlCase(
+        name="rotor-lost-on-sensors",
+        orders=_rotor_lost_on_sensors,
+        setting={"feedback": "sensors", "wind": "5@270", "turbulence": "moderate", "seed": 3},
+    ),
+    SitlCase(name="autopilot-restarted", orders=_restarted, setting={"airborne": 8.0}),
+    SitlCase(
+        name="sticks-by-se3", orders=_sticks, setting={"airborne": 8.0, "controller": "geometric-se3", "wind": "5@90"}
+    ),
+)

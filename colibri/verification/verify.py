@@ -1,0 +1,110 @@
+"""`colibri verify`: a fixed set of flights, each flown twice, in memory, and replayed: is every bit the same?"""
+
+import argparse
+from pathlib import Path
+from typing import NamedTuple
+
+from colibri.autopilot.control.profile import ProfileError
+from colibri.autopilot.control.qp import SolverError
+from colibri.autopilot.control.registry import ControllerError, DecisionError
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
+from colibri.flights.processes import FlightError
+from colibri.flights.replay import replay_flight
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.plant.physics.start import IntegrationError
+from colibri.verification.cases import Case
+
+_SHOWN = 16
+DEFAULT_DURATION_S = 20.0
+
+CASES = (
+    Case("thesis-spiral", {"track": "spiral", "profile": "thesis"}),
+    Case("spiral", {"track": "spiral", "profile": "flight"}),
+    Case(
+        "lemniscate-in-gusts", {"track": "lemniscate", "profile": "flight", "wind": "5@270", "turbulence": "moderate"}
+    ),
+    Case("circle-by-se3", {"track": "circle", "profile": "se3"}),
+    Case("spiral-on-sensors", {"track": "spiral", "profile": "flight", "feedback": Feedback.SENSORS}),
+    Case(
+        "wave-on-sensors-in-gusts",
+        {
+            "track": "wave",
+            "profile": "flight",
+            "feedback": Feedback.SENSORS,
+            "wind": "8@270",
+            "turbulence": "moderate",
+        },
+    ),
+)
+SEED = 7
+
+
+class Verdict(NamedTuple):
+    """What came of a case.
+
+    Attributes:
+        name: Of the case.
+        hashes: Of the trajectories: first, second, in memory.
+        commands: How many of the first were replayed.
+        replays: Whether each was what it was.
+    """
+
+    name: str
+    hashes: tuple[str, str, str]
+    commands: int
+    replays: bool
+
+    @property
+    def same(self) -> bool:
+        """Whether every bit is."""
+        return len(set(self.hashes)) == 1 and self.replays
+
+
+def verify(args: argparse.Namespace) -> int:
+    """Verify as the command line says; return the exit code."""
+    if args.renew or args.only:
+        fail(f"--{'renew' if args.renew else 'only'} goes with --golden alone")
+    if args.duration is None:
+        args.duration = DEFAULT_DURATION_S
+    try:
+        verdicts = [_verdict(case, args) for case in CASES]
+    except (ControllerError, ProfileError, SolverError, IntegrationError, DecisionError) as error:
+        fail(str(error), EXIT_FAILED)
+    except FlightError as error:
+        fail(str(error), error.code)
+    except KeyboardInterrupt:
+        fail(f"interrupted; what was logged is in {args.out}", EXIT_INTERRUPTED)
+    if not args.quiet:
+        _print(verdicts, args)
+    differing = [verdict.name for verdict in verdicts if not verdict.same]
+    if differing:
+        fail(f"not the same twice: {', '.join(differing)}; the logs are in {args.out}", EXIT_FAILED)
+    return 0
+
+
+def _verdict(case: Case, args: argparse.Namespace) -> Verdict:
+    folder: Path = args.out / case.name
+    first, second = (_flown(case, folder / again, args.link, args.duration) for again in ("first", "second"))
+    third = _flown(case, folder / "memory", "memory", args.duration)
+    replayed = replay_flight(folder / "first" / "flight.tlog")
+    return Verdict(case.name, (first, second, third), replayed.commands, replayed.difference is None)
+
+
+def _flown(case: Case, out: Path, link: str, duration_s: float) -> str:
+    """Fly a case; return the hash of its trajectory."""
+    return case.fly(out, link, duration=duration_s, seed=SEED)
+
+
+def _print(verdicts: list[Verdict], args: argparse.Namespace) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    title = f"{args.duration:g} s, seed {SEED}, twice over {args.link} and once in memory; logs in {args.out}"
+    table = Table(title=title, title_justify="left")
+    for column in ("flight", "trajectory", "replayed", "the same"):
+        table.add_column(column, no_wrap=True)
+    for verdict in verdicts:
+        replayed = f"{verdict.commands} commands" if verdict.replays else "differs"
+        hashes = dict.fromkeys(sha256[:_SHOWN] for sha256 in verdict.hashes)
+        table.add_row(verdict.name, "\n".join(hashes), replayed, "yes" if verdict.same else "NO")
+    Console().print(table)

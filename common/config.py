@@ -1,0 +1,83 @@
+"""Strict tables: what vehicle files, profiles and control laws are read into."""
+
+from collections.abc import Mapping
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias, TypeVar
+
+import msgspec
+
+Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
+NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
+T = TypeVar("T")
+
+
+def toml_names(folder: Path) -> list[str]:
+    """Return the names of the TOML files in a folder, without suffix."""
+    return sorted(path.stem for path in folder.glob("*.toml"))
+
+
+def read_named(what: str, folder: Path, name_or_path: str, kind: type[T], error: type[Exception]) -> T:
+    """Read the TOML file of that name in `folder`, or any file if the argument ends in `.toml`.
+
+    Raises:
+        error: There is no such name, or the file has a missing, unknown or impossible key.
+    """
+    if name_or_path.endswith(".toml"):
+        return read_toml(Path(name_or_path), kind, error)
+    known = toml_names(folder)
+    if name_or_path not in known:
+        raise error(f"unknown {what} {name_or_path}: choose {', '.join(known)} or a .toml file")
+    return read_toml(folder / f"{name_or_path}.toml", kind, error)
+
+
+def read_toml(path: Path, kind: type[T], error: type[Exception]) -> T:
+    """Read a TOML file into a strict structure.
+
+    Raises:
+        error: The file cannot be read, or has a missing, unknown or impossible key; names file and key.
+    """
+    try:
+        return msgspec.toml.decode(path.read_bytes(), type=kind)
+    except OSError as reason:
+        raise error(f"{path}: {reason.strerror}") from reason
+    except msgspec.ValidationError as reason:
+        what, _, where = str(reason).partition(" - at `$.")
+        key = where.rstrip("`")
+        raise error(f"{path}: {key}: {what}" if key else f"{path}: {what}") from reason
+    except (msgspec.DecodeError, UnicodeDecodeError, ValueError) as reason:
+        raise error(f"{path}: {reason}") from reason
+
+
+Negative: TypeAlias = Annotated[float, msgspec.Meta(lt=0.0)]
+Degrees: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0, lt=90.0)]
+Count: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1000)]
+
+
+class SettingsError(Exception):
+    """A table with a missing, unknown or impossible key; the message names it."""
+
+
+class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A table of numbers, every one of them finite."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        for key in self.__struct_fields__:
+            value = getattr(self, key)
+            numbers = value if isinstance(value, tuple) else (value,)
+            if any(isinstance(number, float) and not isfinite(number) for number in numbers):
+                raise ValueError(f"{key}: must be finite")
+
+
+def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:
+    """Read a control law's table of a profile into a strict structure.
+
+    Raises:
+        SettingsError: A key is missing, unknown or impossible.
+    """
+    try:
+        return msgspec.convert(dict(table), type=kind)
+    except msgspec.ValidationError as reason:
+        what, _, where = str(reason).partition(" - at `$.")
+        raise SettingsError(f"{where.rstrip('`')}: {what}" if where else what) from reason

@@ -1,0 +1,55 @@
+"""Where on earth a vehicle begins, as the command line says it: LAT,LON,ALT,YAW."""
+
+from argparse import ArgumentTypeError
+from math import isfinite
+from typing import NamedTuple
+
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, is_on_earth
+
+_LOWEST_M, _HIGHEST_M = -500.0, 10_000.0
+
+
+class HomePlace(NamedTuple):
+    """Where the vehicle stands when everything begins; the origin of the ENU frame is there.
+
+    Attributes:
+        latitude_deg: North, degrees.
+        longitude_deg: East, degrees.
+        altitude_m: Above mean sea level.
+        yaw_deg: Heading, clockwise from north.
+    """
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+    yaw_deg: float
+
+    @property
+    def origin(self) -> Geodetic:
+        """The place, without the heading."""
+        return Geodetic(self.latitude_deg, self.longitude_deg, self.altitude_m)
+
+    @property
+    def yaw_enu_deg(self) -> float:
+        """Heading, counter-clockwise from east."""
+        return 90.0 - self.yaw_deg
+
+    def __str__(self) -> str:
+        """Return what `home` reads back."""
+        return ",".join(map(repr, self))
+
+
+DEFAULT_HOME = HomePlace(*DEFAULT_ORIGIN, 0.0)
+
+
+def home(text: str) -> HomePlace:
+    """Read LAT,LON,ALT,YAW of the command line."""
+    try:
+        place = HomePlace(*map(float, text.split(",")))
+    except (TypeError, ValueError):
+        raise ArgumentTypeError(f"expected LAT,LON,ALT,YAW in degrees and metres, not {text}") from None
+    if not is_on_earth(place.latitude_deg, place.longitude_deg):
+        raise ArgumentTypeError(f"not a latitude of -90 to 90 and a longitude of -180 to 180: {text}")
+    if not _LOWEST_M <= place.altitude_m <= _HIGHEST_M or not isfinite(place.yaw_deg) or abs(place.yaw_deg) > 360.0:
+        raise ArgumentTypeError(f"not an altitude of -500 to 10000 m and a yaw of -360 to 360 degrees: {text}")
+    return place

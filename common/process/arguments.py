@@ -1,0 +1,71 @@
+"""The command line: errors of one line, and the numbers that options take."""
+
+import argparse
+import re
+from argparse import ArgumentTypeError
+from math import inf, isfinite
+from pathlib import Path
+from typing import Any, NoReturn
+
+from colibri.common.process.lifecycle import fail
+
+LAST_SYSTEM_ID = 255
+
+
+class ArgumentParser(argparse.ArgumentParser):
+    """A parser whose errors are one line and exit code 2, and to which what begins like `-33.9,` is a value."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Take what argparse takes."""
+        super().__init__(*args, **options)
+        self._negative_number_matcher = re.compile(r"^-\.?\d")
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and where to read on."""
+        fail(f"{message} (see {self.prog} --help)")
+
+
+def number(text: str) -> float:
+    """Read a finite number of the command line."""
+    value = float(text)
+    if not isfinite(value):
+        raise ValueError
+    return value
+
+
+def positive(text: str) -> float:
+    """Read a number above zero of the command line."""
+    value = number(text)
+    if value <= 0.0:
+        raise ArgumentTypeError(f"must be above zero, not {text}")
+    return value
+
+
+def natural(text: str) -> int:
+    """Read a whole number from 0 on of the command line."""
+    value = int(text)
+    if value < 0:
+        raise ArgumentTypeError(f"must not be below zero, not {text}")
+    return value
+
+
+def system_id(text: str) -> int:
+    """Read a MAVLink system id of the command line."""
+    value = int(text)
+    if not 1 <= value <= LAST_SYSTEM_ID:
+        raise ArgumentTypeError(f"must be from 1 to {LAST_SYSTEM_ID}, not {text}")
+    return value
+
+
+def speed(text: str) -> float:
+    """Read how many times real time to fly: a number above zero, or `max`."""
+    return inf if text == "max" else positive(text)
+
+
+def add_common_arguments(parser: ArgumentParser, log: str) -> None:
+    """Add the options that both processes have; `log` names what `--out` writes."""
+    add = parser.add_argument
+    add("--system-id", type=system_id, default=1, metavar="ID", help="MAVLink system (default 1)")
+    add("--out", type=Path, metavar="DIR", help=f"write {log} there")
+    add("--json", action="store_true", help="status as JSON lines on standard output")
+    add("--parent", type=natural, metavar="PID", help="end when that process, which started this one, ends")

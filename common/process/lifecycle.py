@@ -1,0 +1,73 @@
+"""A process's life: one-line errors and exit codes, a clean end on a signal, one thread, no pauses."""
+
+import gc
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import NoReturn
+
+EXIT_FAILED = 1
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+
+
+def use_one_thread() -> None:
+    """Keep linear algebra to one thread: at a dozen states the others only spin, on the cores that the flight needs.
+
+    To be called before numpy is loaded.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
+def nudge_m() -> float:
+    """Return how far every flight begins beside its start, m: a test of the tests, 0 unless COLIBRI_NUDGE_M is set."""
+    return float(os.environ.get("COLIBRI_NUDGE_M", "0"))
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Keep the garbage collector from all that exists already: to look at it again and again costs a flight time."""
+    gc.collect()
+    gc.freeze()
+    gc.enable()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+
+
+def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
+    """End the process with one line on standard error."""
+    sys.stderr.write(f"colibri: error: {message}\n")
+    sys.stderr.flush()
+    raise SystemExit(code)
+
+
+class Stop:
+    """Becomes true when the process shall end: SIGINT, SIGTERM, or (if asked for) the death of its parent."""
+
+    def __init__(self, *, parent: int | None = None, starting: bool = False) -> None:
+        """Take over SIGINT and SIGTERM; `starting`: until first asked they end the process at once.
+
+        What is still loading has nothing to put in order, and may load for seconds before it asks. The parent says who
+        it is: it may have died before this process could ask.
+        """
+        self._signalled = False
+        self._starting = starting
+        self._parent = parent
+        signal.signal(signal.SIGINT, self._handle)
+        signal.signal(signal.SIGTERM, self._handle)
+
+    def __bool__(self) -> bool:
+        """Whether to end now."""
+        self._starting = False
+        return self._signalled or (self._parent is not None and os.getppid() != self._parent)
+
+    def _handle(self, _signal: int, _frame: FrameType | None) -> None:
+        if self._starting:
+            os._exit(EXIT_INTERRUPTED)
+        self._signalled = True

@@ -1,0 +1,87 @@
+"""Rotations, and the only conversions between ENU/FLU (inside) and NED/FRD (the wire).
+
+Vectors and quaternions are tuples of floats: at these sizes they are several times faster than arrays, and they
+cannot be changed by whoever reads them. Quaternions are wxyz, Hamilton, and rotate body vectors into the earth frame.
+Euler angles are Z-Y'-X'': yaw psi, pitch theta, roll phi.
+"""
+
+from math import degrees, floor, pi, sqrt
+
+from colibri.common.elementary import acos, asin, atan2, cos, sin
+from colibri.common.types import Matrix, Quaternion, Vector
+
+
+def normalized(q: Quaternion) -> Quaternion:
+    """Scale a quaternion to unit length.
+
+    Raises:
+        ValueError: The quaternion is zero.
+    """
+    w, x, y, z = q
+    norm = sqrt(w * w + x * x + y * y + z * z)
+    if norm == 0.0:
+        raise ValueError("a zero quaternion is no rotation")
+    return (w / norm, x / norm, y / norm, z / norm)
+
+
+def rotation_matrix(q: Quaternion) -> Matrix:
+    """Return R of THESIS [2.6], rows first: earth vector = R · body vector."""
+    w, x, y, z = q
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
+
+
+def tilt_deg(q: Quaternion) -> float:
+    """Return how far the body's z axis points from straight up, degrees."""
+    return degrees(acos(min(1.0, max(-1.0, rotation_matrix(q)[2][2]))))
+
+
+def earth_from_body(q: Quaternion, vector: Vector) -> Vector:
+    """Rotate a body vector into the earth frame."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation_matrix(q)
+    x, y, z = vector
+    return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
+
+
+def quaternion_from_euler(phi: float, theta: float, psi: float) -> Quaternion:
+    """Build the quaternion of roll `phi`, pitch `theta`, yaw `psi` (rad, Z-Y'-X'')."""
+    cr, sr = cos(0.5 * phi), sin(0.5 * phi)
+    cp, sp = cos(0.5 * theta), sin(0.5 * theta)
+    cy, sy = cos(0.5 * psi), sin(0.5 * psi)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def euler_from_quaternion(q: Quaternion) -> Vector:
+    """Return (phi, theta, psi) in rad of a unit quaternion: theta in [-pi/2, pi/2], phi and psi in (-pi, pi]."""
+    w, x, y, z = q
+    phi = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    theta = asin(min(1.0, max(-1.0, 2.0 * (w * y - x * z))))
+    psi = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return (phi, theta, psi)
+
+
+def euler_rates(phi: float, theta: float, rate: Vector) -> Vector:
+    """Return (phi', theta', psi') = T(phi, theta) · [p q r], THESIS [2.7]; singular at theta = ±pi/2.
+
+    Args:
+        phi: Roll, rad.
+        theta: Pitch, rad.
+        rate: Body rates p, q, r in FLU, rad/s.
+    """
+    p, q, r = rate
+    s, c = sin(phi), cos(phi)
+    swing = s * q + c * r
+    return (p + sin(theta) / cos(theta) * swing, c * q - s * r, swing / cos(theta))
+
+
+def nearest_turn(angle: float, reference: float) -> float:
+    """Add full turns to `angle` (rad) so that it lies within half a turn of `reference` (rad)."""
+    return angle - 2.0 * pi * floor((angle - reference) / (2.0 * pi) + 0.5)

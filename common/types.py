@@ -1,0 +1,16 @@
+"""What numbers are called that every package hands on: arrays, vectors, the numbers of four rotors, addresses."""
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+Vector: TypeAlias = tuple[float, float, float]
+Quaternion: TypeAlias = tuple[float, float, float, float]
+"""w, x, y, z."""
+Matrix: TypeAlias = tuple[Vector, Vector, Vector]
+FourRotors: TypeAlias = tuple[float, float, float, float]
+"""A number of each rotor."""
+Address: TypeAlias = tuple[str, int]
+"""Host and port."""

@@ -1,0 +1,108 @@
+"""The log of each flight: a numbered file that begins when the vehicle is armed, of all frames sent and received.
+
+The format is that of ground stations' telemetry logs: each frame behind its time, µs, as a big-endian integer.
+"""
+
+from collections.abc import Iterable
+from struct import Struct
+
+from colibri.mavlink.files.tree import Entry, Files, Names, Refusal
+
+SUFFIX = ".tlog"
+KEPT = 50
+WRITE_BYTES = 4096
+WRITE_EVERY_US = 1_000_000
+
+_STAMP = Struct(">Q")
+
+
+class FlightLog:
+    """Writes logs into a folder, and removes the oldest for new ones.
+
+    Attributes:
+        name: Of the file that is written to; None between flights.
+        refusal: Why the last write failed and the log ended there; None where none did.
+    """
+
+    def __init__(self, files: Files, folder: Names = (), kept: int = KEPT) -> None:
+        """Write into `folder` and keep the last `kept` logs, the one being written among them."""
+        self._files = files
+        self._folder = folder
+        self._kept = kept
+        self.name: str | None = None
+        self.refusal: Refusal | None = None
+        self._armed = False
+        self._waiting = bytearray()
+        self._size = 0
+        self._write_at_us = 0
+
+    def record(self, time_us: int, frames: Iterable[bytes]) -> None:
+        """Append frames, all of simulated time `time_us`, if a flight is being logged."""
+        if self.name is None:
+            return
+        stamp = _STAMP.pack(time_us)
+        for frame in frames:
+            self._waiting += stamp + frame
+
+    def update(self, armed: bool, now_us: int) -> None:
+        """Begin and end logs; write what waits. Called once a frame of the plant."""
+        if armed != self._armed:
+            self._armed = armed
+            if armed:
+                self._begin(now_us)
+            else:
+                self.close()
+        elif self._waiting and (len(self._waiting) >= WRITE_BYTES or now_us >= self._write_at_us):
+            self._write()
+            self._write_at_us = now_us + WRITE_EVERY_US
+
+    def close(self) -> None:
+        """End the log, if one is written."""
+        if self._waiting:
+            self._write()
+        self.name = None
+
+    def _begin(self, now_us: int) -> None:
+        logs = self._logs()
+        for log in logs[: max(len(logs) - self._kept + 1, 0)]:
+            self._files.remove((*self._folder, log.name))
+        number = _number(logs[-1].name) + 1 if logs else 1
+        name = f"{number:05}{SUFFIX}"
+        place = (*self._folder, name)
+        self.refusal = self._files.create(place)
+        if self.refusal is Refusal.NOT_FOUND and self._folder:  # a ground station removed it
+            self.refusal = self._files.make_folder(self._folder) or self._files.create(place)
+        self.name = name if self.refusal is None else None
+        self._size = 0
+        self._waiting.clear()
+        self._write_at_us = now_us + WRITE_EVERY_US
+
+    def _write(self) -> None:
+        """Write what waits; where there is no space, the oldest logs give it."""
+        data = bytes(self._waiting)
+        self._waiting.clear()
+        if self.name is None:
+            return
+        place = (*self._folder, self.name)
+        refusal = self._files.write(place, self._size, data)
+        for log in self._logs()[:-1] if refusal is Refusal.NO_SPACE else ():
+            self._files.remove((*self._folder, log.name))
+            refusal = self._files.write(place, self._size, data)
+            if refusal is not Refusal.NO_SPACE:
+                break
+        self._size += len(data)
+        if refusal is not None:
+            self.refusal = refusal
+            self.name = None
+
+    def _logs(self) -> list[Entry]:
+        """Return the logs, the oldest first."""
+        found = self._files.list(self._folder)
+        entries = [] if isinstance(found, Refusal) else found
+        return sorted((entry for entry in entries if _number(entry.name)), key=lambda entry: _number(entry.name))
+
+
+def _number(name: str) -> int:
+    """Return the number of a log; 0 for any other file."""
+    number = name.removesuffix(SUFFIX)
+    return int(number) if name != number and number.isascii() and number.isdigit() else 0

@@ -1,0 +1,265 @@
+"""Files in a folder of the disk, and in none but that: the one place of the vehicle's files that does input and output.
+
+Every path is walked from the folder's own handle, name by name, and no link is followed: whatever is asked for, and
+whoever changes the folder meanwhile, nothing outside it is reached. Only regular files and folders are shown.
+"""
+
+import os
+import stat
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from errno import EACCES, EEXIST, EINVAL, EISDIR, ELOOP, ENAMETOOLONG, ENOENT, ENOSPC, ENOTDIR, ENOTEMPTY, EPERM, EROFS
+from functools import partial, wraps
+from pathlib import Path
+from typing import Concatenate, ParamSpec, TypeVar
+
+from colibri.mavlink.files.tree import Entry, Names, Quota, Reading, Refusal, can_be_new
+
+DEFAULT_QUOTA = Quota(64 << 20, 1000)
+
+_SAFELY = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+"""Follow no link; do not wait for the other end of a pipe."""
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | _SAFELY
+
+_REFUSALS = {
+    EACCES: Refusal.PROTECTED,
+    EEXIST: Refusal.EXISTS,
+    EINVAL: Refusal.BAD_NAME,
+    EISDIR: Refusal.IS_FOLDER,
+    ELOOP: Refusal.PROTECTED,
+    ENAMETOOLONG: Refusal.BAD_NAME,
+    ENOENT: Refusal.NOT_FOUND,
+    ENOSPC: Refusal.NO_SPACE,
+    ENOTDIR: Refusal.NOT_A_FOLDER,
+    ENOTEMPTY: Refusal.NOT_EMPTY,
+    EPERM: Refusal.PROTECTED,
+    EROFS: Refusal.PROTECTED,
+}
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
+
+
+class _RefusedError(Exception):
+    """Ends what cannot be done, with the reason."""
+
+    def __init__(self, refusal: Refusal) -> None:
+        super().__init__(refusal.value)
+        self.refusal = refusal
+
+
+def _refusing(
+    method: Callable[Concatenate["Folder", _Arguments], _Result],
+) -> Callable[Concatenate["Folder", _Arguments], _Result | Refusal]:
+    """Return `method` with every error of the system as a refusal."""
+
+    @wraps(method)
+    def refusing(self: "Folder", /, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result | Refusal:
+        try:
+            return method(self, *args, **kwargs)
+        except _RefusedError as error:
+            return error.refusal
+        except OSError as error:
+            return _REFUSALS.get(error.errno or 0, Refusal.FAILED)
+        except (ValueError, OverflowError):  # a NUL in a name, a name that is no text, an offset beyond the system's
+            return Refusal.BAD_NAME
+
+    return refusing
+
+
+class Folder:
+    """Files in a folder of the disk.
+
+    Nobody else is expected to fill it: how much it holds is counted once, and then with what is done here.
+    """
+
+    def __init__(self, path: Path, quota: Quota = DEFAULT_QUOTA) -> None:
+        """Open the folder, made where it is missing.
+
+        Raises:
+            OSError: It cannot be made or read.
+        """
+        path.mkdir(parents=True, exist_ok=True)
+        self._quota = quota
+        self._root = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        self._size, self._entries = self._measure()
+
+    def close(self) -> None:
+        """Let go of the folder."""
+        os.close(self._root)
+
+    @_refusing
+    def list(self, names: Names) -> list[Entry]:
+        """Return what a folder holds, by name."""
+        with self._open_folder(names) as folder, os.scandir(folder) as found:
+            return sorted(entry for entry in map(_entry_of, found) if entry is not None)
+
+    @_refusing
+    def open(self, names: Names) -> Reading:
+        """Open a file to read it."""
+        with self._open_file(names, os.O_RDONLY) as file:
+            return Reading(os.fstat(file).st_size, partial(self._read, names))
+
+    @_refusing
+    def create(self, names: Names) -> None:
+        """Make an empty file; one that exists is emptied."""
+        with self._open_parent(names) as (folder, name):
+            if _kind(folder, name) is None:
+                self._allow_new(name)
+                os.close(os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _SAFELY, 0o644, dir_fd=folder))
+                self._entries += 1
+                return
+        self._cut(names, 0)
+
+    @_refusing
+    def write(self, names: Names, offset: int, data: bytes) -> None:
+        """Put `data` into a file; a gap before it is zeros."""
+        with self._open_file(names, os.O_WRONLY) as file:
+            more = max(offset + len(data) - os.fstat(file).st_size, 0) if data else 0
+            if self._size + more > self._quota.size:
+                raise _RefusedError(Refusal.NO_SPACE)
+            if os.pwrite(file, data, offset) != len(data):
+                raise _RefusedError(Refusal.NO_SPACE)
+            self._size += more
+
+    @_refusing
+    def truncate(self, names: Names, size: int) -> None:
+        """Keep the first `size` bytes of a file; nothing where it has fewer."""
+        self._cut(names, size)
+
+    @_refusing
+    def remove(self, names: Names) -> None:
+        """Remove a file."""
+        with self._open_parent(names) as (folder, name):
+            status = self._existing(folder, name)
+            if stat.S_ISDIR(status.st_mode):
+                raise _RefusedError(Refusal.IS_FOLDER)
+            os.unlink(name, dir_fd=folder)
+            self._size -= status.st_size
+            self._entries -= 1
+
+    @_refusing
+    def rename(self, old: Names, new: Names) -> None:
+        """Give a file or folder another place, where nothing is yet."""
+        with self._open_parent(old) as (old_folder, old_name), self._open_parent(new) as (new_folder, new_name):
+            self._existing(old_folder, old_name)
+            if _kind(new_folder, new_name) is not None:
+                raise _RefusedError(Refusal.EXISTS)
+            if not can_be_new(new_name):
+                raise _RefusedError(Refusal.BAD_NAME)
+            os.rename(old_name, new_name, src_dir_fd=old_folder, dst_dir_fd=new_folder)
+
+    @_refusing
+    def make_folder(self, names: Names) -> None:
+        """Make a folder."""
+        with self._open_parent(names) as (folder, name):
+            if _kind(folder, name) is not None:
+                raise _RefusedError(Refusal.EXISTS)
+            self._allow_new(name)
+            os.mkdir(name, 0o755, dir_fd=folder)
+            self._entries += 1
+
+    @_refusing
+    def remove_folder(self, names: Names) -> None:
+        """Remove an empty folder."""
+        with self._open_parent(names) as (folder, name):
+            os.rmdir(name, dir_fd=folder)
+            self._entries -= 1
+
+    @_refusing
+    def _read(self, names: Names, offset: int, count: int) -> bytes:
+        with self._open_file(names, os.O_RDONLY) as file:
+            return os.pread(file, count, offset)
+
+    def _cut(self, names: Names, size: int) -> None:
+        with self._open_file(names, os.O_WRONLY) as file:
+            gone = os.fstat(file).st_size - size
+            if gone > 0:
+                os.ftruncate(file, size)
+                self._size -= gone
+
+    def _allow_new(self, name: str) -> None:
+        if not can_be_new(name):
+            raise _RefusedError(Refusal.BAD_NAME)
+        if self._entries >= self._quota.entries:
+            raise _RefusedError(Refusal.NO_SPACE)
+
+    def _existing(self, folder: int, name: str) -> os.stat_result:
+        """Return what the system knows of a file or folder that is shown."""
+        status = os.stat(name, dir_fd=folder, follow_symlinks=False)
+        if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
+            raise _RefusedError(Refusal.NOT_FOUND)
+        return status
+
+    @contextmanager
+    def _open_folder(self, names: Names) -> Iterator[int]:
+        """Open the folder at `names`, no link followed on the way."""
+        folder = os.open(".", _FOLDER, dir_fd=self._root)
+        try:
+            for name in names:
+                below = os.open(_plain(name), _FOLDER, dir_fd=folder)
+                os.close(folder)
+                folder = below
+            yield folder
+        finally:
+            os.close(folder)
+
+    @contextmanager
+    def _open_parent(self, names: Names) -> Iterator[tuple[int, str]]:
+        """Open the folder that holds `names`; the root itself cannot be changed."""
+        if not names:
+            raise _RefusedError(Refusal.PROTECTED)
+        with self._open_folder(names[:-1]) as folder:
+            yield folder, _plain(names[-1])
+
+    @contextmanager
+    def _open_file(self, names: Names, how: int) -> Iterator[int]:
+        if not names:
+            raise _RefusedError(Refusal.IS_FOLDER)
+        with self._open_folder(names[:-1]) as folder:
+            name = _plain(names[-1])
+            if stat.S_ISDIR(self._existing(folder, name).st_mode):
+                raise _RefusedError(Refusal.IS_FOLDER)
+            file = os.open(name, how | _SAFELY, dir_fd=folder)
+        try:
+            if not stat.S_ISREG(os.fstat(file).st_mode):
+                raise _RefusedError(Refusal.NOT_FOUND)
+            yield file
+        finally:
+            os.close(file)
+
+    def _measure(self) -> tuple[int, int]:
+        """Return the bytes, and the files and folders, that are there already."""
+        size = entries = 0
+        for _, folders, files, folder in os.fwalk(".", dir_fd=self._root):
+            entries += len(folders) + len(files)
+            size += sum(os.stat(name, dir_fd=folder, follow_symlinks=False).st_size for name in files)
+        return size, entries
+
+
+def _plain(name: str) -> str:
+    """Return `name` if it names something in its folder, and nothing elsewhere."""
+    if name in ("", ".", "..") or "/" in name:
+        raise _RefusedError(Refusal.NOT_FOUND)
+    return name
+
+
+def _kind(folder: int, name: str) -> int | None:
+    """Return the mode of what is there, a link as such; None where nothing is."""
+    try:
+        return os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode
+    except FileNotFoundError:
+        return None
+
+
+def _entry_of(found: os.DirEntry[str]) -> Entry | None:
+    """Return a file or a folder; None for anything else, and for what is gone already."""
+    try:
+        status = found.stat(follow_symlinks=False)
+    except OSError:
+        return None
+    if stat.S_ISDIR(status.st_mode):
+        return Entry(found.name, True, 0, max(int(status.st_mtime), 0))
+    if stat.S_ISREG(status.st_mode):
+        return Entry(found.name, False, status.st_size, max(int(status.st_mtime), 0))
+    return None

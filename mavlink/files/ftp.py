@@ -1,0 +1,367 @@
+"""The file transfer protocol: a ground station lists, reads and writes the vehicle's files.
+
+Specification: https://mavlink.io/en/services/ftp.html. Where it leaves a choice, or clients differ from it:
+
+- A client names its session when it opens a file, and the server takes that number (PX4 and MAVSDK know session 0
+  only and ignore another that the server gives; MAVProxy picks a fresh one for each transfer). So sessions are counted
+  for each client on its own, and every answer echoes the session of its request: clients drop any other.
+- The session of a client that opens another file with the number of one that is open is taken over once it was idle
+  for a moment: the client has lost track of it. Before, it is refused: it may still be read.
+- MAVSDK repeats a request with a new sequence number, so whatever can be is the same when done twice.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+from zlib import crc32
+
+from colibri.mavlink.files.ftp_wire import (
+    DATA_BYTES,
+    SIZE,
+    Error,
+    Key,
+    Nak,
+    Opcode,
+    Request,
+    answer,
+    line_of,
+    path_in,
+    request_of,
+)
+from colibri.mavlink.files.tree import Files, Names, Reading, Refusal
+from colibri.mavlink.node.service import Peer, Send
+from colibri.mavlink.wire.dialect import Message
+
+MOST_SESSIONS = 32
+MOST_SESSIONS_OF_A_PEER = 8
+SESSION_ENDS_AFTER_US = 20_000_000
+TAKEN_OVER_AFTER_US = 1_000_000
+"""Twice the time after which MAVSDK repeats a request."""
+
+REMEMBERED_FOR_US = 3_000_000
+MOST_REMEMBERED = 64
+
+BURST_PACKETS_A_POLL = 8
+LONGEST_BURST = 1000
+"""Packets: a client that is gone gets no more than these."""
+CHECKSUM_BYTES_A_POLL = 256 << 10
+
+_LARGEST = 0xFFFFFFFF
+
+Outcome: TypeAlias = bytes | Nak | Refusal | None
+"""Data of the ACK, a refusal, or None where the answer comes by and by."""
+
+
+@dataclass(slots=True)
+class _Session:
+    """An open file: to be read where there is a reading, else to be written."""
+
+    names: Names
+    reading: Reading | None
+    used_us: int
+
+
+@dataclass(slots=True)
+class _Burst:
+    """A burst on its way. The sequence numbers of its packets follow that of the request."""
+
+    request: Request
+    reading: Reading
+    packets_left: int = LONGEST_BURST
+
+
+@dataclass(slots=True)
+class _Checksum:
+    """A checksum being computed."""
+
+    request: Request
+    names: Names
+    reading: Reading
+    done: int = 0
+    register: int = _LARGEST
+
+
+class Ftp:
+    """Serves files.
+
+    Attributes:
+        hears: FILE_TRANSFER_PROTOCOL.
+    """
+
+    hears = frozenset({"FILE_TRANSFER_PROTOCOL"})
+
+    def __init__(self, files: Files) -> None:
+        """Serve `files`."""
+        self._files = files
+        self._sessions: dict[Key, _Session] = {}
+        self._bursts: dict[Key, _Burst] = {}
+        self._checksums: dict[Key, _Checksum] = {}
+        self._remembered: dict[tuple[Peer, bytes], tuple[int, Send]] = {}
+        self._obey: dict[int, Callable[[Request], Outcome]] = {
+            Opcode.NONE: lambda _: b"",
+            Opcode.TERMINATE: self._terminate,
+            Opcode.RESET: self._reset,
+            Opcode.LIST: _on_path(self._list),
+            Opcode.LIST_WITH_TIME: _on_path(self._list),
+            Opcode.OPEN_TO_READ: _on_path(self._open_to_read),
+            Opcode.READ: self._read,
+            Opcode.BURST: self._begin_burst,
+            Opcode.WRITE: self._write,
+            Opcode.CHECKSUM: _on_path(self._begin_checksum),
+        }
+        self._change: dict[int, Callable[[Request], Outcome]] = {
+            Opcode.CREATE: _on_path(self._create),
+            Opcode.OPEN_TO_WRITE: _on_path(self._open_to_write),
+            Opcode.TRUNCATE: _on_path(self._truncate),
+            Opcode.REMOVE: _on_path(lambda _, names: files.remove(names) or b""),
+            Opcode.MAKE_FOLDER: _on_path(lambda _, names: files.make_folder(names) or b""),
+            Opcode.REMOVE_FOLDER: _on_path(lambda _, names: files.remove_folder(names) or b""),
+            Opcode.RENAME: _on_path(self._rename),
+        }
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Do what a client asks for."""
+        request = request_of(bytes(message.fields.payload), peer, now_us)
+        if request.opcode in (Opcode.ACK, Opcode.NAK):  # of another server, and to answer it would begin a quarrel
+            return ()
+        self._forget(now_us)
+        outcome: Outcome = Nak(Error.UNKNOWN_COMMAND)
+        if request.size > DATA_BYTES:
+            outcome = Nak(Error.INVALID_DATA_SIZE)
+        elif request.opcode in self._change:
+            return (self._changed(request),)
+        elif request.opcode in self._obey:
+            outcome = self._obey[request.opcode](request)
+        return () if outcome is None else (answer(request, outcome),)
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        """Go on with bursts and checksums."""
+        del now_us
+        if not self._bursts and not self._checksums:
+            return ()
+        sends: list[Send] = []
+        for key in list(self._bursts)[:BURST_PACKETS_A_POLL]:
+            burst = self._bursts.pop(key)  # to go to the end of the line
+            sends += self._packets(burst, max(BURST_PACKETS_A_POLL // (len(self._bursts) + 1), 1))
+            if burst.packets_left:
+                self._bursts[key] = burst
+        for key in list(self._checksums)[:1]:
+            checksum = self._checksums.pop(key)
+            outcome = _sum(checksum)
+            if outcome is None:
+                self._checksums[key] = checksum
+            else:
+                sends.append(answer(checksum.request, outcome))
+        return sends
+
+    def _changed(self, request: Request) -> Send:
+        """Make a change once, however often it is asked for in the same words: Timeouts/Resending.
+
+        To answer any other request again does no harm.
+        """
+        asked = (request.peer, request.payload)
+        if asked in self._remembered:
+            return self._remembered[asked][1]
+        outcome = self._change[request.opcode](request)
+        assert outcome is not None, "changes are made at once"
+        done = answer(request, outcome)
+        if isinstance(outcome, bytes):
+            if len(self._remembered) >= MOST_REMEMBERED:
+                del self._remembered[next(iter(self._remembered))]
+            self._remembered[asked] = (request.now_us + REMEMBERED_FOR_US, done)
+        return done
+
+    def _forget(self, now_us: int) -> None:
+        """Drop sessions that nobody uses, and answers that nobody will ask for again."""
+        for key, session in list(self._sessions.items()):
+            if now_us - session.used_us > SESSION_ENDS_AFTER_US:
+                self._close(key)
+        for asked, (until_us, _) in list(self._remembered.items()):
+            if now_us > until_us:
+                del self._remembered[asked]
+
+    def _close(self, key: Key) -> None:
+        """Close a session if it is open, and let its client do the same things again: it may be a new one."""
+        self._sessions.pop(key, None)
+        self._bursts.pop(key, None)
+        for peer, payload in list(self._remembered):
+            if (peer, payload[2]) == key:
+                del self._remembered[peer, payload]
+
+    def _terminate(self, request: Request) -> bytes:
+        """Close a session; one that is not open is as closed as it was asked to be, so that it may be asked twice."""
+        self._close(request.key)
+        return b""
+
+    def _reset(self, request: Request) -> bytes:
+        """Forget all about this client; others keep their sessions."""
+        peers = [*self._sessions, *((peer, payload[2]) for peer, payload in self._remembered)]
+        for key in peers:
+            if key[0] == request.peer:
+                self._close(key)
+        return b""
+
+    def _list(self, request: Request, names: Names) -> Outcome:
+        found = self._files.list(names)
+        if isinstance(found, Refusal):
+            return found
+        if request.offset >= len(found):
+            return Nak(Error.END_OF_FILE)
+        data = b""
+        for entry in found[request.offset :]:
+            line = line_of(entry, with_time=request.opcode == Opcode.LIST_WITH_TIME)
+            if len(data) + len(line) > DATA_BYTES:
+                break
+            data += line
+        return data
+
+    def _open_to_read(self, request: Request, names: Names) -> Outcome:
+        reading = self._files.open(names)
+        if isinstance(reading, Refusal):
+            return reading
+        refused = self._opened(request, names, reading)
+        return refused or SIZE.pack(min(reading.size, _LARGEST))
+
+    def _open_to_write(self, request: Request, names: Names) -> Outcome:
+        if self._files.open(names) is Refusal.NOT_FOUND:
+            return self._create(request, names)
+        # Nothing is written here, but so it is known whether it may be.
+        return self._files.write(names, 0, b"") or self._opened(request, names, None) or b""
+
+    def _create(self, request: Request, names: Names) -> Outcome:
+        return (
+            self._no_session(request, names, None)
+            or self._files.create(names)
+            or self._opened(request, names, None)
+            or b""
+        )
+
+    def _opened(self, request: Request, names: Names, reading: Reading | None) -> Nak | None:
+        """Open a session, or return why not."""
+        refused = self._no_session(request, names, reading)
+        if refused is None:
+            self._close(request.key)
+            self._sessions[request.key] = _Session(names, reading, request.now_us)
+        return refused
+
+    def _no_session(self, request: Request, names: Names, reading: Reading | None) -> Nak | None:
+        """Return why no session can be opened."""
+        session = self._sessions.get(request.key)
+        if session is not None:
+            again = session.names == names and (session.reading is None) == (reading is None)
+            idle_us = request.now_us - session.used_us
+            return None if again or idle_us >= TAKEN_OVER_AFTER_US else Nak(Error.NO_SESSIONS)
+        of_peer = sum(peer == request.peer for peer, _ in self._sessions)
+        full = len(self._sessions) >= MOST_SESSIONS or of_peer >= MOST_SESSIONS_OF_A_PEER
+        return Nak(Error.NO_SESSIONS) if full else None
+
+    def _used(self, request: Request) -> _Session | None:
+        session = self._sessions.get(request.key)
+        if session is not None:
+            session.used_us = request.now_us
+        return session
+
+    def _read(self, request: Request) -> Outcome:
+        """Read some of a file; a burst goes on meanwhile, as clients fill its gaps like this."""
+        session = self._used(request)
+        if session is None or session.reading is None:
+            return Nak(Error.INVALID_SESSION)
+        count = min(request.size or DATA_BYTES, session.reading.size - request.offset)
+        if count <= 0:
+            return Nak(Error.END_OF_FILE)
+        return session.reading.read(request.offset, count) or Nak(Error.END_OF_FILE)
+
+    def _begin_burst(self, request: Request) -> Outcome:
+        """Begin a burst; one of this session that is on its way ends."""
+        session = self._used(request)
+        if session is None or session.reading is None:
+            return Nak(Error.INVALID_SESSION)
+        self._bursts.pop(request.key, None)
+        if request.offset >= session.reading.size:
+            return Nak(Error.END_OF_FILE)
+        self._bursts[request.key] = _Burst(request, session.reading)
+        return None
+
+    def _packets(self, burst: _Burst, most: int) -> Iterator[Send]:
+        """Send the next packets of a burst."""
+        size = burst.request.size or DATA_BYTES
+        wanted = min(most * size, burst.reading.size - burst.request.offset)
+        data = burst.reading.read(burst.request.offset, wanted)
+        if isinstance(data, Refusal) or not data:  # removed, or cut, since it was opened
+            burst.packets_left = 0
+            yield answer(burst.request, data or Nak(Error.END_OF_FILE))
+            return
+        for start in range(0, len(data), size):
+            request, part = burst.request, data[start : start + size]
+            end = request.offset + len(part)
+            at_end = end >= burst.reading.size or len(part) < size
+            burst.packets_left = 0 if at_end else burst.packets_left - 1
+            yield answer(request, part, last=burst.packets_left == 0)
+            burst.request = request._replace(sequence=request.sequence + 1, offset=end)
+            if burst.packets_left == 0:
+                return
+
+    def _write(self, request: Request) -> Outcome:
+        session = self._used(request)
+        if session is None:
+            return Nak(Error.INVALID_SESSION)
+        if session.reading is not None:
+            return Nak(Error.PROTECTED)
+        return self._files.write(session.names, request.offset, request.data) or b""
+
+    def _truncate(self, request: Request, names: Names) -> Outcome:
+        reading = self._files.open(names)
+        if isinstance(reading, Refusal):
+            return reading
+        if request.offset > reading.size:
+            return Nak(Error.END_OF_FILE)
+        return self._files.truncate(names, request.offset) or b""
+
+    def _rename(self, request: Request, old: Names) -> Outcome:
+        _, _, rest = request.data.partition(b"\0")
+        new = path_in(rest)
+        if isinstance(new, Refusal):
+            return new
+        if not new:
+            return Nak(Error.INVALID_DATA_SIZE)
+        return self._files.rename(old, new) or b""
+
+    def _begin_checksum(self, request: Request, names: Names) -> Outcome:
+        running = self._checksums.get(request.key)
+        if running is not None and running.names == names:
+            running.request = request  # the client lost patience and asks again
+            return None
+        reading = self._files.open(names)
+        if isinstance(reading, Refusal):
+            return reading
+        if len(self._checksums) >= MOST_SESSIONS:
+            return Nak(Error.NO_SESSIONS)
+        checksum = _Checksum(request, names, reading)
+        outcome = _sum(checksum)
+        if outcome is None:
+            self._checksums[request.key] = checksum
+        return outcome
+
+
+def _on_path(obey: Callable[[Request, Names], Outcome]) -> Callable[[Request], Outcome]:
+    """Return what obeys a request whose data is a path."""
+
+    def obey_request(request: Request) -> Outcome:
+        names = path_in(request.data)
+        return names if isinstance(names, Refusal) else obey(request, names)
+
+    return obey_request
+
+
+def _sum(checksum: _Checksum) -> bytes | Refusal | None:
+    """Add some of the file; return the answer once it is all."""
+    reading = checksum.reading
+    data = reading.read(checksum.done, min(CHECKSUM_BYTES_A_POLL, reading.size - checksum.done))
+    if isinstance(data, Refusal):
+        return data
+    checksum.register = crc32(data, checksum.register)
+    checksum.done += len(data)
+    if data and checksum.done < reading.size:
+        return None
+    # MAVLink's CRC32 begins with 0 and inverts nothing: https://mavlink.io/en/guide/crc.html.
+    return SIZE.pack(checksum.register ^ _LARGEST)

@@ -1,0 +1,157 @@
+"""What the file transfer protocol says on the wire: requests, answers, errors, the lines of a folder.
+
+Specification: https://mavlink.io/en/services/ftp.html, "Payload Format" and what follows it.
+"""
+
+from enum import IntEnum
+from errno import EINVAL, EIO, EISDIR, ENOSPC, ENOTDIR, ENOTEMPTY
+from struct import Struct
+from typing import NamedTuple, TypeAlias
+
+from colibri.mavlink.files.tree import Entry, Names, Refusal, names_of
+from colibri.mavlink.node.service import Peer, Send, to
+
+PAYLOAD_BYTES = 251
+DATA_BYTES = 239
+
+
+class Opcode(IntEnum):
+    """What a request asks for, and what kind an answer is."""
+
+    NONE = 0
+    TERMINATE = 1
+    RESET = 2
+    LIST = 3
+    OPEN_TO_READ = 4
+    READ = 5
+    CREATE = 6
+    WRITE = 7
+    REMOVE = 8
+    MAKE_FOLDER = 9
+    REMOVE_FOLDER = 10
+    OPEN_TO_WRITE = 11
+    TRUNCATE = 12
+    RENAME = 13
+    CHECKSUM = 14
+    BURST = 15
+    LIST_WITH_TIME = 16
+    ACK = 128
+    NAK = 129
+
+
+class Error(IntEnum):
+    """Why a request is refused."""
+
+    FAIL_ERRNO = 2
+    INVALID_DATA_SIZE = 3
+    INVALID_SESSION = 4
+    NO_SESSIONS = 5
+    END_OF_FILE = 6
+    UNKNOWN_COMMAND = 7
+    EXISTS = 8
+    PROTECTED = 9
+    NOT_FOUND = 10
+
+
+SIZE = Struct("<I")
+"""A file's size, or its checksum, in an answer."""
+_HEADER = Struct("<HBBBBBxI")
+
+Key: TypeAlias = tuple[Peer, int]
+"""A session: whose, and its number."""
+
+
+class Request(NamedTuple):
+    """A request of a client.
+
+    Attributes:
+        peer: The client.
+        now_us: Simulated time.
+        payload: The whole of it.
+        sequence: Its number.
+        session: Number of the session.
+        opcode: What to do.
+        size: Length of the data, or of what to read.
+        offset: In a file, or among the entries of a folder.
+        data: Not more than `size` bytes.
+    """
+
+    peer: Peer
+    now_us: int
+    payload: bytes
+    sequence: int
+    session: int
+    opcode: int
+    size: int
+    offset: int
+    data: bytes
+
+    @property
+    def key(self) -> Key:
+        """The session that is meant."""
+        return self.peer, self.session
+
+
+class Nak(NamedTuple):
+    """A refusal: why, and errno with FAIL_ERRNO."""
+
+    error: Error
+    errno: int = 0
+
+
+_NAKS = {
+    Refusal.NOT_FOUND: Nak(Error.NOT_FOUND),
+    Refusal.EXISTS: Nak(Error.EXISTS),
+    Refusal.PROTECTED: Nak(Error.PROTECTED),
+    Refusal.NO_SPACE: Nak(Error.FAIL_ERRNO, ENOSPC),
+    Refusal.IS_FOLDER: Nak(Error.FAIL_ERRNO, EISDIR),
+    Refusal.NOT_A_FOLDER: Nak(Error.FAIL_ERRNO, ENOTDIR),
+    Refusal.NOT_EMPTY: Nak(Error.FAIL_ERRNO, ENOTEMPTY),
+    Refusal.BAD_NAME: Nak(Error.FAIL_ERRNO, EINVAL),
+    Refusal.FAILED: Nak(Error.FAIL_ERRNO, EIO),
+}
+
+
+def request_of(payload: bytes, peer: Peer, now_us: int) -> Request:
+    """Return the request in a message's payload."""
+    payload = payload.ljust(PAYLOAD_BYTES, b"\0")
+    sequence, session, opcode, size, _, _, offset = _HEADER.unpack_from(payload)
+    data = payload[_HEADER.size :][:size]
+    return Request(peer, now_us, payload, sequence, session, opcode, size, offset, data)
+
+
+def answer(request: Request, outcome: bytes | Nak | Refusal, *, last: bool = False) -> Send:
+    """Answer with data, or with why not."""
+    opcode = Opcode.ACK
+    if isinstance(outcome, Refusal):
+        outcome = _NAKS[outcome]
+    if isinstance(outcome, Nak):
+        opcode = Opcode.NAK
+        outcome = bytes(outcome) if outcome.errno else bytes(outcome[:1])
+    sequence = (request.sequence + 1) % 0x10000
+    header = _HEADER.pack(sequence, request.session, opcode, len(outcome), request.opcode, last, request.offset)
+    peer = request.peer
+    payload = (header + outcome).ljust(PAYLOAD_BYTES, b"\0")
+    return to(peer, "FILE_TRANSFER_PROTOCOL", 0, peer.system, peer.component, payload)
+
+
+def path_in(data: bytes) -> Names | Refusal:
+    """Return the path that data begins with."""
+    try:
+        return names_of(data.split(b"\0", 1)[0].decode())
+    except UnicodeDecodeError:
+        return Refusal.NOT_FOUND
+
+
+def line_of(entry: Entry, *, with_time: bool) -> bytes:
+    """Return a folder's entry as it is listed: List Directory, List Directory with Timestamps.
+
+    What cannot be told is skipped by an "S", so that the entries behind it keep their numbers.
+    """
+    name = entry.name.encode(errors="replace")
+    kind = b"D" if entry.is_folder else b"F"
+    facts = b"\t%d\t%d" % (entry.size, entry.modified_s) if with_time else b"\t%d" % entry.size
+    if entry.is_folder and not with_time:  # as PX4 and ArduPilot do: clients would show the size as part of the name
+        facts = b""
+    line = kind + name + facts + b"\0"
+    return line if entry.name.isprintable() and len(line) <= DATA_BYTES else b"S\0"

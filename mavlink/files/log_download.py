@@ -1,0 +1,192 @@
+"""The logs of flights: listed, downloaded and erased.
+
+Specification: the messages LOG_REQUEST_LIST (117) to LOG_REQUEST_END (122), https://mavlink.io/en/messages/common.html;
+there is no page of the service. The logs are the files of one folder by name, and a log's id is its place, from 0.
+A client's ids stay those of its last list, whatever is added or removed meanwhile.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+from colibri.mavlink.files.tree import Entry, Files, Names, Reading, Refusal
+from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.wire.dialect import Message
+
+BLOCK_BYTES = 90
+MESSAGES_A_POLL = 20
+MESSAGES_A_POLL_OF_A_LONG_PART = 8
+SHORT_BYTES = 256 * BLOCK_BYTES
+"""What a client's socket surely holds until it is read: MAVSDK and QGroundControl ask for no more at once. MAVProxy
+asks for a whole log, and cannot read it as fast as it could be sent."""
+MOST_TRANSFERS_OF_A_PEER = 32
+MOST_PEERS = 16
+LAST_ID = 0xFFFF
+
+_LARGEST = 0xFFFFFFFF
+
+
+@dataclass(slots=True)
+class _Listing:
+    """Entries on their way to a client."""
+
+    peer: Peer
+    next: int
+    last: int
+
+
+@dataclass(slots=True)
+class _Transfer:
+    """A part of a log on its way to a client.
+
+    Attributes:
+        offset: Of what is sent next.
+        end: Where the part ends, as the client asked for it.
+    """
+
+    peer: Peer
+    id: int
+    reading: Reading
+    offset: int
+    end: int
+
+
+class Logs:
+    """Serves the logs in a folder.
+
+    Attributes:
+        hears: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_ERASE, LOG_REQUEST_END.
+    """
+
+    hears = frozenset({"LOG_REQUEST_LIST", "LOG_REQUEST_DATA", "LOG_ERASE", "LOG_REQUEST_END"})
+
+    def __init__(
+        self, files: Files, folder: Names = (), being_written: Callable[[], str | None] = lambda: None
+    ) -> None:
+        """Serve the files in `folder`, all of which are logs.
+
+        Args:
+            files: Where they are.
+            folder: Which of them are logs.
+            being_written: Returns the name of the log that is still written to, which is not erased; None for none.
+        """
+        self._files = files
+        self._folder = folder
+        self._being_written = being_written
+        self._shown: dict[Peer, list[Entry]] = {}
+        self._listings: dict[Peer, _Listing] = {}
+        self._transfers: deque[_Transfer] = deque()
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Take in a request."""
+        del now_us
+        fields = message.fields
+        if message.name == "LOG_REQUEST_LIST":
+            return self._list(peer, fields.start, fields.end)
+        if message.name == "LOG_REQUEST_DATA":
+            return self._transfer(peer, fields.id, fields.ofs, fields.count)
+        if message.name == "LOG_ERASE":
+            self._erase()
+        elif message.name == "LOG_REQUEST_END":
+            self._stop(peer)
+        return ()
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        """Go on with what was asked for."""
+        del now_us
+        if not self._transfers and not self._listings:
+            return ()
+        return self._due()
+
+    def _due(self) -> list[Send]:
+        sends: list[Send] = []
+        for listing in list(self._listings.values()):
+            sends += self._entries(listing)
+        share = max(MESSAGES_A_POLL // max(len(self._transfers), 1), 1)
+        for _ in range(min(len(self._transfers), MESSAGES_A_POLL)):
+            transfer = self._transfers.popleft()
+            is_long = transfer.end - transfer.offset > SHORT_BYTES
+            sends += _blocks(transfer, min(share, MESSAGES_A_POLL_OF_A_LONG_PART) if is_long else share)
+            if transfer.offset < transfer.end:
+                self._transfers.append(transfer)
+        return sends
+
+    def _list(self, peer: Peer, start: int, end: int) -> Iterable[Send]:
+        logs = self._look(peer)
+        if not logs:  # "answered with one LOG_ENTRY message with id = 0 and num_logs = 0"
+            return (to(peer, "LOG_ENTRY", 0, 0, 0, 0, 0),)
+        self._listings[peer] = _Listing(peer, start, min(end, len(logs) - 1))
+        return ()
+
+    def _entries(self, listing: _Listing) -> Iterator[Send]:
+        logs = self._shown.get(listing.peer, ())
+        last = min(listing.last, len(logs) - 1)
+        until = min(last + 1, listing.next + MESSAGES_A_POLL)
+        for number in range(listing.next, until):
+            log = logs[number]
+            facts = (len(logs), len(logs) - 1, log.modified_s & _LARGEST, min(log.size, _LARGEST))
+            yield to(listing.peer, "LOG_ENTRY", number, *facts)
+        listing.next = until
+        if until > last:
+            self._listings.pop(listing.peer, None)
+
+    def _look(self, peer: Peer) -> list[Entry]:
+        """Return the logs that there are now, and stay with their ids for this client."""
+        found = self._files.list(self._folder)
+        logs = [] if isinstance(found, Refusal) else [entry for entry in found if not entry.is_folder]
+        self._shown.pop(peer, None)
+        if len(self._shown) >= MOST_PEERS:
+            forgotten = next(iter(self._shown))
+            del self._shown[forgotten]
+            self._stop(forgotten)
+        self._shown[peer] = logs[-LAST_ID:]
+        return self._shown[peer]
+
+    def _transfer(self, peer: Peer, number: int, offset: int, count: int) -> Iterable[Send]:
+        logs = self._shown[peer] if peer in self._shown else self._look(peer)
+        reading = self._files.open((*self._folder, logs[number].name)) if number < len(logs) else Refusal.NOT_FOUND
+        if isinstance(reading, Refusal) or offset >= reading.size or count == 0:
+            return (_block(peer, number, offset, b""),)  # "zero for end of log"
+        transfer = _Transfer(peer, number, reading, offset, offset + count)
+        # A client that asks for another log has turned away from the one before.
+        self._transfers = deque(known for known in self._transfers if known.peer != peer or known.id == number)
+        of_peer = [known for known in self._transfers if known.peer == peer]
+        asked_again = any(
+            (known.id, known.end) == (number, transfer.end) and known.offset <= offset for known in of_peer
+        )
+        if not asked_again and len(of_peer) < MOST_TRANSFERS_OF_A_PEER:
+            self._transfers.append(transfer)
+        return ()
+
+    def _stop(self, peer: Peer) -> None:
+        self._listings.pop(peer, None)
+        self._transfers = deque(transfer for transfer in self._transfers if transfer.peer != peer)
+
+    def _erase(self) -> None:
+        found = self._files.list(self._folder)
+        kept = self._being_written()
+        for entry in () if isinstance(found, Refusal) else found:
+            if not entry.is_folder and entry.name != kept:
+                self._files.remove((*self._folder, entry.name))
+        self._shown.clear()
+        self._listings.clear()
+        self._transfers.clear()
+
+
+def _blocks(transfer: _Transfer, most: int) -> Iterator[Send]:
+    """Send the next blocks; where the log ends with a full one, an empty one tells so."""
+    wanted = min(most * BLOCK_BYTES, transfer.end - transfer.offset)
+    data = transfer.reading.read(transfer.offset, wanted)
+    if isinstance(data, Refusal):
+        data = b""
+    for start in range(0, len(data), BLOCK_BYTES):
+        yield _block(transfer.peer, transfer.id, transfer.offset + start, data[start : start + BLOCK_BYTES])
+    transfer.offset += len(data)
+    if len(data) < wanted:
+        if len(data) % BLOCK_BYTES == 0:
+            yield _block(transfer.peer, transfer.id, transfer.offset, b"")
+        transfer.end = transfer.offset
+
+
+def _block(peer: Peer, number: int, offset: int, data: bytes) -> Send:
+    return to(peer, "LOG_DATA", number, offset, len(data), data.ljust(BLOCK_BYTES, b"\0"))

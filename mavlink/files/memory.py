@@ -1,0 +1,139 @@
+"""Files in memory: what a vehicle keeps that was given no folder."""
+
+from functools import partial
+
+from colibri.mavlink.files.tree import Entry, Names, Quota, Reading, Refusal, can_be_new
+
+DEFAULT_QUOTA = Quota(8 << 20, 1000)
+
+
+class Memory:
+    """Files in memory."""
+
+    def __init__(self, quota: Quota = DEFAULT_QUOTA) -> None:
+        """Begin with nothing."""
+        self._quota = quota
+        self._files: dict[Names, bytearray] = {}
+        self._folders: set[Names] = {()}
+        self._size = 0
+
+    def list(self, names: Names) -> list[Entry] | Refusal:
+        """Return what a folder holds, by name."""
+        if names not in self._folders:
+            return self._no_way(names) or (Refusal.NOT_A_FOLDER if names in self._files else Refusal.NOT_FOUND)
+        found = [Entry(path[-1], True) for path in self._folders if path and path[:-1] == names]
+        found += [Entry(path[-1], False, len(data)) for path, data in self._files.items() if path[:-1] == names]
+        return sorted(found)
+
+    def open(self, names: Names) -> Reading | Refusal:
+        """Open a file to read it."""
+        return self._no_file(names) or Reading(len(self._files[names]), partial(self._read, names))
+
+    def create(self, names: Names) -> Refusal | None:
+        """Make an empty file; one that exists is emptied."""
+        if names in self._files:
+            return self.truncate(names, 0)
+        refusal = self._no_room(names)
+        if refusal is None:
+            self._files[names] = bytearray()
+        return Refusal.IS_FOLDER if refusal is Refusal.EXISTS else refusal
+
+    def write(self, names: Names, offset: int, data: bytes) -> Refusal | None:
+        """Put `data` into a file; a gap before it is zeros."""
+        refusal = self._no_file(names)
+        if refusal is not None:
+            return refusal
+        file = self._files[names]
+        more = max(offset + len(data) - len(file), 0) if data else 0
+        if self._size + more > self._quota.size:
+            return Refusal.NO_SPACE
+        self._size += more
+        file.extend(bytes(more))
+        file[offset : offset + len(data)] = data
+        return None
+
+    def truncate(self, names: Names, size: int) -> Refusal | None:
+        """Keep the first `size` bytes of a file; nothing where it has fewer."""
+        refusal = self._no_file(names)
+        if refusal is None:
+            self._size -= max(len(self._files[names]) - size, 0)
+            del self._files[names][size:]
+        return refusal
+
+    def remove(self, names: Names) -> Refusal | None:
+        """Remove a file."""
+        refusal = self._no_file(names) if names else Refusal.PROTECTED
+        if refusal is None:
+            self._size -= len(self._files.pop(names))
+        return refusal
+
+    def rename(self, old: Names, new: Names) -> Refusal | None:
+        """Give a file or folder another place, where nothing is yet."""
+        refusal = self._no_way(old) if old else Refusal.PROTECTED
+        refusal = refusal or (self._no_way(new) if new else Refusal.PROTECTED)
+        if refusal is not None:
+            return refusal
+        if old not in self._files and old not in self._folders:
+            return Refusal.NOT_FOUND
+        refusal = self._no_place(new)
+        if refusal is not None:
+            return refusal
+        if new[: len(old)] == old:
+            return Refusal.BAD_NAME
+        self._files = {_moved(path, old, new): data for path, data in self._files.items()}
+        self._folders = {_moved(path, old, new) for path in self._folders}
+        return None
+
+    def make_folder(self, names: Names) -> Refusal | None:
+        """Make a folder."""
+        refusal = self._no_room(names)
+        if refusal is None:
+            self._folders.add(names)
+        return refusal
+
+    def remove_folder(self, names: Names) -> Refusal | None:
+        """Remove an empty folder."""
+        if not names:
+            return Refusal.PROTECTED
+        found = self.list(names)
+        if isinstance(found, Refusal):
+            return found
+        if found:
+            return Refusal.NOT_EMPTY
+        self._folders.remove(names)
+        return None
+
+    def _read(self, names: Names, offset: int, count: int) -> bytes | Refusal:
+        return self._no_file(names) or bytes(self._files[names][offset : offset + count])
+
+    def _no_way(self, names: Names) -> Refusal | None:
+        """Return why nothing can be at `names`: the folders that lead there."""
+        for depth in range(1, len(names)):
+            if names[:depth] not in self._folders:
+                return Refusal.NOT_A_FOLDER if names[:depth] in self._files else Refusal.NOT_FOUND
+        return None
+
+    def _no_file(self, names: Names) -> Refusal | None:
+        """Return why there is no file."""
+        if names in self._files:
+            return None
+        if names in self._folders:
+            return Refusal.IS_FOLDER
+        return self._no_way(names) or Refusal.NOT_FOUND
+
+    def _no_place(self, names: Names) -> Refusal | None:
+        """Return why nothing can be put there."""
+        if not names:
+            return Refusal.PROTECTED
+        if names in self._files or names in self._folders:
+            return Refusal.EXISTS
+        return self._no_way(names) or (None if can_be_new(names[-1]) else Refusal.BAD_NAME)
+
+    def _no_room(self, names: Names) -> Refusal | None:
+        """Return why nothing new can be made there."""
+        full = len(self._files) + len(self._folders) > self._quota.entries  # the root is no entry
+        return self._no_place(names) or (Refusal.NO_SPACE if full else None)
+
+
+def _moved(path: Names, old: Names, new: Names) -> Names:
+    return new + path[len(old) :] if path[: len(old)] == old else path

@@ -1,0 +1,250 @@
+"""Faults by the names of MAV_CMD_INJECT_FAILURE: which there are, and what the numbers of each mean.
+
+param1 is the FAILURE_UNIT, param2 the FAILURE_TYPE, param3 the instance from 1 on or 0 for all, as
+https://mavlink.io/en/messages/common.html#MAV_CMD_INJECT_FAILURE has them. param4 to param7 mean what `TABLE` says: a
+number that is 0 or nan is not given. One fault at a time: another one of the same part takes its place, OK ends it.
+"""
+
+from collections.abc import Collection, Mapping
+from enum import StrEnum
+from math import isfinite, isnan
+from typing import Any, NamedTuple
+
+from colibri.common.types import FourRotors
+from colibri.mavlink.wire.dialect import RESULT_DENIED, RESULT_UNSUPPORTED, Codec, mav
+
+COMMAND: int = mav.MAV_CMD_INJECT_FAILURE
+GYROSCOPE: int = mav.FAILURE_UNIT_SENSOR_GYRO
+ACCELEROMETER: int = mav.FAILURE_UNIT_SENSOR_ACCEL
+MAGNETOMETER: int = mav.FAILURE_UNIT_SENSOR_MAG
+BAROMETER: int = mav.FAILURE_UNIT_SENSOR_BARO
+GPS: int = mav.FAILURE_UNIT_SENSOR_GPS
+BATTERY: int = mav.FAILURE_UNIT_SYSTEM_BATTERY
+MOTOR: int = mav.FAILURE_UNIT_SYSTEM_MOTOR
+OK: int = mav.FAILURE_TYPE_OK
+OFF: int = mav.FAILURE_TYPE_OFF
+STUCK: int = mav.FAILURE_TYPE_STUCK
+GARBAGE: int = mav.FAILURE_TYPE_GARBAGE
+WRONG: int = mav.FAILURE_TYPE_WRONG
+SLOW: int = mav.FAILURE_TYPE_SLOW
+DELAYED: int = mav.FAILURE_TYPE_DELAYED
+
+SENSORS = (GYROSCOPE, ACCELEROMETER, MAGNETOMETER, BAROMETER, GPS)
+ALL = 0
+"""The instance that stands for all of a part."""
+MOTORS = 4
+_ROUNDING = 1e-6
+"""Limits are kept to the precision of the wire."""
+_NOT_GIVEN: FourRotors = (0.0, 0.0, 0.0, 0.0)
+
+
+class Part(StrEnum):
+    """What a plant must have for a fault of it."""
+
+    ROTORS = "rotors"
+    BATTERY = "battery"
+    SENSORS = "sensors"
+    """The autopilot must fly by them, too: by the state, nothing that a sensor does changes a flight."""
+
+
+class Fault(NamedTuple):
+    """Something that goes wrong, or is well again.
+
+    Attributes:
+        unit: FAILURE_UNIT, where.
+        kind: FAILURE_TYPE, how.
+        instance: Which, from 1 on; 0 for all.
+        values: param4 to param7.
+    """
+
+    unit: int
+    kind: int
+    instance: int = ALL
+    values: FourRotors = _NOT_GIVEN
+
+
+class Refusal(NamedTuple):
+    """Why a fault is none.
+
+    Attributes:
+        result: MAV_RESULT.
+        reason: In words.
+    """
+
+    result: int
+    reason: str
+
+
+class Value(NamedTuple):
+    """What one of the numbers means.
+
+    Attributes:
+        name: What it is.
+        unit: SI, or the sensor's.
+        least: Smallest that is taken.
+        most: Largest that is taken.
+        usual: Taken where none of a fault's numbers is given.
+        rest: Taken where another is given and this is not.
+    """
+
+    name: str
+    unit: str
+    least: float
+    most: float
+    usual: float
+    rest: float
+
+
+class Row(NamedTuple):
+    """One kind of fault.
+
+    Attributes:
+        unit: FAILURE_UNIT.
+        kind: FAILURE_TYPE.
+        part: What the plant must have.
+        meaning: What it does.
+        values: What param4 and those behind it mean.
+        instances: How many there are of the unit.
+    """
+
+    unit: int
+    kind: int
+    part: Part
+    meaning: str
+    values: tuple[Value, ...] = ()
+    instances: int = 1
+
+
+def _scalar(name: str, unit: str, least: float, most: float, usual: float) -> Value:
+    return Value(name, unit, least, most, usual, usual)
+
+
+def _vector(name: str, unit: str, axes: str, most: float, usual: tuple[float, float, float]) -> tuple[Value, ...]:
+    return tuple(Value(f"{name} {axis}", unit, -most, most, it, 0.0) for axis, it in zip(axes, usual, strict=True))
+
+
+def _sensor(unit: int, wrong: tuple[Value, ...], drift: tuple[Value, ...], noise: Value, what: str) -> tuple[Row, ...]:
+    late = _scalar("late by", "s", 0.001, 10.0, 0.2)
+    part = Part.SENSORS
+    return (
+        Row(unit, OK, part, "is well again"),
+        Row(unit, OFF, part, "measures nothing new"),
+        Row(unit, STUCK, part, "tells what it told last, again and again, as if it were new"),
+        Row(unit, GARBAGE, part, "has more noise: white, normal", (noise,)),
+        Row(unit, WRONG, part, f"is off by {what}", wrong),
+        Row(unit, SLOW, part, "drifts away: is off as by WRONG, and more from now on", drift),
+        Row(unit, DELAYED, part, "tells later", (late,)),
+    )
+
+
+ROWS: tuple[Row, ...] = (
+    *_sensor(
+        GYROSCOPE,
+        _vector("bias", "rad/s", "xyz", 20.0, (0.1, 0.0, 0.0)),
+        _vector("drift", "rad/s²", "xyz", 1.0, (0.01, 0.0, 0.0)),
+        _scalar("standard deviation", "rad/s", 1e-4, 20.0, 0.5),
+        "a bias, forward-left-up",
+    ),
+    *_sensor(
+        ACCELEROMETER,
+        _vector("bias", "m/s²", "xyz", 100.0, (0.0, 0.0, 2.0)),
+        _vector("drift", "m/s³", "xyz", 10.0, (0.0, 0.0, 0.1)),
+        _scalar("standard deviation", "m/s²", 1e-3, 100.0, 5.0),
+        "a bias, forward-left-up",
+    ),
+    *_sensor(
+        MAGNETOMETER,
+        _vector("bias", "gauss", "xyz", 10.0, (0.2, 0.0, 0.0)),
+        _vector("drift", "gauss/s", "xyz", 1.0, (0.01, 0.0, 0.0)),
+        _scalar("standard deviation", "gauss", 1e-4, 10.0, 0.3),
+        "a bias, forward-left-up",
+    ),
+    *_sensor(
+        BAROMETER,
+        (_scalar("bias", "Pa", -20000.0, 20000.0, 100.0),),
+        (_scalar("drift", "Pa/s", -1000.0, 1000.0, 5.0),),
+        _scalar("standard deviation", "Pa", 0.1, 20000.0, 200.0),
+        "a bias, of which 12 Pa are a metre",
+    ),
+    *_sensor(
+        GPS,
+        _vector("jump", "m", "xyz", 10000.0, (10.0, 0.0, 0.0)),
+        _vector("drift", "m/s", "xyz", 100.0, (0.5, 0.0, 0.0)),
+        _scalar("standard deviation", "m", 0.01, 1000.0, 10.0),
+        "a distance, east-north-up",
+    ),
+    Row(BATTERY, OK, Part.BATTERY, "is well again, and has back what a fault took"),
+    Row(BATTERY, OFF, Part.BATTERY, "is empty: its voltage falls to that of no charge"),
+    Row(
+        *(BATTERY, WRONG, Part.BATTERY, "sags: less charge, and the voltage with it; a larger resistance"),
+        values=(
+            Value("part of the full charge that is left", "1", 1e-3, 1.0, 0.2, 0.2),
+            Value("times its resistance", "1", 0.1, 10.0, 1.0, 1.0),
+        ),
+    ),
+    Row(MOTOR, OK, Part.ROTORS, "is well again", instances=MOTORS),
+    Row(MOTOR, OFF, Part.ROTORS, "is lost: nothing drives it, it runs down", instances=MOTORS),
+    Row(MOTOR, STUCK, Part.ROTORS, "turns as fast as at this moment, whatever is commanded", instances=MOTORS),
+    Row(
+        *(MOTOR, WRONG, Part.ROTORS, "is weak: has a part of its thrust and torque"),
+        values=(_scalar("part that is left", "1", 1e-3, 1.0, 0.65),),
+        instances=MOTORS,
+    ),
+)
+TABLE: Mapping[tuple[int, int], Row] = {(row.unit, row.kind): row for row in ROWS}
+"""Every fault that any plant can do."""
+
+
+def unit_name(unit: int) -> str:
+    """Return a FAILURE_UNIT as a person calls it."""
+    return str(mav.enums["FAILURE_UNIT"][unit].name).removeprefix("FAILURE_UNIT_")
+
+
+def kind_name(kind: int) -> str:
+    """Return a FAILURE_TYPE as a person calls it."""
+    return str(mav.enums["FAILURE_TYPE"][kind].name).removeprefix("FAILURE_TYPE_")
+
+
+def fault_from(p1: float, p2: float, p3: float, values: FourRotors) -> Fault | None:
+    """Return the fault of a command's parameters; None where what should be counted is no whole number."""
+    p3 = 0.0 if isnan(p3) else p3
+    if not all(isfinite(number) and number == int(number) for number in (p1, p2, p3)):
+        return None
+    return Fault(int(p1), int(p2), int(p3), values)
+
+
+def judged(fault: Fault, parts: Collection[Part]) -> Fault | Refusal:
+    """Return a fault with all numbers that it has; or why there can be none such where only `parts` are."""
+    row = TABLE.get((fault.unit, fault.kind))
+    if row is None:
+        return Refusal(RESULT_UNSUPPORTED, "no plant does this fault")
+    if row.part not in parts:
+        without = "flown by the state, not by sensors" if row.part is Part.SENSORS else f"no {row.part} to fail"
+        return Refusal(RESULT_UNSUPPORTED, without)
+    if not 0 <= fault.instance <= row.instances:
+        return Refusal(RESULT_DENIED, f"instance must be 0 to {row.instances}")
+    return _with_values(row, fault)
+
+
+def encode_fault(codec: Codec, fault: Fault, target: tuple[int, int]) -> bytes:
+    """Encode a fault as COMMAND_LONG to system and component `target`."""
+    return codec.encode("COMMAND_LONG", *target, COMMAND, 0, fault.unit, fault.kind, fault.instance, *fault.values)
+
+
+def decode_fault(fields: Any) -> Fault | None:
+    """Return the fault of a COMMAND_LONG; None where it names none."""
+    values = (fields.param4, fields.param5, fields.param6, fields.param7)
+    return fault_from(fields.param1, fields.param2, fields.param3, values)
+
+
+def _with_values(row: Row, fault: Fault) -> Fault | Refusal:
+    given = [0.0 if isnan(value) else value for value in fault.values[: len(row.values)]]
+    some = any(given)
+    taken = [value or (it.rest if some else it.usual) for value, it in zip(given, row.values, strict=True)]
+    for value, it in zip(taken, row.values, strict=True):
+        slack = _ROUNDING * max(abs(it.least), abs(it.most))
+        if value and not it.least - slack <= value <= it.most + slack:
+            unit = "" if it.unit == "1" else f" {it.unit}"
+            return Refusal(RESULT_DENIED, f"{it.name} must be {it.least:g} to {it.most:g}{unit}")
+    a, b, c, d = (*taken, *_NOT_GIVEN)[: len(_NOT_GIVEN)]
+    return fault._replace(values=(a, b, c, d))

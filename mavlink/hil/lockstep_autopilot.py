@@ -1,0 +1,167 @@
+"""The autopilot's end of the conversation in lockstep."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+from colibri.mavlink.hil.faults import COMMAND as INJECT_FAILURE
+from colibri.mavlink.hil.faults import Fault, encode_fault
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.lockstep import (
+    ASKED_BY,
+    CALL_AFTER_S,
+    CALL_EVERY_S,
+    FREE_RUNNING,
+    HEARTBEAT_EVERY_US,
+    MADE_OF,
+    encode_heartbeat,
+)
+from colibri.mavlink.hil.plant_status import (
+    NOTHING,
+    Aside,
+    decode_battery,
+    decode_result,
+)
+from colibri.mavlink.hil.sensors import Frame, decode_sensors
+from colibri.mavlink.hil.state import (
+    ActuatorCommand,
+    decode_state,
+    encode_actuators,
+)
+from colibri.mavlink.wire import dialect
+from colibri.mavlink.wire.dialect import Codec, Message
+
+
+class AutopilotEnd:
+    """The autopilot's end: calls the plant, hands each new frame out once, remembers the last answer.
+
+    Attributes:
+        refused: The plant's refusal of the frames asked for (a MAV_RESULT), None if there was none.
+        repeated: How many frames came again and got the remembered answer.
+        dropped: What was received and not used, by reason.
+        aside: What the plant told beside the frame that was handed out last.
+    """
+
+    def __init__(
+        self, *, system_id: int, frame_interval_us: int, now_s: float, feedback: Feedback = Feedback.STATE
+    ) -> None:
+        """Speak as the autopilot of `system_id`, ask the plant for a frame of `feedback` every `frame_interval_us`."""
+        self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
+        self._plant = (system_id, dialect.PLANT_COMPONENT)
+        self._frame_interval_us = frame_interval_us
+        self._feedback = feedback
+        self._made_of = MADE_OF[feedback]
+        self.aside = NOTHING
+        self._runs_freely = False
+        self.refused: int | None = None
+        self.repeated = 0
+        self.dropped: Counter[str] = self._codec.dropped
+        self._time_us: int | None = None
+        self._answer: bytes | None = None
+        self._heard_s = now_s - CALL_AFTER_S
+        self._call_at_s = now_s
+        self._outbox: list[bytes] = []
+
+    def silence_s(self, now_s: float) -> float:
+        """How long the plant has been silent."""
+        return now_s - self._heard_s
+
+    def receive(self, datagram: bytes, now_s: float) -> Frame | None:
+        """Take one datagram in; return its frame if that is the next one to compute."""
+        parts: dict[str, Message] = {}
+        battery, results = None, []
+        for message in self._codec.decode(datagram):
+            if message.source != self._plant:
+                self.dropped["foreign"] += 1
+            elif message.name in self._made_of:
+                parts[message.name] = message
+            elif message.name == "COMMAND_ACK" and message.fields.command == INJECT_FAILURE:
+                results.append(decode_result(message))
+            elif message.name == "COMMAND_ACK":
+                self._hear_ack(message)
+            elif message.name == "BATTERY_STATUS":
+                battery = decode_battery(message)
+            elif message.name == "HEARTBEAT":
+                self._runs_freely = message.fields.custom_mode == FREE_RUNNING
+            else:
+                self.dropped["unexpected"] += 1
+        if not parts:
+            return None
+        frame = self._decoded(parts)
+        if frame is None:
+            self.dropped["invalid"] += 1
+            return None
+        following = self._next(frame, now_s)
+        if following is not None:
+            self.aside = Aside(battery, tuple(results))
+        return following
+
+    def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
+        """Send the command that answers the frame handed out last, with faults to happen then, and remember it."""
+        answer = encode_actuators(self._codec, command)
+        for fault in faults:
+            answer += encode_fault(self._codec, fault, self._plant)
+        if command.time_us % HEARTBEAT_EVERY_US == 0:
+            answer += self._heartbeat(command.armed)
+        self._answer = answer
+        self._outbox.append(answer)
+
+    def poll(self, now_s: float) -> float:
+        """Do what is due at `now_s`; return the time at which something will be due again."""
+        if self.silence_s(now_s) < CALL_AFTER_S:
+            return self._heard_s + CALL_AFTER_S
+        if now_s >= self._call_at_s:
+            self._call_at_s = now_s + CALL_EVERY_S
+            self._outbox.append(self._call())
+        return self._call_at_s
+
+    def take_outbox(self) -> list[bytes]:
+        """Return the datagrams to send to the plant now, and forget them."""
+        outbox, self._outbox = self._outbox, []
+        return outbox
+
+    def _decoded(self, parts: dict[str, Message]) -> Frame | None:
+        first, second = (parts.get(name) for name in self._made_of)
+        if first is None:
+            return None
+        if self._feedback is Feedback.SENSORS:
+            return decode_sensors(first, second)
+        return None if second is None else decode_state(first, second)
+
+    def _next(self, frame: Frame, now_s: float) -> Frame | None:
+        lost = self.silence_s(now_s) >= CALL_AFTER_S
+        if frame.time_us == self._time_us:
+            self._heard_s = now_s
+            self.repeated += 1
+            if self._answer is not None:
+                self._outbox.append(self._answer)
+            return None
+        if self._time_us is not None and not lost and not self._follows(frame.time_us, self._time_us):
+            self.dropped["out of step"] += 1
+            return None
+        self._heard_s = now_s
+        self._time_us = frame.time_us
+        self._answer = None
+        return frame
+
+    def _follows(self, time_us: int, before_us: int) -> bool:
+        return time_us > before_us if self._runs_freely else time_us == before_us + self._frame_interval_us
+
+    def _hear_ack(self, message: Message) -> None:
+        fields = message.fields
+        refused = fields.command == dialect.CMD_SET_MESSAGE_INTERVAL and fields.result != dialect.RESULT_ACCEPTED
+        self.refused = fields.result if refused else None
+
+    def _call(self) -> bytes:
+        request = self._codec.encode(
+            "COMMAND_LONG",
+            *self._plant,
+            dialect.CMD_SET_MESSAGE_INTERVAL,
+            0,
+            ASKED_BY[self._feedback],
+            self._frame_interval_us,
+            *[0.0] * 5,
+        )
+        return request + self._heartbeat(armed=False)
+
+    def _heartbeat(self, armed: bool) -> bytes:
+        return encode_heartbeat(self._codec, dialect.TYPE_QUADROTOR, dialect.AUTOPILOT_GENERIC, armed)

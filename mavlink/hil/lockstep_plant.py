@@ -1,0 +1,239 @@
+"""The plant's end of the conversation in lockstep."""
+
+from collections import Counter
+from collections.abc import Collection
+from typing import NamedTuple
+
+from colibri.common.types import Address
+from colibri.mavlink.hil.faults import COMMAND as INJECT_FAILURE
+from colibri.mavlink.hil.faults import Fault, decode_fault
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.lockstep import (
+    ASKS_FOR,
+    BATTERY_EVERY_US,
+    FREE_RUNNING,
+    HEARTBEAT_EVERY_US,
+    MAX_FRAME_INTERVAL_US,
+    MIN_FRAME_INTERVAL_US,
+    PEER_LOST_AFTER_S,
+    RESEND_AFTER_S,
+    encode_heartbeat,
+)
+from colibri.mavlink.hil.plant_status import (
+    NOTHING,
+    Aside,
+    PlantBattery,
+    encode_battery,
+    encode_results,
+)
+from colibri.mavlink.hil.sensors import Frame, encode_sensors
+from colibri.mavlink.hil.state import (
+    ActuatorCommand,
+    StateFrame,
+    decode_actuators,
+    encode_state,
+)
+from colibri.mavlink.wire import dialect
+from colibri.mavlink.wire.dialect import Codec, Message
+
+
+class Outgoing(NamedTuple):
+    """A datagram to send, the address it goes to, and the frames that it is made of."""
+
+    frames: tuple[bytes, ...]
+    address: Address
+
+    @property
+    def datagram(self) -> bytes:
+        """The bytes to send."""
+        return b"".join(self.frames)
+
+
+class PlantEnd:
+    """The plant's end: offers a frame, waits for its answer.
+
+    Attributes:
+        peer: Where the autopilot is, None until one has called.
+        frame_interval_us: Time between frames; fixed once the first frame was offered.
+        feedback: Which frames the autopilot wants; fixed then, too.
+        resent: How many times a frame was sent again.
+        dropped: What was received and not used, by reason.
+        received: Frames of the autopilot that were understood, in order; the owner may log and clear it.
+        waits: Whether a frame is sent again until it is answered; else the plant runs freely.
+    """
+
+    def __init__(
+        self,
+        *,
+        system_id: int,
+        frame_interval_us: int,
+        serves: Collection[Feedback] = (Feedback.STATE,),
+        waits: bool = True,
+    ) -> None:
+        """Wait for the autopilot of `system_id`; `frame_interval_us` holds unless it asks for another.
+
+        It may ask for what the plant `serves`; the state, unless it does.
+        """
+        self.waits = waits
+        self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
+        self._truth_codec = Codec(system_id, dialect.TRUTH_COMPONENT)
+        self._autopilot = (system_id, dialect.AUTOPILOT_COMPONENT)
+        self.peer: Address | None = None
+        self.frame_interval_us = frame_interval_us
+        self.feedback = Feedback.STATE
+        self._serves = frozenset(serves)
+        self.resent = 0
+        self.dropped: Counter[str] = self._codec.dropped
+        self.received: list[bytes] = []
+        self._peer_heard_s = 0.0
+        self._frames: tuple[bytes, ...] = ()
+        self._begun = False
+        self._awaited_us: int | None = None
+        self._answered_us: int | None = None
+        self._battery: PlantBattery | None = None
+        self._faults: list[Fault] = []
+        self._resend_at_s = 0.0
+        self._outbox: list[Outgoing] = []
+
+    def offer(self, frame: Frame, now_s: float, aside: Aside = NOTHING, truth: StateFrame | None = None) -> None:
+        """Send `frame`, of the kind of `feedback`, and what goes beside it; await the command that answers it.
+
+        The `truth` is appended, as another component's, for whoever stands in between: it is not the autopilot's.
+        """
+        if isinstance(frame, StateFrame):
+            frames = encode_state(self._codec, frame)
+        else:
+            frames = encode_sensors(self._codec, frame)
+        if frame.time_us % HEARTBEAT_EVERY_US == 0:
+            frames.append(self._heartbeat())
+        if aside.results:
+            frames += encode_results(self._codec, aside.results, self._autopilot)
+        self._battery = aside.battery
+        if aside.battery is not None and frame.time_us % BATTERY_EVERY_US == 0:
+            frames.append(encode_battery(self._codec, aside.battery))
+        if truth is not None:
+            frames += encode_state(self._truth_codec, truth)
+        self._frames = tuple(frames)
+        self._begun = True
+        self._awaited_us = frame.time_us
+        self._send_frame(now_s)
+
+    def receive(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
+        """Take one datagram in; return the command that answers the frame awaited, if it holds that."""
+        command = None
+        asked: list[Message] = []
+        for message in self._codec.decode(datagram):
+            if message.source != self._autopilot:
+                self.dropped["foreign"] += 1
+                continue
+            if message.name == "HEARTBEAT":
+                self._hear_heartbeat(sender, now_s)
+            elif message.name == "COMMAND_LONG" and message.fields.command == INJECT_FAILURE:
+                asked.append(message)
+            elif message.name == "COMMAND_LONG":
+                self._obey(message, sender)
+            elif message.name == "HIL_ACTUATOR_CONTROLS" and sender == self.peer:
+                command = self._accept(message) or command
+            else:
+                self.dropped["unexpected"] += 1
+                continue
+            if sender == self.peer:
+                self._peer_heard_s = now_s
+                self.received.append(message.frame)
+        for message in asked:
+            self._hear_fault(message, answered=command is not None)
+        return command
+
+    def take_faults(self) -> list[Fault]:
+        """Return the faults that came with the last answer, and forget them; nobody has judged them yet."""
+        faults, self._faults = self._faults, []
+        return faults
+
+    def poll(self, now_s: float) -> float:
+        """Do what is due at `now_s`; return the time at which something will be due again."""
+        if self._awaited_us is None or not self.waits:
+            return now_s + RESEND_AFTER_S
+        if now_s >= self._resend_at_s:
+            self.resent += 1
+            self._send_frame(now_s)
+        return self._resend_at_s
+
+    def take_outbox(self) -> list[Outgoing]:
+        """Return the datagrams to send now, and forget them."""
+        outbox, self._outbox = self._outbox, []
+        return outbox
+
+    def _send_frame(self, now_s: float) -> None:
+        self._resend_at_s = now_s + RESEND_AFTER_S
+        if self.peer is not None:
+            self._outbox.append(Outgoing(self._frames, self.peer))
+
+    def _hear_heartbeat(self, sender: Address, now_s: float) -> None:
+        if sender == self.peer:
+            return
+        if self.peer is not None and now_s - self._peer_heard_s < PEER_LOST_AFTER_S:
+            self.dropped["second autopilot"] += 1
+            return
+        self.peer = sender
+        if self._awaited_us is not None:
+            if self._battery is not None:
+                self._frames += (encode_battery(self._codec, self._battery),)
+            if not self.waits:
+                self._frames += (self._heartbeat(),)
+            self._send_frame(now_s)
+
+    def _heartbeat(self) -> bytes:
+        mode = 0 if self.waits else FREE_RUNNING
+        return encode_heartbeat(
+            self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False, custom_mode=mode
+        )
+
+    def _hear_fault(self, message: Message, *, answered: bool) -> None:
+        fields = message.fields
+        if (fields.target_system, fields.target_component) != self._codec.source:
+            self.dropped["foreign"] += 1
+        elif not answered:
+            self.dropped["repeated"] += 1
+        elif (fault := decode_fault(fields)) is None:
+            self.dropped["invalid"] += 1
+        else:
+            self._faults.append(fault)
+
+    def _obey(self, message: Message, sender: Address) -> None:
+        fields = message.fields
+        if (fields.target_system, fields.target_component) != self._codec.source:
+            self.dropped["foreign"] += 1
+            return
+        result: int = dialect.RESULT_UNSUPPORTED
+        feedback = ASKS_FOR.get(fields.param1) if fields.command == dialect.CMD_SET_MESSAGE_INTERVAL else None
+        if feedback in self._serves:
+            result = self._set_frames(feedback, fields.param2)
+        ack = self._codec.encode("COMMAND_ACK", fields.command, result, 0, 0, *message.source)
+        self._outbox.append(Outgoing((ack,), sender))
+
+    def _set_frames(self, feedback: Feedback, interval_us: float) -> int:
+        whole_ms = MIN_FRAME_INTERVAL_US <= interval_us <= MAX_FRAME_INTERVAL_US and interval_us % 1000 == 0
+        if not whole_ms:
+            return dialect.RESULT_DENIED
+        if self._begun and (feedback, interval_us) != (self.feedback, self.frame_interval_us):
+            return dialect.RESULT_TEMPORARILY_REJECTED
+        self.feedback, self.frame_interval_us = feedback, int(interval_us)
+        return dialect.RESULT_ACCEPTED
+
+    def _accept(self, message: Message) -> ActuatorCommand | None:
+        command = decode_actuators(message)
+        if command is None:
+            self.dropped["invalid"] += 1
+        elif not self._is_awaited(command.time_us):
+            self.dropped["repeated"] += 1
+            command = None
+        elif self.waits:
+            self._awaited_us = None
+        else:
+            self._answered_us = command.time_us
+        return command
+
+    def _is_awaited(self, time_us: int) -> bool:
+        if self.waits or self._awaited_us is None:
+            return time_us == self._awaited_us
+        return time_us <= self._awaited_us and (self._answered_us is None or time_us > self._answered_us)

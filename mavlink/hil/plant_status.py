@@ -1,0 +1,89 @@
+"""What a plant tells its autopilot beside a frame: its battery, and what became of the faults that were asked for."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from colibri.mavlink.hil import faults
+from colibri.mavlink.wire.dialect import Codec, Message, mav
+
+_NO_CELL = 65535
+_LARGEST_MV = 65534
+_UNKNOWN_TEMPERATURE = 32767
+
+
+class PlantBattery(NamedTuple):
+    """A battery as the plant has it, and no model of it.
+
+    Attributes:
+        voltage_v: At its terminals.
+        current_a: Out of it.
+        used_ah: Charge taken since it was full.
+        remaining: Part of its charge that is left.
+    """
+
+    voltage_v: float
+    current_a: float
+    used_ah: float
+    remaining: float
+
+
+class FaultResult(NamedTuple):
+    """What became of a fault that was asked for.
+
+    Attributes:
+        unit: FAILURE_UNIT.
+        kind: FAILURE_TYPE.
+        result: MAV_RESULT.
+    """
+
+    unit: int
+    kind: int
+    result: int
+
+
+class Aside(NamedTuple):
+    """What goes with a frame.
+
+    Attributes:
+        battery: None where there is none, or nothing is told of it.
+        results: Of the faults that came with the answer to the frame before, in order.
+    """
+
+    battery: PlantBattery | None = None
+    results: tuple[FaultResult, ...] = ()
+
+
+NOTHING = Aside()
+
+
+def encode_battery(codec: Codec, battery: PlantBattery) -> bytes:
+    """Encode a battery as BATTERY_STATUS: the whole pack as its first cell, mV; cA, mAh, percent."""
+    voltages = (min(round(1e3 * battery.voltage_v), _LARGEST_MV), *(_NO_CELL,) * 9)
+    kind = (0, mav.MAV_BATTERY_FUNCTION_ALL, mav.MAV_BATTERY_TYPE_LIPO, _UNKNOWN_TEMPERATURE)
+    current = min(round(100.0 * battery.current_a), 32767)
+    return codec.encode(
+        "BATTERY_STATUS", *kind, voltages, current, round(1e3 * battery.used_ah), -1, round(100.0 * battery.remaining)
+    )
+
+
+def decode_battery(message: Message) -> PlantBattery | None:
+    """Decode a BATTERY_STATUS; None where it does not say what the battery is like."""
+    fields = message.fields
+    cells_mv = [cell for cell in fields.voltages if cell != _NO_CELL]
+    if not cells_mv or fields.current_consumed < 0 or not 0 <= fields.battery_remaining <= 100:
+        return None
+    current_a = max(0.0, fields.current_battery / 100.0)
+    return PlantBattery(sum(cells_mv) / 1e3, current_a, fields.current_consumed / 1e3, fields.battery_remaining / 100.0)
+
+
+def encode_results(codec: Codec, results: Sequence[FaultResult], target: tuple[int, int]) -> list[bytes]:
+    """Encode results as COMMAND_ACK; `result_param2` says of which fault: 256 unit + type."""
+    return [
+        codec.encode("COMMAND_ACK", faults.COMMAND, it.result, 0, it.unit << 8 | it.kind, *target) for it in results
+    ]
+
+
+def decode_result(message: Message) -> FaultResult:
+    """Decode a COMMAND_ACK of a fault."""
+    unit, kind = divmod(message.fields.result_param2, 256)
+    return FaultResult(unit, kind, message.fields.result)

@@ -1,0 +1,131 @@
+"""PX4's simulator interface, the autopilot's end, as a state machine: what came and the time in, datagrams out.
+
+It calls the simulator with a HEARTBEAT, and goes on with two a second by the wall clock, as a simulator that hears none
+for three seconds begins anew. Each HIL_SENSOR is answered by a HIL_ACTUATOR_CONTROLS that names its time and asks for
+lockstep. A simulator's clock may stand anywhere when it begins: time is counted from its first frame.
+
+jMAVSim's habits are borne: its HIL_GPS comes behind the HIL_SENSOR of the same time, and belongs to the next; older
+ones leave `fields_updated` empty, and mean that everything is new.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from colibri.common.types import FourRotors
+from colibri.mavlink.hil.faults import Fault
+from colibri.mavlink.hil.plant_status import NOTHING
+from colibri.mavlink.hil.sensors import Frame, GpsFix, SensorFrame, Updated, decode_gps, decode_sensors
+from colibri.mavlink.hil.state import ActuatorCommand, encode_actuators
+from colibri.mavlink.wire import dialect
+from colibri.mavlink.wire.dialect import Codec
+
+CALL_EVERY_S = 0.5
+"""Wall-clock time between two HEARTBEAT."""
+ANSWER_AGAIN_AFTER_S = 1.0
+"""Wall-clock silence after which the last answer is sent again: a datagram may have been lost."""
+
+_EVERYTHING = Updated.ACCELEROMETER | Updated.GYROSCOPE | Updated.MAGNETOMETER | Updated.BAROMETER
+
+
+class FlierEnd:
+    """The autopilot's end: hands each new frame out once, remembers the last answer.
+
+    Attributes:
+        refused: None: a simulator is not asked for anything.
+        repeated: How many frames came again and got the remembered answer.
+        dropped: What was received and not used, by reason.
+        aside: Nothing: a simulator tells nothing beside its frames.
+    """
+
+    def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[FourRotors], FourRotors]) -> None:
+        """Speak as the autopilot of `system_id`.
+
+        Args:
+            system_id: MAVLink system.
+            now_s: Wall-clock time.
+            to_motors: Parts of the rotors' top speeds, in the order of the vehicle file -> what the simulator takes.
+        """
+        self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
+        self._to_motors = to_motors
+        self.aside = NOTHING
+        self.refused: int | None = None
+        self.repeated = 0
+        self.dropped: Counter[str] = self._codec.dropped
+        self._zero_us: int | None = None
+        self._time_us: int | None = None
+        self._fix: GpsFix | None = None
+        self._answer: bytes | None = None
+        self._armed = False
+        self._heard_s = now_s - ANSWER_AGAIN_AFTER_S
+        self._call_at_s = self._again_at_s = now_s
+        self._outbox: list[bytes] = []
+
+    def silence_s(self, now_s: float) -> float:
+        """How long the simulator has been silent."""
+        return now_s - self._heard_s
+
+    def receive(self, datagram: bytes, now_s: float) -> Frame | None:
+        """Take one datagram in; return its frame if that is the next one to compute."""
+        frame = None
+        for message in self._codec.decode(datagram):
+            if message.name == "HIL_SENSOR":
+                frame = self._next(decode_sensors(message), now_s) or frame
+            elif message.name == "HIL_GPS":
+                self._fix = decode_gps(message)
+            elif message.name not in ("HEARTBEAT", "HIL_STATE_QUATERNION", "SYSTEM_TIME", "COMMAND_ACK"):
+                self.dropped["unexpected"] += 1
+        return frame
+
+    def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
+        """Send the command that answers the frame handed out last, and remember it; a simulator takes no faults."""
+        assert not faults, "whoever flies a simulator refuses them"
+        assert self._zero_us is not None, "what is answered has come"
+        self._armed = command.armed
+        controls = self._to_motors(command.controls)
+        moved = replace(command, time_us=command.time_us + self._zero_us, controls=controls)
+        self._answer = encode_actuators(self._codec, moved)
+        self._outbox.append(self._answer)
+
+    def poll(self, now_s: float) -> float:
+        """Do what is due at `now_s`; return the time at which something will be due again."""
+        if now_s >= self._call_at_s:
+            self._call_at_s = now_s + CALL_EVERY_S
+            self._outbox.append(self._heartbeat())
+        if self._answer is None:
+            return self._call_at_s
+        if now_s >= self._again_at_s:
+            self._again_at_s = now_s + ANSWER_AGAIN_AFTER_S
+            self._outbox.append(self._answer)
+        return min(self._call_at_s, self._again_at_s)
+
+    def take_outbox(self) -> list[bytes]:
+        """Return the datagrams to send now, and forget them."""
+        outbox, self._outbox = self._outbox, []
+        return outbox
+
+    def _next(self, frame: SensorFrame, now_s: float) -> SensorFrame | None:
+        self._heard_s, self._again_at_s = now_s, now_s + ANSWER_AGAIN_AFTER_S
+        if frame.time_us == self._time_us:
+            self.repeated += 1
+            if self._answer is not None:
+                self._outbox.append(self._answer)
+            return None
+        if self._zero_us is None or (self._time_us is not None and frame.time_us < self._time_us):
+            self._zero_us, self._fix = frame.time_us, None
+        self._time_us, self._answer = frame.time_us, None
+        time_us = frame.time_us - self._zero_us
+        fix, self._fix = self._fix, None
+        groups = frame.updated & _EVERYTHING
+        return replace(
+            frame,
+            time_us=time_us,
+            updated=groups or int(_EVERYTHING),
+            gps=None if fix is None else replace(fix, time_us=time_us),
+        )
+
+    def _heartbeat(self) -> bytes:
+        mode = dialect.MODE_ARMED if self._armed else 0
+        return self._codec.encode(
+            "HEARTBEAT", dialect.TYPE_QUADROTOR, dialect.AUTOPILOT_GENERIC, mode, 0, dialect.STATE_ACTIVE, 3
+        )

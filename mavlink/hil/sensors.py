@@ -1,0 +1,182 @@
+"""What sensors tell the autopilot: dataclasses in SI, ENU/FLU, and the messages of PX4's simulator interface.
+
+HIL_SENSOR has what is measured on board; its `fields_updated` says which groups are new. HIL_GPS comes at its own rate,
+and tells of the past. Units and frames are those that PX4 reads: https://docs.px4.io/main/en/simulation/ and
+https://mavlink.io/en/messages/common.html. Nothing is judged here: an autopilot must cope with any
+number that a broken sensor sends.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from math import degrees, hypot, nan
+from typing import TypeAlias
+
+from colibri.common.earth.atmosphere import altitude_m
+from colibri.common.earth.geodesy import Geodetic
+from colibri.common.kernels import atan2
+from colibri.common.types import Vector
+from colibri.mavlink.hil.state import StateFrame
+from colibri.mavlink.wire.dialect import Codec, Message
+from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
+
+
+class Updated:
+    """The groups of HIL_SENSOR.fields_updated; a group is new when all its bits are set.
+
+    Plain numbers: flags of `enum` would cost more than all else that is done with a frame.
+    """
+
+    ACCELEROMETER = 0x7
+    GYROSCOPE = 0x38
+    MAGNETOMETER = 0x1C0
+    BAROMETER = 0x1A00
+    """Pressure, pressure altitude and temperature; 0x400 is differential pressure, which no multicopter measures."""
+
+
+class FixType(IntEnum):
+    """Of GPS_FIX_TYPE what a simulated receiver has."""
+
+    NO_FIX = 1
+    FIX_3D = 3
+    RTK_FLOAT = 5
+    RTK_FIXED = 6
+
+
+@dataclass(frozen=True, slots=True)
+class GpsFix:
+    """What a GPS receiver tells.
+
+    Attributes:
+        time_us: Simulated time from which it is told, µs; it was measured the receiver's delay before, exactly.
+        fix_type: How good it is (`FixType`, or any number that a simulator sends).
+        place: Position.
+        velocity_enu_m_s: Velocity, m/s, ENU.
+        horizontal_accuracy_m: Standard deviation that it claims.
+        vertical_accuracy_m: Standard deviation that it claims.
+        satellites: How many are used.
+    """
+
+    time_us: int
+    fix_type: int
+    place: Geodetic
+    velocity_enu_m_s: Vector
+    horizontal_accuracy_m: float
+    vertical_accuracy_m: float
+    satellites: int
+
+
+@dataclass(frozen=True, slots=True)
+class SensorFrame:
+    """What is measured on board at one instant of simulated time, and what GPS has told since the frame before.
+
+    A group that `updated` leaves out holds its last value, or zeros.
+
+    Attributes:
+        time_us: Simulated time, µs.
+        updated: Which groups are new (`Updated`).
+        specific_force_flu_m_s2: Of the accelerometer: (0, 0, 9.81) at rest and level.
+        rate_flu_rad_s: Of the gyroscope.
+        magnetic_field_flu_gauss: Of the magnetometer.
+        pressure_pa: Static pressure.
+        temperature_c: Of the barometer, degrees Celsius.
+        gps: None between two fixes.
+    """
+
+    time_us: int
+    updated: int
+    specific_force_flu_m_s2: Vector
+    rate_flu_rad_s: Vector
+    magnetic_field_flu_gauss: Vector
+    pressure_pa: float
+    temperature_c: float
+    gps: GpsFix | None = None
+
+    def has(self, group: int) -> bool:
+        """Whether a group is new."""
+        return self.updated & group == group
+
+
+Frame: TypeAlias = StateFrame | SensorFrame
+"""What a plant tells its autopilot at one instant of simulated time."""
+
+
+def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
+    """Encode a frame as HIL_SENSOR, and HIL_GPS if there is a fix; the pressure altitude is the standard's."""
+    messages = [
+        codec.encode(
+            "HIL_SENSOR",
+            frame.time_us,
+            *frd_from_flu(frame.specific_force_flu_m_s2),
+            *frd_from_flu(frame.rate_flu_rad_s),
+            *frd_from_flu(frame.magnetic_field_flu_gauss),
+            frame.pressure_pa / 100.0,
+            0.0,
+            altitude_m(frame.pressure_pa),
+            frame.temperature_c,
+            frame.updated,
+        )
+    ]
+    if frame.gps is not None:
+        messages.append(_encode_gps(codec, frame.gps))
+    return messages
+
+
+def decode_sensors(sensor: Message, gps: Message | None = None) -> SensorFrame:
+    """Decode a HIL_SENSOR, and the HIL_GPS that came with it."""
+    s = sensor.fields
+    return SensorFrame(
+        time_us=s.time_usec,
+        updated=s.fields_updated,
+        specific_force_flu_m_s2=frd_from_flu((s.xacc, s.yacc, s.zacc)),
+        rate_flu_rad_s=frd_from_flu((s.xgyro, s.ygyro, s.zgyro)),
+        magnetic_field_flu_gauss=frd_from_flu((s.xmag, s.ymag, s.zmag)),
+        pressure_pa=s.abs_pressure * 100.0,
+        temperature_c=s.temperature,
+        gps=None if gps is None else decode_gps(gps),
+    )
+
+
+def _encode_gps(codec: Codec, fix: GpsFix) -> bytes:
+    east, north, up = fix.velocity_enu_m_s
+    return codec.encode(
+        "HIL_GPS",
+        fix.time_us,
+        fix.fix_type,
+        round(fix.place.latitude_deg * 1e7),
+        round(fix.place.longitude_deg * 1e7),
+        round(fix.place.altitude_m * 1e3),
+        _in(fix.horizontal_accuracy_m, 1e2, 65534),
+        _in(fix.vertical_accuracy_m, 1e2, 65534),
+        _in(hypot(east, north), 1e2, 65534),
+        _signed_in(north),
+        _signed_in(east),
+        _signed_in(-up),
+        round(degrees(atan2(east, north)) % 360.0 * 1e2) % 36000,
+        fix.satellites,
+    )
+
+
+def decode_gps(message: Message) -> GpsFix:
+    """Decode a HIL_GPS; accuracies that it does not know are nan."""
+    g = message.fields
+    return GpsFix(
+        time_us=g.time_usec,
+        fix_type=g.fix_type,
+        place=Geodetic(g.lat / 1e7, g.lon / 1e7, g.alt / 1e3),
+        velocity_enu_m_s=ned_from_enu((g.vn / 100.0, g.ve / 100.0, g.vd / 100.0)),
+        horizontal_accuracy_m=_accuracy_m(g.eph),
+        vertical_accuracy_m=_accuracy_m(g.epv),
+        satellites=g.satellites_visible,
+    )
+
+
+def _in(value: float, scale: float, largest: int) -> int:
+    return min(round(value * scale), largest)
+
+
+def _signed_in(speed_m_s: float) -> int:
+    return max(-32767, min(32767, round(speed_m_s * 1e2)))
+
+
+def _accuracy_m(cm: int) -> float:
+    return nan if cm == 65535 else cm / 100.0

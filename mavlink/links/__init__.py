@@ -1,0 +1,1 @@
+"""Endpoints by URL: UDP and TCP sockets that never block; the only sockets."""

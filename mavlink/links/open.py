@@ -1,0 +1,96 @@
+"""Endpoints by URL.
+
+`udpin:HOST:PORT` waits for whoever sends, `udpout:HOST:PORT` speaks with that address only; `tcpin:HOST:PORT` waits for
+clients, `tcp:HOST:PORT` calls a server. The link between plant and autopilot is UDP.
+"""
+
+import os
+import socket
+from ipaddress import ip_address
+
+from colibri.common.types import Address
+from colibri.mavlink.links.link import GroundLink, LinkError
+from colibri.mavlink.links.tcp import TcpClient, TcpServer
+from colibri.mavlink.links.udp import UdpLink
+
+_UDP = ("udpin", "udpout")
+_TCP = ("tcpin", "tcp")
+
+
+def open_link(url: str) -> UdpLink:
+    """Open the UDP endpoint that `url` names; port 0 with `udpin:` takes any free port.
+
+    Raises:
+        LinkError: The URL is malformed, the host unknown, or the port taken.
+    """
+    return _open_udp(url, *_parse(url, _UDP))
+
+
+def open_ground_link(url: str) -> GroundLink:
+    """Open the endpoint that `url` names, of UDP or TCP; port 0 takes any free port where it waits.
+
+    Raises:
+        LinkError: The URL is malformed, the host unknown, or the port taken.
+    """
+    scheme, host, port = _parse(url, (*_UDP, *_TCP))
+    if scheme in _UDP:
+        return _open_udp(url, scheme, host, port)
+    address = (_resolved(url, host), port)
+    if scheme == "tcp":
+        return TcpClient(url, address)
+    sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    if os.name == "posix":  # elsewhere this would let two programs have one port
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    _bind(sock, url, address, listen=True)
+    return TcpServer(sock, f"tcpin:{host}:{sock.getsockname()[1]}")
+
+
+def beyond_loopback(url: str) -> bool:
+    """Whether the endpoint that `url` names can be reached from, or reaches, another computer.
+
+    Raises:
+        LinkError: The URL is malformed, or the host unknown.
+    """
+    _, host, _ = _parse(url, (*_UDP, *_TCP))
+    return not ip_address(_resolved(url, host)).is_loopback
+
+
+def unsigned_refusal(url: str) -> str:
+    """Return the line that refuses to open a link beyond loopback without a key."""
+    return f"{url} reaches beyond this computer: give --signing-key FILE, or --insecure to let anybody fly the vehicle"
+
+
+def _open_udp(url: str, scheme: str, host: str, port: int) -> UdpLink:
+    address = (_resolved(url, host), port)
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    if scheme == "udpout":
+        return UdpLink(sock, url, address)
+    _bind(sock, url, address)
+    return UdpLink(sock, f"udpin:{host}:{sock.getsockname()[1]}", None)
+
+
+def _resolved(url: str, host: str) -> str:
+    try:
+        return socket.gethostbyname(host)
+    except (OSError, UnicodeError) as error:
+        raise LinkError(f"{url}: unknown host {host}") from error
+
+
+def _bind(sock: socket.socket, url: str, address: Address, *, listen: bool = False) -> None:
+    try:
+        sock.bind(address)
+        if listen:
+            sock.listen()
+    except OSError as error:
+        sock.close()
+        raise LinkError(f"{url}: {error.strerror}; end the program that has this port, or name another") from error
+
+
+def _parse(url: str, schemes: tuple[str, ...]) -> tuple[str, str, int]:
+    scheme, _, rest = url.partition(":")
+    host, _, port = rest.rpartition(":")
+    if scheme not in schemes or not host or not port.isdecimal() or int(port) > 65535:
+        raise LinkError(f"{url}: expected " + " or ".join(f"{scheme}:HOST:PORT" for scheme in schemes))
+    if scheme in ("udpout", "tcp") and int(port) == 0:
+        raise LinkError(f"{url}: port 0 is no port to send to")
+    return scheme, host, int(port)

@@ -1,0 +1,269 @@
+"""TCP endpoints, of a server and of a client: nothing blocks, whole frames come in and go out.
+
+A reader that is too slow loses frames, as it would over UDP; a connection that has died is closed and forgotten.
+"""
+
+import select
+import socket
+from time import perf_counter
+
+from colibri.common.types import Address
+from colibri.mavlink.wire.framing import Framer
+
+OUTPUT_BYTES = 1 << 18
+"""What may wait for a slow reader beyond what the system keeps; more is dropped."""
+CONNECTIONS = 16
+"""Clients that a server has at once; further ones are turned away."""
+RECONNECT_AFTER_S = 1.0
+_CHUNK_BYTES = 4096
+_CHUNKS_AT_ONCE = 16
+"""So that whoever sends without a pause cannot hold the process up."""
+
+
+class Connection:
+    """One connection.
+
+    Attributes:
+        address: The other end.
+        alive: False once the other end is gone.
+        dropped: Datagrams not sent because the other end reads too slowly.
+    """
+
+    def __init__(self, sock: socket.socket, address: Address) -> None:
+        """Take over a connected socket."""
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket = sock
+        self._framer = Framer()
+        self._pending = bytearray()
+        self.address = address
+        self.alive = True
+        self.dropped = 0
+
+    def send(self, datagram: bytes) -> None:
+        """Send whole frames; drop them if too much is waiting already."""
+        if len(self._pending) + len(datagram) > OUTPUT_BYTES:
+            self.dropped += 1
+            return
+        self._pending += datagram
+        self.flush()
+
+    def fileno(self) -> int:
+        """Return what `select` knows the socket by."""
+        return self._socket.fileno()
+
+    def flush(self) -> None:
+        """Send what is waiting, as far as it will go now."""
+        try:
+            while self._pending and self.alive:
+                del self._pending[: self._socket.send(self._pending)]
+        except BlockingIOError:
+            return
+        except OSError:
+            self.close()
+
+    def receive_now(self) -> list[bytes]:
+        """Return the frames that have come."""
+        self.flush()
+        frames: list[bytes] = []
+        for _ in range(_CHUNKS_AT_ONCE if self.alive else 0):
+            try:
+                chunk = self._socket.recv(_CHUNK_BYTES)
+            except BlockingIOError:
+                break
+            except OSError:
+                chunk = b""
+            if not chunk:
+                self.close()
+                break
+            frames += self._framer.take(chunk)
+        return frames
+
+    def close(self) -> None:
+        """Close the connection."""
+        self.alive = False
+        self._socket.close()
+
+
+class TcpServer:
+    """Waits for clients, of which it has several.
+
+    Attributes:
+        url: The URL of the endpoint, with the port that it really has.
+        target: None: a server calls nobody.
+    """
+
+    def __init__(self, sock: socket.socket, url: str) -> None:
+        """Take over a listening socket."""
+        sock.setblocking(False)
+        self._socket = sock
+        self._connections: dict[Address, Connection] = {}
+        self._opened: list[Address] = []
+        self._closed: list[Address] = []
+        self.url = url
+        self.target: Address | None = None
+
+    def send(self, datagram: bytes, address: Address | None = None) -> None:
+        """Send whole frames to the client at `address`, or to all; nothing if there is none."""
+        for connection in list(self._connections.values()):
+            if address is None or connection.address == address:
+                connection.send(datagram)
+        self._forget_dead()
+
+    def receive_now(self) -> list[tuple[bytes, Address]]:
+        """Return the frames that have come, and from which client each."""
+        self._accept()
+        received = [
+            (frame, connection.address)
+            for connection in self._connections.values()
+            for frame in connection.receive_now()
+        ]
+        self._forget_dead()
+        return received
+
+    def wait(self, timeout_s: float) -> None:
+        """Sleep until somebody has come, gone or sent something, but no longer than `timeout_s`."""
+        sockets = [self._socket.fileno(), *(connection.fileno() for connection in self._connections.values())]
+        select.select(sockets, [], [], timeout_s)
+
+    def take_opened(self) -> list[Address]:
+        """Return the clients that have come since last asked: some say nothing before they hear something."""
+        opened, self._opened = self._opened, []
+        return opened
+
+    def take_closed(self) -> list[Address]:
+        """Return the clients that have gone since last asked."""
+        closed, self._closed = self._closed, []
+        return closed
+
+    def close(self) -> None:
+        """Close every connection and stop waiting."""
+        for connection in self._connections.values():
+            connection.close()
+        self._connections.clear()
+        self._socket.close()
+
+    def _accept(self) -> None:
+        for _ in range(CONNECTIONS):
+            try:
+                sock, address = self._socket.accept()
+            except OSError:  # nobody, gone again, or no descriptors left
+                return
+            connection = _established(sock, address) if len(self._connections) < CONNECTIONS else None
+            if connection is None:
+                sock.close()
+            else:
+                self._connections[address] = connection
+                self._opened.append(address)
+
+    def _forget_dead(self) -> None:
+        for address in [connection.address for connection in self._connections.values() if not connection.alive]:
+            del self._connections[address]
+            self._closed.append(address)
+
+
+class TcpClient:
+    """Calls a server, and again `RECONNECT_AFTER_S` later if that failed or the connection ended.
+
+    Attributes:
+        url: The URL of the endpoint.
+        target: The server.
+    """
+
+    def __init__(self, url: str, target: Address) -> None:
+        """Call `target` at once, and wait for nothing."""
+        self._socket: socket.socket | None = None
+        self._connection: Connection | None = None
+        self._call_again_s = 0.0
+        self._opened: list[Address] = []
+        self._closed: list[Address] = []
+        self.url = url
+        self.target: Address = target
+        self._call()
+
+    def send(self, datagram: bytes, address: Address | None = None) -> None:
+        """Send whole frames to the server; they are lost while there is no connection."""
+        connection = self._connected()
+        if connection and address in (None, self.target):
+            connection.send(datagram)
+            self._notice_end(connection)
+
+    def receive_now(self) -> list[tuple[bytes, Address]]:
+        """Return the frames that have come."""
+        connection = self._connected()
+        if connection is None:
+            return []
+        received = [(frame, self.target) for frame in connection.receive_now()]
+        self._notice_end(connection)
+        return received
+
+    def wait(self, timeout_s: float) -> None:
+        """Sleep until the server has sent something, hung up or answered a call, but no longer than `timeout_s`."""
+        if self._connection is not None:
+            select.select([self._connection], [], [], timeout_s)
+        else:
+            select.select([], [] if self._socket is None else [self._socket], [], min(timeout_s, RECONNECT_AFTER_S))
+
+    def take_opened(self) -> list[Address]:
+        """Return the server if it has answered a call since last asked."""
+        opened, self._opened = self._opened, []
+        return opened
+
+    def take_closed(self) -> list[Address]:
+        """Return the server if a connection to it has ended since last asked."""
+        closed, self._closed = self._closed, []
+        return closed
+
+    def close(self) -> None:
+        """Close the connection and call no more."""
+        self._hang_up()
+        self._call_again_s = float("inf")
+
+    def _connected(self) -> Connection | None:
+        """Return the connection, if there is one; call if it is time to, and see what became of a call."""
+        if self._connection is not None:
+            return self._connection
+        if self._socket is None:
+            if perf_counter() >= self._call_again_s:
+                self._call()
+        elif select.select([], [self._socket], [], 0.0)[1]:
+            self._connection = _established(self._socket, self.target)
+            if self._connection is None:
+                self._hang_up()
+            else:
+                self._opened.append(self.target)
+        return self._connection
+
+    def _notice_end(self, connection: Connection) -> None:
+        if not connection.alive:
+            self._hang_up()
+            self._closed.append(self.target)
+
+    def _call(self) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._socket.setblocking(False)
+        try:
+            self._socket.connect(self.target)
+        except BlockingIOError:
+            return
+        except OSError:
+            self._hang_up()
+
+    def _hang_up(self) -> None:
+        if self._socket is not None:
+            self._socket.close()
+        self._socket = self._connection = None
+        self._call_again_s = perf_counter() + RECONNECT_AFTER_S
+
+
+def _established(sock: socket.socket, address: Address) -> Connection | None:
+    """Return the connection that a call led to; None if it led nowhere, or to itself.
+
+    A call to a port of its own host that nobody listens on may be given just that port as its own.
+    """
+    try:
+        if sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) or sock.getsockname() == sock.getpeername():
+            return None
+        return Connection(sock, address)
+    except OSError:
+        return None

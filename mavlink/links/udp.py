@@ -1,0 +1,105 @@
+"""A UDP endpoint that never blocks."""
+
+import socket
+from select import select
+from time import perf_counter
+
+from colibri.common.types import Address
+from colibri.mavlink.links.link import SPIN_S, LinkError, give_way
+
+_LARGEST_DATAGRAM = 4096
+_DATAGRAMS_AT_ONCE = 64
+"""So that whoever sends without a pause cannot hold the process up."""
+
+
+class UdpLink:
+    """A UDP socket that never blocks for longer than it is told.
+
+    Attributes:
+        url: The URL of the endpoint, with the port that it really has.
+        target: Whom it speaks with; None for whoever sends.
+        spin_s: How long to look for a datagram before going to sleep.
+    """
+
+    def __init__(self, sock: socket.socket, url: str, target: Address | None) -> None:
+        """Wrap a bound socket; with a `target`, hear nobody else."""
+        sock.setblocking(False)
+        self._socket = sock
+        self.target = target
+        self.spin_s = SPIN_S
+        self._waited_s = 0.0
+        self._opened = [] if target is None else [target]
+        self.url = url
+
+    def send(self, datagram: bytes, address: Address | None = None) -> None:
+        """Send to `address`, or to the target. What the network will not take now is lost, as UDP may lose it.
+
+        Raises:
+            LinkError: The target can never be reached from here.
+        """
+        destination = address or self.target
+        assert destination is not None, "an endpoint that waits needs an address to send to"
+        try:
+            self._socket.sendto(datagram, destination)
+        except (BlockingIOError, ConnectionRefusedError):
+            return
+        except OSError as error:
+            if address is not None:
+                return  # a sender may lie about where it is
+            raise LinkError(f"cannot send to {destination[0]}:{destination[1]}: {error.strerror}") from error
+
+    def receive(self, timeout_s: float) -> tuple[bytes, Address] | None:
+        """Return the next datagram and its sender, or None after `timeout_s`."""
+        began_s = perf_counter()
+        give_up_s = began_s + timeout_s
+        spin_until_s = began_s + (self.spin_s if self._waited_s <= self.spin_s else 0.0)
+        while (received := self._receive_now()) is None:
+            now_s = perf_counter()
+            if now_s >= give_up_s:
+                break
+            if now_s >= spin_until_s:
+                select([self._socket], [], [], give_up_s - now_s)
+            else:
+                give_way()
+        self._waited_s = perf_counter() - began_s
+        return received
+
+    def receive_now(self) -> list[tuple[bytes, Address]]:
+        """Return the datagrams that have come, and their senders."""
+        received = []
+        for _ in range(_DATAGRAMS_AT_ONCE):
+            try:
+                datagram, sender = self._socket.recvfrom(_LARGEST_DATAGRAM)
+            except ConnectionRefusedError:
+                continue
+            except BlockingIOError:
+                break
+            if self.target is None or sender == self.target:
+                received.append((datagram, sender))
+        return received
+
+    def wait(self, timeout_s: float) -> None:
+        """Sleep until a datagram has come, but no longer than `timeout_s`."""
+        select([self._socket], [], [], timeout_s)
+
+    def take_opened(self) -> list[Address]:
+        """Return the target, once."""
+        opened, self._opened = self._opened, []
+        return opened
+
+    def take_closed(self) -> list[Address]:
+        """Return nobody: UDP has no connections."""
+        return []
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def _receive_now(self) -> tuple[bytes, Address] | None:
+        try:
+            datagram, sender = self._socket.recvfrom(_LARGEST_DATAGRAM)
+        except (BlockingIOError, ConnectionRefusedError):
+            return None
+        if self.target is not None and sender != self.target:
+            return None
+        return datagram, sender

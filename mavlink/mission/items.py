@@ -1,0 +1,131 @@
+"""Mission items as they are stored: every value as it came, so that a download equals the upload.
+
+Specification: https://mavlink.io/en/services/mission.html, "Mission Items" and "Detecting Mission/Plan Changes".
+"""
+
+from collections.abc import Sequence
+from math import isfinite, isnan
+from struct import Struct
+from typing import Any, NamedTuple
+from zlib import crc32
+
+from colibri.mavlink.node.service import Fields, Peer
+from colibri.mavlink.wire.dialect import mav
+
+MISSION: int = mav.MAV_MISSION_TYPE_MISSION
+FENCE: int = mav.MAV_MISSION_TYPE_FENCE
+RALLY: int = mav.MAV_MISSION_TYPE_RALLY
+ALL: int = mav.MAV_MISSION_TYPE_ALL
+PLAN_TYPES = (MISSION, FENCE, RALLY)
+
+ACCEPTED: int = mav.MAV_MISSION_ACCEPTED
+NOT_GIVEN = 2**31 - 1
+"""A latitude or longitude that says nothing, as in a COMMAND_INT."""
+DEGREES = 1e-7
+
+GLOBAL_FRAMES: frozenset[int] = frozenset(
+    (
+        mav.MAV_FRAME_GLOBAL,
+        mav.MAV_FRAME_GLOBAL_INT,
+        mav.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+        mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+        mav.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+        mav.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
+    )
+)
+"""Frames whose x and y are latitude and longitude. MISSION_ITEM_INT has them in degE7 whether or not the frame's name
+ends in INT: so does everybody send them."""
+
+_PACKED = Struct("<BHBffffiif")
+_INT32 = range(-(2**31), 2**31)
+
+
+class MissionItem(NamedTuple):
+    """An item of a plan, in wire units.
+
+    Attributes:
+        frame: MAV_FRAME.
+        command: MAV_CMD.
+        autocontinue: Whether the next item follows by itself.
+        p1: First parameter.
+        p2: Second parameter.
+        p3: Third parameter.
+        p4: Fourth parameter.
+        x: Latitude, degE7; or the fifth parameter.
+        y: Longitude, degE7; or the sixth parameter.
+        z: Altitude, m; or the seventh parameter.
+    """
+
+    frame: int
+    command: int
+    autocontinue: int
+    p1: float
+    p2: float
+    p3: float
+    p4: float
+    x: int
+    y: int
+    z: float
+
+
+class Plan(NamedTuple):
+    """The items of one type that the vehicle holds.
+
+    Attributes:
+        items: In sequence.
+        id: The opaque id: changes with the items; 0 without any.
+    """
+
+    items: tuple[MissionItem, ...] = ()
+    id: int = 0
+
+
+NO_PLAN = Plan()
+
+
+def plan_of(items: Sequence[MissionItem]) -> Plan:
+    """Return the plan of these items. Its id is their CRC-32, made 1 where that would be the 0 of "no plan"."""
+    if not items:
+        return NO_PLAN
+    return Plan(tuple(items), crc32(b"".join(_PACKED.pack(*item) for item in items)) or 1)
+
+
+def item_of(message_name: str, fields: Any) -> MissionItem | int:
+    """Return the item in a MISSION_ITEM_INT or MISSION_ITEM; a MAV_MISSION_RESULT where its place fits no integer."""
+    x, y = fields.x, fields.y
+    if message_name == "MISSION_ITEM":
+        scale = 1e7 if fields.frame in GLOBAL_FRAMES else 1.0
+        x, y = _whole(x, scale), _whole(y, scale)
+        if x is None:
+            return int(mav.MAV_MISSION_INVALID_PARAM5_X)
+        if y is None:
+            return int(mav.MAV_MISSION_INVALID_PARAM6_Y)
+    return MissionItem(
+        fields.frame,
+        fields.command,
+        fields.autocontinue,
+        fields.param1,
+        fields.param2,
+        fields.param3,
+        fields.param4,
+        x,
+        y,
+        fields.z,
+    )
+
+
+def item_fields(peer: Peer, seq: int, item: MissionItem, current: bool, plan_type: int) -> Fields:
+    """Return the fields of the MISSION_ITEM_INT that tells `peer` an item."""
+    frame, command, autocontinue, p1, p2, p3, p4, x, y, z = item
+    target = (peer.system, peer.component)
+    return (*target, seq, frame, command, int(current), autocontinue, p1, p2, p3, p4, x, y, z, plan_type)
+
+
+def _whole(value: float, scale: float) -> int | None:
+    """Return a scaled coordinate as an integer; None where it fits none, `NOT_GIVEN` for nan."""
+    if isnan(value):
+        return NOT_GIVEN
+    if not isfinite(value):
+        return None
+    whole = round(value * scale)
+    return whole if whole in _INT32 else None

@@ -1,0 +1,242 @@
+"""The mission microservice: plans up and down, which item is current, what was reached.
+
+Specification: https://mavlink.io/en/services/mission.html. Mission, geofence and rally points are three plans, each
+stored and handled by itself. Uploads are in `mission_upload`, downloads in `mission_download`.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import isfinite, isnan
+from typing import Any, NamedTuple, TypeAlias
+
+from colibri.common.earth.geodesy import LARGEST_LATITUDE_DEG, LARGEST_LONGITUDE_DEG
+from colibri.mavlink.mission.download import Downloads
+from colibri.mavlink.mission.items import (
+    ACCEPTED,
+    ALL,
+    DEGREES,
+    FENCE,
+    GLOBAL_FRAMES,
+    MISSION,
+    NO_PLAN,
+    PLAN_TYPES,
+    RALLY,
+    MissionItem,
+    Plan,
+    plan_of,
+)
+from colibri.mavlink.mission.upload import Rules, Uploads, ack
+from colibri.mavlink.node.service import Fields, Peer, Send, to_all
+from colibri.mavlink.services.command import ACCEPTED as COMMAND_ACCEPTED
+from colibri.mavlink.services.command import DENIED, Command, Outcome
+from colibri.mavlink.services.statustext import WARNING, StatusText
+from colibri.mavlink.wire.dialect import Message, mav
+
+STREAM_EVERY_US = 1_000_000
+NO_MISSION_TOTAL = 0xFFFF
+"""MISSION_CURRENT.total of a vehicle without a mission."""
+GUIDED = 2
+"""MISSION_ITEM.current of an item that is no part of a mission but a place to fly to now, as DroneKit's simple_goto."""
+
+
+class Progress(NamedTuple):
+    """Where the mission stands.
+
+    Attributes:
+        seq: The current item.
+        state: MISSION_STATE.
+        mode: 1 while the vehicle flies the mission, 2 while it does something else.
+    """
+
+    seq: int = 0
+    state: int = mav.MISSION_STATE_NO_MISSION
+    mode: int = 2
+
+
+Receiver: TypeAlias = Callable[[Any, Peer, int], Iterable[Send]]
+
+
+class Vehicle(NamedTuple):
+    """What the service asks of the vehicle that flies the plans.
+
+    Attributes:
+        load: (plan type, plan): take a new plan; empty where it was cleared.
+        progress: () -> where the mission stands; called at every poll, best returns the same object while nothing
+            changes.
+        set_current: (seq or -1 for the current, reset the counters) -> why not; empty if it was done.
+        guided_goto: (latitude in degrees, longitude in degrees, altitude in m, MAV_FRAME) -> whether it flies there.
+    """
+
+    load: Callable[[int, Plan], None]
+    progress: Callable[[], Progress]
+    set_current: Callable[[int, bool], str]
+    guided_goto: Callable[[float, float, float, int], Outcome]
+
+
+class MissionService:
+    """Holds the three plans and speaks the mission protocol about them.
+
+    Attributes:
+        plans: By MAV_MISSION_TYPE.
+    """
+
+    def __init__(self, rules: Mapping[int, Rules], vehicle: Vehicle, text: StatusText) -> None:
+        """Begin without plans; `rules` are those of each of the three types."""
+        self.plans: dict[int, Plan] = dict.fromkeys(PLAN_TYPES, NO_PLAN)
+        self._vehicle = vehicle
+        self._progress = vehicle.progress
+        self._text = text
+        self._uploads = Uploads(rules, self.load)
+        self._downloads = Downloads()
+        self._outbox: list[Send] = []
+        self._shown: Progress | None = None
+        self._stream_us = self._due_us = 0
+        self._receivers: dict[str, Receiver] = {
+            "MISSION_COUNT": self._count,
+            "MISSION_REQUEST_LIST": self._request_list,
+            "MISSION_REQUEST_INT": self._request,
+            "MISSION_REQUEST": self._request,
+            "MISSION_ACK": self._ack,
+            "MISSION_CLEAR_ALL": self._clear_all,
+            "MISSION_SET_CURRENT": self._set_current,
+            "MISSION_WRITE_PARTIAL_LIST": self._partial,
+            "MISSION_REQUEST_PARTIAL_LIST": self._partial,
+        }
+        self.hears = frozenset((*self._receivers, "MISSION_ITEM_INT", "MISSION_ITEM"))
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Take in one message; return what to send at once."""
+        receiver = self._receivers.get(message.name)
+        sends = self._item(message, peer, now_us) if receiver is None else receiver(message.fields, peer, now_us)
+        self._due_us = min(self._stream_us, self._uploads.due_us)
+        return sends
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        """Ask for what has not come; tell which item is current, once a second and when that changes."""
+        progress = self._progress()
+        if now_us < self._due_us and progress is self._shown and not self._outbox:
+            return ()
+        sends, self._outbox = self._outbox, []
+        sends += self._uploads.poll(now_us)
+        if progress != self._shown or now_us >= self._stream_us:
+            self._stream_us = now_us + STREAM_EVERY_US
+            sends.append(self._current())
+        self._shown = progress
+        self._due_us = min(self._stream_us, self._uploads.due_us)
+        return sends
+
+    def reached(self, seq: int) -> None:
+        """Tell everybody, at the next poll, that an item is reached ("Monitor Mission Progress")."""
+        self._outbox.append(to_all("MISSION_ITEM_REACHED", seq))
+
+    def current(self) -> Fields:
+        """Return the fields of a MISSION_CURRENT."""
+        progress = self._progress()
+        total = len(self.plans[MISSION].items) or NO_MISSION_TOTAL
+        ids = (self.plans[plan_type].id for plan_type in (MISSION, FENCE, RALLY))
+        return (progress.seq, total, progress.state, progress.mode, *ids)
+
+    def load(self, plan_type: int, items: Sequence[MissionItem]) -> Plan:
+        """Replace a plan by valid items, as an upload does."""
+        plan = plan_of(items)
+        self.plans[plan_type] = plan
+        self._vehicle.load(plan_type, plan)
+        self._announce()
+        return plan
+
+    def do_set_mission_current(self, command: Command) -> Outcome:
+        """Obey MAV_CMD_DO_SET_MISSION_CURRENT."""
+        seq, reset = command.p1, 0.0 if isnan(command.p2) else command.p2
+        if not (-1.0 <= seq <= 0xFFFF and seq == int(seq)):
+            return Outcome(DENIED, "mission: not a sequence number")
+        if reset not in (0.0, 1.0):
+            return Outcome(DENIED, "mission: reset is 0 or 1")
+        reason = self._vehicle.set_current(int(seq), reset == 1.0)
+        if reason:
+            return Outcome(DENIED, reason)
+        self._announce()
+        return Outcome()
+
+    def _announce(self) -> None:
+        """Have the next poll tell where the mission stands, changed or not."""
+        self._stream_us = self._due_us = 0
+
+    def _current(self) -> Send:
+        return to_all("MISSION_CURRENT", *self.current())
+
+    def _count(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+        if fields.mission_type not in PLAN_TYPES:
+            return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)]
+        return [self._uploads.begin(peer, fields.mission_type, fields.count, now_us)]
+
+    def _item(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        fields = message.fields
+        if fields.current >= GUIDED and not self._uploads.expects(peer, fields.mission_type):
+            return self._guided(message, peer)
+        answer = self._uploads.item(message, peer, now_us)
+        return () if answer is None else [answer]
+
+    def _guided(self, message: Message, peer: Peer) -> Iterable[Send]:
+        result, reason = self._fly_to(message)
+        text = self._text.say(WARNING, reason) if reason else []
+        return [ack(peer, result, message.fields.mission_type), *text]
+
+    def _fly_to(self, message: Message) -> tuple[int, str]:
+        fields = message.fields
+        scale = DEGREES if message.name == "MISSION_ITEM_INT" else 1.0
+        latitude, longitude = fields.x * scale, fields.y * scale
+        known = (fields.current, fields.command, fields.mission_type) == (GUIDED, mav.MAV_CMD_NAV_WAYPOINT, MISSION)
+        if not known:
+            return mav.MAV_MISSION_UNSUPPORTED, ""
+        if fields.frame not in GLOBAL_FRAMES:
+            return mav.MAV_MISSION_UNSUPPORTED_FRAME, ""
+        if not abs(latitude) <= LARGEST_LATITUDE_DEG:
+            return mav.MAV_MISSION_INVALID_PARAM5_X, ""
+        if not abs(longitude) <= LARGEST_LONGITUDE_DEG:
+            return mav.MAV_MISSION_INVALID_PARAM6_Y, ""
+        if not isfinite(fields.z):
+            return mav.MAV_MISSION_INVALID_PARAM7, ""
+        outcome = self._vehicle.guided_goto(latitude, longitude, fields.z, fields.frame)
+        return (ACCEPTED if outcome.result == COMMAND_ACCEPTED else mav.MAV_MISSION_DENIED), outcome.reason
+
+    def _request_list(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+        if fields.mission_type not in PLAN_TYPES:
+            return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)]
+        self._uploads.hush(peer)
+        return [self._downloads.begin(peer, fields.mission_type, self.plans[fields.mission_type], now_us)]
+
+    def _request(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+        plan_type = fields.mission_type
+        if plan_type not in PLAN_TYPES:
+            return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, plan_type)]
+        current = self._progress().seq if plan_type == MISSION else -1
+        return [self._downloads.item(peer, plan_type, fields.seq, self.plans[plan_type], current, now_us)]
+
+    def _ack(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+        self._downloads.end(peer, fields.mission_type)
+        answer = self._uploads.acknowledged(peer, fields.mission_type, fields.type, now_us)
+        return () if answer is None else [answer]
+
+    def _clear_all(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+        del now_us
+        plan_type = fields.mission_type
+        if plan_type not in (*PLAN_TYPES, ALL):
+            return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, plan_type)]
+        cleared = PLAN_TYPES if plan_type == ALL else (plan_type,)
+        self._uploads.drop(peer, cleared)
+        for each in cleared:
+            self.load(each, ())
+        return [ack(peer, ACCEPTED, plan_type)]
+
+    def _set_current(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Go to an item: that it was done, or why not, is broadcast ("Set Current Mission Item")."""
+        del peer, now_us
+        reason = self._vehicle.set_current(fields.seq, False)
+        if reason:
+            return self._text.say(WARNING, reason)
+        self._announce()
+        return ()
+
+    def _partial(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Partial lists are "not an official/standardised part of the mission service"."""
+        del now_us
+        return [ack(peer, mav.MAV_MISSION_UNSUPPORTED, fields.mission_type)]

@@ -1,0 +1,220 @@
+"""Uploads of plans: the vehicle asks for one item after another and replaces the old plan by a whole, valid one.
+
+Specification: https://mavlink.io/en/services/mission.html, "Upload a Mission to the Vehicle", "Canceling Operations",
+"Timeouts and Retries". Two things it leaves open, or recommends otherwise, follow PX4, because clients rely on them:
+
+- The specification recommends five retries of 250 ms. Over a link that loses a fifth of the datagrams each way, two of
+  three uploads of 500 items would then fail; so, as PX4, the vehicle asks every 250 ms until five seconds passed
+  without the item.
+- Any MISSION_ACK ends whatever transfer MAVSDK has under way. So none is sent that the ground station does not wait
+  for: not for strays, and not to give up an upload that the ground station has itself given up for something else.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from colibri.mavlink.mission.items import ACCEPTED, PLAN_TYPES, MissionItem, Plan, item_of
+from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.wire.dialect import Message, mav
+
+ASK_EVERY_US = 250_000
+PATIENCE_US = 5_000_000
+OLD_FORM_AFTER = 2
+"""Requests for an item that go unanswered before every other one is the old MISSION_REQUEST."""
+ANSWER_AGAIN_AFTER_US = 200_000
+"""A copy of the last item that comes sooner was copied by the link; one that comes later was sent again."""
+NEVER_US = 2**63
+
+
+class Rules(NamedTuple):
+    """What a plan of one type may hold.
+
+    Attributes:
+        check_item: (item) -> MAV_MISSION_RESULT, of an item by itself.
+        check_plan: (items) -> MAV_MISSION_RESULT, of all of them, each checked before.
+        most: Items there is space for.
+    """
+
+    check_item: Callable[[MissionItem], int]
+    check_plan: Callable[[Sequence[MissionItem]], int]
+    most: int = 1000
+
+
+class _Answer(NamedTuple):
+    """The MISSION_ACK that ended an upload."""
+
+    peer: Peer
+    seq: int
+    send: Send
+    at_us: int
+
+
+class _Upload:
+    """One upload under way."""
+
+    def __init__(self, peer: Peer, plan_type: int, count: int, now_us: int) -> None:
+        self.peer = peer
+        self.plan_type = plan_type
+        self.count = count
+        self.items: list[MissionItem] = []
+        self.heard_us = self.due_us = now_us
+        self.quiet = False
+        self.asked_in_old_form = False
+        self._old_form: bool | None = None
+        self._asked = 0
+        self._last_form = False
+
+    def ask(self, now_us: int) -> Send:
+        """Request the next item, in the form that the ground station answers.
+
+        Some know MISSION_REQUEST alone, some nack it (MAVSDK): the new form goes first.
+        """
+        old = bool(self._old_form)
+        if self._old_form is None and self._asked >= OLD_FORM_AFTER:
+            old = self._asked % 2 == 0
+        self._asked += 1
+        self._last_form = old
+        self.asked_in_old_form |= old
+        self.due_us = now_us + ASK_EVERY_US
+        name = "MISSION_REQUEST" if old else "MISSION_REQUEST_INT"
+        return to(self.peer, name, self.peer.system, self.peer.component, len(self.items), self.plan_type)
+
+    def take(self, item: MissionItem, now_us: int) -> None:
+        """Take the item that was asked for; the form that brought it is the one to go on with."""
+        self.items.append(item)
+        self.heard_us = now_us
+        self.quiet = False
+        self._asked = 0
+        if not self.asked_in_old_form:
+            self._old_form = False
+        elif self._old_form is None and self._last_form:
+            self._old_form = True
+
+    def nacked(self) -> None:
+        """Ask in the new form alone: the ground station does not know the other."""
+        self._old_form = False
+
+
+class Uploads:
+    """The uploads under way: at most one of a type, and one of a ground station.
+
+    Attributes:
+        due_us: When `poll` has something to do.
+    """
+
+    def __init__(self, rules: Mapping[int, Rules], store: Callable[[int, Sequence[MissionItem]], Plan]) -> None:
+        """Check items by the `rules` of each type; hand a whole valid plan to `store`."""
+        self._rules = rules
+        self._store = store
+        self._under_way: dict[int, _Upload] = {}
+        self._answers: dict[int, _Answer] = {}
+        self.due_us = NEVER_US
+
+    def begin(self, peer: Peer, plan_type: int, count: int, now_us: int) -> Send:
+        """Obey a MISSION_COUNT. A repeated one begins again; an upload of another peer is not disturbed."""
+        other = self._under_way.get(plan_type)
+        if other is not None and other.peer != peer:
+            return ack(peer, mav.MAV_MISSION_DENIED, plan_type)
+        self.drop(peer, PLAN_TYPES)
+        self._answers.pop(plan_type, None)
+        if count > self._rules[plan_type].most:
+            return ack(peer, mav.MAV_MISSION_NO_SPACE, plan_type)
+        if count == 0:  # "has the same effect as clearing the mission"
+            return ack(peer, ACCEPTED, plan_type, self._store(plan_type, ()).id)
+        upload = self._under_way[plan_type] = _Upload(peer, plan_type, count, now_us)
+        return self._asking(upload, now_us)
+
+    def expects(self, peer: Peer, plan_type: int) -> bool:
+        """Whether `peer` has an upload of a type under way."""
+        upload = self._under_way.get(plan_type)
+        return upload is not None and upload.peer == peer
+
+    def item(self, message: Message, peer: Peer, now_us: int) -> Send | None:
+        """Take a MISSION_ITEM_INT or MISSION_ITEM in."""
+        fields = message.fields
+        upload = self._under_way.get(fields.mission_type)
+        if upload is None or upload.peer != peer:
+            return self._answer_again(fields, peer, now_us)
+        expected = len(upload.items)
+        if fields.seq < expected:  # a copy: to ask again would have every later item sent twice
+            return None
+        if fields.seq > expected:  # "the expected item should be re-requested"
+            return self._asking(upload, now_us)
+        item = item_of(message.name, fields)
+        result = item if isinstance(item, int) else self._rules[upload.plan_type].check_item(item)
+        if result != ACCEPTED or isinstance(item, int):
+            return self._end(upload, result, 0, now_us)
+        upload.take(item, now_us)
+        if len(upload.items) < upload.count:
+            return self._asking(upload, now_us)
+        return self._complete(upload, now_us)
+
+    def acknowledged(self, peer: Peer, plan_type: int, result: int, now_us: int) -> Send | None:
+        """Take a MISSION_ACK in: it cancels an upload, or says that MISSION_REQUEST is not known."""
+        upload = self._under_way.get(plan_type)
+        if upload is None or upload.peer != peer or result == ACCEPTED:  # a late one of a download accepts
+            return None
+        if result == mav.MAV_MISSION_UNSUPPORTED and upload.asked_in_old_form:
+            upload.nacked()
+            return self._asking(upload, now_us)
+        self.drop(peer, (plan_type,))
+        return None
+
+    def drop(self, peer: Peer, plan_types: Sequence[int]) -> None:
+        """Forget the uploads of `peer`, of these types."""
+        for plan_type in plan_types:
+            if self.expects(peer, plan_type):
+                del self._under_way[plan_type]
+        self._schedule()
+
+    def hush(self, peer: Peer) -> None:
+        """Give the uploads of `peer` up without a word, should it come to that: it has begun something else."""
+        for upload in self._under_way.values():
+            upload.quiet |= upload.peer == peer
+
+    def poll(self, now_us: int) -> list[Send]:
+        """Ask again for what has not come; give up what is not coming."""
+        sends = []
+        for upload in list(self._under_way.values()):
+            if now_us < upload.due_us:
+                continue
+            if now_us - upload.heard_us < PATIENCE_US:
+                sends.append(upload.ask(now_us))
+                continue
+            del self._under_way[upload.plan_type]
+            if not upload.quiet:
+                sends.append(ack(upload.peer, mav.MAV_MISSION_OPERATION_CANCELLED, upload.plan_type))
+        self._schedule()
+        return sends
+
+    def _asking(self, upload: _Upload, now_us: int) -> Send:
+        send = upload.ask(now_us)
+        self._schedule()
+        return send
+
+    def _complete(self, upload: _Upload, now_us: int) -> Send:
+        result = self._rules[upload.plan_type].check_plan(upload.items)
+        plan_id = self._store(upload.plan_type, upload.items).id if result == ACCEPTED else 0
+        return self._end(upload, result, plan_id, now_us)
+
+    def _end(self, upload: _Upload, result: int, plan_id: int, now_us: int) -> Send:
+        self.drop(upload.peer, (upload.plan_type,))
+        send = ack(upload.peer, result, upload.plan_type, plan_id)
+        last = max(0, len(upload.items) - 1) if result == ACCEPTED else len(upload.items)
+        self._answers[upload.plan_type] = _Answer(upload.peer, last, send, now_us)
+        return send
+
+    def _answer_again(self, fields: Any, peer: Peer, now_us: int) -> Send | None:
+        """Answer the last item of an upload once more if it comes again: the MISSION_ACK may have been lost."""
+        answer = self._answers.get(fields.mission_type)
+        if answer is None or answer.peer != peer or answer.seq != fields.seq:
+            return None
+        return answer.send if ANSWER_AGAIN_AFTER_US <= now_us - answer.at_us < PATIENCE_US else None
+
+    def _schedule(self) -> None:
+        self.due_us = min((upload.due_us for upload in self._under_way.values()), default=NEVER_US)
+
+
+def ack(peer: Peer, result: int, plan_type: int, plan_id: int = 0) -> Send:
+    """Answer `peer` with a MISSION_ACK."""
+    return to(peer, "MISSION_ACK", peer.system, peer.component, result, plan_type, plan_id)

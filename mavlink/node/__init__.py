@@ -1,0 +1,1 @@
+"""One MAVLink component: its channels, routing between them, and the interface of its services."""

@@ -1,0 +1,116 @@
+"""A channel: one remote address on one link, with what was heard on it and what is to be sent."""
+
+from typing import NamedTuple
+
+from colibri.common.types import Address
+from colibri.mavlink.node.router import SOURCES, Source
+from colibri.mavlink.wire.dialect import Codec, Message, sequence_of
+
+DATAGRAM_BYTES = 1400
+"""What fits a datagram on the networks there are."""
+_SEQUENCES = 256
+
+
+class ChannelState(NamedTuple):
+    """What a channel was used for so far.
+
+    Attributes:
+        number: Of the channel.
+        link: Number of its link.
+        address: The remote address.
+        sources: System and component ids heard.
+        heard_us: Simulated time when something was heard last; None if nothing was.
+        received: Messages.
+        sent: Messages, forwarded ones too.
+        dropped: Pieces of input that were not used.
+        lost: Messages that never came, by the gaps in their numbers.
+    """
+
+    number: int
+    link: int
+    address: Address | None
+    sources: tuple[Source, ...]
+    heard_us: int | None
+    received: int
+    sent: int
+    dropped: int
+    lost: int
+
+
+class Channel:
+    """Numbers, packs and counts the traffic with one remote address.
+
+    Attributes:
+        number: Of the channel.
+        link: Number of its link.
+        address: The remote address.
+        fixed: Whether it stays open however long it is silent.
+        codec: Its own, for sequence numbers are counted per channel.
+        active_us: Simulated time when it was opened, or heard last.
+    """
+
+    def __init__(
+        self, number: int, link: int, address: Address | None, codec: Codec, *, fixed: bool, now_us: int
+    ) -> None:
+        """Open at `now_us`."""
+        self.number = number
+        self.link = link
+        self.address = address
+        self.fixed = fixed
+        self.codec = codec
+        self.active_us = now_us
+        self._received = 0
+        self._sent = 0
+        self._lost = 0
+        self._sequences: dict[Source, int] = {}
+        self._pending: list[bytes] = []
+
+    def hear(self, message: Message, now_us: int) -> None:
+        """Count a message that came, and those before it that did not."""
+        self.active_us = now_us
+        self._received += 1
+        sequence = sequence_of(message.frame)
+        last = self._sequences.get(message.source)
+        if last is not None:
+            gap = (sequence - last - 1) % _SEQUENCES
+            if gap >= _SEQUENCES // 2:
+                return  # one that was overtaken, or came twice
+            self._lost += gap
+        elif len(self._sequences) == SOURCES:
+            del self._sequences[next(iter(self._sequences))]
+        self._sequences[message.source] = sequence
+
+    def say(self, frame: bytes) -> None:
+        """Send a whole frame."""
+        self._sent += 1
+        self._pending.append(frame)
+
+    def take(self) -> list[bytes]:
+        """Return the datagrams to send, as few as hold all frames, and forget them."""
+        if not self._pending:
+            return []
+        datagrams: list[bytes] = []
+        packed: list[bytes] = []
+        size = 0
+        for frame in self._pending:
+            size += len(frame)
+            if size > DATAGRAM_BYTES:
+                datagrams.append(b"".join(packed))
+                packed, size = [], len(frame)
+            packed.append(frame)
+        self._pending = []
+        return [*datagrams, b"".join(packed)]
+
+    def state(self) -> ChannelState:
+        """Return what it was used for so far."""
+        return ChannelState(
+            self.number,
+            self.link,
+            self.address,
+            tuple(self._sequences),
+            self.active_us if self._received else None,
+            self._received,
+            self._sent,
+            self.codec.dropped.total(),
+            self._lost,
+        )

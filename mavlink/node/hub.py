@@ -1,0 +1,241 @@
+"""Where all links meet: judges and routes what comes, hands the services what is theirs, sends what they say."""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, Protocol
+
+from colibri.common.types import Address
+from colibri.mavlink.node.channel import Channel, ChannelState
+from colibri.mavlink.node.router import Router, target_of
+from colibri.mavlink.node.service import Peer, Send, Service
+from colibri.mavlink.wire.dialect import UNKNOWN, Codec, Message
+from colibri.mavlink.wire.signing import Signing
+
+CHANNELS = 32
+"""Channels open at once; of more, the one silent longest that is not fixed is forgotten."""
+FORGET_AFTER_US = 300_000_000
+"""Silence after which a channel that opened by itself is forgotten: what it is sent costs time in every frame."""
+_TIDY_EVERY_US = 1_000_000
+_OPENS_NOTHING = frozenset({UNKNOWN, "RADIO_STATUS"})
+"""Nobody can have checked, or signed, these."""
+
+
+class Outgoing(NamedTuple):
+    """A datagram of whole frames to send.
+
+    Attributes:
+        link: Number of the link.
+        address: Where to; None where the link knows.
+        datagram: The bytes.
+    """
+
+    link: int
+    address: Address | None
+    datagram: bytes
+
+
+class ChannelObserver(Protocol):
+    """Whoever must know which channels there are."""
+
+    def opened(self, channel: int, now_us: int) -> None:
+        """Take note that `channel` was opened."""
+        ...
+
+    def closed(self, channel: int) -> None:
+        """Take note that `channel` is no more; no other will have its number."""
+        ...
+
+
+class Hub:
+    """A component on any number of links.
+
+    A channel is one remote address on one link. It opens with the first valid message from there.
+
+    Attributes:
+        hears_only: The messages that services hear for the time being; None for all.
+    """
+
+    def __init__(
+        self,
+        system_id: int,
+        component_id: int,
+        services: Sequence[Service],
+        *,
+        signing: Signing | None = None,
+        observers: Sequence[ChannelObserver] = (),
+    ) -> None:
+        """Be component `component_id` of system `system_id`; without `signing` nobody can switch that on."""
+        self._own = (system_id, component_id)
+        self._services = tuple(services)
+        names = frozenset[str]().union(*(service.hears for service in services))
+        self._hearing = {name: [service for service in services if name in service.hears] for name in names}
+        self._signing = signing
+        self._observers = tuple(observers)
+        self._router = Router(self._own)
+        self._strangers = Codec(*self._own, keep_unknown=True)
+        self._channels: dict[int, Channel] = {}
+        self._numbers: dict[tuple[int, Address | None], int] = {}
+        self._next_number = 0
+        self.hears_only: frozenset[str] | None = None
+        self._now_us = 0
+        self._tidy_at_us = 0
+        self._dropped_before: Counter[str] = Counter()
+
+    @property
+    def channels(self) -> tuple[ChannelState, ...]:
+        """What each open channel was used for so far."""
+        return tuple(channel.state() for channel in self._channels.values())
+
+    @property
+    def dropped(self) -> Counter[str]:
+        """What was received and not used, by reason."""
+        total = self._dropped_before + self._strangers.dropped
+        for channel in self._channels.values():
+            total += channel.codec.dropped
+        return total
+
+    def open(self, link: int, address: Address | None) -> int:
+        """Open a channel that stays; return its number. With no address, it takes in whatever comes on the link."""
+        number = self._numbers.get((link, address))
+        channel = self._open(link, address) if number is None else self._channels[number]
+        channel.fixed = True
+        return channel.number
+
+    def close(self, link: int, address: Address) -> None:
+        """Forget the channel to `address`, as its connection has ended."""
+        number = self._numbers.get((link, address))
+        if number is not None:
+            self._forget(number)
+
+    def receive(
+        self, datagram: bytes, link: int, address: Address | None, now_us: int, *, loopback: bool = True
+    ) -> None:
+        """Take in what came on a link from an address; `loopback` says whether from this computer."""
+        self._now_us = now_us
+        number = self._numbers.get((link, address), self._numbers.get((link, None)))
+        channel = None if number is None else self._channels[number]
+        codec = self._strangers if channel is None else channel.codec
+        for message in codec.decode(datagram):
+            reason = self._refusal(message, known=channel is not None)
+            if reason is not None:
+                codec.dropped[reason] += 1
+                continue
+            channel = channel or self._admit(link, address)
+            if channel is None:
+                codec.dropped["no room"] += 1
+                continue
+            self._take_in(message, channel, loopback)
+
+    def poll(self, now_us: int) -> None:
+        """Have every service do what is due at `now_us`."""
+        self._now_us = now_us
+        for service in self._services:
+            sends = service.poll(now_us)
+            if sends:
+                self.send(sends)
+        if now_us >= self._tidy_at_us:
+            self._tidy_at_us = now_us + _TIDY_EVERY_US
+            self._forget_silent()
+
+    def send(self, sends: Iterable[Send]) -> None:
+        """Send messages, each to its channel or to all; one for a channel that is no more is lost."""
+        for name, fields, number in sends:
+            if number is None:
+                for channel in self._channels.values():
+                    channel.say(channel.codec.encode(name, *fields))
+            elif number in self._channels:
+                channel = self._channels[number]
+                channel.say(channel.codec.encode(name, *fields))
+
+    def take_outbox(self) -> list[Outgoing]:
+        """Return the datagrams to send now, and forget them."""
+        return [
+            Outgoing(channel.link, channel.address, datagram)
+            for channel in self._channels.values()
+            for datagram in channel.take()
+        ]
+
+    def _refusal(self, message: Message, *, known: bool) -> str | None:
+        """Return why a message is not to be taken in."""
+        if message.source == self._own:
+            return "echo"
+        if not known and message.name in _OPENS_NOTHING:
+            return "stranger"
+        if self._signing is None:
+            return None
+        return self._signing.refusal(message.name, message.frame, self._now_us)
+
+    def _take_in(self, message: Message, channel: Channel, loopback: bool) -> None:
+        if message.name == UNKNOWN:  # its CRC may be wrong, so nothing is learned from it
+            self._forward(message, (0, 0), channel)
+            return
+        channel.hear(message, self._now_us)
+        self._router.hear(message.source, channel.number)
+        target = target_of(message.fields)
+        if message.name == "SETUP_SIGNING":  # "must never be automatically forwarded", message_signing.html
+            self._set_up_signing(message, target, channel, loopback)
+            return
+        self._forward(message, target, channel)
+        if self._router.concerns_us(target) and (self.hears_only is None or message.name in self.hears_only):
+            peer = Peer(channel.number, *message.source)
+            for service in self._hearing.get(message.name, ()):
+                self.send(service.receive(message, peer, self._now_us))
+
+    def _forward(self, message: Message, target: tuple[int, int], channel: Channel) -> None:
+        """Forward byte for byte, with the signature of whoever signed it: all share the key."""
+        for number in self._router.onward(message.source, target, channel.number):
+            self._channels[number].say(message.frame)
+
+    def _set_up_signing(self, message: Message, target: tuple[int, int], channel: Channel, loopback: bool) -> None:
+        """Obey SETUP_SIGNING from this computer, addressed to us: it "should never be broadcast"."""
+        fields, signing = message.fields, self._signing
+        addressed = target[0] == self._own[0] and self._router.concerns_us(target)
+        if not (signing and loopback and addressed):
+            channel.codec.dropped["signing not set up"] += 1
+            return
+        if not signing.set_up(bytes(fields.secret_key), fields.initial_timestamp, self._now_us):
+            channel.codec.dropped["signing not set up"] += 1
+        for each in self._channels.values():
+            self._seal(each)
+
+    def _seal(self, channel: Channel) -> None:
+        """Have a channel sign, with its number for link id, if there is a key."""
+        signing = self._signing
+        if signing is None or not signing.active:
+            channel.codec.seal = None
+        else:
+            channel.codec.seal = lambda frame: signing.sign(frame, channel.number, self._now_us)
+
+    def _admit(self, link: int, address: Address | None) -> Channel | None:
+        """Open a channel to a new sender; None if there are too many that stay."""
+        if len(self._channels) >= CHANNELS:
+            passing = [channel for channel in self._channels.values() if not channel.fixed]
+            if not passing:
+                return None
+            self._forget(min(passing, key=lambda channel: channel.active_us).number)
+        return self._open(link, address)
+
+    def _open(self, link: int, address: Address | None) -> Channel:
+        codec = Codec(*self._own, keep_unknown=True)
+        channel = Channel(self._next_number, link, address, codec, fixed=False, now_us=self._now_us)
+        self._next_number += 1
+        self._channels[channel.number] = channel
+        self._numbers[link, address] = channel.number
+        self._router.open(channel.number)
+        self._seal(channel)
+        for observer in self._observers:
+            observer.opened(channel.number, self._now_us)
+        return channel
+
+    def _forget(self, number: int) -> None:
+        channel = self._channels.pop(number)
+        del self._numbers[channel.link, channel.address]
+        self._router.close(number)
+        self._dropped_before += channel.codec.dropped
+        for observer in self._observers:
+            observer.closed(number)
+
+    def _forget_silent(self) -> None:
+        for channel in list(self._channels.values()):
+            if not channel.fixed and self._now_us - channel.active_us > FORGET_AFTER_US:
+                self._forget(channel.number)

@@ -1,0 +1,70 @@
+"""What every microservice is: messages and the simulated time in, messages to send out.
+
+A service hears only what is meant for this component, or for all, and what comes from another: the hub sees to that.
+Whatever the fields hold, `receive` and `poll` raise nothing. Nobody has checked the values: NaN, infinities, unknown
+enumerations and lies about counts are the service's to refuse.
+"""
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple, Protocol, TypeAlias
+
+from colibri.mavlink.wire.dialect import Message
+
+Fields: TypeAlias = tuple[Any, ...]
+"""A message's fields in the order of its MAVLink definition, in wire units and frames."""
+
+
+class Peer(NamedTuple):
+    """Who sent a message, and the channel that an answer takes.
+
+    Attributes:
+        channel: Number of the channel: one remote address on one link.
+        system: System id.
+        component: Component id.
+    """
+
+    channel: int
+    system: int
+    component: int
+
+
+class Send(NamedTuple):
+    """A message to send.
+
+    Attributes:
+        name: Message name as MAVLink has it, "COMMAND_ACK".
+        fields: Its fields.
+        channel: The channel to take; None for all of them.
+    """
+
+    name: str
+    fields: Fields
+    channel: int | None = None
+
+
+class Service(Protocol):
+    """A microservice.
+
+    Attributes:
+        hears: Names of the messages that `receive` is to be given.
+    """
+
+    hears: frozenset[str]
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Take in one message; return what to send at once."""
+        ...
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        """Do what is due at `now_us`; return what to send. Called once a frame of the plant."""
+        ...
+
+
+def to(peer: Peer, name: str, *fields: Any) -> Send:
+    """Answer `peer`."""
+    return Send(name, fields, peer.channel)
+
+
+def to_all(name: str, *fields: Any) -> Send:
+    """Tell everybody."""
+    return Send(name, fields)

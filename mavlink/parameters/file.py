@@ -1,0 +1,92 @@
+"""Parameters as text in QGroundControl's format, so that ground stations load and save the very same files.
+
+A line is vehicle id, component id, name, value and MAV_PARAM_TYPE, with tabs between them; `#` begins a remark.
+"""
+
+from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, Refusal, Value, float32
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT
+
+_COLUMNS = 5
+_LARGEST_ID = 255
+_HEADER = "# Onboard parameters for Vehicle {system}\n#\n# Vehicle-Id Component-Id Name Value Type\n"
+
+
+class ParameterFileError(Exception):
+    """A parameter file that cannot be used; the message names line and parameter."""
+
+
+def write(parameters: Parameters, system_id: int = 1) -> str:
+    """Return the parameters that are not at their defaults as a file."""
+    lines = [_HEADER.format(system=system_id)]
+    for parameter in parameters:
+        value = parameters[parameter.name]
+        if value != parameter.default:
+            cells = (system_id, AUTOPILOT_COMPONENT, parameter.name, _text(parameter, value), parameter.kind.value)
+            lines.append("\t".join(map(str, cells)) + "\n")
+    return "".join(lines)
+
+
+def read(text: str, parameters: Parameters) -> dict[str, Value]:
+    """Return the values of a file, each of which `parameters` may have.
+
+    Lines of other components than the autopilot, and read-only parameters, are passed over: a ground station saves
+    them too.
+
+    Raises:
+        ParameterFileError: A line is none, or a parameter is unknown, given twice, or cannot have its value.
+    """
+    values: dict[str, Value] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip() or line.startswith("#"):
+            continue
+        cells = line.split("\t")
+        if len(cells) != _COLUMNS:
+            raise ParameterFileError(f"line {number}: expected {_COLUMNS} columns between tabs, not {len(cells)}")
+        try:
+            parameter = _parameter(cells, parameters)
+            value = None if parameter is None else _value(parameter, cells[3], cells[4])
+        except ValueError as reason:
+            raise ParameterFileError(f"line {number}: {cells[2]}: {reason}") from None
+        if parameter is None or value is None or parameter.read_only:
+            continue
+        if parameter.name in values:
+            raise ParameterFileError(f"line {number}: {parameter.name}: given twice")
+        values[parameter.name] = value
+    return values
+
+
+def _parameter(cells: list[str], parameters: Parameters) -> Parameter | None:
+    """Return which parameter a line is about; None where it is another component's."""
+    for what, cell in zip(("vehicle", "component"), cells, strict=False):
+        if not cell.isascii() or not cell.isdigit() or int(cell) > _LARGEST_ID:
+            raise ValueError(f"no {what} id: {cell!r}")
+    if int(cells[1]) != AUTOPILOT_COMPONENT:
+        return None
+    index = parameters.index(cells[2])
+    if index is None:
+        raise ValueError("there is no such parameter")
+    return parameters.at(index)
+
+
+def _value(parameter: Parameter, text: str, kind: str) -> Value:
+    if kind != str(parameter.kind.value):
+        raise ValueError(f"its type is {parameter.kind.value}, not {kind!r}")
+    value: Value
+    try:
+        value = int(text) if parameter.kind == Kind.INT else float32(float(text))
+    except ValueError:
+        raise ValueError(f"no number: {text!r}") from None
+    if parameter.refusal(value) == Refusal.VALUE_OUT_OF_RANGE:
+        raise ValueError(f"{text} is not {_choices(parameter)}")
+    return value
+
+
+def _choices(parameter: Parameter) -> str:
+    if parameter.values:
+        return "one of " + ", ".join(str(value) for value, _ in parameter.values)
+    return f"from {_text(parameter, parameter.minimum)} to {_text(parameter, parameter.maximum)}"
+
+
+def _text(parameter: Parameter, value: Value) -> str:
+    """Return a value so that its 32 bits can be read back."""
+    return str(value) if parameter.kind == Kind.INT else f"{value:.9g}"

@@ -1,0 +1,74 @@
+"""`@PARAM/param.pck`: all parameters as one compact file, which ground stations fetch by FTP.
+
+Specification: https://mavlink.io/en/services/parameter_ftp.html.
+"""
+
+from struct import Struct
+
+from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, bits_of
+
+PATH = "@PARAM/param.pck"
+BLOCK_BYTES = 239
+"""Of every read that a client makes: no value lies across the border of two."""
+
+_HEADER = Struct("<HHH")
+"""Magic, parameters in this file, parameters in all."""
+_MAGIC, _MAGIC_WITH_DEFAULTS = 0x671B, 0x671C
+_TYPES = {Kind.INT: 3, Kind.REAL: 4}
+_HAS_DEFAULT = 0x10
+_VALUE_BYTES = 4
+_LONGEST_COMMON = 15
+
+
+def packed(parameters: Parameters, with_defaults: bool = False, start: int = 0, count: int = 0) -> bytes | None:
+    """Return the file; None where there is nothing at `start`.
+
+    Args:
+        parameters: What to pack.
+        with_defaults: Whether to add the default where a value differs from it.
+        start: Index of the first parameter.
+        count: How many at most; 0 for all that follow.
+    """
+    if start < 0 or count < 0 or start >= max(len(parameters), 1):
+        return None
+    chosen = tuple(parameters)[start : start + count if count else None]
+    magic = _MAGIC_WITH_DEFAULTS if with_defaults else _MAGIC
+    file = bytearray(_HEADER.pack(magic, len(chosen), len(parameters)))
+    before = ""
+    for parameter in chosen:
+        value = _bytes(parameter, parameters[parameter.name])
+        default = _bytes(parameter, parameter.default) if with_defaults else value
+        values = value if default == value else value + default
+        entry = _name(parameter, before, len(values) > _VALUE_BYTES) + values
+        past = (len(file) + len(entry)) % BLOCK_BYTES
+        if 0 < past < len(values):
+            file += bytes(len(values) - past)
+        file += entry
+        before = parameter.name
+    return bytes(file)
+
+
+def packed_for(parameters: Parameters, query: str) -> bytes | None:
+    """Return the file as the part of its path behind the question mark asks for it; None where it cannot be."""
+    wanted = {"withdefaults": 0, "start": 0, "count": 0}
+    for pair in filter(None, query.split("&")):
+        key, _, value = pair.partition("=")
+        if key not in wanted:
+            continue
+        if not value.isascii() or not value.isdigit() or len(value) > 5:
+            return None
+        wanted[key] = int(value)
+    return packed(parameters, wanted["withdefaults"] == 1, wanted["start"], wanted["count"])
+
+
+def _name(parameter: Parameter, before: str, has_default: bool) -> bytes:
+    """Return type, lengths, and what of the name is not as in the one before: at least a character."""
+    most = min(len(before), len(parameter.name) - 1, _LONGEST_COMMON)
+    common = next((i for i in range(most) if before[i] != parameter.name[i]), most)
+    own = parameter.name[common:].encode()
+    kind = _TYPES[parameter.kind] | (_HAS_DEFAULT if has_default else 0)
+    return bytes((kind, (len(own) - 1) << 4 | common)) + own
+
+
+def _bytes(parameter: Parameter, value: float) -> bytes:
+    return bits_of(parameter.kind, value).to_bytes(_VALUE_BYTES, "little")

@@ -1,0 +1,132 @@
+"""The parameter microservice, the vehicle's side: every parameter listed, read one by one, and set.
+
+Specification: https://mavlink.io/en/services/parameter.html. Values are encoded bytewise, as PX4 has them
+(MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE), in two types: INT32 and REAL32.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, Refusal, Value, bits_of, value_of
+from colibri.mavlink.wire.dialect import Bits, Message, param_bits
+
+INTERVAL_US = 2_000
+"""Between two parameters of a list: 150 of them take 0.3 s."""
+MOST_AT_ONCE = 20
+BY_ID = -1
+"""param_index of who names a parameter by its id."""
+_NOT_EXACT_IN_FLOAT = 2**24
+"""From here on, a float can be the nearest of two integers."""
+
+
+@dataclass(slots=True)
+class _Listing:
+    """A list on its way along a channel: which parameter is next, how many are left, when the last one was due."""
+
+    index: int
+    left: int
+    last_us: int
+
+
+class ParameterService:
+    """Answers for `parameters`."""
+
+    hears = frozenset({"PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"})
+
+    def __init__(self, parameters: Parameters) -> None:
+        """Serve `parameters`."""
+        self._parameters = parameters
+        self._listings: dict[int, _Listing] = {}
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Answer a request."""
+        fields = message.fields
+        if message.name == "PARAM_REQUEST_LIST":
+            self._begin_list(peer, now_us)
+            return ()
+        if message.name == "PARAM_REQUEST_READ":
+            return (self._read(fields.param_id, fields.param_index, peer),)
+        return self._set(fields.param_id, fields.param_type, param_bits(message), peer)
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        """Send what is due of each list: "allow breaks between each message" (read all parameters)."""
+        if not self._listings:
+            return ()
+        return [send for channel in tuple(self._listings) for send in self._go_on(channel, now_us)]
+
+    def announce(self, name: str) -> Send:
+        """Tell everybody the value of a parameter that the vehicle changed by itself."""
+        index = self._parameters.index(name)
+        assert index is not None, "the vehicle knows its parameters"
+        return self._value(index)
+
+    def _begin_list(self, peer: Peer, now_us: int) -> None:
+        """Begin a list. Who asks while one is on its way gets the rest of it, then what went before."""
+        listing = self._listings.setdefault(peer.channel, _Listing(0, 0, now_us))
+        listing.left = len(self._parameters)
+
+    def _go_on(self, channel: int, now_us: int) -> list[Send]:
+        listing = self._listings[channel]
+        listing.last_us = min(listing.last_us, now_us)  # simulated time can begin anew
+        due = (now_us - listing.last_us) // INTERVAL_US
+        listing.last_us += due * INTERVAL_US
+        sends = []
+        for _ in range(min(due, listing.left, MOST_AT_ONCE)):
+            sends.append(self._value(listing.index, channel))
+            listing.index = (listing.index + 1) % len(self._parameters)
+            listing.left -= 1
+        if listing.left == 0:
+            del self._listings[channel]
+        return sends
+
+    def _read(self, name: str, index: int, peer: Peer) -> Send:
+        """Answer by PARAM_VALUE, or by PARAM_ERROR where there is no such parameter (read single parameter)."""
+        if index == BY_ID:
+            known = self._parameters.index(name)
+        else:
+            known = None if self._parameters.at(index) is None else index
+        if known is None:
+            return _refuse(peer, name, index, Refusal.DOES_NOT_EXIST)
+        return self._value(known, peer.channel)
+
+    def _set(self, name: str, wire_type: int, bits: int, peer: Peer) -> Iterable[Send]:
+        """Set, and tell everybody what holds now; who was refused hears why first (write parameters)."""
+        index = self._parameters.index(name)
+        definition = None if index is None else self._parameters.at(index)
+        if index is None or definition is None:
+            return (_refuse(peer, name, BY_ID, Refusal.DOES_NOT_EXIST),)
+        value = _meant(definition, wire_type, bits)
+        refusal = value if isinstance(value, Refusal) else self._parameters.set(name, value)
+        answer = self._value(index)
+        return (answer,) if refusal is None else (_refuse(peer, name, index, refusal), answer)
+
+    def _value(self, index: int, channel: int | None = None) -> Send:
+        """Return the PARAM_VALUE for a channel, or for all of them."""
+        definition = self._parameters.at(index)
+        assert definition is not None, "indices are checked where they come from"
+        bits = Bits(bits_of(definition.kind, self._parameters[definition.name]))
+        fields = (definition.name, bits, definition.kind, len(self._parameters), index)
+        return Send("PARAM_VALUE", fields, channel)
+
+
+def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | Refusal:
+    """Return the value that somebody sent.
+
+    The type must be the parameter's, with one exception. Who has read the packed file (MAVProxy), or knows no types
+    (DroneKit), sets integers as REAL32 and relies on the vehicle to know better:
+    https://mavlink.io/en/services/parameter_ftp.html, downloading parameters. That is obeyed where a float can mean
+    but one integer.
+    """
+    if wire_type not in tuple(Kind):
+        return Refusal.TYPE_UNSUPPORTED
+    value = value_of(Kind(wire_type), bits)
+    if wire_type == definition.kind:
+        return value
+    if isinstance(value, float) and value.is_integer() and abs(value) < _NOT_EXACT_IN_FLOAT:
+        return int(value)
+    return Refusal.TYPE_MISMATCH
+
+
+def _refuse(peer: Peer, name: str, index: int, refusal: Refusal) -> Send:
+    return to(peer, "PARAM_ERROR", peer.system, peer.component, name, index, refusal)

@@ -1,0 +1,230 @@
+"""The parameters of a vehicle: what they are called, may be and are; two kinds, as 32 bits each on the wire."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from math import copysign, inf, isfinite
+from re import fullmatch
+from struct import Struct
+from typing import TypeAlias
+
+from colibri.mavlink.wire.dialect import mav
+
+Value: TypeAlias = int | float
+"""An int of 32 bits, or a float that a float of 32 bits holds exactly."""
+
+LEAST_INT, LARGEST_INT = -(2**31), 2**31 - 1
+LARGEST_REAL = 3.4028234663852886e38
+_NAME = "[A-Z][A-Z0-9_]{0,15}"
+_INT, _REAL, _BITS = Struct("<i"), Struct("<f"), Struct("<I")
+
+
+class Kind(IntEnum):
+    """MAV_PARAM_TYPE."""
+
+    INT = mav.MAV_PARAM_TYPE_INT32
+    REAL = mav.MAV_PARAM_TYPE_REAL32
+
+
+class Refusal(IntEnum):
+    """Why a parameter is not what somebody wants: MAV_PARAM_ERROR, of which pymavlink knows only the first half."""
+
+    DOES_NOT_EXIST = 1
+    VALUE_OUT_OF_RANGE = 2
+    PERMISSION_DENIED = 3
+    READ_ONLY = 5
+    TYPE_UNSUPPORTED = 6
+    TYPE_MISMATCH = 7
+
+
+Check: TypeAlias = Callable[[str, Mapping[str, Value]], Refusal | None]
+"""(the parameter that is to change, all values with that one in) -> why not; None if it may."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """What a parameter is. Numbers are rounded to what 32 bits hold.
+
+    Attributes:
+        name: At most 16 capitals, digits and underscores.
+        kind: INT or REAL.
+        default: Its value until somebody changes it.
+        minimum: Least value.
+        maximum: Largest value.
+        unit: Of the value.
+        decimals: How many a ground station should show.
+        description: In a few words.
+        details: The rest.
+        group: What it is listed under.
+        reboot_required: Whether it takes effect only at the next start.
+        values: The only values that it may have, and what each stands for; none: all between the bounds.
+        read_only: Whether ground stations cannot change it.
+    """
+
+    name: str
+    kind: Kind
+    default: Value
+    minimum: Value = -LARGEST_REAL
+    maximum: Value = LARGEST_REAL
+    unit: str = ""
+    decimals: int = 3
+    description: str
+    details: str = ""
+    group: str = ""
+    reboot_required: bool = False
+    values: tuple[tuple[int, str], ...] = ()
+    read_only: bool = False
+
+    def __post_init__(self) -> None:
+        """Round, and check that the default may be.
+
+        Raises:
+            ValueError: It may not, or the name is none.
+        """
+        if not fullmatch(_NAME, self.name):
+            raise ValueError(f"{self.name}: no name of a parameter")
+        if self.kind == Kind.INT:
+            object.__setattr__(self, "minimum", max(self.minimum, LEAST_INT))
+            object.__setattr__(self, "maximum", min(self.maximum, LARGEST_INT))
+        else:
+            for field in ("default", "minimum", "maximum"):
+                object.__setattr__(self, field, float32(getattr(self, field)))
+        if self.refusal(self.default) is not None:
+            raise ValueError(f"{self.name}: its default {self.default} is not among the values that it may have")
+
+    def refusal(self, value: Value) -> Refusal | None:
+        """Return why this value cannot be; None if it can."""
+        if self.kind == Kind.INT and not isinstance(value, int):
+            return Refusal.TYPE_MISMATCH
+        if not isfinite(value) or not self.minimum <= value <= self.maximum:
+            return Refusal.VALUE_OUT_OF_RANGE
+        if self.values and all(value != choice for choice, _ in self.values):
+            return Refusal.VALUE_OUT_OF_RANGE
+        return None
+
+
+class Parameters:
+    """The parameters in the order of their names, and their values.
+
+    Attributes:
+        check: Asked before a value changes, after the parameter's own bounds.
+        revision: Counts the changes.
+    """
+
+    def __init__(self, definitions: Iterable[Parameter], check: Check | None = None) -> None:
+        """Begin with every parameter at its default.
+
+        Raises:
+            ValueError: Two have one name.
+        """
+        self._definitions = tuple(sorted(definitions, key=lambda parameter: parameter.name))
+        self._index = {parameter.name: index for index, parameter in enumerate(self._definitions)}
+        if len(self._index) < len(self._definitions):
+            raise ValueError("two parameters have one name")
+        self._values = {parameter.name: parameter.default for parameter in self._definitions}
+        self._changed: dict[str, None] = {}
+        self.check = check
+        self.revision = 0
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self._definitions)
+
+    def __iter__(self) -> Iterator[Parameter]:
+        """Yield what they are, in order."""
+        return iter(self._definitions)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a parameter of that name."""
+        return name in self._index
+
+    def __getitem__(self, name: str) -> Value:
+        """Return the value of a parameter.
+
+        Raises:
+            KeyError: There is none of that name.
+        """
+        return self._values[name]
+
+    def default(self, name: str) -> Value:
+        """Return the default of a parameter.
+
+        Raises:
+            KeyError: There is none of that name.
+        """
+        return self._definitions[self._index[name]].default
+
+    @property
+    def values(self) -> Mapping[str, Value]:
+        """All values as they are now."""
+        return dict(self._values)
+
+    def at(self, index: int) -> Parameter | None:
+        """Return what the parameter at `index` is; None where there is none."""
+        return self._definitions[index] if 0 <= index < len(self._definitions) else None
+
+    def index(self, name: str) -> int | None:
+        """Return the place of a parameter; None where there is none of that name."""
+        return self._index.get(name)
+
+    def set(self, name: str, value: Value) -> Refusal | None:
+        """Change a value, if it may be that; return why not. What it is already, it may always be."""
+        index = self._index.get(name)
+        if index is None:
+            return Refusal.DOES_NOT_EXIST
+        definition = self._definitions[index]
+        if definition.kind == Kind.REAL:
+            value = float32(value)
+        if value == self._values[name] and isinstance(value, type(self._values[name])):
+            return None
+        refusal = definition.refusal(value) or (Refusal.READ_ONLY if definition.read_only else None)
+        if refusal is None and self.check is not None:
+            refusal = self.check(name, {**self._values, name: value})
+        if refusal is None:
+            self._change(name, value)
+        return refusal
+
+    def load(self, values: Mapping[str, Value]) -> None:
+        """Take over values that `parameter_file.read` found fit, all at once: `check` is not asked."""
+        for name, value in values.items():
+            if value != self._values[name]:
+                self._change(name, value)
+
+    def reset(self) -> None:
+        """Set every parameter to its default, as far as it may change now."""
+        for definition in self._definitions:
+            self.set(definition.name, definition.default)
+
+    def take_changed(self) -> tuple[str, ...]:
+        """Return the names of the parameters that changed since this was last asked."""
+        if not self._changed:
+            return ()
+        changed = tuple(self._changed)
+        self._changed.clear()
+        return changed
+
+    def _change(self, name: str, value: Value) -> None:
+        self._values[name] = value
+        self._changed[name] = None
+        self.revision += 1
+
+
+def float32(value: float) -> float:
+    """Return the nearest number that 32 bits hold, infinite where that lies beyond them."""
+    try:
+        (rounded,) = _REAL.unpack(_REAL.pack(value))
+    except OverflowError:
+        return copysign(inf, value)
+    return float(rounded)
+
+
+def bits_of(kind: Kind, value: Value) -> int:
+    """Return the 32 bits of a value, as an unsigned integer: bytewise, whatever its kind."""
+    (bits,) = _BITS.unpack(_INT.pack(value) if kind == Kind.INT else _REAL.pack(value))
+    return int(bits)
+
+
+def value_of(kind: Kind, bits: int) -> Value:
+    """Return the value that 32 bits stand for."""
+    (value,) = (_INT if kind == Kind.INT else _REAL).unpack(_BITS.pack(bits))
+    return int(value) if kind == Kind.INT else float(value)

@@ -1,0 +1,32 @@
+"""The timesync and ping microservices: the vehicle's clock is simulated time, whose speed need not be the wall's.
+
+Specifications: mavlink.io/en/services/timesync.html and mavlink.io/en/services/ping.html.
+"""
+
+from collections.abc import Iterable
+
+from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.wire.dialect import Message
+
+NS_PER_US = 1000
+LARGEST_INT64 = 2**63 - 1
+
+
+class TimeService:
+    """Answers who asks what time it is, and who asks whether anybody is there. Nobody sets this clock."""
+
+    hears = frozenset({"TIMESYNC", "PING", "SYSTEM_TIME"})
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Answer requests; what answers a request of somebody else is ignored, as is SYSTEM_TIME."""
+        fields = message.fields
+        if message.name == "TIMESYNC" and fields.tc1 == 0:  # "tc1 is set to 0 in the request"
+            return (to(peer, "TIMESYNC", min(now_us * NS_PER_US, LARGEST_INT64), fields.ts1),)
+        if message.name == "PING" and fields.target_system == 0 and fields.target_component == 0:
+            # "The response has the same time and sequence, and the target of whoever sent the request."
+            return (to(peer, "PING", fields.time_usec, fields.seq, peer.system, peer.component),)
+        return ()
+
+    def poll(self, now_us: int) -> Iterable[Send]:  # noqa: ARG002
+        """Nothing is ever due."""
+        return ()

@@ -1,0 +1,125 @@
+"""Manual control: the sticks of a ground station, as MANUAL_CONTROL or as RC_CHANNELS_OVERRIDE.
+
+Specification: https://mavlink.io/en/services/manual_control.html and common.xml, messages MANUAL_CONTROL (69) and
+RC_CHANNELS_OVERRIDE (70). Neither is answered. The signs of the yaw stick are the clients': to the right is positive,
+as PX4 and all who fly it have it, though the message's text has counter-clockwise positive. Buttons are not looked at.
+"""
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from colibri.mavlink.node.service import Peer, Send
+from colibri.mavlink.setpoints.arbitration import Streams
+from colibri.mavlink.setpoints.setpoints import Sticks
+from colibri.mavlink.wire.dialect import Message
+
+FULL = 1000
+UNUSED = 0x7FFF
+"""INT16_MAX: the axis is not there; its stick is in the middle."""
+
+RELEASED, UNCHANGED = 0, 0xFFFF
+"""Of channels 1 to 8: 0 gives a channel back to the radio, UINT16_MAX leaves it as it is."""
+LEAST_US, MIDDLE_US, MOST_US = 1000, 1500, 2000
+WIDEST_US = (800, 2200)
+"""Transmitters go beyond 1000 and 2000 µs; what lies in here counts as a full stick."""
+ROLL, PITCH, THRUST, YAW = range(4)
+"""The order of the first four channels: aileron, elevator, throttle, rudder."""
+_ALL_RELEASED = (RELEASED, RELEASED, RELEASED, RELEASED)
+
+Channels = tuple[int, int, int, int]
+
+
+class Controls(NamedTuple):
+    """What one client holds: its sticks, and the channels that they are made of, if any."""
+
+    sticks: Sticks
+    channels: Channels = _ALL_RELEASED
+
+
+class Manual:
+    """Keeps the latest sticks of the client that is obeyed; see `streams` for which that is.
+
+    Attributes:
+        hears: MANUAL_CONTROL and RC_CHANNELS_OVERRIDE.
+        dropped: Messages that were not taken, by reason.
+    """
+
+    hears = frozenset({"MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"})
+
+    def __init__(self, system_id: int) -> None:
+        """Be the vehicle `system_id`."""
+        self.dropped: Counter[str] = Counter()
+        self._system_id = system_id
+        self._streams: Streams[Controls] = Streams()
+
+    @property
+    def source(self) -> Peer | None:
+        """The client that is obeyed; None before the first."""
+        return self._streams.source
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Take in sticks; there is never an answer."""
+        if message.name == "MANUAL_CONTROL":
+            self._hear_sticks(message.fields, peer, now_us)
+        else:
+            self._hear_channels(message.fields, peer, now_us)
+        return ()
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        """Nothing is ever due."""
+        del now_us
+        return ()
+
+    def engage(self, peer: Peer, now_us: int) -> None:
+        """Obey `peer`, who has just asked for a mode that is flown by hand, rather than another that streams too."""
+        self._streams.claim(peer, now_us)
+
+    def latest(self, now_us: int, timeout_us: int) -> Sticks | None:
+        """Return the latest sticks of the client that is obeyed, if they are no older than `timeout_us`."""
+        heard = self._streams.latest(now_us, timeout_us)
+        return heard.value.sticks if heard else None
+
+    def _hear_sticks(self, fields: Any, peer: Peer, now_us: int) -> None:
+        if fields.target not in (self._system_id, 0):
+            self.dropped["another vehicle"] += 1
+            return
+        axes = (fields.x, fields.y, fields.z, fields.r)
+        if not all(axis == UNUSED or -FULL <= axis <= FULL for axis in axes):
+            self.dropped["out of range"] += 1
+            return
+        pitch, roll, yaw = (0.0 if axis == UNUSED else axis / FULL for axis in (fields.x, fields.y, fields.r))
+        # "negative values are negative thrust", which no rotor of ours makes
+        thrust = 0.5 if fields.z == UNUSED else max(fields.z, 0) / FULL
+        self._keep(peer, Controls(Sticks(pitch, roll, thrust, yaw, now_us)), now_us)
+
+    def _hear_channels(self, fields: Any, peer: Peer, now_us: int) -> None:
+        wire = (fields.chan1_raw, fields.chan2_raw, fields.chan3_raw, fields.chan4_raw)
+        least, most = WIDEST_US
+        if not all(value in (RELEASED, UNCHANGED) or least <= value <= most for value in wire):
+            self.dropped["out of range"] += 1
+            return
+        before = self._streams.value(peer, now_us)
+        held = before.channels if before else _ALL_RELEASED
+        c1, c2, c3, c4 = (old if new == UNCHANGED else new for new, old in zip(wire, held, strict=True))
+        channels = (c1, c2, c3, c4)
+        if channels != _ALL_RELEASED:
+            self._keep(peer, Controls(sticks_of(channels, now_us), channels), now_us)
+        elif held != _ALL_RELEASED:
+            self._streams.forget(peer)
+
+    def _keep(self, peer: Peer, controls: Controls, now_us: int) -> None:
+        if not self._streams.hear(peer, controls, now_us):
+            self.dropped["another client"] += 1
+
+
+def sticks_of(channels: Channels, now_us: int) -> Sticks:
+    """Return the sticks of four channels, µs; one that is released is in the middle, as there is no radio.
+
+    A low value of the elevator's channel is its stick forward, as transmitters for copters have it.
+    """
+    roll, pitch, thrust, yaw = (
+        0.0 if value == RELEASED else (min(max(value, LEAST_US), MOST_US) - MIDDLE_US) / (MOST_US - MIDDLE_US)
+        for value in channels
+    )
+    return Sticks(-pitch, roll, 0.5 + 0.5 * thrust, yaw, now_us)

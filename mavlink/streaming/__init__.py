@@ -1,0 +1,1 @@
+"""Which message goes to which channel how often, and the heartbeat."""

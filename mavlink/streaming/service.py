@@ -1,0 +1,233 @@
+"""Streams: which message goes to which channel how often, and messages on request.
+
+Specification: mavlink.io/en/mavgen_python/howto_requestmessages.html; MAV_CMD_SET_MESSAGE_INTERVAL (511),
+MAV_CMD_GET_MESSAGE_INTERVAL (510), MAV_CMD_REQUEST_MESSAGE (512) and the older REQUEST_DATA_STREAM (66).
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import TypeAlias
+
+from colibri.mavlink.node.service import Fields, Peer, Send, to
+from colibri.mavlink.services.command import DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Entry, Handler, Outcome
+from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SILENT
+from colibri.mavlink.streaming.schedule import Schedule
+from colibri.mavlink.telemetry.encoder import Encoder
+from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.wire.dialect import Message, mav
+
+Provider: TypeAlias = Callable[[Command], list[Send] | Outcome]
+"""Answers REQUEST_MESSAGE for a message of another service: param2 to param6 are the command's; or says why not."""
+
+SHORTEST_US = 1_000
+SHORTEST_OF_GROUP_US = 20_000
+"""All groups at the rate of the frames would take a good part of the time that the control law needs."""
+LONGEST_US = 2**31 - 1
+DISABLED = -1.0
+DEFAULT = 0.0
+HEARTBEAT_US = 1_000_000
+MOST_WAITING = 256
+"""Messages on request between two frames of the plant; who asks for more is told to come back."""
+
+_OLD_REQUESTS = {
+    "MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES": "AUTOPILOT_VERSION",
+    "MAV_CMD_REQUEST_FLIGHT_INFORMATION": "FLIGHT_INFORMATION",
+    "MAV_CMD_GET_HOME_POSITION": "HOME_POSITION",
+    "MAV_CMD_REQUEST_PROTOCOL_VERSION": "PROTOCOL_VERSION",
+    "MAV_CMD_REQUEST_STORAGE_INFORMATION": "STORAGE_INFORMATION",
+}
+"""Commands that REQUEST_MESSAGE has replaced."""
+
+
+class StreamService:
+    """Streams telemetry to every channel at its own rates, and sends messages on request.
+
+    The lead tells it of each frame's snapshot by `update` before `poll`.
+    """
+
+    hears = frozenset({"REQUEST_DATA_STREAM"})
+
+    def __init__(self, telemetry: Mapping[str, Encoder], providers: Mapping[str, Provider] | None = None) -> None:
+        """Stream the messages of `telemetry`; have `providers` answer for messages of other services, by name."""
+        self._telemetry = dict(telemetry)
+        self._spread = {name: number for number, name in enumerate(telemetry)}
+        self._names = {_message_id(name): name for name in telemetry}
+        self._providers: dict[int, Provider] = {mav.MAVLINK_MSG_ID_MESSAGE_INTERVAL: self._interval_asked}
+        for name, provider in (providers or {}).items():
+            self.provide(name, provider)
+        self._schedule: Schedule[tuple[int, str]] = Schedule()
+        self._kinds: dict[int, str] = {}
+        self._open: set[int] = set()
+        self._waiting: list[Send] = []
+        self._snapshot: Snapshot | None = None
+        self._told: dict[str, list[Fields]] = {}
+        self._now_us = 0
+
+    def provide(self, name: str, provider: Provider) -> None:
+        """Have `provider` answer requests of message `name`, which the dialect must have."""
+        message_id = _message_id(name)
+        assert message_id >= 0, name
+        self._providers[message_id] = provider
+
+    def update(self, snapshot: Snapshot) -> None:
+        """Take in the vehicle as it is now."""
+        self._snapshot = snapshot
+        if self._told:
+            self._told = {}
+
+    def use(self, channel: int, kind: str) -> None:
+        """Stream to `channel` what its `kind` (of `rates.DEFAULTS`) gets unless it asks for other rates."""
+        self._kinds[channel] = kind
+        if channel in self._open:
+            self._restart(channel, self._now_us)
+
+    def opened(self, channel: int, now_us: int) -> None:
+        """Begin to stream to `channel`: as `use` has said, else as to a ground station."""
+        self._open.add(channel)
+        self._restart(channel, now_us)
+
+    def closed(self, channel: int) -> None:
+        """Stream to `channel` no more."""
+        self._open.discard(channel)
+        self._kinds.pop(channel, None)
+        for name in self._telemetry:
+            self._schedule.drop((channel, name))
+        self._waiting = [send for send in self._waiting if send.channel != channel]
+
+    def interval_us(self, channel: int, name: str) -> int | None:
+        """Return how often `channel` gets message `name`; None if never."""
+        return self._schedule.interval_us((channel, name))
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        """REQUEST_DATA_STREAM: a group of messages, how many a second; none where it is to stop."""
+        fields = message.fields
+        names = ALL_GROUPS if fields.req_stream_id == mav.MAV_DATA_STREAM_ALL else GROUPS.get(fields.req_stream_id, ())
+        rate_hz = fields.req_message_rate if fields.start_stop else 0
+        interval_us = max(SHORTEST_OF_GROUP_US, round(1e6 / rate_hz)) if rate_hz else None
+        for name in names:
+            self._set(peer.channel, name, interval_us, now_us)
+        return ()
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        """Send what is due, and what was asked for."""
+        self._now_us = now_us
+        due = self._schedule.due(now_us)
+        if not due and not self._waiting:
+            return ()
+        sends, self._waiting = self._waiting, []
+        for channel, name in due:
+            sends.extend([Send(name, fields, channel) for fields in self._tell(name)])
+        return sends
+
+    def handlers(self) -> dict[int, Handler | Entry]:
+        """Return who obeys the commands of this service."""
+        commands: dict[int, Handler | Entry] = {
+            mav.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
+            mav.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
+            mav.MAV_CMD_REQUEST_MESSAGE: self._request_message,
+        }
+        for command, name in _OLD_REQUESTS.items():
+            commands[getattr(mav, command)] = self._request_of(name)
+        return commands
+
+    def _set_message_interval(self, command: Command) -> Outcome:
+        """511: param1 message id, param2 interval in µs: -1 none, 0 the default."""
+        message_id, interval_us = _whole(command.p1), command.p2
+        name = self._names.get(message_id)
+        if name is None:
+            return Outcome(DENIED if self._is_known(message_id) else UNSUPPORTED)
+        if interval_us == DISABLED:
+            self._set(command.peer.channel, name, None, command.now_us)
+        elif interval_us == DEFAULT:
+            self._set(command.peer.channel, name, self._default(command.peer.channel, name), command.now_us)
+        elif 0.0 < interval_us <= LONGEST_US:
+            whole_us = max(SHORTEST_US, round(interval_us))
+            self._set(command.peer.channel, name, whole_us, command.now_us)
+        else:
+            return Outcome(DENIED)
+        return Outcome()
+
+    def _get_message_interval(self, command: Command) -> Outcome:
+        """510: param1 message id; answered by MESSAGE_INTERVAL."""
+        return self._report_interval(_whole(command.p1), command.peer)
+
+    def _interval_asked(self, command: Command) -> list[Send] | Outcome:
+        """REQUEST_MESSAGE of MESSAGE_INTERVAL: param2 is the message whose interval is asked for."""
+        outcome = self._report_interval(_whole(command.p2), command.peer)
+        return [] if outcome == Outcome() else outcome
+
+    def _report_interval(self, message_id: int, peer: Peer) -> Outcome:
+        """Tell the interval: -1 means that the message is not streamed."""
+        if message_id == mav.MAVLINK_MSG_ID_HEARTBEAT:
+            interval_us = HEARTBEAT_US
+        elif message_id in self._names:
+            interval_us = self.interval_us(peer.channel, self._names[message_id]) or -1
+        elif self._is_known(message_id):
+            interval_us = -1
+        else:
+            return Outcome(UNSUPPORTED)
+        return self._post([to(peer, "MESSAGE_INTERVAL", message_id, interval_us)])
+
+    def _request_message(self, command: Command) -> Outcome:
+        """512: param1 message id, the rest is the message's. It goes to whoever asks."""
+        return self._request(_whole(command.p1), command)
+
+    def _request_of(self, name: str) -> Handler:
+        message_id = _message_id(name)
+        return lambda command: self._request(message_id, command._replace(p1=float(message_id), p2=0.0))
+
+    def _request(self, message_id: int, command: Command) -> Outcome:
+        provider = self._providers.get(message_id)
+        if provider is not None:
+            answer = provider(command)
+            return answer if isinstance(answer, Outcome) else self._post(answer)
+        name = self._names.get(message_id)
+        if name is None:
+            return Outcome(UNSUPPORTED)
+        sends = [to(command.peer, name, *fields) for fields in self._tell(name)]
+        return self._post(sends) if sends else Outcome(TEMPORARILY_REJECTED)
+
+    def _post(self, sends: list[Send]) -> Outcome:
+        """Send behind the COMMAND_ACK: with what is due next."""
+        if len(self._waiting) + len(sends) > MOST_WAITING:
+            return Outcome(TEMPORARILY_REJECTED)
+        self._waiting.extend(sends)
+        return Outcome()
+
+    def _tell(self, name: str) -> list[Fields]:
+        """Return the fields of the messages `name` of this frame, worked out once however many channels want them."""
+        told = self._told.get(name)
+        if told is None:
+            fields = None if self._snapshot is None else self._telemetry[name](self._snapshot)
+            told = [] if fields is None else fields if isinstance(fields, list) else [fields]
+            self._told[name] = told
+        return told
+
+    def _restart(self, channel: int, now_us: int) -> None:
+        for name in self._telemetry:
+            self._set(channel, name, self._default(channel, name), now_us)
+
+    def _default(self, channel: int, name: str) -> int | None:
+        kind = self._kinds.get(channel, GCS if channel in self._open else SILENT)
+        return DEFAULTS[kind].get(name)
+
+    def _set(self, channel: int, name: str, interval_us: int | None, now_us: int) -> None:
+        if name not in self._telemetry:
+            return
+        if interval_us is None:
+            self._schedule.drop((channel, name))
+        else:
+            self._schedule.set((channel, name), interval_us, self._spread[name], now_us)
+
+    def _is_known(self, message_id: int) -> bool:
+        return message_id in self._providers or message_id == mav.MAVLINK_MSG_ID_HEARTBEAT
+
+
+def _message_id(name: str) -> int:
+    """Return the id of a message; -2, which nobody can ask for, of one that the dialect lacks."""
+    number: int = getattr(mav, f"MAVLINK_MSG_ID_{name}", -2)
+    return number
+
+
+def _whole(number: float) -> int:
+    """Return a message id that came as a float; -1 for what is none."""
+    return int(number) if 0.0 <= number < 2**24 and number == int(number) else -1

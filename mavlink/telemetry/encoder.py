@@ -1,0 +1,153 @@
+"""Numbers -> what a message's fields can hold; and the quantities that several messages tell in the same wire units."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import degrees, hypot, isfinite, pi
+from typing import Any, TypeAlias
+
+from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.common.rotations import earth_from_body
+from colibri.common.types import Quaternion, Vector
+from colibri.mavlink.node.service import Fields
+from colibri.mavlink.telemetry.snapshot import Home, Snapshot
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
+
+Encoder: TypeAlias = Callable[[Snapshot], Fields | list[Fields] | None]
+"""What a message tells of a snapshot: None where there is nothing to tell, a list where it takes several messages."""
+
+UNKNOWN_U8 = 0xFF
+UNKNOWN_U16 = 0xFFFF
+UNKNOWN_I16 = 0x7FFF
+STANDARD_GRAVITY_M_S2 = 9.80665
+MILLI_G = 1000.0 / STANDARD_GRAVITY_M_S2
+FULL_TURN_CDEG = 36_000
+LARGEST_FLOAT32 = 3.4028234663852886e38
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Constants:
+    """What telemetry tells that does not change in flight.
+
+    Attributes:
+        boot_unix_us: Unix time at the start, µs; 0 where nobody knows it.
+        gravity_m_s2: Of the place.
+    """
+
+    boot_unix_us: int = 0
+    gravity_m_s2: float = 9.81
+
+
+def fitted(name: str, encoder: Encoder) -> Encoder:
+    """Return `encoder` of message `name`, its numbers rounded and clamped to what the fields hold.
+
+    Integers that are no number, and places that are nowhere on earth, leave nothing to tell: the whole message is None.
+    """
+    kinds = getattr(mav, f"MAVLink_{name.lower()}_message").fieldtypes
+    converters = [_CONVERTERS.get(kind, _as_it_is) for kind in kinds]
+
+    def fit(fields: Fields) -> Fields:
+        return tuple(
+            tuple(map(convert, value)) if type(value) is tuple else convert(value)
+            for convert, value in zip(converters, fields, strict=False)
+        )
+
+    def encode(snapshot: Snapshot) -> Fields | list[Fields] | None:
+        try:
+            fields = encoder(snapshot)
+            if fields is None:
+                return None
+            return [fit(one) for one in fields] if isinstance(fields, list) else fit(fields)
+        except (ArithmeticError, ValueError):
+            return None
+
+    return encode
+
+
+def _float32(value: float) -> float:
+    if -LARGEST_FLOAT32 <= value <= LARGEST_FLOAT32 or not isfinite(value):
+        return value
+    return LARGEST_FLOAT32 if value > 0.0 else -LARGEST_FLOAT32
+
+
+def _integer(low: int, high: int) -> Callable[[float], int]:
+    def convert(value: float) -> int:
+        whole = round(value)
+        return whole if low <= whole <= high else low if whole < low else high
+
+    return convert
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
+_CONVERTERS: dict[str, Callable[[Any], Any]] = {"float": _float32, "double": _as_it_is}
+for _bits in (8, 16, 32, 64):
+    _CONVERTERS[f"uint{_bits}_t"] = _integer(0, 2**_bits - 1)
+    _CONVERTERS[f"int{_bits}_t"] = _integer(-(2 ** (_bits - 1)), 2 ** (_bits - 1) - 1)
+
+
+def boot_ms(s: Snapshot) -> int:
+    """Time since the start in ms, which a uint32 holds: it starts anew after 49 days."""
+    return s.time_us // 1000 % 2**32
+
+
+def place_of(s: Snapshot) -> Geodetic:
+    """Where the vehicle is."""
+    return geodetic_of(s.position_enu_m, s.origin)
+
+
+def degrees_e7(place: Geodetic) -> tuple[float, float]:
+    """Latitude and longitude in 1e-7 degrees."""
+    return (place.latitude_deg * 1e7, place.longitude_deg * 1e7)
+
+
+def velocity_ned_cm_s(s: Snapshot) -> Vector:
+    """Velocity in cm/s, NED."""
+    return times(100.0, ned_from_enu(s.velocity_enu_m_s))
+
+
+def rate_frd(s: Snapshot) -> Vector:
+    """Body rates in rad/s, FRD."""
+    return frd_from_flu(s.rate_flu_rad_s)
+
+
+def in_body_frd(q: Quaternion, vector_enu: Vector) -> Vector:
+    """Return an earth vector as the body sees it, FRD."""
+    w, x, y, z = q
+    return frd_from_flu(earth_from_body((w, -x, -y, -z), vector_enu))
+
+
+def height_above_home_m(s: Snapshot) -> float:
+    """Height above home, or above the origin while home is not known."""
+    home: Home | None = s.home
+    return s.position_enu_m[2] - (home.position_enu_m[2] if home else 0.0)
+
+
+def yaw_ned(yaw_enu_rad: float) -> float:
+    """Yaw clockwise from north, rad in (-pi, pi]; nan of what is no number."""
+    turned = (pi / 2 - yaw_enu_rad) % (2.0 * pi)
+    return turned - 2.0 * pi if turned > pi else turned
+
+
+def compass_cdeg(angle_rad: float) -> int:
+    """Return a direction, counter-clockwise from east, as a compass shows it: 0 to 35999 centidegrees."""
+    return round(100.0 * degrees(pi / 2 - angle_rad)) % FULL_TURN_CDEG
+
+
+def airspeed_m_s(s: Snapshot) -> float:
+    """Speed through the air; through still air where no wind is known."""
+    wind = s.wind_enu_m_s if all(map(isfinite, s.wind_enu_m_s)) else (0.0, 0.0, 0.0)
+    return hypot(*minus(s.velocity_enu_m_s, wind))
+
+
+def times(factor: float, vector: Sequence[float]) -> Vector:
+    """Scale a vector."""
+    x, y, z = vector
+    return (factor * x, factor * y, factor * z)
+
+
+def minus(a: Vector, b: Vector) -> Vector:
+    """Subtract vectors."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

@@ -1,0 +1,235 @@
+"""The vehicle as its telemetry sees it at one instant: plain values in SI, ENU and FLU."""
+
+from dataclasses import dataclass
+from math import nan
+from typing import NamedTuple
+
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
+from colibri.common.types import FourRotors, Quaternion, Vector
+from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
+
+NOWHERE: Vector = (nan, nan, nan)
+LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
+CHARGE_OK = 1
+"""MAV_BATTERY_CHARGE_STATE_OK."""
+
+
+class Home(NamedTuple):
+    """Where the vehicle returns to.
+
+    Attributes:
+        position_enu_m: m, ENU from the origin.
+        yaw_rad: Heading there, counter-clockwise from east.
+    """
+
+    position_enu_m: Vector
+    yaw_rad: float
+
+
+class BatteryState(NamedTuple):
+    """The battery, as the autopilot believes it to be.
+
+    Attributes:
+        cells: In series.
+        voltage_v: Terminal voltage.
+        current_a: Drawn now.
+        used_ah: Charge taken.
+        remaining: Part of the charge that is left, 0..1.
+        remaining_s: Time until it is empty at this current; nan while none flows.
+        used_wh: Energy taken.
+        charge_state: MAV_BATTERY_CHARGE_STATE.
+    """
+
+    cells: int
+    voltage_v: float
+    current_a: float
+    used_ah: float
+    remaining: float
+    remaining_s: float
+    used_wh: float
+    charge_state: int = CHARGE_OK
+
+
+class Setpoint(NamedTuple):
+    """What the control law steers to now; nan where it steers to nothing.
+
+    Attributes:
+        position_enu_m: m.
+        velocity_enu_m_s: m/s.
+        acceleration_enu_m_s2: m/s².
+        yaw_rad: Counter-clockwise from east.
+        yaw_rate_rad_s: rad/s.
+        attitude: Unit quaternion, FLU to ENU.
+        rate_flu_rad_s: Body rates.
+        thrust: Part of the largest, 0..1.
+    """
+
+    position_enu_m: Vector = NOWHERE
+    velocity_enu_m_s: Vector = NOWHERE
+    acceleration_enu_m_s2: Vector = NOWHERE
+    yaw_rad: float = nan
+    yaw_rate_rad_s: float = nan
+    attitude: Quaternion = LEVEL
+    rate_flu_rad_s: Vector = (0.0, 0.0, 0.0)
+    thrust: float = 0.0
+
+
+class Forecast(NamedTuple):
+    """A point of the predicted horizon.
+
+    Attributes:
+        after_s: From now.
+        position_enu_m: m.
+        velocity_enu_m_s: m/s.
+        acceleration_enu_m_s2: m/s².
+        yaw_rad: Counter-clockwise from east.
+        yaw_rate_rad_s: rad/s.
+    """
+
+    after_s: float
+    position_enu_m: Vector
+    velocity_enu_m_s: Vector
+    acceleration_enu_m_s2: Vector
+    yaw_rad: float
+    yaw_rate_rad_s: float
+
+
+class SolverState(NamedTuple):
+    """How the control law's last decision came about.
+
+    Attributes:
+        status: Code of `colibri.autopilot.control.qp.QpStatus`, 0 is solved; -1 without a QP.
+        fallback: Code of `colibri.autopilot.control.interface.Fallback`; -1 is none.
+        iterations: Of the solver; -1 where it tells none.
+        solve_time_s: Of the QP.
+        step_time_s: Of the whole control step.
+        cost: At the solution.
+        slack: By how much soft limits are exceeded, in parts of each: the largest.
+        active: Constraints that bind: rotors, increments, angles, rates.
+        planned_squared: Squared rotor speeds of the plan's steps, parts of the largest.
+        horizon: Where the plan leads.
+    """
+
+    status: int = -1
+    fallback: int = -1
+    iterations: int = -1
+    solve_time_s: float = 0.0
+    step_time_s: float = 0.0
+    cost: float = 0.0
+    slack: float = 0.0
+    active: tuple[int, int, int, int] = (0, 0, 0, 0)
+    planned_squared: tuple[FourRotors, ...] = ()
+    horizon: tuple[Forecast, ...] = ()
+
+
+class EstimatorState(NamedTuple):
+    """How well the vehicle knows its state.
+
+    Attributes:
+        flags: ESTIMATOR_STATUS_FLAGS.
+        velocity_ratio: Of the last test of a velocity: above 1 it was rejected.
+        position_ratio: Of a horizontal position.
+        height_ratio: Of a height.
+        field_ratio: Of the magnetic field.
+        horizontal_accuracy_m: Standard deviation.
+        vertical_accuracy_m: Standard deviation.
+        failed_sensors: MAV_SYS_STATUS_SENSOR bits of those that are not believed.
+    """
+
+    flags: int
+    velocity_ratio: float
+    position_ratio: float
+    height_ratio: float
+    field_ratio: float
+    horizontal_accuracy_m: float
+    vertical_accuracy_m: float
+    failed_sensors: int
+
+
+NO_SETPOINT = Setpoint()
+NOT_SOLVED = SolverState()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Snapshot:
+    """Everything that telemetry tells.
+
+    Attributes:
+        time_us: Simulated time since the autopilot began, µs.
+        armed: Whether the rotors may turn.
+        base_mode: MAV_MODE_FLAG bits of the HEARTBEAT, but for the armed one.
+        custom_mode: The mode in the layout of the identity that is flown under.
+        intended_custom_mode: What was last asked for.
+        standard_mode: MAV_STANDARD_MODE of the mode, 0 where it is none.
+        landed_state: MAV_LANDED_STATE.
+        failsafe: Whether the vehicle acts on its own to save itself.
+        emergency: Whether it comes down for that.
+        armable: Whether every check before arming passes.
+        position_enu_m: From the origin, m.
+        velocity_enu_m_s: m/s.
+        acceleration_enu_m_s2: Coordinate acceleration, m/s².
+        attitude: Unit quaternion, FLU to ENU.
+        rate_flu_rad_s: Body rates.
+        origin: Of the ENU frame.
+        home: None until it is known.
+        rotor_speeds_rad_s: As the autopilot believes them to be.
+        controls: Commanded, parts of the largest speed.
+        battery: None without one.
+        setpoint: Of the control law.
+        solver: Of the last decision.
+        wind_enu_m_s: Estimated; nan where none is.
+        sticks: Of the last MANUAL_CONTROL: pitch, roll, thrust, yaw, -1..1 (thrust 0..1); None without one.
+        flight_started_us: Time of the last arming; 0 before.
+        takeoff_us: Time of the last take-off; 0 before.
+        landing_us: Time of the last landing; 0 before.
+        flights: How often it was armed.
+        terminated: Whether the flight was ended for good.
+        ground_m: Height of the ground below, over the origin.
+        target_enu_m: Where the way leads, the next waypoint; nan for the setpoint itself.
+        gps_ok: Whether there is GPS.
+        fence_enabled: Whether the geofence is watched.
+        fence_breached: Whether the vehicle is where it must not be.
+        load: Part of the time between two frames that the autopilot computes, 0..1.
+        sensed: What was measured on board last; None where the state is told.
+        fix: The last of GPS; None before it.
+        estimator: How well the state is known; None where it is told.
+    """
+
+    time_us: int
+    armed: bool = False
+    base_mode: int = 0
+    custom_mode: int = 0
+    intended_custom_mode: int = 0
+    standard_mode: int = 0
+    landed_state: int = 1
+    failsafe: bool = False
+    emergency: bool = False
+    armable: bool = True
+    position_enu_m: Vector = (0.0, 0.0, 0.0)
+    velocity_enu_m_s: Vector = (0.0, 0.0, 0.0)
+    acceleration_enu_m_s2: Vector = (0.0, 0.0, 0.0)
+    attitude: Quaternion = LEVEL
+    rate_flu_rad_s: Vector = (0.0, 0.0, 0.0)
+    origin: Geodetic = DEFAULT_ORIGIN
+    home: Home | None = None
+    rotor_speeds_rad_s: FourRotors = (0.0, 0.0, 0.0, 0.0)
+    controls: FourRotors = (0.0, 0.0, 0.0, 0.0)
+    battery: BatteryState | None = None
+    setpoint: Setpoint = NO_SETPOINT
+    solver: SolverState = NOT_SOLVED
+    wind_enu_m_s: Vector = NOWHERE
+    sticks: FourRotors | None = None
+    flight_started_us: int = 0
+    takeoff_us: int = 0
+    landing_us: int = 0
+    flights: int = 0
+    terminated: bool = False
+    ground_m: float = 0.0
+    target_enu_m: Vector = NOWHERE
+    gps_ok: bool = True
+    fence_enabled: bool = False
+    fence_breached: bool = False
+    load: float = 0.0
+    sensed: SensorFrame | None = None
+    fix: GpsFix | None = None
+    estimator: EstimatorState | None = None

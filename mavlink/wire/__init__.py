@@ -1,0 +1,1 @@
+"""Bytes to MAVLink messages and back: dialect, framing, signing, telemetry-log format, the only NED/FRD."""

@@ -1,0 +1,71 @@
+"""Cuts a stream of bytes, which keeps no borders, into whole MAVLink frames."""
+
+import re
+
+from colibri.mavlink.wire.dialect import MARKER, SIGNATURE_BYTES, SIGNED, intact
+
+_MARKERS = re.compile(b"[\xfd\xfe]")
+_MARKER_V1 = 0xFE
+_PREFIX_BYTES = 3
+"""What tells how long a frame is: marker, payload length, incompatibility flags (of MAVLink 2)."""
+_OTHER_BYTES_V1 = 8
+_OTHER_BYTES = 12
+LONGEST_FRAME = _OTHER_BYTES + 255 + SIGNATURE_BYTES
+
+
+class Framer:
+    """Takes chunks of a stream in, gives whole frames out; never keeps more than one frame's bytes.
+
+    A frame is one whose CRC holds. Of a message that the dialect has not nobody can know; that is taken for a frame if
+    another begins behind it, or nothing has come yet.
+
+    Attributes:
+        skipped: Bytes that belonged to no frame.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self._rest = b""
+        self.skipped = 0
+
+    def take(self, chunk: bytes) -> list[bytes]:
+        """Return the frames that are whole with `chunk`; the bytes of a half one wait for the next."""
+        frames: list[bytes] = []
+        data, at = self._rest + chunk, 0
+        while marker := _MARKERS.search(data, at):
+            self.skipped += marker.start() - at
+            at = marker.start()
+            length = frame_length(data, at)
+            if length is None or at + length > len(data):
+                self._rest = data[at:]
+                return frames
+            if length and _is_frame(data, at, at + length):
+                frames.append(data[at : at + length])
+                at += length
+            else:
+                at += 1
+                self.skipped += 1
+        self.skipped += len(data) - at
+        self._rest = b""
+        return frames
+
+
+def frame_length(data: bytes, at: int) -> int | None:
+    """Return the length of the frame that may begin at `at`; 0 if none can, None where too little has come to tell."""
+    if at + _PREFIX_BYTES > len(data):
+        return None
+    marker, payload_bytes, incompatible = data[at : at + _PREFIX_BYTES]
+    if marker == _MARKER_V1:
+        return _OTHER_BYTES_V1 + payload_bytes
+    if marker != MARKER:
+        return 0
+    if incompatible not in (0, SIGNED):
+        return 0
+    return _OTHER_BYTES + payload_bytes + (SIGNATURE_BYTES if incompatible else 0)
+
+
+def _is_frame(data: bytes, at: int, end: int) -> bool:
+    known = intact(data[at:end])
+    if known is None:
+        return end == len(data) or _MARKERS.match(data, end) is not None
+    return known

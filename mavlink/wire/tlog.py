@@ -1,0 +1,62 @@
+"""Telemetry logs as ground stations write them: each frame behind its time, µs, as a big-endian integer."""
+
+import struct
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from colibri.common.process.log_files import open_for_writing
+from colibri.mavlink.wire.framing import frame_length
+
+STAMP = struct.Struct(">Q")
+
+
+class Logged(NamedTuple):
+    """A frame of a log.
+
+    Attributes:
+        time_us: When, µs; of a flight's log simulated time.
+        frame: The bytes.
+    """
+
+    time_us: int
+    frame: bytes
+
+
+class TlogError(Exception):
+    """What is no telemetry log; the message says where it ceases to be one."""
+
+
+def decode(log: bytes) -> Iterator[Logged]:
+    """Yield the frames of a log; of a process that was killed, the last may be cut off.
+
+    Raises:
+        TlogError: This is no log.
+    """
+    at = 0
+    while at + STAMP.size < len(log):
+        begin = at + STAMP.size
+        length = frame_length(log, begin)
+        if length == 0:
+            raise TlogError(f"no MAVLink frame at byte {begin}")
+        if length is None or begin + length > len(log):
+            return
+        yield Logged(STAMP.unpack_from(log, at)[0], log[begin : begin + length])
+        at = begin + length
+
+
+class TlogWriter:
+    """A telemetry log that is written frame by frame."""
+
+    def __init__(self, path: Path) -> None:
+        """Create the file."""
+        self._file = open_for_writing(path)
+
+    def write(self, time_us: int, frames: Iterable[bytes]) -> None:
+        """Append frames, all of simulated time `time_us`."""
+        stamp = STAMP.pack(time_us)
+        self._file.write(b"".join([stamp + frame for frame in frames]))
+
+    def close(self) -> None:
+        """Close."""
+        self._file.close()

@@ -1,0 +1,1 @@
+"""Wind, gusts, turbulence, and the streams of random numbers."""

@@ -1,0 +1,131 @@
+"""Dryden's turbulence as MIL-F-8785C has it at low altitude: white noise through shaping filters, (memory) -> memory.
+
+Spectra, one-sided over angular frequency, with V the airspeed:
+Φu(ω) = σu² (2 Lu / π V) / (1 + (Lu ω / V)²), Φv and Φw(ω) = σ² (L / π V) (1 + 3 (L ω / V)²) / (1 + (L ω / V)²)².
+
+The filters are kept normalised, with stationary states of variance 1: what height and airspeed change are the rates at
+which they forget and the σ that scales them. Their discretisation is exact while those hold. The noise is a
+function of seed and frame, so that a memory has but one future. Turning of the air (p, q, r) is left out: a quadrotor's
+span is small against the eddies.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.common.kernels import exp, expm1, power
+from colibri.plant.environment.random_streams import Source
+from colibri.plant.environment.weather import Intensity
+
+FEET_PER_M = 1.0 / 0.3048
+KNOT_M_S = 1852.0 / 3600.0
+W20_KNOTS: dict[Intensity, float] = {"light": 15.0, "moderate": 30.0, "severe": 45.0}
+"""Wind at 20 feet, which says how strong the turbulence is."""
+LEAST_HEIGHT_M = 10.0 / FEET_PER_M
+LARGEST_HEIGHT_M = 1000.0 / FEET_PER_M
+"""The formulas hold between these; what is lower or higher is as at the nearer one."""
+LEAST_AIRSPEED_M_S = 1.0
+"""Frozen eddies must be flown through to be felt: what hangs in calm air would feel the same forever."""
+
+_SQRT_3 = sqrt(3.0)
+_BLOCK = 256
+_NOISES = 5
+
+
+class Eddies(NamedTuple):
+    """What the filters remember.
+
+    Attributes:
+        frame: How many frames the air has blown.
+        u: Along the mean wind.
+        v: Across it: first and second state.
+        w: Upwards: first and second state.
+    """
+
+    frame: int
+    u: float
+    v: tuple[float, float]
+    w: tuple[float, float]
+
+
+class Scales(NamedTuple):
+    """The turbulence at one height.
+
+    Attributes:
+        sigma_uv_m_s: σu = σv, standard deviation along and across the mean wind.
+        sigma_w_m_s: σw, upwards.
+        length_uv_m: Lu = Lv.
+        length_w_m: Lw.
+    """
+
+    sigma_uv_m_s: float
+    sigma_w_m_s: float
+    length_uv_m: float
+    length_w_m: float
+
+
+def scales(intensity: Intensity, height_m: float) -> Scales:
+    """Return intensities and lengths at a height above ground, MIL-F-8785C, 3.7.3.4."""
+    height_m = min(max(height_m, LEAST_HEIGHT_M), LARGEST_HEIGHT_M)
+    slope = 0.177 + 0.000823 * height_m * FEET_PER_M
+    sigma_w = 0.1 * W20_KNOTS[intensity] * KNOT_M_S
+    return Scales(sigma_w / power(slope, 0.4), sigma_w, height_m / power(slope, 1.2), height_m)
+
+
+def eddy_velocity(eddies: Eddies, scale: Scales) -> tuple[float, float, float]:
+    """Return what the eddies add to the wind: along it, across it to the left, and upwards, m/s."""
+    horizontal = scale.sigma_uv_m_s
+    return horizontal * eddies.u, horizontal * _across(eddies.v), scale.sigma_w_m_s * _across(eddies.w)
+
+
+class Turbulence:
+    """The turbulence of one seed."""
+
+    def __init__(self, seed: int) -> None:
+        """Let everything that is by chance follow from `seed`."""
+        self._key = np.random.SeedSequence(seed, spawn_key=(Source.WEATHER,)).generate_state(2, np.uint64)
+        self._block: tuple[int, list[list[float]]] = (-1, [])
+
+    def begin(self) -> Eddies:
+        """Return how the air is at first: as if it had blown forever."""
+        u, v1, v2, w1, w2 = self._noise(0)
+        return Eddies(1, u, (v1, 0.5 * (v1 + v2)), (w1, 0.5 * (w1 + w2)))
+
+    def step(self, eddies: Eddies, scale: Scales, airspeed_m_s: float, duration_s: float) -> Eddies:
+        """Return the eddies that meet the vehicle after `duration_s`."""
+        way_m = max(airspeed_m_s, LEAST_AIRSPEED_M_S) * duration_s
+        n1, n2, n3, n4, n5 = self._noise(eddies.frame)
+        along, up = way_m / scale.length_uv_m, way_m / scale.length_w_m
+        u = exp(-along) * eddies.u + sqrt(-expm1(-2.0 * along)) * n1
+        return Eddies(eddies.frame + 1, u, _twice(eddies.v, along, n2, n3), _twice(eddies.w, up, n4, n5))
+
+    def _noise(self, frame: int) -> list[float]:
+        """Return a frame's white noise: independent, of variance 1."""
+        block, row = divmod(frame, _BLOCK)
+        if self._block[0] != block:
+            chance = np.random.Generator(np.random.Philox(key=self._key, counter=block << 128))
+            self._block = (block, chance.standard_normal((_BLOCK, _NOISES)).tolist())
+        return self._block[1][row]
+
+
+def _twice(x: tuple[float, float], way: float, n1: float, n2: float) -> tuple[float, float]:
+    """Return the states of two equal lags in a row, x1' = a (n - x1) and x2' = a (x1 - x2), after a t = `way`.
+
+    Their stationary covariance P is [[1, 1/2], [1/2, 1/2]], so that the noise added on the way has the covariance
+    P - Φ P Φᵀ, Φ = exp(-way) [[1, 0], [way, 1]]; here by its Cholesky factor.
+    """
+    fade = exp(-way)
+    squared = fade * fade
+    q11 = -expm1(-2.0 * way)
+    q12 = 0.5 * q11 - squared * way
+    q22 = 0.5 * q11 - squared * (way * way + way)
+    l11 = sqrt(q11)
+    l21 = q12 / l11
+    l22 = sqrt(max(0.0, q22 - l21 * l21))
+    return fade * x[0] + l11 * n1, fade * (way * x[0] + x[1]) + l21 * n1 + l22 * n2
+
+
+def _across(x: tuple[float, float]) -> float:
+    """Return the output (1 + √3 s/a) / (1 + s/a)² of the two lags, scaled to variance 1."""
+    return (_SQRT_3 * x[0] + (1.0 - _SQRT_3) * x[1]) / sqrt(2.0)

@@ -1,0 +1,137 @@
+"""The weather that a flight is flown in, as the command line says it: wind, gusts, turbulence.
+
+Velocities are those of the air, ENU, m/s. `plant.air` makes it blow.
+"""
+
+from bisect import bisect_right
+from math import pi, radians
+from pathlib import Path
+from typing import Literal, NamedTuple, TypeAlias
+
+from colibri.common.elementary import cos, sin
+from colibri.common.types import Vector
+
+Intensity: TypeAlias = Literal["light", "moderate", "severe"]
+
+INTENSITIES: tuple[Intensity, ...] = ("light", "moderate", "severe")
+FASTEST_M_S = 150.0
+"""No wind on Earth's ground was ever faster."""
+
+
+class Wind(NamedTuple):
+    """A constant wind, as meteorology says it.
+
+    Attributes:
+        speed_m_s: Speed.
+        from_deg: Where it blows from, degrees clockwise from north: 270 blows from west to east.
+    """
+
+    speed_m_s: float
+    from_deg: float
+
+    @property
+    def velocity_enu_m_s(self) -> Vector:
+        """Velocity of the air."""
+        direction = radians(self.from_deg)
+        return (-self.speed_m_s * sin(direction), -self.speed_m_s * cos(direction), 0.0)
+
+    @property
+    def constant(self) -> bool:
+        """Whether it is always the same."""
+        return True
+
+    def velocity_at(self, _time_s: float) -> Vector:
+        """Return the velocity of the air at a time."""
+        return self.velocity_enu_m_s
+
+    def __str__(self) -> str:
+        """Return what `wind` reads back."""
+        return f"{self.speed_m_s!r}@{self.from_deg!r}"
+
+
+class RecordedWind(NamedTuple):
+    """A wind from a file: linear between its times, constant before the first and after the last.
+
+    Attributes:
+        path: The file.
+        times_s: Simulated time, rising.
+        velocities_enu_m_s: One for each time.
+    """
+
+    path: Path
+    times_s: tuple[float, ...]
+    velocities_enu_m_s: tuple[Vector, ...]
+
+    @property
+    def constant(self) -> bool:
+        """Whether it is always the same."""
+        return len(self.times_s) == 1
+
+    def velocity_at(self, time_s: float) -> Vector:
+        """Return the velocity of the air at a time."""
+        after = bisect_right(self.times_s, time_s)
+        if after in (0, len(self.times_s)):
+            return self.velocities_enu_m_s[max(0, after - 1)]
+        began_s, ends_s = self.times_s[after - 1 : after + 1]
+        a, b = self.velocities_enu_m_s[after - 1 : after + 1]
+        part = (time_s - began_s) / (ends_s - began_s)
+        return (a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2]))
+
+    def __str__(self) -> str:
+        """Return what `wind` reads back."""
+        return str(self.path)
+
+
+class Gust(NamedTuple):
+    """A discrete gust that comes on and dies away as V/2 (1 - cos 2π(t - start)/duration).
+
+    Attributes:
+        wind: Its peak, V.
+        start_s: Simulated time at which it begins.
+        duration_s: How long it lasts; the peak is in the middle.
+    """
+
+    wind: Wind
+    start_s: float
+    duration_s: float
+
+    def velocity_at(self, time_s: float) -> Vector:
+        """Return the velocity that it adds to the air at a time."""
+        phase = (time_s - self.start_s) / self.duration_s
+        if not 0.0 < phase < 1.0:
+            return (0.0, 0.0, 0.0)
+        share = 0.5 * (1.0 - cos(2.0 * pi * phase))
+        east, north, up = self.wind.velocity_enu_m_s
+        return (share * east, share * north, share * up)
+
+    def __str__(self) -> str:
+        """Return what `gust` reads back."""
+        return f"{self.wind}:start={self.start_s!r},duration={self.duration_s!r}"
+
+
+class Weather(NamedTuple):
+    """All that moves the air.
+
+    Attributes:
+        wind: The mean wind.
+        gusts: What is added to it.
+        turbulence: How strong it is; None for none.
+        seed: Of the turbulence.
+    """
+
+    wind: Wind | RecordedWind
+    gusts: tuple[Gust, ...] = ()
+    turbulence: Intensity | None = None
+    seed: int = 0
+
+    def options(self) -> list[str]:
+        """Return the command line that `add_weather_arguments` reads back; `--seed` is not only the weather's."""
+        return [
+            *("--wind", str(self.wind)),
+            *(f"--gust={gust}" for gust in self.gusts),
+            *(("--turbulence", self.turbulence) if self.turbulence else ()),
+        ]
+
+
+NO_WIND = Wind(0.0, 0.0)
+NO_WEATHER = Weather(NO_WIND)

@@ -1,0 +1,142 @@
+"""Two ways to go on by a frame: fixed-step Runge-Kutta 4, and adaptive Dormand-Prince 5(4), over one compiled f(x)."""
+
+from collections.abc import Callable
+from math import ceil, sqrt
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from colibri.common.jit import compiled
+from colibri.common.kernels import power
+from colibri.common.types import Array, FourRotors
+from colibri.plant.physics.equations import Packed, close, held, write_derivative
+from colibri.plant.physics.start import IntegrationError
+
+Solver: TypeAlias = Callable[[Array, FourRotors, Packed, float], tuple[Array, float]]
+"""(x, commanded rotor speeds, parameters, duration in s) -> x after it, the battery's voltage; see `colibri.plant.physics.equations`."""
+Integrator: TypeAlias = Literal["rk4", "adaptive"]
+
+RK4_STEP_S = 0.001
+RELATIVE_TOLERANCE = 1e-9
+ABSOLUTE_TOLERANCE = 1e-12
+_MAX_STEPS = 10_000
+_ROUNDING = 1e-6
+
+_A = np.array(
+    [
+        [1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0],
+        [44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0],
+        [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+)
+"""Dormand and Prince's weights of the slopes at each stage, the last those of the fifth-order result (FSAL)."""
+_ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+"""Fifth-order less fourth-order weights."""
+_STAGES = 7
+_SAFETY, _MIN_FACTOR, _MAX_FACTOR, _EXPONENT = 0.9, 0.2, 10.0, -0.2
+_TOO_SMALL = 1e-14
+"""A step of this part of the frame is none."""
+
+
+def fixed_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:
+    """Integrate by Runge-Kutta 4 in equal steps of at most `RK4_STEP_S`."""
+    steps = max(1, ceil(duration_s / RK4_STEP_S - _ROUNDING))
+    return runge_kutta_4(x, target, parameters, duration_s, steps)
+
+
+def adaptive_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:
+    """Integrate by the embedded pair of Dormand and Prince, held to a tight tolerance.
+
+    Raises:
+        IntegrationError: No step is small enough.
+    """
+    end, voltage_v, done = dormand_prince(x, target, parameters, duration_s)
+    if not done:
+        raise IntegrationError("the state has left what the model describes: no step is small enough")
+    return end, voltage_v
+
+
+def solver(name: Integrator) -> Solver:
+    """Return the solver of that name."""
+    return adaptive_step if name == "adaptive" else fixed_step
+
+
+@compiled
+def runge_kutta_4(
+    x: Array, target: FourRotors, parameters: Packed, duration_s: float, steps: int
+) -> tuple[Array, float]:
+    """Return x after `duration_s` by the classical fourth-order rule in `steps` equal steps, and the voltage then."""
+    h = duration_s / steps
+    x = held(x, target, parameters)
+    k1, k2, k3, k4 = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
+    y = np.empty_like(x)
+    for _ in range(steps):
+        write_derivative(k1, x, target, parameters[0])
+        _write_sum(y, x, 0.5 * h, k1)
+        write_derivative(k2, y, target, parameters[0])
+        _write_sum(y, x, 0.5 * h, k2)
+        write_derivative(k3, y, target, parameters[0])
+        _write_sum(y, x, h, k3)
+        write_derivative(k4, y, target, parameters[0])
+        for i in range(x.size):
+            x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+        close(x, parameters)
+    return x, close(x, parameters)
+
+
+@compiled
+def dormand_prince(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float, bool]:
+    """Return x after `duration_s`, the voltage then, and whether it got there.
+
+    J. R. Dormand and P. J. Prince, A family of embedded Runge-Kutta formulae, Journal of Computational and Applied
+    Mathematics 6(1), 1980; error norm and step control as E. Hairer, S. P. Nørsett and G. Wanner, Solving Ordinary
+    Differential Equations I, II.4.
+    """
+    x = held(x, target, parameters)
+    k = np.empty((_STAGES, x.size))
+    y = np.empty_like(x)
+    write_derivative(k[0], x, target, parameters[0])
+    gone_s, h = 0.0, duration_s
+    for _ in range(_MAX_STEPS):
+        for stage in range(1, _STAGES):
+            for i in range(x.size):
+                slope = 0.0
+                for j in range(stage):
+                    slope += _A[stage - 1, j] * k[j, i]
+                y[i] = x[i] + h * slope
+            write_derivative(k[stage], y, target, parameters[0])
+        error = _error(x, y, h, k)
+        if error <= 1.0:
+            gone_s += h
+            x[:] = y
+            k[0] = k[_STAGES - 1]
+            if gone_s >= duration_s:
+                return x, close(x, parameters), True
+        elif not h > _TOO_SMALL * duration_s:
+            break
+        factor = _SAFETY * power(error, _EXPONENT) if error > 0.0 else _MAX_FACTOR
+        h = min(h * min(max(factor, _MIN_FACTOR), _MAX_FACTOR if error <= 1.0 else 1.0), duration_s - gone_s)
+    return x, 0.0, False
+
+
+@compiled
+def _error(x: Array, y: Array, h: float, k: Array) -> float:
+    """Return the error of a step from x to y in parts of what is tolerated; infinite where it is no number."""
+    total = 0.0
+    for i in range(x.size):
+        difference = 0.0
+        for j in range(_STAGES):
+            difference += _ERROR[j] * k[j, i]
+        part = h * difference / (ABSOLUTE_TOLERANCE + RELATIVE_TOLERANCE * max(abs(x[i]), abs(y[i])))
+        total += part * part
+    error = sqrt(total / x.size)
+    return error if error < np.inf else np.inf
+
+
+@compiled
+def _write_sum(y: Array, x: Array, factor: float, k: Array) -> None:
+    for i in range(x.size):
+        y[i] = x[i] + factor * k[i]

@@ -1,0 +1,90 @@
+"""How a flight begins: position, attitude, velocity, rotors."""
+
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.common.rotations import earth_from_body, quaternion_from_euler, rotation_matrix
+from colibri.common.types import Quaternion, Vector
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.plant.vehicle.description import Vehicle, VehicleError
+
+_DEEPEST_START_M = 0.01
+
+
+class IntegrationError(Exception):
+    """The state cannot be integrated any further."""
+
+
+class Start(NamedTuple):
+    """How the vehicle begins. Angles are Z-Y'-X''.
+
+    Attributes:
+        x: Position, ENU, m.
+        y: Position, ENU, m.
+        z: Position, ENU, m.
+        phi: Roll, degrees.
+        theta: Pitch, degrees.
+        psi: Yaw, degrees.
+        vx: Velocity, ENU, m/s.
+        vy: Velocity, ENU, m/s.
+        vz: Velocity, ENU, m/s.
+        p: Body rate, FLU, rad/s.
+        q: Body rate, FLU, rad/s.
+        r: Body rate, FLU, rad/s.
+        rotors: Speed of every rotor, turns per minute.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    phi: float = 0.0
+    theta: float = 0.0
+    psi: float = 0.0
+    vx: float = 0.0
+    vy: float = 0.0
+    vz: float = 0.0
+    p: float = 0.0
+    q: float = 0.0
+    r: float = 0.0
+    rotors: float = 0.0
+
+    @property
+    def attitude(self) -> Quaternion:
+        """The unit quaternion that turns FLU into ENU."""
+        return quaternion_from_euler(radians(self.phi), radians(self.theta), radians(self.psi))
+
+    @property
+    def velocity_flu_m_s(self) -> Vector:
+        """The velocity in the body frame."""
+        w, x, y, z = self.attitude
+        return earth_from_body((w, -x, -y, -z), (self.vx, self.vy, self.vz))
+
+    def __str__(self) -> str:
+        """Return what `start_values` reads back."""
+        return ",".join(f"{key}={value!r}" for key, value in self._asdict().items())
+
+
+def check_start(start: Start, vehicle: Vehicle) -> None:
+    """Check that a vehicle can start like that.
+
+    Raises:
+        VehicleError: Its rotors do not turn so fast, or it would start in the ground.
+    """
+    if not 0.0 <= vehicle.speed_from_rpm(start.rotors) <= vehicle.rotors.max_speed:
+        raise VehicleError(f"the rotors of {vehicle.name} cannot start at {start.rotors:g} rpm")
+    if vehicle.ground is None:
+        return
+    _, _, up = rotation_matrix(start.attitude)
+    lowest_m = start.z + float((vehicle.ground.contacts_m(vehicle.rotors) * np.array(up)).sum(axis=1).min())
+    depth_m = vehicle.ground_height_m - lowest_m
+    if depth_m > _DEEPEST_START_M:
+        raise VehicleError(f"{vehicle.name} would start {depth_m:.3g} m below the ground: start it higher")
+
+
+DEFAULT_STARTS = {
+    Feedback.STATE: Start(y=-1.0, z=2.0, psi=90.0, rotors=4740.0),
+    Feedback.SENSORS: Start(y=-1.0, psi=90.0),
+}
+"""The thesis's spiral; or below it on the ground, where an estimator finds its bearings."""

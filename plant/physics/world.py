@@ -1,0 +1,167 @@
+"""The world: vehicle, rotors, battery and time, advanced one frame at a time: (world, command) -> world."""
+
+from dataclasses import dataclass
+from math import isfinite, nan
+
+import numpy as np
+
+from colibri.common.rotations import earth_from_body, normalized
+from colibri.common.types import Array, FourRotors, Vector
+from colibri.mavlink.hil.plant_status import PlantBattery
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
+from colibri.plant.environment.air import CALM, Air
+from colibri.plant.environment.turbulence import Eddies
+from colibri.plant.environment.weather import NO_WEATHER, Weather
+from colibri.plant.physics.equations import CHARGE, ROTORS, attitude_of, packed, specific_force
+from colibri.plant.physics.integrators import Integrator, solver
+from colibri.plant.physics.parameters import parameters_of
+from colibri.plant.physics.start import IntegrationError, Start, check_start
+from colibri.plant.vehicle.description import Vehicle
+
+State = tuple[float, ...]
+
+_STANDING: FourRotors = (0.0, 0.0, 0.0, 0.0)
+_LEVEL: State = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+_MOMENT_S = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """Everything that the next step depends on.
+
+    Attributes:
+        time_us: Simulated time, µs.
+        state: `colibri.plant.physics.equations.STATE`, 13 values.
+        rotor_speeds: What the rotors turn at, in the vehicle's unit; without lag, what they turned at up to now.
+        charge_used_ah: Charge taken from the battery, Ah.
+        voltage_v: The battery's terminal voltage, V; nan before the first step, and without a battery.
+        wind_enu_m_s: Velocity of the air where the vehicle is, held until the next step ends.
+        eddies: What the turbulence remembers; None where there is none.
+    """
+
+    time_us: int
+    state: State
+    rotor_speeds: FourRotors
+    charge_used_ah: float = 0.0
+    voltage_v: float = nan
+    wind_enu_m_s: Vector = CALM
+    eddies: Eddies | None = None
+
+
+def starting_world(start: Start, vehicle: Vehicle, weather: Weather = NO_WEATHER) -> World:
+    """Return a world at time 0, with a full battery.
+
+    Raises:
+        VehicleError: The vehicle cannot start like that.
+    """
+    check_start(start, vehicle)
+    speed = vehicle.speed_from_rpm(start.rotors)
+    state = (*start.velocity_flu_m_s, start.p, start.q, start.r, start.x, start.y, start.z, *start.attitude)
+    wind, eddies = Air(weather).begin(start.z)
+    return World(0, state, (speed, speed, speed, speed), wind_enu_m_s=wind, eddies=eddies)
+
+
+class Physics:
+    """The laws of one vehicle in one weather: how its world goes on."""
+
+    def __init__(self, vehicle: Vehicle, integrator: Integrator, weather: Weather = NO_WEATHER) -> None:
+        """Fly `vehicle`, integrated by `integrator`, in `weather`.
+
+        What is compiled is loaded here, not in the first step.
+        """
+        self._air = Air(weather)
+        self._parameters = packed(parameters_of(vehicle, self._air.steady or CALM))
+        self._wind = self._parameters["wind_enu_m_s"][0]
+        self._integrate = solver(integrator)
+        self._idle = vehicle.rotors.idle_speed
+        self._top = vehicle.rotors.max_speed
+        self._battery = vehicle.battery
+        self._as_built = self._parameters.copy()
+        self._held: list[float | None] | None = None
+        self._integrate(np.array((*_LEVEL, *_STANDING, 0.0)), _STANDING, self._parameters, _MOMENT_S)
+
+    def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
+        """Advance by `duration_us` with the rotors commanded to `command`.
+
+        Raises:
+            IntegrationError: The state cannot be integrated any further.
+        """
+        self._feel_wind(world)
+        x, voltage_v = self._integrate(_vector(world), self._target(command), self._parameters, duration_us * 1e-6)
+        end = x.tolist()
+        if not all(map(isfinite, end)):
+            raise IntegrationError("the state has left what the model describes: it is no longer finite")
+        state = (*end[:9], *normalized(attitude_of(end)))
+        voltage_v = nan if self._battery is None else voltage_v
+        time_us = world.time_us + duration_us
+        wind, eddies = self._air.steady, None
+        if wind is None:
+            velocity = earth_from_body(attitude_of(state), (end[0], end[1], end[2]))
+            wind, eddies = self._air.go_on(world.eddies, time_us, end[8], velocity, duration_us)
+        return World(time_us, state, tuple(end[ROTORS]), end[CHARGE], voltage_v, wind, eddies)
+
+    def specific_force(self, world: World) -> Vector:
+        """Return what an ideal accelerometer at the centre of mass measures, m/s² in FLU: (0, 0, g) at rest and level.
+
+        Rotors without lag turn as they did up to now.
+        """
+        self._feel_wind(world)
+        force: Vector = specific_force(_vector(world), self._parameters)
+        return force
+
+    def battery(self, world: World) -> PlantBattery | None:
+        """Return what the battery gives; None without one."""
+        if self._battery is None:
+            return None
+        numbers = self._parameters[0]
+        power_w = 0.0
+        for at_one_w, speed in zip(numbers["power"].tolist(), world.rotor_speeds, strict=True):
+            power_w += at_one_w * speed * speed * speed
+        voltage_v = world.voltage_v if isfinite(world.voltage_v) else self._battery.full_voltage_v
+        left = max(0.0, 1.0 - world.charge_used_ah / self._battery.capacity_ah)
+        return PlantBattery(voltage_v, power_w / voltage_v, world.charge_used_ah, left)
+
+    def hold_rotor(self, rotor: int, speed: float | None) -> None:
+        """Have a rotor turn at a speed (the vehicle's unit) whatever is commanded; None: it follows commands again."""
+        held = self._held or [None] * len(_STANDING)
+        held[rotor] = speed
+        self._held = held if any(it is not None for it in held) else None
+
+    def weaken_rotor(self, rotor: int, part: float) -> None:
+        """Have a rotor make a part of the thrust and torque that it was built for, and take that part of the power."""
+        for name in ("thrust", "yaw_moment", "power"):
+            self._parameters[name][0, rotor] = part * self._as_built[name][0, rotor]
+
+    def resist(self, times: float) -> None:
+        """Have the battery resist so many times as much as it was built to."""
+        self._parameters["resistance_ohm"] = times * self._as_built["resistance_ohm"]
+
+    def _feel_wind(self, world: World) -> None:
+        if self._air.steady is None:
+            self._wind[:] = world.wind_enu_m_s
+
+    def _target(self, command: ActuatorCommand) -> FourRotors:
+        """Return the rotor speeds that a command asks for: at least idle while armed, none while not.
+
+        A rotor that is held does as it does.
+        """
+        target = _STANDING
+        if command.armed:
+            c1, c2, c3, c4 = command.controls
+            idle, top = self._idle, self._top
+            target = (max(c1 * top, idle), max(c2 * top, idle), max(c3 * top, idle), max(c4 * top, idle))
+        if self._held is None:
+            return target
+        a, b, c, d = (free if held is None else held for free, held in zip(target, self._held, strict=True))
+        return (a, b, c, d)
+
+
+def _vector(world: World) -> Array:
+    return np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
+
+
+def state_frame(world: World) -> StateFrame:
+    """Return what state feedback tells of a world."""
+    u, v, w, p, q, r, x, y, z = world.state[:9]
+    attitude = attitude_of(world.state)
+    return StateFrame(world.time_us, (x, y, z), earth_from_body(attitude, (u, v, w)), attitude, (p, q, r))

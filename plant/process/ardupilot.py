@@ -1,0 +1,119 @@
+"""The plant's end of ArduPilot's JSON interface, as a state machine: (datagram, sender, wall-clock time) -> reply.
+
+ArduPilot sends one binary datagram for each step that it wants, and waits for one JSON object. After about a second of
+silence it sends the same frame_count again. Source: ArduPilot, libraries/SITL/examples/JSON/readme.md and SIM_JSON.cpp.
+
+- Each request advances the world by 1/frame_rate; its remainders in µs are carried, so that time keeps step with it.
+- A frame_count that comes again gets the remembered reply.
+- One that is smaller than the last is an ArduPilot that was started again: so is the world, at time 0.
+- A pulse of 1000 to 2000 µs is a rotor's speed from none to its top speed, or its thrust, as the vehicle file has it.
+  Thrust is the square of the speed: MOT_THST_EXPO is then 1, otherwise 0.
+"""
+
+from collections import Counter
+from struct import Struct
+
+import msgspec
+
+from colibri.common.types import Address
+from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
+from colibri.plant.physics.world import Physics, World, state_frame
+from colibri.plant.vehicle.description import Rotors
+from colibri.plant.vehicle.rotor_numbering import Numbering
+
+PEER_LOST_AFTER_S = 0.5
+"""Wall-clock silence after which another ArduPilot may take over the plant."""
+
+_MAGIC = {Struct("<HHI16H"): 18458, Struct("<HHI32H"): 29569}
+_FORMATS = {form.size: form for form in _MAGIC}
+_ROTORS = slice(3, 7)
+_LEAST_PULSE_US, _PULSE_RANGE_US = 1000.0, 1000.0
+_SECOND_US = 1_000_000
+_SLOWEST_HZ = 10
+
+
+class ArduPilotEnd:
+    """The plant's end: steps a world at each request.
+
+    Attributes:
+        world: The world as it was last told of.
+        peer: Where ArduPilot is, None until it has called.
+        steps: How many times the world was advanced.
+        restarts: How many times an ArduPilot began anew.
+        dropped: What was received and not obeyed, by reason.
+    """
+
+    def __init__(self, physics: Physics, start: World, motors: Numbering, rotors: Rotors) -> None:
+        """Let `physics` go on from `start`; `motors` says which of the `rotors` is ArduPilot's first."""
+        self._physics = physics
+        self._start = start
+        self._motors = motors
+        self._rotors = rotors
+        self.world = start
+        self.peer: Address | None = None
+        self.steps = 0
+        self.restarts = 0
+        self.dropped: Counter[str] = Counter()
+        self._heard_s = 0.0
+        self._count: int | None = None
+        self._carried = 0
+        self._reply = b""
+
+    def receive(self, datagram: bytes, sender: Address, now_s: float) -> bytes | None:
+        """Take one datagram in; return what is to be sent back.
+
+        Raises:
+            IntegrationError: The state cannot be integrated any further.
+        """
+        form = _FORMATS.get(len(datagram))
+        fields = form.unpack(datagram) if form else ()
+        if form is None or fields[0] != _MAGIC[form]:
+            self.dropped["malformed"] += 1
+            return None
+        _, rate_hz, count = fields[:3]
+        if rate_hz < _SLOWEST_HZ:
+            self.dropped["frame rate"] += 1
+            return None
+        if sender != self.peer and self.peer is not None and now_s - self._heard_s < PEER_LOST_AFTER_S:
+            self.dropped["second autopilot"] += 1
+            return None
+        self.peer, self._heard_s = sender, now_s
+        if count == self._count:
+            self.dropped["repeated"] += 1
+            return self._reply
+        if self._count is not None and count < self._count:
+            self._begin_again()
+        self._count = count
+        self._advance(rate_hz, fields[_ROTORS])
+        self._reply = _told(self.world, self._physics)
+        return self._reply
+
+    def _begin_again(self) -> None:
+        self.world, self._carried = self._start, 0
+        self.restarts += 1
+
+    def _advance(self, rate_hz: int, pulses_us: tuple[int, ...]) -> None:
+        duration_us, self._carried = divmod(_SECOND_US + self._carried, rate_hz)
+        a, b, c, d = (min(max((pulse - _LEAST_PULSE_US) / _PULSE_RANGE_US, 0.0), 1.0) for pulse in pulses_us)
+        turning = any((a, b, c, d))  # disarmed, ArduPilot sends the least pulse or none
+        speeds = self._rotors.speeds_of(self._motors.to_vehicle((a, b, c, d)))
+        command = ActuatorCommand(self.world.time_us, speeds, turning)
+        self.world = self._physics.step(self.world, command, duration_us)
+        self.steps += 1
+
+
+def _told(world: World, physics: Physics) -> bytes:
+    """Return the JSON of a world. ArduPilot's parser wants no space behind a colon."""
+    frame = state_frame(world)
+    told = {
+        "timestamp": world.time_us / _SECOND_US,
+        "imu": {
+            "gyro": frd_from_flu(frame.rate_flu_rad_s),
+            "accel_body": frd_from_flu(physics.specific_force(world)),
+        },
+        "position": ned_from_enu(frame.position_enu_m),
+        "quaternion": ned_frd_from_enu_flu(frame.attitude),
+        "velocity": ned_from_enu(frame.velocity_enu_m_s),
+    }
+    return b"\n" + msgspec.json.encode(told) + b"\n"

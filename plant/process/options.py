@@ -1,0 +1,178 @@
+"""The world on a command line: start, weather, latency, and what is left out."""
+
+from argparse import ArgumentTypeError, Namespace
+from itertools import pairwise
+from pathlib import Path
+
+from colibri.common.process.arguments import ArgumentParser, number
+from colibri.common.process.lifecycle import nudge_m
+from colibri.plant.environment.weather import FASTEST_M_S, INTENSITIES, NO_WIND, Gust, RecordedWind, Weather, Wind
+from colibri.plant.physics.start import Start
+
+PARTS = ("rotor-lag", "drag", "ground", "battery")
+"""What `Vehicle.without` can leave out."""
+
+LARGEST_LATENCY_MS = 1000.0
+LATENCY_HELP = (
+    "one way, simulated: the command that answers a frame acts twice that later, and the one before it is held until "
+    "then (default 0)"
+)
+
+
+def nudged(start: Start) -> Start:
+    """Return where a flight really begins: `nudge_m` east and north of its start, which is at it unless tests say."""
+    return start._replace(x=start.x + nudge_m(), y=start.y + nudge_m())
+
+
+def start_values(text: str) -> dict[str, float]:
+    """Read values of a start of the command line, `KEY=VALUE[,KEY=VALUE...]`."""
+    return dict(_start_value(pair) for pair in text.split(","))
+
+
+def _start_value(pair: str) -> tuple[str, float]:
+    key, _, value = pair.partition("=")
+    if key not in Start._fields:
+        raise ArgumentTypeError(f"unknown key {key}: choose {', '.join(Start._fields)}")
+    try:
+        return key, number(value)
+    except ValueError:
+        raise ArgumentTypeError(f"{key}: must be a number, not {value}") from None
+
+
+def latency(text: str) -> float:
+    """Read a latency of the command line, ms: none is negative, and a second is more than anything could fly with."""
+    value = number(text)
+    if not 0.0 <= value <= LARGEST_LATENCY_MS:
+        raise ArgumentTypeError(f"must be 0 to {LARGEST_LATENCY_MS:g} ms, not {text}")
+    return value
+
+
+def add_world_arguments(parser: ArgumentParser, *, start: str, of_whom: str = "") -> None:
+    """Add `--wind`, `--gust`, `--turbulence`, `--without` and `--start`.
+
+    Args:
+        parser: To add them to.
+        start: What is overridden by `--start`, for its help.
+        of_whom: Whose model `--without` concerns, for its help.
+    """
+    add_weather_arguments(parser)
+    add = parser.add_argument
+    add(
+        "--without",
+        action="append",
+        default=[],
+        choices=PARTS,
+        help=f"leave a part of the vehicle file out of the model{of_whom}; may be repeated",
+    )
+    add(
+        "--start",
+        type=start_values,
+        default={},
+        metavar="KEY=VALUE,...",
+        help="begin otherwise: x, y, z (m, ENU), phi, theta, psi (degrees), vx, vy, vz (m/s, ENU), p, q, r (rad/s, "
+        f"FLU), rotors (rpm) (default: {start})",
+    )
+
+
+_FULL_TURN_DEG = 360.0
+_COLUMNS = "t,east,north,up"
+_GUST = "SPEED@FROM:start=S,duration=S"
+
+
+def wind(text: str) -> Wind | RecordedWind:
+    """Read a wind of the command line: `SPEED@FROM`, or a file if it ends in `.csv`."""
+    return recorded_wind(Path(text)) if text.endswith(".csv") else _constant(text)
+
+
+def gust(text: str) -> Gust:
+    """Read a gust of the command line, `SPEED@FROM:start=S,duration=S`."""
+    blows, _, times = text.partition(":")
+    peak = _constant(blows)
+    values = dict(pair.split("=", 1) for pair in times.split(",") if "=" in pair)
+    try:
+        start_s, duration_s = number(values.pop("start")), number(values.pop("duration"))
+    except (KeyError, ValueError):
+        raise ArgumentTypeError(f"must be {_GUST}, 6@270:start=10,duration=2 say, not {text}") from None
+    if values or times.count(",") > 1:
+        raise ArgumentTypeError(f"must be {_GUST} and nothing else, not {text}")
+    if start_s < 0.0 or duration_s <= 0.0:
+        raise ArgumentTypeError(f"the start must not be negative, the duration above zero, not {text}")
+    return Gust(peak, start_s, duration_s)
+
+
+def recorded_wind(path: Path) -> RecordedWind:
+    """Read a wind from a CSV file with a header of t,east,north,up: s and m/s.
+
+    Raises:
+        ArgumentTypeError: The file cannot be read, or is none; the message names file, line and what is wrong.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except OSError as reason:
+        raise ArgumentTypeError(f"{path}: {reason.strerror}") from reason
+    except ValueError as reason:
+        raise ArgumentTypeError(f"{path}: {reason}") from reason
+    if not lines or lines[0].replace(" ", "") != _COLUMNS:
+        raise ArgumentTypeError(f"{path}: line 1: must be {_COLUMNS}")
+    rows = [_row(path, i, line) for i, line in enumerate(lines[1:], start=2) if line.strip()]
+    if not rows:
+        raise ArgumentTypeError(f"{path}: line {len(lines)}: the file ends, and a wind needs a row")
+    for (_, (before, *_)), (line, (after, *_)) in pairwise(rows):
+        if after <= before:
+            raise ArgumentTypeError(f"{path}: line {line}: t must rise, and {after:g} is not after {before:g}")
+    return RecordedWind(path, tuple(row[0] for _, row in rows), tuple(row[1:] for _, row in rows))
+
+
+def _row(path: Path, line: int, text: str) -> tuple[int, tuple[float, float, float, float]]:
+    try:
+        t, east, north, up = map(number, text.split(","))
+    except ValueError:
+        raise ArgumentTypeError(f"{path}: line {line}: must be four numbers, {_COLUMNS}") from None
+    if max(abs(east), abs(north), abs(up)) > FASTEST_M_S:
+        raise ArgumentTypeError(f"{path}: line {line}: no wind is faster than {FASTEST_M_S:g} m/s")
+    return line, (t, east, north, up)
+
+
+def _constant(text: str) -> Wind:
+    speed, _, direction = text.partition("@")
+    try:
+        value = Wind(number(speed), number(direction))
+    except ValueError:
+        raise ArgumentTypeError(f"must be SPEED@FROM in m/s and degrees, 5@270 say, not {text}") from None
+    if value.speed_m_s < 0.0 or not 0.0 <= value.from_deg <= _FULL_TURN_DEG:
+        raise ArgumentTypeError(f"the speed must not be negative, the direction 0 to 360 degrees, not {text}")
+    if value.speed_m_s > FASTEST_M_S:
+        raise ArgumentTypeError(f"no wind is faster than {FASTEST_M_S:g} m/s, not {text}")
+    return value
+
+
+def weather_of(args: Namespace) -> Weather:
+    """Return the weather that a command line asks for."""
+    return Weather(args.wind, tuple(args.gust), args.turbulence, args.seed)
+
+
+def add_weather_arguments(parser: ArgumentParser) -> None:
+    """Add `--wind`, `--gust` and `--turbulence`."""
+    add = parser.add_argument
+    add(
+        "--wind",
+        type=wind,
+        default=NO_WIND,
+        metavar="SPEED@FROM|FILE",
+        help="m/s, and degrees it blows from, clockwise from north: 5@270 blows from west to east; or a .csv file with "
+        f"a header of {_COLUMNS} (s, m/s), linear in between (default: calm)",
+    )
+    add(
+        "--gust",
+        type=gust,
+        action="append",
+        default=[],
+        metavar=_GUST,
+        help="a gust on top of it, of the shape 1 - cosine; may be repeated",
+    )
+    add(
+        "--turbulence",
+        choices=INTENSITIES,
+        help="Dryden's, as MIL-F-8785C has it at low altitude, on top of it; --seed makes another of the same kind "
+        "(default: none)",
+    )

@@ -1,0 +1,180 @@
+"""The plant as a simulator of PX4: in lockstep with it, or, while it starts, at the pace of the wall clock."""
+
+import argparse
+from dataclasses import replace
+from math import hypot
+from time import perf_counter, sleep
+
+from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, undisturbed
+from colibri.common.process.status import Progress, Status
+from colibri.common.rotations import earth_from_body
+from colibri.mavlink.hil.px4_simulator import SimulatorEnd, Truth
+from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.links.link import GroundLink, LinkError, receive_soon
+from colibri.plant.physics.start import IntegrationError, Start
+from colibri.plant.physics.world import Physics, World, starting_world, state_frame
+from colibri.plant.process.logs import PlantLogs
+from colibri.plant.process.options import nudged, weather_of
+from colibri.plant.process.server import Pace
+from colibri.plant.sensors.suite import SensorSuite
+from colibri.plant.vehicle.description import VehicleError, load_vehicle
+
+_SILENCE_SAID_AFTER_S = 2.0
+_WAIT_AT_MOST_S = 0.1
+
+
+def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> int:
+    """Serve PX4 on `link` as the command line says; return the exit code."""
+    try:
+        simulator = Simulator(args, link, status, stop)
+    except VehicleError as error:
+        fail(str(error))
+    try:
+        with undisturbed():
+            simulator.serve()
+    except (IntegrationError, LinkError) as error:
+        fail(str(error), EXIT_FAILED)
+    finally:
+        link.close()
+        simulator.close()
+    return EXIT_INTERRUPTED if stop else 0
+
+
+class Simulator:
+    """Serves one PX4 after the other, each from the start."""
+
+    def __init__(self, args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> None:
+        """Fly as the command line says.
+
+        Raises:
+            VehicleError: There is no such vehicle, or PX4 cannot fly it.
+        """
+        weather = weather_of(args)
+        vehicle = load_vehicle(args.vehicle).without(args.without)
+        if vehicle.sensors is None:
+            raise VehicleError(f"{vehicle.name} has no sensors: PX4 flies a vehicle with a table sensors")
+        self._sensors = vehicle.sensors
+        self._rotors, self._order = vehicle.rotors, vehicle.rotors.numbering()
+        self._gravity_m_s2 = vehicle.gravity_m_s2
+        self._start = starting_world(nudged(Start(psi=args.home.yaw_enu_deg)._replace(**args.start)), vehicle, weather)
+        self._physics = Physics(vehicle, args.integrator, weather)
+        self._origin: Geodetic = args.home.origin
+        self._interval_us = round(1e3 / args.rate) * 1000
+        self._seed, self._speed, self._duration_us = args.seed, args.speed, args.duration * 1e6
+        self._link, self._status, self._stop = link, status, stop
+        self._end = SimulatorEnd(system_id=args.system_id)
+        self._logs = PlantLogs(args.out) if args.out else None
+        self._time_us = 0
+
+    def serve(self) -> None:
+        """Wait for a PX4 and fly with it, and then with the next, until the time is over or told to stop."""
+        over = False
+        while not self._stop and not over:
+            if self._link.target is not None:
+                self._end.call(self._link.target, perf_counter())
+            self._exchange(_WAIT_AT_MOST_S)
+            if self._end.peer is not None:
+                self._status.say("connected", "PX4 has called")
+                over = self._fly()
+
+    def close(self) -> None:
+        """Close the logs."""
+        if self._logs:
+            self._logs.close()
+
+    def _fly(self) -> bool:
+        """Fly from the start with the PX4 that has called; return whether the time is over, and not only PX4 gone."""
+        began_s, call = perf_counter(), self._end.calls
+        suite = SensorSuite(self._sensors, self._physics, self._origin, seed=self._seed, interval_us=self._interval_us)
+        world = replace(self._start, time_us=self._interval_us)  # PX4's clock has no use for 0
+        pace, progress, frames = Pace(self._speed, began_s), Progress(self._status), 0
+        while not self._stop and self._end.peer is not None and self._end.calls == call:
+            if world.time_us > self._duration_us:
+                break
+            self._wait_until(self._due_s(pace, world))
+            self._tell(world, suite)
+            if self._end.lockstep and not self._await_answer(world):
+                break
+            world = self._physics.step(world, self._command(world), self._interval_us)
+            frames += 1
+            progress.report(world.time_us / 1e6, perf_counter() - began_s)
+        gone = self._end.peer is None or self._end.calls != call
+        self._status.say(
+            "gone" if gone else "ended",
+            f"{'PX4 has gone' if gone else 'ended'} at t = {world.time_us / 1e6:.3f} s after {frames} frames",
+            sim_time_s=world.time_us / 1e6,
+            wall_time_s=perf_counter() - began_s,
+            frames=frames,
+            resent=self._end.resent,
+            dropped=dict(self._end.dropped),
+        )
+        return not gone
+
+    def _due_s(self, pace: Pace, world: World) -> float:
+        """Return when a frame is due: flat out at once, but while PX4 is starting, at the pace of the wall clock."""
+        now_s = perf_counter()
+        due_s = pace.due_s(world.time_us - self._interval_us, now_s)
+        return due_s if self._end.lockstep else max(due_s, now_s + self._interval_us * 1e-6)
+
+    def _tell(self, world: World, suite: SensorSuite) -> None:
+        self._time_us = world.time_us
+        truth = self._truth(world) if self._end.wants_truth(world.time_us) else None
+        self._end.offer(suite.measure(world), truth, perf_counter())
+        self._send()
+        if self._logs:
+            self._logs.write_world(world)
+
+    def _truth(self, world: World) -> Truth:
+        state = state_frame(world)
+        east, north, up = earth_from_body(state.attitude, self._physics.specific_force(world))
+        moving = (own - air for own, air in zip(state.velocity_enu_m_s, world.wind_enu_m_s, strict=True))
+        airspeed_m_s = hypot(*moving)
+        acceleration = (east, north, up - self._gravity_m_s2)
+        return Truth(state, geodetic_of(state.position_enu_m, self._origin), acceleration, airspeed_m_s)
+
+    def _await_answer(self, world: World) -> bool:
+        """Wait for the answer to a frame; return False if there will be none."""
+        asked_s, silence_said, call = perf_counter(), False, self._end.calls
+        while not self._end.answered and not self._stop:
+            self._exchange(_WAIT_AT_MOST_S)
+            if self._end.peer is None or self._end.calls != call:
+                return False
+            self._end.poll(perf_counter())
+            if not silence_said and perf_counter() - asked_s > _SILENCE_SAID_AFTER_S:
+                silence_said = True
+                self._status.say("silence", f"no answer at t = {world.time_us / 1e6:.3f} s, waiting for PX4")
+        if silence_said and self._end.answered:
+            self._status.say("answered", "PX4 answers again")
+        return self._end.answered
+
+    def _command(self, world: World) -> ActuatorCommand:
+        controls, armed = self._end.motors
+        return ActuatorCommand(world.time_us, self._rotors.speeds_of(self._order.to_vehicle(controls)), armed)
+
+    def _exchange(self, timeout_s: float) -> None:
+        """Send what is to be sent, and hear what comes within a time."""
+        self._send()
+        for datagram, sender in receive_soon(self._link, timeout_s):
+            self._end.receive(datagram, sender)
+        self._link.take_opened()
+        for address in self._link.take_closed():
+            self._end.close(address)
+        self._send()
+
+    def _send(self) -> None:
+        for frames, address in self._end.take_outbox():
+            self._link.send(b"".join(frames), address)
+            if self._logs:
+                self._logs.write_frames(self._time_us, list(frames))
+        if self._logs:
+            self._logs.write_frames(self._time_us, self._end.received)
+        self._end.received.clear()
+
+    def _wait_until(self, due_s: float) -> None:
+        """Wait, and hear all that comes before: an answer must not be taken for that to the next frame."""
+        while not self._stop and (early_s := due_s - perf_counter()) > 0.0:
+            if self._end.lockstep:
+                sleep(min(early_s, _WAIT_AT_MOST_S))
+            else:
+                self._exchange(min(early_s, _WAIT_AT_MOST_S))

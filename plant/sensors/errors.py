@@ -1,0 +1,90 @@
+"""How sensors err: processes driven by a stream of standard normal numbers, exact at any interval."""
+
+from collections.abc import Iterator
+from math import sqrt
+
+from colibri.common.kernels import exp
+from colibri.common.types import Vector
+from colibri.plant.vehicle.sensors import Accelerometer, Gyroscope
+
+
+class GaussMarkov:
+    """A drift that forgets: first-order, of constant variance, x' = -x / T + w.
+
+    After Δ it is x exp(-Δ / T) plus chance of variance σ² (1 - exp(-2 Δ / T)).
+
+    Attributes:
+        value: The drift now.
+    """
+
+    def __init__(self, deviation: float, time_s: float, chance: Iterator[float]) -> None:
+        """Begin somewhere in the stationary distribution.
+
+        Args:
+            deviation: σ, in the unit of the value.
+            time_s: T, the correlation time.
+            chance: Standard normal numbers.
+        """
+        self._deviation = deviation
+        self._time_s = time_s
+        self._chance = chance
+        self.value = deviation * next(chance)
+
+    def after(self, elapsed_s: float) -> float:
+        """Return the drift so much later."""
+        kept = exp(-elapsed_s / self._time_s)
+        self.value = kept * self.value + self._deviation * sqrt(1.0 - kept * kept) * next(self._chance)
+        return self.value
+
+
+class Triad:
+    """Three axes of white noise on a bias that walks at random, sampled at an interval, cut at the sensor's range.
+
+    White noise is that of a mean over the interval, density / √interval (IEEE Std 952, annex C).
+
+    Attributes:
+        bias: Of each axis, in the unit that is measured.
+    """
+
+    def __init__(
+        self, density: float, walk: float, turn_on: float, largest: float, interval_s: float, chance: Iterator[float]
+    ) -> None:
+        """Switch on.
+
+        Args:
+            density: White noise, units / √Hz.
+            walk: Of the bias, units / s / √Hz.
+            turn_on: Standard deviation of the bias at the start, units.
+            largest: What is larger is cut, units.
+            interval_s: Between two samples.
+            chance: Standard normal numbers.
+        """
+        self._noise = density / sqrt(interval_s)
+        self._walk = walk * sqrt(interval_s)
+        self._largest = largest
+        self._chance = chance
+        self.bias: Vector = (turn_on * next(chance), turn_on * next(chance), turn_on * next(chance))
+
+    def measure(self, truth: Vector) -> Vector:
+        """Return the sample of `truth`, one interval after the one before."""
+        chance, noise, walk, most = self._chance, self._noise, self._walk, self._largest
+        x = self.bias[0] + walk * next(chance)
+        y = self.bias[1] + walk * next(chance)
+        z = self.bias[2] + walk * next(chance)
+        self.bias = (x, y, z)
+        x += truth[0] + noise * next(chance)
+        y += truth[1] + noise * next(chance)
+        z += truth[2] + noise * next(chance)
+        return (min(max(x, -most), most), min(max(y, -most), most), min(max(z, -most), most))
+
+
+def accelerometer(part: Accelerometer, interval_s: float, chance: Iterator[float]) -> Triad:
+    """Return the errors of an accelerometer, m/s²."""
+    walk, turn_on = part.bias_walk_m_s3_rthz, part.turn_on_bias_m_s2
+    return Triad(part.noise_density_m_s2_rthz, walk, turn_on, part.range_m_s2, interval_s, chance)
+
+
+def gyroscope(part: Gyroscope, interval_s: float, chance: Iterator[float]) -> Triad:
+    """Return the errors of a gyroscope, rad/s."""
+    walk, turn_on = part.bias_walk_rad_s2_rthz, part.turn_on_bias_rad_s
+    return Triad(part.noise_density_rad_s_rthz, walk, turn_on, part.range_rad_s, interval_s, chance)

@@ -1,0 +1,63 @@
+"""The plant's GPS receiver: it measures at its own rate, and tells later."""
+
+from collections import deque
+from collections.abc import Iterator
+from math import hypot
+
+from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.common.types import Vector
+from colibri.mavlink.hil.sensors import GpsFix
+from colibri.plant.sensors.errors import GaussMarkov
+from colibri.plant.vehicle.sensors import Gps
+
+
+class GpsReceiver:
+    """Fixes of the past: position with white and correlated errors, velocity with white ones."""
+
+    def __init__(self, part: Gps, origin: Geodetic, chance: Iterator[float]) -> None:
+        """Switch on a receiver of a vehicle whose ENU frame begins at `origin`."""
+        self._part = part
+        self._origin = origin
+        self._chance = chance
+        self._delay_us = round(part.delay_s * 1e6)
+        sideways, upward, time_s = part.horizontal_drift_m, part.vertical_drift_m, part.drift_time_s
+        self._drifts = tuple(GaussMarkov(deviation, time_s, chance) for deviation in (sideways, sideways, upward))
+        self._measured_us: int | None = None
+        self._untold: deque[GpsFix] = deque()
+
+    def measure(self, time_us: int, position_enu_m: Vector, velocity_enu_m_s: Vector) -> None:
+        """Measure now, at `time_us`, to tell after the receiver's delay."""
+        part, chance = self._part, self._chance
+        if self._measured_us is not None:
+            for drift in self._drifts:
+                drift.after((time_us - self._measured_us) * 1e-6)
+        self._measured_us = time_us
+        east, north, up = (drift.value for drift in self._drifts)
+        x, y, z = position_enu_m
+        measured_m = (
+            x + east + part.horizontal_noise_m * next(chance),
+            y + north + part.horizontal_noise_m * next(chance),
+            z + up + part.vertical_noise_m * next(chance),
+        )
+        vx, vy, vz = velocity_enu_m_s
+        noise_m_s = part.velocity_noise_m_s
+        fix = GpsFix(
+            time_us=time_us + self._delay_us,
+            fix_type=part.fix_type,
+            place=geodetic_of(measured_m, self._origin),
+            velocity_enu_m_s=(
+                vx + noise_m_s * next(chance),
+                vy + noise_m_s * next(chance),
+                vz + noise_m_s * next(chance),
+            ),
+            horizontal_accuracy_m=hypot(part.horizontal_noise_m, part.horizontal_drift_m),
+            vertical_accuracy_m=hypot(part.vertical_noise_m, part.vertical_drift_m),
+            satellites=part.satellites,
+        )
+        self._untold.append(fix)
+
+    def tell(self, time_us: int) -> GpsFix | None:
+        """Return the fix that has come up to `time_us` and was not told before."""
+        if self._untold and self._untold[0].time_us <= time_us:
+            return self._untold.popleft()
+        return None

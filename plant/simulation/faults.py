@@ -1,0 +1,81 @@
+"""Faults of one vehicle: what MAV_CMD_INJECT_FAILURE asks for, done to its rotors, its battery and its sensors.
+
+A fault happens at an instant between two frames; what it does then depends on the world and on the seed alone.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, STUCK, WRONG, Fault, Part, Refusal, judged
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.plant_status import FaultResult
+from colibri.mavlink.wire.dialect import RESULT_ACCEPTED
+from colibri.plant.physics.world import Physics, World
+from colibri.plant.sensors.faults import SensorFaults
+from colibri.plant.vehicle.description import Vehicle
+
+
+class Faults:
+    """What has gone wrong with one vehicle.
+
+    Attributes:
+        sensors: What its sensors' frames go through.
+        parts: What of it can fail.
+    """
+
+    def __init__(self, vehicle: Vehicle, physics: Physics, feedback: Feedback, *, seed: int) -> None:
+        """Begin with everything well.
+
+        Args:
+            vehicle: The plant's.
+            physics: Of its world; rotors and battery fail in it.
+            feedback: What is told of it.
+            seed: Of chance.
+        """
+        self._physics = physics
+        self._battery = vehicle.battery
+        self.sensors = SensorFaults(seed)
+        self.parts = {Part.ROTORS}
+        if vehicle.battery is not None:
+            self.parts.add(Part.BATTERY)
+        if feedback is Feedback.SENSORS:
+            self.parts.add(Part.SENSORS)
+        self._taken_ah = 0.0
+
+    def inject(self, asked: Fault, world: World) -> tuple[World, FaultResult]:
+        """Have a fault happen at the time of `world`; return the world after it, and what became of it."""
+        fault = judged(asked, self.parts)
+        if isinstance(fault, Refusal):
+            return world, FaultResult(asked.unit, asked.kind, fault.result)
+        if fault.unit == MOTOR:
+            self._on_rotors(fault, world)
+        elif fault.unit == BATTERY:
+            world = self._on_battery(fault, world)
+        else:
+            self.sensors.begin(fault, world.time_us)
+        return world, FaultResult(fault.unit, fault.kind, RESULT_ACCEPTED)
+
+    def inject_all(self, asked: Sequence[Fault], world: World) -> tuple[World, tuple[FaultResult, ...]]:
+        """Have several happen, in order."""
+        results = []
+        for fault in asked:
+            world, result = self.inject(fault, world)
+            results.append(result)
+        return world, tuple(results)
+
+    def _on_rotors(self, fault: Fault, world: World) -> None:
+        chosen = range(len(world.rotor_speeds)) if fault.instance == ALL else (fault.instance - 1,)
+        for rotor in chosen:
+            held = {OFF: 0.0, STUCK: world.rotor_speeds[rotor]}.get(fault.kind)
+            self._physics.hold_rotor(rotor, held)
+            self._physics.weaken_rotor(rotor, fault.values[0] if fault.kind == WRONG else 1.0)
+
+    def _on_battery(self, fault: Fault, world: World) -> World:
+        """Take charge from the battery, or give back what was taken: what the flight itself has used stays used."""
+        assert self._battery is not None, "what there is none of does not fail"
+        left, resistance = fault.values[:2] if fault.kind == WRONG else (0.0, 1.0)
+        used_ah = world.charge_used_ah - self._taken_ah
+        after_ah = used_ah if fault.kind == OK else max(used_ah, (1.0 - left) * self._battery.capacity_ah)
+        self._taken_ah = after_ah - used_ah
+        self._physics.resist(resistance)
+        return replace(world, charge_used_ah=after_ah)

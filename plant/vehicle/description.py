@@ -1,0 +1,326 @@
+"""The airframe: numbers with units and source, read strictly from a TOML file."""
+
+from collections.abc import Callable, Iterable
+from math import inf, isfinite, pi, sqrt
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias
+
+import msgspec
+import numpy as np
+
+from colibri.common.config import NotNegative, Positive, read_named, toml_names
+from colibri.common.elementary import square
+from colibri.common.types import Array, FourRotors
+from colibri.plant.vehicle.rotor_numbering import Numbering, numbering
+from colibri.plant.vehicle.sensors import Sensors as Sensors
+
+Part: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+Efficiency: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
+TimeConstant: TypeAlias = Annotated[float, msgspec.Meta(ge=0.001)]
+"""At least the plant's integration step."""
+PointInPlane: TypeAlias = tuple[float, float]
+
+_FOLDER = Path(__file__).parent / "models"
+_RAD_S_PER_UNIT = {"rad/s": 1.0, "rpm": 2.0 * pi / 60.0}
+_FASTEST_CONTACT_RAD_S = 2500.0
+"""Runge-Kutta 4 in steps of 1 ms is stable up to 2785."""
+
+
+class VehicleError(Exception):
+    """A vehicle file that cannot be flown; the message names file and key."""
+
+
+class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The rigid body."""
+
+    mass_kg: Positive
+    inertia_kg_m2: tuple[Positive, Positive, Positive]
+    """Ix, Iy, Iz about the FLU axes."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        _check_finite(self.mass_kg, *self.inertia_kg_m2)
+        ix, iy, iz = sorted(self.inertia_kg_m2)
+        if ix + iy < iz:
+            raise ValueError("inertia_kg_m2: no body has one moment of inertia above the sum of the other two")
+
+
+class RotorLag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A rotor's speed follows its command as a first-order lag."""
+
+    time_constant_up_s: TimeConstant
+    """While it speeds up."""
+    time_constant_down_s: TimeConstant
+    """While it slows down."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        _check_finite(self.time_constant_up_s, self.time_constant_down_s)
+
+
+class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The four rotors, all alike. Speeds and coefficients are in the file's own `speed_unit`."""
+
+    speed_unit: Literal["rad/s", "rpm"]
+    thrust_coefficient: Positive
+    """cT: thrust in N per speed unit squared."""
+    torque_coefficient: Positive
+    """cQ: drag torque in N m per speed unit squared."""
+    inertia_kg_m2: Positive
+    """J: moment of inertia of one rotor with its motor about its axis."""
+    max_speed: Positive
+    position_m: tuple[PointInPlane, PointInPlane, PointInPlane, PointInPlane]
+    """x forward, y left of each rotor."""
+    direction: tuple[Literal["ccw", "cw"], Literal["ccw", "cw"], Literal["ccw", "cw"], Literal["ccw", "cw"]]
+    """Seen from above."""
+    gyroscopic_term: Literal["conserving", "as-printed"]
+    """`conserving` keeps angular momentum; `as-printed` has the thesis's sign, and takes the speed in its own unit."""
+    idle_speed: NotNegative = 0.0
+    """What an armed rotor never falls below."""
+    strength: tuple[Part, Part, Part, Part] = (1.0, 1.0, 1.0, 1.0)
+    """Part of its thrust and torque that each rotor has: 0.85 is a rotor 15 % weak."""
+    control: Literal["speed", "thrust"] = "speed"
+    """What a control of 0 to 1 is a part of in the interfaces of other simulators and autopilots."""
+    lag: RotorLag | None = None
+    """Without it, rotors follow their commands at once."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        numbers = (self.thrust_coefficient, self.torque_coefficient, self.inertia_kg_m2, self.max_speed)
+        _check_finite(*numbers, *(metre for position in self.position_m for metre in position))
+        if self.idle_speed >= self.max_speed:
+            raise ValueError("idle_speed: must lie below max_speed")
+        if np.linalg.matrix_rank(_allocation(self)) < len(self.position_m):
+            raise ValueError("position_m, direction: these rotors cannot turn the vehicle about every axis")
+
+    def speeds_of(self, controls: FourRotors) -> FourRotors:
+        """Return the parts of the top speed that the controls of another autopilot mean."""
+        if self.control == "speed":
+            return controls
+        a, b, c, d = map(sqrt, controls)
+        return (a, b, c, d)
+
+    def controls_of(self, speeds: FourRotors) -> FourRotors:
+        """Return the controls by which another simulator turns the rotors at these parts of the top speed."""
+        if self.control == "speed":
+            return speeds
+        a, b, c, d = (speed * speed for speed in speeds)
+        return (a, b, c, d)
+
+    def numbering(self) -> Numbering:
+        """Return how PX4 and ArduPilot number the rotors.
+
+        Raises:
+            VehicleError: They number none that are where these are.
+        """
+        found = numbering(self.position_m, self.direction)
+        if found is None:
+            raise VehicleError(
+                "rotors: PX4 and ArduPilot know a '+' or an 'x' whose opposite rotors turn alike, not this frame"
+            )
+        return found
+
+
+class Drag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Forces against the motion through the air."""
+
+    linear_n_s_m: tuple[NotNegative, NotNegative, NotNegative]
+    """Of the airframe, along the FLU axes: N for each m/s."""
+    rotor_coefficient: NotNegative
+    """Of one rotor, in its plane: N for each m/s and for each of its speed unit."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        _check_finite(*self.linear_n_s_m, self.rotor_coefficient)
+
+
+class Ground(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How the vehicle stands on the ground: on four feet, or on its four rotors when it has fallen on its back.
+
+    Height 0 is that of the centre of mass of the vehicle at rest on its feet.
+    """
+
+    foot_position_m: tuple[PointInPlane, PointInPlane, PointInPlane, PointInPlane]
+    """x forward, y left of each foot."""
+    foot_depth_m: Positive
+    """How far the feet are below the centre of mass."""
+    stiffness_n_m: Positive
+    """Of the ground at one foot."""
+    damping_n_s_m: NotNegative
+    """Of the ground at one foot, against sinking in and coming out."""
+    friction_coefficient: NotNegative
+    """Coulomb's."""
+    slip_damping_n_s_m: NotNegative
+    """Friction of one foot that creeps, before Coulomb's limit: N for each m/s."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        numbers = (self.foot_depth_m, self.stiffness_n_m, self.damping_n_s_m, self.friction_coefficient)
+        _check_finite(*numbers, self.slip_damping_n_s_m, *(metre for foot in self.foot_position_m for metre in foot))
+
+    def contacts_m(self, rotors: Rotors) -> Array:
+        """Return the points in FLU that can touch the ground, (8, 3): the feet, and the rotors in the plane z = 0."""
+        feet = [(x, y, -self.foot_depth_m) for x, y in self.foot_position_m]
+        return np.array([*feet, *((x, y, 0.0) for x, y in rotors.position_m)])
+
+
+class Battery(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A battery: a voltage that falls linearly with the charge taken, behind a resistance.
+
+    The rotors' top speed is proportional to its terminal voltage.
+    """
+
+    full_voltage_v: Positive
+    """Without load."""
+    empty_voltage_v: Positive
+    """Without load."""
+    resistance_ohm: NotNegative
+    capacity_ah: Positive
+    efficiency: Efficiency
+    """Mechanical power of the rotors over electrical power."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        _check_finite(self.full_voltage_v, self.empty_voltage_v, self.resistance_ohm, self.capacity_ah)
+        if self.empty_voltage_v > self.full_voltage_v:
+            raise ValueError("empty_voltage_v: must not lie above full_voltage_v")
+
+
+class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A quadrotor, described in SI but for its rotor speeds (`rotors.speed_unit`).
+
+    What is None is not modelled.
+    """
+
+    name: str
+    gravity_m_s2: Positive
+    body: Body
+    rotors: Rotors
+    drag: Drag | None = None
+    ground: Ground | None = None
+    battery: Battery | None = None
+    sensors: Sensors | None = None
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        _check_finite(self.gravity_m_s2)
+        if self.hover_speed >= self.rotors.max_speed:
+            raise ValueError(f"rotors.max_speed: hover needs {self.hover_speed:.0f} {self.rotors.speed_unit}")
+        if self.ground is not None and _fastest_contact_rad_s(self, self.ground) > _FASTEST_CONTACT_RAD_S:
+            raise ValueError("ground: stiffness or damping too large for the plant's integration step of 1 ms")
+
+    def without(self, parts: Iterable[str]) -> "Vehicle":
+        """Return the vehicle with `parts` not modelled: of `rotor-lag`, `drag`, `ground`, `battery`.
+
+        Raises:
+            KeyError: There is no such part.
+        """
+        vehicle = self
+        for part in parts:
+            vehicle = msgspec.structs.replace(vehicle, **_WITHOUT[part](vehicle))
+        return vehicle
+
+    @property
+    def hover_speed(self) -> float:
+        """Rotor speed at which four rotors carry the weight."""
+        weight_n = self.body.mass_kg * self.gravity_m_s2
+        return sqrt(weight_n / (len(self.rotors.position_m) * self.rotors.thrust_coefficient))
+
+    @property
+    def ground_height_m(self) -> float:
+        """Height of the ground, z of ENU: the vehicle at rest on its feet, a little sunk in, is at 0."""
+        if self.ground is None:
+            return -inf
+        load_n = self.body.mass_kg * self.gravity_m_s2 / len(self.ground.foot_position_m)
+        return load_n / self.ground.stiffness_n_m - self.ground.foot_depth_m
+
+    def speed_from_rpm(self, rpm: float) -> float:
+        """Convert a rotor speed from turns per minute to the vehicle's unit."""
+        return rpm * (_RAD_S_PER_UNIT["rpm"] / self.rad_s_per_speed_unit)
+
+    @property
+    def rad_s_per_speed_unit(self) -> float:
+        """How many rad/s one unit of the vehicle's rotor speeds is."""
+        return _RAD_S_PER_UNIT[self.rotors.speed_unit]
+
+    def allocation(self) -> Array:
+        """Return the 4 x 4 matrix that maps squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2]."""
+        return _allocation(self.rotors)
+
+    def largest_wrench(self) -> Array:
+        """Return the largest U1 (N), U2, U3, U4 (N m) that the rotors can make, each on its own, (4,)."""
+        largest: Array = np.clip(self.allocation(), 0.0, None).sum(axis=1) * square(self.rotors.max_speed)
+        return largest
+
+    def rotor_momentum(self) -> Array:
+        """Return the row (4,) that maps rotor speeds to their angular momentum along body z, N m s.
+
+        `conserving`: h = J (Ω1 - Ω2 + Ω3 - Ω4) with Ω in rad/s. `as-printed`: the thesis's +J Ω [2.8], opposite in
+        sign, and Ω in the file's unit.
+        """
+        spin = _spin(self.rotors) * self.rotors.inertia_kg_m2
+        if self.rotors.gyroscopic_term == "as-printed":
+            return -spin
+        return spin * self.rad_s_per_speed_unit
+
+
+def vehicle_names() -> list[str]:
+    """Return the names of the vehicles that come with Colibri."""
+    return toml_names(_FOLDER)
+
+
+def load_vehicle(name_or_path: str) -> Vehicle:
+    """Read a vehicle by its name, or from a file if the argument ends in `.toml`.
+
+    Raises:
+        VehicleError: There is no such vehicle, or the file has a missing, unknown or impossible key.
+    """
+    return read_named("vehicle", _FOLDER, name_or_path, Vehicle, VehicleError)
+
+
+def _allocation(rotors: Rotors) -> Array:
+    x, y = np.array(rotors.position_m).T
+    strength = np.array(rotors.strength)
+    thrust = rotors.thrust_coefficient * strength
+    return np.array([thrust, thrust * y, -thrust * x, -_spin(rotors) * rotors.torque_coefficient * strength])
+
+
+def _spin(rotors: Rotors) -> Array:
+    """Return +1 for a rotor that turns counter-clockwise seen from above, -1 for the others."""
+    return np.array([1.0 if direction == "ccw" else -1.0 for direction in rotors.direction])
+
+
+def _fastest_contact_rad_s(vehicle: Vehicle, ground: Ground) -> float:
+    """Return a bound on the poles of the level vehicle on its feet, and of the one that lies on its rotors, rad/s."""
+    inertia = np.diag([vehicle.body.mass_kg] * 3 + [*vehicle.body.inertia_kg_m2])
+    points_m = ground.contacts_m(vehicle.rotors)
+    slip = ground.slip_damping_n_s_m
+    fastest = 0.0
+    for contacts_m in (points_m[:4], points_m[4:]):
+        damping = np.linalg.solve(inertia, _contact_matrix(contacts_m, (slip, slip, ground.damping_n_s_m)))
+        stiffness = np.linalg.solve(inertia, _contact_matrix(contacts_m, (0.0, 0.0, ground.stiffness_n_m)))
+        rates = (np.abs(np.linalg.eigvals(damping)).max(), np.sqrt(np.abs(np.linalg.eigvals(stiffness)).max()))
+        fastest = max(fastest, *map(float, rates))
+    return fastest
+
+
+def _contact_matrix(contacts_m: Array, along_axes: tuple[float, float, float]) -> Array:
+    """Return the 6 x 6 matrix that maps a small motion (m, rad) of the body to force and moment against it."""
+    matrix, weights = np.zeros((6, 6)), np.array(along_axes)[:, None, None]
+    for x, y, z in contacts_m:
+        motion = np.array([[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]])
+        matrix += (weights * motion[:, :, None] * motion[:, None, :]).sum(axis=0)
+    return matrix
+
+
+def _check_finite(*numbers: float) -> None:
+    if not all(map(isfinite, numbers)):
+        raise ValueError("every number must be finite")
+
+
+_WITHOUT: dict[str, Callable[[Vehicle], dict[str, Any]]] = {
+    "rotor-lag": lambda vehicle: {"rotors": msgspec.structs.replace(vehicle.rotors, lag=None)},
+    "drag": lambda _vehicle: {"drag": None},
+    "ground": lambda _vehicle: {"ground": None},
+    "battery": lambda _vehicle: {"battery": None},
+}

@@ -1,0 +1,75 @@
+"""How other autopilots number a vehicle's rotors, found from where they are and which way they turn.
+
+PX4 and ArduPilot number quadrotors alike: '+' is right, left, front, rear; 'x' is front right, rear left, front left,
+rear right. The first two turn counter-clockwise and the last two clockwise, or in a reversed frame the other way round.
+Sources: PX4 Airframes Reference, Quadrotor x and +; ArduPilot, AP_MotorsMatrix.cpp, MOTOR_FRAME_QUAD.
+"""
+
+from collections.abc import Sequence
+from math import degrees
+from typing import Literal, NamedTuple, TypeAlias
+
+from colibri.common.elementary import atan2
+from colibri.common.types import FourRotors
+
+Shape: TypeAlias = Literal["+", "x"]
+
+_BEARINGS_DEG: dict[Shape, tuple[float, ...]] = {"+": (90.0, -90.0, 0.0, 180.0), "x": (45.0, -135.0, -45.0, 135.0)}
+_NEAR_DEG = 20.0
+_FULL_TURN_DEG = 360.0
+_USUAL = ("ccw", "ccw", "cw", "cw")
+_REVERSED = ("cw", "cw", "ccw", "ccw")
+_FRAME_TYPES: dict[tuple[Shape, bool], int] = {("+", False): 0, ("+", True): 6, ("x", False): 1, ("x", True): 3}
+
+
+class Numbering(NamedTuple):
+    """How others number the rotors of a vehicle.
+
+    Attributes:
+        shape: '+' or 'x'.
+        reverse: Whether every rotor turns the other way than is usual.
+        rotors: For each of their motors in turn, the index of the rotor in the vehicle file.
+    """
+
+    shape: Shape
+    reverse: bool
+    rotors: tuple[int, int, int, int]
+
+    def to_vehicle(self, motors: FourRotors) -> FourRotors:
+        """Return what is given for each motor in the order of the vehicle file."""
+        a, b, c, d = (motors[self.rotors.index(rotor)] for rotor in range(4))
+        return (a, b, c, d)
+
+    def to_motors(self, rotors: FourRotors) -> FourRotors:
+        """Return what is given for each rotor of the vehicle file in the order of their motors."""
+        a, b, c, d = self.rotors
+        return (rotors[a], rotors[b], rotors[c], rotors[d])
+
+    @property
+    def ardupilot_frame_type(self) -> int:
+        """ArduPilot's parameter FRAME_TYPE; that of an 'x' that turns the other way is called H."""
+        return _FRAME_TYPES[self.shape, self.reverse]
+
+
+def numbering(position_m: Sequence[tuple[float, float]], direction: Sequence[str]) -> Numbering | None:
+    """Return how others number rotors; None if they are neither a '+' nor an 'x', or do not turn as in one.
+
+    Args:
+        position_m: x forward, y left of each.
+        direction: `ccw` or `cw` of each, seen from above.
+    """
+    bearings_deg = [degrees(atan2(-y, x)) for x, y in position_m]
+    for shape, wanted_deg in _BEARINGS_DEG.items():
+        nearest = [[i for i in range(4) if _apart_deg(bearings_deg[i], want) < _NEAR_DEG] for want in wanted_deg]
+        if not all(len(found) == 1 for found in nearest):
+            continue
+        a, b, c, d = (found[0] for found in nearest)
+        turning = tuple(direction[i] for i in (a, b, c, d))
+        if turning in (_USUAL, _REVERSED):
+            return Numbering(shape, turning == _REVERSED, (a, b, c, d))
+    return None
+
+
+def _apart_deg(a: float, b: float) -> float:
+    apart = abs(a - b) % _FULL_TURN_DEG
+    return min(apart, _FULL_TURN_DEG - apart)

@@ -1,0 +1,183 @@
+"""Since when each condition of the failsafes holds."""
+
+from math import inf, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from colibri.autopilot.commander.rules.failsafe_conditions import (
+    NEVER_US,
+    Conditions,
+    Seen,
+    battery_below,
+    needs_position,
+    resting_place,
+    stopping_m,
+)
+from colibri.autopilot.commander.rules.failsafe_parameters import NUMBERS
+from colibri.autopilot.commander.rules.failsafe_table import Condition
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.control.interface import Diagnostics, Fallback, VehicleState
+from colibri.autopilot.guidance.integrator_chain import Limits
+from colibri.autopilot.guidance.reference import Kind, Reference, lead, still_target
+from colibri.common.types import Vector
+from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, PositionSetpoint
+from colibri.mavlink.telemetry.snapshot import BatteryState
+
+LIMITS = {number.name: float(number.default) for number in NUMBERS}
+NOW_US = 10_000_000
+LEVEL = VehicleState((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+FULL = BatteryState(3, 12.0, 5.0, 0.1, 0.9, 600.0, 1.0)
+WELL = Seen(
+    now_us=NOW_US,
+    missed_us=None,
+    state=LEVEL,
+    mode=Mode.HOLD,
+    standing=False,
+    estimate=None,
+    setpoint=None,
+    sticks_us=None,
+    listening_us=NEVER_US,
+    station_us=None,
+    battery=FULL,
+    fence=None,
+    decided=Diagnostics(),
+    late=False,
+    rotor_lost=None,
+    pace=Limits(),
+)
+
+
+def at_speed(velocity: Vector, position: Vector = (0.0, 0.0, 5.0)) -> VehicleState:
+    return LEVEL._replace(velocity_enu_m_s=velocity, position_enu_m=position)
+
+
+def inside_of_10_m(place: Vector) -> float:
+    return 10.0 - abs(place[0])
+
+
+def test_of_a_vehicle_that_is_well_nothing_is_lost() -> None:
+    assert Conditions().look(WELL, LIMITS, ()) == {}
+
+
+LOST = [
+    (Condition.TILTED, WELL._replace(state=LEVEL._replace(euler=(1.5, 0.0, 0.0)))),
+    (Condition.TILTED, WELL._replace(state=LEVEL._replace(euler=(0.0, -1.5, 0.0)))),
+    (Condition.ROTOR_FAILED, WELL._replace(rotor_lost=0)),
+    (Condition.BATTERY_LOW, WELL._replace(battery=FULL._replace(remaining=0.14))),
+    (Condition.BATTERY_CRITICAL, WELL._replace(battery=FULL._replace(remaining=0.06))),
+    (Condition.BATTERY_EMERGENCY, WELL._replace(battery=FULL._replace(remaining=0.04))),
+    (Condition.FENCE_BREACHED, WELL._replace(fence=inside_of_10_m, state=at_speed((0.0, 0.0, 0.0), (10.1, 0.0, 5.0)))),
+    (Condition.PLAN_FAILED, WELL._replace(decided=Diagnostics(fallback=Fallback.LQR))),
+    (Condition.DEADLINE_MISSED, WELL._replace(late=True)),
+]
+
+
+@pytest.mark.parametrize(("condition", "seen"), LOST, ids=[condition for condition, _ in LOST])
+def test_what_begins_to_hold_holds_since_then(condition: Condition, seen: Seen) -> None:
+    conditions = Conditions()
+    assert conditions.look(seen, LIMITS, ())[condition] == NOW_US
+    assert conditions.look(seen._replace(now_us=NOW_US + 8000), LIMITS, ())[condition] == NOW_US
+    assert condition not in conditions.look(WELL._replace(now_us=NOW_US + 16000), LIMITS, ())
+    assert conditions.look(seen._replace(now_us=NOW_US + 24000), LIMITS, ())[condition] == NOW_US + 24000
+
+
+HEARD_US = 9_000_000
+SILENT = [
+    (Condition.TELEMETRY_MISSED, WELL._replace(missed_us=HEARD_US)),
+    (Condition.STATION_LOST, WELL._replace(station_us=HEARD_US)),
+    (Condition.STICKS_LOST, WELL._replace(mode=Mode.ALTITUDE, sticks_us=HEARD_US)),
+    (Condition.SETPOINTS_LOST, WELL._replace(mode=Mode.OFFBOARD, setpoint=PositionSetpoint(time_us=HEARD_US))),
+]
+
+
+@pytest.mark.parametrize(("condition", "seen"), SILENT, ids=[condition for condition, _ in SILENT])
+def test_what_is_silent_is_so_since_it_was_heard_last(condition: Condition, seen: Seen) -> None:
+    assert Conditions().look(seen, LIMITS, ()) == {condition: HEARD_US}
+
+
+@pytest.mark.parametrize("condition", [Condition.STICKS_LOST, Condition.SETPOINTS_LOST])
+def test_a_stream_that_no_mode_asks_for_is_missed_only_if_it_was_lost_before(condition: Condition) -> None:
+    seen = WELL._replace(sticks_us=HEARD_US, setpoint=PositionSetpoint(time_us=HEARD_US))
+    assert condition not in Conditions().look(seen, LIMITS, ())
+    assert Conditions().look(seen, LIMITS, (condition,))[condition] == HEARD_US
+
+
+def test_one_that_was_ended_has_been_silent_for_ever() -> None:
+    assert Conditions().look(WELL._replace(mode=Mode.POSITION), LIMITS, ())[Condition.STICKS_LOST] < -NOW_US
+
+
+def test_after_a_restart_there_is_time_to_be_heard() -> None:
+    seen = WELL._replace(mode=Mode.OFFBOARD, listening_us=NOW_US - 8000)
+    assert Conditions().look(seen, LIMITS, ())[Condition.SETPOINTS_LOST] == NOW_US - 8000
+
+
+def test_recovery_is_no_failure_of_the_plan() -> None:
+    seen = WELL._replace(decided=Diagnostics(fallback=Fallback.RECOVERY))
+    assert Conditions().look(seen, LIMITS, ()) == {}
+
+
+def test_the_same_state_lies_only_where_it_says_that_it_moves() -> None:
+    for velocity, lies in (((0.0, 0.0, 0.0), False), ((0.01, 0.0, 0.0), False), ((0.5, 0.0, 0.0), True)):
+        conditions = Conditions()
+        found = [
+            conditions.look(WELL._replace(now_us=NOW_US + k * 8000, state=at_speed(velocity)), LIMITS, ())
+            for k in range(60)
+        ]
+        assert (found[-1].get(Condition.ATTITUDE_LOST) == NOW_US) is lies
+
+
+def test_voltage_is_looked_at_where_it_has_a_limit() -> None:
+    assert not battery_below(None, 1.0, 12.6)
+    assert not battery_below(FULL, 0.15, 0.0)
+    assert battery_below(FULL, 0.15, 12.1)
+    assert battery_below(FULL, 0.95, 0.0)
+
+
+def test_who_is_steered_by_attitude_needs_no_position() -> None:
+    attitude = AttitudeSetpoint((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.5)
+    assert not needs_position(Mode.STABILIZED, None)
+    assert not needs_position(Mode.OFFBOARD, attitude)
+    assert needs_position(Mode.OFFBOARD, PositionSetpoint())
+    assert needs_position(Mode.HOLD, attitude)
+
+
+@given(st.floats(0.0, 12.0), st.floats(0.5, 10.0), st.floats(1.0, 60.0))
+def test_the_way_to_rest_is_that_of_bounded_acceleration_and_jerk(speed: float, most: float, jerk: float) -> None:
+    """Integrated: the acceleration rises to its bound, or to half of the change, and falls again."""
+    peak = min(most, sqrt(speed * jerk))
+    rise_s, flat_s = peak / jerk, (speed / peak - peak / jerk) if peak > 0.0 else 0.0
+    way, v, a, dt = 0.0, speed, 0.0, 1e-3
+    duration_s = 2.0 * rise_s + max(flat_s, 0.0)
+    for step in range(int(duration_s / dt) + 1):
+        t = step * dt
+        a = min(jerk * t, peak, max(jerk * (duration_s - t), 0.0))
+        way += max(v, 0.0) * dt
+        v -= a * dt
+    assert stopping_m(speed, most, jerk) == pytest.approx(way, abs=0.02 * speed + 1e-3)
+
+
+@settings(max_examples=20)
+@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0))
+def test_the_reference_comes_to_rest_close_to_where_that_is_said(east: float, north: float) -> None:
+    pace, interval_s = Limits(), 0.008
+    motion = np.zeros((4, 3))
+    motion[1] = (east, north, 0.0)
+    reference = Reference(motion, np.zeros(2))
+    target = still_target((0.0, 0.0, 0.0), 0.0, 20, (Kind.VELOCITY,) * 3)
+    for _ in range(750):
+        _, reference = lead(reference, target, pace, interval_s)
+    x, y, _ = resting_place(at_speed((east, north, 0.0), (0.0, 0.0, 0.0)), pace)
+    assert abs(reference.motion[0, 0] - x) < 1.0
+    assert abs(reference.motion[0, 1] - y) < 1.0
+
+
+def test_a_fence_may_be_foreseen() -> None:
+    seen = WELL._replace(fence=inside_of_10_m, state=at_speed((4.0, 0.0, 0.0), (7.0, 0.0, 5.0)))
+    assert Conditions().look(seen, LIMITS, ()) == {}
+    assert Condition.FENCE_BREACHED in Conditions().look(seen, {**LIMITS, "GF_PREDICT": 1}, ())
+    assert Condition.FENCE_BREACHED in Conditions().look(seen, {**LIMITS, "GF_MARGIN": 4.0}, ())
+    standing = seen._replace(standing=True)
+    assert Conditions().look(standing, {**LIMITS, "GF_MARGIN": inf}, ()) == {}

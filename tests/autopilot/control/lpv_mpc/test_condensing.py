@@ -1,0 +1,157 @@
+"""The condensed QP against what it stands for, evaluated step by step."""
+
+import numpy as np
+import pytest
+
+from colibri.autopilot.control.lpv_mpc import condensing, prediction
+from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, RATES, STATES
+
+STEPS, STARTS = 12, np.array([0, 1, 3, 7])
+MOVED = INPUTS * len(STARTS)
+N = MOVED + condensing.SLACKS
+FROM_THRUST = np.full(4, 0.05)
+FROM_MOMENTS = np.array([[0.0, -0.6, -1.5], [-0.6, 0.0, 1.5], [0.0, 0.6, -1.5], [0.6, 0.0, 1.5]])
+LEAST, MOST = 0.01, 1.0
+LIMITS = np.array([1.0, 1.1, 6.0, 7.0, 3.0])
+CHECKED = np.array([3, 6, 12])
+
+
+@pytest.fixture(params=range(4))
+def rng(request: pytest.FixtureRequest) -> np.random.Generator:
+    return np.random.default_rng(request.param)
+
+
+def responses_of(rng: np.random.Generator, u: np.ndarray) -> np.ndarray:
+    x = rng.normal(size=STATES) * [0.4, 2, 0.4, 2, 1, 1, 0.05, 0.05, 0.01]
+    responses = np.empty((STEPS + 1, STATES, 1 + MOVED))
+    body = prediction.Body(0.0034, 0.0034, 0.006, 40.0)
+    schedule = np.tile(x[list(prediction.SCHEDULE)], (STEPS, 1))
+    prediction.respond(x, u, np.zeros(3), schedule, 1e-4, body, STARTS, 0.008, responses)
+    return responses
+
+
+def moments_of(u: np.ndarray, z: np.ndarray) -> np.ndarray:
+    moves = u + z[:MOVED].reshape(-1, INPUTS).cumsum(axis=0)
+    held: np.ndarray = moves[[np.searchsorted(STARTS, step, side="right") - 1 for step in range(STEPS)]]
+    return held
+
+
+def test_the_cost_is_the_sum_over_the_horizon(rng: np.random.Generator) -> None:
+    u = rng.normal(size=3) * 0.05
+    responses = responses_of(rng, u)
+    Q, R = rng.uniform(0.1, 2.0, 3), rng.uniform(0.1, 2.0, 3)
+    root = rng.normal(size=(STATES + INPUTS, STATES + INPUTS))
+    S = root @ root.T
+    angles, terminal = rng.normal(size=(STEPS, 3)), rng.normal(size=STATES + INPUTS)
+    H, f = np.zeros((N, N)), np.zeros(N)
+    condensing.quadratic_cost(responses, angles, terminal, u, Q, S, R, H, f)
+
+    def cost(z: np.ndarray) -> float:
+        states = responses @ [1.0, *z[:MOVED]]
+        errors = states[1:, list(ANGLES)] - angles
+        end = np.concatenate([states[-1], moments_of(u, z)[-1]]) - terminal
+        increments = z[:MOVED].reshape(-1, INPUTS)
+        return 0.5 * float((Q * errors**2).sum() + end @ S @ end + (R * increments**2).sum())
+
+    nothing = np.zeros(N)
+    for _ in range(5):
+        z = np.concatenate([rng.normal(size=MOVED) * 0.1, np.zeros(condensing.SLACKS)])
+        assert 0.5 * z @ H @ z + f @ z == pytest.approx(cost(z) - cost(nothing), rel=1e-9)
+    assert (H == H.T).all()
+
+
+def test_rotor_rows_hold_just_where_every_rotor_is_within_its_limits(rng: np.random.Generator) -> None:
+    u = rng.normal(size=3) * 0.05
+    thrust = rng.uniform(4.0, 12.0, STEPS)
+    rows = 2 * condensing.ROTORS * len(STARTS)
+    G, h = np.zeros((rows, N)), np.zeros(rows)
+    count = condensing.limit_rotors(FROM_MOMENTS, FROM_THRUST, thrust, u, STARTS, LEAST, MOST, G, h)
+    assert count == rows
+    verdicts = set()
+    for size in (0.02, 0.1, 0.3, 0.6):
+        for _ in range(20):
+            z = rng.normal(size=N) * size
+            squared = thrust[:, None] * FROM_THRUST + moments_of(u, z) @ FROM_MOMENTS.T
+            within = bool(((squared >= LEAST) & (squared <= MOST)).all())
+            assert bool((G @ z <= h).all()) is within
+            verdicts.add(within)
+    assert verdicts == {True, False}
+
+
+def tilt_of(phi: float, theta: float) -> float:
+    return float(np.arccos(np.cos(phi) * np.cos(theta)))
+
+
+def test_motion_rows_hold_just_where_the_slacks_cover_what_is_exceeded(rng: np.random.Generator) -> None:
+    u = rng.normal(size=3) * 0.05
+    responses = responses_of(rng, u)
+    schedule = np.zeros((STEPS, len(prediction.SCHEDULE)))  # without a tilt: no tangent
+    rows = condensing.MOTION_ROWS * len(CHECKED)
+    G, h = np.zeros((rows + 3, N)), np.zeros(rows + 3)
+    assert condensing.limit_motion(responses, schedule, CHECKED, LIMITS, 3, G, h) == rows + 3
+    verdicts = set()
+    for slacks in ([0.0, 0.0], [5.0, 0.0], [0.0, 5.0], [0.3, 0.3], [5.0, 5.0]):
+        for size in np.geomspace(0.01, 0.5, 20):
+            z = np.concatenate([rng.normal(size=MOVED) * size, slacks])
+            states = (responses @ [1.0, *z[:MOVED]])[CHECKED]
+            exceeded = np.abs(states[:, [*ANGLES[:2], *RATES]]) / LIMITS - 1.0
+            within = exceeded[:, :2].max() <= slacks[0] and exceeded[:, 2:].max() <= slacks[1]
+            assert bool((G[3:] @ z <= h[3:]).all()) is bool(within)
+            verdicts.add(bool(within))
+    assert verdicts == {True, False}
+
+
+def test_the_tilts_row_is_the_tangent_in_the_direction_expected(rng: np.random.Generator) -> None:
+    """Of two angles that each keep to the limit the tilt may not: the row sees that."""
+    u = rng.normal(size=3) * 0.05
+    responses = responses_of(rng, u)
+    schedule = rng.uniform(-1.0, 1.0, (STEPS, len(prediction.SCHEDULE)))
+    G = np.zeros((condensing.MOTION_ROWS * len(CHECKED), N))
+    h, normal = np.zeros(len(G)), np.empty(2)
+    condensing.limit_motion(responses, schedule, CHECKED, LIMITS, 0, G, h)
+    for place, step in enumerate(CHECKED):
+        row = condensing.MOTION_ROWS * place
+        phi, theta = schedule[step - 1, :2]
+        distance = condensing.tilt_tangent(phi, theta, LIMITS[0], normal)
+        z = np.concatenate([rng.normal(size=MOVED) * 0.1, [0.2, 7.0]])
+        angles = (responses @ [1.0, *z[:MOVED]])[step, list(ANGLES[:2])]
+        assert h[row] - G[row] @ z == pytest.approx(1.2 - normal @ angles / distance)
+
+
+@pytest.mark.parametrize("max_tilt", [0.3, 1.0, 1.3])
+def test_no_tilt_within_the_limit_is_beyond_any_tangent_to_it(rng: np.random.Generator, max_tilt: float) -> None:
+    normal = np.empty(2)
+    for phi, theta in rng.uniform(-1.4, 1.4, (50, 2)):
+        distance = condensing.tilt_tangent(phi, theta, max_tilt, normal)
+        assert normal @ [phi, theta] > 0.0
+        others = rng.uniform(-1.5, 1.5, (200, 2))
+        within = np.array([tilt_of(*other) <= max_tilt for other in others])
+        assert (others[within] @ normal <= distance).all()
+        x, y = np.sin(theta) * np.cos(phi), np.sin(phi)  # the same direction at the limit: it touches
+        x, y = np.sin(max_tilt) * np.array((x, y)) / np.hypot(x, y)
+        touched = (np.arcsin(y), np.arctan2(x, np.cos(max_tilt)))
+        assert tilt_of(*touched) == pytest.approx(max_tilt)
+        assert normal @ touched == pytest.approx(distance)
+
+
+def test_the_plan_is_read_as_it_was_predicted(rng: np.random.Generator) -> None:
+    u, thrust = rng.normal(size=3) * 0.05, rng.uniform(4.0, 12.0, STEPS)
+    responses, z = responses_of(rng, u), rng.normal(size=N) * 0.1
+    states, moments, squared = np.empty((STEPS + 1, STATES)), np.empty((STEPS, 3)), np.empty((STEPS, 4))
+    condensing.read_plan(responses, STARTS, u, z, thrust, FROM_THRUST, FROM_MOMENTS, states, moments, squared)
+    assert states == pytest.approx(responses @ [1.0, *z[:MOVED]])
+    assert moments == pytest.approx(moments_of(u, z))
+    assert squared == pytest.approx(thrust[:, None] * FROM_THRUST + moments @ FROM_MOMENTS.T)
+
+
+def test_active_limits_are_counted_by_kind() -> None:
+    rotor_rows, motion_rows = 8, condensing.MOTION_ROWS
+    G, h = np.zeros((rotor_rows + motion_rows, N)), np.ones(rotor_rows + motion_rows)
+    h[[0, 5]] = 0.0  # rotors
+    h[[rotor_rows, rotor_rows + 4]] = 0.0  # tilt, theta
+    h[[rotor_rows + 5, rotor_rows + 8, rotor_rows + 10]] = 0.0  # p, q, r
+    lower, upper = -np.ones(N), np.ones(N)
+    z = np.zeros(N)
+    z[[1, 2, 4]] = (1.0, -1.0, 1.0)
+    z[-1] = 1.0  # a slack is no increment
+    assert condensing.count_active(G, h, lower, upper, z, rotor_rows, 1e-6) == (2, 3, 2, 3)

@@ -1,0 +1,229 @@
+"""The flight profile's control law: its plans, and what flies when there is none."""
+
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from colibri.autopilot.control.interface import Decision, Diagnostics, Fallback, VehicleState
+from colibri.autopilot.control.lpv_mpc.law import LpvMpc, Memory
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
+from colibri.autopilot.control.vehicle_model.rotor_lag import lead, rotor_lag
+from colibri.autopilot.guidance.trajectories.planner import Planner, plan
+from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
+
+VEHICLE = load_vehicle("hummingbird")
+TABLE = load_profile("flight").table("lpv-mpc")
+START = (2.0, 0.0, 2.0)
+ON_SPIRAL = VehicleState(START, (0.0, 0.314, 0.03), quaternion_from_euler(0, 0, 1.57), (0, 0, 1.57), (0, 0, 0))
+
+
+def build(vehicle: Vehicle = VEHICLE, attitude: dict[str, Any] | None = None) -> tuple[LpvMpc, Planner]:
+    table = {**TABLE, "attitude": {**TABLE["attitude"], **(attitude or {})}}
+    controller = LpvMpc(table, vehicle, lambda: 0.0)
+    return controller, plan(track("spiral"), "by-formula", controller.preview)
+
+
+def steps(controller: LpvMpc, planner: Planner, state: VehicleState, count: int) -> list[Decision]:
+    """Decide `count` times over the same state."""
+    memory, decisions = controller.initial(VEHICLE.hover_speed), []
+    for sample in range(count):
+        time_us = sample * controller.control_interval_us
+        memory, decision = controller.step(memory, time_us, state, planner.horizon(0))
+        decisions.append(decision)
+    return decisions
+
+
+def turned(phi_deg: float, theta_deg: float, rate: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> VehicleState:
+    q = quaternion_from_euler(np.radians(phi_deg), np.radians(theta_deg), 0.0)
+    return VehicleState(START, (0.0, 0.0, 0.0), q, euler_from_quaternion(q), rate)
+
+
+def failing(monkeypatch: pytest.MonkeyPatch, status: QpStatus, after: int) -> None:
+    """Let every QP fail after the first few."""
+    solve, calls = QpSolver.solve, []
+
+    def solve_at_first(self: QpSolver, qp: Qp) -> QpResult:
+        calls.append(1)
+        return solve(self, qp) if len(calls) <= after else QpResult(status, None)
+
+    monkeypatch.setattr(QpSolver, "solve", solve_at_first)
+
+
+@pytest.mark.parametrize("status", [QpStatus.INFEASIBLE, QpStatus.TIME_OUT, QpStatus.NOT_ACCURATE])
+def test_without_a_solution_the_plan_goes_on_then_lqr_then_descent(
+    monkeypatch: pytest.MonkeyPatch, status: QpStatus
+) -> None:
+    controller, planner = build()
+    failing(monkeypatch, status, after=3)
+    decisions = steps(controller, planner, ON_SPIRAL, 40)
+    settings = TABLE["fallback"]
+    expected = (
+        [None] * 3
+        + [Fallback.SHIFTED_PLAN] * settings["shifted_samples"]
+        + [Fallback.LQR] * settings["lqr_samples"]
+        + [Fallback.DESCENT] * 7
+    )
+    assert [decision.diagnostics.fallback for decision in decisions] == expected
+    assert {decision.diagnostics.qp_status for decision in decisions[3:]} == {status}
+    for decision in decisions:
+        assert ((decision.rotor_speeds >= 83.8) & (decision.rotor_speeds <= 838.0)).all()
+
+
+def test_without_any_plan_the_lqr_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    controller, planner = build()
+    failing(monkeypatch, QpStatus.TIME_OUT, after=0)
+    assert steps(controller, planner, ON_SPIRAL, 1)[0].diagnostics.fallback is Fallback.LQR
+
+
+def test_a_solved_qp_ends_every_fallback() -> None:
+    controller, planner = build()
+    memory = controller.initial(VEHICLE.hover_speed)._replace(age=1000)
+    _, decision = controller.step(memory, 0, ON_SPIRAL, planner.horizon(0))
+    assert decision.diagnostics.fallback is None
+    assert decision.diagnostics.qp_status is QpStatus.SOLVED
+
+
+def test_the_shifted_plan_is_the_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was planned for the next sample is what flies then, if the thrust stays."""
+    controller, planner = build()
+    memory = controller.initial(VEHICLE.hover_speed)
+    memory, _ = controller.step(memory, 0, turned(5.0, -5.0), planner.horizon(0))
+    assert memory.plan is not None
+    planned = memory.plan.moments[1]
+    failing(monkeypatch, QpStatus.TIME_OUT, after=0)
+    after, decision = controller.step(memory, 8000, turned(5.0, -5.0), planner.horizon(0))
+    assert decision.diagnostics.fallback is Fallback.SHIFTED_PLAN
+    assert (after.moments == planned).all()
+
+
+@pytest.mark.parametrize("state", [turned(170, 0), turned(180, 0), turned(0, 89), turned(120, 60, (10, -10, 5))])
+def test_far_from_upright_the_recovery_law_flies(state: VehicleState) -> None:
+    decision = steps(*build(), state, 1)[0]
+    assert decision.diagnostics.fallback is Fallback.RECOVERY
+    assert ((decision.rotor_speeds >= 83.8) & (decision.rotor_speeds <= 838.0)).all()
+
+
+@pytest.mark.parametrize("fastest", [600.0, 838.0])
+def test_the_plan_itself_respects_the_rotors(fastest: float) -> None:
+    """Of an upset vehicle, the first of whose plans bind: at every step of the horizon, to the QP's accuracy."""
+    rotors = msgspec.structs.replace(VEHICLE.rotors, max_speed=fastest)
+    vehicle = msgspec.structs.replace(VEHICLE, rotors=rotors)
+    bound = 0
+    for state in (turned(40, 0), turned(-30, 30, (4, -4, 2)), turned(0, -55, (0, 6, 0))):
+        for decision in steps(*build(vehicle), state, 5):
+            planned = decision.diagnostics.planned_squared
+            assert planned is not None
+            assert planned.min() >= (83.8 / fastest) ** 2 - 1e-6
+            assert planned.max() <= 1.0 + 1e-6
+            assert (decision.rotor_speeds <= fastest).all()
+            bound += decision.diagnostics.active.rotors
+    assert bound > 10
+
+
+@pytest.mark.parametrize("u", [(3.0, 0.0, 0.0), (-2.0, 2.0, 0.5), (0.0, 0.0, -1.0)])
+def test_whatever_moments_a_fallback_left_the_next_qp_can_be_solved(u: tuple[float, float, float]) -> None:
+    """Moments that no rotor could make, further from what one can than the largest increment."""
+    controller, planner = build()
+    memory = controller.initial(VEHICLE.hover_speed)._replace(moments=np.array(u))
+    for thrust_speed in (100.0, VEHICLE.hover_speed, 800.0):
+        speeds = np.full(4, thrust_speed / VEHICLE.rotors.max_speed)
+        _, decision = controller.step(memory._replace(speeds=speeds), 0, turned(20, -30), planner.horizon(0))
+        assert decision.diagnostics.qp_status is QpStatus.SOLVED
+
+
+def test_commands_within_the_plans_limits_are_never_cut() -> None:
+    """The mixer's own clipping has nothing to do where a plan was had: without it, the same commands."""
+    lag = rotor_lag(VEHICLE, 0.008)._replace(least=-10.0)
+    controller, planner = build()
+    for state in (turned(40, 0), turned(-30, 30, (4, -4, 2))):
+        memory = controller.initial(VEHICLE.hover_speed)
+        for sample in range(20):
+            speeds = memory.speeds
+            memory, decision = controller.step(memory, 8000 * sample, state, planner.horizon(0))
+            planned = decision.diagnostics.planned_squared
+            assert planned is not None
+            uncut = lead(speeds, planned[0], lag, 10.0)
+            assert decision.rotor_speeds / VEHICLE.rotors.max_speed == pytest.approx(uncut, abs=1e-6)
+
+
+def test_soft_limits_give_way_only_where_they_must() -> None:
+    """A rate beyond its limit is brought back with slack; without one, no slack at all."""
+    upset = steps(*build(), turned(0, 0, (40.0, 0.0, 0.0)), 1)[0].diagnostics
+    assert upset.slack > 0.0
+    calm = steps(*build(), turned(20, 0, (3.0, 0.0, 0.0)), 1)[0].diagnostics
+    assert calm.qp_status is QpStatus.SOLVED
+    assert calm.slack == pytest.approx(0.0, abs=1e-9)
+
+
+def test_an_excess_that_can_be_avoided_is_avoided_at_any_cost() -> None:
+    """The slack's linear part: a reference at the limit, under weights that would rather cross it."""
+    eager = {"largest_rate_rad_s": [1.0, 1.0, 1.0], "output_weight": [100.0, 100.0, 1.0]}
+    diagnostics = steps(*build(attitude=eager), turned(30, 0), 1)[0].diagnostics
+    assert diagnostics.active.rates > 0
+    assert diagnostics.slack == pytest.approx(0.0, abs=1e-9)
+
+
+def test_thrust_gives_way_where_it_leaves_too_little_to_stop_a_tilt() -> None:
+    """Turning fast towards the limit under full thrust: the rotors make half of it, and moments with the rest."""
+    controller, _ = build()
+    planner = plan(track("hover:height=30"), "by-formula", controller.preview)  # far above: all thrust there is
+    thrusts = []
+    for rate in (0.0, 9.0):
+        decision = steps(controller, planner, turned(30, -30, (rate, -rate, 0.0)), 1)[0]
+        planned = decision.diagnostics.planned_squared
+        assert planned is not None
+        assert decision.diagnostics.qp_status is QpStatus.SOLVED
+        thrusts.append(float(planned.mean(axis=1).max()))
+    assert thrusts[0] > 0.6
+    assert thrusts[1] < 0.52
+
+
+def test_daqp_and_clarabel_agree_on_every_input_of_a_flight() -> None:
+    """The same QPs, recorded from an upset: each increment to 1e-4 N m and less."""
+    recorded: list[Qp] = []
+    controller, planner = build()
+    solver = controller._attitude._solver  # noqa: SLF001
+    solve = solver.solve
+
+    def record(qp: Qp) -> QpResult:
+        recorded.append(Qp(*(part.copy() for part in qp if part is not None)))
+        return solve(qp)
+
+    solver.solve = record  # type: ignore[method-assign]
+    for state in (turned(40, 0), turned(-30, 30, (4, -4, 2)), ON_SPIRAL):
+        steps(controller, planner, state, 10)
+    daqp, clarabel = QpSolver("daqp", 1e-8), QpSolver("clarabel", 1e-10)
+    for qp in recorded:
+        one, other = daqp.solve(qp), clarabel.solve(qp)
+        assert one.x is not None
+        assert one.x == pytest.approx(other.x, abs=1e-5)
+
+
+def test_memory_is_explicit() -> None:
+    """Two flights through one controller do not see each other."""
+    controller, planner = build()
+
+    def fly(other: bool) -> list[list[float]]:
+        memory: Memory = controller.initial(VEHICLE.hover_speed)
+        speeds = []
+        for sample in range(6):
+            memory, decision = controller.step(memory, 8000 * sample, turned(10, sample), planner.horizon(0))
+            speeds.append(decision.rotor_speeds.tolist())
+            if other:
+                controller.step(controller.initial(300.0), 0, turned(-40, 20), planner.horizon(0))
+        return speeds
+
+    assert fly(other=False) == fly(other=True)
+
+
+def test_diagnostics_hold_the_whole_horizon() -> None:
+    how: Diagnostics = steps(*build(), ON_SPIRAL, 1)[0].diagnostics
+    assert how.predicted is not None
+    assert how.planned_squared is not None
+    assert how.predicted.shape == (21, 9)
+    assert how.planned_squared.shape == (20, 4)

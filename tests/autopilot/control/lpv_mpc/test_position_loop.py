@@ -1,0 +1,121 @@
+"""The outer loop: forces, attitudes and thrusts against what they stand for."""
+
+from math import pi, sqrt, tan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from colibri.autopilot.control.lpv_mpc import position_loop
+from colibri.autopilot.control.lpv_mpc.position_loop import Limits
+from colibri.autopilot.control.vehicle_model.airframe import Airframe
+from colibri.common.rotations import quaternion_from_euler, rotation_matrix
+from tests.strategies import reals, vectors
+
+AIRFRAME = Airframe(0.698, 9.81, 0.025, 0.05, 0.06)
+NO_DRAG = Airframe(0.698, 9.81, 0.0, 0.0, 0.0)
+LIMITS = Limits(tan(1.0), 1.0, 18.0, 1.5)
+GAINS = (20.0, 9.0)
+NOTHING = np.zeros(3)
+
+
+@pytest.mark.parametrize("poles", [(-4.0, -5.0), (-3.0, -3.0)])
+def test_errors_go_on_as_the_poles_say(poles: tuple[float, float]) -> None:
+    first, second = poles
+    A = np.array([[0.0, 1.0], [-first * second, first + second]])
+    for sample, transition in enumerate(position_loop.error_transition(poles, 0.05, 12)):
+        assert transition == pytest.approx(expm(A * 0.05 * sample), abs=1e-12)
+
+
+def forces_for(
+    position: np.ndarray,
+    velocity: np.ndarray,
+    reference: tuple[np.ndarray, np.ndarray, np.ndarray],
+    airframe: Airframe = NO_DRAG,
+    disturbance: np.ndarray = NOTHING,
+) -> np.ndarray:
+    forces = np.empty((2, 3))
+    r, v, a = (np.tile(part, (2, 1)) for part in reference)
+    ahead = np.tile(np.eye(2), (2, 1, 1))
+    position_loop.wanted_forces(position, velocity, (r, v, a), ahead, GAINS, disturbance, airframe, LIMITS, forces)
+    first: np.ndarray = forces[0]
+    return first
+
+
+def test_the_force_is_newtons_for_the_demanded_acceleration() -> None:
+    e, e_rate, a, d = (np.array(v) for v in ((0.1, -0.05, 0.08), (0.2, 0.1, -0.1), (0.5, 1.0, -0.3), (0.2, -0.4, 0.6)))
+    wanted = 0.698 * (a + 20.0 * e + 9.0 * e_rate - d + np.array([0.0, 0.0, 9.81]))
+    assert forces_for(-e, -e_rate, (NOTHING, NOTHING, a), disturbance=d) == pytest.approx(wanted)
+
+
+@given(vectors(5.0))
+def test_with_drag_the_force_holds_a_steady_motion(velocity: tuple[float, float, float]) -> None:
+    """Thrust, weight and the drag at that thrust's own tilt are in balance."""
+    v = np.array(velocity)
+    force = forces_for(NOTHING, v, (NOTHING, v, NOTHING), AIRFRAME)
+    drag = np.empty(3)
+    thrust = float(np.linalg.norm(force))
+    position_loop.drag_force(AIRFRAME, v, force / thrust, thrust, drag)
+    assert force + drag - np.array([0.0, 0.0, 0.698 * 9.81]) == pytest.approx(NOTHING, abs=2e-3 * (1.0 + v @ v))
+
+
+def test_a_far_reference_is_approached_at_a_limited_speed() -> None:
+    """At the distance that counts at most, feedback is at rest at the speed of approach."""
+    far = np.array([100.0, 0.0, 0.0])
+    resting = np.array([LIMITS.position_error_m * GAINS[0] / GAINS[1], 0.0, 0.0])
+    assert forces_for(NOTHING, resting, (far, NOTHING, NOTHING)) == pytest.approx([0.0, 0.0, 0.698 * 9.81])
+
+
+@given(vectors(100.0))
+def test_limited_forces_keep_height_before_place(force: tuple[float, float, float]) -> None:
+    limited = np.array(force)
+    position_loop.limited_force(limited, LIMITS)
+    assert limited[2] == min(max(force[2], 1.0), 18.0)
+    horizontal = sqrt(limited[0] ** 2 + limited[1] ** 2)
+    assert horizontal <= limited[2] * LIMITS.tilt_tangent * (1.0 + 1e-12)
+    assert np.linalg.norm(limited) <= 18.0 * (1.0 + 1e-12)
+    assert force[0] * limited[1] == pytest.approx(force[1] * limited[0], abs=1e-9)
+
+
+@given(reals(8.0), reals(8.0), st.floats(0.5, 15.0), reals(pi), reals(pi))
+def test_roll_and_pitch_point_thrust_along_the_force_at_any_yaw(
+    x: float, y: float, z: float, yaw: float, wanted: float
+) -> None:
+    angles = np.empty((1, 3))
+    position_loop.attitudes(np.array([[x, y, z]]), np.array([wanted]), np.array([yaw]), angles)
+    phi, theta, psi = angles[0].tolist()
+    up = np.array(rotation_matrix(quaternion_from_euler(phi, theta, yaw)))[:, 2]
+    assert up * np.linalg.norm([x, y, z]) == pytest.approx([x, y, z], abs=1e-9)
+    assert psi == wanted
+
+
+def test_commanded_thrust_leads_its_lag() -> None:
+    forces = np.array([[0.0, 0.0, 6.0], [0.0, 0.0, 6.5], [1.0, 2.0, 6.5], [0.0, 0.0, 30.0]])
+    commands = np.empty(3)
+    position_loop.thrust_commands(6.0, forces, np.array([0.0, 0.0, 1.0]), 0.3, LIMITS, commands)
+    thrust = 6.0
+    for wanted, command in zip((6.5, float(np.linalg.norm(forces[2]))), commands, strict=False):
+        thrust += 0.3 * (command - thrust)
+        assert thrust == pytest.approx(wanted)
+    assert commands[2] == LIMITS.most_thrust_n
+
+
+def test_the_end_of_the_horizon_moves_as_the_angles_do() -> None:
+    """Against a rotation differentiated numerically: body rates, and the moment that makes their derivative."""
+    h, inertia = 1e-3, np.array([0.0034, 0.0034, 0.006])
+
+    def angles_at(t: float) -> np.ndarray:
+        return np.array([0.3 + 0.5 * t + t**2, -0.2 + 0.4 * t, 1.0 + 0.7 * t])
+
+    end = np.empty(12)
+    disturbance = np.array([1e-3, -2e-3, 3e-3])
+    position_loop.end_of_motion(np.array([angles_at(-h), angles_at(0), angles_at(h)]), inertia, disturbance, h, end)
+    R0, R1 = (np.array(rotation_matrix(quaternion_from_euler(*angles_at(t).tolist()))) for t in (-h, h))
+    skew = R0.T @ R1
+    rate = np.array([skew[2, 1] - skew[1, 2], skew[0, 2] - skew[2, 0], skew[1, 0] - skew[0, 1]]) / (4.0 * h)
+    assert end[[0, 2, 4]] == pytest.approx(angles_at(0))
+    assert end[[1, 3, 5]] == pytest.approx(rate, abs=1e-4)
+    assert end[6:9] == pytest.approx(end[9:12])
+    assert end[6] + disturbance[0] == pytest.approx(inertia[0] * 2.0, rel=1e-6)

@@ -1,0 +1,100 @@
+"""The attitude on three rotors: the periodic solution solves the plant's equations, and the gains are an LQR's."""
+
+from math import hypot
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colibri.autopilot.control.rotor_loss.reduced_attitude import (
+    ReducedAttitude,
+    Weights,
+    balancing_thrust,
+    trio_without,
+)
+from colibri.autopilot.control.rotor_loss.three_rotors import shared
+from colibri.autopilot.control.vehicle_model.rotor_lag import rotor_lag
+from colibri.plant.physics.equations import angular_acceleration
+from colibri.plant.vehicle.description import load_vehicle
+
+HUMMINGBIRD = load_vehicle("hummingbird")
+INTERVAL_S = 0.008
+FOLLOWS = rotor_lag(HUMMINGBIRD, INTERVAL_S).planned
+SPIN_RAD_S = 27.0
+
+
+def law(lost: int, vehicle: str = "hummingbird") -> ReducedAttitude:
+    return ReducedAttitude(load_vehicle(vehicle), lost, INTERVAL_S, FOLLOWS, SPIN_RAD_S, Weights())
+
+
+@pytest.mark.parametrize("vehicle", ["hummingbird", "iris"])
+@pytest.mark.parametrize("lost", range(4))
+def test_the_opposite_rotor_is_of_the_same_hand_and_across(lost: int, vehicle: str) -> None:
+    rotors = load_vehicle(vehicle).rotors
+    trio = trio_without(load_vehicle(vehicle), lost)
+    assert sorted(trio[:4]) == [0, 1, 2, 3]
+    assert rotors.direction[trio.o] == rotors.direction[lost]
+    assert np.dot(rotors.position_m[trio.o], rotors.position_m[lost]) < 0.0
+    assert (trio.sign > 0.0) == (rotors.direction[lost] == "ccw")
+
+
+@pytest.mark.parametrize("lost", range(4))
+@pytest.mark.parametrize("spin", [8.0, 15.0, 27.0, 32.0])
+def test_the_periodic_solution_turns_and_stays(lost: int, spin: float) -> None:
+    """Both by the plant's own equations: p' = q' = 0, and the direction wanted stands still in the body."""
+    attitude = law(lost)
+    trio = attitude.trio
+    solution = attitude.solution(spin)
+    pair_n = 0.5 * (HUMMINGBIRD.body.mass_kg * HUMMINGBIRD.gravity_m_s2 - solution.opposite_n)
+    thrust_n = np.zeros(4)
+    thrust_n[trio.a] = thrust_n[trio.b] = pair_n
+    thrust_n[trio.o] = solution.opposite_n
+    speeds = np.sqrt(thrust_n / HUMMINGBIRD.allocation()[0])
+    _, mx, my, mz = HUMMINGBIRD.allocation() @ speeds**2
+    h = float(HUMMINGBIRD.rotor_momentum() @ speeds)
+    rate = (float(solution.rate[0]), float(solution.rate[1]), spin * trio.sign)
+    turn = angular_acceleration(rate, (mx, my, mz), h, 0.0, HUMMINGBIRD.body.inertia_kg_m2)
+    # Elsewhere the rotors' own momentum, which the law takes to be that of the final spin, is a little different.
+    assert hypot(turn[0], turn[1]) < (1e-9 if spin == SPIN_RAD_S else 0.5)
+    x, y = solution.h
+    direction = np.array([x, y, np.sqrt(1.0 - x * x - y * y)])
+    assert np.cross(rate, direction) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("lost", range(4))
+def test_at_the_final_spin_drag_and_torque_balance(lost: int) -> None:
+    trio = trio_without(HUMMINGBIRD, lost)
+    fast, slow = (balancing_thrust(HUMMINGBIRD, trio, spin) for spin in (30.0, 20.0))
+    assert 0.0 < fast < slow < 0.5 * HUMMINGBIRD.body.mass_kg * HUMMINGBIRD.gravity_m_s2
+    assert law(lost).solution(SPIN_RAD_S).opposite_n == pytest.approx(balancing_thrust(HUMMINGBIRD, trio, SPIN_RAD_S))
+
+
+@pytest.mark.parametrize("lost", range(4))
+def test_on_the_solution_it_asks_for_the_solution(lost: int) -> None:
+    attitude = law(lost)
+    solution = attitude.solution(20.0)
+    x, y = solution.h
+    direction = np.array([x, y, np.sqrt(1.0 - x * x - y * y)])
+    rate = np.array([*solution.rate, 20.0 * attitude.trio.sign])
+    d, f_o = attitude.command(direction, rate, np.array([0.0, solution.opposite_n]))
+    assert d == pytest.approx(0.0, abs=1e-12)
+    assert f_o == pytest.approx(solution.opposite_n)
+
+
+@given(st.floats(0.0, 25.0), st.floats(-20.0, 20.0), st.floats(-5.0, 10.0), st.integers(0, 3), st.floats(0.7, 1.0))
+def test_what_is_shared_is_within_limits_and_keeps_the_moment(
+    thrust_n: float, d: float, f_o: float, lost: int, fastest: float
+) -> None:
+    trio = trio_without(HUMMINGBIRD, lost)
+    full_n = HUMMINGBIRD.allocation()[0] * HUMMINGBIRD.rotors.max_speed**2
+    squared = shared(trio, thrust_n, d, f_o, full_n, (0.01, fastest**2))
+    forces = squared * full_n
+    left = [trio.a, trio.b, trio.o]
+    assert squared[lost] == 0.0
+    assert squared[left].min() >= 0.01 - 1e-12
+    assert squared[left].max() <= fastest**2 + 1e-12
+    room = float(full_n[0]) * (fastest**2 - 0.01)
+    assert forces[trio.b] - forces[trio.a] == pytest.approx(min(max(d, -room), room), abs=1e-9)
+    if abs(d) < 2.0 and 0.1 < f_o < 2.0 and 6.0 < thrust_n < 6.0 + f_o and fastest > 0.95:
+        assert forces.sum() == pytest.approx(thrust_n)

@@ -1,0 +1,179 @@
+"""Control laws that are told an attitude: the same law as for a place, the same limits, the same fallbacks."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Fallback, Horizon, VehicleState
+from colibri.autopilot.control.lpv_mpc.law import LpvMpc
+from colibri.autopilot.control.lpv_mpc.position_loop import attitudes
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
+from colibri.autopilot.control.registry import check_rotor_speeds, load_controller
+from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
+from colibri.plant.vehicle.description import load_vehicle
+
+VEHICLE = load_vehicle("hummingbird")
+PROFILE = load_profile("flight")
+WEIGHT_N = VEHICLE.body.mass_kg * VEHICLE.gravity_m_s2
+LAWS = ("lpv-mpc", "geometric-se3")
+
+
+def build(name: str = "lpv-mpc") -> Any:
+    return load_controller(name)(PROFILE.table(name), VEHICLE, lambda: 0.0)
+
+
+def mpc() -> LpvMpc:
+    controller = build()
+    assert isinstance(controller, LpvMpc)
+    return controller
+
+
+def turned(phi_deg: float, theta_deg: float = 0.0, psi: float = 0.0) -> VehicleState:
+    q = quaternion_from_euler(np.radians(phi_deg), np.radians(theta_deg), psi)
+    phi, theta, _ = euler_from_quaternion(q)
+    still = (0.0, 0.0, 0.0)
+    return VehicleState(still, still, q, (phi, theta, psi), still)
+
+
+def held(samples: int, phi: float, theta: float, psi: float, thrust_n: float = WEIGHT_N) -> AttitudeDemand:
+    return AttitudeDemand(np.tile((phi, theta, psi), (samples, 1)), np.zeros((samples, 3)), np.full(samples, thrust_n))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_level_demand_at_hover_is_hover(name: str) -> None:
+    controller = build(name)
+    assert isinstance(controller, AttitudeController)
+    demand = held(controller.preview.samples, 0.0, 0.0, 0.0)
+    memory = controller.initial(VEHICLE.hover_speed)
+    _, decision = controller.step_attitude(memory, 0, turned(0.0), demand)
+    check_rotor_speeds(name, decision.rotor_speeds, VEHICLE.rotors.max_speed)
+    assert decision.rotor_speeds == pytest.approx(np.full(4, VEHICLE.hover_speed), rel=1e-6)
+    assert decision.attitude_reference == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(("phi", "theta", "more", "less"), [(0.3, 0.0, 3, 1), (0.0, 0.3, 2, 0), (-0.3, 0.0, 1, 3)])
+def test_the_rotors_turn_it_the_right_way(name: str, phi: float, theta: float, more: int, less: int) -> None:
+    """Rotors front, right, rear, left: roll right needs the left one, nose down the rear one."""
+    controller = build(name)
+    demand = held(controller.preview.samples, phi, theta, 0.0)
+    _, decision = controller.step_attitude(controller.initial(VEHICLE.hover_speed), 0, turned(0.0), demand)
+    assert decision.rotor_speeds[more] > decision.rotor_speeds[less] + 20.0
+
+
+@pytest.mark.parametrize("name", ["cascade", "global-lpv-mpc"])
+def test_laws_that_cannot_do_not_say_that_they_can(name: str) -> None:
+    thesis = load_profile("thesis")
+    controller = load_controller(name)(thesis.table(name), load_vehicle("hummingbird-thesis"), lambda: 0.0)
+    assert not isinstance(controller, AttitudeController)
+
+
+def test_the_attitude_that_a_place_needs_gives_the_same_decision() -> None:
+    """What the position loop makes of references, demanded as attitude and thrust: the same rotor speeds."""
+    controller = mpc()
+    state = turned(0.0)
+    samples = controller.preview.samples
+    thrust_n = 1.2 * WEIGHT_N
+    forces = np.tile((0.3 * WEIGHT_N, -0.2 * WEIGHT_N, 0.0), (samples, 1))
+    forces[:, 2] = np.sqrt(thrust_n**2 - (forces[:, :2] ** 2).sum(axis=1))
+    angles = np.empty((samples, 3))
+    attitudes(forces, np.zeros(samples), np.zeros(samples), angles)
+    demand = AttitudeDemand(angles, np.zeros((samples, 3)), np.full(samples, thrust_n))
+    memory = controller.initial(VEHICLE.hover_speed)
+    _, by_attitude = controller.step_attitude(memory, 0, state, demand)
+
+    nowhere = np.zeros((samples, 3))
+    acceleration = forces / VEHICLE.body.mass_kg - np.array([0.0, 0.0, VEHICLE.gravity_m_s2])
+    k1, k2 = 30.0, 11.0
+    ahead = controller._errors_ahead  # noqa: SLF001
+    e_rate = -np.array(state.velocity_enu_m_s)
+    follow = acceleration + k1 * (ahead[:, 0, 1, None] * e_rate) + k2 * (ahead[:, 1, 1, None] * e_rate)
+    level = np.zeros(samples)
+    references = Horizon(nowhere, nowhere, follow, nowhere, nowhere, level, level, level)
+    no_drag = build_without_drag()
+    _, by_place = no_drag.step(no_drag.initial(VEHICLE.hover_speed), 0, state, references)
+    assert by_attitude.attitude_reference == pytest.approx(by_place.attitude_reference, abs=1e-9)
+    moments = [VEHICLE.allocation()[1:] @ d.rotor_speeds**2 for d in (by_attitude, by_place)]
+    assert moments[0] == pytest.approx(moments[1], abs=0.05)
+
+
+def build_without_drag() -> LpvMpc:
+    return LpvMpc(PROFILE.table("lpv-mpc"), VEHICLE.without({"drag"}), lambda: 0.0)
+
+
+def test_full_turns_of_yaw_make_no_difference() -> None:
+    controller = mpc()
+    memory = controller.initial(VEHICLE.hover_speed)
+    decisions = [
+        controller.step_attitude(memory, 0, turned(5.0, psi=psi), held(22, 0.2, 0.1, wanted))[1]
+        for psi, wanted in ((0.3, 0.5), (0.3, 0.5 - 4.0 * np.pi), (0.3 + 6.0 * np.pi, 0.5))
+    ]
+    for decision in decisions[1:]:
+        assert decision.rotor_speeds == pytest.approx(decisions[0].rotor_speeds, abs=1e-6)
+
+
+@pytest.mark.parametrize("thrust_n", [-5.0, 0.0, 100.0])
+def test_thrust_leaves_the_moments_their_room(thrust_n: float) -> None:
+    """Clipped with the margin: the plan keeps every rotor within its limits, and there is one."""
+    controller = mpc()
+    memory, planned = controller.initial(VEHICLE.hover_speed), None
+    for sample in range(30):
+        memory, decision = controller.step_attitude(
+            memory, 8000 * sample, turned(0.0), held(22, 0.4, -0.3, 0.5, thrust_n)
+        )
+        planned = decision.diagnostics.planned_squared
+        assert planned is not None
+        assert planned.min() >= (83.8 / 838.0) ** 2 - 1e-6
+        assert planned.max() <= 1.0 + 1e-6
+    span_n = 4.0 * 6.9472e-6 * 838.0**2
+    assert planned is not None
+    commanded = float(planned.mean()) * span_n
+    assert commanded < 0.1 * span_n if thrust_n <= 0.0 else 0.6 * span_n < commanded < 0.96 * span_n
+
+
+def test_far_from_the_demand_the_recovery_law_flies() -> None:
+    controller = mpc()
+    memory = controller.initial(VEHICLE.hover_speed)
+    for state in (turned(170.0), turned(0.0, 80.0), turned(80.0)):
+        _, decision = controller.step_attitude(memory, 0, state, held(22, 0.0, 0.0, 0.0))
+        assert decision.diagnostics.fallback is Fallback.RECOVERY
+    _, decision = controller.step_attitude(memory, 0, turned(50.0), held(22, 0.0, 0.0, 0.0))
+    assert decision.diagnostics.fallback is None
+    _, decision = controller.step_attitude(memory, 0, turned(40.0), held(22, np.radians(-40.0), 0.0, 0.0))
+    assert decision.diagnostics.fallback is Fallback.RECOVERY
+
+
+def test_the_fallbacks_are_those_of_a_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    controller = mpc()
+    memory = controller.initial(VEHICLE.hover_speed)
+    memory, _ = controller.step_attitude(memory, 0, turned(0.0), held(22, 0.1, 0.0, 0.0))
+
+    def fail(self: QpSolver, qp: Qp) -> QpResult:
+        del self, qp
+        return QpResult(QpStatus.TIME_OUT, None)
+
+    monkeypatch.setattr(QpSolver, "solve", fail)
+    flown = []
+    for sample in range(1, 33):
+        memory, decision = controller.step_attitude(memory, 8000 * sample, turned(0.0), held(22, 0.1, 0.0, 0.0))
+        flown.append(decision.diagnostics.fallback)
+    assert flown == [Fallback.SHIFTED_PLAN] * 5 + [Fallback.LQR] * 25 + [Fallback.DESCENT] * 2
+
+
+def test_both_ways_share_what_they_remember() -> None:
+    """A plan made for a place goes on for an attitude, and back."""
+    controller = mpc()
+    still, level = np.zeros((22, 3)), np.zeros(22)
+    references = Horizon(still, still, still, still, still, level, level, level)
+    memory = controller.initial(VEHICLE.hover_speed)
+    for sample in range(6):
+        before = memory
+        if sample % 2:
+            memory, decision = controller.step_attitude(memory, 8000 * sample, turned(3.0), held(22, 0.0, 0.0, 0.0))
+        else:
+            memory, decision = controller.step(memory, 8000 * sample, turned(3.0), references)
+        assert decision.diagnostics.qp_status is QpStatus.SOLVED
+        assert memory.charge_ah > before.charge_ah
+        assert memory.plan is not None

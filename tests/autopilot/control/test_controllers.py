@@ -1,0 +1,222 @@
+"""The interface of a control law: the three that come along, and one of somebody else's."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from colibri.autopilot.control.geometric import track_direction
+from colibri.autopilot.control.interface import Controller, Horizon, Preview, VehicleState
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.registry import (
+    ControllerError,
+    DecisionError,
+    check_controller,
+    check_rotor_speeds,
+    controller_names,
+    load_controller,
+)
+from colibri.autopilot.control.vehicle_model.mixer import Mixer
+from colibri.common.config import SettingsError
+from colibri.common.rotations import quaternion_from_euler
+from colibri.plant.vehicle.description import load_vehicle
+from tools.harness.processes import fly, fly_thesis, rows
+
+DOCS = Path(__file__).parents[3] / "docs"
+PROFILES = {"cascade": "thesis", "global-lpv-mpc": "thesis", "geometric-se3": "se3"}
+
+
+def build(name: str) -> Controller[Any]:
+    vehicle = load_vehicle("hummingbird-thesis")
+    return load_controller(name)(load_profile(PROFILES[name]).table(name), vehicle, lambda: 0.0)
+
+
+def hovering(position: tuple[float, float, float] = (0.0, 0.0, 0.0), psi: float = 0.0) -> VehicleState:
+    still = (0.0, 0.0, 0.0)
+    return VehicleState(position, still, quaternion_from_euler(0.0, 0.0, psi), (0.0, 0.0, psi), still)
+
+
+def staying(preview: Preview) -> Horizon:
+    nowhere, east = np.zeros((preview.samples, 3)), np.zeros(preview.samples)
+    return Horizon(nowhere, nowhere, nowhere, nowhere, nowhere, east, east, east)
+
+
+def test_four_come_along() -> None:
+    assert controller_names() == ["cascade", "geometric-se3", "global-lpv-mpc", "lpv-mpc"]
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_each_keeps_the_interface(name: str) -> None:
+    controller = build(name)
+    check_controller(name, controller)
+    vehicle = load_vehicle("hummingbird-thesis")
+    memory = controller.initial(vehicle.hover_speed)
+    _, decision = controller.step(memory, 0, hovering(), staying(controller.preview))
+    check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)
+    assert decision.rotor_speeds == pytest.approx(np.full(4, vehicle.hover_speed), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_the_same_inputs_give_the_same_decision(name: str) -> None:
+    """Memory is explicit: calls in between change nothing."""
+    controller = build(name)
+    memory = controller.initial(4000.0)
+    references = staying(controller.preview)
+    _, first = controller.step(memory, 0, hovering((0.5, -0.2, 0.1)), references)
+    controller.step(memory, 300_000, hovering((-3.0, 2.0, 1.0)), references)
+    _, again = controller.step(memory, 0, hovering((0.5, -0.2, 0.1)), references)
+    assert (first.rotor_speeds == again.rotor_speeds).all()
+
+
+@pytest.mark.parametrize("name", ["cascade", "global-lpv-mpc"])
+def test_an_mpc_shows_its_plan(name: str) -> None:
+    controller = build(name)
+    _, decision = controller.step(
+        controller.initial(4740.24), 0, hovering((0.1, 0.0, 0.0)), staying(controller.preview)
+    )
+    how = decision.diagnostics
+    assert how.predicted is not None
+    assert how.predicted.shape == (4, 3 if name == "cascade" else 4)
+    assert np.isfinite(how.predicted).all()
+    assert how.active.increments == 0
+    assert how.cost <= 0.0, "doing nothing costs 0, and the optimum no more than that"
+
+
+@pytest.mark.parametrize("name", PROFILES)
+@pytest.mark.parametrize("spoil", [{"colour": 1.0}, {"control_interval_s": 0.0}, {"control_interval_s": 0.0005}])
+def test_a_wrong_table_is_refused(name: str, spoil: dict[str, float]) -> None:
+    table = {**load_profile(PROFILES[name]).table(name), **spoil}
+    with pytest.raises(SettingsError, match=next(iter(spoil))):
+        load_controller(name)(table, load_vehicle("hummingbird-thesis"), lambda: 0.0)
+
+
+def test_a_missing_table_is_refused() -> None:
+    with pytest.raises(SettingsError, match="missing required field"):
+        load_controller("cascade")({}, load_vehicle("hummingbird"), lambda: 0.0)
+
+
+def test_what_is_no_controller_is_refused() -> None:
+    with pytest.raises(ControllerError, match="needs control_interval_us, preview, initial"):
+        check_controller("nothing", object())
+    controller = build("geometric-se3")
+    controller.control_interval_us = 1_500
+    with pytest.raises(ControllerError, match="whole milliseconds"):
+        check_controller("odd", controller)
+
+
+@pytest.mark.parametrize("speeds", [[0.0, 0.0, 0.0, np.nan], [0.0] * 3, [0.0, 0.0, 0.0, 9000.0], [0.0, 0.0, 0.0, -1.0]])
+def test_what_no_rotor_can_follow_is_refused(speeds: list[float]) -> None:
+    with pytest.raises(DecisionError, match="expected four from 0 to 8002"):
+        check_rotor_speeds("wild", np.array(speeds), 8002.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_target_attitude_turns_as_it_says(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    force, force_rate = rng.normal(size=3) + np.array([0.0, 0.0, 9.81]), rng.normal(size=3)
+    yaw, yaw_rate, step = float(rng.normal()), float(rng.normal()), 1e-6
+    target = track_direction(force, force_rate, yaw, yaw_rate)
+    later = track_direction(force + step * force_rate, force_rate, yaw + step * yaw_rate, yaw_rate)
+    turned = (target.rotation.T @ later.rotation - np.eye(3)) / step
+    assert [turned[2, 1], turned[0, 2], turned[1, 0]] == pytest.approx(target.rate, abs=1e-4)
+    assert target.rotation @ target.rotation.T == pytest.approx(np.eye(3), abs=1e-12)
+
+
+def test_a_symmetrical_airframe_stays_symmetrical() -> None:
+    """Where no roll or pitch moment is asked for, opposite rotors turn alike to the last bit."""
+    mixer = Mixer(load_vehicle("hummingbird-thesis"))
+    for thrust_n, yaw_moment in ((6.8, 0.01), (3.3, -0.02), (0.7, 0.001)):
+        front, right, rear, left = mixer.rotor_speeds(np.array([thrust_n, 0.0, 0.0, yaw_moment]))
+        assert front == rear
+        assert right == left
+
+
+@pytest.mark.parametrize("link", ["direct", "memory"])
+def test_the_first_strategy_fails_as_the_thesis_says(tmp_path: Path, link: str) -> None:
+    fly_thesis(tmp_path, "spiral", "--controller", "global-lpv-mpc", "--link", link)
+    flown = rows(tmp_path / "flight.csv")
+    assert np.abs(flown["x"]).max() < 1e-9
+    assert np.abs(flown["y"] + 1.0).max() < 1e-9
+    assert max(np.abs(flown["phi"]).max(), np.abs(flown["theta"]).max()) == 0.0
+    climb_m = 3.0
+    assert np.ptp(flown["z"]) > 100.0 * climb_m
+    assert np.count_nonzero(np.diff(np.sign(np.diff(flown["z"])))) >= 3, "up and down"
+    turned = flown["psi"][-1] - flown["psi"][0]
+    assert turned == pytest.approx(2.5 * 2.0 * pi, rel=0.05)
+    assert max(flown[f"omega{rotor}"].max() for rotor in (1, 2, 3, 4)) <= 8002.0
+
+
+@pytest.mark.parametrize(("track", "rms_m"), [("spiral", 1e-6), ("line", 1e-6), ("crown", 1e-3)])
+def test_the_geometric_controller_follows_an_ideal_vehicle_exactly(tmp_path: Path, track: str, rms_m: float) -> None:
+    figures = fly(tmp_path, track, "--profile", "se3", "--link", "memory", "--duration", "30")
+    assert figures["rmse_after_20s_m"] < rms_m
+    assert figures["solver"] is None
+
+
+def foreign_package(folder: Path, source: str) -> dict[str, str]:
+    """Install a package as pip would, as far as Python looks; return the environment to find it with."""
+    (folder / "their_law.py").write_text(source, encoding="utf-8")
+    information = folder / "their_law-1.0.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: their-law\nVersion: 1.0\n", encoding="utf-8")
+    (information / "entry_points.txt").write_text(
+        "[colibri.controllers]\ntheir-name = their_law:TheirLaw\nbroken = their_law:Nowhere\n", encoding="utf-8"
+    )
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}
+
+
+def example() -> str:
+    """Return the example of docs/controllers.md."""
+    (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "controllers.md").read_text(encoding="utf-8"), re.DOTALL)
+    assert isinstance(code, str)
+    return code
+
+
+def fly_theirs(folder: Path, environment: dict[str, str], *options: str) -> "subprocess.CompletedProcess[str]":
+    command = [
+        sys.executable,
+        "-m",
+        "colibri",
+        "fly",
+        "spiral",
+        "--quiet",
+        "--no-figures",
+        "--out",
+        str(folder / "out"),
+    ]
+    return subprocess.run([*command, *options], env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("link", ["udp", "direct"])
+def test_the_example_of_the_docs_flies(tmp_path: Path, link: str) -> None:
+    assert len(example().splitlines()) <= 36
+    environment = foreign_package(tmp_path, example())
+    done = fly_theirs(tmp_path, environment, "--controller", "their-name", "--link", link, "--duration", "40")
+    assert (done.returncode, done.stderr) == (0, "")
+    figures = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert figures["controller"] == "their-name"
+    assert figures["rmse_after_20s_m"] < 0.5
+
+
+@pytest.mark.parametrize("link", ["udp", "direct"])
+def test_a_foreign_law_that_cannot_be_loaded_is_one_line(tmp_path: Path, link: str) -> None:
+    done = fly_theirs(tmp_path, foreign_package(tmp_path, example()), "--controller", "broken", "--link", link)
+    assert done.returncode == 2
+    assert done.stderr.startswith("colibri: error: controller broken (their_law:Nowhere) cannot be loaded: ")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("link", ["udp", "direct"])
+def test_a_foreign_law_that_goes_wild_ends_in_words(tmp_path: Path, link: str) -> None:
+    wild = example().replace("rotor_speeds=", "rotor_speeds=float('nan') * ")
+    done = fly_theirs(tmp_path, foreign_package(tmp_path, wild), "--controller", "their-name", "--link", link)
+    assert done.returncode == 1
+    assert "colibri: error: controller their-name gave rotor speeds [nan nan nan nan]: expected four" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,89 @@
+"""Position controller, mixer, and the core that composes them."""
+
+from math import cos, sin
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colibri.autopilot.control.thesis.position_loop import PositionController, PositionSettings
+from colibri.autopilot.control.vehicle_model.mixer import Mixer
+from colibri.common.rotations import earth_from_body, quaternion_from_euler
+from colibri.common.types import Vector
+from colibri.plant.physics.equations import packed, rotor_momentum, rotor_wrench
+from colibri.plant.physics.parameters import parameters_of
+from colibri.plant.vehicle.description import load_vehicle
+from tests.strategies import reals, vectors
+
+VEHICLE = load_vehicle("hummingbird")
+WEIGHT_N = VEHICLE.body.mass_kg * VEHICLE.gravity_m_s2
+AT_REST = (0.0, 0.0, 0.0)
+
+
+@given(vectors(3.0), vectors(3.0), reals(10.0))
+def test_the_thrust_makes_the_acceleration_that_the_poles_ask_for(error: Vector, speed: Vector, yaw: float) -> None:
+    """Feedback linearisation: on the nonlinear body the closed loop is e'' = -k1 e - k2 e' on every axis."""
+    controller = PositionController(PositionSettings(samples=1, poles=(-1.0, -1.5)), VEHICLE)
+    demand = controller.step(AT_REST, speed, error, AT_REST, yaw)
+    attitude = quaternion_from_euler(demand.phi, demand.theta, yaw)
+    force_n = np.array(earth_from_body(attitude, (0.0, 0.0, demand.thrust_n))) - [0.0, 0.0, WEIGHT_N]
+    wanted = 1.5 * np.array(error) - 2.5 * np.array(speed)
+    if wanted[2] > -0.9 * VEHICLE.gravity_m_s2:
+        assert force_n / VEHICLE.body.mass_kg == pytest.approx(wanted, abs=1e-9)
+
+
+@given(vectors(1e6), vectors(1e6), reals(100.0))
+def test_no_error_is_too_large_to_fly(error: Vector, speed: Vector, yaw: float) -> None:
+    controller = PositionController(PositionSettings(samples=1, poles=(-1.0, -2.0)), VEHICLE)
+    demand = controller.step(AT_REST, speed, error, AT_REST, yaw)
+    assert np.isfinite(demand).all()
+    assert abs(demand.phi) <= np.pi / 2
+    assert abs(demand.theta) <= np.pi / 2
+    assert demand.thrust_n > 0.0
+
+
+def test_at_the_reference_it_hovers() -> None:
+    controller = PositionController(PositionSettings(samples=1, poles=(-1.0, -2.0)), VEHICLE)
+    assert controller.step(AT_REST, AT_REST, AT_REST, AT_REST, 1.0) == pytest.approx((0.0, 0.0, WEIGHT_N))
+
+
+def test_ahead_is_pitch_and_left_is_negative_roll() -> None:
+    controller = PositionController(PositionSettings(samples=1, poles=(-1.0, -2.0)), VEHICLE)
+    yaw = 0.6
+    ahead, left = (cos(yaw), sin(yaw), 0.0), (-sin(yaw), cos(yaw), 0.0)
+    pitched = controller.step(AT_REST, AT_REST, ahead, AT_REST, yaw)
+    rolled = controller.step(AT_REST, AT_REST, left, AT_REST, yaw)
+    assert pitched.theta > 0.1
+    assert pitched.phi == pytest.approx(0.0, abs=1e-12)
+    assert rolled.phi < -0.1
+    assert rolled.theta == pytest.approx(0.0, abs=1e-12)
+
+
+SPEED = st.floats(0.0, VEHICLE.rotors.max_speed)
+
+
+@pytest.mark.parametrize("name", ["hummingbird", "hummingbird-thesis"])
+@given(st.tuples(*[st.floats(0.0, 1.0)] * 4))
+def test_the_mixer_undoes_the_rotors(name: str, controls: tuple[float, float, float, float]) -> None:
+    vehicle = load_vehicle(name)
+    c1, c2, c3, c4 = (control * vehicle.rotors.max_speed for control in controls)
+    speeds = (c1, c2, c3, c4)
+    wrench = rotor_wrench(speeds, packed(parameters_of(vehicle, AT_REST))[0])
+    mixed = Mixer(vehicle).rotor_speeds(np.array([wrench.force_n[2], *wrench.moment_n_m]))
+    assert mixed**2 == pytest.approx(np.array(speeds) ** 2, abs=1e-9 * vehicle.rotors.max_speed**2)
+
+
+@given(st.tuples(*[reals(1e3)] * 4))
+def test_the_mixer_stays_within_the_rotors_limits(wrench: tuple[float, ...]) -> None:
+    speeds = Mixer(VEHICLE).rotor_speeds(np.array(wrench))
+    assert (speeds >= 0.0).all()
+    assert (speeds <= VEHICLE.rotors.max_speed).all()
+
+
+@given(st.tuples(SPEED, SPEED, SPEED, SPEED))
+def test_plant_and_autopilot_agree_on_the_rotors(speeds: tuple[float, float, float, float]) -> None:
+    mixer, parameters = Mixer(VEHICLE), packed(parameters_of(VEHICLE, AT_REST))[0]
+    wrench = rotor_wrench(speeds, parameters)
+    assert mixer.wrench(np.array(speeds)) == pytest.approx([wrench.force_n[2], *wrench.moment_n_m], rel=1e-12)
+    assert mixer.momentum(np.array(speeds)) == pytest.approx(rotor_momentum(speeds, parameters), abs=1e-12)

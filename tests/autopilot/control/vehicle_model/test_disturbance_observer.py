@@ -1,0 +1,82 @@
+"""The disturbance observers against a vehicle that feels what they should find."""
+
+import numpy as np
+import pytest
+
+from colibri.autopilot.control.vehicle_model.airframe import Airframe
+from colibri.autopilot.control.vehicle_model.disturbance_observer import (
+    MEASURED,
+    Observer,
+    first_estimate,
+    gains,
+    observe,
+)
+
+INTERVAL_S = 0.008
+AIRFRAME = Airframe(0.7, 9.81, 0.0, 0.0, 0.0)
+INERTIA = np.array([0.003, 0.004, 0.006])
+OBSERVER = Observer(*gains(9.0, INTERVAL_S), *gains(12.0, INTERVAL_S), 6.0, 0.3)
+HOVER_N = 0.7 * 9.81
+NO_MOMENT = np.zeros(3)
+NO_DRAG = np.zeros(3)
+
+
+def fly(acceleration: np.ndarray, moment: np.ndarray, seconds: float, observer: Observer = OBSERVER) -> np.ndarray:
+    """Let level thrust and a constant disturbance act, but for gyroscopic coupling, which the caller avoids."""
+    measured = np.zeros(MEASURED)
+    measured[8] = 1.0
+    estimate = first_estimate(measured)
+    for _ in range(round(seconds / INTERVAL_S)):
+        now = measured.copy()
+        now[:3] += INTERVAL_S * acceleration
+        now[3:6] += INTERVAL_S * moment / INERTIA
+        estimate = observe(
+            estimate, measured, now, HOVER_N, NO_MOMENT, 0.0, NO_DRAG, AIRFRAME, INERTIA, observer, INTERVAL_S
+        )
+        measured = now
+    return estimate
+
+
+def test_without_a_disturbance_none_is_seen() -> None:
+    assert fly(NO_MOMENT, NO_MOMENT, 2.0)[6:] == pytest.approx(np.zeros(6), abs=1e-12)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_constant_disturbances_are_found(axis: int) -> None:
+    unit = np.eye(3)[axis]
+    estimate = fly(1.5 * unit, 1e-3 * unit, 2.0)
+    assert estimate[6:9] == pytest.approx(1.5 * unit, abs=1e-4)
+    assert estimate[9:] == pytest.approx(1e-3 * unit, abs=1e-6)
+
+
+def test_both_poles_are_where_they_were_placed() -> None:
+    """A step is seen as 1 - (1 + n (1 - p) / p ...) p^n: after one time constant 26 % of it, after five 96 %."""
+    seen = [fly(np.array([1.0, 0, 0]), NO_MOMENT, factor / 9.0)[6] for factor in (1.0, 5.0)]
+    assert seen == pytest.approx([1.0 - 2.0 * np.exp(-1.0), 1.0 - 6.0 * np.exp(-5.0)], abs=0.03)
+
+
+def test_no_more_is_believed_than_the_limit() -> None:
+    cautious = OBSERVER._replace(most_m_s2=1.0, most_n_m=1e-3)
+    estimate = fly(np.array([5.0, 0.0, -5.0]), np.array([0.01, 0.0, 0.0]), 2.0, cautious)
+    assert estimate[6:9] == pytest.approx([1.0, 0.0, -1.0])
+    assert estimate[9] == pytest.approx(1e-3)
+
+
+def test_the_models_coupling_and_drag_are_no_disturbance() -> None:
+    """Euler's equation with the rotors' momentum, and a drag that slows: one small step, seen by none."""
+    h = 1e-6
+    before = np.array([3.0, -1.0, 0.5, 2.0, -1.0, 0.7, 0.0, 0.0, 1.0])
+    drag = np.array([-0.5, 0.2, -0.025])
+    p, q, r = before[3:6]
+    ix, iy, iz = INERTIA
+    momentum = 2e-3
+    turn = [((iy - iz) * q * r - momentum * q) / ix, ((iz - ix) * p * r + momentum * p) / iy, (ix - iy) * p * q / iz]
+    now = before.copy()
+    now[:3] += h * drag / 0.7
+    now[3:6] += h * np.array(turn)
+    observer = Observer(*gains(9.0, h), *gains(12.0, h), 6.0, 0.3)
+    estimate = observe(
+        first_estimate(before), before, now, HOVER_N, NO_MOMENT, momentum, drag, AIRFRAME, INERTIA, observer, h
+    )
+    assert estimate[:6] == pytest.approx(now[:6], abs=1e-11)
+    assert estimate[6:] == pytest.approx(np.zeros(6), abs=1e-9)

@@ -1,0 +1,124 @@
+"""A sudden bias of the accelerometer is found, and nothing that looks like one is taken for it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from colibri.common.earth.geodesy import geodetic_of
+from colibri.common.types import Vector
+from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
+from tests import sensor_source as source
+from tests.autopilot.estimation.test_estimator import error_m, estimates, known, recorded
+from tests.sensor_source import INTERVAL_US
+
+BEGAN_S = 16.0
+GpsLie = Callable[[GpsFix, float], GpsFix]
+
+
+def plus(vector: Vector, other: Vector, times: float = 1.0) -> Vector:
+    (x, y, z), (a, b, c) = vector, other
+    return (x + times * a, y + times * b, z + times * c)
+
+
+def fails(change: Callable[[SensorFrame, float], SensorFrame]) -> Callable[[SensorFrame, float], SensorFrame]:
+    """Have frames changed by (frame, s since it began)."""
+    return lambda frame, t: frame if t < BEGAN_S else change(frame, t - BEGAN_S)
+
+
+def felt(bias: Vector) -> Callable[[SensorFrame, float], SensorFrame]:
+    return fails(lambda frame, _: replace(frame, specific_force_flu_m_s2=plus(frame.specific_force_flu_m_s2, bias)))
+
+
+def told(lie: GpsLie) -> Callable[[SensorFrame, float], SensorFrame]:
+    return fails(lambda frame, t: frame if frame.gps is None else replace(frame, gps=lie(frame.gps, t)))
+
+
+@pytest.mark.parametrize("path", [source.hover, source.circle])
+@pytest.mark.parametrize(
+    "bias", [(0.0, 0.0, 2.0), (0.0, 0.0, -2.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.8, -0.6, 0.9), (-6.0, 0.0, 0.0)]
+)
+def test_a_sudden_bias_is_found_before_it_is_far(path: source.Path, bias: Vector) -> None:
+    flight = recorded(path, 3, 22.5)
+    of = estimates(flight.frames, felt(bias))
+    last = known(of)[-1]
+    learning = [one for one in known(of) if not one.health.accel_bias]
+    assert (learning[0].frame.time_us * 1e-6 - BEGAN_S) < 1.2
+    assert last.resets == 1
+    assert last.health.accel_bias
+    assert np.allclose(last.accel_bias_m_s2, flight.accel_bias[-1] + bias, atol=0.25)
+    assert max(error_m(flight, of, t) for t in np.arange(BEGAN_S, 21.9, 0.1)) < 1.5
+    assert not any(one.health.gps_lost_since_us for one in known(of))
+    after = [one for one in known(of) if one.frame.time_us > learning[0].frame.time_us + 1_000_000]
+    assert not any(one.health.gps_glitch for one in after)
+
+
+VELOCITY_ALONE: dict[str, GpsLie] = {
+    "velocity slides sideways": lambda fix, t: replace(
+        fix, velocity_enu_m_s=plus(fix.velocity_enu_m_s, (1.0, 0.0, 0.0), t)
+    ),
+    "velocity slides up": lambda fix, t: replace(fix, velocity_enu_m_s=plus(fix.velocity_enu_m_s, (0.0, 0.0, 2.0), t)),
+    "velocity is off": lambda fix, _: replace(fix, velocity_enu_m_s=plus(fix.velocity_enu_m_s, (2.0, 0.0, 1.0))),
+}
+
+
+def sliding(way: Vector) -> GpsLie:
+    """Have place and velocity slide away together, m/s²."""
+    return lambda fix, t: replace(
+        fix,
+        velocity_enu_m_s=plus(fix.velocity_enu_m_s, way, t),
+        place=geodetic_of(plus((0.0, 0.0, 0.0), way, 0.5 * t * t), fix.place),
+    )
+
+
+ALL_OF_GPS = {"all of it slides sideways": sliding((1.5, 0.0, 0.0)), "all of it slides up": sliding((0.0, 0.0, 2.0))}
+
+
+@pytest.mark.parametrize("path", [source.hover, source.circle])
+@pytest.mark.parametrize("lie", [*VELOCITY_ALONE.values(), *ALL_OF_GPS.values()], ids=[*VELOCITY_ALONE, *ALL_OF_GPS])
+def test_a_receiver_that_lies_is_not_taken_for_it(path: source.Path, lie: GpsLie) -> None:
+    of = known(estimates(recorded(path, 5, 22.0).frames, told(lie)))
+    assert of[-1].health.gps_glitch
+    assert of[-1].resets == 0
+
+
+@pytest.mark.parametrize("late_s", [0.2, 0.5, 1.0])
+def test_nor_is_one_that_is_late(late_s: float) -> None:
+    """It goes from rest to its circle while all of GPS tells what was."""
+    flight = recorded(source.circle, 4, 12.0)
+    fixes = {frame.time_us: frame.gps for frame in flight.frames if frame.gps is not None}
+
+    def late(frame: SensorFrame, t: float) -> SensorFrame:
+        if frame.gps is None or t < source.REST_S:
+            return frame
+        before = fixes[frame.time_us - round(late_s * 1e6)]
+        assert before is not None
+        return replace(frame, gps=replace(before, time_us=frame.time_us))
+
+    of = known(estimates(flight.frames, late))
+    assert of[-1].health.gps_glitch
+    assert all(one.health.accel_bias for one in of)
+
+
+def test_nor_is_a_gyroscope_that_errs() -> None:
+    def turning(frame: SensorFrame, _: float) -> SensorFrame:
+        return replace(frame, rate_flu_rad_s=plus(frame.rate_flu_rad_s, (0.0, 0.06, 0.0)))
+
+    of = known(estimates(recorded(source.hover, 6, 22.0).frames, fails(turning)))
+    assert any(one.health.gps_glitch for one in of)
+    assert all(one.health.accel_bias for one in of)
+
+
+@pytest.mark.parametrize("knock", [(0.0, 0.0, 200.0), (90.0, -60.0, 100.0), (-30.0, 20.0, -10.0)])
+def test_nor_is_a_knock(knock: Vector) -> None:
+    """It is over before the next frame, and was measured wrong: velocity is off by up to half a metre a second."""
+
+    def knocked(frame: SensorFrame, t: float) -> SensorFrame:
+        if t >= 1.5 * INTERVAL_US * 1e-6:
+            return frame
+        return replace(frame, specific_force_flu_m_s2=plus(frame.specific_force_flu_m_s2, knock))
+
+    of = known(estimates(recorded(source.hover, 7, 19.0).frames, fails(knocked)))
+    assert any(one.health.gps_glitch for one in of)
+    assert all(one.health.accel_bias for one in of)

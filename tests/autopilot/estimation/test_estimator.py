@@ -1,0 +1,377 @@
+"""The estimator on synthetic flights: how it begins, how well it knows, and what it does when sensors fail."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from math import hypot, nan
+
+import numpy as np
+import pytest
+
+from colibri.autopilot.estimation.estimate import Estimate, StatusFlags
+from colibri.autopilot.estimation.estimator import Estimator
+from colibri.autopilot.estimation.sensing.rejection import Reason, Source
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
+from colibri.common.rotations import earth_from_body
+from colibri.mavlink.hil.sensors import SensorFrame, Updated
+from colibri.plant.vehicle.description import load_vehicle
+from colibri.plant.vehicle.sensors import Sensors
+from tests import sensor_source as source
+from tests.sensor_source import GRAVITY_M_S2, INTERVAL_US, Faults, Recording
+
+Change = Callable[[SensorFrame, float], SensorFrame]
+
+
+def parts() -> Sensors:
+    sensors = load_vehicle("hummingbird").sensors
+    assert sensors is not None
+    return sensors
+
+
+def estimator() -> Estimator:
+    return Estimator(parts(), GRAVITY_M_S2, DEFAULT_ORIGIN, INTERVAL_US)
+
+
+@lru_cache(maxsize=4)
+def recorded(path: source.Path, seed: int, duration_s: float, faults: Faults | None = None) -> Recording:
+    return source.record(path, parts(), seed, duration_s, faults)
+
+
+def estimates(frames: Sequence[SensorFrame], change: Change | None = None) -> list[Estimate | None]:
+    seeing = estimator()
+    return [seeing.step(change(frame, frame.time_us * 1e-6) if change else frame) for frame in frames]
+
+
+def known(all_of_them: list[Estimate | None]) -> list[Estimate]:
+    return [one for one in all_of_them if one is not None]
+
+
+def error_m(flight: Recording, of: list[Estimate | None], at_s: float) -> float:
+    k = round(at_s * 1e6 / INTERVAL_US)
+    one = of[k]
+    assert one is not None
+    return float(np.linalg.norm(flight.motion.position[k] - one.frame.position_enu_m))
+
+
+def largest_jump_m(of: list[Estimate | None]) -> float:
+    """Return the largest step of the published position beside what the published velocity explains."""
+    positions = np.array([one.frame.position_enu_m for one in known(of)])
+    velocities = np.array([one.frame.velocity_enu_m_s for one in known(of)])
+    steps = np.diff(positions, axis=0) - velocities[1:] * INTERVAL_US * 1e-6
+    return float(np.linalg.norm(steps, axis=1).max())
+
+
+# --- how it begins
+
+
+def test_it_begins_after_a_second_of_rest_with_a_fix() -> None:
+    flight = recorded(source.climb, 1, 3.0)
+    first = next(one for one in estimates(flight.frames) if one is not None)
+    assert 1.0 <= first.frame.time_us * 1e-6 <= 1.2
+    assert first.health.flags == (
+        StatusFlags.ATTITUDE
+        | StatusFlags.VELOCITY_HORIZ
+        | StatusFlags.VELOCITY_VERT
+        | StatusFlags.POS_HORIZ_REL
+        | StatusFlags.POS_HORIZ_ABS
+        | StatusFlags.POS_VERT_ABS
+        | StatusFlags.PRED_POS_HORIZ_REL
+        | StatusFlags.PRED_POS_HORIZ_ABS
+    )
+    assert not first.rejected
+
+
+def test_it_does_not_begin_without_a_fix() -> None:
+    frames = recorded(source.climb, 1, 3.0).frames
+    assert not known(estimates(frames, lambda frame, _: replace(frame, gps=None)))
+
+
+def test_it_does_not_begin_while_it_is_shaken() -> None:
+    def shaken(frame: SensorFrame, t: float) -> SensorFrame:
+        x, y, z = frame.specific_force_flu_m_s2
+        return replace(frame, specific_force_flu_m_s2=(x + 2.0 * np.sin(40.0 * t), y, z)) if t < 2.0 else frame
+
+    first = known(estimates(recorded(source.climb, 1, 4.0).frames, shaken))[0]
+    assert first.frame.time_us > 2_900_000
+
+
+def test_it_does_not_begin_while_it_is_turned() -> None:
+    def turned(frame: SensorFrame, _: float) -> SensorFrame:
+        p, q, r = frame.rate_flu_rad_s
+        return replace(frame, rate_flu_rad_s=(p, q, r + 0.5))
+
+    assert not known(estimates(recorded(source.climb, 1, 3.0).frames, turned))
+
+
+# --- how well it knows
+
+
+def test_biases_are_found_within_half_a_minute_of_flight() -> None:
+    wrong = Faults(gyro_bias_rad_s=(0.02, -0.02, 0.02), accel_bias_m_s2=(0.3, -0.3, 0.3))
+    flight = recorded(source.circle, 3, source.REST_S + 30.0, wrong)
+    last = estimates(flight.frames)[-1]
+    assert last is not None
+    assert last.gyro_bias_rad_s == pytest.approx(flight.gyro_bias[-1], abs=5e-4)
+    assert last.accel_bias_m_s2 == pytest.approx(flight.accel_bias[-1], abs=0.02)
+
+
+def test_state_is_that_of_now_and_not_that_of_the_last_fix() -> None:
+    """At 3 m/s the delay of GPS alone would be 0.36 m, and its velocity's 0.5 m/s."""
+    flight = recorded(source.circle, 5, 30.0)
+    of = estimates(flight.frames)
+    late = range(5000, len(of))
+    velocity = [np.subtract(flight.motion.velocity[k], of[k].frame.velocity_enu_m_s) for k in late]  # type: ignore[union-attr]
+    position = np.array([np.subtract(flight.motion.position[k], of[k].frame.position_enu_m) for k in late])  # type: ignore[union-attr]
+    assert np.sqrt(np.mean(np.square(velocity), axis=0)).max() < 0.03
+    assert position.std(axis=0).max() < 0.1
+
+
+def test_the_same_frames_give_the_same_bits() -> None:
+    frames = recorded(source.circle, 6, 12.0).frames
+    assert estimates(frames) == estimates(frames)
+
+
+def test_a_stationary_covariance_is_not_too_small() -> None:
+    last = estimates(recorded(source.hover, 2, 20.0).frames)[-1]
+    assert last is not None
+    gps = parts().gps
+    assert 0.5 * gps.horizontal_drift_m < min(last.position_std_m[:2]) <= max(last.position_std_m[:2])
+    assert max(last.position_std_m) < 2.0 * gps.horizontal_drift_m
+
+
+# --- GPS
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_without_gps_a_hover_drifts_little_says_so_and_comes_back_smoothly(seed: int) -> None:
+    flight = recorded(source.hover, seed, 70.0, Faults(gps_lost_s=(30.0, 50.0)))
+    of = estimates(flight.frames)
+    lost = of[round(49.9e6 / INTERVAL_US)]
+    found = of[-1]
+    assert lost is not None
+    assert found is not None
+    assert error_m(flight, of, 49.9) < 20.0
+    assert error_m(flight, of, 49.9) < 4.0 * float(np.linalg.norm(lost.position_std_m))
+    assert lost.health.dead_reckoning
+    assert lost.health.gps_lost_since_us == pytest.approx(29.9e6, abs=2e5)
+    assert lost.health.attitude
+    assert not found.health.dead_reckoning
+    assert found.health.gps_lost_since_us is None
+    assert error_m(flight, of, 69.9) < 1.5
+    assert largest_jump_m(of[round(35e6 / INTERVAL_US) :]) < 0.06
+
+
+def test_a_glitch_is_not_followed() -> None:
+    def glitch(frame: SensorFrame, t: float) -> SensorFrame:
+        if frame.gps is None or not 10.0 <= t < 15.0:
+            return frame
+        east = geodetic_of((50.0, 0.0, 0.0), frame.gps.place)
+        return replace(frame, gps=replace(frame.gps, place=east))
+
+    flight = recorded(source.hover, 8, 20.0)
+    of = estimates(flight.frames, glitch)
+    during, last = of[3500], of[-1]
+    assert during is not None
+    assert last is not None
+    assert during.health.gps_glitch
+    assert not during.health.dead_reckoning
+    assert max(error_m(flight, of, t) for t in np.arange(9.0, 20.0, 0.5)) < 1.5
+    assert last.rejected == {(Source.GPS, Reason.INNOVATION): 50}
+    assert last.resets == 0
+
+
+def test_what_gps_says_for_long_is_believed_without_a_jump() -> None:
+    def elsewhere(frame: SensorFrame, t: float) -> SensorFrame:
+        if frame.gps is None or t < 10.0:
+            return frame
+        return replace(frame, gps=replace(frame.gps, place=geodetic_of((5.0, 0.0, 0.0), frame.gps.place)))
+
+    of = estimates(recorded(source.hover, 8, 32.0).frames, elsewhere)
+    last = of[-1]
+    assert last is not None
+    assert last.resets == 1
+    assert last.frame.position_enu_m[0] == pytest.approx(5.0, abs=1.0)
+    assert hypot(*last.blending_m) < 0.05
+    assert largest_jump_m(of) < 0.06
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"fix_type": 1}, Reason.NO_FIX),
+        ({"fix_type": 255}, Reason.NO_FIX),
+        ({"time_us": 0}, Reason.TIME),
+        ({"time_us": 1 << 62}, Reason.TIME),
+        ({"velocity_enu_m_s": (nan, 0.0, 0.0)}, Reason.NOT_FINITE),
+        ({"velocity_enu_m_s": (1e6, 0.0, 0.0)}, Reason.RANGE),
+        ({"place": DEFAULT_ORIGIN._replace(latitude_deg=91.0)}, Reason.RANGE),
+        ({"place": DEFAULT_ORIGIN._replace(altitude_m=1e6)}, Reason.RANGE),
+        ({"place": DEFAULT_ORIGIN._replace(longitude_deg=100.0)}, Reason.INNOVATION),
+    ],
+)
+def test_an_impossible_fix_is_counted(change: dict[str, object], reason: Reason) -> None:
+    def spoilt(frame: SensorFrame, t: float) -> SensorFrame:
+        if frame.gps is None or t < 3.0:
+            return frame
+        return replace(frame, gps=replace(frame.gps, **change))  # type: ignore[arg-type]
+
+    last = estimates(recorded(source.hover, 4, 5.0).frames, spoilt)[-1]
+    assert last is not None
+    assert set(last.rejected) == {(Source.GPS, reason)}
+    assert last.health.gps_lost_since_us is not None
+
+
+# --- magnetometer and barometer
+
+
+def test_a_magnet_nearby_does_not_turn_it() -> None:
+    def magnet(frame: SensorFrame, t: float) -> SensorFrame:
+        x, y, z = frame.magnetic_field_flu_gauss
+        return replace(frame, magnetic_field_flu_gauss=(x, y + 0.3, z)) if t >= 8.0 else frame
+
+    flight = recorded(source.hover, 2, 30.0)
+    of = estimates(flight.frames, magnet)
+    during, last = of[3000], of[-1]
+    assert during is not None
+    assert last is not None
+    assert not during.health.magnetometer
+    assert during.health.heading
+    assert set(during.rejected) == {(Source.MAGNETOMETER, Reason.FIELD)}
+    assert last.health.magnetometer
+    assert last.resets == 1
+    ahead = earth_from_body(last.frame.attitude, (1.0, 0.0, 0.0))
+    assert np.dot(ahead, flight.motion.attitude[-1][:, 0]) > np.cos(np.radians(1.0))
+
+
+def test_a_barometer_that_jumps_does_not_lift_it() -> None:
+    def jump(frame: SensorFrame, t: float) -> SensorFrame:
+        return replace(frame, pressure_pa=frame.pressure_pa - 300.0) if t >= 10.0 else frame
+
+    flight = recorded(source.hover, 2, 25.0)
+    of = estimates(flight.frames, jump)
+    during, last = of[3500], of[-1]
+    assert during is not None
+    assert last is not None
+    assert not during.health.barometer
+    assert during.health.height
+    assert last.health.barometer
+    assert last.resets == 1
+    assert max(error_m(flight, of, t) for t in np.arange(9.0, 25.0, 0.5)) < 1.0
+
+
+def test_a_stuck_barometer_is_seen() -> None:
+    def stuck(frame: SensorFrame, t: float) -> SensorFrame:
+        return replace(frame, pressure_pa=95000.0) if t >= 6.0 else frame
+
+    flight = recorded(source.climb, 2, 14.0)
+    of = estimates(flight.frames, stuck)
+    last = of[-1]
+    assert last is not None
+    assert last.rejected[Source.BAROMETER, Reason.FROZEN] > 300
+    assert not last.health.barometer
+    assert error_m(flight, of, 13.9) < 1.0
+
+
+# --- accelerometer and gyroscope
+
+
+@pytest.mark.parametrize("bad", [nan, float("inf"), 1e6, -1e6])
+def test_a_moment_of_nonsense_from_the_inertial_sensors_is_bridged(bad: float) -> None:
+    def nonsense(frame: SensorFrame, t: float) -> SensorFrame:
+        if not 12.0 <= t < 12.02:
+            return frame
+        return replace(frame, rate_flu_rad_s=(bad, 0.0, 0.0), specific_force_flu_m_s2=(0.0, 0.0, bad))
+
+    flight = recorded(source.circle, 2, 20.0)
+    of = estimates(flight.frames, nonsense)
+    assert max(error_m(flight, of, t) for t in np.arange(11.0, 20.0, 0.25)) < 1.0
+
+
+@pytest.mark.parametrize("axes", ["rate_flu_rad_s", "specific_force_flu_m_s2"])
+def test_a_frozen_inertial_sensor_is_told(axes: str) -> None:
+    def frozen(frame: SensorFrame, t: float) -> SensorFrame:
+        return replace(frame, **{axes: (0.01, 0.02, 0.03)}) if t >= 5.0 else frame  # type: ignore[arg-type]
+
+    of = estimates(recorded(source.hover, 2, 7.0).frames, frozen)
+    last = of[-1]
+    assert last is not None
+    assert sum(count for (_, reason), count in last.rejected.items() if reason is Reason.FROZEN) > 400
+    assert last.health.gyroscope == (axes != "rate_flu_rad_s")
+    assert last.health.accelerometer == (axes == "rate_flu_rad_s")
+
+
+# --- time
+
+
+def test_repeated_and_backward_frames_change_nothing() -> None:
+    frames = recorded(source.circle, 6, 10.0).frames
+    disturbed: list[SensorFrame] = []
+    for k, frame in enumerate(frames):
+        disturbed += [frame, frame, frames[k // 2]] if k % 7 == 0 else [frame]
+    plain, other = estimates(frames)[-1], estimates(disturbed)[-1]
+    assert plain is not None
+    assert other is not None
+    assert other.frame == plain.frame
+    assert set(other.rejected) == {(Source.CLOCK, Reason.TIME)}
+
+
+def test_one_frame_from_far_ahead_is_a_stray() -> None:
+    frames = recorded(source.circle, 6, 10.0).frames
+    of = estimates([*frames[:1000], replace(frames[1000], time_us=1 << 60), *frames[1000:]])
+    assert of[1001] is not None
+    assert all(one is not None for one in of[1000:])
+
+
+def test_a_clock_begun_anew_begins_the_estimator_anew() -> None:
+    frames = recorded(source.climb, 6, 3.0).frames
+    of = estimates([*frames, *frames])
+    again = of[len(frames) :]
+    assert again[0] == of[len(frames) - 1]
+    assert again[30] is None
+    assert again[-1] is not None
+    assert again[-1].frame.time_us == frames[-1].time_us
+
+
+def test_lost_frames_are_crossed() -> None:
+    flight = recorded(source.circle, 6, 20.0)
+    kept = [frame for k, frame in enumerate(flight.frames) if k < 1500 or k % 5 < 3]
+    last = estimates(kept)[-1]
+    assert last is not None
+    k = last.frame.time_us // INTERVAL_US
+    assert float(np.linalg.norm(flight.motion.position[k] - last.frame.position_enu_m)) < 1.0
+
+
+def test_a_sensor_that_has_nothing_new_is_not_measured_again() -> None:
+    def everything(frame: SensorFrame, _: float) -> SensorFrame:
+        return replace(frame, updated=0x1FFF)
+
+    held: list[SensorFrame] = []
+    for frame in recorded(source.hover, 2, 5.0).frames:
+        last = held[-1] if held else frame
+        field = frame if frame.has(Updated.MAGNETOMETER) else last
+        pressure = frame if frame.has(Updated.BAROMETER) else last
+        held.append(
+            replace(
+                frame,
+                magnetic_field_flu_gauss=field.magnetic_field_flu_gauss,
+                pressure_pa=pressure.pressure_pa,
+            )
+        )
+    plain, other = estimates(held)[-1], estimates(held, everything)[-1]
+    assert plain is not None
+    assert plain == other
+
+
+def test_without_a_magnetometer_it_does_not_begin() -> None:
+    frames = [
+        replace(frame, updated=frame.updated & ~int(Updated.MAGNETOMETER))
+        for frame in recorded(source.climb, 1, 3.0).frames
+    ]
+    assert not known(estimates(frames))
+
+
+def test_fixes_are_where_they_were_measured() -> None:
+    """Of a vehicle at 3 m/s, fixes agree in the mean with the state of its own instant."""
+    tests = [one.tests.position for one in known(estimates(recorded(source.circle, 5, 30.0).frames))[-2000:]]
+    mean = np.mean([test.innovation for test in tests], axis=0)
+    assert np.abs(mean).max() < 0.05

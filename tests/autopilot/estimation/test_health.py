@@ -1,0 +1,26 @@
+"""What people are told of the estimator's health."""
+
+from colibri.autopilot.estimation.estimate import Health
+from colibri.autopilot.estimation.health import HealthWatch, not_known
+from colibri.mavlink.services.statustext import INFO, WARNING
+
+WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True, True, True)
+
+
+def test_nothing_is_said_while_all_is_well() -> None:
+    assert HealthWatch().lines(WELL) == []
+
+
+def test_each_change_is_said_once() -> None:
+    watch = HealthWatch()
+    lost = WELL._replace(magnetometer=False)
+    assert watch.lines(lost) == [(WARNING, "magnetometer not believed")]
+    assert watch.lines(lost) == []
+    assert watch.lines(lost._replace(barometer=False)) == [(WARNING, "barometer not believed")]
+    assert watch.lines(WELL) == [(INFO, "magnetometer believed again"), (INFO, "barometer believed again")]
+
+
+def test_what_is_not_known_is_named() -> None:
+    assert not_known(WELL) == ""
+    assert not_known(WELL._replace(dead_reckoning=True)) == "position not known"
+    assert not_known(WELL._replace(heading=False, height=False)) == "heading not known, height not known"

@@ -1,0 +1,141 @@
+"""Where frames of sensors become states: when a flight begins, and when it begins anew."""
+
+import pytest
+
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.core.copter import Copter
+from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.estimation import estimate
+from colibri.autopilot.estimation.estimate import Estimate, Health
+from colibri.autopilot.estimation.state_source import Senses, estimator_for
+from colibri.autopilot.ground.stations import StationSettings
+from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.common.rotations import quaternion_from_euler
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.sensors import SensorFrame
+from colibri.mavlink.hil.state import StateFrame
+from colibri.plant.vehicle.description import VehicleError, load_vehicle
+
+VEHICLE = load_vehicle("hummingbird")
+FRAME_US = 4000
+ALIGNED_US = 10 * FRAME_US
+ZERO = (0.0, 0.0, 0.0)
+
+
+UNTESTED = estimate.Test(-1, (), 0.0, 1.0)
+WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True, True, True)
+
+
+def known(frame: StateFrame) -> Estimate:
+    return Estimate(frame, ZERO, ZERO, ZERO, ZERO, ZERO, WELL, estimate.Tests(*[UNTESTED] * 5), {}, 0, ZERO, None)
+
+
+class Standing:
+    """Knows after a while that the vehicle stands under the spiral's start."""
+
+    made: int = 0
+    caught = False
+
+    def __init__(self, interval_us: int) -> None:
+        assert interval_us == FRAME_US
+        Standing.made += 1
+        self._began_us: int | None = None
+
+    def step(self, frame: SensorFrame, /, *, asked: bool) -> Estimate | None:
+        del asked
+        if self._began_us is None:
+            self._began_us = frame.time_us
+        if frame.time_us < self._began_us + ALIGNED_US:
+            return None
+        return known(StateFrame(frame.time_us, (0.0, -1.0, 0.0), ZERO, quaternion_from_euler(0.0, 0.0, 1.57), ZERO))
+
+    def record(self) -> bytes:
+        return b""
+
+    def resume(self, record: bytes, time_us: int, /) -> bool:
+        del record, time_us
+        return False
+
+
+def sensors(time_us: int) -> SensorFrame:
+    return SensorFrame(time_us, 0x3F, (0.0, 0.0, 9.81), ZERO, ZERO, 1e5, 15.0)
+
+
+def autopilot() -> Autopilot:
+    return Autopilot(load_profile("flight"), VEHICLE, track("spiral"), lambda: 0.0, estimator=Standing)
+
+
+def copter() -> Copter:
+    settings = StationSettings(system_id=1, identity="px4", origin=DEFAULT_ORIGIN)
+    return Copter(load_profile("flight"), VEHICLE, settings, lambda: 0.0, estimator=Standing)
+
+
+def test_a_state_is_what_is_known() -> None:
+    told = StateFrame(0, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0), ZERO)
+    senses = Senses(None, FRAME_US)
+    assert senses.state(told) is told
+    assert senses.estimate is None
+
+
+def test_before_the_first_estimate_the_rotors_stand() -> None:
+    flown = autopilot()
+    for time_us in range(0, ALIGNED_US, FRAME_US):
+        step = flown.step(sensors(time_us))
+        assert step.command.controls == (0.0, 0.0, 0.0, 0.0)
+        assert not step.command.armed
+        assert step.command.time_us == time_us
+        assert step.decision is None
+
+
+def test_the_first_estimate_begins_the_flight_from_idle() -> None:
+    idle = VEHICLE.rotors.idle_speed / VEHICLE.rotors.max_speed
+    flown = autopilot()
+    for time_us in range(FRAME_US, ALIGNED_US + FRAME_US, FRAME_US):
+        flown.step(sensors(time_us))
+    first, second = flown.step(sensors(ALIGNED_US + FRAME_US)), flown.step(sensors(ALIGNED_US + 2 * FRAME_US))
+    assert first.decision is None
+    assert first.command.armed
+    assert first.command.controls == pytest.approx((idle,) * 4)
+    assert second.decision is not None
+    assert min(second.command.controls) > idle
+
+
+def test_time_that_goes_back_is_another_flight() -> None:
+    flown = autopilot()
+    made = Standing.made
+    first = [flown.step(sensors(time_us)).command for time_us in range(0, 2 * ALIGNED_US, FRAME_US)]
+    assert Standing.made == made
+    second = [flown.step(sensors(time_us)).command for time_us in range(0, 2 * ALIGNED_US, FRAME_US)]
+    assert Standing.made == made + 1
+    assert first == second
+    assert not first[0].armed
+    assert first[-1].armed
+
+
+def test_a_vehicle_that_stations_fly_is_there_with_the_first_estimate() -> None:
+    flown = copter()
+    for time_us in range(0, ALIGNED_US, FRAME_US):
+        assert not flown.step(sensors(time_us)).command.armed
+        assert flown.serve([]) == []
+    flown.step(sensors(ALIGNED_US))
+    flown.serve([])
+    assert flown.pilot.standing
+    assert not flown.pilot.state.armed
+    assert not flown.stations.restart
+
+
+def test_a_vehicle_that_stations_fly_is_restarted_by_another_flight() -> None:
+    flown = copter()
+    for time_us in (*range(0, ALIGNED_US + 1, FRAME_US), 0):
+        flown.step(sensors(time_us))
+    assert flown.stations.restart
+
+
+def test_who_is_told_the_state_estimates_nothing() -> None:
+    assert estimator_for(Feedback.STATE, VEHICLE, DEFAULT_ORIGIN) is None
+
+
+def test_a_vehicle_without_sensors_cannot_be_flown_on_them() -> None:
+    with pytest.raises(VehicleError, match="has no sensors"):
+        estimator_for(Feedback.SENSORS, load_vehicle("hummingbird-thesis"), DEFAULT_ORIGIN)

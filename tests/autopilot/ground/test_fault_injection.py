@@ -1,0 +1,85 @@
+"""Faults on their way from a ground station to the plant and back: what is handed on, what is refused, and by whom."""
+
+from math import nan
+
+import pytest
+
+from colibri.autopilot.ground.fault_injection import ANSWERED_WITHIN_US, Failures
+from colibri.mavlink.hil.faults import COMMAND, GPS, MOTOR, OFF, WRONG, Fault
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.plant_status import FaultResult
+from colibri.mavlink.node.service import Peer
+from colibri.mavlink.services.command import DENIED, FAILED, LATER, UNSUPPORTED, Command, Outcome
+from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED, RESULT_UNSUPPORTED
+
+PEER = Peer(0, 255, 190)
+
+
+def asked(*params: float, now_us: int = 0) -> Command:
+    p = (*params, *(0.0,) * (7 - len(params)))
+    return Command(COMMAND, p[0], p[1], p[2], p[3], p[4], p[5], p[6], None, PEER, now_us)
+
+
+@pytest.fixture
+def failures() -> Failures:
+    return Failures(Feedback.SENSORS, relays=True)
+
+
+def test_a_fault_is_handed_on_once_and_answered_when_it_has_happened(failures: Failures) -> None:
+    command = asked(MOTOR, WRONG, 2.0, 0.5)
+    assert failures.inject(command, enabled=True) == Outcome(LATER)
+    assert failures.take() == (Fault(MOTOR, WRONG, 2, (0.5, 0.0, 0.0, 0.0)),)
+    assert failures.take() == ()
+    assert failures.poll((), 8000) is None
+    assert failures.poll((FaultResult(GPS, OFF, RESULT_ACCEPTED),), 8000) is None
+    assert failures.poll((FaultResult(MOTOR, WRONG, RESULT_ACCEPTED),), 16000) == (command, Outcome())
+    assert failures.poll((FaultResult(MOTOR, WRONG, RESULT_ACCEPTED),), 24000) is None
+
+
+@pytest.mark.parametrize("result", [RESULT_UNSUPPORTED, RESULT_DENIED])
+def test_what_the_plant_refuses_is_refused(failures: Failures, result: int) -> None:
+    failures.inject(asked(MOTOR, OFF), enabled=True)
+    ended = failures.poll((FaultResult(MOTOR, OFF, result),), 8000)
+    assert ended is not None
+    assert ended[1].result == result
+    assert ended[1].reason.startswith("failure refused by the plant: ")
+
+
+@pytest.mark.parametrize("now_us", [ANSWERED_WITHIN_US, -1])
+def test_a_plant_that_does_not_answer_is_not_waited_for(failures: Failures, now_us: int) -> None:
+    failures.inject(asked(MOTOR, OFF), enabled=True)
+    ended = failures.poll((), now_us)
+    assert ended is not None
+    assert ended[1] == Outcome(FAILED, "failure refused: the plant does not answer")
+
+
+def test_nothing_is_handed_on_where_the_parameter_does_not_allow_it(failures: Failures) -> None:
+    assert failures.inject(asked(MOTOR, OFF), enabled=False).result == DENIED
+    assert failures.take() == ()
+
+
+def test_sensors_do_not_fail_where_the_state_is_told_nor_anything_of_another_simulator() -> None:
+    by_state, elsewhere = Failures(Feedback.STATE, relays=True), Failures(Feedback.SENSORS, relays=False)
+    outcome = by_state.inject(asked(GPS, OFF), enabled=True)
+    assert outcome == Outcome(UNSUPPORTED, "failure refused: flown by the state, not by sensors")
+    assert elsewhere.inject(asked(MOTOR, OFF), enabled=True).result == UNSUPPORTED
+    assert by_state.take() == elsewhere.take() == ()
+
+
+@pytest.mark.parametrize(
+    ("params", "result"),
+    [
+        ((nan, OFF), DENIED),
+        ((MOTOR, 0.5), DENIED),
+        ((MOTOR, OFF, float("inf")), DENIED),
+        ((MOTOR, OFF, -1.0), DENIED),
+        ((MOTOR, WRONG, 1.0, -0.5), DENIED),
+        ((1e30, OFF), UNSUPPORTED),
+        ((MOTOR, 99.0), UNSUPPORTED),
+    ],
+)
+def test_impossible_numbers_are_refused(failures: Failures, params: tuple[float, ...], result: int) -> None:
+    outcome = failures.inject(asked(*params), enabled=True)
+    assert outcome.result == result
+    assert outcome.reason
+    assert failures.take() == ()

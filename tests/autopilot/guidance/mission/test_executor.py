@@ -1,0 +1,452 @@
+"""Missions flown by a stand-in for vehicle and navigator that moves straight to where it is told."""
+
+from math import atan2, cos, dist, hypot, inf, nan, pi, sin, tau
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colibri.autopilot.guidance.mission.executor import (
+    ACTIVE,
+    COMPLETE,
+    NO_MISSION,
+    NOT_STARTED,
+    PAUSED,
+    MissionExecutor,
+    Reached,
+    SetHome,
+)
+from colibri.autopilot.guidance.mission.items import MISSION_RULES
+from colibri.autopilot.guidance.mission.legs import Defaults, Situation
+from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Hold, Land, Order, Return, TakeOff
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
+from colibri.common.types import Vector
+from colibri.mavlink.mission.items import ACCEPTED, MissionItem
+from colibri.mavlink.wire.dialect import mav
+from tests.autopilot.guidance.mission.test_items import ITEMS
+
+STEP_US = 20_000
+HOME = (2.0, -3.0, 0.5)
+MINUTE_S = 60.0
+
+
+def item(
+    command: str, place: Vector | None = None, p1: float = nan, p2: float = nan, p3: float = nan, p4: float = nan
+) -> MissionItem:
+    """Return an item; a place is from home, up relative to it."""
+    number = getattr(mav, f"MAV_CMD_{command}")
+    if place is None:
+        return MissionItem(2, number, 1, p1, p2, p3, p4, 0, 0, 0.0)
+    east, north, up = place
+    there = geodetic_of((HOME[0] + east, HOME[1] + north, 0.0), DEFAULT_ORIGIN)
+    x, y = round(there.latitude_deg * 1e7), round(there.longitude_deg * 1e7)
+    return MissionItem(6, number, 1, p1, p2, p3, p4, x, y, up)
+
+
+class Flight:
+    """A vehicle that moves at 5 m/s, or as fast as it is told, and a navigator that judges when it arrived."""
+
+    def __init__(self, *items: MissionItem, flying: bool = True) -> None:
+        assert all(MISSION_RULES.check_item(each) == ACCEPTED for each in items)
+        self.mission = MissionExecutor(items, Defaults(acceptance_m=0.5, takeoff_height_m=2.5, orbit_radius_m=10.0))
+        self.position: Vector = (HOME[0], HOME[1], HOME[2] + (5.0 if flying else 0.0))
+        self.landed = not flying
+        self.yaw = 0.0
+        self.arrived = False
+        self.turns = 0.0
+        self.turned: list[float] = []
+        self.now_us = 0
+        self.orders: list[Order] = []
+        self.reached: list[int] = []
+        self.homes: list[Vector | None] = []
+        self.speeds: list[float] = []
+
+    def fly(self, seconds: float, until: int = COMPLETE) -> None:
+        """Let time pass, until the mission is in a state."""
+        end_us = self.now_us + round(seconds * 1e6)
+        while self.now_us < end_us and self.mission.progress.state != until:
+            self.step()
+
+    def step(self) -> None:
+        self.now_us += STEP_US
+        situation = Situation(
+            self.position, (0.0, 0.0, 0.0), self.yaw, self.landed, self.arrived, self.turns, HOME, DEFAULT_ORIGIN
+        )
+        step = self.mission.step(situation, self.now_us)
+        assert step.flying == (self.mission.progress.state == ACTIVE)
+        self.reached += [event.seq for event in step.events if isinstance(event, Reached)]
+        self.homes += [event.position_enu_m for event in step.events if isinstance(event, SetHome)]
+        if not self.orders or self.orders[-1] is not step.order:
+            self.orders.append(step.order)
+            self.turned.append(self.turns)
+            self.turns = 0.0
+        before = self.position
+        self._obey(step.order)
+        self.speeds.append(dist(before, self.position) / (STEP_US * 1e-6))
+
+    def _obey(self, order: Order) -> None:
+        x, y, _ = self.position
+        self.arrived = False
+        match order:
+            case GoTo(place, yaw, speed):
+                self.arrived = self._towards(place, speed or 5.0)
+                self.yaw = self.yaw if yaw is None else yaw
+            case TakeOff(height, _):
+                self.arrived = self._towards((x, y, height), 2.0)
+                self.landed = False
+            case Land(place, _):
+                there = place or (x, y, HOME[2])
+                self.landed = self.arrived = self._towards((there[0], there[1], HOME[2]), 5.0)
+            case Return():
+                self.landed = self.arrived = self._towards(HOME, 5.0)
+            case Circle((east, north, up), radius, speed, _):
+                angle = atan2(y - north, x - east) - (speed or 5.0) * STEP_US * 1e-6 / radius
+                self.position = (east + abs(radius) * cos(angle), north + abs(radius) * sin(angle), up)
+                self.turns += (speed or 5.0) * STEP_US * 1e-6 / (abs(radius) * tau)
+            case Hold():
+                self.arrived = True
+
+    def _towards(self, place: Vector, speed: float) -> bool:
+        away, most = dist(self.position, place), speed * STEP_US * 1e-6
+        part = min(1.0, most / away) if away > 0.0 else 1.0
+        x, y, z = (a + part * (b - a) for a, b in zip(self.position, place, strict=True))
+        self.position = (x, y, z)
+        return part == 1.0
+
+    def kinds(self) -> list[str]:
+        return [type(order).__name__ for order in self.orders]
+
+
+def from_home(flight: Flight) -> Vector:
+    x, y, z = (a - b for a, b in zip(flight.position, HOME, strict=True))
+    return (x, y, z)
+
+
+def test_a_whole_mission_from_the_ground_and_back() -> None:
+    flight = Flight(
+        item("NAV_TAKEOFF", (0.0, 0.0, 10.0)),
+        item("DO_CHANGE_SPEED", p1=1.0, p2=8.0),
+        item("NAV_WAYPOINT", (30.0, 0.0, 10.0), p2=2.0, p4=90.0),
+        item("IMAGE_START_CAPTURE", p1=1.0),
+        item("NAV_WAYPOINT", (30.0, 20.0, 12.0), p1=1.0, p2=0.0),
+        item("NAV_LAND", (0.0, 5.0, 0.0)),
+        flying=False,
+    )
+    assert flight.mission.progress.state == NOT_STARTED
+    assert flight.mission.start() == ""
+    flight.fly(MINUTE_S)
+    assert flight.mission.progress == (5, COMPLETE, 2)
+    assert flight.reached == [0, 1, 2, 3, 4, 5]
+    assert flight.kinds() == ["TakeOff", "GoTo", "GoTo", "Land"]
+    assert from_home(flight) == pytest.approx((0.0, 5.0, 0.0), abs=0.02)
+    up, first, second, _ = flight.orders
+    assert isinstance(up, TakeOff)
+    assert up.height_enu_m == pytest.approx(10.5)
+    assert isinstance(first, GoTo)
+    assert first.speed_m_s == 8.0
+    assert first.yaw_rad == pytest.approx(0.0)
+    assert isinstance(second, GoTo)
+    assert second.yaw_rad is None
+
+
+def test_a_mission_that_begins_with_a_waypoint_takes_off_first() -> None:
+    flight = Flight(item("NAV_WAYPOINT", (9.0, 0.0, 6.0)), item("NAV_WAYPOINT", (9.0, 9.0, 1.0)), flying=False)
+    flight.mission.start()
+    flight.fly(MINUTE_S)
+    assert flight.kinds() == ["TakeOff", "GoTo", "GoTo"]
+    assert isinstance(flight.orders[0], TakeOff)
+    assert flight.orders[0].height_enu_m == pytest.approx(HOME[2] + 6.0)
+    assert flight.reached == [0, 1]
+    low = Flight(item("NAV_WAYPOINT", (9.0, 0.0, 1.0)), flying=False)
+    low.mission.start()
+    low.step()
+    assert isinstance(low.orders[0], TakeOff)
+    assert low.orders[0].height_enu_m == pytest.approx(HOME[2] + 2.5)
+
+
+def test_altitudes_above_sea_and_above_home() -> None:
+    heights = []
+    for frame, z in ((0, 500.0), (5, 500.0), (3, 12.0), (6, 12.0), (10, 12.0), (11, 12.0)):
+        flight = Flight(item("NAV_WAYPOINT", (5.0, 0.0, z))._replace(frame=frame))
+        flight.mission.start()
+        flight.step()
+        (order,) = flight.orders
+        assert isinstance(order, GoTo)
+        heights.append(order.position_enu_m[2])
+    assert heights == pytest.approx([12.0] * 2 + [12.5] * 4)
+
+
+def test_waypoints_without_hold_are_flown_through() -> None:
+    through = Flight(item("NAV_WAYPOINT", (20.0, 0.0, 5.0), p2=4.0), item("NAV_WAYPOINT", (20.0, 20.0, 5.0)))
+    through.mission.start()
+    while not through.reached:
+        through.step()
+    assert dist(from_home(through), (20.0, 0.0, 5.0)) == pytest.approx(4.0, abs=0.2)
+    assert len(through.orders) == 2
+    assert min(through.speeds) > 4.0
+
+
+@pytest.mark.parametrize(
+    "waits",
+    [
+        item("NAV_WAYPOINT", (5.0, 0.0, 5.0), p1=3.0),
+        item("NAV_LOITER_TIME", (5.0, 0.0, 5.0), p1=3.0),
+        item("NAV_DELAY", p1=3.0),
+        item("CONDITION_DELAY", p1=3.0),
+    ],
+)
+def test_waiting(waits: MissionItem) -> None:
+    flight = Flight(item("NAV_WAYPOINT", (5.0, 0.0, 5.0)), waits, item("NAV_WAYPOINT", (5.0, 5.0, 5.0)))
+    flight.mission.start()
+    while 0 not in flight.reached:
+        flight.step()
+    began_us = flight.now_us
+    while flight.mission.progress.seq < 2:
+        flight.step()
+    assert (flight.now_us - began_us) * 1e-6 == pytest.approx(3.0, abs=0.2)
+    assert dist(from_home(flight), (5.0, 0.0, 5.0)) < 0.6
+
+
+def test_loitering_for_ever() -> None:
+    flight = Flight(item("NAV_LOITER_UNLIM", (5.0, 0.0, 8.0), p4=180.0), item("NAV_LAND"))
+    flight.mission.start()
+    flight.fly(3600.0)
+    assert (flight.mission.progress.seq, flight.mission.progress.state, flight.reached) == (0, ACTIVE, [0])
+    assert flight.yaw == pytest.approx(-0.5 * pi)
+    assert flight.mission.set_current(1) == ""
+    flight.fly(MINUTE_S)
+    assert (flight.landed, flight.mission.progress.state) == (True, COMPLETE)
+
+
+@pytest.mark.parametrize(("radius", "flown"), [(6.0, 6.0), (-6.0, -6.0), (nan, 10.0), (0.0, 10.0), (-0.25, -1.0)])
+def test_circling(radius: float, flown: float) -> None:
+    flight = Flight(item("NAV_LOITER_TURNS", (20.0, 0.0, 8.0), p1=2.0, p3=radius), item("NAV_RETURN_TO_LAUNCH"))
+    flight.mission.start()
+    flight.step()
+    (order,) = flight.orders
+    assert isinstance(order, Circle)
+    assert order.radius_m == flown
+    while not flight.reached:
+        flight.step()
+    assert 2.0 <= flight.turned[-1] < 2.2
+    flight.fly(MINUTE_S)
+    assert flight.landed
+    assert hypot(*from_home(flight)) < 0.01
+
+
+def test_a_stale_judgement_ends_nothing() -> None:
+    """`arrived` and `turns` of the step in which an order is given are those of the order before."""
+    flight = Flight(
+        item("NAV_LOITER_TURNS", (0.0, 0.0, 5.0), p1=1.0, p3=2.0),
+        item("NAV_LOITER_TURNS", (50.0, 0.0, 5.0), p1=1.0, p3=2.0),
+        item("NAV_WAYPOINT", (90.0, 0.0, 5.0)),
+    )
+    flight.mission.start()
+    flight.arrived = True
+    flight.turns = 7.0
+    flight.fly(MINUTE_S)
+    assert flight.kinds() == ["Circle", "Circle", "GoTo"]
+    assert dist(from_home(flight), (90.0, 0.0, 5.0)) < 0.6
+
+
+def test_what_the_navigator_calls_arrived_is_reached() -> None:
+    flight = Flight(item("NAV_WAYPOINT", (9.0, 0.0, 5.0), p2=1e-9))
+    flight.mission.start()
+    flight.fly(MINUTE_S)
+    assert flight.reached == [0]
+
+
+@pytest.mark.parametrize(
+    ("p1", "p3", "p4", "yaw"),
+    [(90.0, 0.0, 0.0, 0.0), (0.0, nan, nan, 0.5 * pi), (45.0, 1.0, 1.0, -0.25 * pi), (45.0, -1.0, 1.0, 0.25 * pi)],
+)
+def test_turning_on_the_spot(p1: float, p3: float, p4: float, yaw: float) -> None:
+    flight = Flight(item("CONDITION_YAW", p1=p1, p3=p3, p4=p4), item("NAV_WAYPOINT", (20.0, 0.0, 5.0)))
+    flight.mission.start()
+    while flight.mission.progress.seq == 0:
+        flight.step()
+    assert flight.yaw == pytest.approx(yaw)
+    assert flight.reached == [0]
+    assert dist(from_home(flight), (0.0, 0.0, 5.0)) < 0.2
+
+
+def test_jumps_are_counted() -> None:
+    flight = Flight(
+        item("NAV_WAYPOINT", (5.0, 0.0, 5.0)),
+        item("NAV_WAYPOINT", (0.0, 0.0, 5.0)),
+        item("DO_JUMP", p1=0.0, p2=2.0),
+        item("NAV_LAND"),
+    )
+    flight.mission.start()
+    flight.fly(MINUTE_S)
+    assert flight.mission.progress.state == COMPLETE
+    assert flight.reached == [0, 1, 2, 0, 1, 2, 0, 1, 2, 3]
+    assert flight.mission.start() == ""  # counts begin anew with the mission
+    flight.reached.clear()
+    flight.fly(MINUTE_S)
+    assert flight.reached.count(1) == 3
+
+
+def test_jumps_that_never_fly_do_not_hang_or_flood() -> None:
+    for items in (
+        [item("DO_JUMP", p1=0.0, p2=-1.0)],
+        [item("DO_CHANGE_SPEED", p2=3.0)] * 50 + [item("DO_JUMP", p1=0.0, p2=-1.0)],
+        [item("NAV_DELAY", p1=0.0), item("DO_JUMP", p1=0.0, p2=60000.0)],
+        [item("DO_JUMP", p1=1.0, p2=-1.0), item("DO_JUMP", p1=0.0, p2=-1.0)],
+    ):
+        flight = Flight(*items)
+        flight.mission.start()
+        flight.fly(10.0)
+        assert flight.mission.progress.state == ACTIVE
+        assert 0 < len(flight.reached) < 15 * len(items)
+        assert flight.mission.set_current(0) == ""
+        flight.mission.pause()
+        assert flight.mission.progress.state == PAUSED
+
+
+def test_many_items_that_take_no_time_are_done_soon() -> None:
+    flight = Flight(*[item("IMAGE_START_CAPTURE")] * 900, item("NAV_WAYPOINT", (5.0, 0.0, 5.0)))
+    flight.mission.start()
+    while flight.mission.progress.seq < 900:
+        flight.step()
+    assert flight.now_us < 60 * STEP_US
+
+
+def test_pausing_goes_on_with_the_current_item() -> None:
+    flight = Flight(item("NAV_WAYPOINT", (9.0, 0.0, 5.0)), item("NAV_WAYPOINT", (9.0, 30.0, 5.0)))
+    flight.mission.start()
+    while flight.mission.progress.seq == 0:
+        flight.step()
+    assert flight.mission.pause() == ()
+    assert flight.mission.progress == (1, PAUSED, 2)
+    flight.step()
+    assert flight.orders[-1] == Hold()
+    flight.position = (-50.0, 0.0, 20.0)
+    assert flight.mission.start() == ""
+    flight.fly(MINUTE_S)
+    assert flight.reached == [0, 1]
+    assert dist(from_home(flight), (9.0, 30.0, 5.0)) < 0.6
+
+
+def test_an_item_that_another_mode_flies_to_its_end() -> None:
+    """Return is a mode of its own: the mission is over when it is handed the vehicle."""
+    flight = Flight(item("NAV_WAYPOINT", (1.0, 0.0, 5.0)), item("NAV_RETURN_TO_LAUNCH"))
+    flight.mission.start()
+    while flight.orders[-1:] != [Return()]:
+        flight.step()
+    assert flight.mission.pause(item_flown=True) == (Reached(1),)
+    assert flight.mission.progress == (1, COMPLETE, 2)
+    early = Flight(item("NAV_WAYPOINT", (50.0, 0.0, 5.0)), item("NAV_RETURN_TO_LAUNCH"))
+    early.mission.start()
+    early.step()
+    assert (
+        early.mission.pause(item_flown=True) == ()
+    )  # who chooses to return while a waypoint is flown has not flown it
+    assert early.mission.progress == (0, PAUSED, 2)
+    longer = Flight(item("NAV_RETURN_TO_LAUNCH"), item("NAV_LAND"))
+    longer.mission.start()
+    longer.step()
+    assert longer.mission.pause(item_flown=True) == (Reached(0),)
+    assert longer.mission.progress == (1, PAUSED, 2)
+
+
+def test_setting_the_current_item() -> None:
+    flight = Flight(*[item("NAV_WAYPOINT", (5.0 * number, 0.0, 5.0)) for number in range(4)])
+    assert "no item 4" in flight.mission.set_current(4)
+    assert flight.mission.set_current(-2) != ""
+    assert flight.mission.set_current(2) == ""
+    assert flight.mission.progress == (2, NOT_STARTED, 2)
+    flight.mission.start()
+    flight.fly(MINUTE_S)
+    assert flight.reached == [2, 3]
+    assert flight.mission.set_current(1) == ""
+    assert flight.mission.progress == (1, PAUSED, 2)
+    flight.mission.start()
+    flight.fly(MINUTE_S)
+    assert flight.reached == [2, 3, 1, 2, 3]
+    assert flight.mission.set_current(-1, reset=True) == ""
+    assert flight.mission.progress == (3, PAUSED, 2)
+
+
+def test_no_mission() -> None:
+    empty = MissionExecutor()
+    assert empty.progress == (0, NO_MISSION, 2)
+    assert empty.start() != ""
+    assert empty.set_current(0) != ""
+    assert empty.pause() == ()
+
+
+def test_a_mission_that_is_replaced_in_flight() -> None:
+    flight = Flight(item("NAV_WAYPOINT", (100.0, 0.0, 5.0)))
+    flight.mission.start()
+    flight.fly(1.0)
+    flight.mission.load([item("NAV_WAYPOINT", (0.0, 10.0, 5.0)), item("NAV_WAYPOINT", (0.0, 20.0, 5.0))])
+    assert flight.mission.progress == (0, ACTIVE, 1)
+    flight.fly(MINUTE_S)
+    assert dist(from_home(flight), (0.0, 20.0, 5.0)) < 0.6
+    flight.mission.start()
+    flight.mission.load([])
+    assert flight.mission.progress.state == NO_MISSION
+    flight.step()
+    assert flight.orders[-1] == Hold()
+
+
+def test_setting_home() -> None:
+    flight = Flight(item("DO_SET_HOME", p1=1.0), item("DO_SET_HOME", (4.0, 0.0, 0.0)), item("NAV_LAND"))
+    flight.mission.start()
+    flight.step()
+    assert flight.homes == [None, pytest.approx((HOME[0] + 4.0, HOME[1], HOME[2]), abs=0.02)]
+
+
+def test_speeds_last_until_they_are_changed() -> None:
+    flight = Flight(
+        item("DO_CHANGE_SPEED", p1=1.0, p2=3.0),
+        item("NAV_WAYPOINT", (10.0, 0.0, 5.0)),
+        item("DO_CHANGE_SPEED", p1=2.0, p2=9.0),
+        item("DO_CHANGE_SPEED", p2=-1.0),
+        item("NAV_WAYPOINT", (20.0, 0.0, 5.0)),
+        item("DO_CHANGE_SPEED", p2=-2.0),
+        item("NAV_WAYPOINT", (30.0, 0.0, 5.0)),
+    )
+    flight.mission.start()
+    flight.fly(MINUTE_S)
+    assert [order.speed_m_s for order in flight.orders if isinstance(order, GoTo)] == [3.0, 3.0, None]
+
+
+def test_progress_is_one_object_while_nothing_changes() -> None:
+    flight = Flight(item("NAV_WAYPOINT", (100.0, 0.0, 5.0)))
+    flight.mission.start()
+    flight.step()
+    before, order = flight.mission.progress, flight.orders[-1]
+    flight.step()
+    assert flight.mission.progress is before
+    assert flight.orders[-1] is order
+
+
+@given(
+    st.lists(ITEMS.filter(lambda each: MISSION_RULES.check_item(each) == ACCEPTED), max_size=6),
+    st.lists(st.tuples(st.integers(0, 5), st.integers(-2, 7), st.booleans(), st.booleans(), st.floats(0.0, 3.0))),
+)
+def test_whatever_is_uploaded_and_happens_can_be_flown(
+    items: list[MissionItem], happens: list[tuple[int, int, bool, bool, float]]
+) -> None:
+    if MISSION_RULES.check_plan(items) != ACCEPTED:
+        return
+    mission = MissionExecutor(items)
+    now_us = 0
+    for what, seq, landed, arrived, turns in happens:
+        now_us += STEP_US
+        if what == 0:
+            mission.start()
+        elif what == 1:
+            mission.pause(item_flown=arrived)
+        elif what == 2:
+            mission.set_current(seq, reset=landed)
+        situation = Situation(HOME, (0.0, 0.0, 0.0), 0.0, landed, arrived, turns, HOME, DEFAULT_ORIGIN)
+        step = mission.step(situation, now_us)
+        assert 0 <= mission.progress.seq < max(1, len(items))
+        assert step.flying == mission.active
+        if isinstance(step.order, GoTo):
+            assert all(abs(part) < inf for part in step.order.position_enu_m)
+        if not items:
+            assert mission.progress.state == NO_MISSION

@@ -1,0 +1,169 @@
+"""Geofences: https://mavlink.io/en/messages/common.html#MAV_CMD_NAV_FENCE_RETURN_POINT and the items after it."""
+
+from math import atan2, cos, hypot, inf, nan, pi, sin
+from typing import Any
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from colibri.autopilot.guidance.mission.geofence import FENCE_RULES, Disc, Geofence, Polygon
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
+from colibri.mavlink.mission.items import ACCEPTED, MissionItem
+from colibri.mavlink.wire.dialect import mav
+from tests.strategies import reals
+
+IN, OUT, DISC_IN, DISC_OUT, BACK = 5001, 5002, 5003, 5004, 5000
+SQUARE = [(-10.0, -10.0), (10.0, -10.0), (10.0, 10.0), (-10.0, 10.0)]
+HOLE = [(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)]
+HOUR_GLASS = [(0.0, 0.0), (4.0, 4.0), (4.0, 0.0), (0.0, 4.0)]
+HORSESHOE = [(0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (4.0, 6.0), (4.0, 2.0), (2.0, 2.0), (2.0, 6.0), (0.0, 6.0)]
+
+
+def item(command: int, east: float, north: float, p1: float = nan, **changes: Any) -> MissionItem:
+    place = geodetic_of((east, north, 0.0), DEFAULT_ORIGIN)
+    x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
+    return MissionItem(0, command, 1, p1, 0.0, 0.0, 0.0, x, y, 0.0)._replace(**changes)
+
+
+def polygon(command: int, vertices: list[tuple[float, float]], **changes: Any) -> list[MissionItem]:
+    return [item(command, east, north, float(len(vertices)), **changes) for east, north in vertices]
+
+
+def fence(*items: MissionItem, highest_m: float = inf) -> Geofence:
+    assert all(FENCE_RULES.check_item(each) == ACCEPTED for each in items)
+    assert FENCE_RULES.check_plan(items) == ACCEPTED
+    return Geofence(items, DEFAULT_ORIGIN, highest_m=highest_m)
+
+
+def test_no_fence_holds_nothing_back() -> None:
+    assert fence().margin_m((1e6, -1e6, 1e5)) == inf
+    assert fence().inside((0.0, 0.0, 0.0))
+    assert not fence().inside((nan, 0.0, 0.0))
+    assert not fence().inside((0.0, 0.0, inf))
+
+
+def test_margins() -> None:
+    around = fence(*polygon(IN, SQUARE), *polygon(OUT, HOLE), item(DISC_OUT, 6.0, 6.0, 1.0), highest_m=30.0)
+    for place, margin in [
+        ((-5.0, 0.0, 0.0), 3.0),
+        ((-9.0, 0.0, 0.0), 1.0),
+        ((0.0, 0.0, 0.0), -2.0),
+        ((6.0, 6.5, 0.0), -0.5),
+        ((13.0, 14.0, 0.0), -5.0),
+        ((-6.0, 0.0, 29.0), 1.0),
+        ((-6.0, 0.0, 33.0), -3.0),
+    ]:
+        assert around.margin_m(place) == pytest.approx(margin, abs=0.02)
+        assert around.inside(place) == (margin > 0.0)
+
+
+def test_what_is_refused_is_told() -> None:
+    around = fence(item(DISC_IN, 0.0, 0.0, 5.0), highest_m=30.0)
+    assert around.refusal((0.0, 0.0, 10.0)) == ""
+    assert around.refusal((0.0, 6.0, 10.0)) == "outside the geofence"
+    assert around.refusal((0.0, 0.0, 31.0)) == "higher than the 30 m of the geofence"
+    assert around.refusal((nan, 0.0, 0.0)) != ""
+
+
+def test_groups_of_inclusions() -> None:
+    """Inside all zones of a group, of one group at least."""
+    together = fence(item(DISC_IN, 0.0, 0.0, 5.0), item(DISC_IN, 6.0, 0.0, 5.0))
+    assert together.inside((3.0, 0.0, 0.0))
+    assert not together.inside((-1.0, 0.0, 0.0))
+    either = fence(item(DISC_IN, 0.0, 0.0, 5.0, p2=1.0), item(DISC_IN, 20.0, 0.0, 5.0, p2=nan))
+    assert either.inside((-1.0, 0.0, 0.0))
+    assert either.inside((21.0, 0.0, 0.0))
+    assert not either.inside((10.0, 0.0, 0.0))
+
+
+def test_a_circle_of_no_radius_is_none() -> None:
+    """MAVSDK cannot send a polygon alone: who wants no circle sends this one."""
+    around = fence(*polygon(IN, SQUARE), item(DISC_IN, 1e4, 1e4, 0.0), item(DISC_OUT, 0.0, 0.0, 0.0))
+    assert around.margin_m((-5.0, 0.0, 0.0)) == pytest.approx(5.0, abs=0.02)
+
+
+def test_where_to_return() -> None:
+    assert fence(item(BACK, 3.0, -4.0)).return_point_enu_m == pytest.approx((3.0, -4.0), abs=0.02)
+    assert fence().return_point_enu_m is None
+
+
+@pytest.mark.parametrize("vertices", [SQUARE, HORSESHOE, HOUR_GLASS])
+@pytest.mark.parametrize("backwards", [False, True])
+def test_points_on_edges_are_inside_either_way(vertices: list[tuple[float, float]], backwards: bool) -> None:
+    shape = Polygon(vertices[::-1] if backwards else vertices)
+    for (east, north), (to_east, to_north) in zip(vertices, vertices[1:] + vertices[:1], strict=True):
+        for part in (0.0, 0.3, 0.5):
+            depth = shape.depth_m(east + part * (to_east - east), north + part * (to_north - north))
+            assert abs(depth) < 1e-9
+
+
+def test_level_with_a_corner() -> None:
+    """A ray through a corner crosses once."""
+    diamond = Polygon([(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)])
+    assert diamond.depth_m(0.0, 0.0) == pytest.approx(0.5**0.5)
+    assert diamond.depth_m(-2.0, 0.0) == pytest.approx(-1.0)
+    assert diamond.depth_m(-2.0, 1.0) == pytest.approx(-(2.0**0.5))
+    assert Polygon(HORSESHOE).depth_m(3.0, 5.0) == pytest.approx(-1.0)
+    assert Polygon(HORSESHOE).depth_m(1.0, 5.0) == pytest.approx(1.0)
+    assert Polygon(HOUR_GLASS).depth_m(2.0, 1.0) < 0.0 < Polygon(HOUR_GLASS).depth_m(3.5, 2.0)
+
+
+MILLIMETRES = st.integers(-100_000, 100_000).map(lambda number: number / 1000.0)
+
+
+@given(st.lists(st.tuples(MILLIMETRES, MILLIMETRES), min_size=3, max_size=8), MILLIMETRES, MILLIMETRES)
+def test_a_polygon_has_the_sum_of_angles_as_its_measure(
+    vertices: list[tuple[float, float]], east: float, north: float
+) -> None:
+    """The winding number, from the angles that the corners are seen under, is odd just where a point is inside."""
+    depth = Polygon(vertices).depth_m(east, north)
+    assert Polygon(vertices[::-1]).depth_m(east, north) == pytest.approx(depth, abs=1e-9)
+    assume(abs(depth) > 1e-6)
+    turned = 0.0
+    for (a, b), (c, d) in zip(vertices, vertices[1:] + vertices[:1], strict=True):
+        ax, ay, cx, cy = a - east, b - north, c - east, d - north
+        turned += atan2(ax * cy - ay * cx, ax * cx + ay * cy)
+    assert (round(turned / (2.0 * pi)) % 2 == 1) == (depth > 0.0)
+
+
+@given(reals(100.0), reals(100.0), st.floats(0.0, 2.0 * pi), st.floats(0.1, 50.0))
+def test_nothing_closer_than_the_margin_changes_sides(east: float, north: float, angle: float, part: float) -> None:
+    for zone in (Polygon(HORSESHOE), Disc(1.0, 2.0, 30.0)):
+        depth = zone.depth_m(east, north)
+        step = min(part, max(0.999 * abs(depth) - 1e-9, 0.0))
+        there = zone.depth_m(east + step * cos(angle), north + step * sin(angle))
+        assert there * depth >= 0.0 or abs(depth) < 1e-9
+        assert abs(there - depth) <= step + 1e-9
+    assert Disc(0.0, 0.0, 1.0).depth_m(east, north) == 1.0 - hypot(east, north)
+
+
+@pytest.mark.parametrize(
+    ("changes", "result"),
+    [
+        ({"command": 16}, mav.MAV_MISSION_UNSUPPORTED),
+        ({"frame": 2}, mav.MAV_MISSION_UNSUPPORTED_FRAME),
+        ({"p1": 2.0}, mav.MAV_MISSION_INVALID_PARAM1),
+        ({"p1": 3.5}, mav.MAV_MISSION_INVALID_PARAM1),
+        ({"p1": nan}, mav.MAV_MISSION_INVALID_PARAM1),
+        ({"p1": inf}, mav.MAV_MISSION_INVALID_PARAM1),
+        ({"command": DISC_IN, "p1": -1.0}, mav.MAV_MISSION_INVALID_PARAM1),
+        ({"command": DISC_OUT, "p1": nan}, mav.MAV_MISSION_INVALID_PARAM1),
+        ({"p2": inf}, mav.MAV_MISSION_INVALID_PARAM2),
+        ({"x": 900000001}, mav.MAV_MISSION_INVALID_PARAM5_X),
+        ({"y": 1800000001}, mav.MAV_MISSION_INVALID_PARAM6_Y),
+        ({"command": BACK, "p1": nan, "z": nan}, ACCEPTED),
+    ],
+)
+def test_items_and_why_they_are_refused(changes: dict[str, Any], result: int) -> None:
+    assert FENCE_RULES.check_item(item(IN, 0.0, 0.0, 3.0)._replace(**changes)) == result
+
+
+def test_polygons_must_be_whole() -> None:
+    square = polygon(IN, SQUARE)
+    check = FENCE_RULES.check_plan
+    assert check([*square, *polygon(OUT, HOLE), item(BACK, 0.0, 0.0)]) == ACCEPTED
+    assert check(square[:3]) == mav.MAV_MISSION_INVALID_PARAM1
+    assert check([*square[:3], item(DISC_IN, 0.0, 0.0, 4.0)]) == mav.MAV_MISSION_INVALID_PARAM1
+    assert check([*square[:3], square[3]._replace(p1=3.0)]) == mav.MAV_MISSION_INVALID_PARAM1
+    assert check([*square[:3], square[3]._replace(p2=1.0)]) == mav.MAV_MISSION_INVALID_PARAM2

@@ -1,0 +1,52 @@
+"""Arithmetic on Taylor series, against series known in closed form."""
+
+from math import factorial
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from colibri.autopilot.guidance.trajectories.taylor import Jet, atan2, cos, sin
+from colibri.common.types import Array
+from tests.strategies import reals
+
+ORDER = 5
+
+
+def at(t: float) -> Jet:
+    return Jet.time(np.array([t]), ORDER)
+
+
+def derivatives(x: Jet) -> Array:
+    return np.array([x.derivative(order)[0] for order in range(len(x.coefficients))])
+
+
+@given(reals(10.0))
+def test_the_direction_of_a_circle_turns_at_its_rate(t: float) -> None:
+    theta = derivatives(atan2(2.0 * sin(0.7 * at(t)), 2.0 * cos(0.7 * at(t))))
+    assert np.cos(theta[0] - 0.7 * t) == pytest.approx(1.0)
+    assert theta[1:] == pytest.approx([0.7, 0.0, 0.0, 0.0, 0.0], abs=1e-12)
+
+
+@given(reals(3.0))
+def test_the_direction_of_a_line_is_the_arc_tangent(t: float) -> None:
+    """d/dt atan t = 1 / (1 + t²), whose derivatives are those of the imaginary part of 1 / (i + t)."""
+    pole = [(-1.0) ** k * factorial(k) / complex(t, -1.0) ** (k + 1) for k in range(ORDER)]
+    theta = derivatives(atan2(at(t), 0.0 * at(t) + 1.0))
+    assert theta == pytest.approx([np.arctan(t), *(value.imag for value in pole)], rel=1e-9, abs=1e-9)
+
+
+def test_nothing_has_no_direction() -> None:
+    nothing = 0.0 * at(1.0)
+    assert not derivatives(atan2(nothing, nothing)).any()
+
+
+@given(reals(10.0))
+def test_rate_is_the_derivative(t: float) -> None:
+    assert derivatives(sin(at(t)).rate()) == pytest.approx(derivatives(cos(at(t)))[:-1], abs=1e-12)
+
+
+def test_constants_of_their_own_at_each_time() -> None:
+    x = Jet.time(np.array([1.0, 2.0]), 1) * np.array([3.0, 4.0]) - np.array([1.0, 2.0])
+    assert x.derivative(0) == pytest.approx([2.0, 6.0])
+    assert x.derivative(1) == pytest.approx([3.0, 4.0])

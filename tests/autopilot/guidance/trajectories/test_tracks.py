@@ -1,0 +1,101 @@
+"""Tracks by name and options, and where they are."""
+
+from contextlib import suppress
+from math import inf, pi
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS, Track, TrackError, position, track
+from colibri.cli.fly import TRACK_HELP
+
+
+def test_the_five_of_the_thesis() -> None:
+    assert list(THESIS_TRACKS) == ["spiral", "expanding-spiral", "line", "wave", "crown"]
+    assert all(one.yaw is None and one.duration_s == 100.0 for one in THESIS_TRACKS.values())
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("loop", f"unknown track loop: choose {', '.join([*THESIS_TRACKS, *OPTIONS])}"),
+        ("", f"unknown track : choose {', '.join([*THESIS_TRACKS, *OPTIONS])}"),
+        ("loop:size=3", f"unknown track loop: choose {', '.join([*THESIS_TRACKS, *OPTIONS])}"),
+        ("spiral:radius=3", f"track spiral takes no options, but these do: {', '.join(OPTIONS)}"),
+        ("spiral:", f"track spiral takes no options, but these do: {', '.join(OPTIONS)}"),
+        ("circle:", "track circle: options are KEY=VALUE[,KEY=VALUE…], not '': choose radius, speed, height, yaw"),
+        ("hover:2", "track hover: options are KEY=VALUE[,KEY=VALUE…], not '2': choose x, y, height, yaw"),
+        ("hover:x=", "track hover: options are KEY=VALUE[,KEY=VALUE…], not 'x=': choose x, y, height, yaw"),
+        ("hover:=2", "track hover: options are KEY=VALUE[,KEY=VALUE…], not '=2': choose x, y, height, yaw"),
+        ("hover:x=1,", "track hover: options are KEY=VALUE[,KEY=VALUE…], not 'x=1,': choose x, y, height, yaw"),
+        ("hover:x=1,x=2", "track hover: x is given twice"),
+        ("hover:z=1", "track hover has no option z: choose x, y, height, yaw"),
+        ("hover:track=1", "track hover has no option track: choose x, y, height, yaw"),
+        ("circle:radius=0", "track circle: radius=0: Expected `float` >= 0.01"),
+        ("circle:speed=fast", "track circle: speed=fast: Expected `float`, got `str`"),
+        ("circle:speed=-inf", "track circle: speed=-inf: Expected `float` >= 0.01"),
+        ("hover:height=nan", "track hover: height=nan: Expected `float` >= -1000.0"),
+        ("lemniscate:yaw=90", "track lemniscate: yaw=90: choose path, fixed"),
+        ("lemniscate:lap=1e9", "track lemniscate: lap=1e9: Expected `float` <= 3600.0"),
+        ("waypoints", "track waypoints needs file: waypoints:file=FILE"),
+        ("waypoints:speed=2", "track waypoints needs file: waypoints:file=FILE"),
+        ("waypoints:a.csv,file=b.csv", "track waypoints: file is given twice"),
+        ("waypoints:a.csv,b.csv", "track waypoints: options are KEY=VALUE[,KEY=VALUE…], not 'a.csv,b.csv': "
+         "choose file, speed"),
+        ("waypoints:a.csv", "a.csv: No such file or directory"),
+    ],
+)  # fmt: skip
+def test_what_is_no_track_is_one_line(name: str, line: str) -> None:
+    with pytest.raises(TrackError) as refused:
+        track(name)
+    assert str(refused.value) == line
+
+
+@given(st.sampled_from([*THESIS_TRACKS, *OPTIONS]), st.text(st.characters(exclude_categories=["Cs"]), max_size=30))
+def test_any_text_is_a_track_or_a_line(name: str, text: str) -> None:
+    if "waypoints" in name:
+        text = "missing/" + text.replace("\0", "").replace("/", "").replace("..", "")
+    with suppress(TrackError):
+        assert isinstance(track(f"{name}:{text}"), Track)
+
+
+@pytest.mark.parametrize(
+    ("name", "t", "wanted"),
+    [
+        ("hover", 50.0, (0.0, 0.0, 2.0)),
+        ("hover:x=1,y=-2,height=3", 0.0, (1.0, -2.0, 3.0)),
+        ("lemniscate", 0.75, (4.0 * np.sqrt(0.5), 2.0, 3.0)),
+        ("lemniscate:size=2,lap=5,height=1", 1.25, (2.0, 0.0, 1.0)),
+        ("circle", 0.0, (2.0, 0.0, 2.0)),
+        ("circle:radius=3,speed=4,height=5", 3.0 * pi / 8.0, (0.0, 3.0, 5.0)),
+    ],
+)
+def test_where_they_are(name: str, t: float, wanted: tuple[float, float, float]) -> None:
+    assert position(track(name), np.array([t]))[0] == pytest.approx(wanted, abs=1e-12)
+    assert track(name).duration_s == inf
+
+
+def test_the_circle_is_flown_at_its_speed() -> None:
+    velocity = position(track("circle:radius=3,speed=4"), np.linspace(0.0, 200.0, 50), 1)
+    assert np.linalg.norm(velocity, axis=1) == pytest.approx(4.0)
+
+
+def test_after_the_end_nothing_moves() -> None:
+    flown, t = track("wave"), np.array([100.0, 100.0001, 1e6])
+    assert position(flown, t) == pytest.approx(np.tile([-2.0, 200.0, 5.0], (3, 1)))
+    assert position(flown, t, 1)[:, 1] == pytest.approx([2.0, 0.0, 0.0])
+
+
+def test_a_track_without_end_says_its_yaw() -> None:
+    with pytest.raises(ValueError, match="needs a formula for its yaw"):
+        Track(THESIS_TRACKS["spiral"].position, duration_s=inf)
+
+
+def test_the_help_names_every_track_and_option() -> None:
+    for name in THESIS_TRACKS:
+        assert name in TRACK_HELP
+    for name, kind in OPTIONS.items():
+        (usage,) = [part for part in TRACK_HELP.replace("; ", " ").split(" ") if part.startswith(name)]
+        assert all(option in usage.lower() for option in kind.__struct_fields__)

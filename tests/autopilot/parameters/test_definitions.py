@@ -1,0 +1,209 @@
+"""Which numbers are parameters, and what becomes of their values."""
+
+from dataclasses import fields
+from math import radians
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.integrator_chain import Limits
+from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.autopilot.parameters.behaviour import ROWS, TRACKS
+from colibri.autopilot.parameters.control_law import STRUCTURE, law_numbers
+from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, applied, behaviour, definitions
+from colibri.autopilot.parameters.number_paths import described, named, paths, read
+from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
+from colibri.mavlink.parameters.store import Kind, Parameters, Refusal, float32
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
+
+FLIGHT, HUMMINGBIRD = load_profile("flight"), load_vehicle("hummingbird")
+NOT_IN_FLIGHT = {"control_interval_s", "attitude.check_every", "qp.tolerance"}
+
+
+def parameters_of(profile: Profile = FLIGHT, vehicle: Vehicle = HUMMINGBIRD) -> Parameters:
+    return Parameters(definitions(profile, vehicle))
+
+
+def differences(before: Any, after: Any) -> set[str]:
+    numbers = list(paths(before))
+    assert numbers == list(paths(after))
+    return {described(path) for path in numbers if read(before, path) != read(after, path)}
+
+
+@pytest.mark.parametrize("controller", ["lpv-mpc", "geometric-se3", "cascade", "global-lpv-mpc"])
+@pytest.mark.parametrize("vehicle", ["hummingbird", "hummingbird-thesis"])
+def test_there_are_parameters_for_every_law_and_vehicle(controller: str, vehicle: str) -> None:
+    profile = load_profile("flight" if controller in FLIGHT.controllers else "thesis").with_choices(controller, None)
+    parameters = parameters_of(profile, load_vehicle(vehicle))
+    assert all(parameter.description and parameter.group for parameter in parameters)
+    for name in ("MIS_TAKEOFF_ALT", "RTL_RETURN_ALT", "FLW_TGT_HT", "FLW_TGT_DST", "FLW_TGT_FA", "FLW_TGT_RS"):
+        assert parameters.at(parameters.index(name) or 0).kind == Kind.REAL  # type: ignore[union-attr]
+    for name in ("FLW_TGT_ALT_M", "SYS_FAILURE_EN", "MAV_SYS_ID", "TRACK"):
+        assert isinstance(parameters[name], int)
+
+
+def test_every_number_of_the_flight_profile_that_can_change_is_a_parameter() -> None:
+    table = FLIGHT.table("lpv-mpc")
+    there = {described(path) for path in paths(table)}
+    known = {described(number.path) for number in law_numbers("lpv-mpc", table)}
+    assert there - known == NOT_IN_FLIGHT | {f"attitude.moves[{place}]" for place in range(6)}
+
+
+def test_every_number_of_the_vehicle_but_the_ground_under_it_and_its_sensors_is_a_parameter() -> None:
+    tree = msgspec.to_builtins(HUMMINGBIRD)
+    there = {described(path) for path in paths(tree) if path[0] not in ("ground", "sensors")}
+    assert there == {described(number.path) for number in vehicle_numbers(tree)}
+
+
+def test_a_vehicle_has_no_parameters_for_what_it_does_not_model() -> None:
+    parameters = parameters_of(vehicle=HUMMINGBIRD.without(["battery", "drag", "rotor-lag"]))
+    assert not any(parameter.name.startswith(("VEH_BAT", "VEH_DRAG", "VEH_LAG")) for parameter in parameters)
+
+
+def test_defaults_leave_everything_as_it_is() -> None:
+    """64 bits and all: a flight with parameters that nobody touched is the flight without."""
+    profile, vehicle = applied(FLIGHT, HUMMINGBIRD, parameters_of().values)
+    assert profile is FLIGHT
+    assert vehicle is HUMMINGBIRD
+
+
+def test_each_parameter_of_the_law_changes_its_own_number() -> None:
+    table = FLIGHT.table("lpv-mpc")
+    for number in law_numbers("lpv-mpc", table):
+        parameters = parameters_of()
+        value = int(number.maximum) if isinstance(parameters[number.name], int) else number.maximum
+        assert parameters.set(number.name, value) is None
+        profile, vehicle = applied(FLIGHT, HUMMINGBIRD, parameters.values)
+        assert vehicle is HUMMINGBIRD
+        assert differences(table, profile.table("lpv-mpc")) == {described(number.path)}
+        assert read(profile.table("lpv-mpc"), number.path) == pytest.approx(number.maximum, rel=1e-6)
+    assert load_profile("flight") == FLIGHT
+
+
+def test_each_parameter_of_the_vehicle_changes_its_own_number() -> None:
+    tree = msgspec.to_builtins(HUMMINGBIRD)
+    for number in vehicle_numbers(tree):
+        parameters = parameters_of()
+        before = read(tree, number.path)
+        assert parameters[number.name] * number.scale == pytest.approx(before, rel=1e-6)
+        assert parameters.set(number.name, 0.9 * parameters[number.name] + 1e-3) is None
+        _, vehicle = applied(FLIGHT, HUMMINGBIRD, parameters.values)
+        after = msgspec.to_builtins(vehicle)
+        assert differences(tree, after) == {described(number.path)}
+        assert read(after, number.path) == pytest.approx(0.9 * before + 1e-3 * number.scale, rel=1e-6)
+
+
+def test_units_of_the_vehicle() -> None:
+    parameters = parameters_of()
+    assert parameters["VEH_IXX"] == float32(3.4)  # g m^2
+    assert parameters["VEH_CT"] == float32(6.9472)
+    units = {parameter.name: parameter.unit for parameter in parameters_of(vehicle=load_vehicle("hummingbird-thesis"))}
+    assert (units["VEH_CT"], units["VEH_ROT_MAX"]) == ("uN/rpm^2", "rpm")
+
+
+@pytest.mark.parametrize(("name", "value"), [("VEH_MASS", 50.0), ("VEH_ROT_MAX", 100.0), ("VEH_IZZ", 50.0)])
+def test_a_vehicle_that_cannot_be_is_refused(name: str, value: float) -> None:
+    with pytest.raises(ImpossibleError):
+        applied(FLIGHT, HUMMINGBIRD, {**parameters_of().values, name: value})
+
+
+def test_a_vehicle_outside_our_bounds_has_parameters() -> None:
+    big = msgspec.structs.replace(
+        HUMMINGBIRD,
+        body=msgspec.structs.replace(HUMMINGBIRD.body, mass_kg=500.0),
+        rotors=msgspec.structs.replace(HUMMINGBIRD.rotors, thrust_coefficient=0.1),
+        ground=None,
+    )
+    assert parameters_of(vehicle=big)["VEH_MASS"] == 500.0
+
+
+@pytest.mark.parametrize("kind", [Behaviour, Limits])
+def test_every_number_of_the_behaviour_is_a_parameter(kind: Any) -> None:
+    names = set(Limits._fields) if kind is Limits else {field.name for field in fields(Behaviour)} - {"limits"}
+    assert names <= {row.field for row in ROWS}
+
+
+def test_behaviour_is_what_the_parameters_say() -> None:
+    parameters = parameters_of()
+    assert behaviour(parameters) == Behaviour()
+    changes = {"MIS_TAKEOFF_ALT": 4.0, "MPC_XY_CRUISE": 2.0, "MPC_YAWRAUTO_MAX": 90.0, "TRACK": 6, "SYS_FAILURE_EN": 1}
+    for name, value in changes.items():
+        assert parameters.set(name, value) is None
+    now = behaviour(parameters)
+    assert now.takeoff_height_m == 4.0
+    assert now.limits == Limits()._replace(speed_m_s=2.0, yaw_rate_rad_s=radians(90.0))
+    assert now.track == "circle"
+    assert now.inject_failures is True
+    assert now.land_speed_m_s == Behaviour().land_speed_m_s
+
+
+def test_each_parameter_of_the_behaviour_changes_its_own_field() -> None:
+    for row in ROWS:
+        for bound in (row.minimum, row.maximum):
+            parameters = parameters_of()
+            value = int(bound) if isinstance(parameters[row.name], int) else float(bound)
+            assert parameters.set(row.name, value) is None
+            now, usual = behaviour(parameters), Behaviour()
+            changed = {
+                field.name for field in fields(Behaviour) if getattr(now, field.name) != getattr(usual, field.name)
+            }
+            expected = "limits" if row.field in Limits._fields else row.field
+            assert changed == (set() if parameters[row.name] == parameters.default(row.name) else {expected})
+
+
+@pytest.mark.parametrize("name", TRACKS)
+def test_every_track_that_can_be_chosen_flies(name: str) -> None:
+    assert track(name).duration_s > 0.0
+
+
+def test_the_system_id_cannot_be_changed() -> None:
+    parameters = Parameters(definitions(FLIGHT, HUMMINGBIRD, system_id=3))
+    assert parameters["MAV_SYS_ID"] == 3
+    assert parameters.set("MAV_SYS_ID", 4) == Refusal.READ_ONLY
+
+
+def test_names_for_a_law_that_nobody_described() -> None:
+    table = {
+        "control_interval_s": 0.01,
+        "position_frequency_rad_s": 4.0,
+        "weights": {"output": [1.0, 2.0], "terminal": 3},
+        "enabled": True,
+        "solver": "daqp",
+        "qp": {"tolerance": 1e-8},
+    }
+    numbers = law_numbers("my-law", table)
+    assert [(number.name, described(number.path), number.unit) for number in numbers] == [
+        ("MYL_POSIT_FREQU", "position_frequency_rad_s", "rad/s"),
+        ("MYL_WEIGH_OUTPU1", "weights.output[0]", ""),
+        ("MYL_WEIGH_OUTPU2", "weights.output[1]", ""),
+        ("MYL_WEIGH_TERMI", "weights.terminal", ""),
+    ]
+
+
+TABLES = st.recursive(
+    st.floats() | st.integers() | st.text(max_size=3) | st.booleans(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=20), inner, max_size=6),
+    max_leaves=20,
+)
+
+
+@settings(max_examples=50)
+@given(st.text(max_size=12), st.dictionaries(st.text("ab_s1é", max_size=30), TABLES, max_size=8))
+def test_any_table_has_parameters(name: str, table: dict[str, Any]) -> None:
+    profile = msgspec.structs.replace(FLIGHT, controller=name + "?", controllers={name + "?": table})
+    tuned = Numbers(profile, HUMMINGBIRD)
+    parameters = Parameters(tuned.definitions)
+    numbers = law_numbers(name + "?", table)
+    assert all(number.name in parameters for number in numbers)
+    assert {number.path for number in numbers} == {path for path in paths(table) if path[0] not in STRUCTURE}
+    assert tuned.applied(parameters.values)[0] is profile
+
+
+def test_names_that_would_be_alike_differ() -> None:
+    numbers = named("LAW", {"a_b": 1.0, "A_b": 2.0, "a.b": {"": 3.0}, "a" * 20: 1.0, "a" * 21: 2.0}, frozenset())
+    assert len({number.name for number in numbers}) == 5

@@ -1,0 +1,184 @@
+"""Changing the numbers of a control law while it flies."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from colibri.autopilot.control.interface import Decision, Horizon, Preview, VehicleState
+from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.parameters.definitions import Numbers, definitions
+from colibri.autopilot.parameters.retuning import Tuning, builder
+from colibri.common.config import SettingsError
+from colibri.mavlink.parameters.store import Parameters, Refusal, Value
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
+
+NOTHING = (0.0, 0.0, 0.0)
+
+
+def clock() -> float:
+    return 0.0
+
+
+class Flight:
+    """A control law that hovers, and can be tuned."""
+
+    def __init__(self, profile: Profile, vehicle: Vehicle) -> None:
+        self.build = builder(profile.controller, clock)
+        self.law = self.build(profile, vehicle)
+        self.said: list[str] = []
+        self.tuning = Tuning(Numbers(profile, vehicle), self.build, self.law, self.said.append)
+        self.parameters = Parameters(definitions(profile, vehicle), self.tuning.check)
+        self.memory = self.law.initial(vehicle.hover_speed)
+        self.samples = 0
+
+    def step(self) -> Decision:
+        samples = self.law.preview.samples
+        still, straight = np.zeros((samples, 3)), np.zeros(samples)
+        state = VehicleState((0.3, -0.2, 0.1), NOTHING, (1.0, 0.0, 0.0, 0.0), NOTHING, NOTHING)
+        references = Horizon(still, still, still, still, still, straight, straight, straight)
+        time_us = self.samples * self.law.control_interval_us
+        self.memory, decision = self.law.step(self.memory, time_us, state, references)
+        self.samples += 1
+        return decision
+
+
+@pytest.fixture
+def flight() -> Flight:
+    return Flight(load_profile("flight"), load_vehicle("hummingbird"))
+
+
+def test_a_change_gives_a_new_law_that_goes_on_with_the_old_ones_memory(flight: Flight) -> None:
+    for _ in range(5):
+        flight.step()
+    assert flight.parameters.set("LPV_POLE1", -8.0) is None
+    assert flight.parameters.set("VEH_MASS", 0.75) is None
+    tuned = flight.tuning.take()
+    assert tuned is not None
+    assert flight.tuning.take() is None
+    assert tuned.vehicle.body.mass_kg == 0.75
+    assert tuned.profile.table("lpv-mpc")["guidance"]["poles"] == [-8.0, -6.0]
+    memory, before = flight.memory, flight.step()
+    flight.law, flight.memory = tuned.controller, memory
+    after = flight.step()
+    assert after.diagnostics.fallback is None
+    assert not np.allclose(after.rotor_speeds, before.rotor_speeds)
+    flight.law, flight.memory = flight.build(tuned.profile, tuned.vehicle), memory
+    np.testing.assert_array_equal(flight.step().rotor_speeds, after.rotor_speeds)
+
+
+@pytest.mark.parametrize(("name", "value"), [("VEH_MASS", 50.0), ("VEH_IZZ", 900.0), ("VEH_BAT_EMPTY", 99.0)])
+def test_what_cannot_be_together_is_refused(flight: Flight, name: str, value: float) -> None:
+    before = flight.parameters.values
+    assert flight.parameters.set(name, value) == Refusal.VALUE_OUT_OF_RANGE
+    assert flight.parameters.values == before
+    assert flight.tuning.take() is None
+
+
+def test_each_number_can_be_at_its_bounds_or_is_refused(flight: Flight) -> None:
+    """Nothing raises, and whatever is accepted can be hovered with."""
+    refused = set()
+    for parameter in flight.parameters:
+        if not parameter.name.startswith(("LPV_", "VEH_")):
+            continue
+        for bound in (parameter.minimum, parameter.maximum):
+            if flight.parameters.set(parameter.name, bound) is not None:
+                refused.add(parameter.name)
+            flight.parameters.set(parameter.name, parameter.default)
+    assert all(name.startswith("VEH_") for name in refused)
+
+
+def test_the_way_back_is_bit_for_bit(flight: Flight) -> None:
+    flight.parameters.set("VEH_MASS", 0.75)
+    flight.parameters.set("VEH_MASS", flight.parameters.default("VEH_MASS"))
+    tuned = flight.tuning.take()
+    assert tuned is not None
+    assert tuned.vehicle == load_vehicle("hummingbird")
+
+
+def test_behaviour_builds_nothing(flight: Flight) -> None:
+    assert flight.parameters.set("MPC_XY_CRUISE", 3.0) is None
+    assert flight.tuning.take() is None
+
+
+@pytest.mark.parametrize("value", [0.0, -4.0])
+def test_a_law_that_nobody_described_refuses_for_itself(value: float) -> None:
+    flight = Flight(load_profile("se3"), load_vehicle("hummingbird-thesis"))
+    assert flight.parameters.set("GEO_POSIT_FREQU", value) == Refusal.VALUE_OUT_OF_RANGE
+    assert flight.said == ["GEO_POSIT_FREQU not changed: position_frequency_rad_s: Expected `float` > 0.0"]
+    assert flight.parameters.set("GEO_POSIT_FREQU", 5.0) is None
+
+
+def test_the_rhythm_of_a_law_cannot_change() -> None:
+    flight = Flight(load_profile("thesis"), load_vehicle("hummingbird-thesis"))
+    (name,) = (parameter.name for parameter in flight.parameters if "position.samples" in parameter.details)
+    assert flight.parameters.set(name, 2) == Refusal.PERMISSION_DENIED
+    assert flight.parameters[name] == 4
+
+
+class Faulty:
+    """A control law that fails in as many ways as its number says."""
+
+    control_interval_us = 10_000
+    preview = Preview(10_000, 1)
+
+    def __init__(self, table: Mapping[str, Any]) -> None:
+        self.way = table["way"]
+        if self.way == 1.0:
+            raise SettingsError("way: not this one")
+        if self.way == 2.0:
+            raise ZeroDivisionError
+        if self.way == 6.0:
+            raise KeyError("nobody has this")
+
+    def initial(self, rotor_speed: float) -> float:
+        return rotor_speed
+
+    def step(self, memory: float, time_us: int, state: VehicleState, references: Horizon) -> tuple[float, Decision]:
+        del time_us, state, references
+        speeds = {3.0: float("nan"), 4.0: -1.0, 5.0: 1e9}.get(self.way, memory)
+        return memory, Decision(np.full(4, speeds), NOTHING)
+
+
+@pytest.mark.parametrize(
+    ("way", "said"),
+    [
+        (1.0, "way: not this one"),
+        (2.0, "ZeroDivisionError"),
+        (3.0, "controller faulty gave rotor speeds [nan nan nan nan]: expected four from 0 to 838"),
+        (4.0, "controller faulty gave rotor speeds [-1. -1. -1. -1.]: expected four from 0 to 838"),
+        (5.0, "controller faulty gave rotor speeds [1.e+09 1.e+09 1.e+09 1.e+09]: expected four from 0 to 838"),
+        (6.0, "KeyError: 'nobody has this'"),
+    ],
+)
+def test_a_law_that_fails_is_not_flown_and_says_why(way: Value, said: str) -> None:
+    tuning, parameters, words = faulty()
+    assert parameters.set("FAU_WAY", way) == Refusal.VALUE_OUT_OF_RANGE
+    assert parameters["FAU_WAY"] == 0.0
+    assert tuning.take() is None
+    assert words == [f"FAU_WAY not changed: {said}"]
+
+
+def test_a_law_that_does_not_fail_is_flown() -> None:
+    tuning, parameters, words = faulty()
+    assert parameters.set("FAU_WAY", 0.5) is None
+    assert parameters["FAU_WAY"] == 0.5
+    assert tuning.take() is not None
+    assert words == []
+
+
+def faulty() -> tuple[Tuning, Parameters, list[str]]:
+    vehicle = load_vehicle("hummingbird")
+    table = {"way": 0.0}
+    profile = Profile(
+        name="mine",
+        controller="faulty",
+        references="by-formula",
+        controllers={"faulty": table},
+        simulation=load_profile("flight").simulation,
+    )
+    words: list[str] = []
+    numbers = Numbers(profile, vehicle)
+    tuning = Tuning(numbers, lambda profile, _: Faulty(profile.table("faulty")), Faulty(table), words.append)
+    return tuning, Parameters(definitions(profile, vehicle), tuning.check), words

@@ -1,0 +1,138 @@
+"""What a process hears of its links: in turn, and for no longer than it may."""
+
+from collections import Counter
+
+import pytest
+
+from colibri.autopilot.ground.stations import Stations
+from colibri.autopilot.process.ground_links import MOST_SAVED_S, SHARE, GroundLinks
+from colibri.common.types import Address
+from colibri.mavlink.wire.dialect import Codec
+from tools.harness.copter_flight import CopterFlight
+
+HEARTBEAT = Codec(255, 190).encode("HEARTBEAT", 6, 8, 0, 0, 4, 3)
+HERE: Address = ("127.0.0.1", 5)
+FRAME_S = 0.004
+
+
+class Clock:
+    """Time that only work and waiting take."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+class FakeLink:
+    """A link on which so many datagrams are waiting."""
+
+    def __init__(self, number: int, waiting: int) -> None:
+        self.url = f"tcpin:127.0.0.1:{number + 1}"
+        self.target = None
+        self.waiting = waiting
+        self.opened: list[Address] = []
+        self.closed: list[Address] = []
+
+    def send(self, datagram: bytes, address: Address | None = None) -> None:
+        pass
+
+    def receive_now(self) -> list[tuple[bytes, Address]]:
+        taken = min(self.waiting, 64)
+        self.waiting -= taken
+        return [(HEARTBEAT, HERE)] * taken
+
+    def wait(self, timeout_s: float) -> None:
+        pass
+
+    def take_opened(self) -> list[Address]:
+        opened, self.opened = self.opened, []
+        return opened
+
+    def take_closed(self) -> list[Address]:
+        closed, self.closed = self.closed, []
+        return closed
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def stations() -> Stations:
+    return CopterFlight().copter.stations
+
+
+def heard_in_a_frame(links: GroundLinks, stations: Stations, clock: Clock, takes_s: float) -> Counter[int]:
+    """Hear what there is time for, each datagram taking as long as that; return how many of each link."""
+    heard: Counter[int] = Counter()
+    for received in links.receive(stations):
+        heard[received.link] += 1
+        clock.now_s += takes_s
+    return heard
+
+
+@pytest.mark.parametrize("takes_s", [1e-5, 1e-3, 2e-2])
+def test_a_flood_takes_its_share_of_the_time_and_no_more(stations: Stations, takes_s: float) -> None:
+    clock = Clock()
+    links = GroundLinks([FakeLink(0, 10**9)], clock, clock)
+    spent_s = 0.0
+    while clock.now_s < 10.0:
+        spent_s += takes_s * heard_in_a_frame(links, stations, clock, takes_s).total()
+        clock.now_s += FRAME_S
+    assert 0.5 * SHARE * clock.now_s < spent_s < SHARE * clock.now_s + MOST_SAVED_S + takes_s
+
+
+def test_a_flooded_link_is_not_heard_before_others(stations: Stations) -> None:
+    clock = Clock()
+    links = GroundLinks([FakeLink(0, 10**9), FakeLink(1, 10)], clock, clock)
+    heard: Counter[int] = Counter()
+    for _ in range(40):
+        heard += heard_in_a_frame(links, stations, clock, 5e-4)
+        clock.now_s += FRAME_S
+    assert heard[1] == 10
+    assert heard[0] > 10
+
+
+def test_what_comes_in_good_measure_is_heard_at_once(stations: Stations) -> None:
+    clock = Clock()
+    links = GroundLinks([FakeLink(0, 20), FakeLink(1, 20)], clock, clock)
+    assert heard_in_a_frame(links, stations, clock, 1e-4) == {0: 20, 1: 20}
+
+
+def test_the_last_words_of_a_connection_are_heard_and_open_no_other(stations: Stations) -> None:
+    clock = Clock()
+    link = FakeLink(0, 3)
+    links = GroundLinks([link], clock, clock)
+    before = len(stations.hub.channels)
+    link.opened, link.closed = [HERE], [HERE]
+    for received in links.receive(stations):
+        stations.hub.receive(received.datagram, received.link, received.address, 0)
+        assert len(stations.hub.channels) == before + 1
+    assert len(stations.hub.channels) == before
+
+
+def test_a_connection_that_ends_takes_what_there_was_no_time_for_with_it(stations: Stations) -> None:
+    clock = Clock()
+    link = FakeLink(0, 50)
+    links = GroundLinks([link], clock, clock)
+    link.opened, link.closed = [HERE], [HERE]
+    assert heard_in_a_frame(links, stations, clock, 1.0) == {0: 1}
+    clock.now_s += 100.0
+    assert not heard_in_a_frame(links, stations, clock, 1.0)
+
+
+def test_a_busy_computer_makes_nobody_deaf(stations: Stations) -> None:
+    """Time that other processes take, while a datagram is heard or sent, is not spent by who sent it."""
+    clock, processor_clock = Clock(), Clock()
+    link = FakeLink(0, 0)
+    links = GroundLinks([link], clock, processor_clock)
+    for _ in range(20):
+        link.waiting = 1
+        heard = 0
+        for _ in links.receive(stations):
+            heard += 1
+            clock.now_s += 0.2
+            processor_clock.now_s += 1e-4
+        assert heard == 1
+        clock.now_s += FRAME_S

@@ -1,0 +1,191 @@
+"""The same flights in memory and as processes over UDP; what dies there; what bad links do, and what they do not."""
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from random import Random
+from typing import Any
+
+import pytest
+
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.mavlink.hil.conductor import Gathering, Parcel, Turn, packets
+from colibri.sitl.backends.launcher import Forked, FromScratch, Launcher
+from colibri.sitl.backends.link_faults import Pipe, Trouble
+from colibri.sitl.backends.setting import Setting
+from colibri.sitl.backends.stage import StageError
+from colibri.sitl.fleet import Fleet
+from colibri.sitl.session import Flights
+from colibri.sitl.vehicle import Sitl
+
+IN_WIND = {"wind": "3@270", "turbulence": "light", "seed": 3}
+BAD = {"loss": 0.2, "duplicate": 0.1, "reorder": 0.1, "corrupt": 0.1, "jitter_s": 0.004}
+
+
+@pytest.fixture(scope="module")
+def forked() -> Iterator[Launcher]:
+    launcher = Forked()
+    yield launcher
+    launcher.close()
+
+
+def up_and_on(sitl: Sitl) -> None:
+    """Exchange everything there is to exchange with a ground station, in the air."""
+    sitl.set_param("RTL_RETURN_ALT", 7.0)
+    items = sitl.items
+    sitl.upload_mission([items.takeoff(1.0), items.waypoint(1.0, 0.5, 1.5)])
+    sitl.start_mission()
+    sitl.run(2.0)
+    sitl.kill_autopilot()
+    sitl.run(0.5)
+    sitl.inject("motor", "wrong", 1, 0.9)
+    with pytest.raises(sitl.Refused):
+        sitl.inject("system_avoidance", "off")
+    sitl.run(0.1)
+
+
+def flown(launcher: Launcher | None, fly: Callable[[Sitl], object], **setting: Any) -> tuple[str, list[str]]:
+    """Fly; return the hash and what the vehicle said."""
+    with Flights(Setting(**setting), launcher) as flights:
+        sitl = flights.begin()
+        fly(sitl)
+        return sitl.sha256, sitl.texts
+
+
+@pytest.mark.parametrize("feedback", ["state", "sensors"])
+def test_the_same_flight_over_udp(forked: Launcher, feedback: str) -> None:
+    in_memory = flown(None, up_and_on, feedback=feedback, **IN_WIND)
+    assert flown(forked, up_and_on, feedback=feedback, **IN_WIND) == in_memory
+    assert any("take-off" in text for text in in_memory[1])
+
+
+def test_the_same_flight_of_processes_from_scratch() -> None:
+    def hover(sitl: Sitl) -> None:
+        sitl.run(0.2)
+
+    assert flown(FromScratch(), hover, airborne=2.0) == flown(None, hover, airborne=2.0)
+
+
+@pytest.mark.parametrize("processes", [False, True])
+def test_a_bad_link_between_plant_and_autopilot_changes_no_flight(forked: Launcher, processes: bool) -> None:
+    def fly(sitl: Sitl) -> None:
+        sitl.goto(0.3, 0.0, 3.0, wait=False)
+        sitl.run(0.5)
+
+    def fly_badly(sitl: Sitl) -> None:
+        for name, value in BAD.items():
+            setattr(sitl.link.plant, name, value)
+        fly(sitl)
+
+    launcher = forked if processes else None
+    assert flown(launcher, fly_badly, airborne=3.0) == flown(None, fly, airborne=3.0)
+
+
+def test_orders_pass_a_bad_link_to_the_ground() -> None:
+    def fly(sitl: Sitl) -> None:
+        sitl.link.ground.loss, sitl.link.ground.jitter_s = 0.3, 0.05
+        sitl.set_param("RTL_RETURN_ALT", 6.0)
+        items = sitl.items
+        sitl.upload_mission([items.waypoint(0.0, north, 3.0) for north in range(10)])
+        sitl.upload_fence(items.circle(30.0))
+        sitl.start_mission()
+        assert sitl.mode is Mode.MISSION
+        assert sitl.get_param("RTL_RETURN_ALT") == 6.0
+
+    first = flown(None, fly, airborne=3.0, seed=1)
+    assert flown(None, fly, airborne=3.0, seed=1) == first
+    assert flown(None, fly, airborne=3.0, seed=2) != first
+
+
+def test_sticks_are_held_whatever_is_done_meanwhile() -> None:
+    with Flights(Setting(airborne=3.0), None) as flights:
+        sitl = flights.begin()
+        sitl.link.ground.loss, sitl.link.ground.jitter_s = 0.3, 0.05
+        with sitl.sticks_held():
+            sitl.run(0.3)
+            sitl.select(Mode.POSITION)
+            with sitl.sticks_held(pitch=1.0):
+                sitl.run(1.0)
+            assert sitl.velocity[1] > 1.0
+            sitl.wait_until(lambda: sitl.speed_m_s < 0.1, within=4.0)
+            assert sitl.mode is Mode.POSITION
+        sitl.wait_until(lambda: sitl.mode is Mode.HOLD, within=0.7)
+
+
+def test_what_the_vehicle_says_is_known_though_the_link_loses_it() -> None:
+    with Flights(Setting(airborne=3.0), None) as flights:
+        sitl = flights.begin()
+        sitl.link.ground.down = True
+        sitl.inject("motor", "off", 2)
+        sitl.run(0.3)
+        assert sitl.said("rotor 2 failed")
+        assert not sitl.gcs.said("rotor 2 failed")
+
+
+@pytest.mark.parametrize("package", ["plant", "autopilot"])
+def test_a_process_that_dies_is_named(forked: Launcher, package: str) -> None:
+    with Flights(Setting(airborne=3.0), forked) as flights:
+        sitl = flights.begin()
+        sitl.run(0.1)
+        os.kill(process_of(sitl, package), signal.SIGKILL)
+        with pytest.raises(StageError, match=f"the {package} was killed by SIGKILL"):
+            sitl.run(1.0)
+
+
+def test_a_fleet_flies_as_each_flies_alone() -> None:
+    with Flights(Setting(airborne=3.0), None) as flights:
+        fleet = Fleet(flights.begin(system=system, seed=system) for system in (1, 2))
+        fleet[1].goto(1.0, 0.0, 3.0, wait=False)
+        fleet.run(0.5)
+        together = [sitl.sha256 for sitl in fleet]
+        assert {sitl.time_us for sitl in fleet} == {fleet[1].time_us}
+
+    def alone(sitl: Sitl) -> None:
+        if sitl.system == 2:
+            sitl.goto(1.0, 0.0, 3.0, wait=False)
+        while sitl.time_us < fleet[0].time_us:
+            sitl.step()
+
+    assert together == [flown(None, alone, airborne=3.0, system=system, seed=system)[0] for system in (1, 2)]
+
+
+def test_a_process_that_cannot_begin_is_quoted(forked: Launcher) -> None:
+    with (
+        Flights(Setting(wind="three"), forked) as flights,
+        pytest.raises(StageError, match=r"the plant ended with exit code 2: .*must be SPEED@FROM"),
+    ):
+        flights.begin()
+
+
+def process_of(sitl: Sitl, package: str) -> int:
+    """Return the number of a flight's process."""
+    return sitl.processes[package]
+
+
+def test_turns_come_whole_in_whatever_order() -> None:
+    chance = Random(1)
+    parcels = [Parcel(number, chance.randbytes(chance.randrange(1400))) for number in range(20)]
+    turn = Turn(12_345_678, parcels, custom_mode=4 << 16, armed=True)
+    pieces = packets(turn)
+    assert len(pieces) > 2
+    gathering = Gathering()
+    told = [gathering.take(piece) for piece in reversed(pieces)]
+    assert told[:-1] == [None] * (len(pieces) - 1)
+    assert told[-1] == turn
+
+
+def test_a_link_is_as_bad_as_it_is_said_to_be() -> None:
+    trouble = Trouble(loss=0.3, delay_s=0.1, jitter_s=0.05, duplicate=0.2, corrupt=0.1)
+    pipe = Pipe(trouble, "1")
+    sent = [number.to_bytes(4, "little") for number in range(4000)]
+    for datagram in sent:
+        pipe.put(datagram, 0)
+    assert pipe.due(99_999) == []
+    soon = pipe.due(125_000)
+    late = pipe.due(150_000)
+    assert len(soon) / len(late) == pytest.approx(1.0, abs=0.15)
+    assert len(soon + late) == pytest.approx(4000 * 0.7 * 1.2, rel=0.05)
+    assert len(set(soon + late) & set(sent)) == pytest.approx(4000 * 0.7 * 0.9, rel=0.06)
+    trouble.down = True
+    pipe.put(b"never", 200_000)
+    assert pipe.due(10**9) == []

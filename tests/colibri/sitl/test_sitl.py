@@ -1,0 +1,239 @@
+"""The pytest plugin as a stranger's test file meets it: marks, failures, the sum at the end, workers, the docs."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+from colibri.sitl.backends.setting import Setting
+from colibri.sitl.session import Flights
+
+pytest_plugins = ["pytester"]
+
+ROOT = Path(__file__).parents[3]
+DOCS = ROOT / "docs" / "scenarios.md"
+MODULE = "pytest_colibri"
+HOVER = """
+    import pytest
+
+    @pytest.mark.sitl(airborne=3.0)
+    @pytest.mark.seeds(4, 5)
+    @pytest.mark.wind("3@0", turbulence="light")
+    def test_hover(sitl):
+        sitl.run(0.2)
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _loaded(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Load here what flies and draws: a run inside this one unloads whatever it was the first to load."""
+    with Flights(Setting(airborne=3.0), None) as flights:
+        flights.begin()
+        flights.keep(tmp_path_factory.mktemp("loaded"))
+
+
+def options() -> list[str]:
+    """Return what loads the plugin where this very version of the package is not installed."""
+    known = entry_points(group="pytest11")
+    return [] if any(entry.value == MODULE for entry in known) else ["-p", MODULE]
+
+
+def run(pytester: pytest.Pytester, text: str, *more: str) -> pytest.RunResult:
+    pytester.makepyfile(text)
+    return pytester.runpytest_inprocess(*options(), "-p", "no:cacheprovider", *more)
+
+
+def verdict(result: pytest.RunResult) -> str:
+    (line,) = [line for line in result.outlines if line.startswith("sitl: ")]
+    return line.rpartition(" ")[2]
+
+
+def first_test() -> str:
+    """Return the test file of the docs."""
+    found = re.search(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
+    assert found is not None
+    return found[1]
+
+
+def test_a_run_ends_with_its_sum_which_is_the_same_again(pytester: pytest.Pytester) -> None:
+    results = [run(pytester, HOVER, "--sitl-hashes", "hashes", *workers) for workers in ((), ("-n", "2"))]
+    for result in results:
+        result.assert_outcomes(passed=2)
+        result.stdout.re_match_lines(
+            [r"sitl: 2 flights, 0\.4 s simulated in .* sim-s per wall-s, verdict [0-9a-f]{16}"]
+        )
+    assert verdict(results[0]) == verdict(results[1])
+    lines = (pytester.path / "hashes").read_text(encoding="utf-8").splitlines()
+    names, outcomes, hashes = zip(*(line.split(" ") for line in lines), strict=True)
+    assert [name.rpartition("::")[2] for name in names] == ["test_hover[seed4]", "test_hover[seed5]"]
+    assert set(outcomes) == {"passed"}
+    assert len(set(hashes)) == 2
+    assert not (pytester.path / "sitl-failures").exists()
+
+
+def test_a_flight_is_gone_when_its_test_is_over(pytester: pytest.Pytester) -> None:
+    text = """
+        import gc
+        import weakref
+
+        flown = []
+
+        def test_one(sitl):
+            flown.append(weakref.ref(sitl))
+
+        def test_two():
+            gc.collect()
+            assert flown[0]() is None
+    """
+    run(pytester, text).assert_outcomes(passed=2)
+
+
+def test_a_failed_test_keeps_its_flight_and_says_how_to_fly_it_again(pytester: pytest.Pytester) -> None:
+    result = run(
+        pytester,
+        """
+        import pytest
+
+        @pytest.mark.sitl(airborne=3.0)
+        def test_up(sitl):
+            sitl.wait_until(lambda: sitl.position[2] > 4.0, within=0.3, what="the climb")
+        """,
+    )
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(
+        [
+            "*NotInTimeError: the climb took longer than 0.3 s: t = 0.3?? s, hold, armed, at (*",
+            "flight kept in sitl-failures*",
+            "replay: pytest 'test_a_failed*.py::test_up' --sitl-link memory",
+        ]
+    )
+    (folder,) = (pytester.path / "sitl-failures").iterdir()
+    assert {path.name for path in folder.iterdir()} == {
+        *("flight.csv", "flight.json", "flight.png", "ground.tlog", "plant.tlog")
+    }
+    assert all(path.stat().st_size > 100 for path in folder.iterdir())
+
+
+def test_what_a_mark_says_wrongly_is_said_in_one_line(pytester: pytest.Pytester) -> None:
+    result = run(
+        pytester,
+        """
+        import pytest
+
+        @pytest.mark.sitl(winds="3@0")
+        def test_unknown(sitl):
+            pass
+
+        @pytest.mark.wind("three")
+        def test_wind(sitl):
+            pass
+
+        @pytest.mark.sitl(params={"NO_SUCH": 1.0})
+        def test_parameter(sitl):
+            pass
+
+        @pytest.mark.vehicle("no-such")
+        def test_vehicle(sitl):
+            pass
+        """,
+    )
+    result.assert_outcomes(errors=4)
+    result.stdout.fnmatch_lines(
+        [
+            "a flight has no winds: choose airborne, *",
+            "argument --wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not three*",
+            "the vehicle has no parameter NO_SUCH",
+            "*no-such*",
+        ]
+    )
+
+
+def test_a_ground_link_is_bad_where_the_command_line_or_a_mark_says_so(pytester: pytest.Pytester) -> None:
+    source = """
+        import pytest
+
+        def test_as_the_command_line_says(sitl):
+            assert (sitl.link.ground.loss, sitl.link.ground.jitter_s) == (0.3, 0.05)
+            sitl.set_param("RTL_RETURN_ALT", 7.0)
+
+        @pytest.mark.sitl(ground="loss=0.1")
+        def test_as_a_mark_says(sitl):
+            assert (sitl.link.ground.loss, sitl.link.ground.jitter_s) == (0.1, 0.0)
+        """
+    run(pytester, source, "--sitl-ground", "loss=0.3,jitter_s=0.05").assert_outcomes(passed=2)
+    result = run(pytester, source, "--sitl-ground", "lost=0.3")
+    result.assert_outcomes(errors=1, passed=1)
+    result.stdout.fnmatch_lines(["a link does no lost: choose corrupt, delay_s, *"])
+
+
+def test_who_does_not_fly_does_not_load_what_flies(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        "import sys\n\ndef test():\n    assert not {'numpy', 'numba', 'pymavlink'} & set(sys.modules)\n"
+    )
+    result = pytester.runpytest_subprocess(*options(), "-p", "no:hypothesispytest")
+    result.assert_outcomes(passed=1)
+    assert not [line for line in result.outlines if line.startswith("sitl:")]
+
+
+def test_the_docs_first_test_in_a_strangers_folder(tmp_path: Path) -> None:
+    """The wheel alone, in a folder that knows nothing of this repository; only what is compiled is compiled already."""
+    site, stranger = tmp_path / "site", tmp_path / "stranger"
+    stranger.mkdir()
+    (stranger / "test_delivery.py").write_text(first_test(), encoding="utf-8")
+    python = [sys.executable, "-m"]
+    subprocess.run([*python, "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)], cwd=ROOT, check=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    install = (
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-index",
+        "--no-compile",
+        "--target",
+        str(site),
+        str(wheel),
+    )
+    subprocess.run([*python, *install], check=True)
+    keep_compiled(site)
+    environment = {**os.environ, "PYTHONPATH": str(site), "PYTHONSAFEPATH": "1"}
+    command = [*python, "pytest", "-p", "no:cacheprovider", "--sitl-link", "udp", "-q"]
+    result = subprocess.run(command, cwd=stranger, env=environment, capture_output=True, text=True, check=False)
+    assert "3 passed" in result.stdout, result.stdout + result.stderr
+    assert "sitl: 3 flights" in result.stdout
+
+
+def keep_compiled(site: Path) -> None:
+    """Have the kernels of the installed sources loaded from where those of the repository are kept."""
+    for source in site.rglob("*.py"):
+        here = ROOT / source.relative_to(site)
+        if here.exists() and here.read_bytes() == source.read_bytes():
+            shutil.copystat(here, source)
+            for kernel in (here.parent / "__pycache__").glob(f"{here.stem}.*.nb?"):
+                (source.parent / "__pycache__").mkdir(exist_ok=True)
+                shutil.copy2(kernel, source.parent / "__pycache__")
+
+
+def test_a_stranger_who_has_a_package_of_the_same_name_tests_as_ever(tmp_path: Path) -> None:
+    """Only who asks for a vehicle is told why there is none."""
+    (tmp_path / "tools").mkdir()
+    (tmp_path / "tools" / "__init__.py").write_text("MINE = 1\n")
+    tests = (
+        "from tools import MINE",
+        "def test_mine():",
+        "    assert MINE == 1",
+        "def test_flight(sitl):",
+        "    sitl.arm()",
+    )
+    (tmp_path / "test_mine.py").write_text("\n".join(tests) + "\n")
+    command = [sys.executable, "-m", "pytest", *options(), "-p", "no:cacheprovider", "-q", "test_mine.py"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "1 passed, 1 error" in done.stdout
+    assert "another one of that name is in front of it" in done.stdout

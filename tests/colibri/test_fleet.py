@@ -1,0 +1,210 @@
+"""`colibri sitl`: what it refuses, how it ends, and what it shows."""
+
+import os
+import signal
+import subprocess
+import sys
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+from rich.console import Console
+
+from colibri.cli.main import main
+from colibri.flights.fleet import ground_links
+from colibri.flights.fleet_status import status_table
+from colibri.mavlink.links.open import open_link
+from colibri.mavlink.wire.dialect import mav
+from tests.clients.support.ground_station import GroundStation
+from tools.harness.processes import wait_for
+from tools.harness.sitl_process import Vehicle, vehicle
+
+SHUT_DOWN, ACCEPTED = mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, mav.MAV_RESULT_ACCEPTED
+NOT_BEYOND = "reaches beyond this computer: give --signing-key FILE, or --insecure to let anybody fly the vehicle"
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (("--home", "47,8"), "argument --home: expected LAT,LON,ALT,YAW in degrees and metres, not 47,8"),
+        (("--home", "0,181,0,0"), "argument --home: not a latitude of -90 to 90 and a longitude of -180 to 180"),
+        (("--identity", "ardupilot"), "argument --identity: invalid choice: 'ardupilot'"),
+        (("--profile", "fast"), "unknown profile fast: choose flight"),
+        (("--vehicle", "dragonfly"), "unknown vehicle dragonfly: choose hummingbird"),
+        (("--plant-vehicle", "dragonfly"), "unknown vehicle dragonfly: choose hummingbird"),
+        (("--profile", "thesis"), "vehicle hummingbird-thesis has no ground to stand on"),
+        (
+            ("--profile", "thesis", "--feedback", "sensors"),
+            "--feedback sensors: vehicle AscTec Hummingbird (thesis) has",
+        ),
+        (("--gcs", "14550"), "14550: expected udpin:HOST:PORT or udpout:HOST:PORT or tcpin:HOST:PORT"),
+        (("--gcs", "udpin:0.0.0.0:14550"), f"udpin:0.0.0.0:14550 {NOT_BEYOND}"),
+        (("--gcs", "udpout:192.0.2.1:14550"), f"udpout:192.0.2.1:14550 {NOT_BEYOND}"),
+        (("--count", "2", "--gcs", "udpin:127.0.0.1:16210"), "--gcs: several vehicles cannot wait on one port"),
+        (("--count", "2", "--gcs", "tcpin:127.0.0.1:16210"), "--gcs: several vehicles cannot wait on one port"),
+        (("--count", "0"), "--instance and --count: at least one vehicle, instances from 0 to 99"),
+        (("--instance", "100"), "--instance and --count: at least one vehicle, instances from 0 to 99"),
+        (("--instance", "-1"), "argument --instance: must not be below zero, not -1"),
+        (("--speed", "0"), "argument --speed: must be above zero, not 0"),
+    ],
+)
+def test_bad_input_gets_one_line_and_exit_code_2(
+    capfd: pytest.CaptureFixture[str], options: tuple[str, ...], line: str
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["sitl", "--plant-port", "0", *options])
+    assert ended.value.code == 2
+    said = capfd.readouterr()
+    assert said.out == ""
+    assert said.err.startswith(f"colibri: error: {line}")
+    assert said.err.count("\n") == 1
+
+
+def test_a_plant_port_that_is_taken(capfd: pytest.CaptureFixture[str]) -> None:
+    taken = open_link("udpin:127.0.0.1:0")
+    with pytest.raises(SystemExit) as ended:
+        main(["sitl", "--plant-port", taken.url.rpartition(":")[2]])
+    taken.close()
+    assert ended.value.code == 2
+    assert capfd.readouterr().err == (
+        f"colibri: error: {taken.url}: Address already in use; end the program that has this port, or name another\n"
+    )
+
+
+def test_what_only_the_autopilot_can_refuse(tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    key.write_bytes(bytes(31))
+    command = [sys.executable, "-m", "colibri", "sitl", "--plant-port", "0", "--gcs", "udpin:127.0.0.1:0"]
+    options = ("--state", str(tmp_path / "state"), "--signing-key", str(key))
+    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == (
+        f"colibri: error: signing key {key}: expected 32 bytes or 64 hexadecimal digits, found 31 bytes\n"
+    )
+
+
+def test_each_instance_has_its_own_port_for_sdks() -> None:
+    asked = Namespace(gcs=[])
+    assert ground_links(asked, 0) == ["udpout:127.0.0.1:14550", "udpout:127.0.0.1:14540"]
+    assert ground_links(asked, 2) == ["udpout:127.0.0.1:14550", "udpout:127.0.0.1:14542"]
+
+
+@contextmanager
+def standing(folder: Path, *links: str) -> Iterator[tuple[Vehicle, list[psutil.Process]]]:
+    """Run a vehicle while the block lasts, and see its plant and its autopilot."""
+    with vehicle(folder, links=links) as flown:
+        children = psutil.Process(flown.process.pid).children(recursive=True)
+        assert len(children) == 2
+        yield flown, children
+
+
+def assert_gone(processes: list[psutil.Process]) -> None:
+    assert not [process for process in processes if process.is_running()]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_ends_when_told_to(tmp_path: Path, number: signal.Signals) -> None:
+    with standing(tmp_path) as (flown, children):
+        flown.process.send_signal(number)
+        assert flown.process.wait(10.0) == 0
+        assert_gone(children)
+        assert "error" not in flown.said
+        assert "Traceback" not in flown.said
+
+
+def test_ctrl_c_in_a_terminal_while_it_starts(tmp_path: Path) -> None:
+    """It reaches the whole group; the plant and the autopilot are loading."""
+    command = [sys.executable, "-m", "colibri", "sitl", "--plant-port", "0", "--gcs", "udpin:127.0.0.1:0"]
+    errors = tmp_path / "errors"
+    with errors.open("wb") as said:
+        process = subprocess.Popen(
+            [*command, "--state", str(tmp_path / "state")],
+            stderr=said,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+    started = psutil.Process(process.pid)
+    wait_for(started.children, "its first process")
+    children = started.children()
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.wait(10.0) == 0
+    assert_gone(children)
+    assert errors.read_text(encoding="utf-8") == ""
+
+
+@pytest.mark.parametrize("name", ["plant", "autopilot"])
+def test_a_process_that_dies_ends_it_in_words(tmp_path: Path, name: str) -> None:
+    with standing(tmp_path) as (flown, children):
+        (victim,) = (child for child in children if name in child.cmdline()[2])
+        victim.send_signal(signal.SIGKILL)
+        assert flown.process.wait(10.0) == 1
+        assert_gone(children)
+        assert flown.said.splitlines()[-1] == f"colibri: error: the {name} of instance 0 was killed by SIGKILL"
+        assert flown.said.count("error") == 1
+
+
+def test_nothing_outlives_it(tmp_path: Path) -> None:
+    with standing(tmp_path) as (flown, children):
+        flown.process.kill()
+        flown.process.wait()
+        gone, alive = psutil.wait_procs(children, timeout=10.0)
+        assert len(gone) == 2
+        assert not alive
+
+
+def test_a_ground_station_shuts_it_down(tmp_path: Path) -> None:
+    with GroundStation() as station, standing(tmp_path, station.url) as (flown, children):
+        station.wait("HEARTBEAT")
+        assert station.command(SHUT_DOWN, 2.0, 0, 0, 0, 0, 0, 0) == ACCEPTED
+        assert flown.process.wait(10.0) == 0
+        assert_gone(children)
+        assert flown.said.splitlines()[-1] == "  1 autopilot: shut down by a ground station"
+
+
+def test_its_time_is_over(tmp_path: Path) -> None:
+    with vehicle(tmp_path, "--duration", "0.5") as flown:
+        assert flown.process.wait(30.0) == 0
+
+
+FACT = {
+    "mode": "stabilized",
+    "armed": False,
+    "position_enu_m": (-0.04, -123.45, 78.9),
+    "speed_m_s": 12.34,
+    "sim_time_s": 12345.6,
+    "times_real_time": 1.004,
+    "solve_time_us": 123.4,
+    "links": [
+        {"url": "udpout:127.0.0.1:14550", "heard": ["255/190"], "received_hz": 2.4, "sent_hz": 61.0, "lost": 0},
+        {"url": "udpout:127.0.0.1:14540", "heard": [], "received_hz": 0.0, "sent_hz": 0.0, "lost": 0},
+    ],
+}
+
+
+def drawn(*instances: int) -> list[str]:
+    console = Console(width=80, force_terminal=False, color_system=None)
+    with console.capture() as capture:
+        console.print(status_table({instance: FACT for instance in instances}))
+    return [line.rstrip() for line in capture.get().splitlines()]
+
+
+def test_the_status_line_fits_a_terminal() -> None:
+    assert drawn(0) == [
+        " id    time   real mode       rotors     east  north      up    speed solver",
+        "  1 12346 s x 1.00 stabilized disarmed    0.0 -123.5  78.9 m 12.3 m/s 123 µs",
+        "  1  udpout:127.0.0.1:14550  hears 255/190     2/s in  61/s out",
+        "  1  udpout:127.0.0.1:14540  hears nobody yet  0/s in   0/s out",
+    ]
+
+
+def test_the_status_lines_of_a_fleet_leave_out_who_is_not_heard() -> None:
+    assert [line[:30] for line in drawn(1, 0)] == [
+        " id    time   real mode       ",
+        "  1 12346 s x 1.00 stabilized ",
+        "  2 12346 s x 1.00 stabilized ",
+        "  1  udpout:127.0.0.1:14550  h",
+        "  2  udpout:127.0.0.1:14550  h",
+    ]

@@ -1,0 +1,195 @@
+"""`colibri verify --golden`: what differs is named, what does not fit the set is refused, and hashes are renewed."""
+
+import json
+from collections.abc import Callable
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+from colibri.autopilot.control.registry import GROUP
+from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
+from colibri.cli.main import main
+from colibri.cli.verify import GOLDEN_HASHES
+from colibri.sitl.vehicle import Sitl
+from colibri.verification import golden, golden_flights
+from colibri.verification.cases import Case, SitlCase
+
+SHORT = Case("short", {"track": "line", "profile": "se3", "duration": 0.4})
+CORNER = Case("corner", {"track": "waypoints", "profile": "se3", "duration": 0.4}, golden_flights.WAYPOINTS)
+
+
+def hop(sitl: Sitl) -> None:
+    sitl.run(0.1)
+
+
+HOP = SitlCase(name="hop", orders=hop, setting={"airborne": 2.0})
+WRONG = "0" * 64
+
+Verify = Callable[..., int]
+
+
+@pytest.fixture
+def hashes(tmp_path: Path) -> Path:
+    return tmp_path / "golden" / "hashes.json"
+
+
+@pytest.fixture
+def verify(tmp_path: Path, hashes: Path, monkeypatch: pytest.MonkeyPatch) -> Verify:
+    monkeypatch.setattr(golden, "FLIGHTS", (SHORT, CORNER, HOP))
+
+    def run(*options: str) -> int:
+        command = ["verify", "--golden", str(hashes), "--link", "memory", "--out", str(tmp_path / "out")]
+        try:
+            return main([*command, *options])
+        except SystemExit as end:
+            return int(end.code or 0)
+
+    return run
+
+
+def test_what_was_renewed_is_the_same_and_says_what_changed(
+    verify: Verify, hashes: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert verify("--renew") == 0
+    assert "3 of 3 changed" in " ".join(capsys.readouterr().out.split())
+    known = json.loads(hashes.read_text(encoding="utf-8"))
+    assert list(known) == ["short", "corner", "hop"]
+    assert verify() == 0
+    table = capsys.readouterr().out
+    assert table.count("the same") == 3
+    assert known["hop"][:16] in table
+    found = json.loads((tmp_path / "out" / golden.FOUND).read_text(encoding="utf-8"))
+    assert {name: outcome["sha256"] for name, outcome in found.items()} == known
+    assert all(outcome["wall_time_s"] > 0.0 for outcome in found.values())
+    assert verify("--renew") == 0
+    assert "nothing changed" in capsys.readouterr().out
+
+
+def test_what_differs_is_named_with_both_hashes(
+    verify: Verify, hashes: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    verify("--renew", "--quiet")
+    known = json.loads(hashes.read_text(encoding="utf-8"))
+    hashes.write_text(json.dumps(known | {"corner": WRONG}), encoding="utf-8")
+    assert verify() == 1
+    said = capsys.readouterr()
+    assert f"not as in {hashes}: corner; the logs are in" in said.err
+    (line,) = (line for line in said.out.splitlines() if "corner" in line)
+    assert WRONG[:16] in line
+    assert known["corner"][:16] in line
+    assert verify("--only", "short", "--only", "hop", "--quiet") == 0
+
+
+def test_one_flight_is_renewed_alone_and_what_is_no_flight_is_dropped(
+    verify: Verify, hashes: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    verify("--renew", "--quiet")
+    known = json.loads(hashes.read_text(encoding="utf-8"))
+    hashes.write_text(json.dumps({"gone": WRONG, "hop": WRONG, "short": WRONG}), encoding="utf-8")
+    assert verify("--renew", "--only", "short") == 0
+    assert json.loads(hashes.read_text(encoding="utf-8")) == {"short": known["short"], "hop": WRONG}
+    table = " ".join(capsys.readouterr().out.split())
+    assert "2 of 2 changed" in table
+    assert "gone" in table
+    assert "hop" not in table
+
+
+def hop_to_the_moon(sitl: Sitl) -> None:
+    sitl.wait_until(lambda: sitl.position[2] > 4e8, within=0.1, what="the hop")
+
+
+def test_a_flight_that_does_not_end_differs_and_is_not_renewed(
+    verify: Verify, hashes: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    verify("--renew", "--quiet")
+    before = hashes.read_bytes()
+    monkeypatch.setattr(golden, "FLIGHTS", (SHORT, CORNER, SitlCase(name="hop", orders=hop_to_the_moon)))
+    assert verify() == 1
+    said = capsys.readouterr()
+    assert "the hop took longer" in " ".join(said.out.split())
+    assert f"not as in {hashes}: hop;" in said.err
+    assert verify("--renew") == 1
+    assert "hop did not end" in capsys.readouterr().err
+    assert hashes.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, "there are no golden hashes in"),
+        ("short: 12", "holds no golden hashes"),
+        ('{"short": "12"}', "holds no golden hashes"),
+        ('["short"]', "holds no golden hashes"),
+        (json.dumps({"short": WRONG, "corner": WRONG}), "has no hash of golden flight hop: write it anew"),
+        (json.dumps(dict.fromkeys(("short", "corner", "hop", "leap"), WRONG)), "names leap, which is no golden flight"),
+    ],
+)
+def test_a_file_that_does_not_fit_the_set_is_refused_in_one_line(
+    verify: Verify, hashes: Path, capsys: pytest.CaptureFixture[str], content: str | None, words: str
+) -> None:
+    hashes.parent.mkdir()
+    if content is not None:
+        hashes.write_text(content, encoding="utf-8")
+    assert verify() == 2
+    said = capsys.readouterr()
+    assert words in said.err
+    assert str(hashes) in said.err
+    assert said.err.count("\n") == 1
+    assert not said.out
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["verify", "--golden", "--only", "leap"], "--only leap: there is no such golden flight"),
+        (["verify", "--golden", "--duration", "5"], "--duration does not go with --golden"),
+        (["verify", "--renew"], "--renew goes with --golden alone"),
+        (["verify", "--only", "spiral"], "--only goes with --golden alone"),
+    ],
+)
+def test_what_does_not_go_together_is_refused_in_one_line(
+    options: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(options)
+    assert end.value.code == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count("\n") == 1
+
+
+def test_both_kinds_of_flight_are_the_same_over_udp(tmp_path: Path) -> None:
+    for flight in (SHORT, HOP):
+        flown = [golden.fly_golden(flight, tmp_path / flight.name / link, link) for link in ("memory", "udp")]
+        assert flown[0].sha256 == flown[1].sha256 != ""
+
+
+def test_the_file_of_the_project_names_the_set_in_its_order() -> None:
+    """`colibri verify --golden --renew --only NAME` adds what is missing, and drops what is no flight any more."""
+    known = golden.read_hashes(Path(__file__).parents[2] / GOLDEN_HASHES)
+    assert list(known) == [flight.name for flight in golden_flights.FLIGHTS]
+
+
+def test_every_control_law_has_a_golden_flight() -> None:
+    laws = [law.name for law in entry_points(group=GROUP) if law.dist and law.dist.name == "colibri-sitl"]
+    missing = golden.without_flight(laws)
+    assert len(laws) >= 4
+    assert not missing, (
+        f"no golden flight for control law {', '.join(missing)}: add one to colibri/verification/golden_flights.py, "
+        "then colibri verify --golden --renew --only NAME"
+    )
+
+
+def test_a_control_law_without_a_golden_flight_is_found() -> None:
+    assert golden.without_flight(["lpv-mpc", "another", "cascade"]) == ["another"]
+
+
+@pytest.mark.parametrize("profile", ["flight", "thesis"])
+def test_every_track_of_the_thesis_has_a_golden_flight(profile: str) -> None:
+    tracks = [
+        flight.options["track"]
+        for flight in golden_flights.FLIGHTS
+        if isinstance(flight, Case) and flight.options["profile"] == profile
+    ]
+    assert set(THESIS_TRACKS) <= set(tracks)

@@ -1,0 +1,156 @@
+"""`colibri replay`: recorded frames give the recorded commands again, and what does not is found and named."""
+
+import shutil
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from colibri.autopilot.process.recorded_inputs import Setup, read
+from colibri.cli.main import main
+from colibri.flights.replay import replay_flight
+from colibri.mavlink.hil.state import ActuatorCommand, decode_actuators, encode_actuators
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Codec, mav
+from colibri.mavlink.wire.tlog import STAMP, decode
+from tools.harness.observer import Observer
+from tools.harness.processes import Process, fly, running
+
+CHANGED_US = 1_000_000
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("flight")
+    fly(out, "spiral", "--link", "memory", "--duration", "2")
+    return out
+
+
+@pytest.fixture
+def copy(flight: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(flight, tmp_path / "flight"))
+
+
+def test_a_flight_is_replayed(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(flight / "flight.tlog")]) == 0
+    assert capsys.readouterr().out == "500 commands up to t = 1.996 s, all identical\n"
+
+
+def test_a_flight_on_sensors_is_replayed(tmp_path: Path) -> None:
+    fly(tmp_path, "line", "--feedback", "sensors", "--seed", "2", "--link", "memory", "--duration", "4")
+    assert replay_flight(tmp_path / "flight.tlog") == (1000, 3_996_000, None)
+
+
+def change(tlog: Path, changed: Callable[[ActuatorCommand], ActuatorCommand]) -> None:
+    """Change the command of one instant."""
+    codec = Codec(1, AUTOPILOT_COMPONENT)
+    log = b""
+    for time_us, frame in decode(tlog.read_bytes()):
+        (message,) = codec.decode(frame)
+        if time_us == CHANGED_US and message.name == "HIL_ACTUATOR_CONTROLS":
+            command = decode_actuators(message)
+            assert command is not None
+            frame = encode_actuators(codec, changed(command))
+        log += STAMP.pack(time_us) + frame
+    tlog.write_bytes(log)
+
+
+def test_the_first_command_that_differs_is_named(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By the least that the wire can carry."""
+
+    def a_little(command: ActuatorCommand) -> ActuatorCommand:
+        first, *others = command.controls
+        return ActuatorCommand(command.time_us, (first + 2e-7, *others), command.armed)  # type: ignore[arg-type]
+
+    change(copy / "flight.tlog", a_little)
+    with pytest.raises(SystemExit) as end:
+        main(["replay", str(copy / "flight.tlog")])
+    assert end.value.code == 1
+    said = capsys.readouterr()
+    assert said.out.startswith("first difference at t = 1.000 s, in mode track\n")
+    assert "m/s, roll" in said.out
+    assert said.err.endswith("flight.tlog: the autopilot does not answer as it did, after 250 commands\n")
+
+
+def test_another_autopilot_is_found_out(copy: Path) -> None:
+    inputs = copy / "inputs.jsonl"
+    inputs.write_text(inputs.read_text().replace('"lpv-mpc"', '"geometric-se3"').replace('"flight"', '"se3"'))
+    difference = replay_flight(copy / "flight.tlog").difference
+    assert difference is not None
+    assert difference.recorded.time_us == 0
+
+
+def test_of_a_flight_that_was_cut_off_what_there_is_is_replayed(copy: Path) -> None:
+    tlog = copy / "flight.tlog"
+    tlog.write_bytes(tlog.read_bytes()[:-300])
+    commands, _, difference = replay_flight(tlog)
+    assert difference is None
+    assert 490 < commands < 500
+
+
+def forget_inputs(folder: Path) -> None:
+    (folder / "inputs.jsonl").unlink()
+
+
+def garble_inputs(folder: Path) -> None:
+    (folder / "inputs.jsonl").write_text('{"what": "began"}\n')
+
+
+def garble_log(folder: Path) -> None:
+    (folder / "flight.tlog").write_bytes(b"x" * 100)
+
+
+def empty_log(folder: Path) -> None:
+    (folder / "flight.tlog").write_bytes(b"")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (forget_inputs, "inputs.jsonl is missing"),
+        (garble_inputs, "inputs.jsonl: line 1: "),
+        (garble_log, "flight.tlog: no MAVLink frame at byte 8"),
+        (empty_log, "flight.tlog: no frame of state feedback is answered in it"),
+    ],
+)
+def test_what_cannot_be_replayed_is_one_line(
+    spoil: Callable[[Path], None], said: str, copy: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spoil(copy)
+    with pytest.raises(SystemExit) as end:
+        main(["replay", str(copy / "flight.tlog")])
+    assert end.value.code == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_what_ground_stations_ordered_is_replayed(tmp_path: Path) -> None:
+    """Over UDP, in the air: the autopilot is killed and started again; then the vehicle lands."""
+    out, logs = tmp_path / "out", tmp_path / "logs"
+    logs.mkdir()
+    start = ("--vehicle", "hummingbird", "--start", "z=3,psi=90,rotors=4740", "--speed", "4", "--out", str(out))
+    plant = Process(logs, "plant", "--link", "udpin:127.0.0.1:0", *start)
+    with Observer() as seen, running(plant):
+        url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
+        options = ("--plant", url, f"--gcs={seen.url}", "--out", str(out), "--state", str(tmp_path / "state"))
+        first = Process(logs, "autopilot", *options)
+        with running(first):
+            seen.wait(lambda sight: sight.time_s > 1.0, "the vehicle")
+            first.process.send_signal(signal.SIGKILL)
+            first.wait()
+        killed_s = seen.now.time_s
+        second = Process(logs, "autopilot", *options)
+        with running(second):
+            seen.wait(lambda sight: sight.time_s > killed_s + 0.5, "the vehicle again")
+            ack = seen.ask("COMMAND_ACK", "COMMAND_LONG", mav.MAV_CMD_NAV_LAND, 0, *[0.0] * 7)
+            assert (ack.command, ack.result) == (mav.MAV_CMD_NAV_LAND, mav.MAV_RESULT_ACCEPTED)
+            seen.wait(lambda sight: not sight.armed, "the landing")
+            plant.process.send_signal(signal.SIGINT)
+            plant.wait()
+    setups = [what for what in read((out / "inputs.jsonl").read_bytes()) if isinstance(what, Setup)]
+    assert [bool(setup.past) for setup in setups] == [False, True]
+    commands, last_us, difference = replay_flight(out / "flight.tlog")
+    assert difference is None
+    assert commands > 500
+    assert last_us > setups[1].first_us + 2_000_000

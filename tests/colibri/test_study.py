@@ -1,0 +1,172 @@
+"""`colibri study`: what it flies, its tables and figures, and what bad input gets."""
+
+from dataclasses import replace
+from math import isnan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colibri.analysis.recording import COLUMNS, read_recording
+from colibri.cli.main import main
+from colibri.flights.in_process import fly_locally
+from colibri.plant.environment.weather import Weather, Wind
+from colibri.plant.vehicle.description import load_vehicle
+from colibri.studies.studies import FORMATS, STUDIES, Case, Measure, Study, table, write
+from colibri.studies.study_figures import running_rms
+from colibri.studies.study_flights import Flight, Flown, Perturbation, fly
+
+NAMES = ["tracks", "speed", "recovery", "robustness", "limits", "scheduling"]
+
+
+@pytest.fixture(scope="module")
+def short() -> Flown:
+    return fly(Flight("hover:height=20", start=(("z", 20.0), ("phi", 170.0)), duration_s=0.8))
+
+
+def moved(flown: Flown, *, to_t_s: float, by_m: float) -> Flown:
+    """Return a flight whose samples end at another time, `by_m` further from the reference."""
+    recording = flown.recording
+    changed = recording.table.copy()
+    changed[:, COLUMNS.index("t")] += to_t_s - changed[-1, 0]
+    changed[:, COLUMNS.index("x")] += by_m
+    return replace(flown, recording=replace(recording, table=changed))
+
+
+def of_name(name: str) -> Study:
+    (found,) = [study for study in STUDIES if study.name == name]
+    return found
+
+
+def test_the_studies() -> None:
+    assert [study.name for study in STUDIES] == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_case_has_a_cell_of_its_own_and_can_be_flown(name: str, tmp_path: Path) -> None:
+    cases = of_name(name).cases
+    assert len({(case.row, case.group) for case in cases}) == len(cases)
+    assert len({case.row for case in cases}) * len({case.group for case in cases}) == len(cases)
+    for flight in {case.flight for case in cases}:
+        assert flight.plan(tmp_path).duration_s == flight.duration_s
+
+
+def test_a_flight_changes_what_it_says_and_nothing_else(tmp_path: Path) -> None:
+    plain = Flight("spiral").plan(tmp_path)
+    weather = Weather(Wind(5.0, 270.0), turbulence="light", seed=3)
+    flight = Flight("spiral", weather=weather, start=(("phi", 170.0),), scheduling="frozen", duration_s=3.0)
+    changed = flight.plan(tmp_path)
+    assert (changed.weather, changed.start, changed.duration_s) == (weather, plain.start._replace(phi=170.0), 3.0)
+    assert changed.profile.table("lpv-mpc")["attitude"]["scheduling"] == "frozen"
+    assert plain.profile.table("lpv-mpc")["attitude"]["scheduling"] == "along-plan"
+    assert (changed.vehicle, changed.plant_vehicle) == (plain.vehicle, plain.plant_vehicle)
+    assert changed.link == "memory"
+
+
+def test_a_perturbation_is_the_plants_alone(tmp_path: Path) -> None:
+    nominal = load_vehicle("hummingbird")
+    plan = Flight("spiral", perturbation=Perturbation(mass=1.2, inertia=1.3, front_rotor=0.85)).plan(tmp_path)
+    assert plan.vehicle == nominal
+    assert plan.plant_vehicle.body.mass_kg == pytest.approx(1.2 * nominal.body.mass_kg)
+    assert plan.plant_vehicle.body.inertia_kg_m2 == pytest.approx([1.3 * i for i in nominal.body.inertia_kg_m2])
+    assert plan.plant_vehicle.rotors.strength == (0.85, 1.0, 1.0, 1.0)
+
+
+def test_a_limit_is_both_sides(tmp_path: Path) -> None:
+    plan = Flight("spiral", max_speed=600.0).plan(tmp_path)
+    assert plan.vehicle.rotors.max_speed == plan.plant_vehicle.rotors.max_speed == 600.0
+
+
+def test_a_flight_is_that_of_the_command_line(short: Flown, tmp_path: Path) -> None:
+    plan = short.flight.plan(tmp_path)
+    fly_locally(plan, lambda _sim_time_s: None)
+    assert read_recording(plan).trajectory_sha256 == short.recording.trajectory_sha256
+
+
+def test_figures_of_merit(short: Flown) -> None:
+    assert short.failure is None
+    assert isnan(short.rms_m)
+    assert not short.lost
+    assert short.upright[0] == pytest.approx(np.cos(np.radians(170.0)))
+    assert short.tilt_deg[0] == pytest.approx(170.0)
+    assert short.height_lost_m > 0.1
+    late = moved(short, to_t_s=30.0, by_m=1.0)
+    error = late.recording.position_error_m
+    assert late.rms_m == pytest.approx(np.sqrt(np.mean(error**2)))
+    assert late.largest_m == error.max()
+    assert late.least_upright == late.upright.min()
+
+
+def test_far_off_is_lost(short: Flown) -> None:
+    assert moved(short, to_t_s=30.0, by_m=100.0).lost
+    assert not moved(short, to_t_s=10.0, by_m=100.0).lost  # may still be on its way
+    assert replace(short, failure="the state is not finite").lost
+
+
+def test_the_time_from_which_a_bound_holds(short: Flown) -> None:
+    ramp = np.linspace(10.0, 0.0, len(short.t))
+    since_s = short.stays_below(ramp, 5.0)
+    assert since_s == short.t[np.argmax(ramp < 5.0)]
+    assert isnan(short.stays_below(ramp, -1.0))
+    assert short.stays_below(ramp, 11.0) == 0.0
+    assert short.falls_below(ramp, 5.0) == since_s
+    assert isnan(short.falls_below(-ramp, -5.0))  # it only was before its largest
+
+
+def test_a_running_rms_of_what_is_constant() -> None:
+    longer = fly(Flight("hover", duration_s=1.6))
+    t, error = running_rms(longer)
+    assert t[-1] == pytest.approx(longer.t[-1])
+    last = longer.recording.position_error_m[longer.t > longer.t[-1] - 1.0 + 1e-6]
+    assert error[-1] == pytest.approx(np.sqrt(np.mean(last**2)))
+
+
+def test_a_table_has_a_row_for_each_name_and_columns_for_each_group(short: Flown) -> None:
+    measures = (Measure("one", lambda _flown: "1"), Measure("two", lambda flown: flown.flight.track))
+    cases = tuple(Case((row,), group, Flight(row + group)) for row in "ab" for group in ("g", "h"))
+    flown = [replace(short, flight=case.flight) for case in cases]
+    headings, rows = table(Study("", ("name",), measures, cases, lambda _results: {}), flown)
+    assert headings == ("name", "g: one", "g: two", "h: one", "h: two")
+    assert rows == [("a", "1", "ag", "1", "ah"), ("b", "1", "bg", "1", "bh")]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_figures_and_tables_are_written(name: str, short: Flown, tmp_path: Path) -> None:
+    study = of_name(name)
+    flown = [moved(replace(short, flight=case.flight), to_t_s=30.0, by_m=0.1) for case in study.cases]
+    flown[0] = replace(flown[0], failure="lost")
+    written = {path.name for path in write(study, flown, tmp_path)}
+    figures = written - {f"{name}.md", f"{name}.csv"}
+    assert {Path(figure).stem for figure in figures} >= ({name} if name != "limits" else {"limits-spiral-600-with"})
+    assert figures == {f"{Path(figure).stem}.{suffix}" for figure in figures for suffix in FORMATS}
+    assert {path.name for path in tmp_path.iterdir()} == written
+    assert len((tmp_path / f"{name}.md").read_text(encoding="utf-8").splitlines()) == 2 + len(
+        {case.row for case in study.cases}
+    )
+
+
+def test_what_is_lost_says_so(short: Flown) -> None:
+    study = of_name("tracks")
+    lost = moved(short, to_t_s=30.0, by_m=100.0)
+    _, rows = table(study, [lost] * len(study.cases))
+    assert {cell for row in rows for cell in row[1:]} == {"lost"}
+
+
+def test_an_unknown_study_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["study", "speed", "flips", "--out", str(tmp_path)])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == f"colibri: error: there is no study flips: choose {', '.join(NAMES)}\n"
+
+
+def test_a_study_from_the_command_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cases = tuple(Case((f"{lap}", ""), "", Flight(f"lemniscate:lap={lap}", duration_s=0.4)) for lap in (6, 7))
+    brief = of_name("recovery")._replace(cases=cases)
+    monkeypatch.setattr("colibri.studies.studies.STUDIES", (brief,))
+    assert main(["study", "recovery", "--out", str(tmp_path)]) == 0
+    assert "recovery: recovery.md, recovery.csv, recovery.png" in " ".join(capsys.readouterr().out.split())
+    assert (tmp_path / "recovery-6.svg").exists()
+    lines = (tmp_path / "recovery.csv").read_text(encoding="utf-8").splitlines()
+    assert [line.split(",")[0] for line in lines] == ["start", "6", "7"]

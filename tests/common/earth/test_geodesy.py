@@ -1,0 +1,59 @@
+"""Places on earth and metres from an origin: there and back, and what is known of a few."""
+
+from math import cos, hypot, inf, nan, radians
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, EARTH_RADIUS_M, Geodetic, enu_of, geodetic_of, is_on_earth
+from tests.strategies import reals
+
+ORIGINS = st.builds(Geodetic, st.floats(-89.0, 89.0), reals(180.0), reals(5000.0))
+DEGREE_M = radians(1.0) * EARTH_RADIUS_M
+
+
+@given(ORIGINS, st.tuples(reals(1e5), reals(1e5), reals(1e4)))
+def test_there_and_back_again(origin: Geodetic, place: tuple[float, float, float]) -> None:
+    there = geodetic_of(place, origin)
+    assert is_on_earth(there.latitude_deg, there.longitude_deg)
+    assert enu_of(there, origin) == pytest.approx(place, abs=1e-6)
+
+
+@given(ORIGINS, reals(1e4), reals(1e4))
+def test_the_distance_is_kept(origin: Geodetic, east: float, north: float) -> None:
+    x, y, z = enu_of(geodetic_of((east, north, 0.0), origin), origin)
+    assert hypot(x, y) == pytest.approx(hypot(east, north), abs=1e-6)
+    assert z == pytest.approx(0.0, abs=1e-9)
+
+
+@given(ORIGINS)
+def test_the_origin_is_the_origin(origin: Geodetic) -> None:
+    assert enu_of(origin, origin) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+    assert geodetic_of((0.0, 0.0, 3.0), origin) == origin._replace(altitude_m=origin.altitude_m + 3.0)
+
+
+def test_a_degree_north_and_a_degree_east() -> None:
+    latitude, longitude, altitude = DEFAULT_ORIGIN
+    east, north, up = enu_of(Geodetic(latitude + 1.0, longitude, altitude + 7.0), DEFAULT_ORIGIN)
+    assert (east, north, up) == pytest.approx((0.0, DEGREE_M, 7.0), abs=1e-6)
+    east, north, _ = enu_of(Geodetic(latitude, longitude + 0.01, altitude), DEFAULT_ORIGIN)
+    assert east == pytest.approx(0.01 * DEGREE_M * cos(radians(latitude)), rel=1e-6)
+    assert abs(north) < 0.1
+
+
+def test_across_the_date_line() -> None:
+    origin = Geodetic(10.0, 179.9999, 0.0)
+    there = geodetic_of((100.0, 0.0, 0.0), origin)
+    assert -180.0 <= there.longitude_deg < -179.9
+    assert enu_of(there, origin) == pytest.approx((100.0, 0.0, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("place", [(90.0, 180.0), (-90.0, -180.0), (0.0, 0.0)])
+def test_on_earth(place: tuple[float, float]) -> None:
+    assert is_on_earth(*place)
+
+
+@pytest.mark.parametrize("place", [(90.1, 0.0), (0.0, -180.1), (nan, 0.0), (0.0, nan), (inf, 0.0), (0.0, -inf)])
+def test_not_on_earth(place: tuple[float, float]) -> None:
+    assert not is_on_earth(*place)

@@ -1,0 +1,29 @@
+"""Log files: rows that lose no bit, and are there whatever end the process has."""
+
+from math import inf, nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colibri.common.process.log_files import CsvLog
+
+
+@given(row=st.lists(st.floats() | st.integers(-9, 9), min_size=1, max_size=5))
+def test_a_row_keeps_every_bit(tmp_path_factory: pytest.TempPathFactory, row: list[float]) -> None:
+    folder = tmp_path_factory.mktemp("log")
+    log = CsvLog(folder / "log.csv", ["x"] * len(row))
+    log.write(row)
+    _, line = (folder / "log.csv").read_text(encoding="utf-8").splitlines()
+    log.close()
+    assert [float(value).hex() for value in line.split(",")] == [float(value).hex() for value in row]
+
+
+def test_what_is_no_number_has_its_word_and_numpy_its_digits(tmp_path: Path) -> None:
+    log = CsvLog(tmp_path / "log.csv", ("a", "b", "c", "d"))
+    log.write((nan, inf, -inf, 0.5))
+    log.write((np.float64(0.1), 2, 1e-5, -0.0))
+    assert (tmp_path / "log.csv").read_text(encoding="utf-8") == "a,b,c,d\nnan,inf,-inf,0.5\n0.1,2,0.00001,-0.0\n"
+    log.close()

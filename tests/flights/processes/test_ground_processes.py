@@ -1,0 +1,165 @@
+"""Plant, autopilot and ground stations as processes: what dies, floods, falls asleep or vanishes ends no flight."""
+
+import random
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import cycle
+from pathlib import Path
+from threading import Event, Thread
+
+import pytest
+
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.mavlink.wire.dialect import Codec, mav
+from tools.harness.observer import Observer, Sight
+from tools.harness.processes import Process, running, wait_for
+
+HIGH = ("--vehicle", "hummingbird", "--start", "y=0,z=3,psi=90,rotors=4740")
+SPEED = 2.0
+PLACE = (0.0, 0.0, 3.0)
+FASTEST_US = 1_000
+STREAMS = ("ATTITUDE", "ATTITUDE_QUATERNION", "ODOMETRY", "HIGHRES_IMU", "LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
+CODEC = Codec(255, 190)
+CHANCE = random.Random(0)
+HEARTBEAT = CODEC.encode("HEARTBEAT", 6, 8, 0, 0, 4, 3)
+
+FLOODS: dict[str, list[bytes]] = {
+    "noise": [CHANCE.randbytes(300) for _ in range(64)],
+    "heartbeats": [HEARTBEAT],
+    "heartbeats, 150 in one": [150 * HEARTBEAT],
+    "requests, 100 in one": [100 * CODEC.encode("PARAM_REQUEST_READ", 1, 1, b"TRACK", -1)],
+}
+
+
+@pytest.fixture
+def logs(tmp_path: Path) -> Path:
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    return folder
+
+
+@contextmanager
+def hovering(logs: Path, *links: str) -> Iterator[tuple[Process, Process, Observer, str]]:
+    """Let a vehicle that was picked up in the air hover; give its plant, its autopilot, and who sees it."""
+    plant = Process(logs, "plant", "--link", "udpin:127.0.0.1:0", "--speed", repr(SPEED), *HIGH)
+    with Observer() as seen, running(plant):
+        url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
+        autopilot = start(logs, url, seen, *links)
+        with running(autopilot):
+            seen.wait(lambda sight: sight.time_s > 1.0, "the vehicle")
+            yield plant, autopilot, seen, url
+
+
+def start(logs: Path, url: str, seen: Observer, *links: str) -> Process:
+    return Process(logs, "autopilot", "--plant", url, *(f"--gcs={link}" for link in (*links, seen.url)))
+
+
+def hovers(sight: Sight) -> bool:
+    away_m = max(abs(is_at - was_at) for is_at, was_at in zip(sight.position_enu_m, PLACE, strict=True))
+    return sight.mode is Mode.HOLD and sight.armed and away_m < 0.05
+
+
+def flies_on(seen: Observer, seconds: float) -> None:
+    """See the vehicle hover for so long, simulated."""
+    until_s = seen.now.time_s + seconds
+    seen.wait(lambda sight: sight.time_s > until_s, f"{seconds} s of flight")
+    assert all(map(hovers, seen.sights)), seen.now
+
+
+def test_an_autopilot_that_was_killed_is_started_again_and_holds(logs: Path) -> None:
+    with hovering(logs) as (plant, first, seen, url):
+        first.process.send_signal(signal.SIGKILL)
+        first.wait()
+        assert "waiting for the autopilot" in plant.wait_for("silence")["text"]
+        before_s = seen.now.time_s
+        second = start(logs, url, seen)
+        with running(second):
+            seen.wait(lambda sight: sight.time_s > before_s, "the vehicle again")
+            plant.wait_for("answered")
+            flies_on(seen, 1.0)
+
+
+def test_an_autopilot_says_that_its_plant_is_gone(logs: Path) -> None:
+    with hovering(logs) as (plant, autopilot, _, _):
+        plant.process.send_signal(signal.SIGKILL)
+        assert "waiting for a plant" in autopilot.wait_for("silence")["text"]
+        autopilot.process.send_signal(signal.SIGINT)
+        assert autopilot.wait() == 130
+        assert autopilot.errors() == ""
+
+
+@contextmanager
+def flooding(port: int, datagrams: list[bytes]) -> Iterator[Callable[[], int]]:
+    """Send datagrams as fast as this process can; give how many were sent."""
+    ended, sent = Event(), 0
+
+    def flood() -> None:
+        nonlocal sent
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+            sock.connect(("127.0.0.1", port))
+            for datagram in cycle(datagrams):
+                if ended.is_set():
+                    return
+                sock.send(datagram)
+                sent += 1
+
+    thread = Thread(target=flood, daemon=True)
+    thread.start()
+    try:
+        yield lambda: sent
+    finally:
+        ended.set()
+        thread.join()
+
+
+def waiting_ports(autopilot: Process) -> list[int]:
+    urls = [event["url"] for event in autopilot.events("ground")]
+    return [int(url.rpartition(":")[2]) for url in urls if url.partition(":")[0] in ("udpin", "tcpin")]
+
+
+def test_a_flood_ends_no_flight(logs: Path) -> None:
+    with hovering(logs, "udpin:127.0.0.1:0") as (_, autopilot, seen, _):
+        (port,) = waiting_ports(autopilot)
+        for datagrams in FLOODS.values():
+            with flooding(port, datagrams) as sent:
+                flies_on(seen, 1.0)
+            assert sent() > 1000
+        flies_on(seen, 1.0)
+        assert autopilot.errors() == ""
+
+
+def test_clients_that_fall_asleep_or_vanish_are_nobodys_trouble(logs: Path) -> None:
+    with hovering(logs, "tcpin:127.0.0.1:0") as (_, autopilot, seen, _):
+        (port,) = waiting_ports(autopilot)
+        asleep, vanishing = (caller(port) for _ in range(2))
+        for client in (asleep, vanishing):
+            for name in STREAMS:
+                number = getattr(mav, f"MAVLINK_MSG_ID_{name}")
+                wish = (1, 1, mav.MAV_CMD_SET_MESSAGE_INTERVAL, 0, number, FASTEST_US, 0, 0, 0, 0, 0)
+                client.sendall(CODEC.encode("COMMAND_LONG", *wish))
+        heard = b""
+        while len(heard) < 10_000:
+            heard += vanishing.recv(4096)
+        vanishing.close()
+        flies_on(seen, 3.0)
+        wait_for(lambda: not connected(autopilot, 2), "the connection to be forgotten")
+        asleep.close()
+        wait_for(lambda: not connected(autopilot, 1), "the other connection to be forgotten")
+        assert autopilot.errors() == ""
+
+
+def caller(port: int) -> socket.socket:
+    """Call, with little room for what is not read."""
+    sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    sock.connect(("127.0.0.1", port))
+    sock.sendall(HEARTBEAT)
+    return sock
+
+
+def connected(autopilot: Process, how_many: int) -> bool:
+    """Whether the autopilot says that it hears so many, on the link that waits."""
+    status = autopilot.events("status")[-1]
+    return any(len(link["heard"]) >= how_many for link in status["links"] if link["url"].startswith("tcpin"))

@@ -1,0 +1,97 @@
+"""`colibri fly` watched and asked by ground stations: the same flight, bit for bit."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.control.profile import load_profile
+from colibri.mavlink.wire.dialect import mav
+from colibri.plant.physics.start import Start
+from tools.harness.copter_flight import CopterFlight
+from tools.harness.ports import OnPort
+from tools.harness.processes import fly, states
+from tools.harness.stations import ACCEPTED, HOLD, Ack, Station
+
+DURATION = ("--duration", "6")
+WATCHED = ("HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY", "AUTOPILOT_VERSION", "PARAM_VALUE", "PING")
+
+
+@pytest.mark.parametrize(
+    ("track", "profile"),
+    [
+        ("lemniscate", "flight"),
+        *(pytest.param(*flown, marks=pytest.mark.long) for flown in (("circle", "se3"), ("wave", "thesis"))),
+    ],
+)
+def test_a_watched_flight_is_the_same_bit_for_bit(tmp_path: Path, track: str, profile: str) -> None:
+    asked = ("--profile", profile, *DURATION)
+    alone = fly(tmp_path / "alone", track, "--link", "memory", *asked)
+    stations = Station(255, every=2), Station(245, every=2)
+    with OnPort(stations[0]) as one, OnPort(stations[1]) as other:
+        links = ("--gcs", one.url, "--gcs", other.url, "--speed", "3")
+        watched = fly(tmp_path / "watched", track, *links, *asked)
+    for station in stations:
+        assert not [name for name in WATCHED if not station.counts[name]], station.counts
+        assert {ack.target for ack in station.acks} == {station.identity}
+        assert {ack.result for ack in station.acks} == {ACCEPTED}
+        assert {ack.command for ack in station.acks} == set(station.sent)
+    assert watched["trajectory_sha256"] == alone["trajectory_sha256"]
+    assert watched["rmse_m"] == alone["rmse_m"]
+    flown = [(tmp_path / name / "plant.csv").read_bytes() for name in ("alone", "watched")]
+    assert flown[0] == flown[1]
+
+
+def test_nothing_is_compiled_or_loaded_in_flight() -> None:
+    """It would hold the vehicle up for seconds, at its first take-off of all times."""
+    command = [sys.executable, "-m", "tests.flights.processes.compiled_in_flight"]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == ""
+
+
+@pytest.mark.parametrize("profile", ["se3", "thesis"])
+def test_every_control_law_flies_where_it_is_sent(profile: str) -> None:
+    """One previews a single reference, the other two that are four control samples apart."""
+    flight = CopterFlight(profile=load_profile(profile), start=Start(z=5.0, rotors=4740.0))
+    assert flight.go(3.0, 1.0, 6.0) == ACCEPTED
+    flight.run(8.0)
+    assert flight.position == pytest.approx((3.0, 1.0, 6.0), abs=0.05)
+    assert flight.select(Mode.TRACK) == ACCEPTED
+    flight.run(20.0)
+    assert flight.mode is Mode.TRACK
+
+
+def test_a_flight_is_paced_to_the_wall_clock_once_somebody_may_watch(tmp_path: Path) -> None:
+    station = Station(255)
+    with OnPort(station) as port:
+        report = fly(tmp_path, "hover", "--gcs", port.url, "--duration", "1.5")
+    assert station.counts["HEARTBEAT"] >= 1
+    assert report["wall_time_s"] > 1.4
+
+
+def test_a_ground_station_may_take_over(tmp_path: Path) -> None:
+    """A track is a mode like any other: another one can be chosen."""
+    station = Station(255, orders=[HOLD])
+    with OnPort(station) as port:
+        report = fly(tmp_path, "lemniscate", "--gcs", port.url, "--speed", "max", "--duration", "10")
+    assert station.acks[Ack(mav.MAV_CMD_DO_SET_MODE, ACCEPTED, station.identity)] == 1
+    flown = states(tmp_path)
+    assert report["max_error_m"] > 1.0
+    assert abs(flown[-1, 1:4]).max() < 1e-3  # it holds still
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (("--link", "memory", "--gcs", "udpin:127.0.0.1:0"), "--gcs needs --link udp: over memory there is no"),
+        (("--gcs", "udpin:0.0.0.0:0"), "udpin:0.0.0.0:0 reaches beyond this computer: give --signing-key FILE"),
+        (("--gcs", "radio:1"), "radio:1: expected udpin:HOST:PORT or udpout:HOST:PORT"),
+    ],
+)
+def test_an_invitation_that_cannot_be_is_one_line(tmp_path: Path, options: tuple[str, ...], line: str) -> None:
+    command = [sys.executable, "-m", "colibri", "fly", "spiral", *options, "--quiet", "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"colibri: error: {line}")
+    assert done.stderr.count("\n") == 1

@@ -1,0 +1,141 @@
+"""Plant and autopilot as processes: bad links, deaths, restarts, either order."""
+
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tools.harness.lossy_relay import BadLink
+from tools.harness.processes import (
+    THESIS_PLANT,
+    Process,
+    fly_thesis,
+    reference,
+    running,
+    start_autopilot,
+    start_plant,
+    states,
+    wait_for,
+)
+
+START = ("--duration", "100", "--speed", "50")
+
+
+@pytest.fixture
+def logs(tmp_path: Path) -> Path:
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    return folder
+
+
+def test_a_bad_link_does_not_change_the_flight(tmp_path: Path, logs: Path) -> None:
+    """20 % lost, 10 % duplicated, 10 % reordered, both ways."""
+    duration = ("--duration", "20")
+    fly_thesis(tmp_path / "good", "spiral", "--link", "memory", *duration)
+    plant, url = start_plant(logs, tmp_path / "bad", *duration)
+    with BadLink(url, seed=1) as relay:
+        autopilot = start_autopilot(logs, relay.url)
+        with running(plant, autopilot):
+            ended = plant.wait_for("ended")
+            assert plant.wait() == 0
+    assert (states(tmp_path / "bad") == states(tmp_path / "good")).all()
+    assert ended["frames"] == 200
+    assert ended["resent"] > 60
+    assert min(relay.counts.values()) > 20
+    assert plant.errors() + autopilot.errors() == ""
+
+
+def test_the_autopilot_may_start_first(tmp_path: Path, logs: Path) -> None:
+    free, url = start_plant(logs, tmp_path / "unused")
+    free.stop()
+    autopilot = start_autopilot(logs, url)
+    with running(autopilot):
+        autopilot.wait_for("calling")
+        link = ("--link", url.replace("udpout", "udpin"))
+        plant = Process(logs, "plant", *link, *THESIS_PLANT, "--duration", "5")
+        with running(plant):
+            assert plant.wait_for("ended")["frames"] == 50
+            assert plant.wait() == 0
+
+
+def test_a_killed_autopilot_is_replaced_in_mid_flight(tmp_path: Path, logs: Path) -> None:
+    out = tmp_path / "flight"
+    plant, url = start_plant(logs, out, *START)
+    first = start_autopilot(logs, url)
+    with running(plant, first):
+        wait_for(lambda: any(event["sim_time_s"] > 30 for event in plant.events("progress")), "30 s of flight")
+        first.process.send_signal(signal.SIGKILL)
+        first.wait()
+        second = start_autopilot(logs, url)
+        with running(second):
+            assert plant.wait_for("ended")["sim_time_s"] == 100.0
+            assert plant.wait() == 0
+    flown, wanted = states(out), reference("spiral")
+    position = np.stack([wanted["x"], wanted["y"], wanted["z"]], axis=1)
+    off_m = np.linalg.norm(flown[:, 7:10] - position, axis=1)
+    assert off_m.max() < 0.1
+    assert off_m[-100:].max() < 1e-3
+
+
+def test_a_killed_plant_is_missed_and_replaced(tmp_path: Path, logs: Path) -> None:
+    first, url = start_plant(logs, tmp_path / "first")
+    autopilot = start_autopilot(logs, url)
+    with running(first, autopilot):
+        first.wait_for("progress")
+        first.process.send_signal(signal.SIGKILL)
+        first.wait()
+        assert "waiting for a plant" in autopilot.wait_for("silence")["text"]
+        second = Process(
+            logs,
+            "plant",
+            "--link",
+            url.replace("udpout", "udpin"),
+            "--duration",
+            "10",
+            "--out",
+            str(tmp_path / "second"),
+            *THESIS_PLANT,
+        )
+        with running(second):
+            assert second.wait_for("ended")["frames"] == 100
+    fly_thesis(tmp_path / "alone", "spiral", "--link", "memory", "--duration", "10")
+    assert (states(tmp_path / "second") == states(tmp_path / "alone")).all()
+
+
+def test_an_autopilot_at_another_rate_is_told(tmp_path: Path, logs: Path) -> None:
+    profile = tmp_path / "slow.toml"
+    text = (Path(__file__).parents[3] / "autopilot" / "profiles" / "thesis.toml").read_text(encoding="utf-8")
+    profile.write_text(text.replace("control_interval_s = 0.1", "control_interval_s = 0.2"), encoding="utf-8")
+    plant, url = start_plant(logs, tmp_path / "flight", "--speed", "1")
+    first = start_autopilot(logs, url)
+    with running(plant, first):
+        first.wait_for("flying")
+        first.stop()
+        second = start_autopilot(logs, url, "--profile", str(profile))
+        with running(second):
+            assert "another frame rate" in second.wait_for("refused")["text"]
+
+
+def test_an_autopilot_that_wants_sensors_of_a_vehicle_without_is_told(tmp_path: Path, logs: Path) -> None:
+    plant, url = start_plant(logs, tmp_path / "flight", "--speed", "1")
+    autopilot = start_autopilot(logs, url, "--vehicle", "hummingbird", "--feedback", "sensors")
+    with running(plant, autopilot):
+        assert "has no sensors" in autopilot.wait_for("refused")["text"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_both_and_keeps_what_was_logged(tmp_path: Path, logs: Path, number: signal.Signals) -> None:
+    out = tmp_path / "flight"
+    plant, url = start_plant(logs, out)
+    autopilot = start_autopilot(logs, url, "--out", str(out))
+    with running(plant, autopilot):
+        plant.wait_for("progress")
+        for process in (plant, autopilot):
+            process.process.send_signal(number)
+        assert (plant.wait(), autopilot.wait()) == (130, 130)
+    ended = plant.wait_for("ended")
+    assert len(states(out)) == ended["frames"] + 1
+    decisions = (out / "autopilot.csv").read_text(encoding="utf-8").splitlines()
+    assert len(decisions) - 1 in (ended["frames"], ended["frames"] + 1)
+    assert plant.errors() + autopilot.errors() == ""

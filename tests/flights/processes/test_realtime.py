@@ -1,0 +1,82 @@
+"""A plant that waits for nobody: it flies by the wall clock, stops its rotors in silence, and is picked up again."""
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colibri.plant.process.free_running import Silence
+from tools.harness.processes import Process, running, wait_for
+
+HIGH = ("--start", "z=500,psi=0,rotors=4740")
+
+
+def start(logs: Path, out: Path, *options: str) -> tuple[Process, str]:
+    plant = Process(logs, "plant", "--realtime", "--link", "udpin:127.0.0.1:0", "--out", str(out), *HIGH, *options)
+    url: str = plant.wait_for("listening")["url"]
+    return plant, url.replace("udpin", "udpout")
+
+
+def autopilot_for(logs: Path, url: str) -> Process:
+    return Process(logs, "autopilot", "--plant", url, "--track", "hover:height=500")
+
+
+def flown_on(plant: Process, seconds: float) -> Callable[[], bool]:
+    """Return what tells whether it has been answered without a break for so long, simulated."""
+    since: dict[int, float] = {}
+
+    def has() -> bool:
+        silences, now_s = len(plant.events("silence")), plant.events("progress")[-1]["sim_time_s"]
+        return bool(now_s - since.setdefault(silences, now_s) > seconds)
+
+    return has
+
+
+def test_rotors_stop_when_the_autopilot_dies_and_turn_for_the_next(tmp_path: Path) -> None:
+    logs, out = tmp_path / "logs", tmp_path / "flight"
+    logs.mkdir()
+    plant, url = start(logs, out, "--cut-after", "0.3")
+    first = autopilot_for(logs, url)
+    with running(plant, first):
+        first.wait_for("flying")
+        wait_for(
+            lambda: any(event["sim_time_s"] > 0.5 for event in plant.events("progress")), "half a second of flight"
+        )
+        first.process.send_signal(signal.SIGKILL)
+        first.wait()
+        cuts = len(plant.events("silence"))
+        wait_for(lambda: len(plant.events("silence")) > cuts, "the rotors to be stopped")
+        assert "the rotors are stopped" in plant.wait_for("silence")["text"]
+        second = autopilot_for(logs, url)
+        with running(second):
+            answered = len(plant.events("answered"))
+            wait_for(lambda: len(plant.events("answered")) > answered, "an answer")
+            wait_for(flown_on(plant, 0.5), "half a second without another silence")
+            plant.process.send_signal(signal.SIGINT)
+            assert plant.wait() == 130
+    truth = np.genfromtxt(out / "plant.csv", delimiter=",", skip_header=1)
+    assert np.diff(truth[:, 0]) == pytest.approx(0.004)
+    rotors = truth[:, 14:18].max(axis=1)
+    assert rotors.min() < 0.2 * rotors[0]
+    assert rotors[np.argmin(rotors) :].max() > 0.5 * rotors[0]
+
+
+def test_silence_is_said_once_each_time() -> None:
+    silence = Silence(0.5)
+    assert not silence.lasts(400_000)
+    assert silence.lasts(500_000)
+    assert not silence.lasts(600_000)
+    assert silence.ends(650_000)
+    assert not silence.ends(660_000)
+    assert not silence.lasts(1_100_000)
+    assert silence.lasts(1_200_000)
+
+
+@pytest.mark.parametrize("options", [("--speed", "max"), ("--serve", "px4")])
+def test_what_does_not_go_with_the_wall_clock_is_refused(tmp_path: Path, options: tuple[str, ...]) -> None:
+    plant = Process(tmp_path, "plant", "--realtime", *options)
+    assert plant.wait() == 2
+    assert "--realtime follows the wall clock" in plant.errors()
+    assert plant.errors().count("\n") == 1

@@ -1,0 +1,93 @@
+"""Flights on what sensors tell: the same over every link, another with every seed, and on the track."""
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colibri.common.process.lifecycle import nudge_m
+from colibri.mavlink.wire.dialect import Codec
+from tools.harness.lossy_relay import BadLink
+from tools.harness.processes import Process, fly, rows, running, start_autopilot, start_plant, states
+
+ON_SENSORS = ("spiral", "--feedback", "sensors")
+STAMP_BYTES = 8
+
+
+def frames_of(tlog: Path) -> Counter[str]:
+    """Count the messages of a telemetry log; one that was sent again, as on a busy machine, counts once."""
+    data, at, codec, frames = tlog.read_bytes(), 0, Codec(1, 1), set[bytes]()
+    while at < len(data):
+        start = at + STAMP_BYTES
+        at = start + 12 + data[start + 1]
+        frames.add(data[start:at])
+    return Counter(message.name for frame in frames for message in codec.decode(frame))
+
+
+@pytest.mark.long
+def test_a_bad_link_does_not_change_what_sensors_tell(tmp_path: Path) -> None:
+    """20 % lost, 10 % duplicated, 10 % reordered, both ways: the flight is the one in memory, noise and all."""
+    duration = ("--duration", "1.6")
+    fly(tmp_path / "good", *ON_SENSORS, "--link", "memory", "--seed", "3", "--start", "psi=90", *duration)
+    hummingbird = ("--vehicle", "hummingbird", "--integrator", "rk4", "--start", "y=-1,psi=90", "--seed", "3")
+    (tmp_path / "logs").mkdir()
+    plant, url = start_plant(tmp_path / "logs", tmp_path / "bad", *hummingbird, *duration)
+    with BadLink(url, seed=1) as relay:
+        autopilot = start_autopilot(
+            tmp_path / "logs", relay.url, "--profile", "flight", "--track", "spiral", "--feedback", "sensors"
+        )
+        with running(plant, autopilot):
+            ended = plant.wait_for("ended")
+            assert plant.wait() == 0
+    assert ended["frames"] == 400
+    assert ended["resent"] > 100
+    assert (states(tmp_path / "bad") == states(tmp_path / "good")).all()
+    assert plant.errors() + autopilot.errors() == ""
+
+
+def test_two_processes_fly_the_same_flight_as_one(tmp_path: Path) -> None:
+    figures = [
+        fly(tmp_path / link, *ON_SENSORS, "--link", link, "--seed", "1", "--duration", "8")
+        for link in ("udp", "memory")
+    ]
+    assert figures[0]["trajectory_sha256"] == figures[1]["trajectory_sha256"]
+    assert {flown["feedback"] for flown in figures} == {"sensors"}
+    names = frames_of(tmp_path / "udp" / "flight.tlog")
+    assert names == frames_of(tmp_path / "memory" / "flight.tlog")
+    assert names["HIL_SENSOR"] == names["HIL_ACTUATOR_CONTROLS"] == 2000
+    assert names["HIL_GPS"] == 79
+    assert names["ATTITUDE_QUATERNION"] == 0
+
+
+def test_seeds_are_flights(tmp_path: Path) -> None:
+    hashes = [
+        fly(tmp_path / name, *ON_SENSORS, "--link", "direct", "--seed", seed, "--duration", "5")["trajectory_sha256"]
+        for name, seed in (("one", "1"), ("other", "2"), ("again", "1"))
+    ]
+    assert hashes[0] == hashes[2] != hashes[1]
+
+
+def test_the_vehicle_stands_until_it_has_found_its_bearings_then_flies_its_track(tmp_path: Path) -> None:
+    options = ("--link", "memory", "--vehicle", "hummingbird-rtk", "--duration", "30", "--seed", "1")
+    figures = fly(tmp_path, *ON_SENSORS, *options)
+    truth = rows(tmp_path / "plant.csv")
+    assert figures["start"]["z"] == figures["start"]["rotors"] == 0.0
+    first_second = truth["t"] < 1.0
+    assert np.abs(truth["z"][first_second]).max() < 1e-3
+    assert truth["omega1"][first_second].max() == 0.0
+    assert figures["rmse_after_20s_m"] < 0.05
+    assert figures["qp_failures"] == 0
+
+
+def test_an_autopilot_that_wants_the_state_gets_it_from_the_same_plant(tmp_path: Path) -> None:
+    plant = Process(tmp_path, "plant", "--link", "udpin:127.0.0.1:0", "--out", str(tmp_path / "out"), "--duration", "1")
+    url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
+    autopilot = Process(tmp_path, "autopilot", "--plant", url)
+    with running(plant, autopilot):
+        assert plant.wait_for("ended")["frames"] == 250
+    assert truth_start(tmp_path / "out") == pytest.approx((nudge_m(), -1.0 + nudge_m(), 2.0))
+
+
+def truth_start(out: Path) -> tuple[float, ...]:
+    return tuple(states(out)[0, 7:10].tolist())

@@ -1,0 +1,53 @@
+"""What the sensors told in a flight, fed to an estimator again: the same states."""
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+
+from colibri.autopilot.estimation.estimator import Estimator
+from colibri.bench.sensing import sensor_frames
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import load_vehicle
+from tools.harness.processes import fly
+
+GOLDEN = Path(__file__).parents[2] / "golden"
+FRAME_US, CONTROL_US = 4000, 8000
+STATE_COLUMNS = slice(1, 14)
+
+
+def replayed(tlog: bytes) -> dict[int, tuple[float, ...]]:
+    """Return position, velocity, attitude and rates by time."""
+    vehicle = load_vehicle("hummingbird")
+    assert vehicle.sensors is not None
+    estimator = Estimator(vehicle.sensors, vehicle.gravity_m_s2, DEFAULT_ORIGIN, FRAME_US)
+    states: dict[int, tuple[float, ...]] = {}
+    for frame in sensor_frames(tlog):
+        estimate = estimator.step(frame, asked=frame.time_us % CONTROL_US == 0)
+        if estimate is not None and estimate.frame.time_us == frame.time_us:
+            f = estimate.frame
+            states[f.time_us] = (*f.position_enu_m, *f.velocity_enu_m_s, *f.attitude, *f.rate_flu_rad_s)
+    return states
+
+
+def logged(path: Path) -> Array:
+    table: Array = np.genfromtxt(path, delimiter=",", skip_header=1)
+    return table
+
+
+def test_a_flight_replays_bit_for_bit(tmp_path: Path) -> None:
+    fly(tmp_path, "spiral", "--feedback", "sensors", "--seed", "3", "--duration", "8", "--link", "memory")
+    again = replayed((tmp_path / "flight.tlog").read_bytes())
+    told = logged(tmp_path / "estimate.csv")
+    assert len(told) > 500
+    for row in told:
+        assert again[round(row[0] * 1e6)] == tuple(row[STATE_COLUMNS])
+
+
+def test_a_golden_capture_gives_the_same_states_as_ever() -> None:
+    """To 1e-9 only: another processor may round the last bits otherwise."""
+    with gzip.open(GOLDEN / "spiral-sensors.tlog.gz") as capture:
+        states = replayed(capture.read())
+    for time_s, *state in logged(GOLDEN / "spiral-sensors.csv"):
+        assert np.abs(np.array(states[round(time_s * 1e6)]) - state).max() < 1e-9

@@ -1,0 +1,28 @@
+"""A service with one file, and a client of it."""
+
+import pytest
+
+from colibri.mavlink.files.ftp import Ftp
+from colibri.mavlink.files.memory import Memory
+from colibri.mavlink.files.tree import ReadOnly, Tree
+from tests.mavlink.files.ftp_client import Client
+
+TEXT = bytes(range(256)) * 20
+
+
+@pytest.fixture
+def memory() -> Memory:
+    memory = Memory()
+    memory.create(("text",))
+    memory.write(("text",), 0, TEXT)
+    return memory
+
+
+@pytest.fixture
+def service(memory: Memory) -> Ftp:
+    return Ftp(Tree(memory, {"logs": ReadOnly(Memory())}, {"@PARAM/param.pck": lambda query: b"Q" + query.encode()}))
+
+
+@pytest.fixture
+def client(service: Ftp) -> Client:
+    return Client(service)

@@ -1,0 +1,355 @@
+"""The vehicle's files: memory and disk do the same, nothing leads out of a folder, a tree shows its parts."""
+
+import os
+import socket
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from colibri.mavlink.files.folder import Folder
+from colibri.mavlink.files.memory import Memory
+from colibri.mavlink.files.tree import (
+    Entry,
+    Files,
+    Names,
+    Quota,
+    Reading,
+    ReadOnly,
+    Refusal,
+    Tree,
+    can_be_new,
+    names_of,
+)
+
+QUOTA = Quota(200, 6)
+LONG = "x" * 256
+
+NAMES = st.lists(st.sampled_from(["a", "b", "c", "tab\there", LONG]), max_size=3).map(tuple)
+OFFSETS = st.integers(0, 150)
+DATA = st.binary(max_size=60)
+OPERATIONS = st.lists(
+    st.one_of(
+        st.tuples(st.sampled_from(["list", "open", "create", "remove", "make_folder", "remove_folder"]), NAMES),
+        st.tuples(st.just("write"), NAMES, OFFSETS, DATA),
+        st.tuples(st.just("truncate"), NAMES, OFFSETS),
+        st.tuples(st.just("rename"), NAMES, NAMES),
+    ),
+    max_size=40,
+)
+
+
+def content(files: Files, names: Names) -> bytes:
+    reading = files.open(names)
+    assert isinstance(reading, Reading)
+    data = reading.read(0, reading.size)
+    assert isinstance(data, bytes)
+    return data
+
+
+def plain(outcome: object) -> object:
+    """Return an outcome without what only a disk knows."""
+    if isinstance(outcome, list):
+        return [entry._replace(modified_s=0) for entry in outcome]
+    if isinstance(outcome, Reading):
+        return outcome.size, outcome.read(0, 1000), outcome.read(5, 3), outcome.read(1000, 5)
+    return outcome
+
+
+@given(operations=OPERATIONS)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_memory_and_disk_do_the_same(operations: list[tuple[object, ...]], tmp_path_factory: object) -> None:
+    path: Path = tmp_path_factory.mktemp("files")  # type: ignore[attr-defined]
+    folder, memory = Folder(path, QUOTA), Memory(QUOTA)
+    for name, *arguments in operations:
+        of_disk = getattr(folder, str(name))(*arguments)
+        of_memory = getattr(memory, str(name))(*arguments)
+        if LONG in str(arguments):  # the disk may find out earlier
+            assert isinstance(of_disk, Refusal) == isinstance(of_memory, Refusal)
+        else:
+            assert plain(of_disk) == plain(of_memory), (name, arguments)
+    again = Folder(path, QUOTA)  # which counts what the first one left
+    assert (again._size, again._entries) == (folder._size, folder._entries)  # noqa: SLF001
+    folder.close()
+    again.close()
+
+
+class Model:
+    """What files are, said once more and as simply as can be."""
+
+    def __init__(self) -> None:
+        self.files: dict[str, bytes] = {}
+
+    def create(self, name: str) -> None:
+        self.files[name] = b""
+
+    def write(self, name: str, offset: int, data: bytes) -> None:
+        if name in self.files and data:
+            old = self.files[name].ljust(offset, b"\0")
+            self.files[name] = old[:offset] + data + old[offset + len(data) :]
+
+    def truncate(self, name: str, size: int) -> None:
+        if name in self.files:
+            self.files[name] = self.files[name][:size]
+
+    def remove(self, name: str) -> None:
+        self.files.pop(name, None)
+
+    def rename(self, old: str, new: str) -> None:
+        if old in self.files and new not in self.files:
+            self.files[new] = self.files.pop(old)
+
+
+FLAT = st.sampled_from("abc")
+
+
+@given(
+    st.lists(
+        st.one_of(
+            st.tuples(st.sampled_from(["create", "remove"]), FLAT),
+            st.tuples(st.just("write"), FLAT, OFFSETS, DATA),
+            st.tuples(st.just("truncate"), FLAT, OFFSETS),
+            st.tuples(st.just("rename"), FLAT, FLAT),
+        )
+    )
+)
+def test_files_hold_what_was_written(operations: list[tuple[object, ...]]) -> None:
+    memory, model = Memory(), Model()
+    tree = Tree(memory, {}, {})
+    for name, *arguments in operations:
+        getattr(model, str(name))(*arguments)
+        getattr(tree, str(name))(*[(item,) if isinstance(item, str) else item for item in arguments])
+        assert tree.list(()) == [Entry(file, False, len(data)) for file, data in sorted(model.files.items())]
+        assert all(content(tree, (file,)) == data for file, data in model.files.items())
+
+
+@pytest.mark.parametrize("make", [lambda path: Folder(path, QUOTA), lambda _: Memory(QUOTA)], ids=["folder", "memory"])
+def test_quota(make: object, tmp_path: Path) -> None:
+    files: Files = make(tmp_path / "q")  # type: ignore[operator]
+    for name in "abcde":
+        assert files.create((name,)) is None
+    assert files.make_folder(("f",)) is None
+    assert files.create(("g",)) is Refusal.NO_SPACE
+    assert files.make_folder(("g",)) is Refusal.NO_SPACE
+    assert files.create(("a",)) is None  # which exists
+    assert files.write(("a",), 199, b"x") is None
+    assert files.write(("b",), 0, b"x") is Refusal.NO_SPACE
+    assert files.write(("a",), 0xFFFFFFFF, b"x") is Refusal.NO_SPACE
+    assert files.write(("a",), 100, b"y" * 100) is None
+    assert files.truncate(("a",), 150) is None
+    assert files.write(("b",), 0, b"x" * 50) is None
+    assert files.write(("b",), 50, b"x") is Refusal.NO_SPACE
+    assert files.remove(("a",)) is None
+    assert files.write(("b",), 50, b"x" * 150) is None
+    assert files.create(("g",)) is None
+
+
+def changes(files: Files, names: Names) -> list[object]:
+    return [
+        files.create(names),
+        files.write(names, 0, b"owned"),
+        files.truncate(names, 0),
+        files.remove(names),
+        files.rename(names, ("elsewhere",)),
+        files.rename(("mine",), names),
+        files.make_folder(names),
+        files.remove_folder(names),
+        files.list(names),
+        files.open(names),
+    ]
+
+
+def test_nothing_leads_out_of_a_folder(tmp_path: Path) -> None:
+    """Neither links, nor dots, nor slashes in names, nor devices and pipes."""
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (outside / "secret").write_bytes(b"secret")
+    root = tmp_path / "root"
+    folder = Folder(root)
+    folder.create(("mine",))
+    (root / "link").symlink_to(outside / "secret")
+    (root / "way").symlink_to(outside)
+    (root / "up").symlink_to("..")
+    os.mkfifo(root / "pipe")
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(root / "socket"))
+    hostile: list[Names] = [
+        ("link",),
+        ("way", "secret"),
+        ("up", "outside", "secret"),
+        ("..", "outside", "secret"),
+        ("../outside/secret",),
+        (str(outside / "secret"),),
+        ("pipe",),
+        ("socket",),
+        ("mine\0",),
+        ("\ud800",),
+        ("",),
+        (".",),
+        ("/",),
+        ("x" * 5000,),
+        ("a/b",),
+    ]
+    for names in hostile:
+        outcomes = changes(folder, names)
+        assert all(isinstance(outcome, Refusal) for outcome in outcomes), (names, outcomes)
+    assert folder.list(()) == [Entry("mine", False, 0, int((root / "mine").stat().st_mtime))]
+    assert (outside / "secret").read_bytes() == b"secret"
+    assert [path.name for path in outside.iterdir()] == ["secret"]
+    assert sorted(path.name for path in root.iterdir()) == ["link", "mine", "pipe", "socket", "up", "way"]
+    folder.close()
+
+
+def test_a_folder_swapped_for_a_link_leads_nowhere(tmp_path: Path) -> None:
+    (tmp_path / "outside").mkdir()
+    (tmp_path / "outside" / "secret").write_bytes(b"secret")
+    folder = Folder(tmp_path / "root")
+    folder.make_folder(("a",))
+    folder.create(("a", "secret"))
+    reading = folder.open(("a", "secret"))
+    assert isinstance(reading, Reading)
+    (tmp_path / "root" / "a").rename(tmp_path / "root" / "b")
+    (tmp_path / "root" / "a").symlink_to(tmp_path / "outside")
+    assert isinstance(reading.read(0, 6), Refusal)
+    assert isinstance(folder.write(("a", "secret"), 0, b"x"), Refusal)
+    folder.close()
+
+
+def test_a_folder_that_cannot_be_had_says_so(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    with pytest.raises(OSError, match="File exists"):
+        Folder(tmp_path / "file")
+
+
+def test_what_vanishes_is_not_found(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    folder.create(("a",))
+    folder.write(("a",), 0, b"hello")
+    reading = folder.open(("a",))
+    assert isinstance(reading, Reading)
+    assert reading.read(1, 3) == b"ell"
+    (tmp_path / "a").unlink()
+    assert reading.read(0, 5) is Refusal.NOT_FOUND
+    folder.close()
+    assert folder.list(()) is Refusal.FAILED  # whatever the system says: a handle that is closed
+
+
+@given(st.text())
+def test_no_path_leads_up(path: str) -> None:
+    names = names_of(path)
+    if not isinstance(names, Refusal):
+        assert not {"", ".", ".."} & set(names)
+        assert not any("/" in name or "\0" in name for name in names)
+
+
+@pytest.mark.parametrize(
+    ("path", "names"),
+    [
+        ("/", ()),
+        ("", ()),
+        (".", ()),
+        ("a/b", ("a", "b")),
+        ("//a//./b/", ("a", "b")),
+        ("a/../b", Refusal.NOT_FOUND),
+        ("a\0b", Refusal.NOT_FOUND),
+        ("a/" * 17, Refusal.BAD_NAME),
+        ("ü" * 128, Refusal.BAD_NAME),
+    ],
+)
+def test_paths(path: str, names: object) -> None:
+    assert names_of(path) == names
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "a/b", "a\tb", "a\nb", "\x1b[2J", "\ud800", "x" * 256])
+def test_names_that_nobody_could_list_again_are_refused(name: str) -> None:
+    assert not can_be_new(name)
+    assert isinstance(Memory().create((name,)), Refusal)
+
+
+class TestTree:
+    @pytest.fixture
+    def logs(self) -> Memory:
+        logs = Memory()
+        logs.create(("1.tlog",))
+        logs.write(("1.tlog",), 0, b"log")
+        return logs
+
+    @pytest.fixture
+    def root(self) -> Memory:
+        root = Memory()
+        root.create(("mine",))
+        root.make_folder(("logs",))  # hidden behind the mount
+        root.create(("logs", "hidden"))
+        return root
+
+    @pytest.fixture
+    def tree(self, root: Memory, logs: Memory) -> Tree:
+        generated = {"general.json": lambda _: b"{}", "@PARAM/param.pck": lambda query: b"<" + query.encode() + b">"}
+        return Tree(root, {"logs": ReadOnly(logs), "@MAV_LOG": logs}, generated)
+
+    def test_it_shows_everything(self, tree: Tree) -> None:
+        assert tree.list(()) == [
+            Entry("@MAV_LOG", True),
+            Entry("@PARAM", True),
+            Entry("general.json", False, 2),
+            Entry("logs", True),
+            Entry("mine", False, 0),
+        ]
+        assert tree.list(("@PARAM",)) == [Entry("param.pck", False, 2)]
+        assert tree.list(("logs",)) == tree.list(("@MAV_LOG",)) == [Entry("1.tlog", False, 3)]
+        assert tree.list(("general.json",)) is Refusal.NOT_A_FOLDER
+        assert tree.list(("nope",)) is Refusal.NOT_FOUND
+
+    def test_it_opens_everything(self, tree: Tree) -> None:
+        assert content(tree, ("general.json",)) == b"{}"
+        assert content(tree, ("@PARAM", "param.pck?withdefaults=1")) == b"<withdefaults=1>"
+        assert content(tree, ("logs", "1.tlog")) == content(tree, ("@MAV_LOG", "1.tlog")) == b"log"
+        assert tree.open(("@PARAM",)) is Refusal.IS_FOLDER
+        assert tree.open(("logs",)) is Refusal.IS_FOLDER
+        assert tree.open(("logs", "hidden")) is Refusal.NOT_FOUND
+        assert tree.open(("mine?query",)) is Refusal.NOT_FOUND
+
+    def test_a_folder_has_a_second_path(self) -> None:
+        root = Memory()
+        root.make_folder(("logs",))
+        tree = Tree(root, {}, {}, {"@MAV_LOG": "logs"})
+        assert tree.create(("@MAV_LOG", "a")) is None
+        assert content(tree, ("logs", "a")) == b""
+        assert tree.list(("@MAV_LOG",)) == tree.list(("logs",)) == [Entry("a", False, 0)]
+        assert tree.rename(("@MAV_LOG", "a"), ("b",)) is None
+        assert tree.remove_folder(("@MAV_LOG",)) is Refusal.PROTECTED
+        assert tree.list(()) == [Entry("@MAV_LOG", True), Entry("b", False), Entry("logs", True)]
+
+    def test_what_is_generated_stays_as_it_was_when_opened(self) -> None:
+        contents = iter([b"one", b"three"])
+        tree = Tree(Memory(), {}, {"g": lambda _: next(contents)})
+        first, second = tree.open(("g",)), tree.open(("g",))
+        assert isinstance(first, Reading)
+        assert isinstance(second, Reading)
+        assert (first.size, first.read(0, 9), second.size, second.read(0, 9)) == (3, b"one", 5, b"three")
+
+    @pytest.mark.parametrize("names", [(), ("logs",), ("@PARAM",), ("general.json",), ("@PARAM", "param.pck")])
+    def test_what_it_is_made_of_stays(self, tree: Tree, names: Names) -> None:
+        before = tree.list(())
+        assert all(isinstance(outcome, Refusal) for outcome in changes(tree, names)[:8])
+        assert tree.list(()) == before
+
+    def test_a_read_only_mount_is_protected(self, tree: Tree, logs: Memory) -> None:
+        names = ("logs", "1.tlog")
+        assert set(changes(tree, names)[:5]) == {Refusal.PROTECTED}
+        assert changes(tree, ("logs", "new"))[6:8] == [Refusal.PROTECTED, Refusal.PROTECTED]
+        assert content(logs, ("1.tlog",)) == b"log"
+
+    def test_mounts_can_be_written_to(self, tree: Tree, root: Memory, logs: Memory) -> None:
+        assert tree.remove(("@MAV_LOG", "1.tlog")) is None
+        assert logs.list(()) == []
+        assert tree.make_folder(("d",)) is None
+        assert tree.rename(("mine",), ("d", "mine")) is None
+        assert tree.write(("d", "mine"), 0, b"data") is None
+        assert content(root, ("d", "mine")) == b"data"
+        assert tree.rename(("d", "mine"), ("@MAV_LOG", "mine")) is Refusal.PROTECTED
+        assert tree.truncate(("d", "mine"), 2) is None
+        assert content(root, ("d", "mine")) == b"da"
+        assert tree.remove(("d", "mine")) is None
+        assert tree.remove_folder(("d",)) is None

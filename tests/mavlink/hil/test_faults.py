@@ -1,0 +1,129 @@
+"""The vocabulary of faults: names, numbers, and what is refused, with words."""
+
+from math import inf, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colibri.mavlink.hil.faults import (
+    ACCELEROMETER,
+    BATTERY,
+    GPS,
+    GYROSCOPE,
+    MOTOR,
+    OFF,
+    OK,
+    ROWS,
+    SLOW,
+    TABLE,
+    WRONG,
+    Fault,
+    Part,
+    Refusal,
+    Row,
+    decode_fault,
+    encode_fault,
+    fault_from,
+    judged,
+)
+from colibri.mavlink.hil.plant_status import (
+    FaultResult,
+    PlantBattery,
+    decode_battery,
+    decode_result,
+    encode_battery,
+    encode_results,
+)
+from colibri.mavlink.wire.dialect import RESULT_DENIED, RESULT_UNSUPPORTED, Codec
+
+ALL_PARTS = list(Part)
+ANYTHING = st.floats(allow_nan=True, allow_infinity=True)
+
+
+def refusal(fault: Fault, parts: list[Part] = ALL_PARTS) -> Refusal:
+    judgement = judged(fault, parts)
+    assert isinstance(judgement, Refusal)
+    return judgement
+
+
+def test_no_fault_is_told_twice() -> None:
+    assert len(TABLE) == len(ROWS)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.unit}-{row.kind}")
+def test_each_has_usual_numbers_within_its_limits(row: Row) -> None:
+    fault = judged(Fault(row.unit, row.kind), ALL_PARTS)
+    assert isinstance(fault, Fault)
+    assert fault.values[: len(row.values)] == tuple(value.usual for value in row.values)
+    assert judged(fault, ALL_PARTS) == fault
+    assert all(value.least <= value.usual <= value.most for value in row.values)
+
+
+def test_a_number_that_is_not_given_is_none_beside_one_that_is() -> None:
+    assert judged(Fault(GPS, WRONG, 0, (nan, 5.0, nan, 7.0)), ALL_PARTS) == Fault(GPS, WRONG, 0, (0.0, 5.0, 0.0, 0.0))
+    assert judged(Fault(BATTERY, WRONG, 0, (0.3, 0.0, 0.0, 0.0)), ALL_PARTS) == Fault(
+        BATTERY, WRONG, 0, (0.3, 1.0, 0.0, 0.0)
+    )
+
+
+def test_what_cannot_be_is_denied_with_words() -> None:
+    assert refusal(Fault(MOTOR, WRONG, 1, (1.5, 0.0, 0.0, 0.0))) == Refusal(
+        RESULT_DENIED, "part that is left must be 0.001 to 1"
+    )
+    assert refusal(Fault(GYROSCOPE, WRONG, 0, (inf, 0.0, 0.0, 0.0))) == Refusal(
+        RESULT_DENIED, "bias x must be -20 to 20 rad/s"
+    )
+    assert refusal(Fault(MOTOR, OFF, 5)) == Refusal(RESULT_DENIED, "instance must be 0 to 4")
+    assert refusal(Fault(GPS, OFF, 2)).result == RESULT_DENIED
+
+
+def test_what_no_plant_does_is_not_supported() -> None:
+    assert refusal(Fault(MOTOR, SLOW)) == Refusal(RESULT_UNSUPPORTED, "no plant does this fault")
+    assert refusal(Fault(104, OFF)).result == RESULT_UNSUPPORTED
+    assert refusal(Fault(ACCELEROMETER, OFF), [Part.ROTORS]) == Refusal(
+        RESULT_UNSUPPORTED, "flown by the state, not by sensors"
+    )
+    assert refusal(Fault(BATTERY, OFF), [Part.ROTORS]) == Refusal(RESULT_UNSUPPORTED, "no battery to fail")
+
+
+@given(ANYTHING, ANYTHING, ANYTHING, st.tuples(ANYTHING, ANYTHING, ANYTHING, ANYTHING))
+def test_any_numbers_are_a_fault_within_limits_or_none(
+    p1: float, p2: float, p3: float, values: tuple[float, float, float, float]
+) -> None:
+    asked = fault_from(p1, p2, p3, values)
+    if asked is None:
+        return
+    fault = judged(asked, ALL_PARTS)
+    if isinstance(fault, Fault):
+        for value, it in zip(fault.values, TABLE[fault.unit, fault.kind].values, strict=False):
+            assert it.least <= value * (1.0 - 1e-6) or it.least <= value * (1.0 + 1e-6) or value == it.rest
+            assert abs(value) <= 1.0001 * max(abs(it.least), abs(it.most))
+
+
+@given(st.floats(0.0625, 1.0, width=32), st.integers(0, 4))
+def test_a_fault_goes_over_the_wire(part: float, instance: int) -> None:
+    codec = Codec(1, 1)
+    fault = Fault(MOTOR, WRONG, instance, (part, 0.0, 0.0, 0.0))
+    (message,) = codec.decode(encode_fault(codec, fault, (1, 2)))
+    assert decode_fault(message.fields) == fault
+
+
+def test_results_go_over_the_wire() -> None:
+    codec = Codec(1, 2)
+    results = (FaultResult(MOTOR, OFF, 0), FaultResult(GPS, OK, 3))
+    frames = b"".join(encode_results(codec, results, (1, 1)))
+    assert tuple(map(decode_result, codec.decode(frames))) == results
+
+
+@pytest.mark.parametrize("battery", [PlantBattery(16.8, 0.0, 0.0, 1.0), PlantBattery(9.61, 21.34, 1.234, 0.25)])
+def test_a_battery_goes_over_the_wire(battery: PlantBattery) -> None:
+    codec = Codec(1, 2)
+    (message,) = codec.decode(encode_battery(codec, battery))
+    assert decode_battery(message) == pytest.approx(battery)
+
+
+def test_a_battery_that_tells_nothing_is_none() -> None:
+    codec = Codec(1, 2)
+    nothing = codec.encode("BATTERY_STATUS", 0, 0, 0, 32767, (65535,) * 10, -1, -1, -1, -1)
+    assert decode_battery(codec.decode(nothing)[0]) is None

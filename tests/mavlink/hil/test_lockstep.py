@@ -1,0 +1,421 @@
+"""The lockstep conversation: what each end does with silence, repetition, strangers and restarts."""
+
+import random
+
+import pytest
+
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.mavlink.hil.faults import MOTOR, OFF, WRONG, Fault, encode_fault
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.lockstep import CALL_AFTER_S, PEER_LOST_AFTER_S, RESEND_AFTER_S
+from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
+from colibri.mavlink.hil.lockstep_plant import PlantEnd
+from colibri.mavlink.hil.plant_status import NOTHING, Aside, FaultResult, PlantBattery
+from colibri.mavlink.hil.sensors import Frame, GpsFix, SensorFrame, encode_sensors
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, encode_actuators
+from colibri.mavlink.wire import dialect
+from colibri.mavlink.wire.dialect import Codec
+
+ADDRESS = ("autopilot", 1)
+STRANGER = ("stranger", 2)
+INTERVAL_US = 100_000
+
+
+def frame_at(time_us: int) -> StateFrame:
+    return StateFrame(time_us, (0.0, 0.0, float(time_us)), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def command_at(time_us: int) -> ActuatorCommand:
+    return ActuatorCommand(time_us, (0.25, 0.5, 0.75, 1.0), armed=True)
+
+
+@pytest.fixture
+def plant() -> PlantEnd:
+    return PlantEnd(system_id=1, frame_interval_us=4_000)
+
+
+@pytest.fixture
+def autopilot() -> AutopilotEnd:
+    return AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0)
+
+
+def call(autopilot: AutopilotEnd, plant: PlantEnd) -> None:
+    autopilot.poll(0.0)
+    for datagram in autopilot.take_outbox():
+        plant.receive(datagram, ADDRESS, 0.0)
+    for outgoing in plant.take_outbox():
+        autopilot.receive(outgoing.datagram, 0.0)
+
+
+def answer_to(plant: PlantEnd, autopilot: AutopilotEnd, time_us: int) -> bytes:
+    plant.offer(frame_at(time_us), 0.0)
+    (outgoing,) = plant.take_outbox()
+    frame = autopilot.receive(outgoing.datagram, 0.0)
+    assert frame is not None
+    assert frame.time_us == time_us
+    autopilot.answer(command_at(time_us))
+    (answer,) = autopilot.take_outbox()
+    return answer
+
+
+def test_the_call_sets_peer_and_frame_interval(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    assert plant.peer == ADDRESS
+    assert plant.frame_interval_us == INTERVAL_US
+    assert autopilot.refused is None
+
+
+def test_a_frame_is_answered_once(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    answer = answer_to(plant, autopilot, 0)
+    assert plant.receive(answer, ADDRESS, 0.0) == command_at(0)
+    assert plant.receive(answer, ADDRESS, 0.0) is None
+    plant.offer(frame_at(INTERVAL_US), 0.0)
+    assert plant.receive(answer, ADDRESS, 0.0) is None
+    assert plant.dropped["repeated"] == 2
+
+
+def test_a_repeated_frame_gets_the_remembered_answer(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    answer = answer_to(plant, autopilot, 0)
+    plant.poll(RESEND_AFTER_S)
+    (again,) = plant.take_outbox()
+    assert autopilot.receive(again.datagram, 0.03) is None
+    assert autopilot.take_outbox() == [answer]
+    assert (plant.resent, autopilot.repeated) == (1, 1)
+
+
+def test_a_frame_is_sent_again_only_after_silence(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    plant.offer(frame_at(0), 10.0)
+    plant.take_outbox()
+    assert plant.poll(10.0 + 0.9 * RESEND_AFTER_S) == pytest.approx(10.0 + RESEND_AFTER_S)
+    assert plant.take_outbox() == []
+
+
+@pytest.mark.parametrize("time_us", [2 * INTERVAL_US, INTERVAL_US + 1000, 77 * INTERVAL_US])
+def test_a_frame_out_of_step_is_dropped(plant: PlantEnd, autopilot: AutopilotEnd, time_us: int) -> None:
+    call(autopilot, plant)
+    answer_to(plant, autopilot, 0)
+    plant.offer(frame_at(time_us), 0.0)
+    (outgoing,) = plant.take_outbox()
+    assert autopilot.receive(outgoing.datagram, 0.5) is None
+    assert autopilot.dropped["out of step"] == 1
+
+
+def test_an_earlier_frame_begins_a_new_flight_only_after_silence(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    for time_us in (0, INTERVAL_US, 2 * INTERVAL_US):
+        answer_to(plant, autopilot, time_us)
+    plant.offer(frame_at(0), 0.0)
+    (outgoing,) = plant.take_outbox()
+    assert autopilot.receive(outgoing.datagram, 0.5) is None
+    assert autopilot.receive(outgoing.datagram, CALL_AFTER_S) == frame_at(0)
+
+
+def test_the_autopilot_calls_again_after_silence(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    answer_to(plant, autopilot, 0)
+    assert autopilot.poll(0.5) == CALL_AFTER_S
+    assert autopilot.take_outbox() == []
+    autopilot.poll(CALL_AFTER_S)
+    assert len(autopilot.take_outbox()) == 1
+
+
+def test_a_second_autopilot_is_refused_while_the_first_answers(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    second = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0)
+    second.poll(0.0)
+    (hello,) = second.take_outbox()
+    plant.receive(hello, STRANGER, 0.9 * PEER_LOST_AFTER_S)
+    assert plant.peer == ADDRESS
+    plant.receive(hello, STRANGER, 1.1 * PEER_LOST_AFTER_S)
+    assert plant.peer == STRANGER
+
+
+def test_a_restarted_autopilot_gets_the_frame_awaited_at_once(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    plant.offer(frame_at(INTERVAL_US), 0.0)
+    plant.take_outbox()
+    restarted = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=5.0)
+    restarted.poll(5.0)
+    (hello,) = restarted.take_outbox()
+    plant.receive(hello, STRANGER, 5.0)
+    frames = [restarted.receive(outgoing.datagram, 5.0) for outgoing in plant.take_outbox()]
+    assert frame_at(INTERVAL_US) in frames
+
+
+@pytest.mark.parametrize(
+    ("interval_us", "flying", "result"),
+    [
+        (2_000.0, False, dialect.RESULT_ACCEPTED),
+        (2_500.0, False, dialect.RESULT_DENIED),
+        (0.0, False, dialect.RESULT_DENIED),
+        (-1.0, False, dialect.RESULT_DENIED),
+        (float("nan"), False, dialect.RESULT_DENIED),
+        (float("inf"), False, dialect.RESULT_DENIED),
+        (2_000_000.0, False, dialect.RESULT_DENIED),
+        (2_000.0, True, dialect.RESULT_TEMPORARILY_REJECTED),
+        (4_000.0, True, dialect.RESULT_ACCEPTED),
+    ],
+)
+def test_frame_interval_requests(plant: PlantEnd, interval_us: float, flying: bool, result: int) -> None:
+    if flying:
+        plant.offer(frame_at(0), 0.0)
+    assert asked_for(plant, dialect.MSG_ATTITUDE_QUATERNION, interval_us) == result
+
+
+def asked_for(plant: PlantEnd, message_id: int, interval_us: float) -> int:
+    codec = Codec(1, dialect.AUTOPILOT_COMPONENT)
+    target = (1, dialect.PLANT_COMPONENT)
+    fields = (*target, dialect.CMD_SET_MESSAGE_INTERVAL, 0, message_id, interval_us, 0, 0, 0, 0, 0)
+    plant.take_outbox()
+    plant.receive(codec.encode("COMMAND_LONG", *fields), ADDRESS, 0.0)
+    (outgoing,) = plant.take_outbox()
+    (ack,) = codec.decode(outgoing.datagram)
+    assert ack.fields.command == dialect.CMD_SET_MESSAGE_INTERVAL
+    result: int = ack.fields.result
+    return result
+
+
+SENSORS, STATE = dialect.MSG_HIL_SENSOR, dialect.MSG_ATTITUDE_QUATERNION
+
+
+def sensors_at(time_us: int) -> SensorFrame:
+    """A frame of numbers that float32 holds, with a fix at every second one."""
+    fix = GpsFix(time_us, 3, DEFAULT_ORIGIN, (1.0, 0.5, 0.25), 0.5, 1.0, 9)
+    now = float(time_us % 1024)
+    vectors = ((now, 0.5, 9.75), (0.0, now, -0.5), (0.25, 0.0, now))
+    return SensorFrame(time_us, 0x3F, *vectors, 51_200.0, 15.0, fix if time_us // INTERVAL_US % 2 else None)
+
+
+def both_ends_on_sensors() -> tuple[PlantEnd, AutopilotEnd]:
+    plant = PlantEnd(system_id=1, frame_interval_us=4_000, serves=list(Feedback))
+    autopilot = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0, feedback=Feedback.SENSORS)
+    call(autopilot, plant)
+    return plant, autopilot
+
+
+def test_the_call_asks_for_sensors() -> None:
+    plant, autopilot = both_ends_on_sensors()
+    assert (plant.feedback, plant.frame_interval_us) == (Feedback.SENSORS, INTERVAL_US)
+    assert autopilot.refused is None
+
+
+def test_frames_of_sensors_are_answered_as_any_other() -> None:
+    plant, autopilot = both_ends_on_sensors()
+    for time_us in range(0, 4 * INTERVAL_US, INTERVAL_US):
+        plant.offer(sensors_at(time_us), 0.0)
+        (outgoing,) = plant.take_outbox()
+        assert autopilot.receive(outgoing.datagram, 0.0) == sensors_at(time_us)
+        assert autopilot.receive(outgoing.datagram, 0.0) is None
+        autopilot.answer(command_at(time_us))
+        (answer,) = autopilot.take_outbox()
+        assert plant.receive(answer, ADDRESS, 0.0) == command_at(time_us)
+
+
+def test_a_plant_without_sensors_refuses_them(plant: PlantEnd) -> None:
+    autopilot = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0, feedback=Feedback.SENSORS)
+    call(autopilot, plant)
+    assert autopilot.refused == dialect.RESULT_UNSUPPORTED
+    assert plant.feedback is Feedback.STATE
+
+
+def test_feedback_is_not_changed_in_mid_flight() -> None:
+    plant, _ = both_ends_on_sensors()
+    assert asked_for(plant, STATE, INTERVAL_US) == dialect.RESULT_ACCEPTED
+    assert asked_for(plant, SENSORS, INTERVAL_US) == dialect.RESULT_ACCEPTED
+    plant.offer(sensors_at(0), 0.0)
+    assert asked_for(plant, STATE, INTERVAL_US) == dialect.RESULT_TEMPORARILY_REJECTED
+    assert asked_for(plant, SENSORS, 2 * INTERVAL_US) == dialect.RESULT_TEMPORARILY_REJECTED
+    assert asked_for(plant, SENSORS, INTERVAL_US) == dialect.RESULT_ACCEPTED
+    assert plant.feedback is Feedback.SENSORS
+
+
+def test_frames_of_the_other_kind_are_not_flown_on(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    plant.offer(sensors_at(INTERVAL_US), 0.0)
+    (outgoing,) = plant.take_outbox()
+    assert autopilot.receive(outgoing.datagram, 0.0) is None
+    assert autopilot.dropped["unexpected"] == 2
+    plant, on_sensors = both_ends_on_sensors()
+    plant.offer(frame_at(0), 0.0)
+    (outgoing,) = plant.take_outbox()
+    assert on_sensors.receive(outgoing.datagram, 0.0) is None
+    assert on_sensors.dropped["unexpected"] == 2
+
+
+def test_a_fix_without_a_frame_is_dropped() -> None:
+    _, autopilot = both_ends_on_sensors()
+    _, fix = encode_sensors(Codec(1, dialect.PLANT_COMPONENT), sensors_at(INTERVAL_US))
+    assert autopilot.receive(fix, 0.0) is None
+    assert autopilot.dropped["invalid"] == 1
+
+
+def test_another_command_is_unsupported(plant: PlantEnd) -> None:
+    codec = Codec(1, dialect.AUTOPILOT_COMPONENT)
+    plant.receive(codec.encode("COMMAND_LONG", 1, dialect.PLANT_COMPONENT, 400, 0, *[0.0] * 7), ADDRESS, 0.0)
+    (outgoing,) = plant.take_outbox()
+    (ack,) = codec.decode(outgoing.datagram)
+    assert ack.fields.result == dialect.RESULT_UNSUPPORTED
+
+
+def test_an_autopilot_at_another_rate_learns_that_it_is_refused(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    plant.offer(frame_at(0), 0.0)
+    call(autopilot, plant)
+    assert autopilot.refused == dialect.RESULT_TEMPORARILY_REJECTED
+
+
+@pytest.mark.parametrize("source", [(2, dialect.AUTOPILOT_COMPONENT), (1, 42)])
+def test_a_foreign_command_is_not_obeyed(plant: PlantEnd, autopilot: AutopilotEnd, source: tuple[int, int]) -> None:
+    call(autopilot, plant)
+    plant.offer(frame_at(0), 0.0)
+    assert plant.receive(encode_actuators(Codec(*source), command_at(0)), ADDRESS, 0.0) is None
+    assert plant.dropped["foreign"] == 1
+
+
+def test_a_command_from_another_address_is_not_obeyed(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    answer = answer_to(plant, autopilot, 0)
+    assert plant.receive(answer, STRANGER, 0.0) is None
+    assert plant.receive(answer, ADDRESS, 0.0) == command_at(0)
+
+
+def test_heartbeats_count_in_simulated_time(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    codec = Codec(99, 99)
+    beats = {"plant": 0, "autopilot": 0}
+    for sample in range(31):
+        time_us = sample * INTERVAL_US
+        plant.offer(frame_at(time_us), 0.0)
+        (outgoing,) = plant.take_outbox()
+        beats["plant"] += [message.name for message in codec.decode(outgoing.datagram)].count("HEARTBEAT")
+        assert autopilot.receive(outgoing.datagram, 0.0) is not None
+        autopilot.answer(command_at(time_us))
+        (answer,) = autopilot.take_outbox()
+        beats["autopilot"] += [message.name for message in codec.decode(answer)].count("HEARTBEAT")
+    assert beats == {"plant": 4, "autopilot": 4}
+
+
+@pytest.mark.parametrize("feedback", Feedback)
+@pytest.mark.parametrize("seed", range(10))
+def test_loss_duplication_and_reordering_change_nothing(seed: int, feedback: Feedback) -> None:
+    """Whatever the link does, the plant obeys each command once, in order, and the autopilot sees each frame once."""
+    chance = random.Random(seed)
+    tell = frame_at if feedback is Feedback.STATE else sensors_at
+    plant = PlantEnd(system_id=1, frame_interval_us=4_000, serves=list(Feedback))
+    autopilot = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=0.0, feedback=feedback)
+    call(autopilot, plant)
+    obeyed: list[int] = []
+    computed: list[Frame] = []
+    in_flight: list[tuple[str, bytes]] = []
+
+    def post(to: str, datagram: bytes) -> None:
+        for _ in range(chance.choices((0, 1, 2), (0.2, 0.7, 0.1))[0]):
+            in_flight.insert(chance.randint(0, len(in_flight)), (to, datagram))
+
+    now_s = 0.0
+    plant.offer(tell(0), now_s)
+    while len(obeyed) < 50:
+        now_s += 0.001
+        plant.poll(now_s)
+        for outgoing in plant.take_outbox():
+            post("autopilot", outgoing.datagram)
+        if in_flight:
+            to, datagram = in_flight.pop()
+            if to == "plant":
+                command = plant.receive(datagram, ADDRESS, now_s)
+                if command:
+                    obeyed.append(command.time_us)
+                    plant.offer(tell(command.time_us + INTERVAL_US), now_s)
+            else:
+                frame = autopilot.receive(datagram, now_s)
+                if frame:
+                    computed.append(frame)
+                    autopilot.answer(command_at(frame.time_us))
+        for datagram in autopilot.take_outbox():
+            post("plant", datagram)
+    assert obeyed == [sample * INTERVAL_US for sample in range(50)]
+    assert computed[:50] == [tell(time_us) for time_us in obeyed]
+
+
+BATTERY = PlantBattery(15.5, 12.25, 0.5, 0.75)
+LOST = Fault(MOTOR, OFF, 1)
+
+
+def offered(plant: PlantEnd, time_us: int, aside: Aside = NOTHING) -> bytes:
+    plant.offer(frame_at(time_us), 0.0, aside)
+    (outgoing,) = plant.take_outbox()
+    return outgoing.datagram
+
+
+def test_a_fault_comes_with_the_answer_and_once(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    autopilot.receive(offered(plant, 0), 0.0)
+    autopilot.answer(command_at(0), [LOST])
+    (answer,) = autopilot.take_outbox()
+    assert plant.receive(answer, ADDRESS, 0.0) == command_at(0)
+    assert plant.take_faults() == [LOST]
+    assert plant.receive(answer, ADDRESS, 0.0) is None
+    assert plant.take_faults() == []
+
+
+def test_a_fault_without_an_answer_is_dropped(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    offered(plant, 0)
+    codec = Codec(1, dialect.AUTOPILOT_COMPONENT)
+    plant.receive(encode_fault(codec, LOST, (1, dialect.PLANT_COMPONENT)), ADDRESS, 0.0)
+    assert plant.take_faults() == []
+    assert plant.dropped["repeated"] == 1
+
+
+def test_what_became_of_it_comes_with_the_next_frame_however_often(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    results = (FaultResult(MOTOR, OFF, 0), FaultResult(MOTOR, WRONG, 2))
+    datagram = offered(plant, 0, Aside(None, results))
+    autopilot.receive(datagram, 0.0)
+    assert autopilot.aside == Aside(None, results)
+    autopilot.receive(datagram, 0.0)
+    assert autopilot.repeated == 1
+    autopilot.answer(command_at(0))
+    (answer,) = autopilot.take_outbox()
+    plant.receive(answer, ADDRESS, 0.0)
+    autopilot.receive(offered(plant, INTERVAL_US), 0.0)
+    assert autopilot.aside == NOTHING
+
+
+def test_the_battery_is_told_twice_a_second_and_to_who_is_new(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    told = []
+    for time_us in range(0, 11 * INTERVAL_US, INTERVAL_US):
+        autopilot.receive(offered(plant, time_us, Aside(BATTERY)), 0.0)
+        told.append(autopilot.aside.battery)
+        autopilot.answer(command_at(time_us))
+        plant.receive(autopilot.take_outbox()[0], ADDRESS, 0.0)
+    assert [number for number, battery in enumerate(told) if battery == BATTERY] == [0, 5, 10]
+    offered(plant, 11 * INTERVAL_US, Aside(BATTERY))
+    again = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=1.0)
+    again.poll(1.0)
+    plant.receive(again.take_outbox()[0], STRANGER, 1.0)
+    frames = [again.receive(outgoing.datagram, 1.0) for outgoing in plant.take_outbox()]
+    assert frame_at(11 * INTERVAL_US) in frames
+    assert again.aside.battery == BATTERY
+
+
+def test_a_plant_that_runs_freely_takes_what_is_newer(autopilot: AutopilotEnd) -> None:
+    plant = PlantEnd(system_id=1, frame_interval_us=INTERVAL_US, waits=False)
+    call(autopilot, plant)
+    first = offered(plant, 0)
+    assert autopilot.receive(first, 0.0) == frame_at(0)
+    offered(plant, INTERVAL_US)  # lost
+    third = offered(plant, 2 * INTERVAL_US)
+    assert plant.poll(10.0) > 10.0
+    assert plant.take_outbox() == []
+    assert autopilot.receive(third, 0.0) == frame_at(2 * INTERVAL_US)
+    assert autopilot.receive(first, 0.0) is None
+    answers = [encode_actuators(Codec(1, dialect.AUTOPILOT_COMPONENT), command_at(n * INTERVAL_US)) for n in range(4)]
+    assert plant.receive(answers[1], ADDRESS, 0.0) == command_at(INTERVAL_US)
+    assert plant.receive(answers[0], ADDRESS, 0.0) is None
+    assert plant.receive(answers[1], ADDRESS, 0.0) is None
+    assert plant.receive(answers[3], ADDRESS, 0.0) is None
+    assert plant.receive(answers[2], ADDRESS, 0.0) == command_at(2 * INTERVAL_US)

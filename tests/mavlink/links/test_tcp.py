@@ -1,0 +1,235 @@
+"""TCP endpoints on real sockets of the loopback interface."""
+
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from time import perf_counter, sleep
+from typing import TypeVar
+
+import pytest
+
+from colibri.common.types import Address
+from colibri.mavlink.links import tcp
+from colibri.mavlink.links.link import GroundLink, LinkError
+from colibri.mavlink.links.open import open_ground_link
+from colibri.mavlink.wire.dialect import Codec
+
+T = TypeVar("T")
+HEARTBEAT = Codec(255, 190).encode("HEARTBEAT", 6, 8, 0, 0, 4, 3)
+TEXT = Codec(255, 190).encode("STATUSTEXT", 6, b"x" * 50, 0, 0)
+
+
+def awaited(look: Callable[[], T], timeout_s: float = 5.0) -> T:
+    """Look until there is something."""
+    give_up_s = perf_counter() + timeout_s
+    while not (seen := look()) and perf_counter() < give_up_s:
+        sleep(0.001)
+    return seen
+
+
+@pytest.fixture
+def server() -> Iterator[GroundLink]:
+    with closing(open_ground_link("tcpin:127.0.0.1:0")) as link:
+        yield link
+
+
+def port_of(link: GroundLink) -> int:
+    return int(link.url.rpartition(":")[2])
+
+
+def caller(server: GroundLink) -> socket.socket:
+    return socket.create_connection(("127.0.0.1", port_of(server)), timeout=5.0)
+
+
+def client_of(server: GroundLink) -> GroundLink:
+    return open_ground_link(server.url.replace("tcpin", "tcp"))
+
+
+def exchange(client: GroundLink, server: GroundLink) -> Address:
+    """Send from the client until the server hears it; return its address."""
+
+    def look() -> list[tuple[bytes, Address]]:
+        client.send(HEARTBEAT)
+        return server.receive_now()
+
+    received = awaited(look)
+    assert received[0][0] == HEARTBEAT
+    return received[0][1]
+
+
+def test_a_frame_there_and_back(server: GroundLink) -> None:
+    with closing(client_of(server)) as client:
+        address = exchange(client, server)
+        server.send(TEXT, address)
+        assert awaited(client.receive_now) == [(TEXT, client.target)]
+
+
+def test_several_clients_are_told_apart(server: GroundLink) -> None:
+    with caller(server) as one, caller(server) as two:
+        one.sendall(HEARTBEAT)
+        ((_, first),) = awaited(server.receive_now)
+        two.sendall(HEARTBEAT)
+        ((_, second),) = awaited(server.receive_now)
+        assert (first, second) == (one.getsockname(), two.getsockname())
+        server.send(TEXT, second)
+        assert two.recv(1000) == TEXT
+        server.send(HEARTBEAT, first)
+        assert one.recv(1000) == HEARTBEAT
+
+
+def test_half_a_frame_waits_for_the_other_half_of_the_same_client(server: GroundLink) -> None:
+    with caller(server) as one, caller(server) as two:
+        one.sendall(b"noise" + TEXT[:20])
+        two.sendall(HEARTBEAT[:5])
+        sleep(0.05)
+        assert server.receive_now() == []
+        two.sendall(HEARTBEAT[5:])
+        assert awaited(server.receive_now) == [(HEARTBEAT, two.getsockname())]
+        one.sendall(TEXT[20:] + HEARTBEAT)
+        assert awaited(server.receive_now) == [(TEXT, one.getsockname()), (HEARTBEAT, one.getsockname())]
+
+
+def test_a_client_that_says_nothing_is_noticed_and_can_be_spoken_to(server: GroundLink) -> None:
+    with caller(server) as client:
+
+        def opened() -> list[Address]:
+            server.receive_now()
+            return server.take_opened()
+
+        assert awaited(opened) == [client.getsockname()]
+        assert server.take_opened() == []
+        server.send(TEXT, client.getsockname())
+        assert client.recv(1000) == TEXT
+
+
+def test_a_client_that_has_gone_is_forgotten(server: GroundLink) -> None:
+    with caller(server) as client:
+        client.sendall(HEARTBEAT)
+        awaited(server.receive_now)
+        address = client.getsockname()
+        assert server.take_closed() == []
+
+    def look() -> list[Address]:
+        server.receive_now()
+        return server.take_closed()
+
+    assert awaited(look) == [address]
+    assert server.take_closed() == []
+    server.send(TEXT, address)
+
+
+def test_a_connection_that_is_reset_is_no_error(server: GroundLink) -> None:
+    client = caller(server)
+    client.sendall(HEARTBEAT)
+    ((_, address),) = awaited(server.receive_now)
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+    client.close()
+
+    def look() -> list[Address]:
+        server.send(TEXT, address)
+        return server.take_closed()
+
+    assert awaited(look) == [address]
+
+
+def test_a_slow_reader_loses_whole_frames_and_blocks_nobody(server: GroundLink) -> None:
+    with caller(server) as slow:
+        slow.sendall(HEARTBEAT)
+        ((_, address),) = awaited(server.receive_now)
+        codec = Codec(1, 1)
+        sent = [codec.encode("STATUSTEXT", 6, b"%08d" % i + b"x" * 42, 0, 0) for i in range(150_000)]
+        slowest_s = 0.0
+        for frame in sent:
+            began_s = perf_counter()
+            server.send(frame, address)
+            slowest_s = max(slowest_s, perf_counter() - began_s)
+        assert slowest_s < 0.5
+        stream = bytearray()
+        slow.setblocking(False)
+
+        def look() -> bool:
+            server.receive_now()  # sends on what waits
+            try:
+                stream.extend(slow.recv(1 << 20))
+            except BlockingIOError:
+                return True
+            return False
+
+        quiet = 0
+        while quiet < 20:
+            quiet = quiet + 1 if look() else 0
+            sleep(0.001 if quiet else 0.0)
+        assert len(stream) % len(sent[0]) == 0
+        assert 0 < len(stream) < sum(map(len, sent))
+        assert stream == b"".join(sent[: len(stream) // len(sent[0])])  # what is dropped is dropped at the end
+        server.send(TEXT, address)
+        slow.settimeout(5.0)
+        assert slow.recv(1000) == TEXT
+
+
+def test_a_client_calls_again(server: GroundLink, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tcp, "RECONNECT_AFTER_S", 0.01)
+    url, port = server.url, port_of(server)
+    with closing(client_of(server)) as client:
+        exchange(client, server)
+        assert client.take_opened() == [client.target]
+        server.close()
+
+        def closed() -> list[Address]:
+            client.receive_now()
+            return client.take_closed()
+
+        assert awaited(closed) == [("127.0.0.1", port)]
+        for _ in range(20):
+            client.send(HEARTBEAT)
+            client.receive_now()
+            sleep(0.002)
+        with closing(open_ground_link(url)) as again:
+            exchange(client, again)
+            assert client.take_opened() == [client.target]
+            assert client.take_opened() == []
+
+
+def test_a_client_waits_before_it_calls_again(server: GroundLink) -> None:
+    url = server.url
+    server.close()
+    with closing(open_ground_link(url.replace("tcpin", "tcp"))) as client:
+        for _ in range(20):
+            client.receive_now()
+            sleep(0.002)
+        with closing(open_ground_link(url)) as again:
+            client.receive_now()
+            assert again.receive_now() == []
+
+
+def test_too_many_clients_are_turned_away(server: GroundLink, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tcp, "CONNECTIONS", 2)
+    with caller(server) as one, caller(server) as two, caller(server) as three:
+        sleep(0.05)
+        server.receive_now()
+        server.receive_now()
+        assert three.recv(10) == b""
+        for client in (one, two):
+            client.sendall(HEARTBEAT)
+        heard = awaited(server.receive_now) + server.receive_now()
+        assert [frame for frame, _ in heard] == [HEARTBEAT] * 2
+
+
+def test_a_taken_port_is_named(server: GroundLink) -> None:
+    with pytest.raises(LinkError, match=f"{server.url}: .*; end the program that has this port"):
+        open_ground_link(server.url)
+
+
+def test_a_port_is_free_again_at_once(server: GroundLink) -> None:
+    with caller(server) as client:
+        client.sendall(HEARTBEAT)
+        awaited(server.receive_now)
+        server.close()
+        open_ground_link(server.url).close()
+
+
+@pytest.mark.parametrize("scheme", ["udpin", "udpout", "tcpin", "tcp"])
+def test_closed_twice_is_closed(scheme: str) -> None:
+    link = open_ground_link(f"{scheme}:127.0.0.1:{0 if scheme.endswith('in') else 9}")
+    link.close()
+    link.close()

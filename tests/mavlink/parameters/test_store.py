@@ -1,0 +1,127 @@
+"""What a parameter may be, and what happens when it changes."""
+
+from collections.abc import Mapping
+from math import inf, nan
+
+import pytest
+
+from colibri.mavlink.parameters.store import (
+    LARGEST_INT,
+    LEAST_INT,
+    Kind,
+    Parameter,
+    Parameters,
+    Refusal,
+    Value,
+    float32,
+)
+
+COUNT = Parameter(name="COUNT", kind=Kind.INT, default=3, minimum=-5, maximum=9, description="Of things")
+ANY = Parameter(name="ANY", kind=Kind.INT, default=0, description="Anything")
+SPEED = Parameter(name="SPEED", kind=Kind.REAL, default=0.1, minimum=0.1, maximum=0.7, description="Of it")
+TRACK = Parameter(name="TRACK", kind=Kind.INT, default=0, description="Which", values=((0, "Line"), (2, "Circle")))
+ID = Parameter(name="ID", kind=Kind.INT, default=7, description="Its own", read_only=True)
+
+
+@pytest.fixture
+def parameters() -> Parameters:
+    return Parameters([SPEED, COUNT, ID, TRACK, ANY])
+
+
+def test_they_come_in_the_order_of_their_names(parameters: Parameters) -> None:
+    assert [parameter.name for parameter in parameters] == ["ANY", "COUNT", "ID", "SPEED", "TRACK"]
+    assert parameters.index("ID") == 2
+    assert parameters.at(2) == ID
+    assert parameters.at(-1) is None
+    assert parameters.at(5) is None
+    assert parameters.index("NONE") is None
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "refusal"),
+    [
+        ("COUNT", -5, None),
+        ("COUNT", 9, None),
+        ("COUNT", 10, Refusal.VALUE_OUT_OF_RANGE),
+        ("COUNT", -6, Refusal.VALUE_OUT_OF_RANGE),
+        ("COUNT", 4.0, Refusal.TYPE_MISMATCH),
+        ("ANY", LEAST_INT, None),
+        ("ANY", LARGEST_INT, None),
+        ("ANY", LARGEST_INT + 1, Refusal.VALUE_OUT_OF_RANGE),
+        ("SPEED", 0.1, None),
+        ("SPEED", 0.7, None),
+        ("SPEED", 0.71, Refusal.VALUE_OUT_OF_RANGE),
+        ("SPEED", nan, Refusal.VALUE_OUT_OF_RANGE),
+        ("SPEED", inf, Refusal.VALUE_OUT_OF_RANGE),
+        ("SPEED", 1e300, Refusal.VALUE_OUT_OF_RANGE),
+        ("TRACK", 2, None),
+        ("TRACK", 1, Refusal.VALUE_OUT_OF_RANGE),
+        ("ID", 8, Refusal.READ_ONLY),
+        ("ID", 7, None),
+        ("NONE", 1, Refusal.DOES_NOT_EXIST),
+    ],
+)
+def test_what_may_be_set(parameters: Parameters, name: str, value: Value, refusal: Refusal | None) -> None:
+    before = parameters.values
+    assert parameters.set(name, value) == refusal
+    if refusal is None:
+        assert parameters[name] == float32(value) if name == "SPEED" else value
+    else:
+        assert parameters.values == before
+        assert parameters.revision == 0
+
+
+def test_changes_are_counted_and_handed_out_once(parameters: Parameters) -> None:
+    assert parameters.take_changed() == ()
+    for value in (4, 4, 5):
+        parameters.set("COUNT", value)
+    parameters.set("SPEED", 0.5)
+    assert parameters.revision == 3
+    assert parameters.take_changed() == ("COUNT", "SPEED")
+    assert parameters.take_changed() == ()
+
+
+def test_the_check_sees_all_values_and_can_refuse(parameters: Parameters) -> None:
+    seen: list[tuple[str, Mapping[str, Value]]] = []
+
+    def check(name: str, values: Mapping[str, Value]) -> Refusal | None:
+        seen.append((name, values))
+        return Refusal.PERMISSION_DENIED if values["COUNT"] + values["ANY"] > 8 else None
+
+    parameters.check = check
+    assert parameters.set("COUNT", 5) is None
+    assert parameters.set("ANY", 4) == Refusal.PERMISSION_DENIED
+    assert parameters["ANY"] == 0
+    assert parameters.set("ANY", 3) is None
+    assert parameters.set("COUNT", 99) == Refusal.VALUE_OUT_OF_RANGE
+    assert seen[1] == ("ANY", {**parameters.values, "ANY": 4})
+    assert len(seen) == 3
+
+
+def test_loading_and_resetting(parameters: Parameters) -> None:
+    parameters.load({"COUNT": 6, "SPEED": 0.5})
+    assert (parameters["COUNT"], parameters["SPEED"]) == (6, 0.5)
+    parameters.reset()
+    assert (parameters["COUNT"], parameters["SPEED"]) == (3, float32(0.1))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"name": "lower"},
+        {"name": "SEVENTEEN_LETTERS"},
+        {"name": ""},
+        {"name": "1ST"},
+        {"default": 10},
+        {"values": ((1, "One"),)},
+    ],
+)
+def test_a_parameter_that_cannot_be(change: dict[str, object]) -> None:
+    wanted = {"name": "COUNT", "kind": Kind.INT, "default": 3, "maximum": 9, "description": "", **change}
+    with pytest.raises(ValueError, match=r"name|default"):
+        Parameter(**wanted)  # type: ignore[arg-type]
+
+
+def test_two_of_one_name() -> None:
+    with pytest.raises(ValueError, match="one name"):
+        Parameters([COUNT, COUNT])

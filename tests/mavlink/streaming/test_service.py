@@ -1,0 +1,309 @@
+"""Streams: rates that hold, on each channel its own, whatever is asked."""
+
+from collections import Counter
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from colibri.mavlink.node.service import Fields, Peer, Send, to
+from colibri.mavlink.services.command import ACCEPTED, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Outcome
+from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SDK, SILENT
+from colibri.mavlink.streaming.service import MOST_WAITING, StreamService
+from colibri.mavlink.telemetry.snapshot import Snapshot
+from colibri.mavlink.telemetry.table import TELEMETRY
+from colibri.mavlink.wire.dialect import mav
+from tests.mavlink.services.peers import FLOATS, GROUND, NAN, OTHER, PEERS, message, on_the_wire
+from tests.mavlink.telemetry.snapshots import FLYING
+
+FRAME_US = 4_000
+ATTITUDE, HOME, HEARTBEAT = 30, 242, 0
+SET, GET, REQUEST = 511, 510, 512
+
+MESSAGE_IDS = FLOATS | st.sampled_from([30.0, 242.0, 244.0])
+
+
+def flying(kind: str = SILENT) -> StreamService:
+    stream = StreamService(TELEMETRY, {"AUTOPILOT_VERSION": lambda command: [to(command.peer, "AUTOPILOT_VERSION")]})
+    stream.update(FLYING)
+    for peer in (GROUND, OTHER):
+        stream.use(peer.channel, kind)
+        stream.opened(peer.channel, 0)
+    return stream
+
+
+def ask(stream: StreamService, command: int, p1: float, p2: float = 0.0, peer: Peer = GROUND) -> int:
+    handler: Any = stream.handlers()[command]
+    outcome: Outcome = handler(Command(command, p1, p2, 0.0, 0.0, 0.0, 0.0, 0.0, None, peer, 0))
+    return outcome.result
+
+
+def fly(stream: StreamService, from_us: int, until_us: int, frame_us: int = FRAME_US) -> list[tuple[int, Send]]:
+    sends = []
+    for now_us in range(from_us, until_us, frame_us):
+        stream.update(replace(FLYING, time_us=now_us))
+        sends += [(now_us, send) for send in stream.poll(now_us)]
+    return sends
+
+
+def counts(sends: list[tuple[int, Send]], channel: int = GROUND.channel) -> Counter[str]:
+    return Counter(send.name for _, send in sends if send.channel == channel)
+
+
+@pytest.mark.parametrize("kind", [SDK, GCS])
+def test_the_defaults_hold_over_a_minute(kind: str) -> None:
+    sends = fly(flying(kind), 0, 60_000_000, 4 * FRAME_US if kind == GCS else FRAME_US)
+    for peer in (GROUND, OTHER):
+        told = counts(sends, peer.channel)
+        assert told.keys() == DEFAULTS[kind].keys()
+        for name, interval_us in DEFAULTS[kind].items():
+            each = 8 if name == "NAMED_VALUE_FLOAT" else 1
+            assert told[name] / each == pytest.approx(60e6 / interval_us, abs=1.0), name
+
+
+def test_every_default_and_every_group_can_be_told() -> None:
+    names = {name for rates in DEFAULTS.values() for name in rates} | set(ALL_GROUPS)
+    assert names <= TELEMETRY.keys()
+
+
+def test_the_sdk_gets_everything() -> None:
+    assert DEFAULTS[SDK].keys() == TELEMETRY.keys()
+
+
+def test_frames_share_the_messages() -> None:
+    """A second of the SDK's streams has about 430 messages in 250 frames: none may have many of them."""
+    sends = fly(flying(SDK), 0, 10_000_000)
+    of_a_frame = Counter(now_us for now_us, send in sends if send.channel == GROUND.channel)
+    assert max(of_a_frame.values()) < 18
+    assert len(of_a_frame) > 0.7 * 2500
+
+
+def test_a_silent_channel_gets_what_it_asks_for_alone() -> None:
+    stream = flying()
+    assert ask(stream, SET, ATTITUDE, 100_000) == ACCEPTED
+    sends = fly(stream, 0, 10_000_000)
+    assert counts(sends) == {"ATTITUDE": 100}
+    assert counts(sends, OTHER.channel) == {}
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1_000, 3_000_000), st.integers(1_000, 50_000), st.integers(0, 10**12))
+def test_intervals_do_not_drift(interval_us: int, frame_us: int, start_us: int) -> None:
+    stream = flying()
+    ask(stream, SET, ATTITUDE, float(interval_us))
+    stream.poll(start_us)
+    frames = 500
+    sends = fly(stream, start_us + frame_us, start_us + (frames + 1) * frame_us, frame_us)
+    wanted = min(frames, frames * frame_us / max(interval_us, 1000))
+    assert len(sends) == pytest.approx(wanted, abs=1.0)
+
+
+def test_a_jump_of_the_clock_is_no_burst() -> None:
+    stream = flying(SDK)
+    fly(stream, 0, 1_000_000)
+    names = counts([(0, send) for send in stream.poll(3_600_000_000)])
+    assert all(count == 1 for name, count in names.items() if name != "NAMED_VALUE_FLOAT")
+    assert counts(fly(stream, 3_600_004_000, 3_601_004_000))["ATTITUDE"] == pytest.approx(100, abs=1)
+
+
+def test_a_clock_that_begins_anew_goes_on() -> None:
+    stream = flying(SDK)
+    fly(stream, 0, 10_000_000)
+    assert counts(fly(stream, 0, 1_000_000))["ATTITUDE"] == pytest.approx(100, abs=1)
+
+
+def test_the_same_messages_come_every_time() -> None:
+    assert repr(fly(flying(SDK), 0, 500_000)) == repr(fly(flying(SDK), 0, 500_000))
+
+
+def test_fields_are_worked_out_once_for_all_channels() -> None:
+    calls = []
+
+    def encoder(s: Snapshot) -> Fields:
+        calls.append(s.time_us)
+        return TELEMETRY["ATTITUDE"](s)  # type: ignore[return-value]
+
+    stream = StreamService({"ATTITUDE": encoder})
+    for peer in (GROUND, OTHER):
+        stream.opened(peer.channel, 0)
+        ask(stream, SET, ATTITUDE, 4_000.0, peer)
+    sends = fly(stream, 0, 400_000)
+    assert len(sends) == pytest.approx(200, abs=2)
+    assert len(calls) == len(set(calls)) == len(sends) / 2
+
+
+def test_a_closed_channel_gets_nothing() -> None:
+    stream = flying(SDK)
+    ask(stream, REQUEST, ATTITUDE)
+    stream.closed(GROUND.channel)
+    sends = fly(stream, 0, 1_000_000)
+    assert counts(sends) == {}
+    assert counts(sends, OTHER.channel)["ATTITUDE"] > 90
+
+
+def test_a_channel_may_change_its_kind() -> None:
+    stream = flying(GCS)
+    stream.use(GROUND.channel, SDK)
+    sends = fly(stream, 0, 1_000_000)
+    assert counts(sends)["ATTITUDE"] == pytest.approx(100, abs=1)
+    assert counts(sends, OTHER.channel)["ATTITUDE"] == pytest.approx(10, abs=1)
+
+
+def test_an_unspecified_channel_is_a_ground_station() -> None:
+    stream = StreamService(TELEMETRY)
+    stream.opened(7, 0)
+    assert stream.interval_us(7, "ATTITUDE") == DEFAULTS[GCS]["ATTITUDE"]
+
+
+@pytest.mark.parametrize(
+    ("p1", "p2", "result"),
+    [
+        (ATTITUDE, 1e5, ACCEPTED),
+        (ATTITUDE, -1.0, ACCEPTED),
+        (ATTITUDE, 0.0, ACCEPTED),
+        (ATTITUDE, -2.0, DENIED),
+        (ATTITUDE, NAN, DENIED),
+        (ATTITUDE, float("inf"), DENIED),
+        (ATTITUDE, 1e12, DENIED),
+        (HEARTBEAT, 1e5, DENIED),
+        (148.0, 1e5, DENIED),
+        (246.0, 1e5, UNSUPPORTED),
+        (30.5, 1e5, UNSUPPORTED),
+        (NAN, 1e5, UNSUPPORTED),
+        (-1.0, 1e5, UNSUPPORTED),
+        (float("inf"), 1e5, UNSUPPORTED),
+    ],
+)
+def test_intervals_that_can_be_set(p1: float, p2: float, result: int) -> None:
+    assert ask(flying(SDK), SET, p1, p2) == result
+
+
+def test_an_interval_is_set_switched_off_and_set_back() -> None:
+    stream = flying(SDK)
+    for p2, interval_us in ((2e5, 200_000), (-1.0, None), (0.0, 10_000)):
+        ask(stream, SET, ATTITUDE, p2)
+        assert stream.interval_us(GROUND.channel, "ATTITUDE") == interval_us
+        assert stream.interval_us(OTHER.channel, "ATTITUDE") == 10_000
+
+
+@pytest.mark.parametrize(("message_id", "interval_us"), [(ATTITUDE, 10_000), (148, -1), (HEARTBEAT, 1_000_000)])
+@pytest.mark.parametrize("way", [GET, REQUEST])
+def test_intervals_can_be_asked_for(message_id: int, interval_us: int, way: int) -> None:
+    stream = flying()
+    ask(stream, SET, ATTITUDE, 10_000.0)
+    asked = (message_id, 0.0) if way == GET else (mav.MAVLINK_MSG_ID_MESSAGE_INTERVAL, message_id)
+    assert ask(stream, way, *asked) == ACCEPTED
+    (send,) = stream.poll(0)
+    (answer,) = on_the_wire([send])
+    assert send.channel == GROUND.channel
+    assert (answer.fields.message_id, answer.fields.interval_us) == (message_id, interval_us)
+
+
+@pytest.mark.parametrize("message_id", [246, NAN, 1e9])
+def test_there_is_no_interval_of_an_unknown_message(message_id: float) -> None:
+    assert ask(flying(), GET, message_id) == UNSUPPORTED
+    assert ask(flying(), REQUEST, 244, message_id) == UNSUPPORTED
+
+
+def test_a_message_comes_on_request_to_whoever_asks() -> None:
+    stream = flying()
+    assert ask(stream, REQUEST, HOME) == ACCEPTED
+    assert ask(stream, REQUEST, 148, peer=OTHER) == ACCEPTED
+    assert [(send.name, send.channel) for send in stream.poll(0)] == [("HOME_POSITION", 1), ("AUTOPILOT_VERSION", 2)]
+    assert list(stream.poll(0)) == []
+
+
+@pytest.mark.parametrize("message_id", [300, 246, 9999, NAN, -5.0])
+def test_an_unknown_message_is_unsupported_at_once(message_id: float) -> None:
+    assert ask(flying(), REQUEST, message_id) == UNSUPPORTED
+
+
+def test_what_is_not_known_yet_may_be_asked_for_later() -> None:
+    stream = StreamService(TELEMETRY)
+    assert ask(stream, REQUEST, ATTITUDE) == TEMPORARILY_REJECTED
+    stream.update(Snapshot(time_us=0))
+    assert ask(stream, REQUEST, HOME) == TEMPORARILY_REJECTED
+    stream.update(FLYING)
+    assert ask(stream, REQUEST, HOME) == ACCEPTED
+
+
+def test_a_provider_may_refuse() -> None:
+    stream = flying()
+    stream.provide("STORAGE_INFORMATION", lambda _: Outcome(DENIED))
+    assert ask(stream, REQUEST, mav.MAVLINK_MSG_ID_STORAGE_INFORMATION) == DENIED
+
+
+@pytest.mark.parametrize(
+    ("command", "result", "name"),
+    [
+        (520, ACCEPTED, "AUTOPILOT_VERSION"),
+        (410, ACCEPTED, "HOME_POSITION"),
+        (528, ACCEPTED, "FLIGHT_INFORMATION"),
+        (519, UNSUPPORTED, None),
+        (525, UNSUPPORTED, None),
+    ],
+)
+def test_older_requests_are_answered_alike(command: int, result: int, name: str | None) -> None:
+    stream = flying()
+    assert ask(stream, command, 1.0) == result
+    assert [send.name for send in stream.poll(0)] == ([name] if name else [])
+
+
+def test_requests_between_two_frames_have_a_limit() -> None:
+    stream = flying()
+    results = Counter(ask(stream, REQUEST, HOME) for _ in range(MOST_WAITING + 5))
+    assert results == {ACCEPTED: MOST_WAITING, TEMPORARILY_REJECTED: 5}
+
+
+@pytest.mark.parametrize("group", [0, *GROUPS])
+def test_a_data_stream_is_a_group_of_messages(group: int) -> None:
+    stream = flying()
+    assert list(stream.receive(message("REQUEST_DATA_STREAM", 0, 0, group, 4, 1), GROUND, 0)) == []
+    names = GROUPS[group] if group else ALL_GROUPS
+    told = counts(fly(stream, 0, 10_000_000))
+    assert told.keys() == set(names)
+    assert all(count == pytest.approx(40, abs=1) for count in told.values())
+    stream.receive(message("REQUEST_DATA_STREAM", 0, 0, group, 4, 0), GROUND, 10_000_000)
+    assert fly(stream, 10_000_000, 11_000_000) == []
+
+
+def test_asking_again_and_again_for_a_slow_stream_does_not_put_it_off() -> None:
+    stream = flying()
+    told: Counter[str] = Counter()
+    for start_us in range(0, 10_000_000, 500_000):
+        stream.receive(message("REQUEST_DATA_STREAM", 0, 0, 10, 1, 1), GROUND, start_us)
+        told += counts(fly(stream, start_us, start_us + 500_000))
+    assert told == {"ATTITUDE": 10, "ATTITUDE_QUATERNION": 10}
+
+
+@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([SET, GET, REQUEST, 520, 519]),
+            MESSAGE_IDS,
+            FLOATS,
+            PEERS,
+        )
+        | st.tuples(st.integers(0, 255), st.integers(0, 65535), st.integers(0, 255), PEERS),
+        max_size=30,
+    )
+)
+def test_whatever_is_asked_nothing_raises(asked: list[tuple[Any, Any, Any, Peer]]) -> None:
+    stream = flying(GCS)
+    for number, (first, second, third, peer) in enumerate(asked):
+        if isinstance(second, float):
+            ask(stream, first, second, third, peer)
+        else:
+            fields = message("REQUEST_DATA_STREAM", 1, 1, first, second, third)
+            list(stream.receive(fields, peer, number * FRAME_US))
+        on_the_wire([send for send in stream.poll(number * FRAME_US) if send.fields])
+
+
+def test_setting_intervals_without_end_takes_no_memory() -> None:
+    stream = flying()
+    for number in range(5_000):
+        ask(stream, SET, ATTITUDE, 1e9 + 1000.0 * number)
+    assert len(stream._schedule._heap) < 200  # noqa: SLF001

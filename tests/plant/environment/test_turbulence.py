@@ -1,0 +1,133 @@
+"""Dryden's turbulence against the formulas of MIL-F-8785C."""
+
+from collections.abc import Callable
+from math import exp, pi, sqrt
+
+import numpy as np
+import pytest
+from scipy.signal import welch
+
+from colibri.common.types import Array
+from colibri.plant.environment.air import Air
+from colibri.plant.environment.turbulence import LEAST_AIRSPEED_M_S, Turbulence, eddy_velocity, scales
+from colibri.plant.environment.weather import Intensity, Weather
+from colibri.plant.process.options import wind
+
+FOOT = 0.3048
+KNOT = 1852.0 / 3600.0
+AIRSPEED_M_S, HEIGHT_M = 10.0, 30.0
+SCALE = scales("moderate", HEIGHT_M)
+
+
+def blow(steps: int, step_s: float, seed: int = 1) -> Array:
+    """Return the velocities along, across and upwards, (steps, 3), m/s."""
+    turbulence = Turbulence(seed)
+    eddies = turbulence.begin()
+    velocities = []
+    for _ in range(steps):
+        velocities.append(eddy_velocity(eddies, SCALE))
+        eddies = turbulence.step(eddies, SCALE, AIRSPEED_M_S, step_s)
+    return np.array(velocities)
+
+
+def along(omega: Array, sigma: float, length_m: float) -> Array:
+    spectrum: Array = sigma**2 * 2.0 * length_m / (pi * AIRSPEED_M_S) / (1.0 + (length_m * omega / AIRSPEED_M_S) ** 2)
+    return spectrum
+
+
+def across(omega: Array, sigma: float, length_m: float) -> Array:
+    squared = (length_m * omega / AIRSPEED_M_S) ** 2
+    spectrum: Array = sigma**2 * length_m / (pi * AIRSPEED_M_S) * (1.0 + 3.0 * squared) / (1.0 + squared) ** 2
+    return spectrum
+
+
+@pytest.mark.parametrize(("intensity", "knots"), [("light", 15.0), ("moderate", 30.0), ("severe", 45.0)])
+def test_the_scales_are_those_of_the_specification(intensity: Intensity, knots: float) -> None:
+    vertical = 0.1 * knots * KNOT
+    assert scales(intensity, 1000.0 * FOOT) == pytest.approx((vertical, vertical, 1000.0 * FOOT, 1000.0 * FOOT))
+    slope = 0.177 + 0.000823 * 100.0
+    low = (vertical / slope**0.4, vertical, 100.0 * FOOT / slope**1.2, 100.0 * FOOT)
+    assert scales(intensity, 100.0 * FOOT) == pytest.approx(low)
+
+
+@pytest.mark.parametrize(("height_ft", "as_ft"), [(9.0, 10.0), (-5.0, 10.0), (1500.0, 1000.0)])
+def test_below_ten_and_above_a_thousand_feet_it_is_as_there(height_ft: float, as_ft: float) -> None:
+    assert scales("light", height_ft * FOOT) == pytest.approx(scales("light", as_ft * FOOT))
+
+
+@pytest.mark.parametrize(("axis", "formula"), [(0, along), (1, across), (2, across)])
+def test_the_spectrum_is_drydens(axis: int, formula: Callable[[Array, float, float], Array]) -> None:
+    step_s = 0.02
+    sigma_uv, sigma_w, length_uv, length_w = SCALE
+    sigma, length = (sigma_w, length_w) if axis == 2 else (sigma_uv, length_uv)
+    frequencies, measured = welch(blow(1 << 17, step_s)[:, axis], fs=1.0 / step_s, nperseg=4096)
+    shown = (frequencies > 0.02) & (frequencies < 5.0)  # above, a sampled spectrum holds what lies beyond 25 Hz too
+    wanted = 2.0 * pi * formula(2.0 * pi * frequencies[shown], sigma, length)
+    bands = np.array_split(np.log(measured[shown] / wanted), 8)
+    assert [float(np.mean(band)) for band in bands] == pytest.approx([0.0] * 8, abs=0.12)
+
+
+@pytest.mark.parametrize("step_s", [0.004, 0.5])
+def test_variance_and_memory_do_not_depend_on_the_step(step_s: float) -> None:
+    """The correlation of eddies that drift past: exp(-a t) along, exp(-a t)(1 - a t / 2) across, a = V / L."""
+    sigma_uv, sigma_w, length_uv, length_w = SCALE
+    rows = {0: (sigma_uv, length_uv, 1.0), 1: (sigma_uv, length_uv, 0.5), 2: (sigma_w, length_w, 0.5)}
+    every = round(2.0 / step_s)
+    products = []
+    for seed in range(40):
+        blown = blow(10 * every if step_s < 0.1 else 500 * every, step_s, seed)[::every]
+        products.append([(blown**2).mean(axis=0), (blown[1:] * blown[:-1]).mean(axis=0)])
+    mean = np.mean(products, axis=0)
+    error = np.std(products, axis=0) / sqrt(len(products))
+    for axis, (sigma, length, share) in rows.items():
+        way = 2.0 * AIRSPEED_M_S / length
+        wanted = (sigma**2, sigma**2 * exp(-way) * (1.0 - (1.0 - share) * way))
+        for k in range(2):
+            assert abs(mean[k, axis] - wanted[k]) < 4.0 * error[k, axis]
+
+
+def test_it_blows_from_the_first_frame_on() -> None:
+    first = np.array([blow(1, 0.004, seed)[0] for seed in range(2000)])
+    sigma_uv, sigma_w, _, _ = SCALE
+    assert first.std(axis=0) == pytest.approx([sigma_uv, sigma_uv, sigma_w], rel=0.06)
+    assert np.abs(np.corrcoef(first.T) - np.eye(3)).max() < 0.08
+
+
+def test_a_memory_has_one_future() -> None:
+    turbulence = Turbulence(7)
+    history = [turbulence.begin()]
+    for _ in range(600):
+        history.append(turbulence.step(history[-1], SCALE, 5.0, 0.004))
+    again = Turbulence(7)
+    for frame in (599, 3, 300, 255, 256):
+        assert again.step(history[frame], SCALE, 5.0, 0.004) == history[frame + 1]
+
+
+def test_seeds_differ() -> None:
+    """A minute apart, eddies have forgotten each other: 4000 samples are independent."""
+    one, other = blow(4000, 60.0, 1), blow(4000, 60.0, 2)
+    assert all(abs(np.corrcoef(one[:, axis], other[:, axis])[0, 1]) < 0.08 for axis in range(3))
+    assert (blow(10, 0.004, 1) == blow(10, 0.004, 1)).all()
+
+
+def test_who_stands_in_the_wind_meets_the_eddies_of_who_flies_through_calm_air() -> None:
+    standing, flying = (Air(Weather(wind(text), turbulence="light", seed=5)) for text in ("8@270", "0@0"))
+    velocity_0, eddies_0 = standing.begin(HEIGHT_M)
+    velocity_1, eddies_1 = flying.begin(HEIGHT_M)
+    for frame in range(1, 100):
+        velocity_0, eddies_0 = standing.go_on(eddies_0, 4000 * frame, HEIGHT_M, (0.0, 0.0, 0.0), 4000)
+        velocity_1, eddies_1 = flying.go_on(eddies_1, 4000 * frame, HEIGHT_M, (-8.0, 0.0, 0.0), 4000)
+        assert velocity_0 == pytest.approx(np.add(velocity_1, (8.0, 0.0, 0.0)))
+
+
+def test_the_eddies_are_along_the_wind() -> None:
+    east, north = (
+        Air(Weather(wind(text), turbulence="light", seed=5)).begin(HEIGHT_M)[0] for text in ("8@270", "8@180")
+    )
+    assert north == pytest.approx((-east[1], east[0], east[2]))
+
+
+def test_who_drifts_with_the_air_still_meets_eddies() -> None:
+    turbulence = Turbulence(1)
+    begin = turbulence.begin()
+    assert turbulence.step(begin, SCALE, 0.0, 0.1) == turbulence.step(begin, SCALE, LEAST_AIRSPEED_M_S, 0.1)

@@ -1,0 +1,62 @@
+"""A simple law by which other autopilots than Colibri hover, in NED and FRD and with rotors numbered as theirs."""
+
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from colibri.common.types import Array
+
+Point: TypeAlias = tuple[float, float, float]
+
+
+class Airframe(NamedTuple):
+    """What a stranger knows of the vehicle.
+
+    Attributes:
+        mass_kg: Mass.
+        inertia_kg_m2: About the body's axes.
+        motors: Of each: how far forward and right it is, m, and its drag torque about down, m per N of thrust.
+    """
+
+    mass_kg: float
+    inertia_kg_m2: Point
+    motors: tuple[Point, Point, Point, Point]
+
+
+class Known(NamedTuple):
+    """What a stranger knows of the flight: NED, FRD."""
+
+    position_m: Array
+    velocity_m_s: Array
+    quaternion: Array
+    rate_rad_s: Array
+
+
+def hovering(airframe: Airframe, known: Known, target_ned_m: Point) -> Array:
+    """Return the thrust of each motor, N, that flies the vehicle to a point, looking north."""
+    R = rotation(known.quaternion)
+    wanted = np.clip(np.array(target_ned_m) - known.position_m, -1.0, 1.0) * 1.5 - known.velocity_m_s
+    force = airframe.mass_kg * (2.0 * wanted - np.array([0.0, 0.0, 9.81]))
+    thrust_n = max(0.0, float(-force @ R[:, 2]))
+    down = -force / np.linalg.norm(force)
+    right = np.cross(down, [1.0, 0.0, 0.0])
+    right /= np.linalg.norm(right)
+    aimed = np.stack([np.cross(right, down), right, down], axis=1)
+    twist = 0.5 * (aimed.T @ R - R.T @ aimed)
+    error = np.array([twist[2, 1], twist[0, 2], twist[1, 0]])
+    moment = np.array(airframe.inertia_kg_m2) * (-64.0 * error - 16.0 * known.rate_rad_s)
+    forward, starboard, turn = np.array(airframe.motors).T
+    thrusts: Array = np.linalg.solve(np.array([np.ones(4), -starboard, forward, turn]), [thrust_n, *moment])
+    return np.maximum(0.0, thrusts)
+
+
+def rotation(q: Array) -> Array:
+    """Return the matrix that turns FRD into NED."""
+    w, x, y, z = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )

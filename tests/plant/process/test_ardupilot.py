@@ -1,0 +1,217 @@
+"""ArduPilot's JSON interface: the conversation, the order of the rotors, and a flight through it."""
+
+from collections.abc import Iterator
+from math import atan2, radians
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colibri.mavlink.links.open import open_link
+from colibri.plant.physics.start import Start
+from colibri.plant.physics.world import Physics, starting_world
+from colibri.plant.process.ardupilot import ArduPilotEnd
+from colibri.plant.vehicle.description import Rotors, VehicleError, load_vehicle
+from tests.plant.process.ardupilot import pulses, read, request
+from tools.harness.processes import GIVE_UP_AFTER_S, Process, running
+
+VEHICLE = load_vehicle("hummingbird")
+PHYSICS = Physics(VEHICLE, "rk4")
+MOTORS = VEHICLE.rotors.numbering()
+SENDER, OTHER = ("127.0.0.1", 50000), ("127.0.0.1", 50001)
+NORTH = Start(psi=90.0)
+TARGET_NED_M = (2.0, 1.0, -3.0)
+
+
+def standing(start: Start = NORTH) -> ArduPilotEnd:
+    return ArduPilotEnd(PHYSICS, starting_world(start, VEHICLE), MOTORS, VEHICLE.rotors)
+
+
+def answered(end: ArduPilotEnd, datagram: bytes, now_s: float = 0.0) -> bytes:
+    reply = end.receive(datagram, SENDER, now_s)
+    assert reply is not None
+    return reply
+
+
+def turned(bearings_deg: tuple[float, ...], directions: str) -> Rotors:
+    """Return the Hummingbird's rotors elsewhere: degrees clockwise from the front; `c` turns clockwise."""
+    places = tuple((0.17 * float(np.cos(radians(b))), -0.17 * float(np.sin(radians(b)))) for b in bearings_deg)
+    turns = tuple("cw" if letter == "c" else "ccw" for letter in directions)
+    return msgspec.structs.replace(VEHICLE.rotors, position_m=places, direction=turns)
+
+
+def test_a_stranger_flies_the_vehicle_from_the_ground_to_a_point_and_holds_it() -> None:
+    end = standing()
+    told = read(answered(end, request(0)))
+    for count in range(1, 400 * 15):
+        told = read(answered(end, request(count, pulses(told, TARGET_NED_M))))
+    assert told["position"] == pytest.approx(TARGET_NED_M, abs=0.02)
+    assert np.linalg.norm(told["velocity"]) < 0.01
+    w, _, _, z = told["quaternion"]
+    assert 2.0 * atan2(z, w) == pytest.approx(0.0, abs=0.02)
+    assert told["imu"]["accel_body"] == pytest.approx([0.0, 0.0, -9.81], abs=0.05)
+    assert end.world.state[6:9] == pytest.approx((1.0, 2.0, 3.0), abs=0.02)
+
+
+def test_at_rest_on_the_ground_it_feels_gravity() -> None:
+    told = read(answered(standing(), request(0)))
+    assert told["imu"]["accel_body"] == pytest.approx([0.0, 0.0, -9.81], abs=1e-6)
+    assert told["quaternion"] == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=1e-9)
+    assert list(told) == ["timestamp", "imu", "position", "quaternion", "velocity"]
+
+
+@pytest.mark.parametrize("rate_hz", [400, 1200, 777])
+def test_time_keeps_step_with_the_frame_rate(rate_hz: int) -> None:
+    end = standing()
+    times = [read(answered(end, request(count, rate_hz=rate_hz)))["timestamp"] for count in range(2 * rate_hz)]
+    assert times[rate_hz - 1] == 1.0
+    assert times[-1] == 2.0
+    assert np.diff(times) == pytest.approx(1.0 / rate_hz, abs=1.1e-6)
+
+
+def test_a_repeated_request_is_answered_from_memory() -> None:
+    end = standing()
+    first = answered(end, request(0, (1500,) * 4))
+    world = end.world
+    assert answered(end, request(0, (1900,) * 4)) == first
+    assert end.world is world
+    assert end.dropped == {"repeated": 1}
+    assert read(answered(end, request(1)))["timestamp"] == 2 / 400
+
+
+def test_an_ardupilot_that_starts_again_finds_the_vehicle_at_its_start() -> None:
+    end = standing()
+    first = answered(end, request(0))
+    for count in range(1, 200):
+        answered(end, request(count, (1700,) * 4))
+    assert end.world.state[8] > 0.1
+    assert answered(end, request(0)) == first
+    assert end.restarts == 1
+
+
+def test_a_plant_that_starts_again_goes_on_with_whatever_it_is_asked_for() -> None:
+    end = standing()
+    assert read(answered(end, request(123456)))["timestamp"] == 1 / 400
+    assert read(answered(end, request(123457)))["timestamp"] == 2 / 400
+    assert end.restarts == 0
+
+
+def test_thirty_two_channels() -> None:
+    both = [answered(standing(), request(7, (1600,) * 4, channels=channels)) for channels in (16, 32)]
+    assert both[0] == both[1]
+
+
+def test_a_second_ardupilot_waits_until_the_first_is_gone() -> None:
+    end = standing()
+    answered(end, request(5), now_s=1.0)
+    assert end.receive(request(0), OTHER, 1.4) is None
+    assert end.dropped == {"second autopilot": 1}
+    assert end.world.time_us == 2500
+    assert end.receive(request(0), OTHER, 1.6) is not None
+    assert end.peer == OTHER
+
+
+@given(st.one_of(st.binary(max_size=100), st.binary(min_size=40, max_size=40), st.binary(min_size=72, max_size=72)))
+def test_what_is_no_request_is_dropped(datagram: bytes) -> None:
+    end = standing()
+    reply = end.receive(datagram, SENDER, 0.0)
+    assert (reply is None) == (end.dropped.total() == 1)
+    assert reply is not None or (end.peer is None and end.world.time_us == 0)
+
+
+def test_a_frame_rate_that_no_simulation_needs_is_refused() -> None:
+    end = standing()
+    assert end.receive(request(0, rate_hz=0), SENDER, 0.0) is None
+    assert end.receive(request(0, rate_hz=9), SENDER, 0.0) is None
+    assert end.dropped == {"frame rate": 2}
+
+
+def test_disarmed_the_rotors_stand() -> None:
+    end = standing()
+    for count, pulse in enumerate((1000, 0, 900)):
+        answered(end, request(count, (pulse,) * 4))
+        assert end.world.rotor_speeds == (0.0,) * 4
+    answered(end, request(3, (1100, 1000, 1000, 1000)))
+    assert min(end.world.rotor_speeds) > 0.0
+
+
+def test_the_hummingbird_is_a_reversed_plus() -> None:
+    assert (MOTORS.shape, MOTORS.reverse, MOTORS.ardupilot_frame_type) == ("+", True, 6)
+    end = standing(Start(z=50.0))
+    for count in range(100):
+        answered(end, request(count, (1400, 1500, 1600, 1700)))
+    front, right, rear, left = end.world.rotor_speeds
+    assert right < left < front < rear
+
+
+@pytest.mark.parametrize(
+    ("bearings_deg", "directions", "shape", "rotors", "frame_type"),
+    [
+        ((90.0, -90.0, 0.0, 180.0), "ttcc", "+", (0, 1, 2, 3), 0),
+        ((0.0, 90.0, 180.0, 270.0), "tctc", "+", (1, 3, 0, 2), 6),
+        ((0.0, 90.0, 180.0, 270.0), "ctct", "+", (1, 3, 0, 2), 0),
+        ((45.0, -135.0, -45.0, 135.0), "ttcc", "x", (0, 1, 2, 3), 1),
+        ((45.0, -135.0, -45.0, 135.0), "cctt", "x", (0, 1, 2, 3), 3),
+        ((-50.0, 50.0, 130.0, 230.0), "ctct", "x", (1, 3, 0, 2), 1),
+    ],
+)
+def test_rotors_are_numbered_by_where_they_are(
+    bearings_deg: tuple[float, ...], directions: str, shape: str, rotors: tuple[int, ...], frame_type: int
+) -> None:
+    found = turned(bearings_deg, directions).numbering()
+    assert (found.shape, found.rotors, found.ardupilot_frame_type) == (shape, rotors, frame_type)
+
+
+def test_rotors_that_nobody_else_numbers_are_refused() -> None:
+    with pytest.raises(VehicleError, match="not this frame"):
+        turned((22.5, 112.5, 202.5, 292.5), "tctc").numbering()
+
+
+@pytest.fixture
+def plant(tmp_path: Path) -> Iterator[Process]:
+    process = Process(
+        tmp_path, "plant", "--serve", "ardupilot-json", "--link", "udpin:127.0.0.1:0", "--out", str(tmp_path / "out")
+    )
+    with running(process):
+        yield process
+
+
+def test_the_process_answers_whoever_asks_and_keeps_what_was_flown(plant: Process, tmp_path: Path) -> None:
+    link = open_link(plant.wait_for("listening")["url"].replace("udpin", "udpout"))
+    assert plant.wait_for("frame")["frame_type"] == 6
+    end, told = standing(), None
+    for count in range(300):
+        sent = request(count, pulses(told, TARGET_NED_M) if told else (1000,) * 4)
+        for _ in range(3 if count == 0 else 1):  # it asks again while the plant is still loading
+            link.send(sent)
+        received = link.receive(GIVE_UP_AFTER_S)
+        assert received is not None
+        assert received[0] == answered(end, sent)
+        told = read(received[0])
+    link.close()
+    plant.process.terminate()
+    assert plant.wait() == 130
+    ended = plant.events("ended")[0]
+    assert ended["steps"] == 300
+    rows = (tmp_path / "out" / "plant.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 301
+    assert float(rows[-1].split(",")[0]) == 0.75
+
+
+def test_a_vehicle_that_ardupilot_cannot_fly_is_one_line(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[3] / "plant" / "vehicle" / "models" / "hummingbird.toml").read_text(encoding="utf-8")
+    places = "[[0.171, 0.0], [0.0, -0.171], [-0.171, 0.0], [0.0, 0.171]]"
+    between = "[[0.158, 0.065], [0.065, -0.158], [-0.158, -0.065], [-0.065, 0.158]]"
+    changed = text.replace(f"position_m = {places}", f"position_m = {between}")
+    assert changed != text
+    path = tmp_path / "odd.toml"
+    path.write_text(changed, encoding="utf-8")
+    process = Process(
+        tmp_path, "plant", "--serve", "ardupilot-json", "--link", "udpin:127.0.0.1:0", "--vehicle", str(path)
+    )
+    with running(process):
+        assert process.wait() == 2
+    assert "PX4 and ArduPilot know a '+' or an 'x'" in process.errors()

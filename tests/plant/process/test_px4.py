@@ -1,0 +1,250 @@
+"""PX4's simulator interface: the conversation, and a flight through it over TCP and UDP."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
+from colibri.mavlink.hil.px4_simulator import RESEND_AFTER_S, Motors, SimulatorEnd, Truth
+from colibri.mavlink.hil.sensors import SensorFrame, Updated
+from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.links.link import GroundLink, receive_soon
+from colibri.mavlink.links.open import open_ground_link
+from colibri.mavlink.wire.dialect import Codec
+from colibri.plant.physics.start import Start
+from colibri.plant.physics.world import Physics, starting_world, state_frame
+from colibri.plant.sensors.suite import SensorSuite
+from colibri.plant.vehicle.description import load_vehicle
+from tests.plant.process.px4 import Px4, serve
+from tools.harness.processes import GIVE_UP_AFTER_S, Process, running, wait_for
+
+PX4, OTHER = ("127.0.0.1", 4561), ("127.0.0.1", 4562)
+STOPPED = Motors((0.0,) * 4, armed=False)
+VEHICLE = load_vehicle("jmavsim")
+FRAME_US = 4000
+
+
+def frame(time_us: int) -> SensorFrame:
+    return SensorFrame(
+        time_us, int(Updated.ACCELEROMETER), (0.0, 0.0, 9.81), (0.0,) * 3, (0.2, 0.0, 0.4), 95000.0, 15.0
+    )
+
+
+def connected() -> tuple[SimulatorEnd, Px4]:
+    end, px4 = SimulatorEnd(system_id=1), Px4(starting_frames=0)
+    for datagram in reversed(px4.hello()):
+        end.receive(datagram, PX4)
+    return end, px4
+
+
+def carried(end: SimulatorEnd, px4: Px4) -> list[bytes]:
+    """Carry what the simulator sends to PX4; return the answers, which are not carried."""
+    return [answer for frames, _ in end.take_outbox() for answer in px4.hear(b"".join(frames))]
+
+
+def test_it_begins_when_it_is_called_and_waits_for_nobody_before_the_first_answer() -> None:
+    for hello in (Px4().hello(), Px4().hello()[::-1]):  # two threads of PX4 say these
+        end = SimulatorEnd(system_id=1)
+        end.receive(Px4().answer(), PX4)
+        assert (end.peer, end.dropped) == (None, {"not begun": 1})
+        end.offer(frame(4000), None, 0.0)
+        assert end.take_outbox() == []
+        for datagram in hello:
+            end.receive(datagram, PX4)
+        assert (end.peer, end.calls, end.lockstep) == (PX4, 1, False)
+        assert end.wants_truth(0)
+
+
+def test_an_answer_moves_the_motors_and_begins_the_lockstep() -> None:
+    end, px4 = connected()
+    end.offer(frame(4000), None, 0.0)
+    assert not end.answered
+    (answer,) = carried(end, px4)
+    end.receive(answer, PX4)
+    assert (end.answered, end.lockstep, end.motors) == (True, True, STOPPED)
+    assert px4.time_us == 4000
+
+
+def test_an_autopilot_that_keeps_its_own_time_is_not_waited_for() -> None:
+    end = SimulatorEnd(system_id=1)
+    px4 = Px4(lockstep=False, starting_frames=0)
+    end.receive(px4.hello()[1], PX4)
+    end.offer(frame(4000), None, 0.0)
+    end.receive(carried(end, px4)[0], PX4)
+    assert (end.answered, end.lockstep) == (True, False)
+
+
+def test_a_frame_that_was_sent_again_is_answered_once() -> None:
+    end, px4 = connected()
+    end.offer(frame(4000), None, 0.0)
+    first = carried(end, px4)
+    end.poll(0.5 * RESEND_AFTER_S)
+    assert end.resent == 0
+    end.poll(RESEND_AFTER_S)
+    assert end.resent == 1
+    again = carried(end, px4)
+    end.receive(first[0], PX4)
+    end.offer(frame(8000), None, 2.0)
+    end.receive(again[0], PX4)
+    assert not end.answered
+    assert end.dropped == {"repeated": 1}
+    end.receive(carried(end, px4)[0], PX4)
+    assert end.answered
+
+
+@pytest.mark.parametrize(
+    ("controls", "motors"),
+    [
+        ((0.1, 0.2, 0.3, 0.4), (0.1, 0.2, 0.3, 0.4)),
+        ((-0.5, 1.5, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0)),
+        ((float("nan"), 0.2, 0.3, 0.4), (0.0, 0.0, 0.0, 0.0)),
+        ((float("inf"), 0.2, 0.3, 0.4), (0.0, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_controls_that_no_motor_could_follow(controls: tuple[float, ...], motors: tuple[float, ...]) -> None:
+    end, _ = connected()
+    end.offer(frame(4000), None, 0.0)
+    end.receive(Codec(1, 1).encode("HIL_ACTUATOR_CONTROLS", 4000, [*controls, *[0.0] * 12], 129, 1), PX4)
+    assert end.answered
+    assert end.motors.controls == pytest.approx(motors)
+
+
+def test_a_second_autopilot_is_not_heard_until_the_first_has_gone() -> None:
+    end, px4 = connected()
+    heartbeat = px4.hello()[1]
+    end.receive(heartbeat, OTHER)
+    assert (end.peer, end.dropped) == (PX4, {"second autopilot": 1})
+    end.close(OTHER)
+    assert end.peer == PX4
+    end.close(PX4)
+    end.receive(heartbeat, OTHER)
+    assert (end.peer, end.calls, end.motors) == (OTHER, 2, STOPPED)
+
+
+def test_the_truth_is_told_as_often_as_it_is_wanted() -> None:
+    end, px4 = connected()
+    physics = Physics(VEHICLE, "rk4")
+    world = starting_world(Start(x=100.0, y=-50.0, z=20.0, psi=90.0, vx=3.0, vz=-1.0, r=0.5), VEHICLE)
+    told = 0
+    for _ in range(10):
+        world = physics.step(world, ActuatorCommand(0, (0.0,) * 4, armed=False), FRAME_US)
+        state = state_frame(world)
+        place = geodetic_of(state.position_enu_m, DEFAULT_ORIGIN)
+        wanted = end.wants_truth(world.time_us)
+        told += wanted
+        end.offer(frame(world.time_us), Truth(state, place, (0.0, 0.0, -9.8), 3.2) if wanted else None, 0.0)
+        carried(end, px4)
+    assert told == 5  # asked for every 5 ms, at frames of 4 ms
+    assert px4.known is not None
+    assert px4.known.position_m == pytest.approx([-50.0, 100.1, -20.0], abs=0.2)
+    assert px4.known.velocity_m_s == pytest.approx([0.0, 3.0, 1.3], abs=0.1)
+    assert px4.known.rate_rad_s == pytest.approx([0.0, 0.0, -0.5], abs=1e-3)
+    message = next(message for message in px4.messages if message.name == "HIL_STATE_QUATERNION")
+    assert (message.fields.true_airspeed, message.fields.zacc) == (320, 999)
+
+
+@given(st.lists(st.one_of(st.binary(max_size=80), st.sampled_from(Px4().hello()))))
+def test_nothing_that_comes_breaks_it(datagrams: list[bytes]) -> None:
+    end = SimulatorEnd(system_id=1)
+    for datagram in datagrams:
+        end.receive(datagram, PX4)
+    assert end.motors == STOPPED
+
+
+def test_the_controls_of_a_stranger_are_thrust_or_speed_in_the_order_of_the_vehicle_file() -> None:
+    for name, wanted in {"jmavsim": (0.5, 0.6, 0.7, 0.8), "iris": (0.25, 0.36, 0.49, 0.64)}.items():
+        rotors = load_vehicle(name).rotors
+        controls = rotors.numbering().to_vehicle((0.25, 0.36, 0.49, 0.64))
+        assert rotors.speeds_of(controls) == pytest.approx(wanted)
+    plus = load_vehicle("hummingbird").rotors.numbering()
+    right, left, front, rear = 0.1, 0.2, 0.3, 0.4
+    assert plus.to_vehicle((right, left, front, rear)) == (front, right, rear, left)
+
+
+@pytest.mark.parametrize("name", ["jmavsim", "iris"])
+def test_the_vehicles_of_px4_stand_and_have_thrust_to_spare(name: str) -> None:
+    vehicle = load_vehicle(name)
+    physics, world = Physics(vehicle, "rk4"), starting_world(Start(), vehicle)
+    for _ in range(250):
+        world = physics.step(world, ActuatorCommand(0, (0.0,) * 4, armed=False), FRAME_US)
+    assert world.state[8] == pytest.approx(0.0, abs=1e-4)
+    assert np.abs(world.state[:6]).max() < 1e-6
+    assert vehicle.largest_wrench()[0] > 1.8 * vehicle.body.mass_kg * vehicle.gravity_m_s2
+    assert vehicle.sensors is not None
+    suite = SensorSuite(vehicle.sensors, physics, DEFAULT_ORIGIN, seed=1, interval_us=FRAME_US)
+    assert suite.measure(world).specific_force_flu_m_s2[2] == pytest.approx(9.81, abs=1.0)
+
+
+@contextmanager
+def plant(folder: Path, url: str, *options: str) -> Iterator[Process]:
+    process = Process(
+        folder,
+        "plant",
+        *("--serve", "px4", "--link", url, "--vehicle", "jmavsim", "--out", str(folder / "out")),
+        *options,
+    )
+    with running(process):
+        yield process
+
+
+def flown(px4: Px4, link: GroundLink) -> None:
+    """Take off, fly to a point and hold it for a while."""
+    serve(px4, link, lambda: px4.sensors > 200, "PX4 to be served")
+    assert px4.known is not None
+    assert px4.known.position_m == pytest.approx([0.0, 0.0, 0.0], abs=0.02)
+    px4.armed, px4.target_ned_m = True, (2.0, 1.0, -3.0)
+    serve(px4, link, lambda: px4.time_us > 15_000_000, "the flight")
+    assert px4.known.position_m == pytest.approx(px4.target_ned_m, abs=0.05)
+
+
+def test_a_px4_takes_off_and_hovers_over_tcp_and_so_does_the_next(tmp_path: Path) -> None:
+    with plant(tmp_path, "tcpin:127.0.0.1:0") as process:
+        url = process.wait_for("listening")["url"].replace("tcpin", "tcp")
+        for number in (1, 2):
+            px4, link = Px4(), open_ground_link(url)
+            wait_for(partial(_connected, link), "a connection")
+            for datagram in px4.hello():
+                link.send(datagram)
+            flown(px4, link)
+            link.close()
+            wait_for(partial(_has_gone, process, number), "the plant to notice")
+            times = [message.fields.time_usec for message in px4.messages if message.name == "HIL_SENSOR"]
+            assert set(np.diff(times)) == {FRAME_US}
+            assert len(px4.fixes) == pytest.approx(15 * 20, abs=10)
+        process.process.terminate()
+        assert process.wait() == 130
+    assert (tmp_path / "out" / "flight.tlog").stat().st_size > 100_000
+
+
+def test_a_px4_that_waits_to_be_called_is_called_over_udp(tmp_path: Path) -> None:
+    px4, link = Px4(), open_ground_link("udpin:127.0.0.1:0")
+    with plant(tmp_path, link.url.replace("udpin", "udpout")):
+        called = receive_soon(link, GIVE_UP_AFTER_S)
+        for datagram in px4.hello():
+            link.send(datagram, called[0][1])
+        serve(px4, link, lambda: px4.sensors > 500, "frames")
+    link.close()
+
+
+def _connected(link: GroundLink) -> bool:
+    link.receive_now()
+    return bool(link.take_opened())
+
+
+def _has_gone(process: Process, times: int) -> bool:
+    return len(process.events("gone")) == times
+
+
+def test_a_vehicle_without_sensors_is_refused_in_one_line(tmp_path: Path) -> None:
+    process = Process(
+        tmp_path, "plant", "--serve", "px4", "--link", "tcpin:127.0.0.1:0", "--vehicle", "hummingbird-thesis"
+    )
+    with running(process):
+        assert process.wait() == 2
+    assert process.errors().splitlines()[-1].endswith("has no sensors: PX4 flies a vehicle with a table sensors")

@@ -1,0 +1,70 @@
+"""Commands that arrive late act late, to the microsecond, and the one before holds until then."""
+
+import pytest
+
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.plant.physics.start import Start
+from colibri.plant.physics.world import Physics, starting_world
+from colibri.plant.simulation.command_delay import Actuation
+from colibri.plant.simulation.plant import Plant
+from colibri.plant.vehicle.description import load_vehicle
+
+VEHICLE = load_vehicle("hummingbird").without(["battery"])
+FRAME_US = 8_000
+
+
+def command(share: float, armed: bool = True) -> ActuatorCommand:
+    return ActuatorCommand(0, (share, share, share, share), armed)
+
+
+def test_the_last_that_has_arrived_is_followed() -> None:
+    first, second, third = command(0.1), command(0.2), command(0.3)
+    actuation = Actuation(first)
+    actuation.arrive(10, second)
+    actuation.arrive(14, third)
+    assert list(actuation.spans(0, 8)) == [(first, 8)]
+    assert list(actuation.spans(8, 16)) == [(first, 2), (second, 4), (third, 2)]
+    assert list(actuation.spans(16, 24)) == [(third, 8)]
+
+
+def test_a_command_for_now_is_followed_at_once_and_one_that_is_overtaken_never() -> None:
+    actuation = Actuation(command(0.0))
+    actuation.arrive(0, command(0.1))
+    actuation.arrive(0, command(0.2))
+    assert list(actuation.spans(0, 8)) == [(command(0.2), 8)]
+
+
+def flown(latency_us: int, frames: int) -> list[float]:
+    """Fly from hover with a command that changes once; return the first rotor's speed at each frame."""
+    start = Start(z=10.0, rotors=4740.0)
+    physics = Physics(VEHICLE, "rk4")
+    plant = Plant(
+        starting_world(start, VEHICLE),
+        VEHICLE,
+        physics,
+        Feedback.STATE,
+        DEFAULT_ORIGIN,
+        seed=0,
+        interval_us=FRAME_US,
+        latency_us=latency_us,
+    )
+    speeds = []
+    for _ in range(frames):
+        speeds.append(plant.world.rotor_speeds[0])
+        plant.answer(command(0.9))
+    return speeds
+
+
+def test_latency_shifts_what_happens() -> None:
+    at_once, late = flown(0, 30), flown(4_000, 31)
+    assert late[1:] == pytest.approx(at_once, rel=1e-12)
+    assert late[0] == late[1]
+
+
+def test_half_a_frame_is_half_a_frame() -> None:
+    late = flown(2_000, 3)
+    lag = VEHICLE.rotors.lag
+    assert lag is not None
+    assert flown(0, 3)[1] > late[1] > late[0]

@@ -1,0 +1,151 @@
+"""Hold, wind and attitude."""
+
+from math import radians
+
+from colibri.autopilot.commander.rules.modes import Mode
+from tests.scenarios.words.conditions import ARMED, above, every, height, mode, near, slower, tilted_less
+from tests.scenarios.words.scenario import Scenario
+from tests.scenarios.words.steps import (
+    by_hand,
+    check,
+    farthest_from,
+    goto,
+    hold,
+    measured,
+    most_tilted,
+    put,
+    run,
+    select,
+    then,
+    until,
+)
+
+PLACE = (0.0, 0.0, 5.0)
+KICKED = {"airborne": 5.0, "start": {"p": radians(400.0)}}
+
+
+def kicked(deg: float) -> None:
+    """See that there was a kick."""
+    assert deg > 1.0
+
+
+def is_tilted(deg: float) -> None:
+    """See that the tilt is the one asked for."""
+    assert abs(deg - 20.0) < 0.5
+
+
+SCENARIOS = (
+    Scenario(
+        name="altitude-hold",
+        peer="AP ModeAltHold: ± 1 m for 5 s",
+        holds="± 0.05 m for 5 s",
+        steps=(
+            by_hand(
+                then(
+                    run(0.3),
+                    select(Mode.ALTITUDE),
+                    hold(every(mode(Mode.ALTITUDE), height(5.0, 0.05)), for_=5.0),
+                )
+            ),
+        ),
+        setting={"airborne": 5.0},
+    ),
+    Scenario(
+        name="loiter",
+        peer="AP ModeLoiter: within 5 m for 10 s",
+        holds="within 0.01 m for 10 s",
+        steps=(hold(near(PLACE, 0.01), for_=10.0),),
+        setting={"airborne": 5.0},
+    ),
+    Scenario(
+        name="steady-wind",
+        peer="ours: 5 m/s, at most 0.5 m",
+        holds="at most 0.3 m while it is found, 0.01 m then",
+        steps=(hold(near(PLACE, 0.3), for_=10.0), hold(near(PLACE, 0.01), for_=5.0)),
+        setting={"airborne": 5.0, "wind": "5@270"},
+    ),
+    Scenario(
+        name="gusts-and-turbulence",
+        peer="ours: Dryden, 20 seeds",
+        holds="within 0.15 m for 10 s in 5 m/s and moderate turbulence",
+        steps=(run(3.0), hold(near(PLACE, 0.15), for_=10.0)),
+        setting={"airborne": 5.0, "wind": "5@270", "turbulence": "moderate"},
+        seeds=tuple(range(1, 21)),
+    ),
+    Scenario(
+        name="one-hard-gust",
+        peer="ours: 1 - cosine, 10 m/s within 2 s",
+        holds="at most 0.3 m, back within 0.02 m after 3 s",
+        steps=(
+            run(5.0),
+            measured("the distance", farthest_from(PLACE), 0.3),
+            run(1.0),
+            hold(near(PLACE, 0.02), for_=1.0),
+        ),
+        setting={"airborne": 5.0, "gusts": ("10@270:start=1,duration=2",)},
+    ),
+    Scenario(
+        name="a-kick",
+        peer="AP AirMode: roll at most 20°, more than 1° to prove that it was kicked",
+        holds="400°/s: roll between 1° and 20°, level within 1.5 s",
+        steps=(
+            run(1.5),
+            measured("the tilt", most_tilted, 20.0),
+            lambda sitl: kicked(most_tilted(sitl.flown())),
+            check(every(tilted_less(1.0), near(PLACE, 0.3))),
+        ),
+        setting=KICKED,
+    ),
+    Scenario(
+        name="a-tilt-that-is-asked-for",
+        peer="PX4: -20° pitch, error below 5° after 3 s",
+        holds="error below 0.5° after 1 s",
+        steps=(
+            put("MPC_MAN_TILT_MAX", 20.0),
+            by_hand(then(run(0.3), select(Mode.STABILIZED))),
+            by_hand(run(1.0), pitch=1.0, thrust=0.45),
+            lambda sitl: is_tilted(sitl.tilt_deg),
+        ),
+        setting={"airborne": 20.0},
+    ),
+    Scenario(
+        name="a-payload",
+        peer="ours: 15 % more mass than it believes",
+        holds="within 0.5 m from the first second on, 0.02 m after 4 s",
+        steps=(hold(near(PLACE, 0.5), for_=4.0), hold(near(PLACE, 0.02), for_=3.0)),
+        setting={"airborne": 5.0, "params": {"VEH_MASS": 0.607}},
+    ),
+    Scenario(
+        name="position-mode-brakes",
+        peer="ours",
+        holds="5 m/s by sticks, then stands within 4 s, and stays within 0.05 m",
+        steps=(
+            by_hand(then(run(0.3), select(Mode.POSITION))),
+            by_hand(run(4.0), pitch=1.0),
+            by_hand(then(until(slower(0.05), within=4.0), hold(every(slower(0.1), height(5.0, 0.1)), for_=2.0))),
+        ),
+        setting={"airborne": 5.0},
+    ),
+    Scenario(
+        name="goes-where-it-is-told",
+        peer="PX4: 5 m to 0.3 m within 10 s",
+        holds="5 m to 0.05 m within 8 s",
+        steps=(
+            goto((5.0, 0.0, 5.0), wait=False),
+            until(every(near((5.0, 0.0, 5.0), 0.05), slower(0.2)), within=8.0),
+        ),
+        setting={"airborne": 5.0},
+    ),
+    Scenario(
+        name="upside-down",
+        peer="ours",
+        holds="upright within 2 s, at most 4 m lost, back within 0.1 m after 6 s",
+        steps=(
+            until(tilted_less(10.0), within=2.0),
+            hold(every(ARMED, above(16.0)), for_=4.0),
+            run(2.0),
+            check(every(height(20.0, 0.5), slower(0.5))),
+        ),
+        setting={"airborne": 20.0, "start": {"phi": 180.0}},
+    ),
+)

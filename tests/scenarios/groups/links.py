@@ -1,0 +1,196 @@
+"""Links and processes: what they lose, spoil, delay; what dies; and what else there is on them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.mavlink.wire.dialect import mav
+from colibri.sitl import mission_items
+from colibri.sitl.vehicle import Sitl
+from tests.scenarios.groups import holding, missions, offboard, takeoff_land
+from tests.scenarios.words.conditions import ARMED, DISARMED, above, every, mode, near, over, tilted_less
+from tests.scenarios.words.scenario import FleetScenario, Scenario, Step
+from tests.scenarios.words.steps import (
+    check,
+    farthest_from,
+    hold,
+    measured,
+    put,
+    run,
+    start_mission,
+    trouble,
+    until,
+    upload,
+)
+
+PLACE = (0.0, 0.0, 5.0)
+LARGEST_TILT_DEG = 75.0
+ROUGH = {"loss": 0.3, "jitter_s": 0.05}
+"""Of the ground link."""
+COMMANDED = {
+    scenario.name: scenario
+    for group in (takeoff_land, holding, missions, offboard)
+    for scenario in group.SCENARIOS
+    if isinstance(scenario, Scenario)
+}
+OVER_A_ROUGH_LINK = (
+    "lands-where-it-took-off",
+    "returns-and-lands-at-home",
+    "goes-where-it-is-told",
+    "pauses-and-goes-on",
+    "outside-the-fence-it-does-not-begin",
+    "mode-changes-while-it-uploads",
+)
+
+
+def kill_autopilot(sitl: Sitl) -> None:
+    """Kill it, as kill -9 does; it is started again at once."""
+    sitl.kill_autopilot()
+
+
+def unlike(sitls: Sequence[Sitl]) -> None:
+    """Fly the same with a plant link that is perfect, and with one that is not."""
+    good, bad = sitls
+    for name, value in {"loss": 0.2, "duplicate": 0.1, "reorder": 0.1, "corrupt": 0.05}.items():
+        setattr(bad.link.plant, name, value)
+    for sitl in sitls:
+        sitl.goto(4.0, 2.0, 6.0)
+    assert good.sha256 == bad.sha256
+
+
+def hears_spoiled(sitl: Sitl) -> None:
+    """See that spoiled datagrams were dropped and counted, and that most came through."""
+    dropped = sum(sitl.gcs.dropped.values())
+    assert dropped > 20
+    assert sum(sitl.gcs.counts.values()) > 3 * dropped
+
+
+def many_listen(sitl: Sitl) -> None:
+    """Have two more ground stations, and see that none misses a heartbeat for 30 s."""
+    stations = [sitl.gcs, sitl.client(252), sitl.client(253, 25)]
+    sitl.run(2.0)
+    before = [station.counts["HEARTBEAT"] for station in stations]
+    sitl.run(30.0)
+    assert all(station.counts["HEARTBEAT"] - was >= 30 for station, was in zip(stations, before, strict=True))
+
+
+def is_not_moved(sitl: Sitl) -> None:
+    """See that what is meant for somebody else, or comes from nobody that may command, moves nothing."""
+    sitl.send("COMMAND_LONG", 77, 1, mav.MAV_CMD_NAV_LAND, 0, *[0.0] * 7)
+    sitl.send("SET_MODE", 77, 1, 0)
+    sitl.run(1.0)
+
+
+def lands_after(kills: int, every_s: float) -> Step:
+    """Kill the autopilot so often on the way, and see the mission end."""
+
+    def step(sitl: Sitl) -> None:
+        for _ in range(kills):
+            sitl.run(every_s)
+            sitl.kill_autopilot()
+        sitl.wait_until(lambda: not sitl.armed, within=80.0, what="the end of the mission")
+
+    return step
+
+
+SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
+    FleetScenario(
+        name="the-plant-link-cannot-change-a-flight",
+        peer="ours: reordered and duplicated, the same trajectory in lockstep",
+        holds="20 % lost, 10 % twice, 10 % late, 5 % spoiled: the same hash",
+        count=2,
+        fly=unlike,
+        setting={"airborne": 5.0},
+    ),
+    Scenario(
+        name="spoiled-bits-are-dropped-and-counted",
+        peer="ours: dropped by their checksum, counters rise",
+        holds="10 % of the ground link: none is believed, the vehicle is where it was",
+        steps=(trouble("ground", corrupt=0.1), run(10.0), hears_spoiled, check(near(PLACE, 0.01))),
+        setting={"airborne": 5.0},
+    ),
+    *(
+        replace(
+            COMMANDED[name],
+            name=f"{name}-over-a-rough-link",
+            peer="ours: 30 % lost and 50 ms of jitter, each way",
+            holds=f"as without: {COMMANDED[name].holds}",
+            steps=(trouble("ground", **ROUGH), *COMMANDED[name].steps),
+        )
+        for name in OVER_A_ROUGH_LINK
+    ),
+    Scenario(
+        name="autopilot-killed-in-hover",
+        peer="ours: at most 2 m lost, at most 45° more tilt than the limit",
+        holds="at most 0.05 m, 5°, and it holds on",
+        steps=(
+            run(2.0),
+            *(kill_autopilot, run(2.0), kill_autopilot, run(2.0)),
+            measured("the distance", farthest_from(PLACE), 0.05),
+            check(every(ARMED, mode(Mode.HOLD), tilted_less(5.0))),
+        ),
+        setting={"airborne": 5.0},
+    ),
+    Scenario(
+        name="autopilot-killed-on-a-mission",
+        peer="ours: the mission ends",
+        holds="killed five times on the way: ends over its last item",
+        steps=(
+            upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
+            start_mission,
+            lands_after(5, 6.0),
+            measured("the distance from the square", missions.off_the_square, 1.2),
+            check(over(0.0, 0.0, 0.2)),
+        ),
+    ),
+    Scenario(
+        name="autopilot-killed-on-a-mission-on-sensors",
+        peer="ours: the mission ends",
+        holds="killed three times on the way: lands within 3 m of its last item",
+        steps=(
+            upload([mission_items.takeoff(10.0), *missions.CORRIDOR, mission_items.land(0.0, 0.0)]),
+            start_mission,
+            lands_after(3, 9.0),
+            check(every(DISARMED, over(0.0, 0.0, 3.0))),
+        ),
+        setting={"feedback": "sensors", "seed": 3},
+    ),
+    Scenario(
+        name="more-ground-stations-keep-their-heartbeats",
+        peer="AP: two more, 30 s",
+        holds="30 in 30 s for each of three",
+        steps=(many_listen,),
+        calm="counts heartbeats",
+    ),
+    Scenario(
+        name="what-is-meant-for-another-moves-nothing",
+        peer="ours",
+        holds="stays within 0.01 m",
+        steps=(is_not_moved, hold(every(near(PLACE, 0.01), mode(Mode.HOLD)), for_=1.0)),
+        setting={"airborne": 5.0},
+    ),
+    Scenario(
+        name="a-slow-solver",
+        peer="ours: a declared time to solve delays the rotors",
+        holds="7 ms of 8: a step of 3 m ends within 0.05 m after 8 s",
+        steps=(
+            put("SIM_SOLVE_MS", 7.0),
+            lambda sitl: sitl.goto(3.0, 0.0, 5.0, wait=False),
+            until(near((3.0, 0.0, 5.0), 0.05), within=8.0),
+            hold(every(near((3.0, 0.0, 5.0), 0.1), tilted_less(10.0)), for_=3.0),
+        ),
+        setting={"airborne": 5.0},
+    ),
+    Scenario(
+        name="a-ground-link-that-is-late",
+        peer="ours",
+        holds="half a second each way: goes there and back",
+        steps=(
+            trouble("ground", delay_s=0.5),
+            lambda sitl: sitl.goto(3.0, 0.0, 5.0),
+            lambda sitl: sitl.goto(0.0, 0.0, 5.0),
+            check(every(near(PLACE, 0.3), above(4.7))),
+        ),
+        setting={"airborne": 5.0},
+    ),
+)

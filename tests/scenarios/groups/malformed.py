@@ -1,0 +1,177 @@
+"""Malformed input: what no sane ground station sends."""
+
+from math import inf, nan
+from random import Random
+from typing import Any
+
+import pytest
+
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.mavlink.mission.items import MissionItem
+from colibri.mavlink.wire.dialect import Codec, mav
+from colibri.sitl import mission_items
+from colibri.sitl.ground_station import RefusedError
+from colibri.sitl.vehicle import Sitl
+from tests.scenarios.words.conditions import ARMED, DISARMED, every, height, mode, near
+from tests.scenarios.words.scenario import Scenario, Step
+from tests.scenarios.words.steps import arm, check, command, hold, refused, upload, upload_fence
+from tools.fuzz.messages import Messages
+
+PLACE = (0.0, 0.0, 5.0)
+STAYS = hold(every(near(PLACE, 0.01), ARMED, mode(Mode.HOLD)), for_=1.0)
+FRAME: int = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+WAYPOINT: int = mav.MAV_CMD_NAV_WAYPOINT
+TOO_MANY = 65535
+MOST_COMMANDS = {mav.MAV_CMD_NAV_TAKEOFF: 7, mav.MAV_CMD_DO_CHANGE_SPEED: 7, mav.MAV_CMD_DO_SET_HOME: 7}
+
+
+def send_noise(sitl: Sitl) -> None:
+    """Send bytes that are no messages: noise, halves of messages, long ones."""
+    chance = Random(1)
+    whole = Codec(255, 190).encode("PARAM_REQUEST_READ", 1, 1, b"TRACK", -1)
+    for number in range(400):
+        sitl.gcs.send_raw(chance.randbytes(chance.randrange(1, 300)))
+        sitl.gcs.send_raw(whole[: number % len(whole)])
+        sitl.gcs.send_raw(whole + chance.randbytes(7))
+        if number % 4 == 0:
+            sitl.step()
+
+
+def fire(count: int) -> Step:
+    """Send messages that are right by their checksum, and mean anything."""
+
+    def step(sitl: Sitl) -> None:
+        messages = Messages(Random(7), ("TRACK", "MPC_XY_CRUISE"), tuple(MOST_COMMANDS))
+        for number in range(count):
+            sitl.gcs.send_raw(messages.any().frame)
+            if number % 20 == 0:
+                sitl.step()
+
+    return step
+
+
+def still_answers(sitl: Sitl) -> None:
+    """See that it beats, and answers what is asked."""
+    before = sitl.gcs.counts["HEARTBEAT"]
+    sitl.run(2.1)
+    assert sitl.gcs.counts["HEARTBEAT"] - before >= 2
+    assert sitl.get_param("SYS_AUTOSTART") == 4001
+
+
+def parameter_refused(name: str, value: float) -> Step:
+    """Try to set what cannot be, and see that nothing has changed."""
+
+    def step(sitl: Sitl) -> None:
+        before = sitl.get_param(name)
+        with pytest.raises(RefusedError):
+            sitl.set_param(name, value)
+        assert sitl.get_param(name) == before
+
+    return step
+
+
+def many_items_refused(sitl: Sitl) -> None:
+    """Announce more items than there is room for."""
+    sitl.gcs.forget()
+    announce = lambda _: sitl.send("MISSION_COUNT", sitl.system, 1, TOO_MANY, 0)  # noqa: E731
+    sitl.gcs.ask(announce, lambda: sitl.heard("MISSION_ACK"), "MISSION_ACK")
+    assert sitl.gcs.latest("MISSION_ACK").type == mav.MAV_MISSION_NO_SPACE
+
+
+def on_wire(**changes: Any) -> MissionItem:
+    """Return a waypoint with something wrong."""
+    usual = MissionItem(FRAME, WAYPOINT, 1, 0.0, 0.3, 0.0, nan, 473977420, 85455940, 5.0)
+    return usual._replace(**changes)
+
+
+def slower_than(sitl: Sitl, m_s: float) -> None:
+    """See that it was never faster than that."""
+    assert abs(sitl.flown()["vx"]).max() < m_s
+
+
+SCENARIOS = (
+    Scenario(
+        name="noise",
+        peer="ours: dropped",
+        holds="1200 datagrams of bytes: it stays where it is, and answers",
+        steps=(send_noise, STAYS, still_answers),
+        setting={"airborne": 5.0},
+    ),
+    Scenario(
+        name="right-checksums-and-any-meaning",
+        peer="ours: 10⁶ frames, no exception (`make fuzz`); one out-of-range value once ended ArduPilot's SITL",
+        holds="2000 of them here: it still answers",
+        steps=(fire(2000), still_answers),
+    ),
+    Scenario(
+        name="places-that-are-none",
+        peer="AP: ignored",
+        holds="not a number, infinite, beyond the poles: refused, and it stays",
+        steps=(
+            *(
+                command(mav.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, nan, *place, result=mav.MAV_RESULT_DENIED)
+                for place in ((inf, 8.5, 500.0), (91.0, 8.5, 500.0), (47.4, 181.0, 500.0), (47.4, 8.5, inf))
+            ),
+            STAYS,
+        ),
+        setting={"airborne": 5.0},
+    ),
+    Scenario(
+        name="parameters-that-cannot-be",
+        peer="PX4: refused",
+        holds="not a number, infinite, out of range, unknown: refused, the value stays",
+        steps=(
+            parameter_refused("MPC_XY_CRUISE", nan),
+            parameter_refused("MPC_XY_CRUISE", inf),
+            parameter_refused("MPC_XY_CRUISE", 1e6),
+            parameter_refused("VEH_MASS", -1.0),
+            parameter_refused("TRACK", 99),
+        ),
+    ),
+    Scenario(
+        name="missions-that-cannot-be",
+        peer="PX4: INVALID_PARAMn",
+        holds="refused item by item, and no mission is left",
+        steps=(
+            *(
+                refused(upload([on_wire(**wrong)]), "mission")
+                for wrong in (
+                    {"x": 2_000_000_000},
+                    {"z": nan},
+                    {"z": inf},
+                    {"p1": -inf},
+                    {"frame": 99},
+                    {"command": 65535},
+                )
+            ),
+            many_items_refused,
+            check(DISARMED),
+        ),
+    ),
+    Scenario(
+        name="fences-that-cannot-be",
+        peer="AP: refused",
+        holds="two corners, a negative and an infinite radius: refused, and it arms by the fence before: none",
+        steps=(
+            refused(upload_fence(mission_items.polygon([(0.0, 0.0), (1.0, 0.0)])), "fence"),
+            refused(upload_fence(mission_items.circle(-1.0)), "fence"),
+            refused(upload_fence(mission_items.circle(inf)), "fence"),
+            arm(),
+            check(ARMED),
+        ),
+    ),
+    Scenario(
+        name="setpoints-beyond-reason",
+        peer="AP SetpointBadVel",
+        holds="a place 10¹² m away and a velocity of 10⁹ m/s: never faster than the limit, never lower",
+        steps=(
+            lambda sitl: sitl.run(0.2, lambda: sitl.setpoint(position=PLACE)),
+            lambda sitl: sitl.select(Mode.OFFBOARD),
+            lambda sitl: sitl.run(1.0, lambda: sitl.setpoint(position=(1e12, 0.0, 5.0))),
+            lambda sitl: sitl.run(1.0, lambda: sitl.setpoint(velocity=(1e9, 0.0, 0.0))),
+            lambda sitl: slower_than(sitl, 12.5),
+            check(height(5.0, 0.3)),
+        ),
+        setting={"airborne": 5.0},
+    ),
+)

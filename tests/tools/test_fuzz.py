@@ -1,0 +1,73 @@
+"""The short version of the fuzzing campaign: `make fuzz` has the long one."""
+
+import random
+from pathlib import Path
+
+import pytest
+
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.mavlink.hil.state import StateFrame
+from colibri.mavlink.wire.dialect import Codec
+from colibri.plant.vehicle.description import load_vehicle
+from tools.fuzz.campaign import campaign
+from tools.fuzz.datagrams import FRAME_US, Fuzzer
+from tools.fuzz.frames import AUTOPILOT, PLANT
+from tools.fuzz.memory import NOW_S, Flight
+
+FRAMES = 50
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_decoding_never_raises_and_keeps_nothing(seed: int) -> None:
+    fuzzer = Fuzzer(random.Random(seed), AUTOPILOT, PLANT)
+    codec = Codec(*PLANT)
+    good = Codec(*AUTOPILOT).encode("HEARTBEAT", 2, 0, 0, 0, 4, 3)
+    for _ in range(2000):
+        codec.decode(fuzzer.random())
+        codec.decode(fuzzer.hostile())
+        assert [message.frame for message in codec.decode(good)] == [good]
+    assert {"malformed", "unknown", "truncated"} <= set(codec.dropped)
+
+
+@pytest.fixture(scope="module")
+def undisturbed() -> list[tuple[float, ...]]:
+    return Flight().fly(FRAMES)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_flight_under_fire_is_the_same_flight(seed: int, undisturbed: list[tuple[float, ...]]) -> None:
+    """Hostile datagrams from the peer's own address, before and after each good one, change no bit of any state."""
+    chance = random.Random(seed)
+    flight = Flight()
+    states = flight.fly(FRAMES, 20, (Fuzzer(chance, AUTOPILOT, PLANT), Fuzzer(chance, PLANT, AUTOPILOT)))
+    assert states == undisturbed
+    assert flight.plant_end.frame_interval_us == FRAME_US
+    plant, autopilot = flight.plant_end.dropped, flight.autopilot_end.dropped
+    assert min(plant[reason] for reason in ("foreign", "invalid", "repeated", "unexpected", "unknown")) > 10
+    assert min(autopilot[reason] for reason in ("foreign", "invalid", "out of step", "unexpected", "unknown")) > 10
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("seed", range(4))
+def test_the_control_law_answers_whatever_decodes(seed: int) -> None:
+    """Frames of a plant gone mad, finite and with a unit quaternion, get a command that rotors can follow.
+
+    At a pitch of 90 degrees numpy may warn that the model overflows: the QP then has no solution, and the moments stay.
+    """
+    chance = random.Random(seed)
+    profile = load_profile("thesis")
+    autopilot = Autopilot(profile, load_vehicle(profile.simulation.vehicle), track("spiral"), lambda: NOW_S)
+    for sample in range(100):
+        scale = 10.0 ** chance.uniform(-38.0, 38.0)
+        x, y, z, u, v, w, p, q, r = (chance.choice((0.0, scale, -scale, 3.4e38)) for _ in range(9))
+        attitude = chance.choice(((1.0, 0.0, 0.0, 0.0), (0.5**0.5, 0.0, 0.5**0.5, 0.0), (0.0, 0.6, 0.8, 0.0)))
+        step = autopilot.step(StateFrame(sample * FRAME_US, (x, y, z), (u, v, w), attitude, (p, q, r)))
+        assert all(0.0 <= control <= 1.0 for control in step.command.controls)
+
+
+def test_two_processes_under_fire(tmp_path: Path) -> None:
+    outcome = campaign(tmp_path, 2500, burst=50, seed=1)
+    assert outcome.failures == []
+    assert set(outcome.sent.values()) == {2500}

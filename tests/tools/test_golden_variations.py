@@ -1,0 +1,109 @@
+"""The golden flights, on this computer and on others as far as it can pass for them, are the same to the last bit."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from colibri.cli.main import main
+from colibri.verification.golden_flights import FLIGHTS
+from tools.golden.__main__ import main as golden_main
+from tools.golden.__main__ import table
+from tools.golden.pythons import environments, other_pythons, set_up
+from tools.golden.variations import Flown, Variation, fly, variations
+from tools.harness.processes import begins_as_recorded
+
+FEW = ("at-its-limits-in-gusts", "lemniscate-on-sensors", "wave-by-global-lpv-mpc", "crown", "tumbling-by-se3")
+"""Those that showed a difference of kernels first, and others of other parts."""
+FEWER = ("at-its-limits-in-gusts", "wave-by-global-lpv-mpc")
+ALL = {variation.name: variation for variation in variations()}
+FEW_VARIATIONS = ("openblas-nehalem", "openblas-haswell", "numpy-without-simd", "glibc-without-avx2-and-fma")
+
+
+def check(variation: Variation, flown: Flown) -> None:
+    differing = [
+        f"{flight}: expected {expected[:16]}, found {found[:16] or 'none: it did not end'}"
+        for flight, (expected, found) in flown.differing().items()
+    ]
+    assert not differing, f"not the golden flights, {variation.name}, {flown.took_s:.0f} s:\n" + "\n".join(differing)
+
+
+def fly_here(variation: Variation, tmp_path: Path, link: str = "memory", only: tuple[str, ...] = ()) -> Flown:
+    obstacle = variation.obstacle()
+    if obstacle:
+        pytest.skip(f"{variation.name}: {obstacle}")
+    return fly(variation, tmp_path, link, only)
+
+
+@begins_as_recorded
+def test_a_few_golden_flights_are_what_they_were(tmp_path: Path) -> None:
+    only = [f"--only={name}" for name in FEW]
+    assert main(["verify", "--golden", "--link", "memory", "--out", str(tmp_path), "--quiet", *only]) == 0
+
+
+@begins_as_recorded
+@pytest.mark.parametrize("name", FEW_VARIATIONS)
+def test_fewer_are_the_same_under_a_few_variations(tmp_path: Path, name: str) -> None:
+    check(ALL[name], fly_here(ALL[name], tmp_path, only=FEWER))
+
+
+@begins_as_recorded
+@pytest.mark.long
+@pytest.mark.parametrize("name", ALL)
+def test_every_golden_flight_is_the_same_under_every_variation(tmp_path: Path, name: str) -> None:
+    flown = fly_here(ALL[name], tmp_path)
+    assert list(flown.hashes) == [flight.name for flight in FLIGHTS]
+    check(ALL[name], flown)
+
+
+@begins_as_recorded
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["as-it-is", "openblas-haswell"])
+def test_every_golden_flight_is_the_same_over_udp(tmp_path: Path, name: str) -> None:
+    check(ALL[name], fly_here(ALL[name], tmp_path, "udp"))
+
+
+def test_what_the_cpu_cannot_do_is_not_flown_and_says_why() -> None:
+    assert Variation(name="future", needs=("avx2048",)).obstacle() == "this CPU has no avx2048"
+    assert Variation(name="elsewhere", lacks="not here").obstacle() == "not here"
+    assert not Variation(name="here").obstacle()
+
+
+def test_the_table_says_what_differs_and_how_long_it_took(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    golden = tmp_path / "hashes.json"
+    golden.write_text('{"crown": "aa", "wave": "bb"}', encoding="utf-8")
+    monkeypatch.setattr("tools.golden.variations.HASHES", golden)
+    flown = {"here": Flown({"crown": "aa", "wave": "bb"}, 2.4), "there": Flown({"crown": "cc", "wave": "bb"}, 3.6)}
+    assert table(flown).splitlines() == [
+        "| flight | here | there |",
+        "| --- | --- | --- |",
+        "| crown | = | **differs** |",
+        "| wave | = | = |",
+        "| took | 2 s | 4 s |",
+    ]
+
+
+def test_an_unknown_variation_is_refused_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        golden_main(["--variation", "abacus"])
+    assert end.value.code == 2
+    error = capsys.readouterr().err
+    assert "--variation abacus: there is no such variation; there are as-it-is, openblas-nehalem" in error
+    assert error.count("\n") == 1
+
+
+def test_environments_are_those_that_are_set_up_and_newer_than_the_lock_they_stay(tmp_path: Path) -> None:
+    (tmp_path / "requirements.lock").touch()
+    for version in ("3.10", "3.12", "3.13"):
+        (tmp_path / f".venv-{version}").mkdir()
+    for version in ("3.10", "3.12"):
+        (tmp_path / f".venv-{version}" / ".ready").touch()
+    os.utime(tmp_path / "requirements.lock", (0.0, 0.0))
+    assert environments(tmp_path) == {"3.12": tmp_path / ".venv-3.12" / "bin" / "python"}
+    set_up(tmp_path, "3.12", Path("/no/such/python"))
+
+
+def test_other_pythons_are_of_other_versions_that_can_run_the_project() -> None:
+    own = f"3.{sys.version_info.minor}"
+    assert all(version != own and int(version[2:]) >= 11 for version in other_pythons())

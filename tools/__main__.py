@@ -1,7 +1,0 @@
-"""`python -m tools` is `colibri`."""
-
-import sys
-
-from tools.cli import main
-
-sys.exit(main())

@@ -1,0 +1,1 @@
+"""RotorPy, a peer to measure beside."""

@@ -1,0 +1,1 @@
+"""Random and hostile datagrams and messages at both processes."""

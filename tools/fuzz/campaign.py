@@ -1,0 +1,146 @@
+"""One flight of two real processes under fire, and what must hold after it."""
+
+import signal
+from collections.abc import Callable
+from hashlib import sha256
+from math import ceil
+from pathlib import Path
+from time import monotonic, sleep
+from typing import NamedTuple
+
+import psutil
+
+from tools.fuzz.datagrams import FRAME_US
+from tools.fuzz.relay import FuzzingRelay, unreadable
+from tools.harness.processes import Process, fly_thesis, running, start_autopilot, start_plant, states
+
+MOST_GROWTH_MIB = 4.0
+_MARGIN = 1.05
+_STALLED_AFTER_S = 60.0
+_LOOK_EVERY_S = 0.1
+_EXIT_CODES = {"plant": 0, "autopilot": 130}
+
+
+class Outcome(NamedTuple):
+    """What a campaign came to.
+
+    Attributes:
+        sent: Bad datagrams sent, by whom they were for and of which kind.
+        lost: Datagrams that the kernel dropped because a receiver was too slow.
+        memory_mib: Resident memory after a tenth of the flight and at its end, by process.
+        failures: What did not hold, in words.
+    """
+
+    sent: dict[tuple[str, str], int]
+    lost: int
+    memory_mib: dict[str, tuple[float, float]]
+    failures: list[str]
+
+
+def campaign(
+    folder: Path, quota: int, *, burst: int, seed: int, progress: Callable[[float], None] = lambda _part: None
+) -> Outcome:
+    """Fly until `quota` datagrams of each kind were sent to each process; compare with an undisturbed flight.
+
+    Args:
+        folder: Takes the logs.
+        quota: Datagrams of each kind, to each process.
+        burst: Datagrams with each good one, half of each kind.
+        seed: Of all chance.
+        progress: Is told which part of the flight is flown.
+    """
+    duration_s = (10 + ceil(_MARGIN * 2 * quota / burst)) * FRAME_US / 1e6
+    logs = folder / "logs"
+    logs.mkdir()
+    plant, url = start_plant(logs, folder / "flight", "--duration", str(duration_s))
+    with FuzzingRelay(url, burst=burst, quota=quota, seed=seed) as relay:
+        autopilot = start_autopilot(logs, relay.url)
+        processes = {"plant": plant, "autopilot": autopilot}
+        with running(*processes.values()):
+            failures = _fly_to(0.1 * duration_s, duration_s, processes, progress)
+            before = _memory_mib(processes)
+            failures = failures or _fly_to(0.98 * duration_s, duration_s, processes, progress)
+            after = _memory_mib(processes)
+            lost = _kernel_drops(processes)
+            failures += _end(processes) if not failures else []
+    if not failures:
+        failures += _miscounted(processes, relay)
+        failures += ["the trajectory differs"] * (_hash(folder / "flight") != _undisturbed(folder, duration_s))
+    failures += ["not all was sent"] * (set(relay.sent.values()) != {quota})
+    failures += [f"{name} said: {process.errors()}" for name, process in processes.items() if process.errors()]
+    memory = {name: (before[name], after[name]) for name in processes}
+    failures += [f"the {name} grew" for name, (was, now) in memory.items() if now - was > MOST_GROWTH_MIB]
+    return Outcome(relay.sent, lost, memory, failures)
+
+
+def _fly_to(
+    time_s: float, duration_s: float, processes: dict[str, Process], progress: Callable[[float], None]
+) -> list[str]:
+    """Wait until so much is flown; return why it never will be, if so."""
+    flown_s, moved_at_s = -1.0, monotonic()
+    while flown_s < time_s:
+        sleep(_LOOK_EVERY_S)
+        now_s = _flown_s(processes["plant"])
+        if now_s > flown_s:
+            flown_s, moved_at_s = now_s, monotonic()
+            progress(flown_s / duration_s)
+        codes = {name: process.process.poll() for name, process in processes.items()}
+        if flown_s < time_s and any(code is not None for code in codes.values()):
+            return [f"ended in mid-flight: exit codes {codes}"]
+        if monotonic() - moved_at_s > _STALLED_AFTER_S:
+            return [f"the flight stands at t = {flown_s:.1f} s"]
+    return []
+
+
+def _end(processes: dict[str, Process]) -> list[str]:
+    """Let the plant end by itself and the autopilot when it is told to; return what was wrong with that."""
+    codes = {"plant": processes["plant"].wait()}
+    processes["autopilot"].process.send_signal(signal.SIGINT)
+    codes["autopilot"] = processes["autopilot"].wait()
+    return [] if codes == _EXIT_CODES else [f"exit codes {codes}"]
+
+
+def _miscounted(processes: dict[str, Process], relay: FuzzingRelay) -> list[str]:
+    """Compare what each process says it could not read with what it was sent: equal only if all of it arrived."""
+    failures = []
+    for name, process in processes.items():
+        counted = unreadable(process.events("ended")[-1]["dropped"])
+        if counted != relay.unreadable(name):
+            failures.append(f"the {name} counted {counted}, not {relay.unreadable(name)}")
+    return failures
+
+
+def _flown_s(plant: Process) -> float:
+    said = plant.events("ended") or plant.events("progress") or [{"sim_time_s": 0.0}]
+    return float(said[-1]["sim_time_s"])
+
+
+def _memory_mib(processes: dict[str, Process]) -> dict[str, float]:
+    return {name: _rss(process.process.pid) / 2**20 for name, process in processes.items()}
+
+
+def _rss(pid: int) -> int:
+    try:
+        return int(psutil.Process(pid).memory_info().rss)
+    except psutil.NoSuchProcess:
+        return 0
+
+
+def _kernel_drops(processes: dict[str, Process]) -> int:
+    """Sum the last column of /proc/net/udp over the sockets of the processes; 0 where there is no such file."""
+    table = Path("/proc/net/udp")
+    alive = [psutil.Process(process.process.pid) for process in processes.values() if process.process.poll() is None]
+    ports = {connection.laddr.port for process in alive for connection in process.net_connections("udp4")}
+    if not table.exists():
+        return 0
+    rows = [line.split() for line in table.read_text(encoding="utf-8").splitlines()[1:]]
+    return sum(int(row[-1]) for row in rows if int(row[1].split(":")[1], 16) in ports)
+
+
+def _undisturbed(folder: Path, duration_s: float) -> str:
+    fly_thesis(folder / "undisturbed", "spiral", "--link", "memory", "--duration", str(duration_s))
+    return _hash(folder / "undisturbed")
+
+
+def _hash(out: Path) -> str:
+    return sha256(states(out).tobytes()).hexdigest()

@@ -1,0 +1,84 @@
+"""A relay that hides each good datagram in a burst of bad ones, from the address that the good ones come from."""
+
+import random
+import socket
+from collections.abc import Mapping
+
+from colibri.mavlink.wire.dialect import Codec
+from tools.fuzz.datagrams import Fuzzer
+from tools.fuzz.frames import ACTUATORS, ATTITUDE, AUTOPILOT, PLANT
+from tools.harness.relay import Relay
+
+UNREADABLE = ("malformed", "unknown", "truncated")
+"""What a codec counts by the datagram alone, whatever the receiver waits for."""
+
+_RECEIVE_BUFFER = 2**20
+
+
+class FuzzingRelay(Relay):
+    """A relay with an attacker in it.
+
+    A burst goes with the first datagram that names a moment, never with one sent again: two bursts at most wait in a
+    receiver's buffer, whatever it makes of them. What the genuine autopilot asks for before a flight is no attack, and
+    a message cut to nothing names time 0, so the first frame and its answer pass undisturbed.
+
+    Attributes:
+        sent: Bad datagrams sent so far, by whom they were for and of which kind.
+    """
+
+    def __init__(self, plant_url: str, *, burst: int, quota: int, seed: int) -> None:
+        """Relay to the plant; send bursts of `burst`, half random and half hostile, up to `quota` of each each way."""
+        super().__init__(plant_url)
+        for sock in (self._near, self._far):
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+        self._chance = random.Random(seed)
+        self._fuzzers = {
+            "plant": Fuzzer(self._chance, AUTOPILOT, PLANT),
+            "autopilot": Fuzzer(self._chance, PLANT, AUTOPILOT),
+        }
+        self._twins = {"plant": Codec(*PLANT), "autopilot": Codec(*AUTOPILOT)}
+        self._burst = burst
+        self._quota = quota
+        self._moments_us = dict.fromkeys(self._fuzzers, 0)
+        self.sent = {(to, kind): 0 for to in self._fuzzers for kind in ("random", "hostile")}
+
+    def unreadable(self, to: str) -> dict[str, int]:
+        """Return what the codec of `to` must have counted if every bad datagram arrived."""
+        return unreadable(self._twins[to].dropped)
+
+    def pass_on(self, to: str, datagram: bytes) -> None:
+        """Send it on, somewhere in a burst if it is what the flight goes on with."""
+        moment_us = _moment_us(datagram)
+        datagrams = []
+        if moment_us > self._moments_us[to]:
+            self._moments_us[to] = moment_us
+            datagrams = self._bad(to, moment_us, datagram)
+        datagrams.insert(self._chance.randint(0, len(datagrams)), datagram)
+        for each in datagrams:
+            self.deliver(to, each)
+
+    def _bad(self, to: str, moment_us: int, good: bytes) -> list[bytes]:
+        fuzzer, datagrams = self._fuzzers[to], []
+        fuzzer.moment_us, fuzzer.good = moment_us, good
+        for number in range(self._burst):
+            kind = "hostile" if number % 2 else "random"
+            if self.sent[to, kind] < self._quota:
+                self.sent[to, kind] += 1
+                datagrams.append(fuzzer.hostile() if kind == "hostile" else fuzzer.random())
+                self._twins[to].decode(datagrams[-1])
+        return datagrams
+
+
+def unreadable(dropped: Mapping[str, int]) -> dict[str, int]:
+    """Return those counts of a receiver that the datagrams alone decide."""
+    return {reason: dropped.get(reason, 0) for reason in UNREADABLE}
+
+
+def _moment_us(datagram: bytes) -> int:
+    """Return the simulated time of a command or a frame of the flight, 0 of anything else."""
+    message_id = int.from_bytes(datagram[7:10], "little")
+    if message_id == ACTUATORS:
+        return int.from_bytes(datagram[10:18], "little")
+    if message_id == ATTITUDE:
+        return int.from_bytes(datagram[10:14], "little") * 1000
+    return 0

@@ -1,0 +1,195 @@
+"""A vehicle that ground stations fire messages at, and what must hold at every step of its flight."""
+
+import random
+from collections import Counter
+from math import hypot
+from typing import Any
+
+import numpy as np
+
+from colibri.autopilot.commander.rules.modes import MANUAL, Mode, State, custom_mode, mode_of_custom
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.mavlink.files.tree import Files
+from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
+from colibri.mavlink.services.command import NOT_GIVEN
+from colibri.mavlink.wire.dialect import MARKER, mav
+from colibri.plant.physics.start import Start
+from tools.fuzz.messages import Messages, Sent
+from tools.fuzz.sensible import COMMANDS, SENSIBLE, asked
+from tools.harness.client import COMPONENT, SYSTEM, Client
+from tools.harness.copter_flight import ACCEPTED, FORCE, STANDING, CopterFlight
+
+HIGH = Start(z=15.0, vz=-1.0, rotors=4740.0)
+"""Falling: what lies still has landed."""
+_FASTEST_REFERENCE_M_S = 60.0
+_FARTHEST_M, _FARTHEST_HOME_M = 2_000.0, 101_000.0
+_ACK = mav.MAVLINK_MSG_ID_COMMAND_ACK
+_PORTS = (17001, 17002, 14540)
+_FRAME = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
+_WAYPOINT = MissionItem(_FRAME, mav.MAV_CMD_NAV_WAYPOINT, 1, 0.0, 0.0, 0.0, 0.0, 473977420, 85456100, 12.0)
+_LOITER = _WAYPOINT._replace(command=mav.MAV_CMD_NAV_LOITER_TURNS, p1=1.0, p3=5.0)
+PLAN = (_WAYPOINT, _LOITER, _WAYPOINT._replace(x=473978000, p1=3.0))
+
+SITUATIONS: tuple[State, ...] = (
+    *(State(mode, armed=True) for mode in Mode),
+    State(Mode.HOLD, armed=False),
+    State(Mode.MISSION, armed=False),
+)
+"""Where messages are fired: in the air in every mode, and disarmed on the ground."""
+
+
+class BrokenError(AssertionError):
+    """Something did not hold."""
+
+
+class Shooter(Client):
+    """Hears nothing but acknowledgements: all the telemetry that was asked for would take the time."""
+
+    def receive(self, datagram: bytes) -> None:
+        """Decode the COMMAND_ACKs of a datagram of whole frames."""
+        at = 0
+        while at < len(datagram):
+            assert datagram[at] == MARKER, "the vehicle sends MAVLink 2 alone, but for what it forwards"
+            end = at + 12 + datagram[at + 1] + (13 if datagram[at + 2] else 0)
+            if int.from_bytes(datagram[at + 7 : at + 10], "little") == _ACK:
+                super().receive(datagram[at:end])
+            at = end
+
+
+class Target:
+    """One vehicle under fire from three places.
+
+    Attributes:
+        flight: The vehicle.
+        messages: Makes what is fired.
+        sent: How many, by the mode that they met and whether it was armed.
+        accepted: How many commands were, by number.
+    """
+
+    def __init__(self, chance: random.Random, files: Files | None = None) -> None:
+        """Begin on the ground; all chance comes from `chance`."""
+        self.flight = CopterFlight(files=files)
+        self.messages = Messages(chance, [parameter.name for parameter in self.flight.copter.parameters], COMMANDS)
+        self.sent: Counter[State] = Counter()
+        self.accepted: Counter[int] = Counter()
+        self._shooters = [self.flight.add(Shooter(port=port)) for port in _PORTS]
+        self._unanswered: list[list[Sent]] = [[] for _ in _PORTS]
+
+    def shoot(self, sent: Sent, place: int) -> None:
+        """Send one message with the next frame, from one of the places."""
+        self._shooters[place].send_raw(sent.frame)
+        self.sent[self.flight.copter.pilot.state] += 1
+        if sent.wants_answer:
+            self._unanswered[place].append(sent)
+
+    def step(self) -> None:
+        """Fly one frame, and check everything.
+
+        Raises:
+            BrokenError: Something did not hold.
+        """
+        for client in (*self._shooters, self.flight.client):
+            client.forget()
+        self.flight.step()
+        for place, shooter in enumerate(self._shooters):
+            commands, self._unanswered[place] = self._unanswered[place], []
+            self._check_answers(commands, shooter.acks)
+        _must(not self.flight.client.acks, "an acknowledgement went to who had asked for nothing")
+        check(self.flight)
+        if self.flight.copter.stations.restart:
+            self.flight.restart()
+
+    def _check_answers(self, commands: list[Sent], acks: list[Any]) -> None:
+        """Every command is acknowledged once, to who sent it, and only what can be meant is accepted."""
+        asked_for = [(one.fields["command"], *one.source) for one in commands]
+        answered = [(ack.command, ack.target_system, ack.target_component) for ack in acks]
+        _must(asked_for == answered, f"asked {asked_for}, answered {answered}")
+        for one, ack in zip(commands, acks, strict=True):
+            if ack.result == ACCEPTED:
+                self.accepted[ack.command] += 1
+                sensible = SENSIBLE.get(ack.command)
+                _must(sensible is None or sensible(asked(one.fields)), f"accepted {one}")
+
+    def prepare(self, state: State) -> None:
+        """Begin a situation anew: everything as it is after the start but for the mode, and where it flies."""
+        flight, copter = self.flight, self.flight.copter
+        copter.parameters.reset()
+        copter.parameters.set("MIS_TAKEOFF_ALT", 40.0)
+        for plan in (FENCE, RALLY, MISSION):
+            copter.stations.missions.service.load(plan, ())
+        self._order(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE)
+        flight.put(STANDING)
+        flight.run(0.8)
+        flight.send("SET_GPS_GLOBAL_ORIGIN", SYSTEM, *_integers(DEFAULT_ORIGIN))
+        self._order(mav.MAV_CMD_DO_SET_HOME, 1.0)
+        self._select(Mode.HOLD)
+        if state.armed:
+            flight.put(HIGH)
+            copter.pilot.standing = False
+            self._order(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE)
+        copter.stations.missions.service.load(MISSION, PLAN)
+        self._meet(state.mode)
+        if state.mode is not Mode.ORBIT:
+            self._select(state.mode)
+        for _ in range(3):
+            self.step()
+        _must(copter.pilot.state == state, f"{copter.pilot.state} instead of {state}")
+
+    def _meet(self, mode: Mode) -> None:
+        """Meet what a mode needs."""
+        if mode in MANUAL:
+            self.flight.stick()
+        elif mode is Mode.OFFBOARD:
+            self.flight.setpoint(position=(0.0, 0.0, 15.0))
+        elif mode is Mode.ORBIT:
+            self.flight.send("COMMAND_INT", SYSTEM, COMPONENT, 3, mav.MAV_CMD_DO_ORBIT, 0, 0, 5.0, 2.0, 0.0, 0.0,
+                             NOT_GIVEN, NOT_GIVEN, float("nan"))  # fmt: skip
+            self.flight.run(0.1)
+            self.flight.client.acks.clear()
+
+    def _order(self, number: int, *params: float) -> None:
+        result = self.flight.command(number, *params)
+        _must(result == ACCEPTED, f"{number} {params}: {result}")
+        self.flight.client.acks.clear()
+
+    def _select(self, mode: Mode) -> None:
+        number = custom_mode(mode)
+        self._order(mav.MAV_CMD_DO_SET_MODE, 1.0, number >> 16 & 0xFF, number >> 24)
+
+    @property
+    def lost(self) -> bool:
+        """Whether the vehicle is so far away that nothing more is to be learnt there."""
+        x, y, z = self.flight.position
+        return hypot(x, y, z) > _FARTHEST_M or z < -1.0
+
+
+def check(flight: CopterFlight) -> None:
+    """Check what must hold at every step.
+
+    Raises:
+        BrokenError: It does not.
+    """
+    pilot = flight.copter.pilot
+    controls = flight.rotors.controls
+    _must(all(0.0 <= control <= 1.0 for control in controls), f"rotors commanded to {controls}")
+    _must(flight.rotors.armed or not any(controls), "a rotor turns while disarmed")
+    _must(pilot.state.mode in Mode, "no mode of the table")
+    told = mode_of_custom(flight.client.latest("HEARTBEAT").custom_mode)
+    _must(told is not None, "no mode of the table is told")
+    reference = pilot.reference
+    _must(reference is not None, "there is always a reference")
+    assert reference is not None
+    _must(bool(np.isfinite(reference.motion).all() and np.isfinite(reference.heading).all()), "a reference of nan")
+    fast = float(np.linalg.norm(reference.motion[1]))
+    _must(fast < _FASTEST_REFERENCE_M_S, f"a reference of {fast:.0f} m/s")
+    _must(hypot(*pilot.home_enu_m) <= _FARTHEST_HOME_M, "home is nowhere")
+
+
+def _must(holds: bool, otherwise: str) -> None:
+    if not holds:
+        raise BrokenError(otherwise)
+
+
+def _integers(place: tuple[float, float, float]) -> tuple[int, int, int]:
+    latitude, longitude, altitude = place
+    return round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3)

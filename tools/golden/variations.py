@@ -1,0 +1,159 @@
+"""Other computers, as far as one can pass for them: what libraries choose by the CPU is chosen for them."""
+
+import json
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.verification.golden import FOUND
+from tools.golden.pythons import environments
+
+ROOT = Path(__file__).parents[2]
+HASHES = ROOT / "tests" / "golden" / "hashes.json"
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+NO_AVX2_NOR_FMA = "glibc.cpu.hwcaps=-AVX2_Usable,-AVX2,-FMA_Usable,-FMA,-FMA4_Usable,-FMA4,-AVX512F_Usable,-AVX512F"
+"""glibc before 2.33 has the names that end in _Usable; each passes over the others."""
+_AVX2 = ("avx2", "fma")
+_AVX512 = (*_AVX2, "avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")
+
+
+class VariationError(Exception):
+    """The flights of a variation did not come to an end."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variation:
+    """Another computer.
+
+    Attributes:
+        name: What it is called.
+        environment: Variables that its processes have beside the usual ones.
+        needs: Flags that the CPU must have, as /proc/cpuinfo names them: what is chosen is executed.
+        lacks: Why it cannot be flown here whatever the CPU is; empty where it can.
+        python: The interpreter.
+    """
+
+    name: str
+    environment: Mapping[str, str] = field(default_factory=dict)
+    needs: Sequence[str] = ()
+    lacks: str = ""
+    python: Path = Path(sys.executable)
+
+    def obstacle(self) -> str:
+        """Return why it cannot be flown on this computer; empty where it can."""
+        missing = [flag for flag in self.needs if flag not in cpu_flags()]
+        return self.lacks or (f"this CPU has no {', '.join(missing)}" if missing else "")
+
+
+class Flown(NamedTuple):
+    """What came of the golden flights under a variation.
+
+    Attributes:
+        hashes: Of each flight; empty where it did not end.
+        took_s: Wall-clock time, start of the process and compilation included.
+    """
+
+    hashes: dict[str, str]
+    took_s: float
+
+    def differing(self) -> dict[str, tuple[str, str]]:
+        """Return of each flight that is not the golden one the expected and the found hash."""
+        golden: dict[str, str] = json.loads(HASHES.read_text(encoding="utf-8"))
+        return {name: (golden[name], found) for name, found in self.hashes.items() if found != golden[name]}
+
+
+def variations() -> list[Variation]:
+    """Return all variations, the computer as it is first."""
+    return [
+        Variation(name="as-it-is"),
+        *(_openblas(core, needs) for core, needs in _OPENBLAS_CORES.items()),
+        _numpy_without_simd(),
+        *(_numba(cpu, needs) for cpu, needs in _NUMBA_CPUS.items()),
+        Variation(
+            name="glibc-without-avx2-and-fma",
+            environment={"GLIBC_TUNABLES": NO_AVX2_NOR_FMA},
+            needs=_AVX2,
+            lacks="" if platform.libc_ver()[0] == "glibc" else "the C library is not glibc",
+        ),
+        Variation(name="two-threads", environment=dict.fromkeys(ONE_THREAD, "2")),
+        *(Variation(name=f"python-{version}", python=python) for version, python in environments(ROOT).items()),
+    ]
+
+
+_OPENBLAS_CORES = {"Nehalem": ("sse4_2",), "Haswell": _AVX2, "SkylakeX": _AVX512, "Zen": _AVX2}
+_NUMBA_CPUS = {"generic": (), "haswell": _AVX2, "skylake-avx512": _AVX512}
+
+
+def _openblas(core: str, needs: Sequence[str]) -> Variation:
+    return Variation(name=f"openblas-{core.lower()}", environment={"OPENBLAS_CORETYPE": core}, needs=needs)
+
+
+def _numpy_without_simd() -> Variation:
+    """Return that of a numpy that uses only what every x86 CPU has; what this CPU lacks must not be named."""
+    found: list[str] = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    return Variation(
+        name="numpy-without-simd",
+        environment={"NPY_DISABLE_CPU_FEATURES": " ".join(found)},
+        lacks="" if found else "this numpy chooses nothing by the CPU",
+    )
+
+
+def _numba(cpu: str, needs: Sequence[str]) -> Variation:
+    """Return that of kernels compiled for a CPU and, without its features said, for no more than it has."""
+    kept = Path(sys.prefix) / "golden-kernels" / cpu
+    environment = {"NUMBA_CPU_NAME": cpu, "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(kept)}
+    lacks = "" if platform.machine() in ("x86_64", "AMD64") else "not an x86 CPU"
+    return Variation(name=f"numba-{cpu}", environment=environment, needs=needs, lacks=lacks)
+
+
+@cache
+def cpu_flags() -> frozenset[str]:
+    """Return what the CPU can, as /proc/cpuinfo names it; nothing where there is no such file."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return frozenset()
+    return frozenset(flag for line in lines if line.startswith("flags") for flag in line.partition(":")[2].split())
+
+
+def fly(variation: Variation, out: Path, link: str = "memory", only: Sequence[str] = ()) -> Flown:
+    """Fly golden flights in a process of their own.
+
+    Args:
+        variation: The computer to fly them on.
+        out: Folder of the logs.
+        link: `udp` or `memory`.
+        only: Names of the flights; none for all.
+
+    Raises:
+        VariationError: The process ended before the flights did.
+    """
+    command = [str(variation.python), "-m", "colibri", "verify", "--golden", str(HASHES), "--link", link]
+    command += ["--out", str(out), "--quiet", *(f"--only={name}" for name in only)]
+    began_s = perf_counter()
+    done = subprocess.run(command, cwd=ROOT, env=_environment(variation), capture_output=True, text=True, check=False)
+    took_s = perf_counter() - began_s
+    if not (out / FOUND).exists():
+        words = done.stderr.strip().splitlines()
+        raise VariationError(f"{variation.name}: exit code {done.returncode}: {words[-1] if words else 'no word'}")
+    outcomes = json.loads((out / FOUND).read_text(encoding="utf-8"))
+    flown = Flown({name: outcome["sha256"] for name, outcome in outcomes.items()}, took_s)
+    assert done.returncode == (1 if flown.differing() else 0), done.stderr
+    return flown
+
+
+def _environment(variation: Variation) -> dict[str, str]:
+    """Return the variables of a variation's process: ours, but for those that any variation sets."""
+    varied = {"OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "GLIBC_TUNABLES", *ONE_THREAD}
+    varied |= {"NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"}
+    usual = {name: value for name, value in os.environ.items() if name not in varied}
+    return {**usual, **ONE_THREAD, **variation.environment}

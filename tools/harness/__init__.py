@@ -1,0 +1,1 @@
+"""Flights for fuzzing, soaking and tests: a vehicle in this process, processes, relays, observers."""

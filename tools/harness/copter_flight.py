@@ -1,0 +1,364 @@
+"""A whole vehicle in one process: plant and autopilot in lockstep on simulated time, flown by clients over MAVLink.
+
+Nothing is simulated of the links but the bytes.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan, pi
+from typing import Any
+
+import pytest
+from msgspec import structs
+
+from colibri.autopilot.commander.rules.modes import Mode, custom_mode, mode_of_custom
+from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.core.checkpoint import Kept, Past
+from colibri.autopilot.core.copter import Copter
+from colibri.autopilot.estimation.estimate import Estimate
+from colibri.autopilot.estimation.state_source import estimator_for
+from colibri.autopilot.ground.stations import StationSettings
+from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
+from colibri.common.rotations import euler_from_quaternion
+from colibri.common.serialization import of_bytes, to_bytes
+from colibri.common.types import Vector
+from colibri.mavlink.files.tree import Files
+from colibri.mavlink.hil.faults import Fault
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.parameters.store import Value
+from colibri.mavlink.services.command import NOT_GIVEN
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.ned import ned_from_enu
+from colibri.plant.environment.air import CALM
+from colibri.plant.physics.start import Start
+from colibri.plant.physics.world import Physics, World, starting_world, state_frame
+from colibri.plant.process.options import nudged
+from colibri.plant.simulation.plant import Plant
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
+from tools.harness.client import COMPONENT, SYSTEM, Client
+from tools.harness.plant_flights import blowing
+
+STANDING = Start()
+"""On its feet: z counts from where the vehicle stands."""
+NO_CLOCK_S = 0.0
+ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
+DENIED: int = mav.MAV_RESULT_DENIED
+FORCE = 21196.0
+_AS_IT_IS = load_profile("flight")
+FLIGHT = structs.replace(_AS_IT_IS, simulation=structs.replace(_AS_IT_IS.simulation, frame_interval_s=None))
+"""The flight profile with a frame for each control sample and none between: a third less to compute."""
+
+
+def in_the_air(height_m: float = 5.0, **settings: Any) -> "CopterFlight":
+    """Return a vehicle that is picked up in flight, in hold above home, without having had to take off."""
+    start = Start(z=height_m, psi=90.0, rotors=FLIGHT.simulation.rotor_speed_rpm)
+    flight = CopterFlight(start=start, **settings)
+    assert flight.copter.pilot.state == (Mode.HOLD, True)
+    return flight
+
+
+class CopterFlight:
+    """A vehicle and its surroundings.
+
+    Attributes:
+        copter: The autopilot.
+        plant: The plant.
+        client: The first ground station.
+        rotors: The last command to the plant.
+        estimate: What the autopilot makes of its sensors; None where the state is told.
+        path: Positions, ENU, one a control sample, once `record` is set.
+    """
+
+    def __init__(
+        self,
+        *,
+        start: Start = STANDING,
+        values: dict[str, Value] | None = None,
+        profile: Profile | None = None,
+        vehicle: Vehicle | None = None,
+        wind_enu_m_s: Vector = CALM,
+        first: Track | None = None,
+        origin: Geodetic = DEFAULT_ORIGIN,
+        client: Client | None = None,
+        files: Files | None = None,
+        feedback: Feedback = Feedback.STATE,
+        seed: int = 0,
+        latency_us: int = 0,
+    ) -> None:
+        """Begin at `start`, with parameters `values`; `vehicle` is the plant's, where it is not the autopilot's.
+
+        On sensors it stands until there is an estimate.
+        """
+        self._profile = profile or FLIGHT
+        self._believed = load_vehicle(self._profile.simulation.vehicle)
+        self._settings = StationSettings(
+            system_id=SYSTEM, identity="px4", origin=origin, files=files, feedback=feedback
+        )
+        self._weather = blowing(wind_enu_m_s)
+        self._physics = Physics(vehicle or self._believed, "rk4", self._weather)
+        self._estimator = estimator_for(feedback, self._believed, origin)
+        self.copter = self._copter(values, first)
+        self.plant = Plant(
+            starting_world(nudged(start), self._believed, self._weather),
+            vehicle or self._believed,
+            self._physics,
+            feedback,
+            origin,
+            seed=seed,
+            interval_us=self.copter.frame_interval_us,
+            latency_us=latency_us,
+        )
+        self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
+        self.estimate: Estimate | None = None
+        self.client = client or Client()
+        self._clients: list[Client] = []
+        self.add(self.client)
+        self.step()
+        if feedback is Feedback.SENSORS:
+            self.until(lambda: self.estimate is not None, 10.0, "the first estimate")
+        self.step()
+
+    def past(self) -> Past:
+        """Return what is kept of the flight, as it comes from a disk."""
+        kept = of_bytes(Kept, to_bytes(self.copter.record()))
+        assert kept is not None
+        plans = self.copter.stations.missions.service.plans
+        return Past(kept, {plan_type: plan.items for plan_type, plan in plans.items()})
+
+    def _copter(self, values: dict[str, Value] | None, first: Track | None, past: Past | None = None) -> Copter:
+        return Copter(
+            self._profile,
+            self._believed,
+            self._settings,
+            lambda: NO_CLOCK_S,
+            values=values,
+            first=first,
+            estimator=self._estimator,
+            past=past,
+        )
+
+    def add(self, client: Client) -> Client:
+        """Connect another client."""
+        self._clients.append(client)
+        self.copter.stations.hub.open(client.link, client.address)
+        return client
+
+    def put(self, start: Start) -> None:
+        """Put the vehicle elsewhere, at this very time."""
+        self.world = replace(starting_world(start, self._believed, self._weather), time_us=self.world.time_us)
+
+    def restart(self, past: Past | None = None) -> None:
+        """Start the autopilot anew, wherever the vehicle is; with what was kept of a flight it flies on at once."""
+        values = None if past is None else dict(self.copter.parameters.values)
+        self.copter = self._copter(values, None, past)
+        for client in self._clients:
+            self.copter.stations.hub.open(client.link, client.address)
+        if past is not None:
+            self.step()
+
+    def step(self) -> None:
+        """Fly one frame."""
+        frame, aside = self.plant.tell()
+        self.copter.hear(aside)
+        step = self.copter.step(frame)
+        self.rotors, self.estimate = step.command, step.estimate or self.estimate
+        self.plant.answer(step.command, step.faults)
+        inbox = [received for client in self._clients for received in client.take_sent()]
+        for link, address, datagram in self.copter.serve(inbox):
+            for client in self._clients:
+                if (client.link, client.address) == (link, address):
+                    client.receive(datagram)
+
+    def skip(self, frames: int) -> None:
+        """Have the plant go on by itself for some frames, with the last command."""
+        for _ in range(frames):
+            self.plant.go_on()
+
+    def run(self, seconds: float, each_frame: Callable[[], None] | None = None) -> None:
+        """Fly for so long; call `each_frame` before each frame."""
+        end_us = self.world.time_us + round(seconds * 1e6)
+        while self.world.time_us < end_us:
+            if each_frame:
+                each_frame()
+            self.step()
+
+    def until(self, condition: Callable[[], object], at_most_s: float, what: str = "") -> float:
+        """Fly until `condition()`; return how long that took, s of simulated time."""
+        began_us = self.world.time_us
+        while not condition():
+            assert self.world.time_us < began_us + at_most_s * 1e6, f"{what or 'it'} took longer than {at_most_s} s"
+            self.step()
+        return (self.world.time_us - began_us) * 1e-6
+
+    def path(self, seconds: float) -> list[Vector]:
+        """Fly for so long; return where it was at each frame."""
+        end_us = self.world.time_us + round(seconds * 1e6)
+        return self.path_until(lambda: self.world.time_us >= end_us, seconds + 1.0)
+
+    def path_until(self, condition: Callable[[], object], at_most_s: float) -> list[Vector]:
+        """Fly until `condition()`; return where it was at each frame."""
+        path = [self.position]
+
+        def note_and_ask() -> object:
+            path.append(self.position)
+            return condition()
+
+        self.until(note_and_ask, at_most_s)
+        return path
+
+    def send(self, name: str, *fields: Any) -> None:
+        """Send a message from the first client."""
+        self.client.send(name, *fields)
+
+    def command(self, number: int, *params: float, client: Client | None = None, confirmation: int = 0) -> int:
+        """Send a COMMAND_LONG and return the MAV_RESULT; parameters that are left out are 0."""
+        who = client or self.client
+        values = (*params, *(0.0,) * (7 - len(params)))
+        who.send("COMMAND_LONG", SYSTEM, COMPONENT, number, confirmation, *values)
+        return self._result(number, who)
+
+    def command_int(
+        self, number: int, *params: float, frame: int, x: int = NOT_GIVEN, y: int = NOT_GIVEN, z: float = nan
+    ) -> int:
+        """Send a COMMAND_INT and return the MAV_RESULT; x, y, z that are left out are not given."""
+        values = (*params, *(0.0,) * (4 - len(params)))
+        self.client.send("COMMAND_INT", SYSTEM, COMPONENT, frame, number, 0, 0, *values, x, y, z)
+        return self._result(number, self.client)
+
+    def _result(self, number: int, who: Client) -> int:
+        before = len(who.acks)
+        self.until(lambda: len(who.acks) > before, 0.1, f"COMMAND_ACK of {number}")
+        self.step()
+        (ack,) = who.acks[before:]
+        assert ack.command == number
+        return int(ack.result)
+
+    def select(self, mode: Mode) -> int:
+        """Choose a mode by DO_SET_MODE; return the MAV_RESULT."""
+        number = custom_mode(mode)
+        return self.command(mav.MAV_CMD_DO_SET_MODE, 1.0, number >> 16 & 0xFF, number >> 24 & 0xFF)
+
+    def arm(self) -> int:
+        """Arm; return the MAV_RESULT."""
+        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+
+    def arm_by_force(self) -> int:
+        """Arm whatever the checks say; return the MAV_RESULT."""
+        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE)
+
+    def disarm(self, magic: float = 0.0) -> int:
+        """Disarm, or try to; return the MAV_RESULT."""
+        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, magic)
+
+    def stick(self, pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: float = 0.0) -> None:
+        """Send sticks once: forward, right, up (0..1, the middle is 0.5), clockwise."""
+        axes = (pitch, roll, thrust, yaw)
+        self.send("MANUAL_CONTROL", SYSTEM, *(round(1000.0 * axis) for axis in axes), 0)
+
+    def setpoint(
+        self,
+        position: Vector | None = None,
+        velocity: Vector | None = None,
+        acceleration: Vector | None = None,
+        yaw_rad: float | None = None,
+        yaw_rate_rad_s: float | None = None,
+    ) -> None:
+        """Send an offboard setpoint once, ENU; what is None is masked."""
+        groups = (position, velocity, acceleration)
+        mask = sum(0b111 << 3 * place for place, group in enumerate(groups) if group is None)
+        mask |= (yaw_rad is None) << 10 | (yaw_rate_rad_s is None) << 11
+        ned = [value for group in groups for value in ned_from_enu(group or (0.0, 0.0, 0.0))]
+        yaw = 0.0 if yaw_rad is None else 0.5 * pi - yaw_rad
+        fields = (mav.MAV_FRAME_LOCAL_NED, mask, *ned, yaw, -(yaw_rate_rad_s or 0.0))
+        self.send("SET_POSITION_TARGET_LOCAL_NED", 0, SYSTEM, COMPONENT, *fields)
+
+    def drain(self, part: float) -> None:
+        """Have so much of the full battery's charge gone at once, and the autopilot know."""
+        assert self._believed.battery is not None
+        gone_ah = part * self._believed.battery.capacity_ah
+        self.world = replace(self.world, charge_used_ah=self.world.charge_used_ah + gone_ah)
+        self.step()
+
+    def inject(self, unit: int, kind: int, instance: int = 0, *values: float) -> int:
+        """Have a fault happen in the plant, which nobody has asked for; return the MAV_RESULT."""
+        a, b, c, d = (*values, 0.0, 0.0, 0.0, 0.0)[:4]
+        self.world, told = self.plant.faults.inject(Fault(unit, kind, instance, (a, b, c, d)), self.world)
+        return told.result
+
+    def set(self, name: str, value: Value) -> None:
+        """Set a parameter as a ground station does, and see that it was taken."""
+        self.copter.parameters.set(name, value)
+        self.step()
+        assert self.copter.parameters[name] == pytest.approx(value, rel=1e-6)  # they are of 32 bits
+
+    def take_off(self, height_m: float = 2.5) -> None:
+        """Arm, climb above home and stay."""
+        assert self.command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, height_m) == ACCEPTED
+        assert self.arm() == ACCEPTED
+        self.until(lambda: self.mode is Mode.HOLD, 5.0 + 2.0 * height_m, "take-off")
+        self.run(1.0)
+
+    def land(self) -> None:
+        """Land where it is, and wait until the rotors have stopped."""
+        assert self.select(Mode.LAND) == ACCEPTED
+        self.until(lambda: not self.armed, 5.0 + 2.0 * self.position[2], "landing")
+
+    def go(self, east_m: float, north_m: float, up_m: float, yaw_rad: float = nan, speed_m_s: float = -1.0) -> int:
+        """Reposition to a place, ENU from the origin; return the MAV_RESULT."""
+        there = geodetic_of((east_m, north_m, up_m), self._settings.origin)
+        x, y = round(there.latitude_deg * 1e7), round(there.longitude_deg * 1e7)
+        params = (speed_m_s, 1.0, 0.0, yaw_rad)
+        frame = mav.MAV_FRAME_GLOBAL
+        return self.command_int(mav.MAV_CMD_DO_REPOSITION, *params, frame=frame, x=x, y=y, z=there.altitude_m)
+
+    @property
+    def world(self) -> World:
+        """The plant's world."""
+        return self.plant.world
+
+    @world.setter
+    def world(self, world: World) -> None:
+        self.plant.world = world
+
+    @property
+    def now_s(self) -> float:
+        """Simulated time, s."""
+        return self.world.time_us * 1e-6
+
+    @property
+    def mode(self) -> Mode:
+        """The flight mode."""
+        return self.copter.pilot.state.mode
+
+    @property
+    def armed(self) -> bool:
+        """Whether the rotors may turn."""
+        return self.copter.pilot.state.armed
+
+    @property
+    def told_mode(self) -> Mode | None:
+        """The flight mode of the last HEARTBEAT."""
+        return mode_of_custom(self.client.latest("HEARTBEAT").custom_mode)
+
+    @property
+    def position(self) -> Vector:
+        """Of the plant, m, ENU."""
+        x, y, z = self.world.state[6:9]
+        return (x, y, z)
+
+    @property
+    def velocity(self) -> Vector:
+        """Of the plant, m/s, ENU."""
+        return state_frame(self.world).velocity_enu_m_s
+
+    @property
+    def yaw_rad(self) -> float:
+        """Of the plant, counter-clockwise from east."""
+        return self.euler[2]
+
+    @property
+    def euler(self) -> Vector:
+        """Roll, pitch, yaw of the plant, rad."""
+        return euler_from_quaternion(state_frame(self.world).attitude)

@@ -1,0 +1,110 @@
+"""Families of flights: the same track from starts a millimetre apart, so that no verdict hangs on one trajectory.
+
+`python -m tools.harness.family`: a table of tilts and distances on lemniscates that no vehicle can follow.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.guidance.trajectories.tracks import position
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.common.process.lifecycle import undisturbed
+from colibri.common.types import Array
+from colibri.flights.in_process import Direct
+from colibri.flights.plan import FlightPlan
+from colibri.plant.physics.start import Start
+from colibri.plant.physics.world import Physics, starting_world
+from colibri.plant.process.options import nudged
+from colibri.plant.simulation.plant import Plant
+
+APART_M = 1e-3
+LAPS_S = (4.0, 3.0, 2.0, 1.0)
+STARTS = 50
+DURATION_S = 40.0
+CAUGHT_UP_S = 4.0
+"""The start, 1 m below and beside the track, no longer counts."""
+
+
+class Flown(NamedTuple):
+    """A flight, one value a frame.
+
+    Attributes:
+        t: s, (n,).
+        tilt_deg: Of the body's z axis from the vertical, (n,).
+        error_m: Distance to the reference of the same instant, (n,).
+        z_m: Height, (n,).
+        fallback: Whether something other than a plan decided, (n,).
+    """
+
+    t: Array
+    tilt_deg: Array
+    error_m: Array
+    z_m: Array
+    fallback: NDArray[np.bool_]
+
+
+def starts(start: Start, count: int) -> Iterator[Start]:
+    """Return `count` starts: `start`, and others a millimetre from it in every direction."""
+    rng = np.random.default_rng(1)
+    yield start
+    for _ in range(count - 1):
+        x, y, z = rng.normal(size=3)
+        scale = APART_M / np.sqrt(x * x + y * y + z * z)
+        yield start._replace(x=start.x + scale * x, y=start.y + scale * y, z=start.z + scale * z)
+
+
+def fly_family(track: str, count: int, duration_s: float, **start: float) -> list[Flown]:
+    """Fly profile `flight` from each of `count` starts; `start` as in `Start`, in place of the profile's."""
+    plan = FlightPlan.of_options(Path(), track=track, profile="flight", link="direct", start=start)
+    return [_fly(plan, it, duration_s) for it in starts(plan.start, count)]
+
+
+def _fly(plan: FlightPlan, start: Start, duration_s: float) -> Flown:
+    autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, lambda: 0.0)
+    plant = Plant(
+        starting_world(nudged(start), plan.plant_vehicle),
+        plan.plant_vehicle,
+        Physics(plan.plant_vehicle, "rk4"),
+        plan.feedback,
+        DEFAULT_ORIGIN,
+        seed=0,
+        interval_us=autopilot.frame_interval_us,
+    )
+    exchange, states, fallback = Direct(autopilot), [], []
+    with undisturbed():
+        while plant.world.time_us < duration_s * 1e6:
+            step, command = exchange(plant)
+            plant.answer(command)
+            states.append((plant.world.time_us * 1e-6, *plant.world.state))
+            fallback.append(step.decision is not None and step.decision.diagnostics.fallback is not None)
+    return _flown(plan, np.array(states), np.array(fallback))
+
+
+def _flown(plan: FlightPlan, states: Array, fallback: NDArray[np.bool_]) -> Flown:
+    """Return the flight of times and states (n, 14)."""
+    t, places, (_, q1, q2, _) = states[:, 0], states[:, 7:10], states[:, 10:14].T
+    tilt = np.arccos(np.clip(1.0 - 2.0 * (q1 * q1 + q2 * q2), -1.0, 1.0))
+    errors = np.linalg.norm(places - position(plan.track, t), axis=1)
+    return Flown(t, np.degrees(tilt), errors, places[:, 2], fallback)
+
+
+def main() -> None:
+    """Print the table."""
+    print("| lap (s) | tilt: largest (deg) | median of the largest | distance (m) | height (m) | fallback samples |")  # noqa: T201
+    print("| ---: | ---: | ---: | ---: | ---: | ---: |")  # noqa: T201
+    for lap_s in LAPS_S:
+        flown = fly_family(f"lemniscate:lap={lap_s}", STARTS, DURATION_S)
+        tilts = [float(it.tilt_deg.max()) for it in flown]
+        heights = f"{min(it.z_m.min() for it in flown):.2f} to {max(it.z_m.max() for it in flown):.2f}"
+        error_m = max(it.error_m[it.t > CAUGHT_UP_S].max() for it in flown)
+        samples = max(it.fallback.sum() for it in flown)
+        print(f"| {lap_s:g} | {max(tilts):.1f} | {np.median(tilts):.1f} | {error_m:.2f} | {heights} | {samples} |")  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,260 @@
+"""Sees what a vehicle really does, on a link of its own: clients are judged by this, not by what they say."""
+
+import socket
+from collections import Counter
+from collections.abc import Callable
+from select import select
+from threading import Condition, Event, Thread
+from time import monotonic
+from typing import Any, NamedTuple, Self
+
+from colibri.autopilot.commander.rules.modes import Mode, mode_of_custom
+from colibri.common.rotations import euler_from_quaternion
+from colibri.common.types import Vector
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Codec, Message, mav
+from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
+
+ON_GROUND: int = mav.MAV_LANDED_STATE_ON_GROUND
+GIVE_UP_AFTER_S = 60.0
+
+_SYSTEM_ID = 240
+_LOOK_EVERY_S = 0.05
+_INTERVALS_US = {
+    "LOCAL_POSITION_NED": 50_000,
+    "ATTITUDE_QUATERNION": 50_000,
+    "EXTENDED_SYS_STATE": 100_000,
+}
+_NEEDED = {"HEARTBEAT", "ATTITUDE_QUATERNION", "EXTENDED_SYS_STATE"}
+
+
+class Sight(NamedTuple):
+    """The vehicle at an instant.
+
+    Attributes:
+        time_s: Simulated time.
+        position_enu_m: From the origin.
+        velocity_enu_m_s: Of it.
+        euler_rad: Roll, pitch, yaw; FLU to ENU.
+        rate_flu_rad_s: Body rates.
+        mode: The flight mode.
+        armed: Whether the rotors may turn.
+        landed: MAV_LANDED_STATE.
+    """
+
+    time_s: float
+    position_enu_m: Vector
+    velocity_enu_m_s: Vector
+    euler_rad: Vector
+    rate_flu_rad_s: Vector
+    mode: Mode | None
+    armed: bool
+    landed: int
+
+    @property
+    def height_m(self) -> float:
+        """Above the origin."""
+        return self.position_enu_m[2]
+
+    @property
+    def flying(self) -> bool:
+        """Whether it is off the ground."""
+        return self.landed not in (ON_GROUND, mav.MAV_LANDED_STATE_UNDEFINED)
+
+
+class Observer:
+    """Records what a vehicle sends to a port of this computer.
+
+    Attributes:
+        url: The link that the vehicle is to serve.
+    """
+
+    def __init__(self, port: int = 0) -> None:
+        """Listen on `port`; 0: any that is free."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4_000_000)
+        self._socket.bind(("127.0.0.1", port))
+        self.url = f"udpout:127.0.0.1:{self._socket.getsockname()[1]}"
+        self._codec = Codec(_SYSTEM_ID, mav.MAV_COMP_ID_MISSIONPLANNER)
+        self._vehicle: tuple[str, int] | None = None
+        self._system_id = 0
+        self._has_asked = False
+        self._latest: dict[str, Any] = {}
+        self._sights: list[Sight] = []
+        self._texts: list[str] = []
+        self._modes: list[Mode] = []
+        self._counts: Counter[str] = Counter()
+        self._news = Condition()
+        self._ended = Event()
+        self._thread = Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> Self:
+        """Begin."""
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End."""
+        self._ended.set()
+        self._thread.join()
+        self._socket.close()
+
+    @property
+    def sights(self) -> list[Sight]:
+        """What was seen so far, about 20 times a simulated second."""
+        with self._news:
+            return list(self._sights)
+
+    @property
+    def texts(self) -> list[str]:
+        """The STATUSTEXT lines so far."""
+        with self._news:
+            return list(self._texts)
+
+    @property
+    def now(self) -> Sight:
+        """The vehicle as it was seen last."""
+        with self._news:
+            return self._sights[-1]
+
+    @property
+    def counts(self) -> Counter[str]:
+        """How many messages of each name came so far, from whomever."""
+        with self._news:
+            return self._counts.copy()
+
+    @property
+    def fix(self) -> int:
+        """GPS_FIX_TYPE of the last GPS_RAW_INT."""
+        with self._news:
+            return int(self._latest["GPS_RAW_INT"].fix_type)
+
+    def modes(self) -> list[Mode]:
+        """Return the modes of armed heartbeats, each once in a row: one is sent whenever the mode changes."""
+        with self._news:
+            return list(self._modes)
+
+    def in_mode(self, mode: Mode) -> list[Sight]:
+        """Return what was seen in a mode, in flight."""
+        return [sight for sight in self.sights if sight.mode is mode and sight.armed and sight.flying]
+
+    def wait(self, condition: Callable[[Sight], bool], what: str, within_s: float = GIVE_UP_AFTER_S) -> Sight:
+        """Return the first sight from now on that meets `condition`.
+
+        Args:
+            condition: To be met.
+            what: It, in words.
+            within_s: Wall-clock bound for what hangs.
+
+        Raises:
+            AssertionError: In vain.
+        """
+        with self._news:
+            seen = len(self._sights) - 1
+            give_up_s = monotonic() + within_s
+            while True:
+                for sight in self._sights[max(seen, 0) :]:
+                    if condition(sight):
+                        return sight
+                seen = len(self._sights)
+                left_s = give_up_s - monotonic()
+                last = self._sights[-1] if self._sights else None
+                assert left_s > 0.0, f"waited in vain for {what}; {last}; {self._texts}"
+                self._news.wait(left_s)
+
+    def wait_until_disarmed(self) -> Sight:
+        """Return the first sight from now on in which a flight that was seen is over.
+
+        On a busy machine what is seen lags behind what a client has been told already.
+        """
+        return self.wait(
+            lambda sight: not sight.armed and any(it.armed for it in self._sights), "the end of the flight"
+        )
+
+    def ask(self, answer: str, name: str, *fields: Any, within_s: float = 5.0) -> Any:
+        """Send message `name` to the vehicle; return the fields of the first message `answer` after it.
+
+        Args:
+            answer: Name of the message that answers.
+            name: Of what is sent; its fields begin with the target system and component, which are filled in.
+            *fields: The other fields.
+            within_s: Wall-clock bound for what hangs.
+        """
+        with self._news:
+            assert self._vehicle is not None, "nobody to ask"
+            before = self._counts[answer]
+            target = (self._system_id, AUTOPILOT_COMPONENT)
+            self._socket.sendto(self._codec.encode(name, *target, *fields), self._vehicle)
+            assert self._news.wait_for(lambda: self._counts[answer] > before, within_s), f"no {answer}"
+            return self._latest[answer]
+
+    def plan_length(self, mission_type: int = mav.MAV_MISSION_TYPE_MISSION) -> int:
+        """Return how many items of a plan the vehicle has."""
+        return int(self.ask("MISSION_COUNT", "MISSION_REQUEST_LIST", mission_type).count)
+
+    def parameter(self, name: str) -> float:
+        """Return a REAL32 parameter of the vehicle."""
+        value = self.ask("PARAM_VALUE", "PARAM_REQUEST_READ", name, -1)
+        assert value.param_id == name
+        return float(value.param_value)
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Set a REAL32 parameter of the vehicle."""
+        told = self.ask("PARAM_VALUE", "PARAM_SET", name, value, mav.MAV_PARAM_TYPE_REAL32)
+        assert (told.param_id, told.param_value) == (name, value)
+
+    def _run(self) -> None:
+        while not self._ended.is_set():
+            if not select([self._socket], [], [], _LOOK_EVERY_S)[0]:
+                continue
+            datagram, self._vehicle = self._socket.recvfrom(4096)
+            with self._news:
+                for message in self._codec.decode(datagram):
+                    self._take(message)
+                self._news.notify_all()
+
+    def _take(self, message: Message) -> None:
+        name, fields = message.name, message.fields
+        self._counts[name] += 1
+        if name == "STATUSTEXT":
+            self._texts.append(fields.text)
+        if message.source[1] != AUTOPILOT_COMPONENT:
+            return
+        self._system_id = message.source[0]
+        self._latest[name] = fields
+        if name == "HEARTBEAT":
+            self._note_mode(fields)
+        elif name == "LOCAL_POSITION_NED" and self._latest.keys() >= _NEEDED:
+            self._sights.append(self._sight())
+
+    def _note_mode(self, heartbeat: Any) -> None:
+        mode = mode_of_custom(heartbeat.custom_mode)
+        if heartbeat.base_mode & MODE_ARMED and mode and self._modes[-1:] != [mode]:
+            self._modes.append(mode)
+        if not self._has_asked:
+            self._ask()
+
+    def _ask(self) -> None:
+        """Ask for the rates at which to see, once: loopback loses nothing."""
+        assert self._vehicle is not None, "it has just been heard"
+        self._has_asked = True
+        for name, interval_us in _INTERVALS_US.items():
+            number = getattr(mav, f"MAVLINK_MSG_ID_{name}")
+            fields = (
+                *(self._system_id, AUTOPILOT_COMPONENT, mav.MAV_CMD_SET_MESSAGE_INTERVAL, 0),
+                *(number, interval_us, 0, 0, 0, 0, 0),
+            )
+            self._socket.sendto(self._codec.encode("COMMAND_LONG", *fields), self._vehicle)
+
+    def _sight(self) -> Sight:
+        where, heartbeat = self._latest["LOCAL_POSITION_NED"], self._latest["HEARTBEAT"]
+        attitude = self._latest["ATTITUDE_QUATERNION"]
+        return Sight(
+            where.time_boot_ms * 1e-3,
+            ned_from_enu((where.x, where.y, where.z)),
+            ned_from_enu((where.vx, where.vy, where.vz)),
+            euler_from_quaternion(ned_frd_from_enu_flu((attitude.q1, attitude.q2, attitude.q3, attitude.q4))),
+            frd_from_flu((attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed)),
+            mode_of_custom(heartbeat.custom_mode),
+            bool(heartbeat.base_mode & MODE_ARMED),
+            self._latest["EXTENDED_SYS_STATE"].landed_state,
+        )

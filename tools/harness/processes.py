@@ -1,0 +1,133 @@
+"""Flights for tests: one command line in, report and rows out."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+import numpy as np
+import pytest
+
+from colibri.analysis.recording import COLUMNS
+from colibri.cli.main import main
+from colibri.common.process.lifecycle import nudge_m
+from colibri.common.types import Array
+
+REFERENCE = Path(__file__).parents[2] / "tests" / "reference"
+GIVE_UP_AFTER_S = 60.0
+begins_as_recorded = pytest.mark.skipif(nudge_m() != 0.0, reason="compares with a flight that began at its start")
+"""For tests that compare with recorded flights more closely than COLIBRI_NUDGE_M moves the start."""
+THESIS_PLANT = (
+    *("--vehicle", "hummingbird-thesis"),
+    *("--integrator", "adaptive"),
+    *("--start", "y=-1,z=0,psi=90,rotors=3000"),
+)
+"""What `colibri plant` needs to begin as profile `thesis` does."""
+
+
+def fly(out: Path, *options: str) -> dict[str, Any]:
+    """Fly through the command line, without figures; return the report."""
+    assert main(["fly", *options, "--quiet", "--no-figures", "--out", str(out)]) == 0
+    figures: dict[str, Any] = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    return figures
+
+
+def fly_thesis(out: Path, *options: str) -> dict[str, Any]:
+    """Fly with profile `thesis`."""
+    return fly(out, *options, "--profile", "thesis")
+
+
+def rows(path: Path) -> dict[str, Array]:
+    """Read a flight's CSV as columns."""
+    header = path.read_text(encoding="utf-8").partition("\n")[0].split(",")
+    table = np.genfromtxt(path, delimiter=",", skip_header=1)
+    return dict(zip(header, table.T, strict=True))
+
+
+def reference(track: str) -> dict[str, Array]:
+    """Read the thesis's closed-loop data of a track."""
+    return rows(REFERENCE / f"{track}.csv")
+
+
+def largest_difference(flown: dict[str, Array], wanted: dict[str, Array], columns: tuple[str, ...]) -> float:
+    """Return the largest difference in any of `columns` at any row."""
+    assert set(columns) <= set(COLUMNS)
+    return float(max(np.abs(flown[column] - wanted[column]).max() for column in columns))
+
+
+def wait_for(condition: Callable[[], object], what: str, hours: float = GIVE_UP_AFTER_S / 3600.0) -> None:
+    """Wait until `condition()`; a bound for what hangs, never a part of the verdict."""
+    give_up_s = monotonic() + 3600.0 * hours
+    while not condition():
+        assert monotonic() < give_up_s, f"waited in vain for {what}"
+        sleep(0.01)
+
+
+class Process:
+    """`colibri plant` or `colibri autopilot` as a user starts it, its JSON status read from a file."""
+
+    def __init__(self, folder: Path, package: str, *options: str) -> None:
+        """Start it; `folder` takes what it says."""
+        self._said = folder / f"{package}-{len(list(folder.iterdir()))}.jsonl"
+        self._errors = self._said.with_suffix(".err")
+        with self._said.open("wb") as said, self._errors.open("wb") as errors:
+            command = [sys.executable, "-m", f"colibri.{package}", "--json", "--parent", str(os.getpid()), *options]
+            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=said, stderr=errors)
+
+    def events(self, name: str) -> list[dict[str, Any]]:
+        """Return the events of that name said so far."""
+        lines = self._said.read_text(encoding="utf-8").split("\n")[:-1]
+        return [event for event in map(json.loads, lines) if event["event"] == name]
+
+    def wait_for(self, name: str) -> dict[str, Any]:
+        """Wait for an event and return the latest of its name."""
+        wait_for(lambda: self.events(name) or self.process.poll() is not None, f"{name} in {self._said.name}")
+        events = self.events(name)
+        assert events, f"ended without {name}: {self.errors()}"
+        return events[-1]
+
+    def errors(self) -> str:
+        """Return what it wrote to standard error."""
+        return self._errors.read_text(encoding="utf-8")
+
+    def wait(self) -> int:
+        """Wait for its end; return the exit code."""
+        return self.process.wait(GIVE_UP_AFTER_S)
+
+    def stop(self) -> None:
+        """End it, however it is."""
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+
+
+@contextmanager
+def running(*processes: Process) -> Iterator[None]:
+    """Leave no process behind."""
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.stop()
+
+
+def start_plant(folder: Path, out: Path, *options: str) -> tuple[Process, str]:
+    """Start the thesis's plant on a free port; return it and the URL to call it."""
+    plant = Process(folder, "plant", "--link", "udpin:127.0.0.1:0", "--out", str(out), *THESIS_PLANT, *options)
+    url: str = plant.wait_for("listening")["url"]
+    return plant, url.replace("udpin", "udpout")
+
+
+def start_autopilot(folder: Path, url: str, *options: str) -> Process:
+    """Start an autopilot with profile `thesis` that calls the plant at `url`."""
+    return Process(folder, "autopilot", "--plant", url, "--profile", "thesis", *options)
+
+
+def states(out: Path) -> Array:
+    """Return the plant's states at every frame."""
+    return np.genfromtxt(out / "plant.csv", delimiter=",", skip_header=1)[:, :14]

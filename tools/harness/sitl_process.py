@@ -1,0 +1,94 @@
+"""`colibri sitl` for a test: started on free ports, watched by an observer, ended."""
+
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tools.harness.observer import Observer
+from tools.harness.processes import wait_for
+
+WAITING = "udpin:127.0.0.1:0"
+_WAITS = re.compile(r"waits for ground stations on 127\.0\.0\.1:(\d+) \((udpin|tcpin)\)")
+_GRACE_S = 10.0
+_COMPILES_HOURS = 0.05
+"""The first start after a change compiles."""
+
+
+class Vehicle:
+    """A running `colibri sitl`.
+
+    Attributes:
+        process: Its process.
+        seen: What it really does.
+        state: The folder of its parameters, logs and files.
+    """
+
+    def __init__(self, process: subprocess.Popen[bytes], seen: Observer, state: Path, said: Path) -> None:
+        """Wrap what runs; `said` takes its standard error."""
+        self.process = process
+        self.seen = seen
+        self.state = state
+        self._said = said
+
+    @property
+    def ports(self) -> list[int]:
+        """Where it waits for clients, in the order of its links."""
+        return [int(port) for port, _ in _WAITS.findall(self.said)]
+
+    @property
+    def port(self) -> int:
+        """Where it waits for clients: on the first link that does."""
+        return self.ports[0]
+
+    @property
+    def mavsdk_url(self) -> str:
+        """The first link that waits, as MAVSDK is told to call it."""
+        return f"udpout://127.0.0.1:{self.port}"
+
+    @property
+    def said(self) -> str:
+        """What it has written to standard error."""
+        return self._said.read_text(encoding="utf-8")
+
+    def end(self) -> int:
+        """Ask it to end, as Ctrl-C does; return its exit code."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            return self.process.wait(_GRACE_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise
+
+
+@contextmanager
+def vehicle(folder: Path, *options: str, links: tuple[str, ...] = (WAITING,), speed: float = 1.0) -> Iterator[Vehicle]:
+    """Run `colibri sitl` while the block lasts; it stands, ready to be armed, when the block begins.
+
+    Args:
+        folder: For what it keeps and says.
+        options: More of its command line.
+        links: URLs that it serves beside the observer's; by default it waits on any free port.
+        speed: Times real time.
+    """
+    said, state = folder / "sitl.err", folder / "state"
+    with Observer() as seen, said.open("wb") as errors:
+        command = [
+            *(sys.executable, "-m", "colibri", "sitl", "--plant-port", "0", "--speed", repr(speed)),
+            *("--state", str(state)),
+            *(f"--gcs={url}" for url in (*links, seen.url)),
+            *options,
+        ]
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=errors)
+        flown = Vehicle(process, seen, state, said)
+        try:
+            wait_for(lambda: seen.sights or process.poll() is not None, "the vehicle's first word", _COMPILES_HOURS)
+            assert process.poll() is None, flown.said
+            yield flown
+        finally:
+            flown.end()

@@ -1,0 +1,175 @@
+"""Ground stations that ask for a lot and keep account of what they are told; no input or output in them.
+
+What they send follows from what comes, so that it does not matter how fast the vehicle flies.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import chain, cycle
+from math import cos, dist, sin
+from typing import Any, NamedTuple
+
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Codec, Message, mav
+
+ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
+OFFBOARD = (mav.MAV_CMD_DO_SET_MODE, 1, 6, 0)
+HOLD = (mav.MAV_CMD_DO_SET_MODE, 1, 4, 3)
+ARM = (mav.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+
+VEHICLE = (1, AUTOPILOT_COMPONENT)
+_ALIVE_EVERY_S = 1.0
+_ASKED = ("AUTOPILOT_VERSION", "HOME_POSITION", "ODOMETRY", "ESTIMATOR_STATUS", "AVAILABLE_MODES", "GPS_GLOBAL_ORIGIN")
+_STREAMED_US = {"ATTITUDE_QUATERNION": 4_000, "LOCAL_POSITION_NED": 8_000, "HIGHRES_IMU": 8_000, "ATTITUDE": 20_000}
+
+_SETPOINT_EVERY_S = 0.05
+_POSITION_AND_VELOCITY = 0b1101_1100_0000
+_RADIUS_M, _RATE_RAD_S, _HEIGHT_M = 2.0, 0.5, 3.0
+
+
+class Ack(NamedTuple):
+    """An acknowledgement.
+
+    Attributes:
+        command: MAV_CMD.
+        result: MAV_RESULT.
+        target: System and component that it is for.
+    """
+
+    command: int
+    result: int
+    target: tuple[int, int]
+
+
+class Station:
+    """A ground station.
+
+    Attributes:
+        identity: System and component that it speaks as.
+        sent: How often each MAV_CMD was sent.
+        counts: How many messages of each name came from the vehicle.
+        acks: How often each acknowledgement came.
+        longest_gap_s: The longest time between two heartbeats of the vehicle, by the clock that it is told.
+        time_s: Simulated time of the vehicle.
+        position_ned_m: Where the vehicle is.
+    """
+
+    def __init__(
+        self,
+        system_id: int,
+        component_id: int = mav.MAV_COMP_ID_MISSIONPLANNER,
+        *,
+        every: int = 25,
+        orders: Sequence[tuple[float, ...]] = (),
+    ) -> None:
+        """Ask for something with every `every` datagrams that come: first `orders`, a MAV_CMD and its parameters each.
+
+        After them it asks for all that a ground station may ask for, over and over.
+        """
+        self.identity = (system_id, component_id)
+        self.sent: Counter[int] = Counter()
+        self.counts: Counter[str] = Counter()
+        self.acks: Counter[Ack] = Counter()
+        self.longest_gap_s = 0.0
+        self.time_s = 0.0
+        self.position_ned_m = (0.0, 0.0, 0.0)
+        self._every = every
+        self._wishes = chain(self._orders(orders), cycle(self._wish()))
+        self._codec = Codec(*self.identity)
+        self._datagrams = 0
+        self._heartbeat_s: float | None = None
+        self._alive_s: float | None = None
+        self._outbox: list[bytes] = []
+
+    def receive(self, datagram: bytes, now_s: float) -> list[bytes]:
+        """Take in a datagram of the vehicle; return what to send to it."""
+        self._datagrams += 1
+        for message in self._codec.decode(datagram):
+            if message.source == VEHICLE:
+                self._take(message, now_s)
+        self._told()
+        if self._datagrams % self._every == 0:
+            next(self._wishes)()
+        if self._alive_s is None or now_s >= self._alive_s + _ALIVE_EVERY_S:
+            self._alive_s = now_s
+            self._send("HEARTBEAT", mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE, 3)
+        outbox, self._outbox = self._outbox, []
+        return outbox
+
+    def _take(self, message: Message, now_s: float) -> None:
+        self.counts[message.name] += 1
+        fields = message.fields
+        if message.name == "HEARTBEAT":
+            if self._heartbeat_s is not None:
+                self.longest_gap_s = max(self.longest_gap_s, now_s - self._heartbeat_s)
+            self._heartbeat_s = now_s
+        elif message.name == "LOCAL_POSITION_NED":
+            self.time_s = fields.time_boot_ms * 1e-3
+            self.position_ned_m = (fields.x, fields.y, fields.z)
+        elif message.name == "COMMAND_ACK":
+            self.acks[Ack(fields.command, fields.result, (fields.target_system, fields.target_component))] += 1
+
+    def _told(self) -> None:
+        """Do what is to be done with every datagram."""
+
+    def _orders(self, orders: Sequence[tuple[float, ...]]) -> Iterator[Callable[[], None]]:
+        for command, *parameters in orders:
+            yield partial(self._command, int(command), *parameters)
+
+    def _wish(self) -> Iterator[Callable[[], None]]:
+        """Yield what a ground station asks for, of every kind."""
+        for name, interval_us in _STREAMED_US.items():
+            yield partial(self._command, mav.MAV_CMD_SET_MESSAGE_INTERVAL, _number(name), interval_us)
+        for name in _ASKED:
+            yield partial(self._command, mav.MAV_CMD_REQUEST_MESSAGE, _number(name))
+        yield partial(self._tell, "PARAM_REQUEST_LIST")
+        yield partial(self._tell, "PARAM_REQUEST_READ", "TRACK", -1)
+        yield partial(self._tell, "MISSION_REQUEST_LIST", mav.MAV_MISSION_TYPE_MISSION)
+        yield partial(self._send, "PING", 0, 7, 0, 0)
+        yield partial(self._send, "TIMESYNC", 0, 7)
+
+    def _command(self, command: int, *parameters: float) -> None:
+        self.sent[command] += 1
+        self._tell("COMMAND_LONG", command, 0, *parameters, *[0.0] * (7 - len(parameters)))
+
+    def _tell(self, name: str, *fields: Any) -> None:
+        self._send(name, *VEHICLE, *fields)
+
+    def _send(self, name: str, *fields: Any) -> None:
+        self._outbox.append(self._codec.encode(name, *fields))
+
+
+class Companion(Station):
+    """A companion computer that takes off and flies the vehicle in a circle, by setpoints.
+
+    Attributes:
+        off_m: The largest distance to the setpoint once the vehicle has caught up.
+    """
+
+    def __init__(self, system_id: int) -> None:
+        """Engage mode offboard, arm."""
+        super().__init__(system_id, mav.MAV_COMP_ID_ONBOARD_COMPUTER, orders=[OFFBOARD, ARM])
+        self.off_m = 0.0
+        self._setpoint_s = 0.0
+        self._caught_up = False
+
+    def _told(self) -> None:
+        """Send a setpoint 20 times a simulated second."""
+        if self.time_s < self._setpoint_s + _SETPOINT_EVERY_S:
+            return
+        self._setpoint_s = self.time_s
+        angle = _RATE_RAD_S * self.time_s
+        x, y, z = place = (_RADIUS_M * cos(angle), _RADIUS_M * sin(angle), -_HEIGHT_M)
+        away_m = dist(self.position_ned_m, place)
+        self._caught_up = self._caught_up or away_m < 0.15
+        if self._caught_up:
+            self.off_m = max(self.off_m, away_m)
+        motion = (x, y, z, -_RATE_RAD_S * y, _RATE_RAD_S * x, *[0.0] * 6)
+        when_ms = round(self.time_s * 1e3)
+        frame = mav.MAV_FRAME_LOCAL_NED
+        self._send("SET_POSITION_TARGET_LOCAL_NED", when_ms, *VEHICLE, frame, _POSITION_AND_VELOCITY, *motion)
+
+
+def _number(name: str) -> int:
+    number: int = getattr(mav, f"MAVLINK_MSG_ID_{name}")
+    return number

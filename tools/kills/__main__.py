@@ -1,0 +1,135 @@
+"""`python -m tools.kills`: autopilots or plants killed in flight, again and again, and what came of it."""
+
+import argparse
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import perf_counter
+
+from colibri.common.process.arguments import natural
+from colibri.mavlink.hil.feedback import Feedback, feedback
+from tools.kills import autopilots, plants
+from tools.kills.between import HangsError
+
+MOST_TILT_DEG = 35.0 + 45.0
+"""45° more than the largest tilt that a pilot may ask for."""
+MOST_LOST_M = 2.0
+_PLANTS_A_FLIGHT = 10
+
+
+def main() -> int:
+    """Kill as often as asked, and print what it came to; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m tools.kills", description=__doc__)
+    parser.add_argument("--of", choices=("autopilot", "plant"), default="autopilot", help="who dies")
+    parser.add_argument("--kills", type=natural, default=200)
+    parser.add_argument("--seed", type=natural, default=1)
+    parser.add_argument("--feedback", type=feedback, default=Feedback.STATE, metavar="state|sensors")
+    args = parser.parse_args()
+    started_s = perf_counter()
+    run = _autopilots if args.of == "autopilot" else _plants
+    lines, failures = run(args.kills, args.seed, args.feedback)
+    seconds = perf_counter() - started_s
+    verdict = [f"FAILED: {failure}" for failure in failures] or ["every flight went on"]
+    lines.append(f"{seconds:.0f} s, {args.of}, {args.feedback}, seed {args.seed}")
+    sys.stdout.write("\n".join([*lines, *verdict]) + "\n")
+    return 1 if failures else 0
+
+
+def failures_of(number: int, flight: autopilots.Flight) -> list[str]:
+    """Return what is wrong with a flight in which autopilots were killed."""
+    found = [] if flight.flown else [f"mission {number} did not end"]
+    found += [f"mission {number}: {flight.words}"] if flight.words else []
+    for kill in flight.kills:
+        where = f"mission {number}, t = {kill.time_s:.3f} s, {kill.phase.value}, item {kill.item}"
+        if kill.tilt_deg > MOST_TILT_DEG:
+            found.append(f"{where}: tilted by {kill.tilt_deg:.0f} degrees")
+        if kill.lost_m > MOST_LOST_M:
+            found.append(f"{where}: lost {kill.lost_m:.2f} m")
+        if not kill.went_on:
+            found.append(f"{where}: did not say that it goes on")
+    return found
+
+
+def _autopilots(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[str]]:
+    """Kill autopilots; return what to print, and what failed."""
+    done: list[autopilots.Kill] = []
+    failures: list[str] = []
+    flights = 0
+    while len(done) < kills:
+        flights += 1
+        try:
+            with _folder() as folder:
+                flight = autopilots.fly(folder, feedback, 1000 * seed + flights, kills - len(done))
+        except HangsError as error:
+            failures.append(f"mission {flights}: {error}")
+            break
+        done += flight.kills
+        failures += failures_of(flights, flight)
+        _say(f"mission {flights}: {len(flight.kills)} kills in {flight.duration_s:.0f} s, {len(done)} in all")
+    hovers, others = [kill for kill in done if kill.still], [kill for kill in done if not kill.hovered]
+    phases = Counter(kill.phase for kill in done)
+    lines = [
+        f"{len(done)} kills in {flights} missions: " + ", ".join(f"{n} {phase.value}" for phase, n in phases.items()),
+        f"largest tilt after a kill {_most(kill.tilt_deg for kill in done):.1f} degrees, "
+        f"and in the second before one {_most(kill.tilt_before_deg for kill in done):.1f}",
+        f"hovering, {len(hovers)} kills: "
+        f"largest tilt {_most(kill.tilt_deg for kill in hovers):.2f} degrees, "
+        f"height lost {_most(kill.lost_m for kill in hovers):.3f} m, "
+        f"moved {_most(kill.moved_m for kill in hovers):.3f} m",
+        f"on the way, {len(others)} kills",
+    ]
+    return lines, failures
+
+
+def _plants(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[str]]:
+    """Kill plants; return what to print, and what failed."""
+    done: list[plants.Kill] = []
+    failures: list[str] = []
+    flights = 0
+    while len(done) < kills:
+        flights += 1
+        try:
+            with _folder() as folder:
+                most = min(_PLANTS_A_FLIGHT, kills - len(done))
+                killed, words = plants.fly(folder, feedback, 1000 * seed + flights, most)
+        except HangsError as error:
+            failures.append(f"autopilot {flights}: {error}")
+            break
+        done += killed
+        failures += [f"autopilot {flights}: {words}"] if words else []
+        for kill in killed:
+            if not kill.stood:
+                failures.append(f"autopilot {flights}, t = {kill.time_s:.3f} s: the next flight did not begin anew")
+            if kill.said and "waiting for a plant" not in kill.said:
+                failures.append(f"autopilot {flights}, t = {kill.time_s:.3f} s: said {kill.said}")
+        _say(f"autopilot {flights}: {len(killed)} plants, {len(done)} in all")
+    phases = Counter(kill.phase for kill in done)
+    waited = sum(bool(kill.said) for kill in done)
+    lines = [
+        f"{len(done)} kills: " + ", ".join(f"{n} {phase.value}" for phase, n in phases.items()),
+        f"{waited} times the autopilot said that it waits for a plant; every time the next plant's flight began anew",
+    ]
+    return lines, failures
+
+
+@contextmanager
+def _folder() -> Iterator[Path]:
+    """Give a folder that is to be made for a flight, and is gone after it."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder) / "flight"
+
+
+def _most(values: Iterator[float]) -> float:
+    return max(values, default=0.0)
+
+
+def _say(line: str) -> None:
+    sys.stderr.write(line + "\n")
+    sys.stderr.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

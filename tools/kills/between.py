@@ -1,0 +1,160 @@
+"""Stands between plant and autopilot, and tells at which simulated instant something is to be done."""
+
+import random
+import socket
+from collections.abc import Callable
+from enum import Enum
+from select import select
+from time import monotonic
+
+from colibri.mavlink.wire import dialect
+from tools.kills.station import Station
+
+GIVE_UP_AFTER_S, COMPILES_S = 60.0, 900.0
+"""By the clock: bounds for what hangs, never a part of a verdict; the first autopilot may have to compile."""
+ADDRESS = ("127.0.0.1", 0)
+_LARGEST = 65536
+_LOOK_S = 0.02
+_HEAD = 10
+"""Bytes of a frame of MAVLink 2 before its payload."""
+_TIMES = {dialect.MSG_ATTITUDE_QUATERNION: (4, 1000), dialect.MSG_HIL_SENSOR: (8, 1)}
+"""What a frame of the plant begins with: the bytes of its time, and the unit in µs."""
+_ANSWER = 93
+"""HIL_ACTUATOR_CONTROLS."""
+
+
+class Phase(Enum):
+    """Where in the exchange of a frame the process is killed."""
+
+    BEFORE = "before the frame comes"
+    DURING = "while the answer is computed"
+    AFTER = "when the answer is sent"
+    LOST = "when the answer is sent, which is lost"
+
+
+class HangsError(Exception):
+    """Something was waited for in vain."""
+
+
+class Between:
+    """Passes datagrams on between a plant and the autopilots that call it one after another.
+
+    Every autopilot has a way of its own to the plant, as it would have without this.
+
+    Attributes:
+        time_us: Of the newest frame.
+        url: What the next autopilot is to call; another after each `cut`.
+    """
+
+    def __init__(self, plant: tuple[str, int]) -> None:
+        """Pass on to the plant at `plant`."""
+        self._plant = plant
+        self.time_us = 0
+        self._due: tuple[int, Phase, Callable[[], None]] | None = None
+        self._chance = random.Random(0)
+        self._open()
+
+    def at(self, time_us: int, phase: Phase, do: Callable[[], None]) -> None:
+        """Do something once, with the first frame from `time_us` on."""
+        self._due = (time_us, phase, do)
+
+    @property
+    def waits(self) -> bool:
+        """Whether there is something still to be done."""
+        return self._due is not None
+
+    def cut(self) -> None:
+        """Let go of the autopilot that called, and wait for the next."""
+        self.close()
+        self._open()
+
+    def fly_until(
+        self, station: Station, condition: Callable[[], bool], what: str, give_up_after_s: float = GIVE_UP_AFTER_S
+    ) -> None:
+        """Pass on, and have the ground station hear, until `condition()`.
+
+        Raises:
+            HangsError: It does not come about.
+        """
+        give_up_s = monotonic() + give_up_after_s
+        while not condition():
+            ready, _, _ = select([self._near, self._far, station.socket], [], [], _LOOK_S)
+            for sock in (self._near, self._far):
+                if sock in ready and sock.fileno() >= 0:
+                    self._pass_on(sock)
+            if station.socket in ready:
+                station.hear()
+            if monotonic() > give_up_s:
+                said = f"{station.mode}, item {station.seq}, {station.texts[-3:]}"
+                raise HangsError(f"waited in vain for {what} at t = {self.time_us * 1e-6:.3f} s: {said}")
+
+    def close(self) -> None:
+        """Let go of everybody."""
+        self._near.close()
+        self._far.close()
+
+    def _open(self) -> None:
+        self._near, self._far = _bound(), _bound()
+        self.url = f"udpout:127.0.0.1:{self._near.getsockname()[1]}"
+        self._autopilot: tuple[str, int] | None = None
+
+    def _pass_on(self, sock: socket.socket) -> None:
+        while sock.fileno() >= 0:
+            try:
+                datagram, sender = sock.recvfrom(_LARGEST)
+            except BlockingIOError:
+                return
+            except ConnectionRefusedError:
+                continue
+            if sock is self._near:
+                self._autopilot = sender
+                self._from_autopilot(datagram)
+            else:
+                self._from_plant(datagram)
+
+    def _from_plant(self, datagram: bytes) -> None:
+        count, unit_us = _TIMES.get(_number(datagram), (0, 0))
+        if count:
+            payload = datagram[_HEAD : _HEAD + min(count, datagram[1])]  # zeros at a payload's end are left out
+            self.time_us = int.from_bytes(payload, "little") * unit_us
+        if self._is_due(Phase.BEFORE):
+            return
+        if self._autopilot:
+            self._send(self._near, datagram, self._autopilot)
+        self._is_due(Phase.DURING)
+
+    def _from_autopilot(self, datagram: bytes) -> None:
+        is_answer = _number(datagram) == _ANSWER
+        far = self._far
+        if is_answer and self._is_due(Phase.LOST):
+            return
+        if far.fileno() >= 0:
+            self._send(far, datagram, self._plant)
+        if is_answer:
+            self._is_due(Phase.AFTER)
+
+    def _is_due(self, phase: Phase) -> bool:
+        """Do what is due in this phase, if it is; return whether it was."""
+        if self._due is None or self._due[1] is not phase or self.time_us < self._due[0]:
+            return False
+        (_, _, do), self._due = self._due, None
+        do()
+        return True
+
+    def _send(self, sock: socket.socket, datagram: bytes, address: tuple[str, int]) -> None:
+        try:
+            sock.sendto(datagram, address)
+        except ConnectionRefusedError:
+            return
+
+
+def _number(datagram: bytes) -> int:
+    """Return which message a datagram begins with."""
+    return int.from_bytes(datagram[7:_HEAD], "little")
+
+
+def _bound() -> socket.socket:
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.bind(ADDRESS)
+    sock.setblocking(False)
+    return sock

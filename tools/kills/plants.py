@@ -1,0 +1,101 @@
+"""Plants killed in flight: the autopilot says what it waits for, and flies the next plant as if it had just begun."""
+
+import random
+from pathlib import Path
+from typing import NamedTuple
+
+from colibri.mavlink.hil.feedback import Feedback
+from tools.harness.processes import Process
+from tools.kills.autopilots import start
+from tools.kills.between import COMPILES_S, Between, Phase
+from tools.kills.station import Station, mission
+
+_LATEST_S = 12.0
+
+
+class Kill(NamedTuple):
+    """What came of a kill.
+
+    Attributes:
+        time_s: Simulated time of the frame in which it died.
+        phase: Where in the exchange.
+        said: What the autopilot said while there was no plant; empty where the next was there before it had to.
+        stood: Whether the vehicle stood disarmed, without a mission, at the next plant's begin.
+    """
+
+    time_s: float
+    phase: Phase
+    said: str
+    stood: bool
+
+
+def fly(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple[list[Kill], str]:
+    """Kill as many plants in mid-mission; return what came of each, and what was said on standard error."""
+    folder.mkdir()
+    chance = random.Random(seed)
+    station = Station(mission())
+    processes = [_plant(folder, "udpin:127.0.0.1:0", seed)]
+    try:
+        url = processes[0].wait_for("listening")["url"]
+        _, host, port = url.split(":")
+        between = Between((host, int(port)))
+        autopilot = start(folder, between.url, station, feedback)
+        processes.append(autopilot)
+        flights = _Flights(folder, url, autopilot, between, station, processes, chance)
+        done = [flights.kill(seed) for _ in range(kills)]
+        between.fly_until(station, lambda: station.armed is True, "the last plant's vehicle to be armed")
+        between.close()
+    finally:
+        for process in processes:
+            process.stop()
+        station.close()
+    return done, "".join(process.errors() for process in processes)
+
+
+class _Flights:
+    """One autopilot, and the plants that it flies one after another."""
+
+    def __init__(
+        self,
+        folder: Path,
+        url: str,
+        autopilot: Process,
+        between: Between,
+        station: Station,
+        processes: list[Process],
+        chance: random.Random,
+    ) -> None:
+        self._folder, self._url = folder, url
+        self._autopilot, self._between, self._station = autopilot, between, station
+        self._processes = processes
+        self._plant = processes[0]
+        self._chance = chance
+
+    def kill(self, seed: int) -> Kill:
+        """Fly for a while, kill the plant, start another: at once, or when the autopilot has said what it misses."""
+        between, station, chance = self._between, self._station, self._chance
+        between.fly_until(station, lambda: station.armed is True, "the rotors to be armed", COMPILES_S)
+        phase = chance.choice(list(Phase))
+        due_us = between.time_us + round(1e6 * chance.uniform(0.0, _LATEST_S))
+        between.at(due_us, phase, self._plant.process.kill)
+        between.fly_until(station, lambda: not between.waits, "the instant of the kill")
+        self._plant.process.wait()
+        died_us, silences = between.time_us, len(self._autopilot.events("silence"))
+        if chance.random() < 0.5:
+            between.fly_until(
+                station, lambda: len(self._autopilot.events("silence")) > silences, "the words that the plant is gone"
+            )
+        said = [event["text"] for event in self._autopilot.events("silence")[silences:]]
+        station.begin_anew()
+        station.drain()
+        self._plant = _plant(self._folder, self._url, seed)
+        self._processes.append(self._plant)
+        between.fly_until(
+            station, lambda: station.armed is not None and between.time_us < died_us, "the next plant's flight"
+        )
+        return Kill(died_us * 1e-6, phase, said[0] if said else "", station.armed is False)
+
+
+def _plant(folder: Path, url: str, seed: int) -> Process:
+    options = ("--vehicle", "hummingbird", "--start", "y=0,z=0,psi=90,rotors=0", "--seed", str(seed))
+    return Process(folder, "plant", "--link", url, *options)

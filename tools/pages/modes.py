@@ -1,0 +1,137 @@
+"""`python -m tools.pages.modes FOLDER`: writes `modes.md` and `modes.png` from the autopilot's own tables."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from colibri.autopilot.commander.rules.modes import MODES, ROWS, TRANSITIONS, Event, Mode, Transition, custom_mode
+
+_PLACES = {
+    Mode.STABILIZED: (0.0, 3.0),
+    Mode.ALTITUDE: (0.0, 2.0),
+    Mode.POSITION: (0.0, 1.0),
+    Mode.OFFBOARD: (0.0, 0.0),
+    Mode.HOLD: (2.6, 1.5),
+    Mode.TAKEOFF: (2.6, 3.0),
+    Mode.ORBIT: (2.6, 0.0),
+    Mode.MISSION: (5.2, 3.0),
+    Mode.TRACK: (5.2, 2.0),
+    Mode.FOLLOW: (5.2, 0.0),
+    Mode.RETURN: (8.4, 3.0),
+    Mode.LAND: (8.4, 1.0),
+}
+_DISARMED = (11.9, 1.5)
+_ANY = (5.2, 1.0)
+_HEAD = """# Flight modes
+
+This page and its picture are written from the tables in `autopilot/commander/rules/modes.py` by `python -m tools.pages.modes docs`;
+a test holds that they agree.
+
+![The transitions, drawn from the table](modes.png)
+
+Any mode can be selected at any time if what it needs is there; on the ground, disarmed, it need not be yet. A refusal
+says why, in the COMMAND_ACK's company by a STATUSTEXT. Arming asks for more, see [Arming](ground-stations.md#arming).
+What leads to a failsafe, and which of them wins, has [a table of its own](failsafes.md).
+
+"""
+
+
+def page() -> str:
+    """Return the page."""
+    return _HEAD + "\n".join([*_modes(), "", "## Transitions", "", *_transitions()]) + "\n"
+
+
+def _modes() -> Iterator[str]:
+    yield "| mode | custom mode | standard mode | what it does | needs | arms |"
+    yield "|---|---|---|---|---|---|"
+    for row in MODES:
+        needs = "; ".join(need.name.lower().replace("_", " ") for need in row.needs) or "-"
+        number = f"{row.main}/{row.sub} = {custom_mode(row.mode)}"
+        yield f"| {row.mode} | {number} | {row.standard or '-'} | {row.meaning} | {needs} | {_yes(row.to_arm)} |"
+
+
+def _transitions() -> Iterator[str]:
+    yield "| in | when | then | rotors |"
+    yield "|---|---|---|---|"
+    for row in TRANSITIONS:
+        source = ", ".join(row.sources) or "any mode"
+        if row.event is Event.ARM:
+            yield f"| {source} | {row.event}, every check passes | the same mode | turn |"
+            continue
+        target = row.target or ("the mode selected" if row.event is Event.SELECT else "the same mode")
+        yield f"| {source} | {row.event} | {target} | {'stop' if row.disarms else '-'} |"
+
+
+def _yes(value: bool) -> str:
+    return "yes" if value else "no"
+
+
+def draw(path: Path) -> None:
+    """Draw the transitions as a PNG."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+    from matplotlib.patches import FancyBboxPatch
+
+    figure, axes = plt.subplots(figsize=(13.0, 5.2))
+    axes.set_xlim(-1.2, 13.0)
+    axes.set_ylim(-1.1, 3.9)
+    axes.axis("off")
+    axes.add_patch(
+        FancyBboxPatch((-0.9, -0.6), 10.1, 4.1, boxstyle="round,pad=0.15", facecolor="#f4f7fa", edgecolor="#8899aa")
+    )
+    axes.text(-0.9, -0.95, "armed: any mode can be selected whose needs are met", fontsize=10, color="#445566")
+    style = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": "#223344"}
+    for mode, place in _PLACES.items():
+        needs = ROWS[mode].needs
+        axes.text(*place, mode + ("*" if needs else ""), ha="center", va="center", fontsize=11, bbox=style, zorder=3)
+    axes.text(*_DISARMED, "disarmed", ha="center", va="center", fontsize=11, bbox=style, zorder=3)
+    dashed = {**style, "linestyle": "--", "facecolor": "#f4f7fa"}
+    axes.text(*_ANY, "any mode", ha="center", va="center", fontsize=11, bbox=dashed, zorder=3)
+    axes.text(9.2, -0.95, "* needs something, see the table", fontsize=10, color="#445566", ha="right")
+    arrow = {"arrowstyle": "-|>", "color": "#225588", "shrinkA": 22, "shrinkB": 24, "linewidth": 1.2}
+    for row in TRANSITIONS:
+        for source, target in _edges(row):
+            (x0, y0), (x1, y1) = source, target
+            axes.annotate("", xy=target, xytext=source, arrowprops=arrow, zorder=1)
+            axes.text(
+                0.55 * x0 + 0.45 * x1,
+                0.55 * y0 + 0.45 * y1,
+                row.event,
+                fontsize=8.5,
+                color="#225588",
+                ha="center",
+                bbox={"facecolor": "#f4f7fa", "edgecolor": "none", "pad": 0.8},
+                zorder=2,
+            )
+    rises = [row.event for row in TRANSITIONS if row.disarms]
+    axes.annotate(
+        "", xy=(_DISARMED[0] - 0.65, 1.75), xytext=(8.65, 1.75), arrowprops={**arrow, "shrinkA": 0, "shrinkB": 0}
+    )
+    axes.text(10.3, 1.85, "\n".join(dict.fromkeys(rises)), fontsize=8.5, color="#225588", ha="center", va="bottom")
+    axes.annotate(
+        "", xy=(8.65, 1.25), xytext=(_DISARMED[0] - 0.65, 1.25), arrowprops={**arrow, "shrinkA": 0, "shrinkB": 0}
+    )
+    axes.text(10.3, 1.15, "armed, in the\nsame mode", fontsize=8.5, color="#225588", ha="center", va="top")
+    figure.savefig(path, dpi=110, bbox_inches="tight")
+    plt.close(figure)
+
+
+def _edges(row: Transition) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
+    if row.target is None or row.disarms:
+        return
+    for source in [_PLACES[mode] for mode in row.sources] or [_ANY]:
+        yield source, _PLACES[row.target]
+
+
+def main() -> int:
+    """Write page and picture into the folder that the command line names."""
+    folder = Path(sys.argv[1])
+    (folder / "modes.md").write_text(page())
+    draw(folder / "modes.png")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,212 @@
+"""Flights in which a rotor is lost: what a vehicle does then, by seeds, all in memory."""
+
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from math import nan
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.core.copter import Copter
+from colibri.autopilot.estimation.state_source import estimator_for
+from colibri.autopilot.ground.stations import StationSettings
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.common.rotations import tilt_deg
+from colibri.common.types import Array
+from colibri.mavlink.hil.faults import MOTOR, OFF, WRONG, Fault
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.plant.environment.weather import Intensity, Weather, Wind
+from colibri.plant.physics.start import Start
+from colibri.plant.physics.world import Physics, starting_world, state_frame
+from colibri.plant.simulation.plant import Plant
+from colibri.plant.vehicle.description import load_vehicle
+
+HEIGHT_M = 10.0
+UPRIGHT_DEG, NEAR_M, SOFT_M_S = 20.0, 5.0, 2.0
+"""What must hold: tilt once settled, distance at touch-down, speed there."""
+SETTLED_S = 1.0
+"""So long after the loss the vehicle is to be upright for good."""
+COLUMNS = ("t", "x", "y", "z", "vz", "tilt", "spin", "c1", "c2", "c3", "c4")
+"""Of a path: s since the loss, m from where that was (z above ground), m/s, degrees, rad/s, parts of the largest."""
+_T, _X, _Y, _Z, _VZ, _TILT, _SPIN = range(7)
+_BLADES_LEFT = 0.001
+_BEFORE_S, _AFTER_S, _LONGEST_S = 1.0, 1.5, 40.0
+_WORKERS = 2
+_LOW_M = 0.3
+_FULL_TURN_DEG = 360.0
+
+
+class Case(NamedTuple):
+    """What the flights of a row have in common.
+
+    Attributes:
+        name: What is different.
+        feedback: What is flown by.
+        runs_down: Whether the rotor runs down as its motor stops; else its thrust is gone at once.
+        wind_m_s: Mean wind; each seed has it from elsewhere.
+        turbulence: How strong; None for none.
+    """
+
+    name: str
+    feedback: Feedback
+    runs_down: bool = False
+    wind_m_s: float = 0.0
+    turbulence: Intensity | None = None
+
+
+class Flown(NamedTuple):
+    """One flight.
+
+    Attributes:
+        seed: Of everything random; the rotor is seed mod 4.
+        noticed_s: From the loss until it was known which rotor; nan if it never was.
+        path: `COLUMNS`, one row a frame, from a little before the loss until the vehicle rests, (n, 11).
+        rights: Whether the right rotor was named.
+    """
+
+    seed: int
+    noticed_s: float
+    path: Array
+    rights: bool
+
+    @property
+    def lost(self) -> Array:
+        """The path from the loss to the ground."""
+        after = self.path[self.path[:, _T] > 0.0]
+        touched = np.flatnonzero(np.diff(after[:, _VZ]) > _knock(after))
+        low = [row for row in touched.tolist() if after[row, _Z] < _LOW_M]
+        return after[: low[0] + 1] if low else after
+
+    @property
+    def peak_deg(self) -> float:
+        """Largest tilt of the thrust from the vertical."""
+        return float(self.lost[:, _TILT].max())
+
+    @property
+    def upright_s(self) -> float:
+        """From the loss until the tilt is within its limit for good."""
+        beyond = np.flatnonzero(self.lost[:, _TILT] > UPRIGHT_DEG)
+        return float(self.lost[beyond[-1], _T]) if beyond.size else 0.0
+
+    @property
+    def settled_deg(self) -> float:
+        """Largest tilt from a second after the loss on."""
+        return float(self.lost[self.lost[:, _T] > SETTLED_S, _TILT].max())
+
+    @property
+    def farthest_m(self) -> float:
+        """Largest horizontal distance from where the rotor was lost."""
+        return float(np.hypot(self.lost[:, _X], self.lost[:, _Y]).max())
+
+    @property
+    def landed_m(self) -> float:
+        """The same at touch-down."""
+        return float(np.hypot(self.lost[-1, _X], self.lost[-1, _Y]))
+
+    @property
+    def touched_m_s(self) -> float:
+        """Speed of the descent at touch-down."""
+        return float(-self.lost[-1, _VZ])
+
+    @property
+    def spin_rad_s(self) -> float:
+        """Fastest turn about the body's z axis."""
+        return float(np.abs(self.lost[:, _SPIN]).max())
+
+    @property
+    def rest_deg(self) -> float:
+        """Tilt in the end."""
+        return float(self.path[-1, _TILT])
+
+    @property
+    def well(self) -> bool:
+        """Whether all that must hold does."""
+        upright = self.settled_deg <= UPRIGHT_DEG and self.rest_deg <= UPRIGHT_DEG
+        return self.rights and upright and self.landed_m <= NEAR_M and self.touched_m_s <= SOFT_M_S
+
+
+def _knock(path: Array) -> float:
+    """Return the change of the vertical speed from one row to the next, m/s, that only the ground makes."""
+    return float(9.81 * (path[1, _T] - path[0, _T]))
+
+
+def fly(case: Case, seed: int) -> Flown:
+    """Fly to the height, lose a rotor, and see what comes of it."""
+    profile = load_profile("flight")
+    vehicle = load_vehicle(profile.simulation.vehicle)
+    weather = Weather(Wind(case.wind_m_s, _FULL_TURN_DEG * seed / 50.0), turbulence=case.turbulence, seed=seed)
+    physics = Physics(vehicle, "rk4", weather)
+    settings = StationSettings(1, "px4", DEFAULT_ORIGIN, feedback=case.feedback)
+    estimator = estimator_for(case.feedback, vehicle, DEFAULT_ORIGIN)
+    values = {"MIS_TAKEOFF_ALT": HEIGHT_M}
+    copter = Copter(profile, vehicle, settings, lambda: 0.0, values=values, estimator=estimator)
+    start = Start(psi=_FULL_TURN_DEG * seed / 50.0)
+    world = starting_world(start, vehicle, weather)
+    plant = Plant(
+        world, vehicle, physics, case.feedback, DEFAULT_ORIGIN, seed=seed, interval_us=copter.frame_interval_us
+    )
+    _take_off(copter, plant)
+    return _lose(copter, plant, seed, _fault(case, seed % 4))
+
+
+def fly_all(cases: Iterable[Case], seeds: Iterable[int]) -> dict[Case, list[Flown]]:
+    """Fly each case by each seed, two at a time."""
+    numbers = list(seeds)
+    with ProcessPoolExecutor(_WORKERS) as pool:
+        return {case: list(pool.map(fly, [case] * len(numbers), numbers)) for case in cases}
+
+
+def _fault(case: Case, rotor: int) -> Fault:
+    if case.runs_down:
+        return Fault(MOTOR, OFF, rotor + 1)
+    return Fault(MOTOR, WRONG, rotor + 1, (_BLADES_LEFT, 0.0, 0.0, 0.0))
+
+
+def _take_off(copter: Copter, plant: Plant) -> None:
+    """Climb to the height, and stay for a moment."""
+    while not copter.pilot.has_seen or copter.pilot.refusals():
+        _step(copter, plant)
+        assert plant.world.time_us < _LONGEST_S * 1e6, "it must be ready to arm"
+    copter.pilot.select(Mode.TAKEOFF)
+    copter.pilot.arm()
+    began_us = plant.world.time_us
+    while copter.pilot.state.mode is not Mode.HOLD:
+        _step(copter, plant)
+        assert plant.world.time_us < began_us + _LONGEST_S * 1e6, "it must reach its height"
+
+
+def _lose(copter: Copter, plant: Plant, seed: int, fault: Fault) -> Flown:
+    """Lose a rotor; fly until the vehicle rests."""
+    lost_us = plant.world.time_us + round(_BEFORE_S * 1e6)
+    rows: list[tuple[float, ...]] = []
+    ends_us, noticed_s = lost_us + round(_LONGEST_S * 1e6), nan
+    while plant.world.time_us < ends_us:
+        if plant.world.time_us == lost_us:
+            plant.inject([fault])
+        controls = _step(copter, plant)
+        after_s = (plant.world.time_us - lost_us) * 1e-6
+        rows.append((after_s, *_seen(plant), *controls))
+        if copter.rotor_loss.lost is not None and np.isnan(noticed_s):
+            noticed_s = after_s - plant.interval_us * 1e-6
+        if not copter.pilot.state.armed:
+            ends_us = min(ends_us, plant.world.time_us + round(_AFTER_S * 1e6))
+    path = np.array(rows)
+    at_loss = int(np.argmin(np.abs(path[:, _T])))
+    path[:, _X : _Y + 1] -= path[at_loss, _X : _Y + 1]
+    return Flown(seed, noticed_s, path, copter.rotor_loss.lost == fault.instance - 1)
+
+
+def _step(copter: Copter, plant: Plant) -> tuple[float, ...]:
+    frame, aside = plant.tell()
+    copter.hear(aside)
+    step = copter.step(frame)
+    plant.answer(step.command, step.faults)
+    copter.serve(())
+    return step.command.controls
+
+
+def _seen(plant: Plant) -> tuple[float, ...]:
+    frame = state_frame(plant.world)
+    return (*frame.position_enu_m, frame.velocity_enu_m_s[2], tilt_deg(frame.attitude), frame.rate_flu_rad_s[2])

@@ -1,0 +1,1 @@
+"""The suites again and again, and clients for minutes."""

@@ -1,0 +1,137 @@
+"""Two ground stations and an offboard companion on one vehicle, for as long as is asked for: `make soak-clients`."""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import monotonic, sleep
+from typing import Any, NamedTuple
+
+import psutil
+
+from colibri import plant
+from tools.harness.ports import OnPort
+from tools.harness.sitl_process import vehicle
+from tools.harness.stations import Companion, Station
+
+LONGEST_GAP_S = 1.5
+MOST_GROWTH_BYTES = 2_000_000
+MOST_OFF_M = 0.5
+WARM_UP_S = 60.0
+LOOK_EVERY_S = 5.0
+
+_VEHICLE = Path(plant.__file__).parent / "vehicle" / "models" / "hummingbird.toml"
+
+
+class Look(NamedTuple):
+    """What the processes take at an instant.
+
+    Attributes:
+        wall_s: Since the soak began.
+        sim_s: Simulated time.
+        resident_bytes: Of each process, by name.
+        cpu_s: Of each process so far.
+    """
+
+    wall_s: float
+    sim_s: float
+    resident_bytes: dict[str, int]
+    cpu_s: dict[str, float]
+
+
+def crew() -> tuple[Station, Station, Companion]:
+    """Return two ground stations and a companion."""
+    return Station(255), Station(254), Companion(245)
+
+
+def faults(crew: Iterable[Station]) -> list[str]:
+    """Return what clients have to complain of."""
+    found = []
+    for client in crew:
+        name = f"{client.identity[0]}/{client.identity[1]}"
+        if client.longest_gap_s > LONGEST_GAP_S:
+            found.append(f"{name}: {client.longest_gap_s:.2f} s without a heartbeat")
+        found += [f"{name}: got {ack} of another" for ack in client.acks if ack.target != client.identity]
+        acknowledged = sum(client.acks.values())
+        if not sum(client.sent.values()) - 2 <= acknowledged <= sum(client.sent.values()):
+            found.append(f"{name}: {acknowledged} of {sum(client.sent.values())} commands acknowledged")
+        if isinstance(client, Companion) and not 0.0 < client.off_m < MOST_OFF_M:
+            found.append(f"{name}: {client.off_m:.2f} m off its circle")
+    return found
+
+
+def without_battery(folder: Path) -> Path:
+    """Write the Hummingbird's file without its battery, which would last 9 minutes; return it."""
+    path = folder / "tireless.toml"
+    path.write_text(_VEHICLE.read_text(encoding="utf-8").partition("[battery]")[0], encoding="utf-8")
+    return path
+
+
+def soak(duration_s: float) -> tuple[dict[str, Any], list[str]]:
+    """Fly by the wall clock; return figures, and what was wrong."""
+    clients = crew()
+    with TemporaryDirectory() as name, ExitStack() as stack:
+        folder = Path(name)
+        links = tuple(stack.enter_context(OnPort(client)).url for client in clients)
+        tireless = ("--vehicle", str(without_battery(folder)))
+        flown = stack.enter_context(vehicle(folder, *tireless, links=links))
+        processes = {child.cmdline()[2]: child for child in psutil.Process(flown.process.pid).children()}
+        looks: list[Look] = []
+        began_s = monotonic()
+        while monotonic() < began_s + duration_s and flown.process.poll() is None:
+            sleep(LOOK_EVERY_S)
+            resident = {name: process.memory_info().rss for name, process in processes.items()}
+            cpu_s = {name: sum(process.cpu_times()[:2]) for name, process in processes.items()}
+            looks.append(Look(monotonic() - began_s, clients[0].time_s, resident, cpu_s))
+        ended = flown.process.poll()
+    warm = next(look for look in looks if look.wall_s >= min(WARM_UP_S, 0.5 * duration_s))
+    figures = _figures(clients, looks, warm)
+    wrong = faults(clients) + ([] if ended is None else [f"the vehicle ended with exit code {ended}"])
+    for name, growth in figures["growth_bytes"].items():
+        if growth > MOST_GROWTH_BYTES:
+            wrong.append(f"{name} grew by {growth} bytes")
+    return figures, wrong
+
+
+def _figures(clients: Sequence[Station], looks: Sequence[Look], warm: Look) -> dict[str, Any]:
+    last = looks[-1]
+    lasted_s = last.wall_s - warm.wall_s
+    return {
+        "wall_s": last.wall_s,
+        "times_real_time": (last.sim_s - warm.sim_s) / lasted_s,
+        "resident_bytes": last.resident_bytes,
+        "growth_bytes": {name: last.resident_bytes[name] - warm.resident_bytes[name] for name in last.resident_bytes},
+        "cpu_share": {name: (last.cpu_s[name] - warm.cpu_s[name]) / lasted_s for name in last.cpu_s},
+        "clients": {
+            f"{client.identity[0]}/{client.identity[1]}": {
+                "longest_gap_s": client.longest_gap_s,
+                "commands": sum(client.sent.values()),
+                "acks": sum(client.acks.values()),
+                "messages": sum(client.counts.values()),
+            }
+            for client in clients
+        },
+        "off_m": max(client.off_m for client in clients if isinstance(client, Companion)),
+        "looks": looks,
+    }
+
+
+def main() -> int:
+    """Soak for so many minutes; print the figures; return 1 if something was wrong."""
+    parser = argparse.ArgumentParser(prog="python -m tools.soak.clients", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--out", type=Path, help="write all figures as JSON there")
+    args = parser.parse_args()
+    figures, wrong = soak(60.0 * args.minutes)
+    if args.out:
+        args.out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    figures.pop("looks")
+    sys.stdout.write("\n".join([json.dumps(figures, indent=1), *wrong, ""]))
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
