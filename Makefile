@@ -86,8 +86,9 @@ golden: setup
 verify-pythons: setup
 	$(BIN)/python -m tools.golden --pythons $(GOLDEN)
 
+# `colibri bench`, with RotorPy's flights beside its own where that is installed.
 bench: setup
-	$(BIN)/colibri bench
+	$(BIN)/python -m tools.bench
 
 # The lock names versions and hashes, no registry. Needs uv.
 lock:

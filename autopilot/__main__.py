@@ -1,6 +1,7 @@
 """`colibri autopilot`: the command line of the autopilot."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from colibri.common.earth.home import DEFAULT_HOME, home
@@ -51,9 +52,9 @@ def command_line() -> ArgumentParser:
     return parser
 
 
-def main() -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run the autopilot; return the exit code."""
-    args = command_line().parse_args()
+    args = command_line().parse_args(argv)
     if args.simulator is None:
         link, status, stop = begin("autopilot", args.plant, args, open_link)
         from colibri.autopilot.process.run import run

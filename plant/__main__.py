@@ -1,6 +1,7 @@
 """`colibri plant`: the command line of the plant. It listens before it loads what takes time to load."""
 
 import sys
+from collections.abc import Sequence
 from math import inf
 
 from colibri.common.earth.home import DEFAULT_HOME, home
@@ -70,11 +71,11 @@ def command_line() -> ArgumentParser:
     return parser
 
 
-def main() -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run the plant; return the exit code."""
-    args = command_line().parse_args()
+    args = command_line().parse_args(argv)
     if args.realtime and (args.serve != "colibri" or args.speed == inf):
-        fail("--realtime follows the wall clock for colibri autopilot: no --serve beside it, and no --speed max")
+        fail("--realtime follows the wall clock for `colibri autopilot`: no --serve beside it, and no --speed max")
     args.speed = args.speed or (1.0 if args.realtime else inf)
     url = args.link or DEFAULT_LINKS[args.serve]
     if args.serve == "px4":

@@ -40,7 +40,7 @@ class Recording:
         solve_time_us: Time of each QP, (m,).
         control_step_us: Time of each control step, (m,).
         slack: By how much soft limits were planned to be exceeded, in parts of each, (m,).
-        active: How many constraints of each kind were active, columns as in `colibri.autopilot.control.interface.Active`, (m, 4).
+        active: How many constraints of each kind were active, columns as in `interface.Active`, (m, 4).
         trajectory_sha256: Hash of the plant's states at every frame, as float64.
     """
 

@@ -1,10 +1,9 @@
-"""`colibri bench`: how long each stage takes, and how much faster than real time it flies, beside a peer."""
+"""`colibri bench`: how long each stage takes, and how much faster than real time it flies."""
 
 import argparse
 import json
 import os
 import platform
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,33 +18,29 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
 from colibri.bench.sensing import FLIGHTS_A_RUN, sensing_figures
 from colibri.bench.serving import ALONE, CHANNELS, WATCHED, serving_figures
-from colibri.bench.speed import CONTROL_S, LINKS, THESIS_LINKS, Tell, rate_figures, thesis_figures
+from colibri.bench.speed import CONTROL_S, LINKS, THESIS_LINKS, Peer, Tell, rate_figures, thesis_figures
 from colibri.bench.stages import MOVES, STAGES, stage_figures
 from colibri.common.process.lifecycle import fail
-from tools.bench import rotorpy_peer
 
 PROFILE = "flight"
 SHORTEST_S, LONGEST_S = 0.1, 1000.0
 _SERVED = ("p50 µs", "p99 µs", "messages a second")
 
 
-def bench(args: argparse.Namespace) -> int:
-    """Measure what the command line says, print tables, write JSON; return the exit code."""
+def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
+    """Measure what the command line says, flights beside `peer`; print tables, write JSON; return the exit code."""
     wanted = args.only or ["stages", "flights", "sensors", "ground", "thesis"]
     if not SHORTEST_S <= args.duration <= LONGEST_S:
         fail(f"--duration: {SHORTEST_S:g} to {LONGEST_S:g} s, not {args.duration:g}")
     if args.out:
         _check_writable(args.out)
-    beside = "flights" in wanted and rotorpy_peer.installed()
-    if "flights" in wanted and not beside:
-        _note(rotorpy_peer.MISSING)
     figures: dict[str, Any] = {"settings": _settings(args)}
-    with _progress(parts(wanted, args.runs, beside=beside)) as tell, TemporaryDirectory() as folder:
+    with _progress(parts(wanted, args.runs, beside=peer is not None)) as tell, TemporaryDirectory() as folder:
         profile = load_profile(PROFILE)
         if "stages" in wanted:
             figures["stages"] = stage_figures(profile, Path(folder), args.duration, tell)
         if "flights" in wanted:
-            figures["flights"] = rate_figures(profile, Path(folder), args.duration, args.runs, tell, beside=beside)
+            figures["flights"] = rate_figures(profile, Path(folder), args.duration, args.runs, tell, peer)
         if "sensors" in wanted:
             figures["sensors"] = sensing_figures(profile, Path(folder), args.duration, args.runs, tell)
         if "ground" in wanted:
@@ -175,10 +170,6 @@ def _table(title: str, columns: list[str] | tuple[str, ...]) -> Table:
 
 def _number(value: float) -> str:
     return f"{value:.3g}" if value < 100 else f"{value:.0f}"
-
-
-def _note(text: str) -> None:
-    sys.stderr.write(f"colibri: {text}\n")
 
 
 def _check_writable(path: Path) -> None:

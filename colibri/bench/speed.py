@@ -1,4 +1,4 @@
-"""Real-time factors: profile `flight` at several frame rates with its peer beside it, and the thesis's spiral."""
+"""Real-time factors: profile `flight` at several frame rates, beside a peer if there is one, and the spiral."""
 
 import json
 import subprocess
@@ -8,7 +8,7 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from colibri.autopilot.control.profile import Profile
 from colibri.bench.variants import TRACK, plan_of, with_intervals
@@ -16,7 +16,6 @@ from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import Summary
 from colibri.flights.processes import FlightError, fly_processes
-from tools.bench import rotorpy_peer
 
 Tell: TypeAlias = Callable[[str], None]
 Samples: TypeAlias = dict[str, list[float]]
@@ -25,17 +24,28 @@ CONTROL_S: Mapping[int, float] = {100: 0.01, 250: 0.008, 500: 0.008}
 """Control interval at each frame rate, Hz."""
 LINKS = ("memory", "udp")
 THESIS_LINKS = ("udp", "memory")
-PEER = "rotorpy"
 
 _PEER_LONGEST_S = 2.0
-"""It takes longer than the time that it simulates."""
+"""A peer may take longer than the time that it simulates."""
 _WARM_UP_S = 0.5
 
 
+class Peer(NamedTuple):
+    """Another simulator to measure beside.
+
+    Attributes:
+        name: Of its figures.
+        real_time_factor: Flies at so many frames a second, for so many seconds; returns simulated over wall-clock time.
+    """
+
+    name: str
+    real_time_factor: Callable[[int, float], float]
+
+
 def rate_figures(
-    profile: Profile, folder: Path, duration_s: float, runs: int, tell: Tell, *, beside: bool
+    profile: Profile, folder: Path, duration_s: float, runs: int, tell: Tell, peer: Peer | None = None
 ) -> dict[str, Any]:
-    """Fly at every rate over every link, and the peer if it shall be `beside`, one after the other in every run.
+    """Fly at every rate over every link, and the peer if there is one, one after the other in every run.
 
     Ratios are taken within a run, so that what else the machine does weighs on both sides.
     """
@@ -50,11 +60,11 @@ def rate_figures(
             for link in LINKS:
                 tell(f"{frames_hz} Hz, {link}, {run + 1} of {runs}")
                 flown.setdefault(link, []).append(_real_time_factor(chosen, folder, duration_s, link))
-            if beside:
-                tell(f"{frames_hz} Hz, RotorPy, {run + 1} of {runs}")
-                factor = rotorpy_peer.real_time_factor(frames_hz, min(duration_s, _PEER_LONGEST_S))
-                flown.setdefault(PEER, []).append(factor)
-    rates = {str(frames_hz): _with_ratios(flown) for frames_hz, flown in samples.items()}
+            if peer is not None:
+                tell(f"{frames_hz} Hz, {peer.name}, {run + 1} of {runs}")
+                factor = peer.real_time_factor(frames_hz, min(duration_s, _PEER_LONGEST_S))
+                flown.setdefault(peer.name, []).append(factor)
+    rates = {str(frames_hz): _with_ratios(flown, peer) for frames_hz, flown in samples.items()}
     return {"track": TRACK, "control_interval_s": {str(hz): s for hz, s in CONTROL_S.items()}, "rates_hz": rates}
 
 
@@ -75,11 +85,13 @@ def summarised(values: Iterable[float]) -> dict[str, float]:
     return {"min": ordered[0], "median": median(ordered), "max": ordered[-1]}
 
 
-def _with_ratios(flown: Samples) -> dict[str, dict[str, float]]:
+def _with_ratios(flown: Samples, peer: Peer | None) -> dict[str, dict[str, float]]:
     figures = {name: summarised(values) for name, values in flown.items()}
-    for link in LINKS if PEER in flown else ():
-        pairs = zip(flown[link], flown[PEER], strict=True)
-        figures[f"{link} / {PEER}"] = summarised(ours / theirs for ours, theirs in pairs)
+    if peer is None:
+        return figures
+    for link in LINKS:
+        pairs = zip(flown[link], flown[peer.name], strict=True)
+        figures[f"{link} / {peer.name}"] = summarised(ours / theirs for ours, theirs in pairs)
     return figures
 
 

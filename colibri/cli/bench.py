@@ -12,8 +12,8 @@ def add_bench_options(parser: ArgumentParser) -> None:
         "--only",
         action="append",
         choices=("stages", "flights", "sensors", "ground", "thesis"),
-        help="stages: each stage of a control step; flights: times real time at several rates, beside RotorPy if it is "
-        "installed; sensors: the estimator, and flights on sensors beside those on the state; ground: serving ground "
+        help="stages: each stage of a control step; flights: times real time at several rates; "
+        "sensors: the estimator, and flights on sensors beside those on the state; ground: serving ground "
         "stations, and the control step beside it; thesis: its spiral through the whole command; may be repeated "
         "(default: all)",
     )

@@ -1,12 +1,14 @@
 """`colibri`: the one command. Loads only what the subcommand needs."""
 
 import signal
+import sys
 import threading
 
 from colibri.cli.bench import add_bench_options
 from colibri.cli.compare import add_compare_options, in_another_world
 from colibri.cli.figures import add_figures_options
 from colibri.cli.fly import add_fly_options
+from colibri.cli.processes import PROCESSES, run_process
 from colibri.cli.replay import add_replay_options
 from colibri.cli.sitl import add_sitl_options
 from colibri.cli.study import add_study_options
@@ -17,7 +19,10 @@ from colibri.common.process.lifecycle import EXIT_INTERRUPTED, fail, use_one_thr
 
 def main(argv: list[str] | None = None) -> int:
     """Run a subcommand; return the exit code."""
-    args = _parser().parse_args(argv)
+    given = sys.argv[1:] if argv is None else argv
+    if given and given[0] in PROCESSES:
+        return run_process(given[0], given[1:])
+    args = _parser().parse_args(given)
     use_one_thread()
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that what was started is ended, too
@@ -84,4 +89,6 @@ def _parser() -> ArgumentParser:
             "verify", help="fly a fixed set of flights: is every bit the same, twice, or as it once was?"
         )
     )
+    for name, what in PROCESSES.items():
+        commands.add_parser(name, help=what, add_help=False)
     return parser

@@ -13,7 +13,7 @@ from colibri.plant.physics.equations import Packed, close, held, write_derivativ
 from colibri.plant.physics.start import IntegrationError
 
 Solver: TypeAlias = Callable[[Array, FourRotors, Packed, float], tuple[Array, float]]
-"""(x, commanded rotor speeds, parameters, duration in s) -> x after it, the battery's voltage; see `colibri.plant.physics.equations`."""
+"""(x, commanded rotor speeds, parameters, duration in s) -> x after it, the battery's voltage; see `equations`."""
 Integrator: TypeAlias = Literal["rk4", "adaptive"]
 
 RK4_STEP_S = 0.001

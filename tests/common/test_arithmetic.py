@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-FLOWN = [path for package in ("autopilot", "common", "mavlink", "plant") for path in (ROOT / package).rglob("*.py")]
+PACKAGES = Path(__file__).parents[2] / "colibri"
+FLOWN = [path for package in ("autopilot", "common", "mavlink", "plant") for path in (PACKAGES / package).rglob("*.py")]
 
 _TRANSCENDENTAL = (
     "acos acosh asin asinh atan atan2 atanh cbrt cos cosh exp exp2 expm1 log log10 log1p log2 pow sin sinh"
@@ -45,9 +45,9 @@ def used(path: Path) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("path", FLOWN, ids=lambda path: path.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize("path", FLOWN, ids=lambda path: path.relative_to(PACKAGES).as_posix())
 def test_no_bit_of_a_flight_is_left_to_a_library(path: Path) -> None:
-    name = path.relative_to(ROOT).as_posix()
+    name = path.relative_to(PACKAGES).as_posix()
     assert used(path) <= OF_SCIPY.get(name, set()) | CHECKS.get(name, set())
 
 

@@ -16,10 +16,10 @@ from colibri import autopilot, common, mavlink, plant
 from colibri.common.jit import files_of
 
 MODULES = [
-    importlib.import_module(f"{package.__name__}.{entry.name}")
+    importlib.import_module(entry.name)
     for package in (autopilot, common, mavlink, plant)
-    for entry in pkgutil.iter_modules(package.__path__)
-    if entry.name != "__main__"
+    for entry in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+    if not entry.name.endswith("__main__")
 ]
 KERNELS = {
     f"{kernel.py_func.__module__}.{kernel.py_func.__name__}": kernel
@@ -66,13 +66,13 @@ def test_kernels_are_exact_and_kept_on_disk_and_call_others_by_name(kernel: Disp
 
 def test_the_files_of_a_kernel_are_those_of_all_that_it_calls() -> None:
     names = {Path(file).name for file in files_of(KERNELS["colibri.plant.physics.integrators.runge_kutta_4"])}
-    assert names == {"integrate.py", "dynamics.py", "frames.py"}
+    assert names == {"integrators.py", "equations.py", "rotations.py"}
 
 
 def test_machine_code_is_renewed_with_a_kernel_that_it_calls(tmp_path: Path) -> None:
     def run(factor: float) -> str:
         (tmp_path / "callee.py").write_text(CALLEE.format(factor=factor))
-        path = os.pathsep.join([str(tmp_path), str(Path(common.__path__[0]).parent)])
+        path = os.pathsep.join([str(tmp_path), str(Path(common.__path__[0]).parents[1])])
         environment = {**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": ""}
         command = [sys.executable, str(tmp_path / "caller.py")]
         return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip()

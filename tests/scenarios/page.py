@@ -17,9 +17,9 @@ def page() -> str:
     lines = [
         "# The scenarios",
         "",
-        f"{count} scenarios, {flights} tests with their seeds, in `tests/scenarios/`: `make scenarios` flies them over UDP,",
-        "`make soak` again and again. This page is written from them by `python -m tests.scenarios.page docs`; a test holds",
-        "that they agree.",
+        f"{count} scenarios, {flights} tests with their seeds, in `tests/scenarios/`: `make scenarios` flies them over",
+        "UDP, `make soak` again and again. This page is written from them by `python -m tests.scenarios.page docs`; a",
+        "test holds that they agree.",
         "",
         "`make scenarios-rough` flies them over ground links that lose 30 % each way, with 50 ms of jitter: all but",
         "",

@@ -1,4 +1,4 @@
-"""`python -m tools.pages.failsafes FOLDER`: writes `failsafes.md` and `failsafes.png` from the autopilot's own table."""
+"""`python -m tools.pages.failsafes FOLDER`: writes `failsafes.md` and `failsafes.png` from the autopilot's table."""
 
 import sys
 from collections.abc import Iterator
@@ -15,8 +15,8 @@ from colibri.plant.vehicle.description import load_vehicle
 
 _HEAD = """# Failsafes
 
-This page and its picture are written from `autopilot/commander/rules/failsafe_table.py` by `python -m tools.pages.failsafes docs`; a test
-holds that they agree.
+This page and its picture are written from `autopilot/commander/rules/failsafe_table.py` by
+`python -m tools.pages.failsafes docs`; a test holds that they agree.
 
 ![What leads to what, drawn from the table](failsafes.png)
 

@@ -24,8 +24,8 @@ _DISARMED = (11.9, 1.5)
 _ANY = (5.2, 1.0)
 _HEAD = """# Flight modes
 
-This page and its picture are written from the tables in `autopilot/commander/rules/modes.py` by `python -m tools.pages.modes docs`;
-a test holds that they agree.
+This page and its picture are written from the tables in `autopilot/commander/rules/modes.py` by
+`python -m tools.pages.modes docs`; a test holds that they agree.
 
 ![The transitions, drawn from the table](modes.png)
 

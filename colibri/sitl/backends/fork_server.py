@@ -1,4 +1,4 @@
-"""`python -m colibri.sitl.backends.fork_server`: loads what plant and autopilot need, then forks one or the other as asked.
+"""A program of its own: loads what plant and autopilot need, then forks one or the other as asked.
 
 A request is a line on standard input, a JSON list: "start", the package, a file for what it says, and its options;
 "code" or "kill" and a process. The answer is a line on standard output: the process, or its exit code, or null.
@@ -76,7 +76,7 @@ def _fork(package: str, said: str, *options: str) -> int:
 
 
 def _be(package: str) -> NoReturn:
-    """Be `python -m package`, to the end of this process."""
+    """Be `colibri package`, to the end of this process."""
     from colibri.autopilot.__main__ import main as autopilot
     from colibri.plant.__main__ import main as plant
 

@@ -36,7 +36,7 @@ class Launcher(Protocol):
     """Starts processes."""
 
     def start(self, package: str, options: Sequence[str], said: Path) -> Running:
-        """Start `python -m package` with `options`; what it says goes into file `said`."""
+        """Start `python -m colibri.PACKAGE` with `options`; what it says goes into file `said`."""
         ...
 
     def close(self) -> None:
@@ -88,7 +88,7 @@ class FromScratch:
     """Starts each process from scratch, as a user does."""
 
     def start(self, package: str, options: Sequence[str], said: Path) -> Running:
-        """Start `python -m package` with `options`; what it says goes into file `said`."""
+        """Start `python -m colibri.PACKAGE` with `options`; what it says goes into file `said`."""
         command = [sys.executable, "-m", f"colibri.{package}", "--parent", str(os.getpid()), *options]
         with said.open("wb") as out:
             return _Popened(subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=out))
@@ -119,7 +119,7 @@ class Forked:
         self._nursery = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def start(self, package: str, options: Sequence[str], said: Path) -> Running:
-        """Start what `python -m package` with `options` is; what it says goes into file `said`."""
+        """Start what `python -m colibri.PACKAGE` with `options` is; what it says goes into file `said`."""
         said.touch()
         pid = self._ask("start", package, str(said), *options)
         assert pid is not None, "whatever is forked has a number"

@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from importlib.metadata import entry_points
@@ -12,12 +11,12 @@ import pytest
 
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.session import Flights
+from tests.colibri.installs import ROOT, build, keep_compiled
 
 pytest_plugins = ["pytester"]
 
-ROOT = Path(__file__).parents[3]
 DOCS = ROOT / "docs" / "scenarios.md"
-MODULE = "pytest_colibri"
+MODULE = "colibri.pytest_plugin"
 HOVER = """
     import pytest
 
@@ -186,8 +185,7 @@ def test_the_docs_first_test_in_a_strangers_folder(tmp_path: Path) -> None:
     stranger.mkdir()
     (stranger / "test_delivery.py").write_text(first_test(), encoding="utf-8")
     python = [sys.executable, "-m"]
-    subprocess.run([*python, "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)], cwd=ROOT, check=True)
-    (wheel,) = tmp_path.glob("*.whl")
+    wheel = build("wheel", tmp_path)
     install = (
         "pip",
         "install",
@@ -208,32 +206,23 @@ def test_the_docs_first_test_in_a_strangers_folder(tmp_path: Path) -> None:
     assert "sitl: 3 flights" in result.stdout
 
 
-def keep_compiled(site: Path) -> None:
-    """Have the kernels of the installed sources loaded from where those of the repository are kept."""
-    for source in site.rglob("*.py"):
-        here = ROOT / source.relative_to(site)
-        if here.exists() and here.read_bytes() == source.read_bytes():
-            shutil.copystat(here, source)
-            for kernel in (here.parent / "__pycache__").glob(f"{here.stem}.*.nb?"):
-                (source.parent / "__pycache__").mkdir(exist_ok=True)
-                shutil.copy2(kernel, source.parent / "__pycache__")
-
-
-def test_a_stranger_who_has_a_package_of_the_same_name_tests_as_ever(tmp_path: Path) -> None:
-    """Only who asks for a vehicle is told why there is none."""
-    (tmp_path / "tools").mkdir()
-    (tmp_path / "tools" / "__init__.py").write_text("MINE = 1\n")
+@pytest.mark.parametrize("command", [(sys.executable, "-m", "pytest"), (str(Path(sys.executable).parent / "pytest"),)])
+def test_a_stranger_who_has_packages_of_the_same_names_flies(tmp_path: Path, command: tuple[str, ...]) -> None:
+    """Nothing of what a stranger may call `tools`, `plant`, `mavlink` or `autopilot` is in the way."""
+    for package in ("tools", "mavlink", "autopilot"):
+        (tmp_path / package).mkdir()
+        (tmp_path / package / "__init__.py").write_text("MINE = 1\n")
+    (tmp_path / "plant.py").write_text("MINE = 1\n")
     tests = (
-        "from tools import MINE",
+        "import autopilot, mavlink, plant, tools",
         "def test_mine():",
-        "    assert MINE == 1",
+        "    assert autopilot.MINE == mavlink.MINE == plant.MINE == tools.MINE",
         "def test_flight(sitl):",
         "    sitl.arm()",
+        "    sitl.takeoff(1.0)",
     )
     (tmp_path / "test_mine.py").write_text("\n".join(tests) + "\n")
-    command = [sys.executable, "-m", "pytest", *options(), "-p", "no:cacheprovider", "-q", "test_mine.py"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert "1 passed, 1 error" in done.stdout
-    assert "another one of that name is in front of it" in done.stdout
+    given = [*command, *options(), "-p", "no:cacheprovider", "-q"]
+    done = subprocess.run(given, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert "2 passed" in done.stdout, done.stdout + done.stderr

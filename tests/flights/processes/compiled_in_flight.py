@@ -18,9 +18,8 @@ from tools.harness.copter_flight import ACCEPTED, CopterFlight
 
 def versions() -> dict[str, int]:
     """Return of each kernel how many versions are loaded."""
-    names = [
-        f"autopilot.{entry.name}" for entry in pkgutil.iter_modules(autopilot.__path__) if entry.name != "__main__"
-    ]
+    entries = pkgutil.walk_packages(autopilot.__path__, "colibri.autopilot.")
+    names = [entry.name for entry in entries if not entry.name.endswith("__main__")]
     found = [kernel for name in names for kernel in vars(importlib.import_module(name)).values()]
     return {str(kernel): len(kernel.signatures) for kernel in found if isinstance(kernel, Dispatcher)}
 

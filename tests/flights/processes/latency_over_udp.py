@@ -1,4 +1,4 @@
-"""`python -m tests.flights.processes.latency_over_udp SPEED MS...`: flights of docs/latency.md with a plant that runs freely.
+"""`python -m tests.flights.processes.latency_over_udp SPEED MS...`: docs/latency.md with a plant that runs freely.
 
 Two processes over UDP beside the wall clock, and a relay between them that delays each datagram by half of the round
 trip. What the processes themselves take comes on top, and is measured: the time from a frame's being due to its answer.

@@ -14,8 +14,8 @@ from tools.harness.copter_flight import CopterFlight
 
 def loaded() -> dict[str, int]:
     """Return how many versions of each kernel of the autopilot are loaded."""
-    names = [entry.name for entry in pkgutil.iter_modules(autopilot.__path__) if entry.name != "__main__"]
-    modules = [importlib.import_module(f"autopilot.{name}") for name in names]
+    entries = pkgutil.walk_packages(autopilot.__path__, "colibri.autopilot.")
+    modules = [importlib.import_module(entry.name) for entry in entries if not entry.name.endswith("__main__")]
     return {
         f"{module.__name__}.{name}": len(kernel.signatures)
         for module in modules

@@ -167,7 +167,7 @@ def test_both_kinds_of_flight_are_the_same_over_udp(tmp_path: Path) -> None:
 
 def test_the_file_of_the_project_names_the_set_in_its_order() -> None:
     """`colibri verify --golden --renew --only NAME` adds what is missing, and drops what is no flight any more."""
-    known = golden.read_hashes(Path(__file__).parents[2] / GOLDEN_HASHES)
+    known = golden.read_hashes(Path(__file__).parents[3] / GOLDEN_HASHES)
     assert list(known) == [flight.name for flight in golden_flights.FLIGHTS]
 
 

@@ -13,7 +13,6 @@ from colibri.autopilot.control.qp import installed_solvers
 from colibri.bench import run, sensing, serving, speed, stages
 from colibri.bench.variants import plan_of, toml_lines, with_intervals, with_moves
 from colibri.cli.main import main
-from tools.bench import rotorpy_peer
 
 SHORT_S = "0.2"
 
@@ -62,34 +61,11 @@ def test_what_was_timed_is_as_it_was_before(measured: dict[str, Any]) -> None:
     assert not [stage for stage in stages.STAGES if getattr(stage.owner, stage.method).__name__ == "timed"]
 
 
-def test_flies_beside_the_peer_in_every_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(rotorpy_peer, "installed", lambda: True)
-    monkeypatch.setattr(rotorpy_peer, "real_time_factor", lambda _frames_hz, _duration_s: 2.0)
-    monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 8.0)
-    flights = figures_of(tmp_path / "flights.json", "--only", "flights")["flights"]
-    assert {int(frames_hz) for frames_hz in flights["rates_hz"]} == set(speed.CONTROL_S)
-    for rate in flights["rates_hz"].values():
-        assert set(rate) == {"memory", "udp", "rotorpy", "memory / rotorpy", "udp / rotorpy"}
-        assert rate["udp / rotorpy"]["median"] == pytest.approx(rate["udp"]["median"] / 2.0)
-    assert "memory / rotorpy" in capsys.readouterr().out
-
-
-def test_a_missing_peer_is_said_in_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(rotorpy_peer, "installed", lambda: False)
+def test_flights_are_measured_at_every_rate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 1.0)
     flights = figures_of(tmp_path / "flights.json", "--only", "flights")["flights"]
+    assert {int(frames_hz) for frames_hz in flights["rates_hz"]} == set(speed.CONTROL_S)
     assert all(set(rate) == {"memory", "udp"} for rate in flights["rates_hz"].values())
-    assert capsys.readouterr().err == f"colibri: {rotorpy_peer.MISSING}\n"
-    assert "colibri-sitl[bench]" in rotorpy_peer.MISSING
-
-
-@pytest.mark.skipif(not rotorpy_peer.installed(), reason="needs RotorPy, which the lock leaves out")
-def test_the_peer_flies() -> None:
-    assert rotorpy_peer.real_time_factor(100, 0.2) > 0.0
 
 
 @pytest.mark.long
@@ -125,8 +101,7 @@ def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.Monkey
     told: list[str] = []
     monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 1.0)
     profile = load_profile(run.PROFILE)
-    monkeypatch.setattr(rotorpy_peer, "real_time_factor", lambda *_: 1.0)
-    speed.rate_figures(profile, tmp_path, 0.1, 2, told.append, beside=True)
+    speed.rate_figures(profile, tmp_path, 0.1, 2, told.append, speed.Peer("rotorpy", lambda *_: 1.0))
     assert len(told) == run.parts(["flights"], 2, beside=True)
 
 

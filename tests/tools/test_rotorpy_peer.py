@@ -1,0 +1,47 @@
+"""`make bench`: flights beside RotorPy's, and what is said where there is none."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from colibri.bench import speed
+from tools.bench import rotorpy_peer
+from tools.bench.__main__ import main
+
+
+def flights_of(out: Path) -> dict[str, Any]:
+    assert main(["--runs", "1", "--duration", "0.2", "--out", str(out), "--only", "flights"]) == 0
+    figures: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))["flights"]
+    return figures
+
+
+def test_flies_beside_the_peer_in_every_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(rotorpy_peer, "installed", lambda: True)
+    monkeypatch.setattr(rotorpy_peer, "real_time_factor", lambda _frames_hz, _duration_s: 2.0)
+    monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 8.0)
+    flights = flights_of(tmp_path / "flights.json")
+    assert {int(frames_hz) for frames_hz in flights["rates_hz"]} == set(speed.CONTROL_S)
+    for rate in flights["rates_hz"].values():
+        assert set(rate) == {"memory", "udp", "rotorpy", "memory / rotorpy", "udp / rotorpy"}
+        assert rate["udp / rotorpy"]["median"] == pytest.approx(rate["udp"]["median"] / 2.0)
+    assert "memory / rotorpy" in capsys.readouterr().out
+
+
+def test_a_missing_peer_is_said_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(rotorpy_peer, "installed", lambda: False)
+    monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 1.0)
+    flights = flights_of(tmp_path / "flights.json")
+    assert all(set(rate) == {"memory", "udp"} for rate in flights["rates_hz"].values())
+    assert capsys.readouterr().err == f"colibri: {rotorpy_peer.MISSING}\n"
+    assert "colibri-sitl[bench]" in rotorpy_peer.MISSING
+
+
+@pytest.mark.skipif(not rotorpy_peer.installed(), reason="needs RotorPy, which the lock leaves out")
+def test_the_peer_flies() -> None:
+    assert rotorpy_peer.real_time_factor(100, 0.2) > 0.0
