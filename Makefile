@@ -54,11 +54,11 @@ fuzz: setup
 # Every scenario of tests/scenarios/, over UDP: SITL_LINK=memory flies them in one process each.
 SITL_LINK ?= udp
 scenarios: setup
-	$(BIN)/python -m pytest -m scenarios tests/scenarios/ -n 2 --dist worksteal --sitl-link $(SITL_LINK)
+	$(BIN)/python -m pytest -m scenarios tests/scenarios -n 2 --dist worksteal --sitl-link $(SITL_LINK)
 
 # Over ground links that lose 30 % each way and are up to 50 ms late: all but those that say why they need better ones.
 scenarios-rough: setup
-	$(BIN)/python -m pytest -m "scenarios and not calm" tests/scenarios/ -n 2 --dist worksteal --sitl-link $(SITL_LINK) \
+	$(BIN)/python -m pytest -m "scenarios and not calm" tests/scenarios -n 2 --dist worksteal --sitl-link $(SITL_LINK) \
 	  --sitl-ground loss=0.3,jitter_s=0.05
 
 # All of them 100 times, in memory and over UDP in turn: no verdict and no hash may differ. SOAK="--runs 10 --load", or

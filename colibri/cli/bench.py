@@ -1,12 +1,15 @@
-"""Options of `colibri bench`."""
+"""`colibri bench`: its options and its call."""
 
+from argparse import Namespace
 from pathlib import Path
 
 from colibri.common.process.arguments import ArgumentParser, positive
 
+HELP = "measure how fast it flies"
 
-def add_bench_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri bench`."""
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options."""
     add = parser.add_argument
     add(
         "--only",
@@ -26,3 +29,10 @@ def add_bench_options(parser: ArgumentParser) -> None:
         help="simulated time of a flight, but of the spiral's (default %(default)s)",
     )
     add("--out", type=Path, metavar="FILE", help="write the figures as JSON there")
+
+
+def run(args: Namespace) -> int:
+    """Do it; return the exit code."""
+    from colibri.bench.run import bench
+
+    return bench(args)

@@ -1,4 +1,4 @@
-"""Options of `colibri compare`."""
+"""`colibri compare`: its options and its call."""
 
 from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
@@ -8,6 +8,8 @@ from colibri.common.process.arguments import ArgumentParser, positive
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import NO_WIND
 from colibri.plant.process.options import add_weather_arguments
+
+HELP = "fly several controllers on several tracks, side by side"
 
 COMPARED_S = 100.0
 
@@ -31,8 +33,8 @@ def seeds(text: str) -> range:
     return chosen
 
 
-def add_compare_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri compare`."""
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options."""
     add = parser.add_argument
     add(
         "--profile",
@@ -62,3 +64,14 @@ def add_compare_options(parser: ArgumentParser) -> None:
         help="folder for the tables (default %(default)s)",
     )
     add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def run(args: Namespace) -> int:
+    """Fly side by side what the options say; return the exit code."""
+    if in_another_world(args):
+        from colibri.studies.seeds import compare_seeds
+
+        return compare_seeds(args)
+    from colibri.studies.compare import compare
+
+    return compare(args)

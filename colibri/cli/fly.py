@@ -1,10 +1,13 @@
-"""Options of `colibri fly`."""
+"""`colibri fly`: its options and its call."""
 
+from argparse import Namespace
 from pathlib import Path
 
 from colibri.cli.shared_options import add_feedback, add_signing
 from colibri.common.process.arguments import ArgumentParser, natural, positive, speed
 from colibri.plant.process.options import LATENCY_HELP, add_world_arguments, latency
+
+HELP = "fly a track and report how well it went"
 
 TRACK_HELP = (
     "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
@@ -13,8 +16,8 @@ TRACK_HELP = (
 )
 
 
-def add_fly_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri fly`."""
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options."""
     add = parser.add_argument
     add("track", metavar="TRACK", help=TRACK_HELP)
     add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
@@ -55,3 +58,10 @@ def add_fly_options(parser: ArgumentParser) -> None:
     )
     add("--quiet", action="store_true", help="say nothing but errors")
     add("--no-figures", action="store_true", help="draw no PNG figures")
+
+
+def run(args: Namespace) -> int:
+    """Do it; return the exit code."""
+    from colibri.cli.fly_and_report import fly
+
+    return fly(args)

@@ -1,5 +1,6 @@
-"""Options of `colibri sitl`."""
+"""`colibri sitl`: its options and its call."""
 
+from argparse import Namespace
 from math import inf
 from pathlib import Path
 
@@ -8,9 +9,11 @@ from colibri.common.earth.home import DEFAULT_HOME, home
 from colibri.common.process.arguments import ArgumentParser, natural, positive, speed
 from colibri.plant.process.options import add_world_arguments
 
+HELP = "stand ready for ground stations: QGroundControl, MAVSDK, MAVProxy"
 
-def add_sitl_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri sitl`."""
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options."""
     add = parser.add_argument
     add(
         "--instance", type=natural, default=0, metavar="N", help="number of the (first) vehicle: its system id is N + 1"
@@ -57,3 +60,10 @@ def add_sitl_options(parser: ArgumentParser) -> None:
     add("--speed", type=speed, default=1.0, metavar="N", help="times real time, or max (default 1)")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
     add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def run(args: Namespace) -> int:
+    """Do it; return the exit code."""
+    from colibri.flights.fleet import sitl
+
+    return sitl(args)

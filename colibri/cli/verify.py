@@ -1,14 +1,17 @@
-"""Options of `colibri verify`."""
+"""`colibri verify`: its options and its call."""
 
+from argparse import Namespace
 from pathlib import Path
 
 from colibri.common.process.arguments import ArgumentParser, positive
 
+HELP = "fly a fixed set of flights: is every bit the same, twice, or as it once was?"
+
 GOLDEN_HASHES = Path("tests/golden/hashes.json")
 
 
-def add_verify_options(parser: ArgumentParser) -> None:
-    """Add the options of `colibri verify`."""
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options."""
     add = parser.add_argument
     add("--link", default="udp", choices=("udp", "memory"), help="of the flights (default %(default)s)")
     add("--duration", type=positive, metavar="S", help="simulated time of each flight (default 20; golden: its own)")
@@ -25,3 +28,14 @@ def add_verify_options(parser: ArgumentParser) -> None:
     add("--only", action="append", default=[], metavar="NAME", help="with --golden: only this flight; may be repeated")
     add("--out", type=Path, default=Path("out/verify"), metavar="DIR", help="folder for the logs (default %(default)s)")
     add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def run(args: Namespace) -> int:
+    """Fly what the options say, and compare; return the exit code."""
+    if args.golden is not None:
+        from colibri.verification.golden import verify_golden
+
+        return verify_golden(args)
+    from colibri.verification.verify import verify
+
+    return verify(args)

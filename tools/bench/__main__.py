@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from colibri.bench.run import bench
 from colibri.bench.speed import Peer
-from colibri.cli.bench import add_bench_options
+from colibri.cli.bench import add_options
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import EXIT_INTERRUPTED, fail, use_one_thread
 from tools.bench import rotorpy_peer
@@ -14,7 +14,7 @@ from tools.bench import rotorpy_peer
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure what the command line says; return the exit code."""
     parser = ArgumentParser(prog="python -m tools.bench", description="How fast it flies, beside RotorPy.")
-    add_bench_options(parser)
+    add_options(parser)
     args = parser.parse_args(argv)
     use_one_thread()
     peer = Peer("rotorpy", rotorpy_peer.real_time_factor) if rotorpy_peer.installed() else None
