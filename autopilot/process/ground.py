@@ -3,50 +3,33 @@
 import argparse
 from collections.abc import Iterable
 from math import hypot
-from pathlib import Path
 from time import perf_counter, thread_time, time
 from typing import TYPE_CHECKING, Any
 
 from colibri.autopilot.control.profile import Profile
-from colibri.autopilot.core.checkpoint import Kept, Past
+from colibri.autopilot.core.checkpoint import Past
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.estimation.state_source import Estimator
 from colibri.autopilot.ground.stations import REBOOT, SHUT_DOWN, StationSettings
 from colibri.autopilot.guidance.trajectories.tracks import track
-from colibri.autopilot.parameters.definitions import ImpossibleError, definitions
+from colibri.autopilot.parameters.definitions import ImpossibleError
 from colibri.autopilot.process.conducted_links import ConductedLinks, Conductor
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
-from colibri.common.process.slot_file import Slots
+from colibri.autopilot.process.state_folder import GroundError, StateFolder
 from colibri.common.process.status import Status
-from colibri.common.serialization import of_bytes, to_bytes
-from colibri.mavlink.files.folder import Folder
-from colibri.mavlink.files.tree import Quota
+from colibri.common.serialization import to_bytes
 from colibri.mavlink.links.link import LinkError
-from colibri.mavlink.mission.items import MissionItem
-from colibri.mavlink.parameters.file import ParameterFileError, read, write
-from colibri.mavlink.parameters.store import Parameters, Value
-from colibri.mavlink.wire.signing import Signing, SigningError, parse_key, tick_at
+from colibri.mavlink.wire.signing import tick_at
 from colibri.plant.vehicle.description import Vehicle
 
 if TYPE_CHECKING:
     from colibri.autopilot.process.logs import AutopilotLog
 
-KEY = "signing.key"
-TIMESTAMP = "signing.timestamp"
-FILES = "files"
-LOGS = "logs"
-FLIGHT = "flight"
-PLANS = "plans"
-LOG_QUOTA = Quota(512 << 20, 200)
 _TELL_EVERY_S = 0.5
 _SAVE_EVERY_S = 10.0
 _STANDING_SAMPLES = 50
 """A vehicle that is not armed loses nothing in that many control samples."""
-
-
-class GroundError(LinkError):
-    """Ground stations cannot be served as asked; the message is the one line that a user needs."""
 
 
 class Ground:
@@ -76,21 +59,21 @@ class Ground:
         self._vehicle = vehicle
         self._estimator = estimator
         self._status = status
-        self._state: Path | None = args.state
-        self._signing = self._read_key()
-        try:
-            self._folder = Folder(self._state / FILES) if self._state else None
-            self._logs = Folder(self._state / LOGS, LOG_QUOTA) if self._state else None
-            self._flight = Slots(self._state / FLIGHT) if self._state else None
-        except OSError as error:
-            raise GroundError(f"cannot write to --state {self._state}: {error.strerror}") from error
+        self._state = StateFolder(
+            args.state,
+            profile,
+            vehicle,
+            system_id=args.system_id,
+            signing_key=args.signing_key,
+            tick=tick_at(time()),
+        )
         self._first = track(args.track) if args.track else None
         self._log: AutopilotLog | None = None
-        self.copter = self._vehicle_anew(self._past())
+        self.copter = self._vehicle_anew(self._state.past())
         self._kept_samples = self._kept_plans = 0
         self._kept_armed = False
         try:
-            links = open_links(args.gcs, signed=self._signing.active, insecure=args.insecure)
+            links = open_links(args.gcs, signed=self._state.signing.active, insecure=args.insecure)
         except LinkError as error:
             raise GroundError(str(error)) from error
         self._links: GroundLinks | ConductedLinks = GroundLinks(links, perf_counter, thread_time)
@@ -125,22 +108,17 @@ class Ground:
         if now_s >= self._told_s + _TELL_EVERY_S and self.copter.pilot.has_seen:
             self._tell(now_s)
         if self.copter.parameters.revision != self._revision:
-            self._save_parameters()
+            self._revision = self.copter.parameters.revision
+            self._state.save_parameters(self.copter.parameters)
         if self.copter.resumed and not self._resumed_said:
             self._resumed_said = True
             self._status.say("said", self.copter.resumed)
-        if self._flight is not None:
-            self._keep(self._flight)
+        if self._state.keeps_flights:
+            self._keep()
         self._links.send(outbox)
         return self.copter
 
-    def _past(self) -> Past | None:
-        """Return what was kept of the last flight: it goes on if this is the same one."""
-        content = self._flight.newest() if self._flight else None
-        kept = of_bytes(Kept, content) if content else None
-        return None if kept is None else Past(kept, self._read_plans())
-
-    def _keep(self, flight: Slots) -> None:
+    def _keep(self) -> None:
         """Keep what the flight needs to go on, should this process be killed."""
         copter = self.copter
         changes, armed = copter.stations.missions.changes, copter.pilot.state.armed
@@ -148,34 +126,20 @@ class Ground:
         if copter.samples - self._kept_samples < (1 if armed or changed else _STANDING_SAMPLES):
             return
         if changes != self._kept_plans:
-            self._save_plans()
+            plans = copter.stations.missions.service.plans
+            self._state.save_plans({plan_type: plan.items for plan_type, plan in plans.items()})
         record = copter.record()
-        if record is not None and not flight.write(to_bytes(record)) and not self._said_too_much:
+        if record is not None and not self._state.keep(record) and not self._said_too_much:
             self._said_too_much = True
             self._status.say("said", "the flight is too much to keep: after a restart it would begin in hold")
         self._kept_samples, self._kept_plans, self._kept_armed = copter.samples, changes, armed
 
-    def _save_plans(self) -> None:
-        assert self._state is not None, "asked for only where something is kept"
-        plans = self.copter.stations.missions.service.plans
-        _replace(self._state / PLANS, to_bytes({plan_type: plan.items for plan_type, plan in plans.items()}))
-
-    def _read_plans(self) -> dict[int, list[MissionItem]]:
-        assert self._state is not None, "asked for only where something is kept"
-        try:
-            content = (self._state / PLANS).read_bytes()
-        except OSError:
-            return {}
-        return of_bytes(dict[int, list[MissionItem]], content) or {}
-
     def close(self) -> None:
         """Write what is left to write, and let go of everything."""
         self.copter.stations.log.close()
-        self._save_signing()
+        self._state.save_signing()
         self._links.close()
-        for kept in (self._folder, self._logs, self._flight):
-            if kept:
-                kept.close()
+        self._state.close()
 
     def _restart(self, kind: float) -> None:
         if kind == SHUT_DOWN:
@@ -193,16 +157,16 @@ class Ground:
 
     def _vehicle_anew(self, past: Past | None) -> Copter:
         args = self._args
-        self._values = self._read_parameters()
+        self._values = self._state.parameters()
         self._past_bytes = b"" if past is None else to_bytes(past)
         settings = StationSettings(
             system_id=args.system_id,
             identity=args.identity,
             origin=args.home.origin,
             boot_unix_us=round(time() * 1e6),
-            signing=self._signing,
-            files=self._folder,
-            logs=self._logs,
+            signing=self._state.signing,
+            files=self._state.files,
+            logs=self._state.logs,
             feedback=args.feedback,
             relays_faults=args.simulator is None,
         )
@@ -218,72 +182,8 @@ class Ground:
                 past=past,
             )
         except ImpossibleError as error:
-            raise GroundError(f"{self._parameter_path()}: {error}") from error
+            raise GroundError(f"{self._state.parameter_path()}: {error}") from error
         return copter
-
-    def _parameter_path(self) -> Path:
-        """Each control law and vehicle has its own parameters."""
-        assert self._state is not None, "asked for only where something is kept"
-        return self._state / f"{self._profile.controller}-{self._vehicle.name.lower().replace(' ', '-')}.params"
-
-    def _read_parameters(self) -> dict[str, Value]:
-        if self._state is None:
-            return {}
-        path = self._parameter_path()
-        try:
-            text = path.read_text()
-        except FileNotFoundError:
-            return {}
-        except (OSError, UnicodeDecodeError) as error:
-            raise GroundError(f"cannot read parameters from {path}: {error}") from error
-        try:
-            return read(text, Parameters(definitions(self._profile, self._vehicle, self._args.system_id)))
-        except ParameterFileError as error:
-            raise GroundError(f"{path}: {error}; correct or remove it") from error
-
-    def _save_parameters(self) -> None:
-        self._revision = self.copter.parameters.revision
-        if self._state is not None:
-            _replace(self._parameter_path(), write(self.copter.parameters, self._args.system_id).encode())
-
-    def _read_key(self) -> Signing:
-        path: Path | None = self._args.signing_key
-        if path is None and self._state and (self._state / KEY).exists():
-            path = self._state / KEY
-        try:
-            key = None if path is None else parse_key(path.read_bytes())
-        except OSError as error:
-            raise GroundError(f"cannot read signing key {path}: {error.strerror}") from error
-        except SigningError as error:
-            raise GroundError(f"signing key {path}: {error}") from error
-        return Signing(key, max(self._read_timestamp(), tick_at(time())))
-
-    def _read_timestamp(self) -> int:
-        """Return the last timestamp of the run before: none of it may be signed with again."""
-        if self._state is None:
-            return 0
-        path = self._state / TIMESTAMP
-        try:
-            return int(path.read_text())
-        except (FileNotFoundError, NotADirectoryError):
-            return 0
-        except OSError as error:
-            raise GroundError(f"cannot read {path}: {error.strerror}") from error
-        except ValueError as error:
-            raise GroundError(f"{path}: not a whole number; remove it once the clock is right") from error
-
-    def _save_signing(self) -> None:
-        if self._state is None or not (self._signing.active or self._signing.key_changed):
-            return
-        _replace(self._state / TIMESTAMP, str(self._signing.timestamp).encode())
-        if self._signing.key_changed:
-            self._signing.key_changed = False
-            key = self._signing.key
-            if key is None:
-                (self._state / KEY).unlink(missing_ok=True)
-            else:
-                _replace(self._state / KEY, key)
-                (self._state / KEY).chmod(0o600)
 
     def _tell(self, now_s: float) -> None:
         pilot = self.copter.pilot
@@ -296,9 +196,9 @@ class Ground:
                 if f"{link['url']} {who}" not in self._heard:
                     self._heard.add(f"{link['url']} {who}")
                     self._status.say("heard", f"system {who} is heard on {link['url']}")
-        if self._signing.key_changed or now_s >= self._saved_s + _SAVE_EVERY_S:
+        if self._state.signing.key_changed or now_s >= self._saved_s + _SAVE_EVERY_S:
             self._saved_s = now_s
-            self._save_signing()
+            self._state.save_signing()
 
     def _facts(self, now_s: float) -> dict[str, Any]:
         pilot = self.copter.pilot
@@ -334,14 +234,3 @@ def _invitation(url: str) -> str:
     scheme, _, rest = url.partition(":")
     calls = scheme in ("udpout", "tcp")
     return f"calls ground stations at {rest} ({scheme})" if calls else f"waits for ground stations on {rest} ({scheme})"
-
-
-def _replace(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all; what cannot be written is not worth a crash."""
-    new = path.with_suffix(path.suffix + ".new")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        new.write_bytes(content)
-        new.replace(path)
-    except OSError:
-        return

@@ -1,0 +1,180 @@
+"""What outlives the autopilot's process, in the folder of --state: parameters, key, files, logs, plans, the flight."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.core.checkpoint import Kept, Past
+from colibri.autopilot.parameters.definitions import definitions
+from colibri.common.process.slot_file import Slots
+from colibri.common.serialization import of_bytes, to_bytes
+from colibri.mavlink.files.folder import Folder
+from colibri.mavlink.files.tree import Quota
+from colibri.mavlink.links.link import LinkError
+from colibri.mavlink.mission.items import MissionItem
+from colibri.mavlink.parameters.file import ParameterFileError, read, write
+from colibri.mavlink.parameters.store import Parameters, Value
+from colibri.mavlink.wire.signing import Signing, SigningError, parse_key
+from colibri.plant.vehicle.description import Vehicle
+
+KEY = "signing.key"
+TIMESTAMP = "signing.timestamp"
+FILES = "files"
+LOGS = "logs"
+FLIGHT = "flight"
+PLANS = "plans"
+LOG_QUOTA = Quota(512 << 20, 200)
+
+
+class GroundError(LinkError):
+    """Ground stations cannot be served as asked; the message is the one line that a user needs."""
+
+
+class StateFolder:
+    """The folder of --state; without one nothing is kept.
+
+    Attributes:
+        signing: The key and the last timestamp, at least `tick` at first.
+        files: What ground stations may read and write.
+        logs: What they may download.
+    """
+
+    def __init__(
+        self,
+        path: Path | None,
+        profile: Profile,
+        vehicle: Vehicle,
+        *,
+        system_id: int,
+        signing_key: Path | None,
+        tick: int,
+    ) -> None:
+        """Read the key, of the file `signing_key` if there is one, and open what is kept.
+
+        Raises:
+            GroundError: Something of it cannot be used.
+        """
+        self._path = path
+        self._profile = profile
+        self._vehicle = vehicle
+        self._system_id = system_id
+        self.signing = Signing(self._read_key(signing_key), max(self._read_timestamp(), tick))
+        try:
+            self.files = Folder(path / FILES) if path else None
+            self.logs = Folder(path / LOGS, LOG_QUOTA) if path else None
+            self._flight = Slots(path / FLIGHT) if path else None
+        except OSError as error:
+            raise GroundError(f"cannot write to --state {path}: {error.strerror}") from error
+
+    @property
+    def keeps_flights(self) -> bool:
+        """Whether a flight is kept, to go on after a restart."""
+        return self._flight is not None
+
+    def past(self) -> Past | None:
+        """Return what was kept of the last flight: it goes on if this is the same one."""
+        content = self._flight.newest() if self._flight else None
+        kept = of_bytes(Kept, content) if content else None
+        return None if kept is None else Past(kept, self._read_plans())
+
+    def keep(self, record: Kept) -> bool:
+        """Keep what the flight needs to go on; return whether there was room."""
+        return self._flight is None or self._flight.write(to_bytes(record))
+
+    def save_plans(self, plans: Mapping[int, Sequence[MissionItem]]) -> None:
+        """Keep the items of mission, geofence and rally points."""
+        if self._path is not None:
+            _replace(self._path / PLANS, to_bytes(dict(plans)))
+
+    def parameter_path(self) -> Path:
+        """Return the file of parameters: each control law and vehicle has its own."""
+        assert self._path is not None, "asked for only where something is kept"
+        return self._path / f"{self._profile.controller}-{self._vehicle.name.lower().replace(' ', '-')}.params"
+
+    def parameters(self) -> dict[str, Value]:
+        """Return the parameters that were saved.
+
+        Raises:
+            GroundError: Their file cannot be read.
+        """
+        if self._path is None:
+            return {}
+        path = self.parameter_path()
+        try:
+            text = path.read_text()
+        except FileNotFoundError:
+            return {}
+        except (OSError, UnicodeDecodeError) as error:
+            raise GroundError(f"cannot read parameters from {path}: {error}") from error
+        try:
+            return read(text, Parameters(definitions(self._profile, self._vehicle, self._system_id)))
+        except ParameterFileError as error:
+            raise GroundError(f"{path}: {error}; correct or remove it") from error
+
+    def save_parameters(self, parameters: Parameters) -> None:
+        """Save them."""
+        if self._path is not None:
+            _replace(self.parameter_path(), write(parameters, self._system_id).encode())
+
+    def save_signing(self) -> None:
+        """Save the timestamp of the last signature, and the key if a ground station has changed it."""
+        if self._path is None or not (self.signing.active or self.signing.key_changed):
+            return
+        _replace(self._path / TIMESTAMP, str(self.signing.timestamp).encode())
+        if self.signing.key_changed:
+            self.signing.key_changed = False
+            key = self.signing.key
+            if key is None:
+                (self._path / KEY).unlink(missing_ok=True)
+            else:
+                _replace(self._path / KEY, key)
+                (self._path / KEY).chmod(0o600)
+
+    def close(self) -> None:
+        """Let go of everything."""
+        for kept in (self.files, self.logs, self._flight):
+            if kept:
+                kept.close()
+
+    def _read_plans(self) -> dict[int, list[MissionItem]]:
+        assert self._path is not None, "asked for only where something is kept"
+        try:
+            content = (self._path / PLANS).read_bytes()
+        except OSError:
+            return {}
+        return of_bytes(dict[int, list[MissionItem]], content) or {}
+
+    def _read_key(self, path: Path | None) -> bytes | None:
+        if path is None and self._path and (self._path / KEY).exists():
+            path = self._path / KEY
+        try:
+            return None if path is None else parse_key(path.read_bytes())
+        except OSError as error:
+            raise GroundError(f"cannot read signing key {path}: {error.strerror}") from error
+        except SigningError as error:
+            raise GroundError(f"signing key {path}: {error}") from error
+
+    def _read_timestamp(self) -> int:
+        """Return the last timestamp of the run before: none of it may be signed with again."""
+        if self._path is None:
+            return 0
+        path = self._path / TIMESTAMP
+        try:
+            return int(path.read_text())
+        except (FileNotFoundError, NotADirectoryError):
+            return 0
+        except OSError as error:
+            raise GroundError(f"cannot read {path}: {error.strerror}") from error
+        except ValueError as error:
+            raise GroundError(f"{path}: not a whole number; remove it once the clock is right") from error
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all; what cannot be written is not worth a crash."""
+    new = path.with_suffix(path.suffix + ".new")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        new.write_bytes(content)
+        new.replace(path)
+    except OSError:
+        return
