@@ -161,7 +161,7 @@ def test_a_ground_station_shuts_it_down(tmp_path: Path) -> None:
         assert station.command(SHUT_DOWN, 2.0, 0, 0, 0, 0, 0, 0) == ACCEPTED
         assert flown.process.wait(10.0) == 0
         assert_gone(children)
-        assert flown.said.splitlines()[-1] == "  1 autopilot: shut down by a ground station"
+        assert "  1 autopilot: shut down by a ground station" in flown.said.splitlines()
 
 
 def test_its_time_is_over(tmp_path: Path) -> None:
