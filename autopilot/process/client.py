@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from colibri.autopilot.core.step import Step
 from colibri.autopilot.core.track_autopilot import Autopilot
+from colibri.autopilot.process.logs import AutopilotLog
 from colibri.common.process.lifecycle import Stop
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
@@ -16,7 +17,7 @@ from colibri.mavlink.wire.dialect import RESULT_UNSUPPORTED
 if TYPE_CHECKING:
     from colibri.autopilot.core.copter import Copter
     from colibri.autopilot.process.ground import Ground
-from colibri.autopilot.process.logs import AutopilotLog
+
 
 _SILENCE_SAID_AFTER_S = 2.0
 _WAIT_AT_MOST_S = 0.1

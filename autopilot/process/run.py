@@ -10,6 +10,8 @@ from colibri.autopilot.control.registry import ControllerError, DecisionError
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import Estimator, estimator_for
 from colibri.autopilot.guidance.trajectories.tracks import TrackError, track
+from colibri.autopilot.process.client import Client
+from colibri.autopilot.process.logs import AutopilotLog
 from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, undisturbed
 from colibri.common.process.status import Status
@@ -22,8 +24,7 @@ from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicl
 
 if TYPE_CHECKING:
     from colibri.autopilot.process.ground import Ground
-from colibri.autopilot.process.client import Client
-from colibri.autopilot.process.logs import AutopilotLog
+
 
 TRACK = "spiral"
 """What flies where nothing else is said."""
