@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from colibri.sitl.backends.setting import SettingError, setting_of
+from colibri.sitl.errors import SitlError
 from colibri.sitl.summary import FLOWN, Summary
 
 if TYPE_CHECKING:
@@ -191,11 +192,9 @@ def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack)
 
 def _begun(flights: Flights, **changes: Any) -> Sitl:
     """Begin a flight, or fail in one line."""
-    from colibri.sitl.backends.stage import StageError
-
     try:
         return flights.begin(**changes)
-    except (SettingError, StageError) as error:
+    except SitlError as error:
         pytest.fail(str(error), pytrace=False)
 
 

@@ -7,6 +7,8 @@ from typing import Annotated, Any, TypeAlias, TypeVar
 
 import msgspec
 
+from colibri.common.errors import Error
+
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
 T = TypeVar("T")
@@ -17,7 +19,7 @@ def toml_names(folder: Path) -> list[str]:
     return sorted(path.stem for path in folder.glob("*.toml"))
 
 
-def read_named(what: str, folder: Path, name_or_path: str, kind: type[T], error: type[Exception]) -> T:
+def read_named(what: str, folder: Path, name_or_path: str, kind: type[T], error: type[Error]) -> T:
     """Read the TOML file of that name in `folder`, or any file if the argument ends in `.toml`.
 
     Raises:
@@ -31,7 +33,7 @@ def read_named(what: str, folder: Path, name_or_path: str, kind: type[T], error:
     return read_toml(folder / f"{name_or_path}.toml", kind, error)
 
 
-def read_toml(path: Path, kind: type[T], error: type[Exception]) -> T:
+def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
     """Read a TOML file into a strict structure.
 
     Raises:
@@ -54,7 +56,7 @@ Degrees: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0, lt=90.0)]
 Count: TypeAlias = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 
 
-class SettingsError(Exception):
+class SettingsError(Error):
     """A table with a missing, unknown or impossible key; the message names it."""
 
 

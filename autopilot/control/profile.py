@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 import msgspec
 
 from colibri.autopilot.control.settings import ControlInterval
+from colibri.autopilot.errors import AutopilotError
 from colibri.common.config import Table, read_named
 
 _FOLDER = Path(__file__).parents[1] / "profiles"
@@ -13,7 +14,7 @@ _FOLDER = Path(__file__).parents[1] / "profiles"
 References: TypeAlias = Literal["by-formula", "by-differences"]
 
 
-class ProfileError(Exception):
+class ProfileError(AutopilotError):
     """A profile that cannot be flown; the message names file and key."""
 
 

@@ -7,6 +7,7 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
+from colibri.autopilot.errors import AutopilotError
 from colibri.common.types import Array
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _NONE = np.empty(0)
 _PATTERNS = 64
 
 
-class SolverError(Exception):
+class SolverError(AutopilotError):
     """A solver that cannot be used; the message says what to do."""
 
 

@@ -7,6 +7,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from colibri.autopilot.control.interface import Clock, Controller
+from colibri.autopilot.errors import AutopilotError
+from colibri.common.errors import InFlightError
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -14,11 +16,11 @@ GROUP = "colibri.controllers"
 DEFAULT = "cascade"
 
 
-class ControllerError(Exception):
+class ControllerError(AutopilotError):
     """A control law that cannot be used."""
 
 
-class DecisionError(Exception):
+class DecisionError(AutopilotError, InFlightError):
     """A control law decided in flight what no rotor can follow."""
 
 

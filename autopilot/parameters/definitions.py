@@ -7,6 +7,7 @@ import msgspec
 
 from colibri.autopilot.commander.rules.failsafe_parameters import failsafe_parameters
 from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.parameters.behaviour import behaviour, behaviour_parameters
 from colibri.autopilot.parameters.control_law import law_numbers
 from colibri.autopilot.parameters.number_paths import changed, described
@@ -17,7 +18,7 @@ from colibri.plant.vehicle.description import Vehicle
 __all__ = ["ImpossibleError", "Numbers", "applied", "behaviour", "definitions"]
 
 
-class ImpossibleError(Exception):
+class ImpossibleError(AutopilotError):
     """Values that no vehicle can have together; the message names the key."""
 
 

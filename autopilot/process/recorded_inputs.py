@@ -9,12 +9,13 @@ from typing import TypeAlias
 
 import msgspec
 
+from colibri.autopilot.errors import AutopilotError
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
 
 
-class InputsError(Exception):
+class InputsError(AutopilotError):
     """What is no such log; the message says where."""
 
 

@@ -4,23 +4,22 @@ import argparse
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from colibri.autopilot.control.profile import Profile, ProfileError, load_profile
-from colibri.autopilot.control.qp import SolverError
-from colibri.autopilot.control.registry import ControllerError, DecisionError
+from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import Estimator, estimator_for
-from colibri.autopilot.guidance.trajectories.tracks import TrackError, track
+from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.autopilot.process.client import Client
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.autopilot.process.recorded_inputs import Setup
+from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, undisturbed
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.px4_autopilot import FlierEnd
-from colibri.mavlink.links.link import LinkError, OneByOne
+from colibri.mavlink.links.link import OneByOne
 from colibri.mavlink.links.open import open_link
 from colibri.mavlink.links.udp import UdpLink
-from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicle
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 if TYPE_CHECKING:
     from colibri.autopilot.process.ground import Ground
@@ -40,7 +39,7 @@ def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop
         ground = _ground(args, profile, vehicle, estimator, status, stop) if served else None
         autopilot = ground.copter if ground else _alone(args, profile, vehicle, estimator)
         end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
-    except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
+    except Error as error:
         fail(str(error))
     log = AutopilotLog(args.out, _setup(args, profile)) if args.out else None
     if ground and log:
@@ -50,7 +49,7 @@ def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop
     try:
         with undisturbed():
             Client(link, end, status, stop, log, ground).fly(autopilot)
-    except (LinkError, DecisionError) as error:
+    except Error as error:
         fail(str(error), EXIT_FAILED)
     finally:
         link.close()

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.checkpoint import Kept, Past
+from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.parameters.definitions import definitions
 from colibri.common.process.slot_file import Slots
 from colibri.common.serialization import of_bytes, to_bytes
 from colibri.mavlink.files.folder import Folder
 from colibri.mavlink.files.tree import Quota
-from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.parameters.file import ParameterFileError, read, write
 from colibri.mavlink.parameters.store import Parameters, Value
@@ -26,7 +26,7 @@ PLANS = "plans"
 LOG_QUOTA = Quota(512 << 20, 200)
 
 
-class GroundError(LinkError):
+class GroundError(AutopilotError):
     """Ground stations cannot be served as asked; the message is the one line that a user needs."""
 
 

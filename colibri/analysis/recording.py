@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.autopilot.guidance.trajectories.tracks import position
+from colibri.common.errors import InFlightError
 from colibri.common.rotations import euler_from_quaternion, nearest_turn
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
@@ -24,7 +25,7 @@ _PLANT_ATTITUDE = slice(10, 14)
 _PLANT_ROTORS = slice(14, 18)
 
 
-class RecordingError(Exception):
+class RecordingError(InFlightError):
     """The logs hold no flight."""
 
 

@@ -6,16 +6,11 @@ from contextlib import contextmanager
 
 from colibri.analysis.outcome import keep_flight, keep_what_there_is
 from colibri.analysis.report import print_report
-from colibri.autopilot.control.profile import ProfileError
-from colibri.autopilot.control.qp import SolverError
-from colibri.autopilot.control.registry import ControllerError, DecisionError
-from colibri.autopilot.guidance.trajectories.tracks import TrackError
+from colibri.common.errors import Error, InFlightError
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
 from colibri.flights.fly import fly_plan, prepare
-from colibri.flights.plan import FlightPlan, PlanError
+from colibri.flights.plan import FlightPlan
 from colibri.flights.processes import FlightError
-from colibri.plant.physics.start import IntegrationError
-from colibri.plant.vehicle.description import VehicleError
 
 _UPDATES = 500
 
@@ -24,22 +19,22 @@ def fly(args: argparse.Namespace) -> int:
     """Fly as the command line says; return the exit code."""
     try:
         plan = FlightPlan.from_arguments(args)
-    except (PlanError, ProfileError, VehicleError, TrackError) as error:
+    except Error as error:
         fail(str(error))
     prepare(plan.out)
     try:
         with _progress(plan, quiet=args.quiet) as (progress, say):
             summary = fly_plan(plan, progress, say)
-    except (ControllerError, ProfileError, SolverError) as error:
-        fail(str(error))
-    except (IntegrationError, DecisionError) as error:
-        keep_what_there_is(plan)
-        fail(f"{error}; what was logged is in {plan.out}", EXIT_FAILED)
     except FlightError as error:
         keep_what_there_is(plan)
         if error.said:
             return error.code
         fail(f"{error}; what was logged is in {plan.out}", error.code)
+    except InFlightError as error:
+        keep_what_there_is(plan)
+        fail(f"{error}; what was logged is in {plan.out}", EXIT_FAILED)
+    except Error as error:
+        fail(str(error))
     except KeyboardInterrupt:
         keep_what_there_is(plan)
         fail(f"interrupted; what was logged is in {plan.out}", EXIT_INTERRUPTED)

@@ -9,8 +9,9 @@ from typing import Protocol
 
 from colibri.cli import bench, compare, figures, fly, replay, sitl, study, verify
 from colibri.cli.processes import PROCESSES, run_process
+from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import EXIT_INTERRUPTED, fail, use_one_thread
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail, use_one_thread
 
 
 class Subcommand(Protocol):
@@ -50,6 +51,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that what was started is ended, too
     try:
         return SUBCOMMANDS[args.command].run(args)
+    except Error as error:
+        fail(str(error), EXIT_FAILED)
     except KeyboardInterrupt:
         fail("interrupted", EXIT_INTERRUPTED)
 

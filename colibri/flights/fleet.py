@@ -14,8 +14,9 @@ from select import select
 from time import perf_counter
 from typing import IO, Any
 
-from colibri.autopilot.control.profile import ProfileError, load_profile
+from colibri.autopilot.control.profile import load_profile
 from colibri.common.earth.home import HomePlace
+from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
 from colibri.flights.fleet_status import StatusLines
 from colibri.mavlink.hil.feedback import Feedback
@@ -23,7 +24,7 @@ from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import beyond_loopback, open_link, unsigned_refusal
 from colibri.plant.physics.start import Start
 from colibri.plant.process.options import weather_of
-from colibri.plant.vehicle.description import VehicleError, load_vehicle
+from colibri.plant.vehicle.description import load_vehicle
 
 PLANT_PORT = 14560
 GROUND_PORT = 14550
@@ -99,7 +100,7 @@ def _check(args: argparse.Namespace) -> None:
         believed = load_vehicle(args.vehicle or profile.simulation.vehicle)
         urls = ground_links(args, args.instance)
         exposed = [url for url in urls if beyond_loopback(url)]
-    except (ProfileError, VehicleError, LinkError) as error:
+    except Error as error:
         fail(str(error))
     if exposed and not (args.signing_key or args.insecure):
         fail(unsigned_refusal(exposed[0]))

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.guidance.trajectories.planner import start_yaw
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, track
+from colibri.common.errors import Error
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import NO_WIND, Weather
 from colibri.plant.physics.start import Start, check_start
@@ -39,7 +40,7 @@ class GroundAccess:
     insecure: bool = False
 
 
-class PlanError(Exception):
+class PlanError(Error):
     """What was asked for does not go together; the message is the one line that a user needs."""
 
 

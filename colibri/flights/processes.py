@@ -5,6 +5,7 @@ import subprocess
 from collections.abc import Callable
 from math import isfinite
 
+from colibri.common.errors import InFlightError
 from colibri.flights.children import end_children, events_of, start_child
 from colibri.flights.plan import FlightPlan, Summary
 
@@ -12,7 +13,7 @@ _TOLD = ("ground", "heard", "said")
 """Events of the autopilot that a user who has invited ground stations wants to read."""
 
 
-class FlightError(Exception):
+class FlightError(InFlightError):
     """A process ended before its flight did.
 
     Attributes:

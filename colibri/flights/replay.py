@@ -6,18 +6,17 @@ from math import degrees
 from pathlib import Path
 from typing import NamedTuple
 
-from colibri.autopilot.control.profile import ProfileError, load_profile
-from colibri.autopilot.control.qp import SolverError
-from colibri.autopilot.control.registry import ControllerError, DecisionError
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.registry import DecisionError
 from colibri.autopilot.core.checkpoint import Past
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.step import Received, Step
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
-from colibri.autopilot.guidance.trajectories.tracks import TrackError, track
-from colibri.autopilot.parameters.definitions import ImpossibleError
+from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.autopilot.process.recorded_inputs import Heard, Input, InputsError, Setup, read
+from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.common.rotations import euler_from_quaternion
 from colibri.common.serialization import of_bytes
@@ -27,7 +26,7 @@ from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_actuat
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 from colibri.mavlink.wire.tlog import Logged, TlogError, decode
-from colibri.plant.vehicle.description import VehicleError, load_vehicle
+from colibri.plant.vehicle.description import load_vehicle
 
 INPUTS = "inputs.jsonl"
 _NO_CLOCK_S = 0.0
@@ -89,7 +88,7 @@ class Replayed(NamedTuple):
     difference: Difference | None
 
 
-class ReplayError(Exception):
+class ReplayError(Error):
     """A recording that cannot be replayed; the message is the one line that a user needs."""
 
 
@@ -123,7 +122,9 @@ def replay_flight(tlog: Path) -> Replayed:
         raise ReplayError(f"{tlog}: no frame of {setups[0].feedback} feedback is answered in it: nothing to replay")
     try:
         return _compare(recorded, inputs)
-    except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, ImpossibleError) as error:
+    except ReplayError:
+        raise
+    except Error as error:
         raise ReplayError(f"{tlog.parent / INPUTS}: {error}") from error
 
 

@@ -8,6 +8,7 @@ from colibri.mavlink.parameters.store import Kind, Value, bits_of, value_of
 from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Bits, Codec, Message, mav, param_bits
 from colibri.sitl.backends.link_faults import Pipe, Trouble
+from colibri.sitl.errors import SitlError
 from colibri.sitl.inbox import Hearing
 
 HEARTBEAT_EVERY_US = 1_000_000
@@ -17,7 +18,7 @@ ANSWER_WITHIN_S = 15.0
 _IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
 
 
-class RefusedError(Exception):
+class RefusedError(SitlError):
     """The vehicle has refused what it was asked for.
 
     Attributes:

@@ -19,6 +19,7 @@ from colibri.sitl import mission_items as items
 from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.backends.stage import Stage
+from colibri.sitl.errors import SitlError
 from colibri.sitl.flight_record import Record
 from colibri.sitl.ground_station import RefusedError, Station
 from colibri.sitl.inbox import Words
@@ -32,7 +33,7 @@ STICKS_EVERY_US = 40_000
 """25 times a second, as QGroundControl sends those of a joystick."""
 
 
-class NotInTimeError(AssertionError):
+class NotInTimeError(SitlError, AssertionError):
     """What was waited for has not come about."""
 
 

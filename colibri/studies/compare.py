@@ -9,14 +9,13 @@ from colibri.analysis.outcome import keep_flight
 from colibri.analysis.parallel import side_by_side
 from colibri.analysis.report import SETTLED_AFTER_S
 from colibri.analysis.tables import write_table
-from colibri.autopilot.control.profile import ProfileError
-from colibri.autopilot.control.registry import ControllerError, load_controller
-from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, TrackError
+from colibri.autopilot.control.registry import load_controller
+from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
+from colibri.common.errors import Error
 from colibri.common.process.lifecycle import fail
 from colibri.flights.fly import make_folder, prepare
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
-from colibri.plant.vehicle.description import VehicleError
 
 DEFAULT_PROFILES = ("thesis", "thesis-euler", "thesis:global-lpv-mpc", "se3")
 COLUMNS = ("controller", "track", "RMS (m)", "maximum (m)", "effort (N m)", "QP p50 (µs)", "QP p99 (µs)")
@@ -47,7 +46,7 @@ def compare(args: argparse.Namespace) -> int:
     try:
         for job in jobs:
             load_controller(job.plan().profile.controller)
-    except (ProfileError, VehicleError, TrackError, ControllerError) as error:
+    except Error as error:
         fail(str(error))
     make_folder(args.out)
     rows = side_by_side(row_of, jobs, "flights", quiet=args.quiet, worth=lambda _job: 1)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple, Self
 
 from colibri.analysis.estimation import MEASURED
+from colibri.common.errors import Error
 
 TABLE, SETTINGS = "seeds-flights.csv", "seeds-settings.txt"
 
@@ -15,7 +16,7 @@ QUANTITIES = ("control", "true", "horizontal", "vertical", "roll", "pitch", "yaw
 (degrees); the mean NEES, and the mean NIS of each kind of measurement in parts of how many numbers it has."""
 
 
-class KeptError(Exception):
+class KeptError(Error):
     """What was kept cannot be gone on with; the message is the one line that a user needs."""
 
 

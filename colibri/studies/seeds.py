@@ -11,19 +11,16 @@ import numpy as np
 from colibri.analysis.estimation import MEASURED
 from colibri.analysis.outcome import keep_flight
 from colibri.analysis.parallel import side_by_side
-from colibri.analysis.recording import RecordingError
 from colibri.analysis.report import SETTLED_AFTER_S
 from colibri.analysis.tables import write_table
-from colibri.autopilot.control.profile import ProfileError
-from colibri.autopilot.control.registry import ControllerError, DecisionError, load_controller
-from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, TrackError
+from colibri.autopilot.control.registry import load_controller
+from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
+from colibri.common.errors import Error, InFlightError
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.common.types import Array
 from colibri.flights.fly import make_folder
-from colibri.flights.plan import FlightPlan, PlanError
-from colibri.flights.processes import FlightError, fly_processes
-from colibri.plant.physics.start import IntegrationError
-from colibri.plant.vehicle.description import VehicleError
+from colibri.flights.plan import FlightPlan
+from colibri.flights.processes import fly_processes
 from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, FlightsLog, Flown, KeptError, kept_flights
 
 DEFAULT_PROFILE = "flight"
@@ -74,7 +71,7 @@ def compare_seeds(args: argparse.Namespace) -> int:
     try:
         for job in jobs:
             load_controller(job.plan(args.out).profile.controller)
-    except (PlanError, ProfileError, VehicleError, TrackError, ControllerError) as error:
+    except Error as error:
         fail(str(error))
     make_folder(args.out)
     try:
@@ -108,7 +105,7 @@ def fly_once(job: Job) -> Flown:
         plan = job.plan(Path(folder))
         try:
             _, figures = keep_flight(plan, _fly(plan))
-        except (IntegrationError, DecisionError, FlightError, RecordingError) as error:
+        except InFlightError as error:
             return Flown(
                 job.contender, job.track, job.seed, str(error), (np.nan,) * len(QUANTITIES), _NO_INNOVATIONS, ""
             )

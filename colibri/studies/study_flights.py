@@ -15,13 +15,12 @@ from colibri.analysis.report import SETTLED_AFTER_S
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fallback
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.qp import QpStatus
-from colibri.autopilot.control.registry import DecisionError
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S
+from colibri.common.errors import InFlightError
 from colibri.common.types import Array
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
 from colibri.plant.environment.weather import NO_WEATHER, Weather
-from colibri.plant.physics.start import IntegrationError
 from colibri.plant.process.logs import TRUTH_COLUMNS
 from colibri.plant.vehicle.description import Vehicle
 
@@ -205,7 +204,7 @@ def fly(flight: Flight) -> Flown:
         failure = None
         try:
             fly_locally(plan, lambda _sim_time_s: None)
-        except (IntegrationError, DecisionError) as error:
+        except InFlightError as error:
             failure = str(error)
         recording = read_recording(plan)
         limits = (plan.vehicle.rotors.idle_speed, _top_speed(plan, recording["t"]))

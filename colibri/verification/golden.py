@@ -9,20 +9,9 @@ from typing import Annotated, NamedTuple, NoReturn
 
 import msgspec
 
-from colibri.analysis.recording import RecordingError
-from colibri.autopilot.control.profile import ProfileError
-from colibri.autopilot.control.qp import SolverError
-from colibri.autopilot.control.registry import ControllerError, DecisionError
-from colibri.autopilot.guidance.trajectories.tracks import TrackError
+from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
 from colibri.flights.fly import make_folder
-from colibri.flights.plan import PlanError
-from colibri.flights.processes import FlightError
-from colibri.plant.physics.start import IntegrationError
-from colibri.sitl.backends.setting import SettingError
-from colibri.sitl.backends.stage import StageError
-from colibri.sitl.ground_station import RefusedError
-from colibri.sitl.vehicle import NotInTimeError
 from colibri.verification.cases import Case, SitlCase
 from colibri.verification.golden_flights import FLIGHTS
 
@@ -30,10 +19,6 @@ FOUND = "golden.json"
 """File in the folder of the logs: what each flight came to."""
 _SHOWN = 16
 _NO_HASH = "-"
-_ERRORS = (
-    *(ControllerError, DecisionError, ProfileError, SolverError, TrackError, IntegrationError, PlanError, FlightError),
-    *(RecordingError, SettingError, StageError, RefusedError, NotInTimeError),
-)
 
 _Hash = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
 
@@ -97,7 +82,7 @@ def fly_golden(flight: Case | SitlCase, out: Path, link: str) -> Outcome:
     began_s = perf_counter()
     try:
         sha256, error = flight.fly(out, link), ""
-    except _ERRORS as failure:
+    except Error as failure:
         sha256, error = "", str(failure)
     return Outcome(flight.name, sha256, perf_counter() - began_s, error)
 

@@ -4,14 +4,11 @@ import argparse
 from pathlib import Path
 from typing import NamedTuple
 
-from colibri.autopilot.control.profile import ProfileError
-from colibri.autopilot.control.qp import SolverError
-from colibri.autopilot.control.registry import ControllerError, DecisionError
+from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
 from colibri.flights.processes import FlightError
 from colibri.flights.replay import replay_flight
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.plant.physics.start import IntegrationError
 from colibri.verification.cases import Case
 
 _SHOWN = 16
@@ -68,10 +65,10 @@ def verify(args: argparse.Namespace) -> int:
         args.duration = DEFAULT_DURATION_S
     try:
         verdicts = [_verdict(case, args) for case in CASES]
-    except (ControllerError, ProfileError, SolverError, IntegrationError, DecisionError) as error:
-        fail(str(error), EXIT_FAILED)
     except FlightError as error:
         fail(str(error), error.code)
+    except Error as error:
+        fail(str(error), EXIT_FAILED)
     except KeyboardInterrupt:
         fail(f"interrupted; what was logged is in {args.out}", EXIT_INTERRUPTED)
     if not args.quiet:

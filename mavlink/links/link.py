@@ -6,6 +6,7 @@ from time import perf_counter
 from typing import Protocol
 
 from colibri.common.types import Address
+from colibri.mavlink.errors import MavlinkError
 
 SPIN_S = 1e-3
 """How long to look for a datagram before going to sleep: on loopback a wake-up costs more than the exchange.
@@ -16,7 +17,7 @@ Each look gives the core away if somebody else could use it: that may be the ver
 give_way = getattr(os, "sched_yield", lambda: None)
 
 
-class LinkError(Exception):
+class LinkError(MavlinkError):
     """A link that cannot be opened or used; the message is the one line that a user needs."""
 
 

@@ -3,6 +3,7 @@
 A line is vehicle id, component id, name, value and MAV_PARAM_TYPE, with tabs between them; `#` begins a remark.
 """
 
+from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, Refusal, Value, float32
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT
 
@@ -11,7 +12,7 @@ _LARGEST_ID = 255
 _HEADER = "# Onboard parameters for Vehicle {system}\n#\n# Vehicle-Id Component-Id Name Value Type\n"
 
 
-class ParameterFileError(Exception):
+class ParameterFileError(MavlinkError):
     """A parameter file that cannot be used; the message names line and parameter."""
 
 

@@ -7,6 +7,7 @@ is 13 bytes behind the frame: link id, timestamp, and the first 48 bits of a SHA
 from hashlib import sha256
 from hmac import compare_digest
 
+from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.wire.dialect import MARKER, SIGNATURE_BYTES, SIGNED
 
 KEY_BYTES = 32
@@ -27,7 +28,7 @@ _NEVER_SIGNED = frozenset({"RADIO_STATUS"})
 """Radios put these in by themselves and have no key: "always accepted without signing"."""
 
 
-class SigningError(Exception):
+class SigningError(MavlinkError):
     """A key that is none; the message is what a user needs."""
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from colibri.common.process.log_files import open_for_writing
+from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.wire.framing import frame_length
 
 STAMP = struct.Struct(">Q")
@@ -23,7 +24,7 @@ class Logged(NamedTuple):
     frame: bytes
 
 
-class TlogError(Exception):
+class TlogError(MavlinkError):
     """What is no telemetry log; the message says where it ceases to be one."""
 
 

@@ -5,15 +5,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.common.errors import InFlightError
 from colibri.common.rotations import earth_from_body, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.hil.feedback import Feedback
+from colibri.plant.errors import PlantError
 from colibri.plant.vehicle.description import Vehicle, VehicleError
 
 _DEEPEST_START_M = 0.01
 
 
-class IntegrationError(Exception):
+class IntegrationError(PlantError, InFlightError):
     """The state cannot be integrated any further."""
 
 

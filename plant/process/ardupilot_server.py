@@ -3,18 +3,18 @@
 import argparse
 from time import perf_counter
 
+from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, undisturbed
 from colibri.common.process.log_files import CsvLog
 from colibri.common.process.status import Progress, Status
 from colibri.common.types import Address
-from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.udp import UdpLink
-from colibri.plant.physics.start import IntegrationError, Start
+from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.ardupilot import ArduPilotEnd
 from colibri.plant.process.logs import TRUTH_COLUMNS, truth_row
 from colibri.plant.process.options import nudged, weather_of
-from colibri.plant.vehicle.description import VehicleError, load_vehicle
+from colibri.plant.vehicle.description import load_vehicle
 
 _SILENCE_SAID_AFTER_S = 2.0
 _WAIT_AT_MOST_S = 0.1
@@ -27,7 +27,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         vehicle = load_vehicle(args.vehicle).without(args.without)
         motors = vehicle.rotors.numbering()
         start = starting_world(nudged(Start(psi=args.home.yaw_enu_deg)._replace(**args.start)), vehicle, weather)
-    except VehicleError as error:
+    except Error as error:
         fail(str(error))
     frame_type = motors.ardupilot_frame_type
     expo = 1 if vehicle.rotors.control == "speed" else 0
@@ -38,7 +38,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     try:
         with undisturbed():
             _serve(end, link, status, stop, log, duration_s=args.duration)
-    except (IntegrationError, LinkError) as error:
+    except Error as error:
         fail(str(error), EXIT_FAILED)
     finally:
         link.close()

@@ -6,13 +6,14 @@ from math import hypot
 from time import perf_counter, sleep
 
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, undisturbed
 from colibri.common.process.status import Progress, Status
 from colibri.common.rotations import earth_from_body
 from colibri.mavlink.hil.px4_simulator import SimulatorEnd, Truth
 from colibri.mavlink.hil.state import ActuatorCommand
-from colibri.mavlink.links.link import GroundLink, LinkError, receive_soon
-from colibri.plant.physics.start import IntegrationError, Start
+from colibri.mavlink.links.link import GroundLink, receive_soon
+from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.options import nudged, weather_of
@@ -28,12 +29,12 @@ def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) 
     """Serve PX4 on `link` as the command line says; return the exit code."""
     try:
         simulator = Simulator(args, link, status, stop)
-    except VehicleError as error:
+    except Error as error:
         fail(str(error))
     try:
         with undisturbed():
             simulator.serve()
-    except (IntegrationError, LinkError) as error:
+    except Error as error:
         fail(str(error), EXIT_FAILED)
     finally:
         link.close()

@@ -2,19 +2,19 @@
 
 import argparse
 
+from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, undisturbed
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
-from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.udp import UdpLink
-from colibri.plant.physics.start import DEFAULT_STARTS, IntegrationError
+from colibri.plant.physics.start import DEFAULT_STARTS
 from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.options import nudged, weather_of
 from colibri.plant.process.server import Server
 from colibri.plant.sensors.suite import served_by
 from colibri.plant.simulation.plant import Plant
-from colibri.plant.vehicle.description import VehicleError, load_vehicle
+from colibri.plant.vehicle.description import load_vehicle
 
 
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
@@ -26,7 +26,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         worlds = {
             it: starting_world(nudged(DEFAULT_STARTS[it]._replace(**args.start)), vehicle, weather) for it in serves
         }
-    except VehicleError as error:
+    except Error as error:
         fail(str(error))
     physics = Physics(vehicle, args.integrator, weather)
     if args.truth:  # several flights share the cores: whoever waits gives way at once
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
                     latency_us=round(args.latency * 1e3),
                 )
                 server.fly(plant, duration_s=args.duration, speed=args.speed)
-    except (IntegrationError, LinkError) as error:
+    except Error as error:
         fail(str(error), EXIT_FAILED)
     finally:
         link.close()

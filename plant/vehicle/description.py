@@ -11,6 +11,7 @@ import numpy as np
 from colibri.common.config import NotNegative, Positive, read_named, toml_names
 from colibri.common.elementary import square
 from colibri.common.types import Array, FourRotors
+from colibri.plant.errors import PlantError
 from colibri.plant.vehicle.rotor_numbering import Numbering, numbering
 from colibri.plant.vehicle.sensors import Sensors as Sensors
 
@@ -26,7 +27,7 @@ _FASTEST_CONTACT_RAD_S = 2500.0
 """Runge-Kutta 4 in steps of 1 ms is stable up to 2785."""
 
 
-class VehicleError(Exception):
+class VehicleError(PlantError):
     """A vehicle file that cannot be flown; the message names file and key."""
 
 

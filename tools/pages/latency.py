@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.analysis.recording import Recording, RecordingError, read_recording
+from colibri.analysis.recording import Recording, read_recording
 from colibri.analysis.tables import markdown
-from colibri.autopilot.control.registry import DecisionError
+from colibri.common.errors import InFlightError
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
-from colibri.plant.physics.start import IntegrationError
 
 ROUND_TRIPS_MS = (*range(0, 31, 2), *range(40, 101, 10))
 LOST_M = 5.0
@@ -117,7 +116,7 @@ def fly(case: Case, round_trip_ms: float) -> Merit | None:
         try:
             fly_locally(plan, lambda _sim_time_s: None)
             return merit(read_recording(plan), case)
-        except (IntegrationError, DecisionError, RecordingError):
+        except InFlightError:
             return None
 
 

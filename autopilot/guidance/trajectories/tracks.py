@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.guidance.trajectories.taylor import Jet, atan2, cos, sin
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, WaypointsError, read_waypoints
 from colibri.common.config import Table
@@ -37,7 +38,7 @@ _INSTANT_S = 1e-9
 """Times are whole microseconds: what differs by less than this is rounding."""
 
 
-class TrackError(Exception):
+class TrackError(AutopilotError):
     """There is no such track, or it cannot be flown; one line says what there is."""
 
 

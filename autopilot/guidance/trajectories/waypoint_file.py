@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from colibri.autopilot.errors import AutopilotError
 from colibri.common.types import Array
 
 DEFAULT_SPEED_M_S = 2.0
@@ -19,7 +20,7 @@ _FARTHEST = 1e4
 """Of every number in the file, in its unit."""
 
 
-class WaypointsError(Exception):
+class WaypointsError(AutopilotError):
     """Waypoints that cannot be flown; the message names file, line and column."""
 
 

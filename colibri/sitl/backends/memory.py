@@ -8,19 +8,17 @@ from time import perf_counter
 from typing import Any
 
 from colibri.autopilot.__main__ import command_line as autopilot_command_line
-from colibri.autopilot.control.profile import ProfileError, load_profile
-from colibri.autopilot.control.qp import SolverError
-from colibri.autopilot.control.registry import ControllerError, DecisionError
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.registry import DecisionError
 from colibri.autopilot.estimation.state_source import estimator_for
-from colibri.autopilot.guidance.trajectories.tracks import TrackError
 from colibri.autopilot.process.ground import open_ground
+from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.status import Status
 from colibri.common.types import Address
 from colibri.mavlink.hil.conductor import Turn
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
-from colibri.mavlink.links.link import LinkError
 from colibri.plant.__main__ import command_line as plant_command_line
 from colibri.plant.physics.start import DEFAULT_STARTS, IntegrationError
 from colibri.plant.physics.world import Physics, starting_world, state_frame
@@ -154,7 +152,7 @@ class MemoryAutopilot:
             estimator = estimator_for(args.feedback, vehicle, args.home.origin)
             self._desk = _Desk()
             self._ground = open_ground(args, profile, vehicle, estimator, _Silence(), self._desk)
-        except (ProfileError, VehicleError, TrackError, ControllerError, SolverError, LinkError) as error:
+        except Error as error:
             raise SettingError(str(error)) from error
         self._copter = self._ground.copter
         self._end = AutopilotEnd(

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from colibri.sitl.backends.link_faults import Trouble
+from colibri.sitl.errors import SitlError
 
 _STANDING = {"x": 0.0, "y": 0.0, "z": 0.0, "psi": 90.0, "rotors": 0.0}
 """On its feet at the origin, its nose to the north."""
 
 
-class SettingError(Exception):
+class SettingError(SitlError):
     """A flight that cannot begin so; the message is the one line that a user needs."""
 
 

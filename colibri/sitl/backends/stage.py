@@ -18,6 +18,7 @@ from colibri.mavlink.wire.dialect import (
     mav,
 )
 from colibri.sitl.backends.link_faults import Pipe, Trouble
+from colibri.sitl.errors import SitlError
 
 _HEADER_BYTES, _CRC_BYTES, _COMPONENT_AT = 10, 2, 6
 
@@ -28,7 +29,7 @@ _GIVE_UP_S = 20.0
 """Of the clock that a link is late by. No flight depends on it."""
 
 
-class StageError(Exception):
+class StageError(SitlError):
     """A flight that cannot go on: a process has died, or does not answer; the message says which and why."""
 
 

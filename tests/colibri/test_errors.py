@@ -1,0 +1,166 @@
+"""Errors: one base above all that a user may see, one a package, and nobody lists them by hand."""
+
+import ast
+import builtins
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import colibri
+from colibri.autopilot.control.registry import DecisionError
+from colibri.autopilot.errors import AutopilotError
+from colibri.cli.main import main
+from colibri.common.errors import Error, InFlightError
+from colibri.mavlink.errors import MavlinkError
+from colibri.mavlink.links.link import LinkError
+from colibri.plant.errors import PlantError
+from colibri.plant.physics.start import IntegrationError
+from colibri.sitl.errors import SitlError
+from colibri.sitl.vehicle import NotInTimeError
+
+SHIPPED = Path(colibri.__file__).parent
+PACKAGES = {
+    "autopilot": "AutopilotError",
+    "mavlink": "MavlinkError",
+    "plant": "PlantError",
+    "sitl": "SitlError",
+}
+INSIDE = {
+    "Refused": "a setpoint that is not flown is counted",
+    "_RefusedError": "a file operation's way out, answered in the same file",
+}
+"""Exceptions that never leave their file's callers: no user sees them."""
+
+
+def sources() -> Iterator[tuple[Path, ast.Module]]:
+    paths = [path for link in sorted(SHIPPED.iterdir()) for path in link.rglob("*.py")]  # rglob follows no links below
+    for path in [*SHIPPED.glob("*.py"), *paths]:
+        yield path.relative_to(SHIPPED), ast.parse(path.read_text(encoding="utf-8"))
+
+
+def names(node: ast.expr | None) -> list[str]:
+    """Return the last parts of the names in an expression."""
+    elements = node.elts if isinstance(node, ast.Tuple) else [] if node is None else [node]
+    return [each.attr if isinstance(each, ast.Attribute) else getattr(each, "id", "") for each in elements]
+
+
+def exceptions() -> dict[str, tuple[str, set[str]]]:
+    """Return each exception class that is shipped: its file, and the names of all that it derives from."""
+    classes: dict[str, tuple[str, list[str]]] = {}
+    for path, tree in sources():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):  # FTP has an enumeration Error, too: of one name all bases count
+                bases = [name for base in node.bases for name in names(base)]
+                classes[node.name] = (str(path), classes.get(node.name, ("", []))[1] + bases)
+
+    def above(name: str) -> set[str]:
+        found: set[str] = set()
+        left = [name]
+        while left:
+            bases = classes.get(left.pop(), ("", []))[1]
+            left += [base for base in bases if base not in found]
+            found.update(bases)
+        return found
+
+    def raises(name: str) -> bool:
+        known = getattr(builtins, name, None)
+        return isinstance(known, type) and issubclass(known, BaseException)
+
+    return {
+        name: (path, above(name)) for name, (path, _) in classes.items() if any(raises(base) for base in above(name))
+    }
+
+
+def test_every_exception_that_a_user_may_see_is_an_error() -> None:
+    found = exceptions()
+    assert len(found) > 25
+    assert {name for name, (_, above) in found.items() if "Error" not in above and name != "Error"} == INSIDE.keys()
+
+
+def test_each_package_has_one_base() -> None:
+    for name, (path, above) in exceptions().items():
+        base = PACKAGES.get(path.partition("/")[0])
+        if base and name not in ("Error", base, *INSIDE):
+            assert base in above, f"{path}: {name}"
+
+
+def test_no_one_lists_errors_by_hand() -> None:
+    errors = exceptions()
+    for path, tree in sources():
+        for node in ast.walk(tree):
+            caught = node.type if isinstance(node, ast.ExceptHandler) else node if isinstance(node, ast.Tuple) else None
+            listed = [name for name in names(caught) if name in errors]
+            assert len(listed) < 2, f"{path}:{node.lineno}: {listed}"  # type: ignore[attr-defined]
+
+
+def test_what_is_caught_by_which_base() -> None:
+    assert colibri.Error is Error
+    assert issubclass(LinkError, MavlinkError)
+    for error, base in ((DecisionError, AutopilotError), (IntegrationError, PlantError)):
+        assert issubclass(error, base)
+        assert issubclass(error, InFlightError)
+    assert issubclass(NotInTimeError, SitlError)
+    assert issubclass(NotInTimeError, AssertionError)
+    for mistake in (AssertionError, ValueError, TypeError, OSError):
+        assert not issubclass(mistake, Error)
+
+
+def exit_code(*command: str) -> int | str | None:
+    try:
+        return main(list(command))
+    except SystemExit as ended:
+        return ended.code
+
+
+@pytest.mark.parametrize(
+    ("command", "line"),
+    [
+        (["replay", "nowhere.tlog"], "inputs.jsonl is missing"),
+        (["compare", "--profile", "fast"], "unknown profile fast: choose"),
+        (["compare", "--seeds", "1-2", "--track", "loop"], "unknown track loop: choose"),
+        (["sitl", "--vehicle", "dragonfly"], "unknown vehicle dragonfly: choose"),
+    ],
+)
+def test_what_cannot_begin_is_one_line_and_exit_code_2(
+    command: list[str], line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert exit_code(*command) == 2
+    said = capsys.readouterr().err
+    assert line in said
+    assert said.startswith("colibri: error: ")
+    assert said.count("\n") == 1
+
+
+def test_a_process_that_cannot_begin_says_one_line_and_exits_with_2() -> None:
+    command = [sys.executable, "-m", "colibri", "autopilot", "--profile", "fast"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("colibri: error: unknown profile fast: choose ")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (DecisionError("nan"), 1, "colibri: error: nan; what was logged is in {out}\n"),
+        (LinkError("no way"), 2, "colibri: error: no way\n"),
+    ],
+)
+def test_a_flight_that_ends_says_where_its_logs_are_and_one_that_never_began_does_not(
+    error: Error,
+    code: int,
+    line: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("colibri.cli.fly_and_report.fly_plan", fail)
+    assert exit_code("fly", "hover", "--quiet", "--out", str(tmp_path)) == code
+    assert capsys.readouterr().err == line.format(out=tmp_path)
