@@ -214,6 +214,13 @@ def test_a_foreign_law_that_cannot_be_loaded_is_one_line(tmp_path: Path, link: s
 
 
 @pytest.mark.parametrize("link", ["udp", "direct"])
+def test_a_foreign_law_that_cannot_be_built_says_why_in_one_line(tmp_path: Path, link: str) -> None:
+    law = "import colibri\n\n\ndef TheirLaw(*_):\n    raise colibri.Error('mind the gap')\n"
+    done = fly_theirs(tmp_path, foreign_package(tmp_path, law), "--controller", "their-name", "--link", link)
+    assert (done.returncode, done.stderr) == (2, "colibri: error: mind the gap\n")
+
+
+@pytest.mark.parametrize("link", ["udp", "direct"])
 def test_a_foreign_law_that_goes_wild_ends_in_words(tmp_path: Path, link: str) -> None:
     wild = example().replace("rotor_speeds=", "rotor_speeds=float('nan') * ")
     done = fly_theirs(tmp_path, foreign_package(tmp_path, wild), "--controller", "their-name", "--link", link)
