@@ -1,15 +1,13 @@
-"""`colibri bench`: its options and its call."""
+"""`colibri bench`: its options, and its call."""
 
 from argparse import Namespace
 from pathlib import Path
 
 from colibri.common.process.arguments import ArgumentParser, positive
 
-HELP = "measure how fast it flies"
-
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `colibri bench`."""
     add = parser.add_argument
     add(
         "--only",
@@ -32,7 +30,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Do it; return the exit code."""
+    """Measure as the command line says; return the exit code."""
     from colibri.bench.run import bench
 
     return bench(args)

@@ -1,4 +1,4 @@
-"""`colibri compare`: its options and its call."""
+"""`colibri compare`: its options, and its call."""
 
 from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
@@ -8,8 +8,6 @@ from colibri.common.process.arguments import ArgumentParser, positive
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import NO_WIND
 from colibri.plant.process.options import add_weather_arguments
-
-HELP = "fly several controllers on several tracks, side by side"
 
 COMPARED_S = 100.0
 
@@ -34,7 +32,7 @@ def seeds(text: str) -> range:
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `colibri compare`."""
     add = parser.add_argument
     add(
         "--profile",
@@ -67,7 +65,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Fly side by side what the options say; return the exit code."""
+    """Compare as the command line says; return the exit code."""
     if in_another_world(args):
         from colibri.studies.seeds import compare_seeds
 

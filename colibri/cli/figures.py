@@ -1,15 +1,13 @@
-"""`colibri figures`: its options and its call."""
+"""`colibri figures`: its options, and its call."""
 
 from argparse import Namespace
 from pathlib import Path
 
 from colibri.common.process.arguments import ArgumentParser
 
-HELP = "fly all that the thesis shows and draw its figures"
-
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `colibri figures`."""
     add = parser.add_argument
     add(
         "--out",
@@ -23,7 +21,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Do it; return the exit code."""
+    """Fly and draw as the command line says; return the exit code."""
     from colibri.studies.thesis_figures import figures
 
     return figures(args)

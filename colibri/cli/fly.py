@@ -1,4 +1,4 @@
-"""`colibri fly`: its options and its call."""
+"""`colibri fly`: its options, and its call."""
 
 from argparse import Namespace
 from pathlib import Path
@@ -6,8 +6,6 @@ from pathlib import Path
 from colibri.cli.shared_options import add_feedback, add_signing
 from colibri.common.process.arguments import ArgumentParser, natural, positive, speed
 from colibri.plant.process.options import LATENCY_HELP, add_world_arguments, latency
-
-HELP = "fly a track and report how well it went"
 
 TRACK_HELP = (
     "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
@@ -17,7 +15,7 @@ TRACK_HELP = (
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `colibri fly`."""
     add = parser.add_argument
     add("track", metavar="TRACK", help=TRACK_HELP)
     add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
@@ -61,7 +59,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Do it; return the exit code."""
+    """Fly as the command line says; return the exit code."""
     from colibri.cli.fly_and_report import fly
 
     return fly(args)

@@ -4,64 +4,70 @@ import signal
 import sys
 import threading
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
-from typing import Protocol
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Protocol, cast
 
-from colibri.cli import bench, compare, figures, fly, replay, sitl, study, verify
 from colibri.cli.processes import PROCESSES, run_process
 from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail, use_one_thread
 
+SUBCOMMANDS = {
+    "fly": "fly a track and report how well it went",
+    "sitl": "stand ready for ground stations: QGroundControl, MAVSDK, MAVProxy",
+    "figures": "fly all that the thesis shows and draw its figures",
+    "compare": "fly several controllers on several tracks, side by side",
+    "study": "fly what shows how far profile flight reaches, and draw it",
+    "bench": "measure how fast it flies",
+    "replay": "feed a recorded flight to the autopilot: are its answers the same?",
+    "verify": "fly a fixed set of flights: is every bit the same, twice, or as it once was?",
+}
+"""What each does, by its name, which is also that of its file beside this one."""
+
 
 class Subcommand(Protocol):
-    """A file of this folder: `HELP` is its line in `colibri --help`."""
-
-    HELP: str
+    """The file of a subcommand."""
 
     def add_options(self, parser: ArgumentParser) -> None:
-        """Add the options."""
+        """Add its options."""
         ...
 
     def run(self, args: Namespace) -> int:
-        """Do what the options say; return the exit code."""
+        """Do it; return the exit code."""
         ...
 
 
-SUBCOMMANDS: Mapping[str, Subcommand] = {
-    "fly": fly,
-    "sitl": sitl,
-    "figures": figures,
-    "compare": compare,
-    "study": study,
-    "bench": bench,
-    "replay": replay,
-    "verify": verify,
-}
-
-
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: list[str] | None = None) -> int:
     """Run a subcommand; return the exit code."""
     given = sys.argv[1:] if argv is None else argv
     if given and given[0] in PROCESSES:
         return run_process(given[0], given[1:])
-    args = _parser().parse_args(given)
     use_one_thread()
+    args = _parser(given).parse_args(given)
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that what was started is ended, too
     try:
-        return SUBCOMMANDS[args.command].run(args)
+        return _subcommand(args.command).run(args)
     except Error as error:
         fail(str(error), EXIT_FAILED)
     except KeyboardInterrupt:
         fail("interrupted", EXIT_INTERRUPTED)
 
 
-def _parser() -> ArgumentParser:
+def _parser(given: Sequence[str]) -> ArgumentParser:
+    """Return the parser of the whole command, with the options of the subcommand that is given alone."""
     parser = ArgumentParser(prog="colibri", description="A quadrotor autopilot in pure Python, flown over MAVLink.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, subcommand in SUBCOMMANDS.items():
-        subcommand.add_options(commands.add_parser(name, help=subcommand.HELP))
+    asked = next((word for word in given if word in SUBCOMMANDS), None)
+    for name, what in SUBCOMMANDS.items():
+        options = commands.add_parser(name, help=what)
+        if name == asked:
+            _subcommand(name).add_options(options)
     for name, what in PROCESSES.items():
         commands.add_parser(name, help=what, add_help=False)
     return parser
+
+
+def _subcommand(name: str) -> Subcommand:
+    return cast(Subcommand, import_module(f"colibri.cli.{name}"))

@@ -1,4 +1,4 @@
-"""`colibri sitl`: its options and its call."""
+"""`colibri sitl`: its options, and its call."""
 
 from argparse import Namespace
 from math import inf
@@ -9,11 +9,9 @@ from colibri.common.earth.home import DEFAULT_HOME, home
 from colibri.common.process.arguments import ArgumentParser, natural, positive, speed
 from colibri.plant.process.options import add_world_arguments
 
-HELP = "stand ready for ground stations: QGroundControl, MAVSDK, MAVProxy"
-
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `colibri sitl`."""
     add = parser.add_argument
     add(
         "--instance", type=natural, default=0, metavar="N", help="number of the (first) vehicle: its system id is N + 1"
@@ -63,7 +61,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Do it; return the exit code."""
+    """Serve ground stations as the command line says; return the exit code."""
     from colibri.flights.fleet import sitl
 
     return sitl(args)

@@ -1,15 +1,13 @@
-"""`colibri study`: its options and its call."""
+"""`colibri study`: its options, and its call."""
 
 from argparse import Namespace
 from pathlib import Path
 
 from colibri.common.process.arguments import ArgumentParser
 
-HELP = "fly what shows how far profile flight reaches, and draw it"
-
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `colibri study`."""
     add = parser.add_argument
     add(
         "names",
@@ -28,7 +26,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Do it; return the exit code."""
+    """Study as the command line says; return the exit code."""
     from colibri.studies.studies import study
 
     return study(args)

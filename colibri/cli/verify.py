@@ -1,17 +1,15 @@
-"""`colibri verify`: its options and its call."""
+"""`colibri verify`: its options, and its call."""
 
 from argparse import Namespace
 from pathlib import Path
 
 from colibri.common.process.arguments import ArgumentParser, positive
 
-HELP = "fly a fixed set of flights: is every bit the same, twice, or as it once was?"
-
 GOLDEN_HASHES = Path("tests/golden/hashes.json")
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options."""
+    """Add the options of `colibri verify`."""
     add = parser.add_argument
     add("--link", default="udp", choices=("udp", "memory"), help="of the flights (default %(default)s)")
     add("--duration", type=positive, metavar="S", help="simulated time of each flight (default 20; golden: its own)")
@@ -31,7 +29,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Fly what the options say, and compare; return the exit code."""
+    """Verify as the command line says; return the exit code."""
     if args.golden is not None:
         from colibri.verification.golden import verify_golden
 

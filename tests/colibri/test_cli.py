@@ -2,20 +2,34 @@
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import psutil
 import pytest
 
-from colibri.cli.main import main
+from colibri.cli.main import SUBCOMMANDS, main
+from colibri.cli.processes import PROCESSES
 from colibri.mavlink.links.open import open_link
 from tools.harness.processes import wait_for
 
 VEHICLE = Path(__file__).parents[2] / "plant" / "vehicle" / "models" / "hummingbird.toml"
+LONGEST_HELP_S = 0.2
+"""Of a core, startup of Python included."""
+HELP = """
+import sys
+from colibri.cli.main import SUBCOMMANDS, main
+from colibri.cli.processes import PROCESSES
+try:
+    main(["--help"])
+finally:
+    print(*sys.modules, file=sys.stderr)
+"""
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "thesis.toml"
 
 
@@ -159,6 +173,25 @@ def test_out_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixtur
         main(["fly", "spiral", "--quiet", "--out", str(occupied / "out")])
     assert ended.value.code == 2
     assert capsys.readouterr().err == f"colibri: error: cannot write to --out {occupied / 'out'}: Not a directory\n"
+
+
+@pytest.mark.parametrize("command", SUBCOMMANDS)
+def test_every_subcommand_has_options_and_a_call(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code([command, "--help"]) == 0
+    assert capsys.readouterr().out.startswith(f"usage: colibri {command} ")
+    assert callable(import_module(f"colibri.cli.{command}").run)
+
+
+def test_help_names_every_command_and_loads_nothing_that_is_large() -> None:
+    took_s = []
+    for _ in range(5):
+        before_s = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        done = subprocess.run([sys.executable, "-c", HELP], capture_output=True, text=True, check=True)
+        took_s.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before_s)
+    for command in (*SUBCOMMANDS, *PROCESSES):
+        assert f"\n    {command}" in done.stdout
+    assert not {"numpy", "numba", "msgspec", "pymavlink", "rich"} & set(done.stderr.split())
+    assert min(took_s) < LONGEST_HELP_S
 
 
 @pytest.mark.parametrize("package", ["plant", "autopilot"])
