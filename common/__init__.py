@@ -1,4 +1,4 @@
-"""What every package may use and nothing here knows a vehicle or MAVLink."""
+"""What every package may use; nothing here knows a vehicle or MAVLink."""
 
 from typing import TYPE_CHECKING
 

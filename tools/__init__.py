@@ -1,1 +1,1 @@
-"""The command line: fly both processes and report, draw, measure."""
+"""The repository's own scripts; nothing of it is shipped."""

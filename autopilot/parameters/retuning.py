@@ -8,14 +8,12 @@ import numpy as np
 from colibri.autopilot.control.interface import Clock, Controller, Horizon, Preview, VehicleState
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import (
-    ControllerError,
-    DecisionError,
     check_controller,
     check_rotor_speeds,
     load_controller,
 )
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers
-from colibri.common.config import SettingsError
+from colibri.common.errors import Error
 from colibri.mavlink.parameters.store import Refusal, Value
 from colibri.plant.vehicle.description import Vehicle
 
@@ -102,7 +100,7 @@ def builder(controller: str, clock: Clock) -> Build:
 def _in_words(error: Exception) -> str:
     """Return one line: a refusal is its own words, of anything else the words may not say what it is."""
     words = " ".join(str(error).split())
-    if words and isinstance(error, ControllerError | DecisionError | SettingsError):
+    if words and isinstance(error, Error):
         return words
     return f"{type(error).__name__}: {words}" if words else type(error).__name__
 
