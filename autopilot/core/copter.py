@@ -27,7 +27,7 @@ from colibri.autopilot.guidance.tasks.task import Steered
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
 from colibri.autopilot.parameters.retuning import Tuning, builder
-from colibri.mavlink.hil.plant_status import NOTHING, Aside
+from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.mavlink.node.hub import Outgoing
@@ -126,7 +126,7 @@ class Copter:
         self._missed_us: int | None = None
         self._waiting_us: int | None = None
         self._solving = SolveTime(self._loop.control_interval_us)
-        self._aside = NOTHING
+        self._plant_status = NOTHING
         self._sent = STILL
         self.rotor_loss = RotorLoss(believed, self._loop.control_interval_us)
         self.rotor_loss.enabled = flies_by.land_on_three
@@ -148,20 +148,19 @@ class Copter:
         """How many decisions have taken longer than a control interval, in simulated time."""
         return self._solving.missed
 
-    def hear(self, aside: Aside) -> None:
-        """Take in what the plant tells beside the frame of the next step."""
-        self._aside = aside
-        if aside.battery is not None:
-            self._loop.know_charge(aside.battery.used_ah)
-            self.power.hear(aside.battery)
+    def step(self, frame: Frame, plant_status: PlantStatus = NOTHING) -> Step:
+        """Answer a frame of the plant and what it tells beside it.
 
-    def step(self, frame: Frame) -> Step:
-        """Answer a frame of the plant; on sensors nothing is known, and nobody obeyed, before the first estimate.
+        On sensors nothing is known, and nobody obeyed, before the first estimate.
 
         Raises:
             DecisionError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
+        self._plant_status = plant_status
+        if plant_status.battery is not None:
+            self._loop.know_charge(plant_status.battery.used_ah)
+            self.power.hear(plant_status.battery)
         if self._wakes:
             self._wake(frame.time_us)
         due = self._loop.is_due(frame.time_us)
@@ -200,8 +199,8 @@ class Copter:
         if self._sample is not None:
             sample, self._sample = self._sample, None
             self._report(*sample)
-        self.stations.hear_plant(self._aside, now_us)
-        self._aside = NOTHING
+        self.stations.hear_plant(self._plant_status, now_us)
+        self._plant_status = NOTHING
         hub = self.stations.hub
         for datagram, link, address, loopback in inbox:
             hub.receive(datagram, link, address, now_us, loopback=loopback)

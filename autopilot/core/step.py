@@ -1,10 +1,14 @@
-"""What a step of any autopilot takes and returns."""
+"""What a step of any autopilot takes and returns, and how it answers a datagram of the plant."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from colibri.autopilot.control.interface import Decision
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.mavlink.hil.faults import Fault
+from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
+from colibri.mavlink.hil.plant_status import PlantStatus
+from colibri.mavlink.hil.px4_autopilot import FlierEnd
+from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand
 
 STILL = (0.0, 0.0, 0.0, 0.0)
@@ -39,6 +43,28 @@ class Step(NamedTuple):
 def nothing_known(time_us: int, duration_s: float) -> Step:
     """Return the answer to a frame of a vehicle of which nothing is known."""
     return Step(ActuatorCommand(time_us, STILL, armed=False), None, duration_s, known=False)
+
+
+class Steps(Protocol):
+    """An autopilot."""
+
+    def step(self, frame: Frame, plant_status: PlantStatus) -> Step:
+        """Answer a frame and what the plant tells beside it."""
+        ...
+
+
+def answer(end: AutopilotEnd | FlierEnd, autopilot: Steps, datagram: bytes, now_s: float) -> Step | None:
+    """Have `autopilot` answer a plant's datagram at its `end` of the link; None if that brings no frame to compute.
+
+    Raises:
+        DecisionError: The control law gave what no rotor can follow.
+    """
+    received = end.receive(datagram, now_s)
+    if received is None:
+        return None
+    step = autopilot.step(*received)
+    end.answer(step.command, step.faults)
+    return step
 
 
 class Received(NamedTuple):

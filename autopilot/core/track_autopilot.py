@@ -7,7 +7,7 @@ from colibri.autopilot.core.step import Step, follows, nothing_known
 from colibri.autopilot.estimation.state_source import Estimator, Senses
 from colibri.autopilot.guidance.trajectories.planner import plan
 from colibri.autopilot.guidance.trajectories.tracks import Track
-from colibri.mavlink.hil.plant_status import Aside
+from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.vehicle.description import Vehicle
@@ -45,13 +45,8 @@ class Autopilot:
         self.frame_interval_us = self._loop.frame_interval_us
         self._senses = Senses(estimator, self.frame_interval_us)
 
-    def hear(self, aside: Aside) -> None:
-        """Take in what the plant tells beside the frame of the next step."""
-        if aside.battery is not None:
-            self._loop.know_charge(aside.battery.used_ah)
-
-    def step(self, frame: Frame) -> Step:
-        """Answer a frame.
+    def step(self, frame: Frame, plant_status: PlantStatus = NOTHING) -> Step:
+        """Answer a frame and what the plant tells beside it.
 
         Frames follow one another at the frame interval; a plant that runs freely may lose a few. One that comes much
         later, or earlier, begins a new flight: with the profile's rotor speed at time 0, and with hover in mid-flight,
@@ -62,6 +57,8 @@ class Autopilot:
             DecisionError: The control law gave what no rotor can follow.
         """
         started_s = self._clock()
+        if plant_status.battery is not None:
+            self._loop.know_charge(plant_status.battery.used_ah)
         due = self._loop.is_due(frame.time_us)
         known = self._senses.state(frame, asked=due)
         if known is None:

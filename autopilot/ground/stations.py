@@ -18,7 +18,7 @@ from colibri.mavlink.files.log_download import Logs
 from colibri.mavlink.files.memory import Memory
 from colibri.mavlink.files.tree import Files, Tree
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.plant_status import Aside
+from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.node.hub import Hub, Outgoing
 from colibri.mavlink.node.service import to
 from colibri.mavlink.parameters.metadata import Metadata
@@ -168,9 +168,9 @@ class Stations:
             self._logs_stream = snapshot.armed
             self._streams.use(self._log_channel, SDK if snapshot.armed else SILENT)
 
-    def hear_plant(self, aside: Aside, now_us: int) -> None:
+    def hear_plant(self, plant_status: PlantStatus, now_us: int) -> None:
         """Take in what the plant says of faults that were asked for."""
-        ended = self.failures.poll(aside.results, now_us)
+        ended = self.failures.poll(plant_status.results, now_us)
         if ended is not None:
             command, outcome = ended
             self.hub.send(self._obeys.finish(command.id, command.peer, outcome))

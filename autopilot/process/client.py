@@ -3,7 +3,7 @@
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from colibri.autopilot.core.step import Step
+from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.common.process.lifecycle import Stop
@@ -75,14 +75,10 @@ class Client:
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
     def _answer(self, autopilot: "Autopilot | Copter", datagram: bytes) -> Step | None:
-        frame = self._end.receive(datagram, perf_counter())
-        if frame is None:
-            return None
-        self._frame_came = True
-        autopilot.hear(self._end.aside)
-        step = autopilot.step(frame)
-        self._end.answer(step.command, step.faults)
-        self._say_if_unknown(step)
+        step = answer(self._end, autopilot, datagram, perf_counter())
+        if step is not None:
+            self._frame_came = True
+            self._say_if_unknown(step)
         return step
 
     def _say_if_unknown(self, step: Step) -> None:

@@ -5,7 +5,7 @@ from math import isfinite
 from time import perf_counter, sleep
 from typing import Protocol
 
-from colibri.autopilot.core.step import Step
+from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.process.logs import AutopilotLog
@@ -109,9 +109,7 @@ class Direct:
 
     def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and its command as it is."""
-        frame, aside = plant.tell()
-        self._autopilot.hear(aside)
-        step = self._autopilot.step(frame)
+        step = self._autopilot.step(*plant.tell())
         return step, step.command
 
 
@@ -131,8 +129,8 @@ class InMemory:
 
     def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and the command as the plant decoded it."""
-        frame, aside = plant.tell()
-        self._plant_end.offer(frame, _NEVER_LATE_S, aside)
+        frame, plant_status = plant.tell()
+        self._plant_end.offer(frame, _NEVER_LATE_S, plant_status)
         step = self._to_autopilot(frame.time_us)
         command = self._to_plant(frame.time_us)
         assert step is not None, "the autopilot answers every new frame"
@@ -144,11 +142,7 @@ class InMemory:
         sent = self._plant_end.take_outbox()
         self._logs.write_traffic(time_us, [], sent)
         for outgoing in sent:
-            frame = self._autopilot_end.receive(outgoing.datagram, _NEVER_LATE_S)
-            if frame is not None:
-                self._autopilot.hear(self._autopilot_end.aside)
-                step = self._autopilot.step(frame)
-                self._autopilot_end.answer(step.command)
+            step = answer(self._autopilot_end, self._autopilot, outgoing.datagram, _NEVER_LATE_S) or step
         return step
 
     def _to_plant(self, time_us: int) -> ActuatorCommand | None:

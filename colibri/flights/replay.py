@@ -163,12 +163,12 @@ def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
             end = _end(setups[time_us], pilot)
         if pilot is None:
             continue
-        frame = end.receive(datagram, _NO_CLOCK_S)
-        if frame is None:
+        told = end.receive(datagram, _NO_CLOCK_S)
+        if told is None:
             continue
-        pilot.hear(end.aside)
+        frame = told.frame
         try:
-            step = pilot.step(frame)
+            step = pilot.step(*told)
         except DecisionError as error:
             raise ReplayError(f"at t = {frame.time_us * 1e-6:.3f} s: {error}") from error
         known = _known(frame, step, known)

@@ -15,12 +15,7 @@ from colibri.mavlink.hil.lockstep import (
     MADE_OF,
     encode_heartbeat,
 )
-from colibri.mavlink.hil.plant_status import (
-    NOTHING,
-    Aside,
-    decode_battery,
-    decode_result,
-)
+from colibri.mavlink.hil.plant_status import PlantStatus, ReceivedFrame, decode_battery, decode_result
 from colibri.mavlink.hil.sensors import Frame, decode_sensors
 from colibri.mavlink.hil.state import (
     ActuatorCommand,
@@ -38,7 +33,6 @@ class AutopilotEnd:
         refused: The plant's refusal of the frames asked for (a MAV_RESULT), None if there was none.
         repeated: How many frames came again and got the remembered answer.
         dropped: What was received and not used, by reason.
-        aside: What the plant told beside the frame that was handed out last.
     """
 
     def __init__(
@@ -50,7 +44,6 @@ class AutopilotEnd:
         self._frame_interval_us = frame_interval_us
         self._feedback = feedback
         self._made_of = MADE_OF[feedback]
-        self.aside = NOTHING
         self._runs_freely = False
         self.refused: int | None = None
         self.repeated = 0
@@ -65,7 +58,7 @@ class AutopilotEnd:
         """How long the plant has been silent."""
         return now_s - self._heard_s
 
-    def receive(self, datagram: bytes, now_s: float) -> Frame | None:
+    def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         """Take one datagram in; return its frame if that is the next one to compute."""
         parts: dict[str, Message] = {}
         battery, results = None, []
@@ -91,9 +84,7 @@ class AutopilotEnd:
             self.dropped["invalid"] += 1
             return None
         following = self._next(frame, now_s)
-        if following is not None:
-            self.aside = Aside(battery, tuple(results))
-        return following
+        return None if following is None else ReceivedFrame(following, PlantStatus(battery, tuple(results)))
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
         """Send the command that answers the frame handed out last, with faults to happen then, and remember it."""

@@ -21,8 +21,8 @@ from colibri.mavlink.hil.lockstep import (
 )
 from colibri.mavlink.hil.plant_status import (
     NOTHING,
-    Aside,
     PlantBattery,
+    PlantStatus,
     encode_battery,
     encode_results,
 )
@@ -95,7 +95,9 @@ class PlantEnd:
         self._resend_at_s = 0.0
         self._outbox: list[Outgoing] = []
 
-    def offer(self, frame: Frame, now_s: float, aside: Aside = NOTHING, truth: StateFrame | None = None) -> None:
+    def offer(
+        self, frame: Frame, now_s: float, plant_status: PlantStatus = NOTHING, truth: StateFrame | None = None
+    ) -> None:
         """Send `frame`, of the kind of `feedback`, and what goes beside it; await the command that answers it.
 
         The `truth` is appended, as another component's, for whoever stands in between: it is not the autopilot's.
@@ -106,11 +108,11 @@ class PlantEnd:
             frames = encode_sensors(self._codec, frame)
         if frame.time_us % HEARTBEAT_EVERY_US == 0:
             frames.append(self._heartbeat())
-        if aside.results:
-            frames += encode_results(self._codec, aside.results, self._autopilot)
-        self._battery = aside.battery
-        if aside.battery is not None and frame.time_us % BATTERY_EVERY_US == 0:
-            frames.append(encode_battery(self._codec, aside.battery))
+        if plant_status.results:
+            frames += encode_results(self._codec, plant_status.results, self._autopilot)
+        self._battery = plant_status.battery
+        if plant_status.battery is not None and frame.time_us % BATTERY_EVERY_US == 0:
+            frames.append(encode_battery(self._codec, plant_status.battery))
         if truth is not None:
             frames += encode_state(self._truth_codec, truth)
         self._frames = tuple(frames)

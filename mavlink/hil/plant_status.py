@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from colibri.mavlink.hil import faults
+from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.wire.dialect import Codec, Message, mav
 
 _NO_CELL = 65535
@@ -41,8 +42,8 @@ class FaultResult(NamedTuple):
     result: int
 
 
-class Aside(NamedTuple):
-    """What goes with a frame.
+class PlantStatus(NamedTuple):
+    """What a plant tells beside a frame.
 
     Attributes:
         battery: None where there is none, or nothing is told of it.
@@ -53,7 +54,14 @@ class Aside(NamedTuple):
     results: tuple[FaultResult, ...] = ()
 
 
-NOTHING = Aside()
+NOTHING = PlantStatus()
+
+
+class ReceivedFrame(NamedTuple):
+    """The next frame to answer, and what the plant tells beside it."""
+
+    frame: Frame
+    plant_status: PlantStatus = NOTHING
 
 
 def encode_battery(codec: Codec, battery: PlantBattery) -> bytes:

@@ -14,8 +14,8 @@ from dataclasses import replace
 
 from colibri.common.types import FourRotors
 from colibri.mavlink.hil.faults import Fault
-from colibri.mavlink.hil.plant_status import NOTHING
-from colibri.mavlink.hil.sensors import Frame, GpsFix, SensorFrame, Updated, decode_gps, decode_sensors
+from colibri.mavlink.hil.plant_status import ReceivedFrame
+from colibri.mavlink.hil.sensors import GpsFix, SensorFrame, Updated, decode_gps, decode_sensors
 from colibri.mavlink.hil.state import ActuatorCommand, encode_actuators
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
@@ -35,7 +35,6 @@ class FlierEnd:
         refused: None: a simulator is not asked for anything.
         repeated: How many frames came again and got the remembered answer.
         dropped: What was received and not used, by reason.
-        aside: Nothing: a simulator tells nothing beside its frames.
     """
 
     def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[FourRotors], FourRotors]) -> None:
@@ -48,7 +47,6 @@ class FlierEnd:
         """
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
         self._to_motors = to_motors
-        self.aside = NOTHING
         self.refused: int | None = None
         self.repeated = 0
         self.dropped: Counter[str] = self._codec.dropped
@@ -65,7 +63,7 @@ class FlierEnd:
         """How long the simulator has been silent."""
         return now_s - self._heard_s
 
-    def receive(self, datagram: bytes, now_s: float) -> Frame | None:
+    def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         """Take one datagram in; return its frame if that is the next one to compute."""
         frame = None
         for message in self._codec.decode(datagram):
@@ -75,7 +73,7 @@ class FlierEnd:
                 self._fix = decode_gps(message)
             elif message.name not in ("HEARTBEAT", "HIL_STATE_QUATERNION", "SYSTEM_TIME", "COMMAND_ACK"):
                 self.dropped["unexpected"] += 1
-        return frame
+        return None if frame is None else ReceivedFrame(frame)
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
         """Send the command that answers the frame handed out last, and remember it; a simulator takes no faults."""

@@ -71,9 +71,9 @@ class FreeServer(Server):
     def _tell(self, plant: Plant) -> float:
         """Send a frame; return when."""
         self._time_us = plant.world.time_us
-        frame, aside = plant.tell()
+        frame, plant_status = plant.tell()
         now_s = perf_counter()
-        self._end.offer(frame, now_s, aside)
+        self._end.offer(frame, now_s, plant_status)
         self._send()
         self._log(plant.world)
         return now_s

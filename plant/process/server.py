@@ -95,8 +95,8 @@ class Server:
         world = plant.world
         self._time_us = world.time_us
         offered_s = perf_counter()
-        frame, aside = plant.tell()
-        self._end.offer(frame, offered_s, aside, state_frame(world) if self._tells_truth else None)
+        frame, plant_status = plant.tell()
+        self._end.offer(frame, offered_s, plant_status, state_frame(world) if self._tells_truth else None)
         self._send()
         self._log(world)  # while the autopilot computes
         silence_said = False

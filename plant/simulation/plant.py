@@ -1,21 +1,17 @@
 """The plant as a pure composition: a world that is told of frame by frame, and goes on with each answer."""
 
 from collections.abc import Sequence
-from typing import TypeAlias
 
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.plant_status import Aside, FaultResult
-from colibri.mavlink.hil.sensors import Frame
+from colibri.mavlink.hil.plant_status import FaultResult, PlantStatus, ReceivedFrame
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.physics.world import Physics, World
 from colibri.plant.sensors.suite import tells
 from colibri.plant.simulation.command_delay import Actuation
 from colibri.plant.simulation.faults import Faults
 from colibri.plant.vehicle.description import Vehicle
-
-Told: TypeAlias = tuple[Frame, Aside]
 
 
 class Plant:
@@ -63,9 +59,9 @@ class Plant:
         self._round_trip_us = 2 * latency_us
         self._results: tuple[FaultResult, ...] = ()
 
-    def tell(self) -> Told:
+    def tell(self) -> ReceivedFrame:
         """Return the frame of the world as it is now, and what goes beside it."""
-        return self._tell(self.world), Aside(self._physics.battery(self.world), self._results)
+        return ReceivedFrame(self._tell(self.world), PlantStatus(self._physics.battery(self.world), self._results))
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
         """Go on to the next frame, with the answer to this one and with faults that happen now."""

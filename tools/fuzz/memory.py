@@ -1,6 +1,7 @@
 """A flight of the thesis's spiral within this process, through both ends of the conversation, with or without fire."""
 
 from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.core.step import answer
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.common.types import Address
@@ -64,9 +65,7 @@ class Flight:
         good = [outgoing.datagram for outgoing in self.plant_end.take_outbox()]
         half = len(bad) // 2
         for datagram in (*bad[:half], *good, *bad[half:]):
-            frame = self.autopilot_end.receive(datagram, NOW_S)
-            if frame is not None:
-                self.autopilot_end.answer(self._autopilot.step(frame).command)
+            answer(self.autopilot_end, self._autopilot, datagram, NOW_S)
 
     def _to_plant(self, bad: list[bytes]) -> ActuatorCommand | None:
         good = self.autopilot_end.take_outbox()

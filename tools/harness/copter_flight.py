@@ -160,9 +160,7 @@ class CopterFlight:
 
     def step(self) -> None:
         """Fly one frame."""
-        frame, aside = self.plant.tell()
-        self.copter.hear(aside)
-        step = self.copter.step(frame)
+        step = self.copter.step(*self.plant.tell())
         self.rotors, self.estimate = step.command, step.estimate or self.estimate
         self.plant.answer(step.command, step.faults)
         inbox = [received for client in self._clients for received in client.take_sent()]

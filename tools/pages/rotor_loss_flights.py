@@ -199,9 +199,7 @@ def _lose(copter: Copter, plant: Plant, seed: int, fault: Fault) -> Flown:
 
 
 def _step(copter: Copter, plant: Plant) -> tuple[float, ...]:
-    frame, aside = plant.tell()
-    copter.hear(aside)
-    step = copter.step(frame)
+    step = copter.step(*plant.tell())
     plant.answer(step.command, step.faults)
     copter.serve(())
     return step.command.controls

@@ -10,6 +10,7 @@ from typing import Any
 from colibri.autopilot.__main__ import command_line as autopilot_command_line
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import DecisionError
+from colibri.autopilot.core.step import answer
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.process.ground import open_ground
 from colibri.common.errors import Error
@@ -121,8 +122,8 @@ class MemoryPlant:
                 latency_us=round(args.latency * 1e3),
             )
         self._answered = False
-        frame, aside = self._plant.tell()
-        end.offer(frame, self._now_s, aside, state_frame(self._plant.world))
+        frame, plant_status = self._plant.tell()
+        end.offer(frame, self._now_s, plant_status, state_frame(self._plant.world))
 
 
 class MemoryAutopilot:
@@ -179,14 +180,10 @@ class MemoryAutopilot:
 
     def hear(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
-        frame = self._end.receive(datagram, NEVER_LATE_S)
-        if frame is not None:
-            self._copter.hear(self._end.aside)
-            try:
-                step = self._copter.step(frame)
-            except DecisionError as error:
-                raise StageError(f"the autopilot ended: {error}") from error
-            self._end.answer(step.command, step.faults)
+        try:
+            answer(self._end, self._copter, datagram, NEVER_LATE_S)
+        except DecisionError as error:
+            raise StageError(f"the autopilot ended: {error}") from error
 
     def listen(self) -> list[bytes]:
         """Return what it has said to the plant."""

@@ -10,7 +10,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep import CALL_AFTER_S, PEER_LOST_AFTER_S, RESEND_AFTER_S
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
-from colibri.mavlink.hil.plant_status import NOTHING, Aside, FaultResult, PlantBattery
+from colibri.mavlink.hil.plant_status import NOTHING, FaultResult, PlantBattery, PlantStatus, ReceivedFrame
 from colibri.mavlink.hil.sensors import Frame, GpsFix, SensorFrame, encode_sensors
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, encode_actuators
 from colibri.mavlink.wire import dialect
@@ -50,9 +50,7 @@ def call(autopilot: AutopilotEnd, plant: PlantEnd) -> None:
 def answer_to(plant: PlantEnd, autopilot: AutopilotEnd, time_us: int) -> bytes:
     plant.offer(frame_at(time_us), 0.0)
     (outgoing,) = plant.take_outbox()
-    frame = autopilot.receive(outgoing.datagram, 0.0)
-    assert frame is not None
-    assert frame.time_us == time_us
+    assert autopilot.receive(outgoing.datagram, 0.0) == ReceivedFrame(frame_at(time_us))
     autopilot.answer(command_at(time_us))
     (answer,) = autopilot.take_outbox()
     return answer
@@ -110,7 +108,7 @@ def test_an_earlier_frame_begins_a_new_flight_only_after_silence(plant: PlantEnd
     plant.offer(frame_at(0), 0.0)
     (outgoing,) = plant.take_outbox()
     assert autopilot.receive(outgoing.datagram, 0.5) is None
-    assert autopilot.receive(outgoing.datagram, CALL_AFTER_S) == frame_at(0)
+    assert autopilot.receive(outgoing.datagram, CALL_AFTER_S) == ReceivedFrame(frame_at(0))
 
 
 def test_the_autopilot_calls_again_after_silence(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
@@ -142,7 +140,7 @@ def test_a_restarted_autopilot_gets_the_frame_awaited_at_once(plant: PlantEnd, a
     (hello,) = restarted.take_outbox()
     plant.receive(hello, STRANGER, 5.0)
     frames = [restarted.receive(outgoing.datagram, 5.0) for outgoing in plant.take_outbox()]
-    assert frame_at(INTERVAL_US) in frames
+    assert ReceivedFrame(frame_at(INTERVAL_US)) in frames
 
 
 @pytest.mark.parametrize(
@@ -207,7 +205,7 @@ def test_frames_of_sensors_are_answered_as_any_other() -> None:
     for time_us in range(0, 4 * INTERVAL_US, INTERVAL_US):
         plant.offer(sensors_at(time_us), 0.0)
         (outgoing,) = plant.take_outbox()
-        assert autopilot.receive(outgoing.datagram, 0.0) == sensors_at(time_us)
+        assert autopilot.receive(outgoing.datagram, 0.0) == ReceivedFrame(sensors_at(time_us))
         assert autopilot.receive(outgoing.datagram, 0.0) is None
         autopilot.answer(command_at(time_us))
         (answer,) = autopilot.take_outbox()
@@ -329,10 +327,10 @@ def test_loss_duplication_and_reordering_change_nothing(seed: int, feedback: Fee
                     obeyed.append(command.time_us)
                     plant.offer(tell(command.time_us + INTERVAL_US), now_s)
             else:
-                frame = autopilot.receive(datagram, now_s)
-                if frame:
-                    computed.append(frame)
-                    autopilot.answer(command_at(frame.time_us))
+                received = autopilot.receive(datagram, now_s)
+                if received:
+                    computed.append(received.frame)
+                    autopilot.answer(command_at(received.frame.time_us))
         for datagram in autopilot.take_outbox():
             post("plant", datagram)
     assert obeyed == [sample * INTERVAL_US for sample in range(50)]
@@ -343,8 +341,8 @@ BATTERY = PlantBattery(15.5, 12.25, 0.5, 0.75)
 LOST = Fault(MOTOR, OFF, 1)
 
 
-def offered(plant: PlantEnd, time_us: int, aside: Aside = NOTHING) -> bytes:
-    plant.offer(frame_at(time_us), 0.0, aside)
+def offered(plant: PlantEnd, time_us: int, plant_status: PlantStatus = NOTHING) -> bytes:
+    plant.offer(frame_at(time_us), 0.0, plant_status)
     (outgoing,) = plant.take_outbox()
     return outgoing.datagram
 
@@ -372,46 +370,43 @@ def test_a_fault_without_an_answer_is_dropped(plant: PlantEnd, autopilot: Autopi
 def test_what_became_of_it_comes_with_the_next_frame_however_often(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
     call(autopilot, plant)
     results = (FaultResult(MOTOR, OFF, 0), FaultResult(MOTOR, WRONG, 2))
-    datagram = offered(plant, 0, Aside(None, results))
-    autopilot.receive(datagram, 0.0)
-    assert autopilot.aside == Aside(None, results)
+    datagram = offered(plant, 0, PlantStatus(None, results))
+    assert autopilot.receive(datagram, 0.0) == ReceivedFrame(frame_at(0), PlantStatus(None, results))
     autopilot.receive(datagram, 0.0)
     assert autopilot.repeated == 1
     autopilot.answer(command_at(0))
     (answer,) = autopilot.take_outbox()
     plant.receive(answer, ADDRESS, 0.0)
-    autopilot.receive(offered(plant, INTERVAL_US), 0.0)
-    assert autopilot.aside == NOTHING
+    assert autopilot.receive(offered(plant, INTERVAL_US), 0.0) == ReceivedFrame(frame_at(INTERVAL_US), NOTHING)
 
 
 def test_the_battery_is_told_twice_a_second_and_to_who_is_new(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
     call(autopilot, plant)
     told = []
     for time_us in range(0, 11 * INTERVAL_US, INTERVAL_US):
-        autopilot.receive(offered(plant, time_us, Aside(BATTERY)), 0.0)
-        told.append(autopilot.aside.battery)
+        received = autopilot.receive(offered(plant, time_us, PlantStatus(BATTERY)), 0.0)
+        told.append(received and received.plant_status.battery)
         autopilot.answer(command_at(time_us))
         plant.receive(autopilot.take_outbox()[0], ADDRESS, 0.0)
     assert [number for number, battery in enumerate(told) if battery == BATTERY] == [0, 5, 10]
-    offered(plant, 11 * INTERVAL_US, Aside(BATTERY))
+    offered(plant, 11 * INTERVAL_US, PlantStatus(BATTERY))
     again = AutopilotEnd(system_id=1, frame_interval_us=INTERVAL_US, now_s=1.0)
     again.poll(1.0)
     plant.receive(again.take_outbox()[0], STRANGER, 1.0)
     frames = [again.receive(outgoing.datagram, 1.0) for outgoing in plant.take_outbox()]
-    assert frame_at(11 * INTERVAL_US) in frames
-    assert again.aside.battery == BATTERY
+    assert ReceivedFrame(frame_at(11 * INTERVAL_US), PlantStatus(BATTERY)) in frames
 
 
 def test_a_plant_that_runs_freely_takes_what_is_newer(autopilot: AutopilotEnd) -> None:
     plant = PlantEnd(system_id=1, frame_interval_us=INTERVAL_US, waits=False)
     call(autopilot, plant)
     first = offered(plant, 0)
-    assert autopilot.receive(first, 0.0) == frame_at(0)
+    assert autopilot.receive(first, 0.0) == ReceivedFrame(frame_at(0))
     offered(plant, INTERVAL_US)  # lost
     third = offered(plant, 2 * INTERVAL_US)
     assert plant.poll(10.0) > 10.0
     assert plant.take_outbox() == []
-    assert autopilot.receive(third, 0.0) == frame_at(2 * INTERVAL_US)
+    assert autopilot.receive(third, 0.0) == ReceivedFrame(frame_at(2 * INTERVAL_US))
     assert autopilot.receive(first, 0.0) is None
     answers = [encode_actuators(Codec(1, dialect.AUTOPILOT_COMPONENT), command_at(n * INTERVAL_US)) for n in range(4)]
     assert plant.receive(answers[1], ADDRESS, 0.0) == command_at(INTERVAL_US)

@@ -36,8 +36,8 @@ class Simulator:
             for datagram in encode_sensors(self.codec, sent):
                 received = self.end.receive(datagram, now_s)
                 if received is not None:
-                    assert isinstance(received, SensorFrame)
-                    got.append(received)
+                    assert isinstance(received.frame, SensorFrame)
+                    got.append(received.frame)
         return got
 
     def heard(self) -> list[Message]:
