@@ -1,23 +1,17 @@
 """`colibri sitl`: vehicles that ground stations connect to, each a plant and an autopilot, until told to stop."""
 
 import argparse
-import json
-import os
-import signal
-import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
-from select import select
 from time import perf_counter
-from typing import IO, Any
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.common.earth.home import HomePlace
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
+from colibri.flights.children import Child, end_children, events_of, how_it_ended
 from colibri.flights.fleet_status import StatusLines
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import LinkError
@@ -31,9 +25,6 @@ GROUND_PORT = 14550
 SDK_PORT = 14540
 LARGEST_FLEET = 100
 
-_LOOK_EVERY_S = 0.1
-_GRACE_S = 5.0
-
 
 @dataclass(slots=True)
 class Member:
@@ -42,26 +33,17 @@ class Member:
     Attributes:
         instance: Its number; its ports and system id follow from it.
         links: The URLs that its autopilot serves.
-        plant: The plant's process.
-        autopilot: The autopilot's process.
-        rest: What each process has said of a line that is not whole yet.
+        children: Its processes, as far as they are started.
     """
 
     instance: int
     links: list[str]
-    plant: subprocess.Popen[bytes] | None = None
-    autopilot: subprocess.Popen[bytes] | None = None
-    rest: dict[int, bytes] = field(default_factory=dict)
+    children: list[Child] = field(default_factory=list)
 
     @property
     def system_id(self) -> int:
         """MAVLink system id."""
         return self.instance + 1
-
-    def processes(self) -> list[tuple[str, subprocess.Popen[bytes]]]:
-        """Return what runs."""
-        both = (("autopilot", self.autopilot), ("plant", self.plant))
-        return [(name, process) for name, process in both if process is not None]
 
 
 def ground_links(args: argparse.Namespace, instance: int) -> list[str]:
@@ -87,7 +69,7 @@ def sitl(args: argparse.Namespace) -> int:
             _start_plant(member, args)
         return _watch(fleet, args, stop, lines)
     finally:
-        _end([process for member in fleet for _, process in member.processes()])
+        end_children(child for member in fleet for child in member.children)
         lines.close()
 
 
@@ -134,8 +116,8 @@ def _start_plant(member: Member, args: argparse.Namespace) -> None:
     home: HomePlace = args.home
     start = Start(psi=home.yaw_enu_deg)._replace(**args.start)
     vehicle = args.plant_vehicle or args.vehicle or load_profile(args.profile).simulation.vehicle
-    member.plant = _process(
-        "plant",
+    options = [
+        "--json",
         *("--link", _plant_url(args, member.instance)),
         *("--vehicle", vehicle),
         *(f"--without={part}" for part in args.without),
@@ -147,13 +129,14 @@ def _start_plant(member: Member, args: argparse.Namespace) -> None:
         *("--home", str(home)),
         *("--system-id", str(member.system_id)),
         *_logs(member, args),
-    )
+    ]
+    member.children.append(Child("plant", options))
 
 
 def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -> None:
     folder: Path = args.state / str(member.instance)
-    member.autopilot = _process(
-        "autopilot",
+    options = [
+        "--json",
         *("--plant", plant_url.replace("udpin", "udpout")),
         *(f"--gcs={url}" for url in member.links),
         *("--profile", args.profile),
@@ -167,17 +150,12 @@ def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -
         *(("--insecure",) if args.insecure else ()),
         *("--system-id", str(member.system_id)),
         *_logs(member, args),
-    )
+    ]
+    member.children.append(Child("autopilot", options))
 
 
 def _logs(member: Member, args: argparse.Namespace) -> tuple[str, ...]:
     return ("--out", str(args.out / str(member.instance))) if args.out else ()
-
-
-def _process(package: str, *options: str) -> subprocess.Popen[bytes]:
-    """Start it out of reach of the terminal's Ctrl-C: that is for this process, which ends the others."""
-    command = [sys.executable, "-m", f"colibri.{package}", "--json", "--parent", str(os.getpid()), *options]
-    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, process_group=0)
 
 
 def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines: StatusLines) -> int:
@@ -195,30 +173,17 @@ def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines:
 
 
 def _hear(fleet: Sequence[Member], args: argparse.Namespace, lines: StatusLines) -> None:
-    """Take in what the processes of `fleet` have said."""
-    streams = {
-        process.stdout: (member, name)
-        for member in fleet
-        for name, process in member.processes()
-        if process.stdout is not None
-    }
-    ready, _, _ = select(list(streams), [], [], _LOOK_EVERY_S)
-    for stream in ready:
-        member, name = streams[stream]
-        for event in _events(member, stream):
-            if name == "plant" and event["event"] == "listening":
-                _start_autopilot(member, args, event["url"])
-            lines.hear(member.instance, name, event)
-
-
-def _events(member: Member, stream: IO[bytes]) -> list[dict[str, Any]]:
-    chunk = os.read(stream.fileno(), 65536)
-    *whole, member.rest[stream.fileno()] = (member.rest.get(stream.fileno(), b"") + chunk).split(b"\n")
-    return [json.loads(line) for line in whole]
+    """Take in what the processes of `fleet` say."""
+    members = {child: member for member in fleet for child in member.children}
+    for child, event in events_of(members):
+        member = members[child]
+        if child.name == "plant" and event["event"] == "listening":
+            _start_autopilot(member, args, event["url"])
+        lines.hear(member.instance, child.name, event)
 
 
 def _has_ended(member: Member) -> bool:
-    return any(process.poll() is not None for _, process in member.processes())
+    return any(child.code() is not None for child in member.children)
 
 
 def _finish(member: Member) -> None:
@@ -226,28 +191,10 @@ def _finish(member: Member) -> None:
 
     Where a process came to another end, everything ends, with its exit code.
     """
-    for name, process in member.processes():
-        code = process.poll()
-        if not code:
-            continue
-        if code < 0:
-            fail(f"the {name} of instance {member.instance} was killed by {signal.Signals(-code).name}", EXIT_FAILED)
-        if code not in (EXIT_FAILED, EXIT_BAD_INPUT):  # of these it has said why
-            fail(f"the {name} of instance {member.instance} ended with exit code {code}", EXIT_FAILED)
-        raise SystemExit(code)
-    _end([process for _, process in member.processes()])
-
-
-def _end(processes: list[subprocess.Popen[bytes]]) -> None:
-    """Ask each process to end, then make it."""
-    for process in processes:
-        if process.poll() is None:
-            process.terminate()
-    for process in processes:
-        try:
-            process.wait(_GRACE_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        if process.stdout:
-            process.stdout.close()
+    for child in reversed(member.children):
+        code = child.code()
+        if code in (EXIT_FAILED, EXIT_BAD_INPUT):  # of these it has said why
+            raise SystemExit(code)
+        if code:
+            fail(f"the {child.name} of instance {member.instance} {how_it_ended(code)}", EXIT_FAILED)
+    end_children(member.children)

@@ -1,12 +1,11 @@
 """A flight as two processes over UDP: started, watched, ended."""
 
-import signal
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from math import isfinite
 
 from colibri.common.errors import InFlightError
-from colibri.flights.children import end_children, events_of, start_child
+from colibri.flights.children import Child, end_children, events_of, how_it_ended
 from colibri.flights.plan import FlightPlan, Summary
 
 _TOLD = ("ground", "heard", "said")
@@ -41,27 +40,29 @@ def fly_processes(
     Raises:
         FlightError: One of them ended before the flight did.
     """
-    processes: dict[str, subprocess.Popen[bytes]] = {}
+    children: dict[str, Child] = {}
     try:
-        processes["plant"] = start_child("plant", *_plant_options(plan), stdout=subprocess.PIPE)
-        for name, event in events_of(processes, lambda: _check_alive(processes)):
-            if name == "autopilot":
-                if event["event"] in _TOLD:
-                    say(event["text"])
-            elif event["event"] == "listening":
-                url = event["url"].replace("udpin", "udpout")
-                said = subprocess.PIPE if plan.ground.links else subprocess.DEVNULL
-                processes["autopilot"] = start_child(
-                    "autopilot", "--plant", url, *_autopilot_options(plan), stdout=said
-                )
-            elif event["event"] == "progress":
-                progress(event["sim_time_s"])
-            elif event["event"] == "ended":
-                return Summary(event["wall_time_s"], event["frames"], event["resent"])
-        _check_alive(processes)
-        raise FlightError("a process ended before the flight did", 1, said=False)
+        children["plant"] = Child("plant", ["--json", *_plant_options(plan)])
+        over = False
+        while not over:
+            over = any(child.code() is not None for child in children.values())
+            for child, event in events_of(children.values()):
+                if child.name == "autopilot":
+                    if event["event"] in _TOLD:
+                        say(event["text"])
+                elif event["event"] == "listening":
+                    url = event["url"].replace("udpin", "udpout")
+                    said = subprocess.PIPE if plan.ground.links else subprocess.DEVNULL
+                    children["autopilot"] = Child(
+                        "autopilot", ["--json", "--plant", url, *_autopilot_options(plan)], stdout=said
+                    )
+                elif event["event"] == "progress":
+                    progress(event["sim_time_s"])
+                elif event["event"] == "ended":
+                    return Summary(event["wall_time_s"], event["frames"], event["resent"])
+        raise _failure(children.values())
     finally:
-        end_children(list(processes.values()))
+        end_children(children.values())
 
 
 def _plant_options(plan: FlightPlan) -> list[str]:
@@ -95,11 +96,10 @@ def _autopilot_options(plan: FlightPlan) -> list[str]:
     ]
 
 
-def _check_alive(processes: dict[str, subprocess.Popen[bytes]]) -> None:
-    for name, process in processes.items():
-        code = process.poll()
-        if code is None or code == 0:
-            continue
-        if code < 0:
-            raise FlightError(f"the {name} was killed by {signal.Signals(-code).name}", 1, said=False)
-        raise FlightError(f"the {name} ended with exit code {code}", code, said=True)
+def _failure(children: Iterable[Child]) -> FlightError:
+    """Return what is wrong with children of whom one has ended."""
+    for child in children:
+        code = child.code()
+        if code:
+            return FlightError(f"the {child.name} {how_it_ended(code)}", max(code, 1), said=code > 0)
+    return FlightError("a process ended before the flight did", 1, said=False)

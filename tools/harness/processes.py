@@ -1,9 +1,6 @@
 """Flights for tests: one command line in, report and rows out."""
 
 import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +14,7 @@ from colibri.analysis.recording import COLUMNS
 from colibri.cli.main import main
 from colibri.common.process.lifecycle import nudge_m
 from colibri.common.types import Array
+from colibri.flights.children import Child
 
 REFERENCE = Path(__file__).parents[2] / "tests" / "reference"
 GIVE_UP_AFTER_S = 60.0
@@ -68,7 +66,7 @@ def wait_for(condition: Callable[[], object], what: str, hours: float = GIVE_UP_
         sleep(0.01)
 
 
-class Process:
+class Process(Child):
     """`colibri plant` or `colibri autopilot` as a user starts it, its JSON status read from a file."""
 
     def __init__(self, folder: Path, package: str, *options: str) -> None:
@@ -76,8 +74,7 @@ class Process:
         self._said = folder / f"{package}-{len(list(folder.iterdir()))}.jsonl"
         self._errors = self._said.with_suffix(".err")
         with self._said.open("wb") as said, self._errors.open("wb") as errors:
-            command = [sys.executable, "-m", f"colibri.{package}", "--json", "--parent", str(os.getpid()), *options]
-            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=said, stderr=errors)
+            super().__init__(package, ["--json", *options], stdout=said, stderr=errors)
 
     def events(self, name: str) -> list[dict[str, Any]]:
         """Return the events of that name said so far."""
@@ -101,9 +98,7 @@ class Process:
 
     def stop(self) -> None:
         """End it, however it is."""
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.wait()
+        self.kill()
 
 
 @contextmanager

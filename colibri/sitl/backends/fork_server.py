@@ -21,7 +21,6 @@ _FLIGHTS = ({"feedback": "state"}, {"feedback": "sensors", "turbulence": "light"
 def main() -> None:
     """Serve until standard input ends."""
     use_one_thread()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the tests, which then end this process
     _load()
     gc.collect()
     gc.freeze()
@@ -68,7 +67,6 @@ def _fork(package: str, said: str, *options: str) -> int:
         nothing = os.open(os.devnull, os.O_RDONLY)
         for to, of in ((0, nothing), (1, out), (2, out)):
             os.dup2(of, to)
-        signal.signal(signal.SIGINT, signal.default_int_handler)
         sys.argv = [package, "--parent", str(nursery), *options]
         _be(package)
     finally:

@@ -2,13 +2,13 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
+from colibri.flights.children import Child, how_it_ended
 from colibri.sitl.backends.stage import StageError
 
 _LAST_WORDS_BYTES = 2000
@@ -44,7 +44,7 @@ class Launcher(Protocol):
         ...
 
 
-class Child:
+class LoggedChild:
     """A flying process, with what it has said.
 
     Attributes:
@@ -69,9 +69,8 @@ class Child:
         code = self._running.code()
         if code is None:
             return
-        how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
         words = self.last_words()
-        raise StageError(f"the {self.name} {how}" + (f": {words}" if words else ""))
+        raise StageError(f"the {self.name} {how_it_ended(code)}" + (f": {words}" if words else ""))
 
     def last_words(self) -> str:
         """Return the last line that is not a status."""
@@ -89,25 +88,11 @@ class FromScratch:
 
     def start(self, package: str, options: Sequence[str], said: Path) -> Running:
         """Start `python -m colibri.PACKAGE` with `options`; what it says goes into file `said`."""
-        command = [sys.executable, "-m", f"colibri.{package}", "--parent", str(os.getpid()), *options]
         with said.open("wb") as out:
-            return _Popened(subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=out))
+            return Child(package, options, stdout=out, stderr=out)
 
     def close(self) -> None:
         """Leave nothing: each flight ends its own."""
-
-
-class _Popened:
-    def __init__(self, process: subprocess.Popen[bytes]) -> None:
-        self._process = process
-        self.number = process.pid
-
-    def code(self) -> int | None:
-        return self._process.poll()
-
-    def kill(self) -> None:
-        self._process.kill()
-        self._process.wait()
 
 
 class Forked:
@@ -116,7 +101,7 @@ class Forked:
     def __init__(self) -> None:
         """Start the nursery; it loads while this process goes on."""
         command = [sys.executable, "-m", "colibri.sitl.backends.fork_server"]
-        self._nursery = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self._nursery = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
 
     def start(self, package: str, options: Sequence[str], said: Path) -> Running:
         """Start what `python -m colibri.PACKAGE` with `options` is; what it says goes into file `said`."""

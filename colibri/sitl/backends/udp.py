@@ -9,7 +9,7 @@ from colibri.common.types import Address
 from colibri.mavlink.hil.conductor import Gathering, Turn, packets
 from colibri.mavlink.links.open import open_link
 from colibri.mavlink.links.udp import UdpLink
-from colibri.sitl.backends.launcher import Child, Launcher
+from colibri.sitl.backends.launcher import Launcher, LoggedChild
 from colibri.sitl.backends.stage import StageError, answers, parted
 
 SILENCE_S = 60.0
@@ -23,7 +23,7 @@ class UdpPlant:
 
     def __init__(self, launcher: Launcher, options: Sequence[str], folder: Path) -> None:
         """Start it; `folder` takes what it says."""
-        self._child = Child(launcher, "plant", ["--json", "--link", _HERE, *options], folder / "plant.said")
+        self._child = LoggedChild(launcher, "plant", ["--json", "--link", _HERE, *options], folder / "plant.said")
         self._link: UdpLink | None = None
         self._last = self._answer = b""
 
@@ -114,7 +114,7 @@ class UdpAutopilot:
         """Start it anew."""
         self._starts += 1
         said = self._folder / f"autopilot-{self._starts}.said"
-        self._child = Child(self._launcher, "autopilot", self._options, said)
+        self._child = LoggedChild(self._launcher, "autopilot", self._options, said)
         self._gathering = Gathering()
         self._time_us = 0
         self._address: Address | None = None
@@ -185,7 +185,7 @@ def opened(url: str) -> UdpLink:
 
 
 def received(
-    link: UdpLink, children: Sequence[Child], name: str, silence_s: float = SILENCE_S
+    link: UdpLink, children: Sequence[LoggedChild], name: str, silence_s: float = SILENCE_S
 ) -> tuple[bytes, Address]:
     """Return what comes next.
 
