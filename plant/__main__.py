@@ -9,7 +9,7 @@ from colibri.common.process.arguments import ArgumentParser, add_common_argument
 from colibri.common.process.lifecycle import fail
 from colibri.mavlink.links.open import open_ground_link, open_link
 from colibri.mavlink.links.startup import begin
-from colibri.plant.process.options import LATENCY_HELP, add_world_arguments, latency
+from colibri.plant.process.options import add_world_arguments
 
 DEFAULT_LINKS = {
     "colibri": "udpin:127.0.0.1:14560",
@@ -49,7 +49,6 @@ def command_line() -> ArgumentParser:
     add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
     add("--home", type=home, default=DEFAULT_HOME, metavar="LAT,LON,ALT,YAW", help="the origin (default %(default)s)")
     add("--rate", type=positive, default=250.0, metavar="HZ", help="frames, if the autopilot asks for no other rate")
-    add("--latency", type=latency, default=0.0, metavar="MS", help=LATENCY_HELP)
     add(
         "--realtime",
         action="store_true",

@@ -19,8 +19,8 @@ from colibri.common.process.lifecycle import EXIT_FAILED, fail, undisturbed
 from colibri.flights.plan import FlightPlan, GroundAccess
 from colibri.flights.processes import FlightError, fly_processes
 from colibri.mavlink.streaming.rates import GCS, SDK
-from colibri.plant.physics.world import Physics, starting_world, state_frame
 from colibri.plant.process.options import nudged
+from colibri.plant.simulation.plant import PlantBuilder
 
 Tell: TypeAlias = Callable[[str], None]
 
@@ -58,13 +58,13 @@ def served(plan: FlightPlan, channels: int) -> Figures:
     copter = Copter(plan.profile, plan.vehicle, settings, perf_counter, first=plan.track)
     for link in range(channels):
         copter.stations.use(copter.stations.hub.open(link, ("127.0.0.1", link)), KINDS[link % len(KINDS)])
-    physics = Physics(plan.plant_vehicle, "rk4")
-    world = starting_world(nudged(plan.start), plan.plant_vehicle)
+    plant = PlantBuilder(plan, plan.plant_vehicle, {plan.feedback: nudged(plan.start)}).build(
+        plan.feedback, copter.frame_interval_us
+    )
     times_us = []
     with undisturbed():
-        while world.time_us < plan.duration_s * 1e6:
-            command = copter.step(state_frame(world)).command
-            world = physics.step(world, command, copter.frame_interval_us)
+        while plant.world.time_us < plan.duration_s * 1e6:
+            plant.answer(copter.step(*plant.tell()).command)
             began_s = perf_counter()
             copter.serve(())
             times_us.append((perf_counter() - began_s) * 1e6)

@@ -14,7 +14,7 @@ COMPARED_S = 100.0
 
 def in_another_world(args: Namespace) -> bool:
     """Whether the comparison leaves the thesis's world: chance, sensors, weather, another vehicle, two processes."""
-    weather = args.wind is not NO_WIND or args.gust or args.turbulence
+    weather = args.wind is not NO_WIND or args.gusts or args.turbulence
     chance = args.seeds or args.feedback is Feedback.SENSORS
     return bool(args.resume or chance or weather or args.vehicle or args.link == "udp" or args.duration != COMPARED_S)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from colibri.cli.shared_options import add_feedback, add_signing
 from colibri.common.process.arguments import ArgumentParser, natural, positive, speed
-from colibri.plant.process.options import LATENCY_HELP, add_world_arguments, latency
+from colibri.plant.process.options import add_world_arguments
 
 TRACK_HELP = (
     "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
@@ -42,7 +42,6 @@ def add_options(parser: ArgumentParser) -> None:
     )
     add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
     add_feedback(add)
-    add("--latency", type=latency, default=0.0, metavar="MS", help=f"between plant and autopilot, {LATENCY_HELP}")
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")

@@ -4,7 +4,6 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from pathlib import Path
 from time import perf_counter
 
 from colibri.autopilot.control.profile import load_profile
@@ -12,12 +11,13 @@ from colibri.common.earth.home import HomePlace
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
 from colibri.flights.children import Child, end_children, events_of, how_it_ended
+from colibri.flights.command_lines import options_of, plant_options
 from colibri.flights.fleet_status import StatusLines
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import beyond_loopback, open_link, unsigned_refusal
 from colibri.plant.physics.start import Start
-from colibri.plant.process.options import weather_of
+from colibri.plant.simulation.setting import WorldSetting, world_values
 from colibri.plant.vehicle.description import load_vehicle
 
 PLANT_PORT = 14560
@@ -116,46 +116,39 @@ def _start_plant(member: Member, args: argparse.Namespace) -> None:
     home: HomePlace = args.home
     start = Start(psi=home.yaw_enu_deg)._replace(**args.start)
     vehicle = args.plant_vehicle or args.vehicle or load_profile(args.profile).simulation.vehicle
-    options = [
-        "--json",
-        *("--link", _plant_url(args, member.instance)),
-        *("--vehicle", vehicle),
-        *(f"--without={part}" for part in args.without),
-        *weather_of(args).options(),
-        *("--start", str(start)),
-        *(("--duration", repr(args.duration)) if isfinite(args.duration) else ()),
-        *("--speed", repr(args.speed) if isfinite(args.speed) else "max"),
-        *("--seed", str(args.seed + member.instance)),
-        *("--home", str(home)),
-        *("--system-id", str(member.system_id)),
-        *_logs(member, args),
-    ]
+    world = WorldSetting(**(world_values(args) | {"start": start, "seed": args.seed + member.instance}))
+    options = plant_options(
+        world,
+        json=True,
+        link=_plant_url(args, member.instance),
+        vehicle=vehicle,
+        duration=args.duration if isfinite(args.duration) else None,
+        speed=args.speed,
+        home=home,
+        system_id=member.system_id,
+        out=args.out and args.out / str(member.instance),
+    )
     member.children.append(Child("plant", options))
 
 
 def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -> None:
-    folder: Path = args.state / str(member.instance)
-    options = [
-        "--json",
-        *("--plant", plant_url.replace("udpin", "udpout")),
-        *(f"--gcs={url}" for url in member.links),
-        *("--profile", args.profile),
-        *(("--vehicle", args.vehicle) if args.vehicle else ()),
-        *(("--controller", args.controller) if args.controller else ()),
-        *("--feedback", args.feedback),
-        *("--home", str(args.home)),
-        *("--identity", args.identity),
-        *("--state", str(folder)),
-        *(("--signing-key", str(args.signing_key)) if args.signing_key else ()),
-        *(("--insecure",) if args.insecure else ()),
-        *("--system-id", str(member.system_id)),
-        *_logs(member, args),
-    ]
+    options = options_of(
+        json=True,
+        plant=plant_url.replace("udpin", "udpout"),
+        gcs=member.links,
+        profile=args.profile,
+        vehicle=args.vehicle,
+        controller=args.controller,
+        feedback=args.feedback,
+        home=args.home,
+        identity=args.identity,
+        state=args.state / str(member.instance),
+        signing_key=args.signing_key,
+        insecure=args.insecure,
+        system_id=member.system_id,
+        out=args.out and args.out / str(member.instance),
+    )
     member.children.append(Child("autopilot", options))
-
-
-def _logs(member: Member, args: argparse.Namespace) -> tuple[str, ...]:
-    return ("--out", str(args.out / str(member.instance))) if args.out else ()
 
 
 def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines: StatusLines) -> int:

@@ -5,6 +5,7 @@ from math import isfinite
 from time import perf_counter, sleep
 from typing import Protocol
 
+from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
@@ -19,10 +20,9 @@ from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.physics.integrators import Integrator
-from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.options import nudged
-from colibri.plant.simulation.plant import Plant
+from colibri.plant.simulation.plant import Plant, PlantBuilder
 
 SYSTEM_ID = 1
 DEFAULT_IDENTITY = "px4"
@@ -47,22 +47,9 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
         SolverError: The solver cannot be used.
         IntegrationError: The state cannot be integrated any further.
     """
-    estimator = estimator_for(plan.feedback, plan.vehicle, DEFAULT_ORIGIN)
-    autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, perf_counter, estimator=estimator)
-    integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
-    physics = Physics(plan.plant_vehicle, integrator, plan.weather)
-    interval_us = autopilot.frame_interval_us
+    autopilot, plant = put_together(plan, perf_counter)
+    interval_us = plant.interval_us
     plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out, _setup(plan))
-    plant = Plant(
-        starting_world(nudged(plan.start), plan.plant_vehicle, plan.weather),
-        plan.plant_vehicle,
-        physics,
-        plan.feedback,
-        DEFAULT_ORIGIN,
-        seed=plan.seed,
-        interval_us=interval_us,
-        latency_us=plan.latency_us,
-    )
     exchange: Exchange = Direct(autopilot)
     if plan.link == "memory":
         exchange = InMemory(autopilot, interval_us, plan.feedback, plant_logs)
@@ -83,6 +70,22 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
         plant_logs.close()
         log.close()
     return Summary(wall_time_s, frames=plant.world.time_us // interval_us, resent=0)
+
+
+def put_together(plan: FlightPlan, clock: Clock) -> tuple[Autopilot, Plant]:
+    """Return the autopilot and the plant of a flight as it begins; `clock` only measures.
+
+    Raises:
+        ControllerError: The control law cannot be used.
+        ProfileError: The control law's table in the profile is wrong.
+        SolverError: The solver cannot be used.
+    """
+    estimator = estimator_for(plan.feedback, plan.vehicle, DEFAULT_ORIGIN)
+    autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, clock, estimator=estimator)
+    integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
+    starts = {plan.feedback: nudged(plan.start)}
+    builder = PlantBuilder(plan, plan.plant_vehicle, starts, integrator=integrator)
+    return autopilot, builder.build(plan.feedback, autopilot.frame_interval_us)
 
 
 def _setup(plan: FlightPlan) -> Setup:

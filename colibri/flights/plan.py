@@ -11,9 +11,9 @@ from colibri.autopilot.guidance.trajectories.planner import start_yaw
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, track
 from colibri.common.errors import Error
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.plant.environment.weather import NO_WIND, Weather
+from colibri.plant.environment.weather import Weather, weather_of
 from colibri.plant.physics.start import Start, check_start
-from colibri.plant.process.options import weather_of
+from colibri.plant.simulation.setting import WorldSetting, world_values
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 
@@ -44,24 +44,20 @@ class PlanError(Error):
     """What was asked for does not go together; the message is the one line that a user needs."""
 
 
-@dataclass(frozen=True, slots=True)
-class FlightPlan:
-    """A flight as it was asked for.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightPlan(WorldSetting):
+    """A flight as it was asked for, in the world of a `WorldSetting`.
 
     Attributes:
         track_name: The track, with its options.
         profile_name: Profile name or file.
         vehicle_name: Vehicle that the autopilot controls, name or file.
         plant_vehicle_name: Vehicle that the plant flies, name or file.
-        without: Parts that the plant's vehicle is flown without.
-        weather: In which the plant flies.
         start: How the plant begins.
         integrator: `rk4` or `adaptive`.
         link: `udp`, `memory` or `direct`.
         speed: Times real time; infinite for flat out.
-        seed: Seed of everything random.
         feedback: What the plant tells the autopilot.
-        latency_us: Between plant and autopilot, one way, simulated.
         duration_s: Simulated time to fly.
         out: Folder for all that the flight leaves.
         solver: QP solver asked for; None for the profile's.
@@ -76,15 +72,11 @@ class FlightPlan:
     profile_name: str
     vehicle_name: str
     plant_vehicle_name: str
-    without: tuple[str, ...]
-    weather: Weather
     start: Start
     integrator: str
     link: str
     speed: float
-    seed: int
     feedback: Feedback
-    latency_us: int
     duration_s: float
     out: Path
     solver: str | None
@@ -120,19 +112,15 @@ class FlightPlan:
         start = _start_of(profile, to_fly, args.feedback)._replace(**args.start)
         check_start(start, plant_vehicle)
         return cls(
+            **(world_values(args) | {"start": start}),
             track_name=args.track,
             profile_name=args.profile,
             vehicle_name=vehicle_name,
             plant_vehicle_name=plant_vehicle_name,
-            without=tuple(args.without),
-            weather=weather_of(args),
-            start=start,
             integrator=args.integrator or profile.simulation.integrator,
             link=args.link,
             speed=args.speed or (1.0 if ground.links else inf),
-            seed=args.seed,
             feedback=args.feedback,
-            latency_us=round(args.latency * 1e3),
             duration_s=args.duration,
             out=args.out,
             solver=args.solver,
@@ -166,24 +154,22 @@ class FlightPlan:
             VehicleError: A vehicle cannot be read, or cannot start as the profile says.
             TrackError: There is no such track, or its file cannot be flown.
         """
-        unset = dict.fromkeys(("controller", "solver", "vehicle", "plant_vehicle", "integrator", "turbulence"))
-        none: dict[str, Any] = {
+        unset = dict.fromkeys(("controller", "solver", "vehicle", "plant_vehicle", "integrator"))
+        usual = {
             "gcs": (),
-            "gust": (),
-            "without": (),
-            "start": {},
             "signing_key": None,
             "insecure": False,
-        }
-        usual = {
-            "wind": NO_WIND,
             "feedback": Feedback.STATE,
-            "seed": 0,
-            "latency": 0.0,
             "speed": inf,
             "duration": DURATION_S,
         }
-        return cls.from_arguments(argparse.Namespace(**(unset | none | usual | options), out=out))
+        asked = world_values(WorldSetting()) | unset | usual | options
+        return cls.from_arguments(argparse.Namespace(**asked, out=out))
+
+    @property
+    def weather(self) -> Weather:
+        """In which the plant flies."""
+        return weather_of(self)
 
     @property
     def start_yaw_rad(self) -> float:

@@ -2,10 +2,10 @@
 
 import subprocess
 from collections.abc import Callable, Iterable
-from math import isfinite
 
 from colibri.common.errors import InFlightError
 from colibri.flights.children import Child, end_children, events_of, how_it_ended
+from colibri.flights.command_lines import options_of, plant_options
 from colibri.flights.plan import FlightPlan, Summary
 
 _TOLD = ("ground", "heard", "said")
@@ -42,7 +42,7 @@ def fly_processes(
     """
     children: dict[str, Child] = {}
     try:
-        children["plant"] = Child("plant", ["--json", *_plant_options(plan)])
+        children["plant"] = Child("plant", _plant_options(plan))
         over = False
         while not over:
             over = any(child.code() is not None for child in children.values())
@@ -51,11 +51,8 @@ def fly_processes(
                     if event["event"] in _TOLD:
                         say(event["text"])
                 elif event["event"] == "listening":
-                    url = event["url"].replace("udpin", "udpout")
                     said = subprocess.PIPE if plan.ground.links else subprocess.DEVNULL
-                    children["autopilot"] = Child(
-                        "autopilot", ["--json", "--plant", url, *_autopilot_options(plan)], stdout=said
-                    )
+                    children["autopilot"] = Child("autopilot", _autopilot_options(plan, event["url"]), stdout=said)
                 elif event["event"] == "progress":
                     progress(event["sim_time_s"])
                 elif event["event"] == "ended":
@@ -66,34 +63,33 @@ def fly_processes(
 
 
 def _plant_options(plan: FlightPlan) -> list[str]:
-    return [
-        *("--link", "udpin:127.0.0.1:0"),
-        *("--vehicle", plan.plant_vehicle_name),
-        *("--integrator", plan.integrator),
-        *(f"--without={part}" for part in plan.without),
-        *plan.weather.options(),
-        *("--start", str(plan.start)),
-        *("--seed", str(plan.seed)),
-        *("--latency", repr(plan.latency_us / 1e3)),
-        *("--duration", repr(plan.duration_s)),
-        *("--speed", repr(plan.speed) if isfinite(plan.speed) else "max"),
-        *("--out", str(plan.out)),
-    ]
+    return plant_options(
+        plan,
+        json=True,
+        link="udpin:127.0.0.1:0",
+        vehicle=plan.plant_vehicle_name,
+        integrator=plan.integrator,
+        duration=plan.duration_s,
+        speed=plan.speed,
+        out=plan.out,
+    )
 
 
-def _autopilot_options(plan: FlightPlan) -> list[str]:
-    return [
-        *("--track", plan.track_name),
-        *("--profile", plan.profile_name),
-        *("--vehicle", plan.vehicle_name),
-        *("--controller", plan.profile.controller),
-        *("--feedback", plan.feedback),
-        *(("--solver", plan.solver) if plan.solver else ()),
-        *(f"--gcs={url}" for url in plan.ground.links),
-        *(("--signing-key", str(plan.ground.signing_key)) if plan.ground.signing_key else ()),
-        *(("--insecure",) if plan.ground.insecure else ()),
-        *("--out", str(plan.out)),
-    ]
+def _autopilot_options(plan: FlightPlan, plant_url: str) -> list[str]:
+    return options_of(
+        json=True,
+        plant=plant_url.replace("udpin", "udpout"),
+        track=plan.track_name,
+        profile=plan.profile_name,
+        vehicle=plan.vehicle_name,
+        controller=plan.profile.controller,
+        feedback=plan.feedback,
+        solver=plan.solver,
+        gcs=plan.ground.links,
+        signing_key=plan.ground.signing_key,
+        insecure=plan.ground.insecure,
+        out=plan.out,
+    )
 
 
 def _failure(children: Iterable[Child]) -> FlightError:

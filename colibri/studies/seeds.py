@@ -58,7 +58,8 @@ class Job(NamedTuple):
 
 _WIDEST = 400
 _COMMON = ("vehicle", "feedback", "link", "duration")
-_WEATHER = ("wind", "gust", "turbulence")
+_WEATHER = ("wind", "gusts", "turbulence")
+_KEPT_AS = {"gusts": "gust"}
 _NO_INNOVATIONS = (0,) * len(MEASURED)
 
 
@@ -154,7 +155,7 @@ def _rms(column: Array) -> Any:
 
 def _settings(args: argparse.Namespace) -> str:
     """Return what every flight of a comparison has in common."""
-    return " ".join(f"{name}={getattr(args, name)}" for name in (*_COMMON, *_WEATHER))
+    return " ".join(f"{_KEPT_AS.get(name, name)}={getattr(args, name)}" for name in (*_COMMON, *_WEATHER))
 
 
 def _print(rows: Sequence[tuple[str, ...]], out: Path) -> None:

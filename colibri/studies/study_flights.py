@@ -95,7 +95,7 @@ class Flight(NamedTuple):
             vehicle=vehicle,
             plant_vehicle=self.perturbation.of(vehicle).without(self.without),
             without=self.without,
-            weather=self.weather,
+            **self.weather._asdict(),
             start=plan.start._replace(**dict(self.start)),
             duration_s=self.duration_s,
         )

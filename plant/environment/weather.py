@@ -6,7 +6,7 @@ Velocities are those of the air, ENU, m/s. `plant.air` makes it blow.
 from bisect import bisect_right
 from math import pi, radians
 from pathlib import Path
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from colibri.common.elementary import cos, sin
 from colibri.common.types import Vector
@@ -124,14 +124,11 @@ class Weather(NamedTuple):
     turbulence: Intensity | None = None
     seed: int = 0
 
-    def options(self) -> list[str]:
-        """Return the command line that `add_weather_arguments` reads back; `--seed` is not only the weather's."""
-        return [
-            *("--wind", str(self.wind)),
-            *(f"--gust={gust}" for gust in self.gusts),
-            *(("--turbulence", self.turbulence) if self.turbulence else ()),
-        ]
-
 
 NO_WIND = Wind(0.0, 0.0)
 NO_WEATHER = Weather(NO_WIND)
+
+
+def weather_of(said: Any) -> Weather:
+    """Return the weather that a command line, or a `WorldSetting` of what it reads, asks for."""
+    return Weather(said.wind or NO_WIND, tuple(said.gusts), said.turbulence, said.seed)

@@ -9,6 +9,7 @@ from colibri.common.process.log_files import CsvLog
 from colibri.common.process.status import Progress, Status
 from colibri.common.types import Address
 from colibri.mavlink.links.udp import UdpLink
+from colibri.plant.environment.weather import weather_of
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.ardupilot import ArduPilotEnd

@@ -1,22 +1,18 @@
 """The world on a command line: start, weather, latency, and what is left out."""
 
-from argparse import ArgumentTypeError, Namespace
+from argparse import ArgumentTypeError
 from itertools import pairwise
 from pathlib import Path
 
 from colibri.common.process.arguments import ArgumentParser, number
 from colibri.common.process.lifecycle import nudge_m
-from colibri.plant.environment.weather import FASTEST_M_S, INTENSITIES, NO_WIND, Gust, RecordedWind, Weather, Wind
+from colibri.plant.environment.weather import FASTEST_M_S, INTENSITIES, NO_WIND, Gust, RecordedWind, Wind
 from colibri.plant.physics.start import Start
 
 PARTS = ("rotor-lag", "drag", "ground", "battery")
 """What `Vehicle.without` can leave out."""
 
 LARGEST_LATENCY_MS = 1000.0
-LATENCY_HELP = (
-    "one way, simulated: the command that answers a frame acts twice that later, and the one before it is held until "
-    "then (default 0)"
-)
 
 
 def nudged(start: Start) -> Start:
@@ -48,7 +44,7 @@ def latency(text: str) -> float:
 
 
 def add_world_arguments(parser: ArgumentParser, *, start: str, of_whom: str = "") -> None:
-    """Add `--wind`, `--gust`, `--turbulence`, `--without` and `--start`.
+    """Add the options of `WorldSetting`, but for `--seed`.
 
     Args:
         parser: To add them to.
@@ -71,6 +67,14 @@ def add_world_arguments(parser: ArgumentParser, *, start: str, of_whom: str = ""
         metavar="KEY=VALUE,...",
         help="begin otherwise: x, y, z (m, ENU), phi, theta, psi (degrees), vx, vy, vz (m/s, ENU), p, q, r (rad/s, "
         f"FLU), rotors (rpm) (default: {start})",
+    )
+    add(
+        "--latency",
+        type=latency,
+        default=0.0,
+        metavar="MS",
+        help="between plant and autopilot, one way, simulated: the command that answers a frame acts twice that later, "
+        "and the one before it is held until then (default 0)",
     )
 
 
@@ -146,11 +150,6 @@ def _constant(text: str) -> Wind:
     return value
 
 
-def weather_of(args: Namespace) -> Weather:
-    """Return the weather that a command line asks for."""
-    return Weather(args.wind, tuple(args.gust), args.turbulence, args.seed)
-
-
 def add_weather_arguments(parser: ArgumentParser) -> None:
     """Add `--wind`, `--gust` and `--turbulence`."""
     add = parser.add_argument
@@ -167,6 +166,7 @@ def add_weather_arguments(parser: ArgumentParser) -> None:
         type=gust,
         action="append",
         default=[],
+        dest="gusts",
         metavar=_GUST,
         help="a gust on top of it, of the shape 1 - cosine; may be repeated",
     )

@@ -13,10 +13,11 @@ from colibri.common.rotations import earth_from_body
 from colibri.mavlink.hil.px4_simulator import SimulatorEnd, Truth
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.links.link import GroundLink, receive_soon
+from colibri.plant.environment.weather import weather_of
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.process.logs import PlantLogs
-from colibri.plant.process.options import nudged, weather_of
+from colibri.plant.process.options import nudged
 from colibri.plant.process.server import Pace
 from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.vehicle.description import VehicleError, load_vehicle

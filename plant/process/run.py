@@ -8,32 +8,40 @@ from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.links.udp import UdpLink
 from colibri.plant.physics.start import DEFAULT_STARTS
-from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.logs import PlantLogs
-from colibri.plant.process.options import nudged, weather_of
+from colibri.plant.process.options import nudged
 from colibri.plant.process.server import Server
 from colibri.plant.sensors.suite import served_by
-from colibri.plant.simulation.plant import Plant
+from colibri.plant.simulation.plant import PlantBuilder
+from colibri.plant.simulation.setting import WorldSetting, world_values
 from colibri.plant.vehicle.description import load_vehicle
+
+
+def builder_of(args: argparse.Namespace) -> PlantBuilder:
+    """Return what builds the plant of a command line.
+
+    Raises:
+        VehicleError: There is no such vehicle, or it cannot start like that.
+    """
+    vehicle = load_vehicle(args.vehicle).without(args.without)
+    starts = {it: nudged(DEFAULT_STARTS[it]._replace(**args.start)) for it in served_by(vehicle)}
+    setting = WorldSetting(**world_values(args))
+    return PlantBuilder(setting, vehicle, starts, integrator=args.integrator, origin=args.home.origin)
 
 
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
     """Serve one flight on `link` as the command line says; return the exit code."""
     try:
-        weather = weather_of(args)
-        vehicle = load_vehicle(args.vehicle).without(args.without)
-        serves = served_by(vehicle)
-        worlds = {
-            it: starting_world(nudged(DEFAULT_STARTS[it]._replace(**args.start)), vehicle, weather) for it in serves
-        }
+        builder = builder_of(args)
     except Error as error:
         fail(str(error))
-    physics = Physics(vehicle, args.integrator, weather)
     if args.truth:  # several flights share the cores: whoever waits gives way at once
         link.spin_s = 0.0
     logs = PlantLogs(args.out) if args.out else None
     interval_us = round(1e3 / args.rate) * 1000
-    end = PlantEnd(system_id=args.system_id, frame_interval_us=interval_us, serves=serves, waits=not args.realtime)
+    end = PlantEnd(
+        system_id=args.system_id, frame_interval_us=interval_us, serves=tuple(builder.starts), waits=not args.realtime
+    )
     server = Server(link, end, status, stop, logs, tells_truth=args.truth)
     if args.realtime:
         from colibri.plant.process.free_running import FreeServer
@@ -42,16 +50,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     try:
         with undisturbed():
             if server.wait():
-                plant = Plant(
-                    worlds[end.feedback],
-                    vehicle,
-                    physics,
-                    end.feedback,
-                    args.home.origin,
-                    seed=args.seed,
-                    interval_us=end.frame_interval_us,
-                    latency_us=round(args.latency * 1e3),
-                )
+                plant = builder.build(end.feedback, end.frame_interval_us)
                 server.fly(plant, duration_s=args.duration, speed=args.speed)
     except Error as error:
         fail(str(error), EXIT_FAILED)

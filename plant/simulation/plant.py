@@ -1,16 +1,20 @@
-"""The plant as a pure composition: a world that is told of frame by frame, and goes on with each answer."""
+"""The plant as a pure composition, told of frame by frame, that goes on with each answer; and what builds it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from colibri.common.earth.geodesy import Geodetic
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult, PlantStatus, ReceivedFrame
 from colibri.mavlink.hil.state import ActuatorCommand
-from colibri.plant.physics.world import Physics, World
+from colibri.plant.environment.weather import weather_of
+from colibri.plant.physics.integrators import Integrator
+from colibri.plant.physics.start import Start
+from colibri.plant.physics.world import Physics, World, starting_world
 from colibri.plant.sensors.suite import tells
 from colibri.plant.simulation.command_delay import Actuation
 from colibri.plant.simulation.faults import Faults
+from colibri.plant.simulation.setting import WorldSetting
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -86,6 +90,57 @@ class Plant:
         begin_us = self.world.time_us
         for command, duration_us in self._actuation.spans(begin_us, begin_us + self.interval_us):
             self.world = self._physics.step(self.world, command, duration_us)
+
+
+class PlantBuilder:
+    """Builds plants of one vehicle in one world: all of them but what an autopilot asks for.
+
+    Attributes:
+        vehicle: That flies.
+        starts: How it begins, by what the autopilot may ask for.
+    """
+
+    def __init__(
+        self,
+        setting: WorldSetting,
+        vehicle: Vehicle,
+        starts: Mapping[Feedback, Start],
+        *,
+        integrator: Integrator = "rk4",
+        origin: Geodetic = DEFAULT_ORIGIN,
+    ) -> None:
+        """Fly `vehicle` from one of `starts` in the world of `setting`; what is compiled is loaded here.
+
+        Args:
+            setting: The world, as options read it; `vehicle` and `starts` have their part of it already.
+            vehicle: That flies.
+            starts: How it begins, by what the autopilot may ask for.
+            integrator: Of its motion.
+            origin: Of the ENU frame.
+
+        Raises:
+            VehicleError: It cannot start like that.
+        """
+        weather = weather_of(setting)
+        self.vehicle = vehicle
+        self.starts = starts
+        self._worlds = {it: starting_world(start, vehicle, weather) for it, start in starts.items()}
+        self._physics = Physics(vehicle, integrator, weather)
+        self._setting = setting
+        self._origin = origin
+
+    def build(self, feedback: Feedback, interval_us: int) -> Plant:
+        """Return a plant that begins now, and tells `feedback` every `interval_us`."""
+        return Plant(
+            self._worlds[feedback],
+            self.vehicle,
+            self._physics,
+            feedback,
+            self._origin,
+            seed=self._setting.seed,
+            interval_us=interval_us,
+            latency_us=round(self._setting.latency * 1e3),
+        )
 
 
 def _held(world: World, vehicle: Vehicle) -> ActuatorCommand:

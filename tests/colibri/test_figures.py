@@ -55,7 +55,7 @@ def fly(out: Path, duration_s: float) -> Flight:
         "out": out,
     }
     files = {"controller": None, "solver": None, "vehicle": None, "plant_vehicle": None, "integrator": "rk4"}
-    world: dict[str, Any] = {"wind": NO_WIND, "gust": (), "turbulence": None, "without": (), "start": {}}
+    world: dict[str, Any] = {"wind": NO_WIND, "gusts": (), "turbulence": None, "without": (), "start": {}}
     ground: dict[str, Any] = {"gcs": (), "signing_key": None, "insecure": False}
     plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files, **world, **ground))
     fly_locally(plan, lambda _sim_time_s: None)

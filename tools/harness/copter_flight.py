@@ -33,9 +33,10 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import ned_from_enu
 from colibri.plant.environment.air import CALM
 from colibri.plant.physics.start import Start
-from colibri.plant.physics.world import Physics, World, starting_world, state_frame
+from colibri.plant.physics.world import World, starting_world, state_frame
 from colibri.plant.process.options import nudged
-from colibri.plant.simulation.plant import Plant
+from colibri.plant.simulation.plant import PlantBuilder
+from colibri.plant.simulation.setting import WorldSetting
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from tools.harness.client import COMPONENT, SYSTEM, Client
 from tools.harness.plant_flights import blowing
@@ -97,19 +98,11 @@ class CopterFlight:
             system_id=SYSTEM, identity="px4", origin=origin, files=files, feedback=feedback
         )
         self._weather = blowing(wind_enu_m_s)
-        self._physics = Physics(vehicle or self._believed, "rk4", self._weather)
         self._estimator = estimator_for(feedback, self._believed, origin)
         self.copter = self._copter(values, first)
-        self.plant = Plant(
-            starting_world(nudged(start), self._believed, self._weather),
-            vehicle or self._believed,
-            self._physics,
-            feedback,
-            origin,
-            seed=seed,
-            interval_us=self.copter.frame_interval_us,
-            latency_us=latency_us,
-        )
+        world = WorldSetting(wind=self._weather.wind, seed=seed, latency=latency_us * 1e-3)
+        builder = PlantBuilder(world, vehicle or self._believed, {feedback: nudged(start)}, origin=origin)
+        self.plant = builder.build(feedback, self.copter.frame_interval_us)
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
         self.estimate: Estimate | None = None
         self.client = client or Client()

@@ -4,23 +4,19 @@
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.guidance.trajectories.tracks import position
-from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import undisturbed
 from colibri.common.types import Array
-from colibri.flights.in_process import Direct
+from colibri.flights.in_process import Direct, put_together
 from colibri.flights.plan import FlightPlan
 from colibri.plant.physics.start import Start
-from colibri.plant.physics.world import Physics, starting_world
-from colibri.plant.process.options import nudged
-from colibri.plant.simulation.plant import Plant
 
 APART_M = 1e-3
 LAPS_S = (4.0, 3.0, 2.0, 1.0)
@@ -65,16 +61,7 @@ def fly_family(track: str, count: int, duration_s: float, **start: float) -> lis
 
 
 def _fly(plan: FlightPlan, start: Start, duration_s: float) -> Flown:
-    autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, lambda: 0.0)
-    plant = Plant(
-        starting_world(nudged(start), plan.plant_vehicle),
-        plan.plant_vehicle,
-        Physics(plan.plant_vehicle, "rk4"),
-        plan.feedback,
-        DEFAULT_ORIGIN,
-        seed=0,
-        interval_us=autopilot.frame_interval_us,
-    )
+    autopilot, plant = put_together(replace(plan, start=start), lambda: 0.0)
     exchange, states, fallback = Direct(autopilot), [], []
     with undisturbed():
         while plant.world.time_us < duration_s * 1e6:

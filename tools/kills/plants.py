@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from colibri.mavlink.hil.feedback import Feedback
 from tools.harness.processes import Process
-from tools.kills.autopilots import start
+from tools.kills.autopilots import start, start_plant
 from tools.kills.between import COMPILES_S, Between, Phase
 from tools.kills.station import Station, mission
 
@@ -34,7 +34,7 @@ def fly(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple[list[K
     folder.mkdir()
     chance = random.Random(seed)
     station = Station(mission())
-    processes = [_plant(folder, "udpin:127.0.0.1:0", seed)]
+    processes = [start_plant(folder, "udpin:127.0.0.1:0", seed)]
     try:
         url = processes[0].wait_for("listening")["url"]
         _, host, port = url.split(":")
@@ -88,14 +88,9 @@ class _Flights:
         said = [event["text"] for event in self._autopilot.events("silence")[silences:]]
         station.begin_anew()
         station.drain()
-        self._plant = _plant(self._folder, self._url, seed)
+        self._plant = start_plant(self._folder, self._url, seed)
         self._processes.append(self._plant)
         between.fly_until(
             station, lambda: station.armed is not None and between.time_us < died_us, "the next plant's flight"
         )
         return Kill(died_us * 1e-6, phase, said[0] if said else "", station.armed is False)
-
-
-def _plant(folder: Path, url: str, seed: int) -> Process:
-    options = ("--vehicle", "hummingbird", "--start", "y=0,z=0,psi=90,rotors=0", "--seed", str(seed))
-    return Process(folder, "plant", "--link", url, *options)

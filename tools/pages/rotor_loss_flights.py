@@ -17,10 +17,11 @@ from colibri.common.rotations import tilt_deg
 from colibri.common.types import Array
 from colibri.mavlink.hil.faults import MOTOR, OFF, WRONG, Fault
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.plant.environment.weather import Intensity, Weather, Wind
+from colibri.plant.environment.weather import Intensity, Wind
 from colibri.plant.physics.start import Start
-from colibri.plant.physics.world import Physics, starting_world, state_frame
-from colibri.plant.simulation.plant import Plant
+from colibri.plant.physics.world import state_frame
+from colibri.plant.simulation.plant import Plant, PlantBuilder
+from colibri.plant.simulation.setting import WorldSetting
 from colibri.plant.vehicle.description import load_vehicle
 
 HEIGHT_M = 10.0
@@ -136,17 +137,14 @@ def fly(case: Case, seed: int) -> Flown:
     """Fly to the height, lose a rotor, and see what comes of it."""
     profile = load_profile("flight")
     vehicle = load_vehicle(profile.simulation.vehicle)
-    weather = Weather(Wind(case.wind_m_s, _FULL_TURN_DEG * seed / 50.0), turbulence=case.turbulence, seed=seed)
-    physics = Physics(vehicle, "rk4", weather)
+    wind = Wind(case.wind_m_s, _FULL_TURN_DEG * seed / 50.0)
+    world = WorldSetting(wind=wind, turbulence=case.turbulence, seed=seed)
     settings = StationSettings(1, "px4", DEFAULT_ORIGIN, feedback=case.feedback)
     estimator = estimator_for(case.feedback, vehicle, DEFAULT_ORIGIN)
     values = {"MIS_TAKEOFF_ALT": HEIGHT_M}
     copter = Copter(profile, vehicle, settings, lambda: 0.0, values=values, estimator=estimator)
-    start = Start(psi=_FULL_TURN_DEG * seed / 50.0)
-    world = starting_world(start, vehicle, weather)
-    plant = Plant(
-        world, vehicle, physics, case.feedback, DEFAULT_ORIGIN, seed=seed, interval_us=copter.frame_interval_us
-    )
+    starts = {case.feedback: Start(psi=_FULL_TURN_DEG * seed / 50.0)}
+    plant = PlantBuilder(world, vehicle, starts).build(case.feedback, copter.frame_interval_us)
     _take_off(copter, plant)
     return _lose(copter, plant, seed, _fault(case, seed % 4))
 

@@ -21,10 +21,9 @@ from colibri.mavlink.hil.conductor import Turn
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.plant.__main__ import command_line as plant_command_line
-from colibri.plant.physics.start import DEFAULT_STARTS, IntegrationError
-from colibri.plant.physics.world import Physics, starting_world, state_frame
-from colibri.plant.process.options import nudged, weather_of
-from colibri.plant.sensors.suite import served_by
+from colibri.plant.physics.start import IntegrationError
+from colibri.plant.physics.world import state_frame
+from colibri.plant.process.run import builder_of
 from colibri.plant.simulation.plant import Plant
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
 from colibri.sitl.backends.setting import SettingError
@@ -47,20 +46,11 @@ class MemoryPlant:
         """
         args = parsed(plant_command_line, options)
         try:
-            weather = weather_of(args)
-            self._vehicle = load_vehicle(args.vehicle).without(args.without)
-            serves = served_by(self._vehicle)
-            worlds = {
-                it: starting_world(nudged(DEFAULT_STARTS[it]._replace(**args.start)), self._vehicle, weather)
-                for it in serves
-            }
+            self._builder = builder_of(args)
         except VehicleError as error:
             raise SettingError(str(error)) from error
-        self._args = args
-        self._worlds = worlds
-        self._world = worlds[served_by(self._vehicle)[0]]
+        serves = tuple(self._builder.starts)
         self._answered = False
-        self._physics = Physics(self._vehicle, args.integrator, weather)
         self._end = PlantEnd(system_id=args.system_id, frame_interval_us=round(1e3 / args.rate) * 1000, serves=serves)
         self._plant: Plant | None = None
         self._now_s = 0.0
@@ -109,18 +99,9 @@ class MemoryPlant:
         return self._now_s
 
     def _offer(self) -> None:
-        end, args = self._end, self._args
+        end = self._end
         if self._plant is None:
-            self._plant = Plant(
-                self._worlds[end.feedback],
-                self._vehicle,
-                self._physics,
-                end.feedback,
-                args.home.origin,
-                seed=args.seed,
-                interval_us=end.frame_interval_us,
-                latency_us=round(args.latency * 1e3),
-            )
+            self._plant = self._builder.build(end.feedback, end.frame_interval_us)
         self._answered = False
         frame, plant_status = self._plant.tell()
         end.offer(frame, self._now_s, plant_status, state_frame(self._plant.world))

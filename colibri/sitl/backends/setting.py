@@ -4,10 +4,12 @@ Nothing here loads what flies: pytest imports it in every run, whoever's tests t
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+from colibri.flights.command_lines import options_of, plant_options
+from colibri.plant.simulation.setting import WorldSetting
 from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.errors import SitlError
 
@@ -20,8 +22,11 @@ class SettingError(SitlError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Setting:
+class Setting(WorldSetting):
     """What a flight begins with; each is what the option of the same name of `colibri plant` or `autopilot` says.
+
+    Beside what a `WorldSetting` has, whose seed is that of the links' faults, too. What is left out of `start` is that
+    of a vehicle that stands, nose to the north; x, y, z count from there.
 
     Attributes:
         vehicle: That the plant flies, name or .toml.
@@ -29,20 +34,12 @@ class Setting:
         profile: Control profile, name or .toml.
         controller: Control law; None for the profile's.
         feedback: What the autopilot is told: "state" or "sensors".
-        wind: "5@270": 5 m/s from the west; or a .csv file.
-        gusts: "6@270:start=10,duration=2", each.
-        turbulence: "light", "moderate", "severe"; None for none.
-        seed: Of everything random, the links' faults among it.
-        start: How the vehicle begins: x, y, z (m, ENU, from where it stands), phi, theta, psi (degrees), vx, vy, vz
-            (m/s), p, q, r (rad/s), rotors (rpm). What is left out is that of a vehicle that stands, nose to the north.
         airborne: Picked up in hold so many metres above the origin, its rotors at hover speed: no take-off needed.
             With feedback "state" only: an estimator begins at rest.
         params: Parameters that were changed before.
         track: Flown from time 0 on; the vehicle must be in the air.
         home: "LAT,LON,ALT,YAW": the origin of the ENU frame.
         ground: What links to ground stations do: loss, delay_s, jitter_s, duplicate, reorder, corrupt, as in `Trouble`.
-        latency: One way between plant and autopilot, ms: commands act so much later, twice.
-        without: Parts that are left out of the vehicle: "drag", "ground", "battery", "rotor-lag".
         identity: Towards ground stations: "px4" or "generic".
         system: MAVLink system id.
         ready: Whether the flight is handed over only when the vehicle says that it is there.
@@ -53,18 +50,11 @@ class Setting:
     profile: str = "flight"
     controller: str | None = None
     feedback: str = "state"
-    wind: str | None = None
-    gusts: tuple[str, ...] = ()
-    turbulence: str | None = None
-    seed: int = 0
-    start: Mapping[str, float] = field(default_factory=dict)
     airborne: float | None = None
     params: Mapping[str, float] = field(default_factory=dict)
     track: str | None = None
     home: str | None = None
     ground: Mapping[str, float] = field(default_factory=dict)
-    latency: float = 0.0
-    without: tuple[str, ...] = ()
     identity: str = "px4"
     system: int = 1
     ready: bool = True
@@ -74,34 +64,22 @@ class Setting:
         start = dict(_STANDING)
         if self.airborne is not None:
             start |= {"z": self.airborne, "rotors": hover_rpm}
-        start |= self.start
-        return [
-            *("--vehicle", self.vehicle),
-            *("--start", ",".join(f"{key}={value!r}" for key, value in start.items())),
-            *("--seed", str(self.seed)),
-            *("--system-id", str(self.system)),
-            *(("--latency", repr(self.latency)) if self.latency else ()),
-            *_given("--wind", self.wind),
-            *_given("--turbulence", self.turbulence),
-            *_given("--home", self.home),
-            *(f"--gust={gust}" for gust in self.gusts),
-            *(f"--without={part}" for part in self.without),
-            "--truth",
-        ]
+        world = replace(self, start=start | dict(self.start))
+        return plant_options(world, vehicle=self.vehicle, system_id=self.system, home=self.home, truth=True)
 
     def autopilot_options(self, state: Path) -> list[str]:
         """Return the command line of an autopilot that keeps its files in folder `state`."""
-        return [
-            *("--vehicle", self.believed or self.vehicle),
-            *("--profile", self.profile),
-            *("--feedback", self.feedback),
-            *("--system-id", str(self.system)),
-            *("--identity", self.identity),
-            *("--state", str(state)),
-            *_given("--controller", self.controller),
-            *_given("--track", self.track),
-            *_given("--home", self.home),
-        ]
+        return options_of(
+            vehicle=self.believed or self.vehicle,
+            profile=self.profile,
+            controller=self.controller,
+            feedback=self.feedback,
+            track=self.track,
+            home=self.home,
+            identity=self.identity,
+            system_id=self.system,
+            state=state,
+        )
 
 
 KEYS = frozenset(each.name for each in fields(Setting))
@@ -139,7 +117,3 @@ def _numbers(name: str, text: str) -> dict[str, float]:
         return {key: float(value) for key, value in (pair.split("=", 1) for pair in text.split(","))}
     except ValueError:
         raise SettingError(f"{name} is KEY=VALUE,..., not {text!r}") from None
-
-
-def _given(option: str, value: str | None) -> tuple[str, ...]:
-    return () if value is None else (f"{option}={value}",)

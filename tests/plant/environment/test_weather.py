@@ -9,11 +9,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.common.process.arguments import ArgumentParser, natural
+from colibri.flights.command_lines import options_of
 from colibri.plant.environment.air import CALM, Air
-from colibri.plant.environment.weather import INTENSITIES, NO_WIND, Gust, Intensity, RecordedWind, Weather, Wind
+from colibri.plant.environment.weather import (
+    INTENSITIES,
+    NO_WIND,
+    Gust,
+    Intensity,
+    RecordedWind,
+    Weather,
+    Wind,
+    weather_of,
+)
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world
-from colibri.plant.process.options import add_weather_arguments, gust, weather_of
+from colibri.plant.process.options import add_weather_arguments, gust
 from colibri.plant.process.options import wind as read_wind
 from tools.harness.plant_flights import FRAME_US, hover, hummingbird, rpm
 
@@ -119,7 +129,7 @@ def test_the_command_line_is_read_back(wind: Wind, gusts: list[Gust], turbulence
     parser = ArgumentParser()
     add_weather_arguments(parser)
     parser.add_argument("--seed", type=natural)
-    assert weather_of(parser.parse_args([*weather.options(), f"--seed={seed}"])) == weather
+    assert weather_of(parser.parse_args(options_of(**weather._asdict()))) == weather
 
 
 def test_air_that_may_change_but_does_not_is_a_constant_wind(tmp_path: Path) -> None:
