@@ -29,12 +29,22 @@ TRACK = "spiral"
 """What flies where nothing else is said."""
 
 
+def loaded(args: argparse.Namespace) -> tuple[Profile, Vehicle, Estimator | None]:
+    """Return what a command line flies with.
+
+    Raises:
+        ProfileError: There is no such profile, or it is wrong.
+        VehicleError: There is no such vehicle, or it cannot be flown by what is asked for.
+    """
+    profile = load_profile(args.profile).with_choices(args.controller, args.solver)
+    vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
+    return profile, vehicle, estimator_for(args.feedback, vehicle, args.home.origin)
+
+
 def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop: Stop) -> int:
     """Fly the plant at the other end of `link` as the command line says; return the exit code."""
     try:
-        profile = load_profile(args.profile).with_choices(args.controller, args.solver)
-        vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
-        estimator = estimator_for(args.feedback, vehicle, args.home.origin)
+        profile, vehicle, estimator = loaded(args)
         served = args.gcs or args.conducted
         ground = _ground(args, profile, vehicle, estimator, status, stop) if served else None
         autopilot = ground.copter if ground else _alone(args, profile, vehicle, estimator)

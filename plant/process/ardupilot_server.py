@@ -14,7 +14,7 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.ardupilot import ArduPilotEnd
 from colibri.plant.process.logs import TRUTH_COLUMNS, truth_row
-from colibri.plant.process.options import nudged, weather_of
+from colibri.plant.process.options import nudged
 from colibri.plant.vehicle.description import load_vehicle
 
 _SILENCE_SAID_AFTER_S = 2.0

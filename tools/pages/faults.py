@@ -38,7 +38,7 @@ _TAIL = """
   simulated time after its sample, the command before is held, and samples due meanwhile are skipped. Nothing is
   measured: the flight is the same on any computer. `0` is none; where it is longer than the control interval, the
   deadline is missed.
-- A slow link: `--latency MS` of `colibri fly` and `colibri plant`, see [latency.md](latency.md).
+- A slow link: `--latency MS` of `colibri fly`, `sitl` and `plant`, see [latency.md](latency.md).
 - A plant that waits for nobody: `colibri plant --realtime`, see [realtime.md](realtime.md).
 - The battery is the plant's: it tells the autopilot twice a second, and at once one that has just started. Charges
   that differ by less than 2 % of the capacity from the autopilot's own count are left to that.

@@ -8,11 +8,10 @@ from time import perf_counter
 from typing import Any
 
 from colibri.autopilot.__main__ import command_line as autopilot_command_line
-from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import DecisionError
 from colibri.autopilot.core.step import answer
-from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.process.ground import open_ground
+from colibri.autopilot.process.run import loaded
 from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.status import Status
@@ -25,7 +24,7 @@ from colibri.plant.physics.start import IntegrationError
 from colibri.plant.physics.world import state_frame
 from colibri.plant.process.run import builder_of
 from colibri.plant.simulation.plant import Plant
-from colibri.plant.vehicle.description import VehicleError, load_vehicle
+from colibri.plant.vehicle.description import VehicleError
 from colibri.sitl.backends.setting import SettingError
 from colibri.sitl.backends.stage import StageError
 
@@ -129,11 +128,8 @@ class MemoryAutopilot:
         """
         args = self._args
         try:
-            profile = load_profile(args.profile).with_choices(args.controller, args.solver)
-            vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
-            estimator = estimator_for(args.feedback, vehicle, args.home.origin)
             self._desk = _Desk()
-            self._ground = open_ground(args, profile, vehicle, estimator, _Silence(), self._desk)
+            self._ground = open_ground(args, *loaded(args), _Silence(), self._desk)
         except Error as error:
             raise SettingError(str(error)) from error
         self._copter = self._ground.copter
