@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from math import hypot, isfinite, isnan, nan, pi, radians
 
 from colibri.autopilot.commander.pilot import Pilot
-from colibri.autopilot.commander.rules.modes import Mode, Refusal, mode_of, mode_of_custom
+from colibri.autopilot.commander.rules.modes import Mode, mode_of, mode_of_custom
 from colibri.autopilot.guidance.tasks.orbit import Round
 from colibri.autopilot.guidance.tasks.orders import Circle, GoTo
 from colibri.autopilot.guidance.tasks.position import Climb, Stop, Way
@@ -20,8 +20,10 @@ from colibri.mavlink.services.command import (
     Command,
     Handler,
     Outcome,
+    outcome_of,
 )
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
 
 FORCE_MAGIC = 21196
 FARTHEST_M = 100_000.0
@@ -40,8 +42,8 @@ _SAME_SPEED, _DEFAULT_SPEED = -1.0, -2.0
 _RELATIVE = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
-Fence = Callable[[Vector], str]
-"""(position) -> why the vehicle may not fly there; empty if it may."""
+Fence = Callable[[Vector], Refusal | None]
+"""(position) -> why the vehicle may not fly there; None if it may."""
 
 
 class Commands:
@@ -77,25 +79,23 @@ class Commands:
             mav.MAV_CMD_RUN_PREARM_CHECKS: self._check,
         }
 
-    def guided_goto(self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int) -> Outcome:
+    def guided_goto(self, latitude_deg: float, longitude_deg: float, altitude_m: float, frame: int) -> Refusal | None:
         """Fly to a place on earth, as DroneKit asks by a mission item outside a mission."""
         return self._go(latitude_deg, longitude_deg, altitude_m, frame, nan, nan)
 
-    def select(self, mode: Mode | None) -> Outcome:
-        """Change the mode; None is a mode that this vehicle does not have."""
-        if mode is None:
-            return Outcome(UNSUPPORTED, "this vehicle has no such mode")
-        return self._select(mode)
+    def select(self, mode: Mode | None) -> Refusal | None:
+        """Change the mode, None being one that this vehicle does not have; return why not."""
+        return Refusal("this vehicle has no such mode", UNSUPPORTED) if mode is None else self._pilot.select(mode)
 
     def _select(self, mode: Mode) -> Outcome:
-        return _outcome(self._pilot.select(mode))
+        return outcome_of(self._pilot.select(mode))
 
     def _arm_disarm(self, command: Command) -> Outcome:
         force = command.p2 == FORCE_MAGIC
         if command.p1 == 1.0:
-            return _outcome(self._pilot.arm(force=force))
+            return outcome_of(self._pilot.arm(force=force))
         if command.p1 == 0.0:
-            return _outcome(self._pilot.disarm(force=force))
+            return outcome_of(self._pilot.disarm(force=force))
         return Outcome(DENIED, "arm with 1, disarm with 0")
 
     def _set_mode(self, command: Command) -> Outcome:
@@ -105,10 +105,10 @@ class Commands:
         base, main, sub = map(int, numbers)
         if not base & _CUSTOM:
             return Outcome(UNSUPPORTED, "mode refused: only custom modes are known")
-        return self.select(mode_of(main, sub))
+        return outcome_of(self.select(mode_of(main, sub)))
 
-    def set_custom_mode(self, base_mode: int, custom_mode: int) -> Outcome:
-        """Obey a SET_MODE message."""
+    def set_custom_mode(self, base_mode: int, custom_mode: int) -> Refusal | None:
+        """Obey a SET_MODE message; return why not."""
         return self.select(mode_of_custom(custom_mode) if base_mode & _CUSTOM else None)
 
     def _take_off(self, command: Command) -> Outcome:
@@ -121,10 +121,10 @@ class Commands:
             return _denied("take-off", "not a height above the ground")
         scene = pilot.scene()
         x, y, _ = scene.place
-        refused = self._fence((x, y, height_m))
-        if refused:
-            return _denied("take-off", refused)
-        return _outcome(pilot.fly(Mode.TAKEOFF, Climb(height_m, None, scene, pilot.behaviour.takeoff_speed_m_s)))
+        refusal = self._fence((x, y, height_m))
+        if refusal is not None:
+            return _denied("take-off", refusal.reason)
+        return outcome_of(pilot.fly(Mode.TAKEOFF, Climb(height_m, None, scene, pilot.behaviour.takeoff_speed_m_s)))
 
     def _height_of_takeoff(self, command: Command) -> float:
         """Take z as above home, as most mean it, but from who says otherwise: QGC, which sends a pitch of -1."""
@@ -146,28 +146,28 @@ class Commands:
         if not (isnan(speed) or self._may_fly_at(speed)):
             return _denied("reposition", f"a speed of {speed:g} m/s")
         if all(map(isnan, (command.x, command.y, command.z, command.p4))):
-            return _outcome(self._pilot.fly(Mode.HOLD, Stop()))
+            return outcome_of(self._pilot.fly(Mode.HOLD, Stop()))
         frame = mav.MAV_FRAME_GLOBAL if command.frame is None else command.frame
-        return self._go(command.x, command.y, command.z, frame, command.p4, speed)
+        return outcome_of(self._go(command.x, command.y, command.z, frame, command.p4, speed))
 
-    def _go(self, x: float, y: float, z: float, frame: int, yaw_ned: float, speed: float) -> Outcome:
+    def _go(self, x: float, y: float, z: float, frame: int, yaw_ned: float, speed: float) -> Refusal | None:
         pilot = self._pilot
         if not self._flies:
-            return _denied("reposition", "the vehicle is not flying")
+            return Refusal("reposition refused: the vehicle is not flying")
         scene = pilot.scene()
         place, only_height = scene.place, isnan(x) and isnan(y)
         if not only_height:
             if not is_on_earth(x, y):
-                return _denied("reposition", "not a latitude and longitude")
+                return Refusal("reposition refused: not a latitude and longitude")
             place = (*enu_of(Geodetic(x, y, 0.0), self.origin)[:2], place[2])
         if not isnan(z):
             height_m = pilot.home_enu_m[2] + z if frame in _RELATIVE else z - self.origin.altitude_m
             place = (place[0], place[1], height_m)
-        refused = self.unreachable(place)
-        if refused:
-            return _denied("reposition", refused)
+        refusal = self.unreachable(place)
+        if refusal is not None:
+            return Refusal(f"reposition refused: {refusal.reason}")
         yaw = 0.5 * pi - yaw_ned if not isnan(yaw_ned) else scene.yaw_rad if only_height else None
-        return _outcome(pilot.fly(Mode.HOLD, Way(GoTo(place, yaw, None if isnan(speed) else speed), scene)))
+        return pilot.fly(Mode.HOLD, Way(GoTo(place, yaw, None if isnan(speed) else speed), scene))
 
     @property
     def _flies(self) -> bool:
@@ -176,11 +176,11 @@ class Commands:
     def _may_fly_at(self, speed_m_s: float) -> bool:
         return 0.0 < speed_m_s <= self._pilot.behaviour.fastest_m_s
 
-    def unreachable(self, place: Vector) -> str:
-        """Return why the vehicle may not fly to a place; empty if it may."""
+    def unreachable(self, place: Vector) -> Refusal | None:
+        """Return why the vehicle may not fly to a place; None if it may."""
         away = hypot(place[0], place[1])
         if not isfinite(away) or away > FARTHEST_M or not -HIGHEST_M < place[2] < HIGHEST_M:
-            return "too far away"
+            return Refusal("too far away")
         return self._fence(place)
 
     def _orbit(self, command: Command) -> Outcome:
@@ -200,23 +200,23 @@ class Commands:
         speed = None if isnan(command.p2) else abs(command.p2)
         yaw = 0.0 if isnan(command.p3) else command.p3
         circle = Circle((x, y, z), radius, speed, int(yaw) if yaw in _YAW_BEHAVIOURS else -1)
-        refused = self._no_circle(circle)
-        if refused:
-            return _denied("orbit", refused)
-        return _outcome(pilot.fly(Mode.ORBIT, Round(circle, scene)))
+        refusal = self._no_circle(circle)
+        if refusal is not None:
+            return _denied("orbit", refusal.reason)
+        return outcome_of(pilot.fly(Mode.ORBIT, Round(circle, scene)))
 
-    def _no_circle(self, circle: Circle) -> str:
-        """Return why the vehicle may not fly a circle; empty if it may."""
+    def _no_circle(self, circle: Circle) -> Refusal | None:
+        """Return why the vehicle may not fly a circle; None if it may."""
         (x, y, z), radius, speed, yaw_behaviour = circle
         if not SMALLEST_RADIUS_M <= abs(radius) <= FARTHEST_M:
-            return f"a radius of {radius:g} m"
+            return Refusal(f"a radius of {radius:g} m")
         if speed is not None and not self._may_fly_at(speed):
-            return f"a speed of {speed:g} m/s"
+            return Refusal(f"a speed of {speed:g} m/s")
         if yaw_behaviour not in _YAW_BEHAVIOURS:
-            return "no such yaw behaviour"
+            return Refusal("no such yaw behaviour")
         angles = (2.0 * pi * point / _POINTS for point in range(_POINTS))
         around = ((x + radius * cos(angle), y + radius * sin(angle), z) for angle in angles)
-        return next(filter(None, map(self.unreachable, around)), "")
+        return next(filter(None, map(self.unreachable, around)), None)
 
     def _change_speed(self, command: Command) -> Outcome:
         """Set the speed over ground; -1 leaves it, -2 is the parameters'."""
@@ -243,20 +243,20 @@ class Commands:
             return _denied("home", "1 is here, 0 is there")
         if not is_on_earth(command.x, command.y) or not isfinite(command.z):
             return _denied("home", "not a latitude, longitude and altitude")
-        refused = self.move_home(Geodetic(command.x, command.y, command.z))
-        return Outcome(DENIED, refused) if refused else Outcome()
+        return outcome_of(self.move_home(Geodetic(command.x, command.y, command.z)))
 
-    def move_home(self, place: Geodetic) -> str:
+    def move_home(self, place: Geodetic) -> Refusal | None:
         """Have home at a place on earth; return why not."""
         home = enu_of(place, self.origin)
-        refused = self.unreachable(home)
-        if not refused:
-            self._pilot.set_home(home, self._pilot.home_yaw_rad)
-        return f"home refused: {refused}" if refused else ""
+        refusal = self.unreachable(home)
+        if refusal is not None:
+            return Refusal(f"home refused: {refusal.reason}")
+        self._pilot.set_home(home, self._pilot.home_yaw_rad)
+        return None
 
     def _terminate(self, command: Command) -> Outcome:
         if command.p1 == 1.0:
-            return _outcome(self._pilot.disarm(force=True))
+            return outcome_of(self._pilot.disarm(force=True))
         return Outcome(DENIED, "flight terminated by 1 alone, and never undone")
 
     def _turn(self, command: Command) -> Outcome:
@@ -271,7 +271,7 @@ class Commands:
         scene = self._pilot.scene()
         zero_rad = scene.yaw_rad if relative else 0.5 * pi
         yaw = zero_rad - radians(-angle if relative and way < 0.0 else angle)
-        return _outcome(self._pilot.fly(Mode.HOLD, Way(GoTo(scene.place, yaw), scene)))
+        return outcome_of(self._pilot.fly(Mode.HOLD, Way(GoTo(scene.place, yaw), scene)))
 
     def _check(self, command: Command) -> Outcome:
         del command
@@ -281,7 +281,3 @@ class Commands:
 
 def _denied(what: str, reason: str) -> Outcome:
     return Outcome(DENIED, f"{what} refused: {reason}")
-
-
-def _outcome(refusal: Refusal | None) -> Outcome:
-    return Outcome() if refusal is None else Outcome(DENIED, refusal.reason)

@@ -18,6 +18,7 @@ from colibri.mavlink.mission.items import ACCEPTED, FENCE, MISSION, RALLY, Missi
 from colibri.mavlink.mission.service import MissionService, Vehicle
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.services.statustext import INFO, WARNING, StatusText
+from colibri.mavlink.wire.refusal import Refusal
 
 _LOOK_EVERY_US = 100_000
 
@@ -38,7 +39,8 @@ class Missions:
         self.executor = MissionExecutor()
         self.changes = 0
         self._fence = Geofence((), commands.origin)
-        self._outside = self._breach = ""
+        self._outside = ""
+        self._breach: Refusal | None = None
         self._breach_due_us = 0
         rules = {
             MISSION: Rules(check_item, check_mission),
@@ -68,18 +70,18 @@ class Missions:
         behaviour = self._pilot.behaviour
         return AroundHome(self._pilot.home_enu_m, behaviour.farthest_m, behaviour.highest_m)
 
-    def fence_refusal(self, place: Vector) -> str:
-        """Return why the vehicle may not fly to a place; empty if it may."""
+    def fence_refusal(self, place: Vector) -> Refusal | None:
+        """Return why the vehicle may not fly to a place; None if it may."""
         return self._fence.refusal(place) or self._around_home.refusal(place)
 
     def margin_m(self, place: Vector) -> float:
         """Return how far a place is inside of every fence, m; negative outside."""
         return min(self._fence.margin_m(place), self._around_home.margin_m(place))
 
-    def breach(self, place: Vector, now_us: int) -> str:
+    def breach(self, place: Vector, now_us: int) -> Refusal | None:
         """Return why the vehicle may not be where it is; looked at ten times a second, fences take time."""
         if not self.has_fence:
-            self._breach = ""
+            self._breach = None
         elif now_us >= self._breach_due_us:
             self._breach_due_us = now_us + _LOOK_EVERY_US
             self._breach = self.fence_refusal(place)
@@ -166,19 +168,19 @@ class Missions:
 
     def _fence_in(self, items: Sequence[MissionItem]) -> None:
         self._fence = Geofence(items, self._commands.origin)
-        self._breach, self._breach_due_us = "", 0
+        self._breach, self._breach_due_us = None, 0
         self._check_mission()
 
     def _check_mission(self) -> None:
         """Look for an item that leads outside the geofence; the way between two items is not looked at."""
         pilot, before = self._pilot, self._outside
         found = places(self.executor.items, pilot.home_enu_m, self._commands.origin) if self.has_fence else ()
-        outside = [(seq, refused) for seq, place in found if (refused := self.fence_refusal(place))]
+        outside = [(seq, refusal.reason) for seq, place in found if (refusal := self.fence_refusal(place))]
         self._outside = f"item {outside[0][0]} of the mission: {outside[0][1]}" if outside else ""
         if self._outside and self._outside != before:
             pilot.say(WARNING, self._outside)
 
-    def _set_current(self, seq: int, reset: bool) -> str:
+    def _set_current(self, seq: int, reset: bool) -> Refusal | None:
         return self.executor.set_current(seq, reset)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from colibri.autopilot.commander.rules.arming import Facts, refusals
 from colibri.autopilot.commander.rules.failsafe_table import Action
-from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, Refusal, State, following
+from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, State, following
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon, VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.landing_detector import Landing, is_below, stands_at_first, watch
@@ -18,6 +18,7 @@ from colibri.autopilot.guidance.tasks.position import Stop
 from colibri.autopilot.guidance.tasks.task import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
 from colibri.common.types import Array, Vector
 from colibri.mavlink.services.statustext import EMERGENCY, INFO, NOTICE
+from colibri.mavlink.wire.refusal import Refusal
 
 CourseMaker: TypeAlias = Callable[[Mode, Scene], Course]
 _ORIGIN: Vector = (0.0, 0.0, 0.0)

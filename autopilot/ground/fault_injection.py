@@ -4,11 +4,12 @@ A fault travels with the answer to the next frame, and the frame after that tell
 whoever asked: what is accepted has happened.
 """
 
-from colibri.mavlink.hil.faults import Fault, Part, Refusal, fault_from, judged
+from colibri.mavlink.hil.faults import Fault, Part, fault_from, judged
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
 from colibri.mavlink.services.command import DENIED, FAILED, LATER, UNSUPPORTED, Command, Outcome
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_DENIED
+from colibri.mavlink.wire.refusal import Refusal
 
 ANSWERED_WITHIN_US = 1_000_000
 """A plant that knows faults answers with the next frame but one."""

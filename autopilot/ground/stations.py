@@ -26,7 +26,16 @@ from colibri.mavlink.parameters.metadata_json import metadata_json
 from colibri.mavlink.parameters.pack import packed_for
 from colibri.mavlink.parameters.service import ParameterService
 from colibri.mavlink.parameters.store import Parameters
-from colibri.mavlink.services.command import ACCEPTED, DENIED, Command, CommandService, Entry, Handler, Outcome
+from colibri.mavlink.services.command import (
+    ACCEPTED,
+    DENIED,
+    Command,
+    CommandService,
+    Entry,
+    Handler,
+    Outcome,
+    outcome_of,
+)
 from colibri.mavlink.services.identity import IDENTITIES, autopilot_version, banner, version_of
 from colibri.mavlink.services.origin import OriginService, Setters
 from colibri.mavlink.services.shell import Shell
@@ -44,6 +53,7 @@ from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
 from colibri.mavlink.wire.framing import Framer
+from colibri.mavlink.wire.refusal import Refusal
 from colibri.mavlink.wire.signing import Signing
 
 VERSION = version_of_package("colibri-sitl")
@@ -128,7 +138,9 @@ class Stations:
             self.offboard,
             self.manual,
             self.follow,
-            OriginService(Setters(self._set_origin, self.commands.move_home, self._set_mode), self._text),
+            OriginService(
+                Setters(self._set_origin, self.commands.move_home, self.commands.set_custom_mode), self._text
+            ),
             Ftp(files),
             Logs(files, (LOGS,), lambda: self.log.name),
             Shell({"ver": lambda _: self.banner() + "\n", "status": lambda _: self._status(), "param": self._param}),
@@ -232,7 +244,7 @@ class Stations:
             ),
             mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._restart,
             mav.MAV_CMD_PREFLIGHT_STORAGE: self._storage,
-            mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN: lambda command: _denied(
+            mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN: lambda command: outcome_of(
                 self._set_origin(Geodetic(command.x, command.y, command.z))
             ),
         }
@@ -252,22 +264,22 @@ class Stations:
 
     def _select(self, number: int, command: Command) -> Outcome:
         del command
-        return self.commands.select(mode_of_custom(number))
+        return outcome_of(self.commands.select(mode_of_custom(number)))
 
     def _version(self) -> Sequence[object]:
         return autopilot_version(self._identity, version_of(VERSION), self._settings.system_id)
 
-    def _set_origin(self, place: Geodetic) -> str:
+    def _setters(self) -> Setters:
+        return Setters(self._set_origin, self.commands.move_home, self.commands.set_custom_mode)
+
+    def _set_origin(self, place: Geodetic) -> Refusal | None:
         if not is_on_earth(place.latitude_deg, place.longitude_deg) or not abs(place.altitude_m) <= HIGHEST_M:
-            return "origin refused: not a latitude, longitude and altitude"
+            return Refusal("origin refused: not a latitude, longitude and altitude")
         if self._pilot.state.armed:
-            return "origin refused: the rotors are armed"
+            return Refusal("origin refused: the rotors are armed")
         self.commands.origin = place
         self.missions.moved_origin()
-        return ""
-
-    def _set_mode(self, base_mode: int, number: int) -> str:
-        return self.commands.set_custom_mode(base_mode, number).reason
+        return None
 
     def _restart(self, command: Command) -> Outcome:
         if self._pilot.state.armed:
@@ -299,7 +311,3 @@ class Stations:
         shown = arguments[1:] if arguments[:1] == ["show"] else arguments
         names = [p.name for p in self._parameters if not shown or p.name.startswith(shown[0].upper().rstrip("*"))]
         return "".join(f"{name} {self._parameters[name]:g}\n" for name in names) or "no such parameter\n"
-
-
-def _denied(reason: str) -> Outcome:
-    return Outcome(DENIED, reason) if reason else Outcome()

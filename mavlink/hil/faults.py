@@ -11,7 +11,8 @@ from math import isfinite, isnan
 from typing import Any, NamedTuple
 
 from colibri.common.types import FourRotors
-from colibri.mavlink.wire.dialect import RESULT_DENIED, RESULT_UNSUPPORTED, Codec, mav
+from colibri.mavlink.wire.dialect import RESULT_UNSUPPORTED, Codec, mav
+from colibri.mavlink.wire.refusal import Refusal
 
 COMMAND: int = mav.MAV_CMD_INJECT_FAILURE
 GYROSCOPE: int = mav.FAILURE_UNIT_SENSOR_GYRO
@@ -61,18 +62,6 @@ class Fault(NamedTuple):
     kind: int
     instance: int = ALL
     values: FourRotors = _NOT_GIVEN
-
-
-class Refusal(NamedTuple):
-    """Why a fault is none.
-
-    Attributes:
-        result: MAV_RESULT.
-        reason: In words.
-    """
-
-    result: int
-    reason: str
 
 
 class Value(NamedTuple):
@@ -217,12 +206,12 @@ def judged(fault: Fault, parts: Collection[Part]) -> Fault | Refusal:
     """Return a fault with all numbers that it has; or why there can be none such where only `parts` are."""
     row = TABLE.get((fault.unit, fault.kind))
     if row is None:
-        return Refusal(RESULT_UNSUPPORTED, "no plant does this fault")
+        return Refusal("no plant does this fault", RESULT_UNSUPPORTED)
     if row.part not in parts:
         without = "flown by the state, not by sensors" if row.part is Part.SENSORS else f"no {row.part} to fail"
-        return Refusal(RESULT_UNSUPPORTED, without)
+        return Refusal(without, RESULT_UNSUPPORTED)
     if not 0 <= fault.instance <= row.instances:
-        return Refusal(RESULT_DENIED, f"instance must be 0 to {row.instances}")
+        return Refusal(f"instance must be 0 to {row.instances}")
     return _with_values(row, fault)
 
 
@@ -245,6 +234,6 @@ def _with_values(row: Row, fault: Fault) -> Fault | Refusal:
         slack = _ROUNDING * max(abs(it.least), abs(it.most))
         if value and not it.least - slack <= value <= it.most + slack:
             unit = "" if it.unit == "1" else f" {it.unit}"
-            return Refusal(RESULT_DENIED, f"{it.name} must be {it.least:g} to {it.most:g}{unit}")
+            return Refusal(f"{it.name} must be {it.least:g} to {it.most:g}{unit}")
     a, b, c, d = (*taken, *_NOT_GIVEN)[: len(_NOT_GIVEN)]
     return fault._replace(values=(a, b, c, d))

@@ -26,10 +26,10 @@ from colibri.mavlink.mission.items import (
 )
 from colibri.mavlink.mission.upload import Rules, Uploads, ack
 from colibri.mavlink.node.service import Fields, Peer, Send, to_all
-from colibri.mavlink.services.command import ACCEPTED as COMMAND_ACCEPTED
-from colibri.mavlink.services.command import DENIED, Command, Outcome
+from colibri.mavlink.services.command import DENIED, Command, Outcome, outcome_of
 from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.refusal import Refusal
 
 STREAM_EVERY_US = 1_000_000
 NO_MISSION_TOTAL = 0xFFFF
@@ -62,14 +62,15 @@ class Vehicle(NamedTuple):
         load: (plan type, plan): take a new plan; empty where it was cleared.
         progress: () -> where the mission stands; called at every poll, best returns the same object while nothing
             changes.
-        set_current: (seq or -1 for the current, reset the counters) -> why not; empty if it was done.
-        guided_goto: (latitude in degrees, longitude in degrees, altitude in m, MAV_FRAME) -> whether it flies there.
+        set_current: (seq or -1 for the current, reset the counters) -> why not; None if it was done.
+        guided_goto: (latitude in degrees, longitude in degrees, altitude in m, MAV_FRAME) -> why not;
+            None if it flies there.
     """
 
     load: Callable[[int, Plan], None]
     progress: Callable[[], Progress]
-    set_current: Callable[[int, bool], str]
-    guided_goto: Callable[[float, float, float, int], Outcome]
+    set_current: Callable[[int, bool], Refusal | None]
+    guided_goto: Callable[[float, float, float, int], Refusal | None]
 
 
 class MissionService:
@@ -150,11 +151,10 @@ class MissionService:
             return Outcome(DENIED, "mission: not a sequence number")
         if reset not in (0.0, 1.0):
             return Outcome(DENIED, "mission: reset is 0 or 1")
-        reason = self._vehicle.set_current(int(seq), reset == 1.0)
-        if reason:
-            return Outcome(DENIED, reason)
-        self._announce()
-        return Outcome()
+        refusal = self._vehicle.set_current(int(seq), reset == 1.0)
+        if refusal is None:
+            self._announce()
+        return outcome_of(refusal)
 
     def _announce(self) -> None:
         """Have the next poll tell where the mission stands, changed or not."""
@@ -195,8 +195,8 @@ class MissionService:
             return mav.MAV_MISSION_INVALID_PARAM6_Y, ""
         if not isfinite(fields.z):
             return mav.MAV_MISSION_INVALID_PARAM7, ""
-        outcome = self._vehicle.guided_goto(latitude, longitude, fields.z, fields.frame)
-        return (ACCEPTED if outcome.result == COMMAND_ACCEPTED else mav.MAV_MISSION_DENIED), outcome.reason
+        refusal = self._vehicle.guided_goto(latitude, longitude, fields.z, fields.frame)
+        return (ACCEPTED, "") if refusal is None else (mav.MAV_MISSION_DENIED, refusal.reason)
 
     def _request_list(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
         if fields.mission_type not in PLAN_TYPES:
@@ -230,9 +230,9 @@ class MissionService:
     def _set_current(self, fields: Any, peer: Peer, now_us: int) -> Iterable[Send]:
         """Go to an item: that it was done, or why not, is broadcast ("Set Current Mission Item")."""
         del peer, now_us
-        reason = self._vehicle.set_current(fields.seq, False)
-        if reason:
-            return self._text.say(WARNING, reason)
+        refusal = self._vehicle.set_current(fields.seq, False)
+        if refusal is not None:
+            return self._text.say(WARNING, refusal.reason)
         self._announce()
         return ()
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 from colibri.mavlink.node.service import Peer, Send, to
 from colibri.mavlink.services.statustext import ERROR, WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.refusal import Refusal
 
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 TEMPORARILY_REJECTED: int = mav.MAV_RESULT_TEMPORARILY_REJECTED
@@ -96,6 +97,11 @@ class Outcome(NamedTuple):
     reason: str = ""
     param2: int = 0
     progress: int = PROGRESS_UNKNOWN
+
+
+def outcome_of(refusal: Refusal | None) -> Outcome:
+    """Return what became of a command that was refused, or done at once."""
+    return Outcome() if refusal is None else Outcome(refusal.result, refusal.reason)
 
 
 Handler: TypeAlias = Callable[[Command], Outcome]

@@ -11,12 +11,13 @@ from colibri.common.earth.geodesy import Geodetic, is_on_earth
 from colibri.mavlink.node.service import Peer, Send, to_all
 from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message
+from colibri.mavlink.wire.refusal import Refusal
 
 _LOWEST_MM, _HIGHEST_MM = -1_000_000, 20_000_000
 
 
 class Setters(NamedTuple):
-    """What obeys; each says why not, or nothing.
+    """What obeys; each returns why not, None if it is done.
 
     Attributes:
         origin: Of the ENU frame.
@@ -24,9 +25,9 @@ class Setters(NamedTuple):
         mode: (base mode, custom mode).
     """
 
-    origin: Callable[[Geodetic], str]
-    home: Callable[[Geodetic], str]
-    mode: Callable[[int, int], str]
+    origin: Callable[[Geodetic], Refusal | None]
+    home: Callable[[Geodetic], Refusal | None]
+    mode: Callable[[int, int], Refusal | None]
 
 
 class OriginService:
@@ -52,12 +53,12 @@ class OriginService:
         place = Geodetic(fields.latitude * 1e-7, fields.longitude * 1e-7, fields.altitude * 1e-3)
         on_earth = is_on_earth(place.latitude_deg, place.longitude_deg)
         if not on_earth or not _LOWEST_MM <= fields.altitude <= _HIGHEST_MM:
-            return self._refused("refused: not a latitude, longitude and altitude")
+            return self._refused(Refusal("refused: not a latitude, longitude and altitude"))
         if message.name == "SET_HOME_POSITION":
             return self._refused(self._setters.home(place))
-        reason = self._setters.origin(place)
-        if reason:
-            return self._refused(reason)
+        refusal = self._setters.origin(place)
+        if refusal is not None:
+            return self._refused(refusal)
         return [to_all("GPS_GLOBAL_ORIGIN", fields.latitude, fields.longitude, fields.altitude, now_us)]
 
     def poll(self, now_us: int) -> Iterable[Send]:
@@ -65,5 +66,5 @@ class OriginService:
         del now_us
         return ()
 
-    def _refused(self, reason: str) -> list[Send]:
-        return self._text.say(WARNING, reason) if reason else []
+    def _refused(self, refusal: Refusal | None) -> list[Send]:
+        return [] if refusal is None else self._text.say(WARNING, refusal.reason)

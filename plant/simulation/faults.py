@@ -6,10 +6,11 @@ A fault happens at an instant between two frames; what it does then depends on t
 from collections.abc import Sequence
 from dataclasses import replace
 
-from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, STUCK, WRONG, Fault, Part, Refusal, judged
+from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, STUCK, WRONG, Fault, Part, judged
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
 from colibri.mavlink.wire.dialect import RESULT_ACCEPTED
+from colibri.mavlink.wire.refusal import Refusal
 from colibri.plant.physics.world import Physics, World
 from colibri.plant.sensors.faults import SensorFaults
 from colibri.plant.vehicle.description import Vehicle

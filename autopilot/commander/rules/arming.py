@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from colibri.autopilot.control.interface import VehicleState
 from colibri.common.rotations import tilt_deg
+from colibri.mavlink.wire.refusal import Refusal
 
 LARGEST_TILT_DEG = 45.0
 LARGEST_SPEED_M_S = 0.5
@@ -23,7 +24,7 @@ class Facts(NamedTuple):
         standing: Whether it stands on the ground.
         charge: Part of the battery's charge that is left; 1 without a battery.
         thrust_stick: Of the pilot, 0..1; None if the mode takes none, or no pilot is heard.
-        outside_fence: Why the vehicle may not be where it is; empty if it may.
+        outside_fence: Why the vehicle may not be where it is; None if it may.
         not_known: What the estimator does not know well enough; empty if nothing.
         battery: Why the battery is not to be flown on, apart from its charge; empty if it is.
     """
@@ -32,7 +33,7 @@ class Facts(NamedTuple):
     standing: bool
     charge: float
     thrust_stick: float | None
-    outside_fence: str = ""
+    outside_fence: Refusal | None = None
     not_known: str = ""
     battery: str = ""
 
@@ -69,7 +70,7 @@ def _thrust_stick(facts: Facts) -> str:
 
 
 def _fence(facts: Facts) -> str:
-    return facts.outside_fence
+    return facts.outside_fence.reason if facts.outside_fence else ""
 
 
 def _knows(facts: Facts) -> str:

@@ -4,11 +4,12 @@ One table of modes and one of transitions decide; `docs/modes.md` is drawn from 
 PX4's (main mode << 16 | sub mode << 24), which every ground station knows.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection
 from enum import Enum, StrEnum
 from typing import NamedTuple
 
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
 
 
 class Mode(StrEnum):
@@ -239,16 +240,10 @@ class State(NamedTuple):
     armed: bool
 
 
-class Refusal(NamedTuple):
-    """Why an event changes nothing."""
-
-    reason: str
-
-
 FIRST = State(Mode.HOLD, armed=False)
 
 
-def following(state: State, event: Event, selected: Mode | None, missing: Sequence[Need]) -> State | Refusal:
+def following(state: State, event: Event, selected: Mode | None, missing: Collection[Need]) -> State | Refusal:
     """Return the state after an event, or why there is none.
 
     Args:
@@ -264,20 +259,20 @@ def following(state: State, event: Event, selected: Mode | None, missing: Sequen
         return Refusal(f"nothing follows from '{event}' in {state.mode}")
     mode = row.target or selected or state.mode
     if event is Event.SELECT and (state.armed or not ROWS[mode].selectable):
-        reason = first_missing(mode, missing)
-        if reason:
-            return Refusal(f"{mode} refused: {reason}")
+        need = first_missing(mode, missing)
+        if need is not None:
+            return Refusal(f"{mode} refused: {need.value}")
     if event is Event.ARM:
-        reason = first_missing(mode, missing)
-        if reason or not ROWS[mode].to_arm:
-            return Refusal(f"not armed in {mode}: {reason or 'choose another mode first'}")
+        need = first_missing(mode, missing)
+        if need is not None or not ROWS[mode].to_arm:
+            return Refusal(f"not armed in {mode}: {need.value if need else 'choose another mode first'}")
     armed = event is Event.ARM or (state.armed and not row.disarms)
     return State(mode, armed)
 
 
-def first_missing(mode: Mode, missing: Sequence[Need]) -> str:
-    """Return the first need of a mode that nothing meets; empty if all are met."""
-    return next((need.value for need in ROWS[mode].needs if need in missing), "")
+def first_missing(mode: Mode, missing: Collection[Need]) -> Need | None:
+    """Return the first need of a mode that nothing meets; None if all are met."""
+    return next((need for need in ROWS[mode].needs if need in missing), None)
 
 
 def custom_mode(mode: Mode) -> int:

@@ -15,6 +15,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.mission.service import Progress
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
 
 NO_MISSION: int = mav.MISSION_STATE_NO_MISSION
 NOT_STARTED: int = mav.MISSION_STATE_NOT_STARTED
@@ -143,10 +144,10 @@ class MissionExecutor:
         self._reset()
         self._show(0, NO_MISSION if not items else ACTIVE if flying else NOT_STARTED)
 
-    def start(self) -> str:
+    def start(self) -> Refusal | None:
         """Fly the mission: go on at the current item, from the first if it is complete. Return why not."""
         if not self._items:
-            return "mission: there is none"
+            return Refusal("mission: there is none")
         if self.progress.state == COMPLETE:
             self._reset()
             self._show(0, ACTIVE)
@@ -154,7 +155,7 @@ class MissionExecutor:
             self._leave()
             self._order = _HOLD
             self._show(self.progress.seq, ACTIVE)
-        return ""
+        return None
 
     def pause(self, *, item_flown: bool = False) -> tuple[MissionEvent, ...]:
         """Stop flying it; `start` goes on with the current item, or after it if it is a return that another flies."""
@@ -170,18 +171,18 @@ class MissionExecutor:
             self._show(self.progress.seq, PAUSED)
         return (Reached(seq),)
 
-    def set_current(self, seq: int, reset: bool = False) -> str:
+    def set_current(self, seq: int, reset: bool = False) -> Refusal | None:
         """Go to an item, -1 for the current one; `reset` counts jumps anew. Return why not."""
         if not self._items:
-            return "mission: there is none"
+            return Refusal("mission: there is none")
         seq = self.progress.seq if seq == -1 else seq
         if not 0 <= seq < len(self._items):
-            return f"mission: there is no item {seq}"
+            return Refusal(f"mission: there is no item {seq}")
         if reset:
             self._jumps.clear()
         self._leave()
         self._show(seq, PAUSED if self.progress.state == COMPLETE else self.progress.state)
-        return ""
+        return None
 
     def step(self, situation: Situation, now_us: int) -> Step:
         """Return what to fly now."""

@@ -17,6 +17,7 @@ from colibri.common.types import Array, Vector
 from colibri.mavlink.mission.items import ACCEPTED, DEGREES, GLOBAL_FRAMES, MissionItem
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
 
 RETURN_POINT: int = mav.MAV_CMD_NAV_FENCE_RETURN_POINT
 POLYGONS: tuple[int, ...] = (
@@ -162,11 +163,11 @@ class Geofence:
         """Whether a position is within the fence; its edge is."""
         return self.margin_m(position_enu_m) >= -EDGE_M
 
-    def refusal(self, position_enu_m: Vector) -> str:
-        """Return why the vehicle may not fly to a position; empty if it may."""
+    def refusal(self, position_enu_m: Vector) -> Refusal | None:
+        """Return why the vehicle may not fly to a position; None if it may."""
         if position_enu_m[2] > self.highest_m + EDGE_M:
-            return f"higher than the {self.highest_m:g} m of the geofence"
-        return "" if self.inside(position_enu_m) else "outside the geofence"
+            return Refusal(f"higher than the {self.highest_m:g} m of the geofence")
+        return None if self.inside(position_enu_m) else Refusal("outside the geofence")
 
 
 class AroundHome(NamedTuple):
@@ -195,12 +196,12 @@ class AroundHome(NamedTuple):
         away_m = self.farthest_m - hypot(east, north) if self.farthest_m > 0.0 else inf
         return min(away_m, self.highest_m - up) if self.highest_m > 0.0 else away_m
 
-    def refusal(self, position_enu_m: Vector) -> str:
-        """Return why the vehicle may not fly to a position; empty if it may."""
+    def refusal(self, position_enu_m: Vector) -> Refusal | None:
+        """Return why the vehicle may not fly to a position; None if it may."""
         if self.margin_m(position_enu_m) >= -EDGE_M:
-            return ""
+            return None
         too_high = 0.0 < self.highest_m < position_enu_m[2] - self.home_enu_m[2]
-        return (
+        return Refusal(
             f"more than {self.highest_m:g} m above home" if too_high else f"more than {self.farthest_m:g} m from home"
         )
 

@@ -237,7 +237,9 @@ def test_plans_and_home_are_kept_on_the_ground_too() -> None:
     flight.restart(flight.past())
     missions, pilot = flight.copter.stations.missions, flight.copter.pilot
     assert missions.service.plans == plans
-    assert "fence" in missions.fence_refusal((60.0, 0.0, 1.0))
+    refusal = missions.fence_refusal((60.0, 0.0, 1.0))
+    assert refusal is not None
+    assert "fence" in refusal.reason
     assert (pilot.home_enu_m, pilot.standing, flight.armed) == ((1.0, 2.0, 0.0), True, False)
     assert not flight.client.said("restarted in flight")
     assert flight.arm() == ACCEPTED

@@ -20,7 +20,6 @@ from colibri.mavlink.hil.faults import (
     WRONG,
     Fault,
     Part,
-    Refusal,
     Row,
     decode_fault,
     encode_fault,
@@ -36,6 +35,7 @@ from colibri.mavlink.hil.plant_status import (
     encode_results,
 )
 from colibri.mavlink.wire.dialect import RESULT_DENIED, RESULT_UNSUPPORTED, Codec
+from colibri.mavlink.wire.refusal import Refusal
 
 ALL_PARTS = list(Part)
 ANYTHING = st.floats(allow_nan=True, allow_infinity=True)
@@ -68,23 +68,19 @@ def test_a_number_that_is_not_given_is_none_beside_one_that_is() -> None:
 
 
 def test_what_cannot_be_is_denied_with_words() -> None:
-    assert refusal(Fault(MOTOR, WRONG, 1, (1.5, 0.0, 0.0, 0.0))) == Refusal(
-        RESULT_DENIED, "part that is left must be 0.001 to 1"
-    )
-    assert refusal(Fault(GYROSCOPE, WRONG, 0, (inf, 0.0, 0.0, 0.0))) == Refusal(
-        RESULT_DENIED, "bias x must be -20 to 20 rad/s"
-    )
-    assert refusal(Fault(MOTOR, OFF, 5)) == Refusal(RESULT_DENIED, "instance must be 0 to 4")
+    assert refusal(Fault(MOTOR, WRONG, 1, (1.5, 0.0, 0.0, 0.0))) == Refusal("part that is left must be 0.001 to 1")
+    assert refusal(Fault(GYROSCOPE, WRONG, 0, (inf, 0.0, 0.0, 0.0))) == Refusal("bias x must be -20 to 20 rad/s")
+    assert refusal(Fault(MOTOR, OFF, 5)) == Refusal("instance must be 0 to 4")
     assert refusal(Fault(GPS, OFF, 2)).result == RESULT_DENIED
 
 
 def test_what_no_plant_does_is_not_supported() -> None:
-    assert refusal(Fault(MOTOR, SLOW)) == Refusal(RESULT_UNSUPPORTED, "no plant does this fault")
+    assert refusal(Fault(MOTOR, SLOW)) == Refusal("no plant does this fault", RESULT_UNSUPPORTED)
     assert refusal(Fault(104, OFF)).result == RESULT_UNSUPPORTED
     assert refusal(Fault(ACCELEROMETER, OFF), [Part.ROTORS]) == Refusal(
-        RESULT_UNSUPPORTED, "flown by the state, not by sensors"
+        "flown by the state, not by sensors", RESULT_UNSUPPORTED
     )
-    assert refusal(Fault(BATTERY, OFF), [Part.ROTORS]) == Refusal(RESULT_UNSUPPORTED, "no battery to fail")
+    assert refusal(Fault(BATTERY, OFF), [Part.ROTORS]) == Refusal("no battery to fail", RESULT_UNSUPPORTED)
 
 
 @given(ANYTHING, ANYTHING, ANYTHING, st.tuples(ANYTHING, ANYTHING, ANYTHING, ANYTHING))

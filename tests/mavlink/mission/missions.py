@@ -8,9 +8,9 @@ from colibri.mavlink.mission.items import ACCEPTED, MISSION, PLAN_TYPES, Mission
 from colibri.mavlink.mission.service import MissionService, Progress, Vehicle
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.node.service import Peer, Send
-from colibri.mavlink.services.command import Outcome
 from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.wire.dialect import Codec, Message, mav
+from colibri.mavlink.wire.refusal import Refusal
 
 STEP_US = 4_000
 VEHICLE = (1, 1)
@@ -35,9 +35,9 @@ class Ground:
         self.loaded: list[tuple[int, Plan]] = []
         self.progress = Progress()
         self.set: list[tuple[int, bool]] = []
-        self.refuses = ""
+        self.refuses: Refusal | None = None
         self.flown_to: list[tuple[float, float, float, int]] = []
-        self.guided = Outcome()
+        self.guided: Refusal | None = None
         vehicle = Vehicle(
             lambda plan_type, plan: self.loaded.append((plan_type, plan)),
             lambda: self.progress,
@@ -48,12 +48,12 @@ class Ground:
         self.codec = Codec(*VEHICLE)
         self.now_us = 0
 
-    def _set_current(self, seq: int, reset: bool) -> str:
-        if not self.refuses:
+    def _set_current(self, seq: int, reset: bool) -> Refusal | None:
+        if self.refuses is None:
             self.set.append((seq, reset))
         return self.refuses
 
-    def _guided_goto(self, latitude: float, longitude: float, altitude: float, frame: int) -> Outcome:
+    def _guided_goto(self, latitude: float, longitude: float, altitude: float, frame: int) -> Refusal | None:
         self.flown_to.append((latitude, longitude, altitude, frame))
         return self.guided
 

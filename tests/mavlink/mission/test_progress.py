@@ -9,6 +9,7 @@ from colibri.mavlink.mission.items import ACCEPTED, MISSION
 from colibri.mavlink.mission.service import Progress
 from colibri.mavlink.services.command import DENIED, Command, Outcome
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
 from tests.mavlink.mission.missions import FIRST, VEHICLE, Ground, fielded, results, some_item, upload
 
 
@@ -45,7 +46,7 @@ def test_setting_the_current_item() -> None:
     ground.hear(FIRST, "MISSION_SET_CURRENT", *VEHICLE, 5)
     assert ground.set == [(5, False)]
     assert [message.name for message in ground.poll(4_000)] == ["MISSION_CURRENT"]
-    ground.refuses = "mission: there is none"
+    ground.refuses = Refusal("mission: there is none")
     (text,) = ground.hear(FIRST, "MISSION_SET_CURRENT", *VEHICLE, 6)
     assert (text.name, ground.poll(4_000)) == ("STATUSTEXT", [])
 
@@ -72,7 +73,7 @@ def test_the_command_to_set_the_current_item(p1: float, p2: float, expected: tup
     assert ground.set == ([expected] if expected else [])
     assert outcome == Outcome() if expected else outcome.result == DENIED
     assert len(ground.poll(4_000)) == (1 if expected else 0)
-    ground.refuses = "no"
+    ground.refuses = Refusal("no")
     assert ground.service.do_set_mission_current(command).result == DENIED
 
 
@@ -84,7 +85,7 @@ def test_a_place_to_fly_to_now() -> None:
     answer = ground.hear(FIRST, "MISSION_ITEM_INT", *VEHICLE, 0, *fielded(some_item(), current=2))
     assert results(answer) == [ACCEPTED]
     assert ground.flown_to == [(47.25, 8.5, 20.0, 3), pytest.approx((47.397742, 8.545594, 2.5, 3))]
-    ground.guided = Outcome(DENIED, "not flying")
+    ground.guided = Refusal("not flying")
     answers = ground.hear(FIRST, "MISSION_ITEM", *VEHICLE, *fields)
     assert [message.name for message in answers] == ["MISSION_ACK", "STATUSTEXT"]
     assert results(answers) == [mav.MAV_MISSION_DENIED]

@@ -9,6 +9,7 @@ from colibri.mavlink.node.service import Send
 from colibri.mavlink.services.origin import OriginService, Setters
 from colibri.mavlink.services.statustext import StatusText
 from colibri.mavlink.wire.dialect import Message
+from colibri.mavlink.wire.refusal import Refusal
 from tests.mavlink.services.peers import GROUND, message, on_the_wire
 
 Q = [1.0, 0.0, 0.0, 0.0]
@@ -18,17 +19,17 @@ class Vehicle:
     """Remembers what it was told; refuses with `reason`."""
 
     def __init__(self, reason: str = "") -> None:
-        self.reason = reason
+        self.refusal = Refusal(reason) if reason else None
         self.told: list[object] = []
         self.service = OriginService(Setters(self.take, self.take, self.take_mode), StatusText())
 
-    def take(self, place: Geodetic) -> str:
+    def take(self, place: Geodetic) -> Refusal | None:
         self.told.append(place)
-        return self.reason
+        return self.refusal
 
-    def take_mode(self, base: int, custom: int) -> str:
+    def take_mode(self, base: int, custom: int) -> Refusal | None:
         self.told.append((base, custom))
-        return self.reason
+        return self.refusal
 
     def hear(self, received: Message) -> list[Message]:
         sends: Iterable[Send] = self.service.receive(received, GROUND, 1_000_000)

@@ -7,6 +7,7 @@ import pytest
 from colibri.autopilot.commander.rules.arming import CHECKS, Facts, refusals
 from colibri.autopilot.control.interface import VehicleState
 from colibri.common.types import Vector
+from colibri.mavlink.wire.refusal import Refusal
 
 READY = VehicleState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 FACTS = Facts(READY, standing=True, charge=1.0, thrust_stick=None)
@@ -35,7 +36,7 @@ FAILING = [
     (FACTS._replace(charge=0.09), "battery at 9%"),
     (FACTS._replace(thrust_stick=0.7), "thrust stick is up"),
     (FACTS._replace(battery="battery not healthy: 0.0 V"), "battery not healthy: 0.0 V"),
-    (FACTS._replace(outside_fence="outside the geofence"), "outside the geofence"),
+    (FACTS._replace(outside_fence=Refusal("outside the geofence")), "outside the geofence"),
 ]
 
 
@@ -64,7 +65,7 @@ def test_every_reason_is_told_at_once() -> None:
         False,
         0.0,
         1.0,
-        "outside",
+        Refusal("outside"),
         "height not known",
         "battery critical",
     )

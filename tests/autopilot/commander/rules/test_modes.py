@@ -15,7 +15,6 @@ from colibri.autopilot.commander.rules.modes import (
     Event,
     Mode,
     Need,
-    Refusal,
     State,
     Transition,
     custom_mode,
@@ -24,6 +23,7 @@ from colibri.autopilot.commander.rules.modes import (
     mode_of_custom,
     mode_of_standard,
 )
+from colibri.mavlink.wire.refusal import Refusal
 from tools.pages.modes import page
 
 PAGE = Path(__file__).parents[4] / "docs" / "modes.md"

@@ -23,6 +23,7 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
 from tests.autopilot.guidance.mission.test_items import ITEMS
 
 STEP_US = 20_000
@@ -133,7 +134,7 @@ def test_a_whole_mission_from_the_ground_and_back() -> None:
         flying=False,
     )
     assert flight.mission.progress.state == NOT_STARTED
-    assert flight.mission.start() == ""
+    assert flight.mission.start() is None
     flight.fly(MINUTE_S)
     assert flight.mission.progress == (5, COMPLETE, 2)
     assert flight.reached == [0, 1, 2, 3, 4, 5]
@@ -213,7 +214,7 @@ def test_loitering_for_ever() -> None:
     flight.fly(3600.0)
     assert (flight.mission.progress.seq, flight.mission.progress.state, flight.reached) == (0, ACTIVE, [0])
     assert flight.yaw == pytest.approx(-0.5 * pi)
-    assert flight.mission.set_current(1) == ""
+    assert flight.mission.set_current(1) is None
     flight.fly(MINUTE_S)
     assert (flight.landed, flight.mission.progress.state) == (True, COMPLETE)
 
@@ -281,7 +282,7 @@ def test_jumps_are_counted() -> None:
     flight.fly(MINUTE_S)
     assert flight.mission.progress.state == COMPLETE
     assert flight.reached == [0, 1, 2, 0, 1, 2, 0, 1, 2, 3]
-    assert flight.mission.start() == ""  # counts begin anew with the mission
+    assert flight.mission.start() is None  # counts begin anew with the mission
     flight.reached.clear()
     flight.fly(MINUTE_S)
     assert flight.reached.count(1) == 3
@@ -299,7 +300,7 @@ def test_jumps_that_never_fly_do_not_hang_or_flood() -> None:
         flight.fly(10.0)
         assert flight.mission.progress.state == ACTIVE
         assert 0 < len(flight.reached) < 15 * len(items)
-        assert flight.mission.set_current(0) == ""
+        assert flight.mission.set_current(0) is None
         flight.mission.pause()
         assert flight.mission.progress.state == PAUSED
 
@@ -322,7 +323,7 @@ def test_pausing_goes_on_with_the_current_item() -> None:
     flight.step()
     assert flight.orders[-1] == Hold()
     flight.position = (-50.0, 0.0, 20.0)
-    assert flight.mission.start() == ""
+    assert flight.mission.start() is None
     flight.fly(MINUTE_S)
     assert flight.reached == [0, 1]
     assert dist(from_home(flight), (9.0, 30.0, 5.0)) < 0.6
@@ -352,27 +353,27 @@ def test_an_item_that_another_mode_flies_to_its_end() -> None:
 
 def test_setting_the_current_item() -> None:
     flight = Flight(*[item("NAV_WAYPOINT", (5.0 * number, 0.0, 5.0)) for number in range(4)])
-    assert "no item 4" in flight.mission.set_current(4)
-    assert flight.mission.set_current(-2) != ""
-    assert flight.mission.set_current(2) == ""
+    assert flight.mission.set_current(4) == Refusal("mission: there is no item 4")
+    assert flight.mission.set_current(-2) is not None
+    assert flight.mission.set_current(2) is None
     assert flight.mission.progress == (2, NOT_STARTED, 2)
     flight.mission.start()
     flight.fly(MINUTE_S)
     assert flight.reached == [2, 3]
-    assert flight.mission.set_current(1) == ""
+    assert flight.mission.set_current(1) is None
     assert flight.mission.progress == (1, PAUSED, 2)
     flight.mission.start()
     flight.fly(MINUTE_S)
     assert flight.reached == [2, 3, 1, 2, 3]
-    assert flight.mission.set_current(-1, reset=True) == ""
+    assert flight.mission.set_current(-1, reset=True) is None
     assert flight.mission.progress == (3, PAUSED, 2)
 
 
 def test_no_mission() -> None:
     empty = MissionExecutor()
     assert empty.progress == (0, NO_MISSION, 2)
-    assert empty.start() != ""
-    assert empty.set_current(0) != ""
+    assert empty.start() is not None
+    assert empty.set_current(0) is not None
     assert empty.pause() == ()
 
 

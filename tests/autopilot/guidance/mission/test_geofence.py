@@ -11,6 +11,7 @@ from colibri.autopilot.guidance.mission.geofence import FENCE_RULES, Disc, Geofe
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
 from tests.strategies import reals
 
 IN, OUT, DISC_IN, DISC_OUT, BACK = 5001, 5002, 5003, 5004, 5000
@@ -60,10 +61,10 @@ def test_margins() -> None:
 
 def test_what_is_refused_is_told() -> None:
     around = fence(item(DISC_IN, 0.0, 0.0, 5.0), highest_m=30.0)
-    assert around.refusal((0.0, 0.0, 10.0)) == ""
-    assert around.refusal((0.0, 6.0, 10.0)) == "outside the geofence"
-    assert around.refusal((0.0, 0.0, 31.0)) == "higher than the 30 m of the geofence"
-    assert around.refusal((nan, 0.0, 0.0)) != ""
+    assert around.refusal((0.0, 0.0, 10.0)) is None
+    assert around.refusal((0.0, 6.0, 10.0)) == Refusal("outside the geofence")
+    assert around.refusal((0.0, 0.0, 31.0)) == Refusal("higher than the 30 m of the geofence")
+    assert around.refusal((nan, 0.0, 0.0)) is not None
 
 
 def test_groups_of_inclusions() -> None:

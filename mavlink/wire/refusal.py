@@ -1,0 +1,17 @@
+"""A refusal: why something that was asked for is not done, in words and as MAVLink tells it."""
+
+from typing import NamedTuple
+
+from colibri.mavlink.wire.dialect import RESULT_DENIED
+
+
+class Refusal(NamedTuple):
+    """Why something is not done. What is done returns None, or what came of it, instead.
+
+    Attributes:
+        reason: In words, as a ground station shows them; empty where the result says it all.
+        result: MAV_RESULT.
+    """
+
+    reason: str
+    result: int = RESULT_DENIED
