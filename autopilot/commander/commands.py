@@ -1,13 +1,15 @@
 """MAVLink commands to the vehicle, each checked and handed to the pilot: what is not finite or too large is denied."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from math import hypot, isfinite, isnan, nan, pi, radians
+from typing import Protocol
 
 from colibri.autopilot.commander.pilot import Pilot
-from colibri.autopilot.commander.rules.modes import Mode, mode_of, mode_of_custom
+from colibri.autopilot.commander.rules.modes import Mode, Need, mode_of, mode_of_custom
 from colibri.autopilot.guidance.tasks.orbit import Round
 from colibri.autopilot.guidance.tasks.orders import Circle, GoTo
 from colibri.autopilot.guidance.tasks.position import Climb, Stop, Way
+from colibri.autopilot.guidance.tasks.task import Course
 from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
 from colibri.common.kernels import cos, sin
 from colibri.common.types import Vector
@@ -42,22 +44,32 @@ _SAME_SPEED, _DEFAULT_SPEED = -1.0, -2.0
 _RELATIVE = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 _CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
-Fence = Callable[[Vector], Refusal | None]
-"""(position) -> why the vehicle may not fly there; None if it may."""
+
+class Limit(Protocol):
+    """What holds the vehicle back from places."""
+
+    def refusal(self, place: Vector) -> Refusal | None:
+        """Return why the vehicle may not fly to a place; None if it may."""
+        ...
+
+
+class Needs(Protocol):
+    """What knows which needs of modes are met."""
+
+    def missing(self) -> tuple[Need, ...]:
+        """Return the needs that nothing meets now."""
+        ...
 
 
 class Commands:
-    """Obeys what a ground station commands.
+    """Obeys what a ground station commands."""
 
-    Attributes:
-        origin: Of the ENU frame, on earth.
-    """
-
-    def __init__(self, pilot: Pilot, origin: Geodetic, fence: Fence) -> None:
-        """Hand commands to `pilot`."""
+    def __init__(self, pilot: Pilot, fence: Limit, needs: Needs) -> None:
+        """Hand commands to `pilot`, as far as `fence` and the needs of modes let it fly."""
         self._pilot = pilot
         self._fence = fence
-        self.origin = origin
+        self._needs = needs
+        self._home = pilot.home
 
     def handlers(self) -> Mapping[int, Handler]:
         """Return what obeys which command."""
@@ -85,15 +97,21 @@ class Commands:
 
     def select(self, mode: Mode | None) -> Refusal | None:
         """Change the mode, None being one that this vehicle does not have; return why not."""
-        return Refusal("this vehicle has no such mode", UNSUPPORTED) if mode is None else self._pilot.select(mode)
+        return Refusal("this vehicle has no such mode", UNSUPPORTED) if mode is None else self._choose(mode)
+
+    def _choose(self, mode: Mode) -> Refusal | None:
+        return self._pilot.select(mode, self._needs.missing())
 
     def _select(self, mode: Mode) -> Outcome:
-        return outcome_of(self._pilot.select(mode))
+        return outcome_of(self._choose(mode))
+
+    def _fly(self, mode: Mode, course: Course) -> Refusal | None:
+        return self._pilot.fly(mode, course, self._needs.missing())
 
     def _arm_disarm(self, command: Command) -> Outcome:
         force = command.p2 == FORCE_MAGIC
         if command.p1 == 1.0:
-            return outcome_of(self._pilot.arm(force=force))
+            return outcome_of(self._pilot.arm(self._needs.missing(), force=force))
         if command.p1 == 0.0:
             return outcome_of(self._pilot.disarm(force=force))
         return Outcome(DENIED, "arm with 1, disarm with 0")
@@ -121,15 +139,15 @@ class Commands:
             return _denied("take-off", "not a height above the ground")
         scene = pilot.scene()
         x, y, _ = scene.place
-        refusal = self._fence((x, y, height_m))
+        refusal = self._fence.refusal((x, y, height_m))
         if refusal is not None:
             return _denied("take-off", refusal.reason)
-        return outcome_of(pilot.fly(Mode.TAKEOFF, Climb(height_m, None, scene, pilot.behaviour.takeoff_speed_m_s)))
+        return outcome_of(self._fly(Mode.TAKEOFF, Climb(height_m, None, scene, pilot.behaviour.takeoff_speed_m_s)))
 
     def _height_of_takeoff(self, command: Command) -> float:
         """Take z as above home, as most mean it, but from who says otherwise: QGC, which sends a pitch of -1."""
         above_sea = command.p1 == -1.0 if command.frame is None else command.frame not in _RELATIVE
-        return command.z - self.origin.altitude_m if above_sea else self._pilot.home_enu_m[2] + command.z
+        return command.z - self._home.origin.altitude_m if above_sea else self._home.position_enu_m[2] + command.z
 
     def _pause_or_go_on(self, command: Command) -> Outcome:
         if command.p1 == 0.0:
@@ -146,7 +164,7 @@ class Commands:
         if not (isnan(speed) or self._may_fly_at(speed)):
             return _denied("reposition", f"a speed of {speed:g} m/s")
         if all(map(isnan, (command.x, command.y, command.z, command.p4))):
-            return outcome_of(self._pilot.fly(Mode.HOLD, Stop()))
+            return outcome_of(self._fly(Mode.HOLD, Stop()))
         frame = mav.MAV_FRAME_GLOBAL if command.frame is None else command.frame
         return outcome_of(self._go(command.x, command.y, command.z, frame, command.p4, speed))
 
@@ -159,15 +177,15 @@ class Commands:
         if not only_height:
             if not is_on_earth(x, y):
                 return Refusal("reposition refused: not a latitude and longitude")
-            place = (*enu_of(Geodetic(x, y, 0.0), self.origin)[:2], place[2])
+            place = (*enu_of(Geodetic(x, y, 0.0), self._home.origin)[:2], place[2])
         if not isnan(z):
-            height_m = pilot.home_enu_m[2] + z if frame in _RELATIVE else z - self.origin.altitude_m
+            height_m = self._home.position_enu_m[2] + z if frame in _RELATIVE else z - self._home.origin.altitude_m
             place = (place[0], place[1], height_m)
         refusal = self.unreachable(place)
         if refusal is not None:
             return Refusal(f"reposition refused: {refusal.reason}")
         yaw = 0.5 * pi - yaw_ned if not isnan(yaw_ned) else scene.yaw_rad if only_height else None
-        return pilot.fly(Mode.HOLD, Way(GoTo(place, yaw, None if isnan(speed) else speed), scene))
+        return self._fly(Mode.HOLD, Way(GoTo(place, yaw, None if isnan(speed) else speed), scene))
 
     @property
     def _flies(self) -> bool:
@@ -181,7 +199,7 @@ class Commands:
         away = hypot(place[0], place[1])
         if not isfinite(away) or away > FARTHEST_M or not -HIGHEST_M < place[2] < HIGHEST_M:
             return Refusal("too far away")
-        return self._fence(place)
+        return self._fence.refusal(place)
 
     def _orbit(self, command: Command) -> Outcome:
         """Fly around; z is above sea level whatever the frame says, as MAVSDK and PX4 take it."""
@@ -193,9 +211,9 @@ class Commands:
         if not (isnan(command.x) and isnan(command.y)):
             if not is_on_earth(command.x, command.y):
                 return _denied("orbit", "not a latitude and longitude")
-            x, y, _ = enu_of(Geodetic(command.x, command.y, 0.0), self.origin)
+            x, y, _ = enu_of(Geodetic(command.x, command.y, 0.0), self._home.origin)
         if not isnan(command.z):
-            z = command.z - self.origin.altitude_m
+            z = command.z - self._home.origin.altitude_m
         radius = pilot.behaviour.orbit_radius_m if isnan(command.p1) else command.p1
         speed = None if isnan(command.p2) else abs(command.p2)
         yaw = 0.0 if isnan(command.p3) else command.p3
@@ -203,7 +221,7 @@ class Commands:
         refusal = self._no_circle(circle)
         if refusal is not None:
             return _denied("orbit", refusal.reason)
-        return outcome_of(pilot.fly(Mode.ORBIT, Round(circle, scene)))
+        return outcome_of(self._fly(Mode.ORBIT, Round(circle, scene)))
 
     def _no_circle(self, circle: Circle) -> Refusal | None:
         """Return why the vehicle may not fly a circle; None if it may."""
@@ -226,18 +244,17 @@ class Commands:
         if relative == 1.0:
             return Outcome(UNSUPPORTED, "speed refused: only absolute ones can be set")
         if speed == _DEFAULT_SPEED:
-            self._pilot.speed_m_s = None
+            self._pilot.fly_at(None)
         elif self._may_fly_at(speed):
-            self._pilot.speed_m_s = speed
+            self._pilot.fly_at(speed)
         elif speed != _SAME_SPEED:
             return _denied("speed", f"{speed:g} m/s")
         return Outcome()
 
     def _set_home(self, command: Command) -> Outcome:
-        pilot = self._pilot
         if command.p1 == 1.0:
-            scene = pilot.scene()
-            pilot.set_home(scene.state.position_enu_m, scene.state.euler[2])
+            state = self._pilot.scene().state
+            self._home.move(state.position_enu_m, state.euler[2])
             return Outcome()
         if command.p1 != 0.0 and not isnan(command.p1):
             return _denied("home", "1 is here, 0 is there")
@@ -247,11 +264,11 @@ class Commands:
 
     def move_home(self, place: Geodetic) -> Refusal | None:
         """Have home at a place on earth; return why not."""
-        home = enu_of(place, self.origin)
+        home = enu_of(place, self._home.origin)
         refusal = self.unreachable(home)
         if refusal is not None:
             return Refusal(f"home refused: {refusal.reason}")
-        self._pilot.set_home(home, self._pilot.home_yaw_rad)
+        self._home.move(home, self._home.yaw_rad)
         return None
 
     def _terminate(self, command: Command) -> Outcome:
@@ -271,7 +288,7 @@ class Commands:
         scene = self._pilot.scene()
         zero_rad = scene.yaw_rad if relative else 0.5 * pi
         yaw = zero_rad - radians(-angle if relative and way < 0.0 else angle)
-        return outcome_of(self._pilot.fly(Mode.HOLD, Way(GoTo(scene.place, yaw), scene)))
+        return outcome_of(self._fly(Mode.HOLD, Way(GoTo(scene.place, yaw), scene)))
 
     def _check(self, command: Command) -> Outcome:
         del command

@@ -1,14 +1,12 @@
 """How each mode begins to be flown, and how it goes on after the autopilot was killed in it."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import TypeAlias
 
 from colibri.autopilot.commander.missions import Missions
-from colibri.autopilot.commander.pilot import Pilot
-from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.commander.supervisor import Supervisor
 from colibri.autopilot.commander.task_record import CourseRecord
-from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.control.interface import Preview
 from colibri.autopilot.control.profile import References
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference
 from colibri.autopilot.guidance.reference import Reference, target_of
@@ -23,92 +21,116 @@ from colibri.autopilot.guidance.tasks.sticks import PositionSticks
 from colibri.autopilot.guidance.tasks.task import Course, Scene
 from colibri.autopilot.guidance.trajectories.planner import Planner, plan, start_yaw
 from colibri.autopilot.guidance.trajectories.tracks import Track, track
+from colibri.plant.vehicle.description import Vehicle
+
+TaskFactory: TypeAlias = Callable[[Scene], Course]
+"""Says how a mode begins to be flown from a scene."""
 
 
-@dataclass(slots=True)
-class ModeCourses:
-    """Makes the courses of one vehicle.
+class ModeTasks:
+    """Makes the courses of one vehicle: a table of modes, and what each begins with."""
 
-    Attributes:
-        pilot: Flies them.
-        supervisor: Says whether the place is known.
-        missions: Have the course of a mission.
-        loop: The control law, and the vehicle that it believes in.
-        attitude: Leads attitude and thrust; None for a law that takes neither.
-        instants: At which references are planned.
-        references: How a track is planned, as the profile says it.
-        first: A track that is flown from time 0 on, until it is begun; None for none.
-    """
+    def __init__(
+        self,
+        missions: Missions,
+        attitude: AttitudeReference | None,
+        vehicle: Vehicle,
+        preview: Preview,
+        instants: Instants,
+        references: References,
+        first: Track | None,
+    ) -> None:
+        """Make courses of these parts.
 
-    pilot: Pilot
-    supervisor: Supervisor
-    missions: Missions
-    loop: ControlLoop
-    attitude: AttitudeReference | None
-    instants: Instants
-    references: References
-    first: Track | None
+        Args:
+            missions: Have the course of a mission.
+            attitude: Leads attitude and thrust; None for a law that takes neither.
+            vehicle: As the control law knows it.
+            preview: The references that the law wants.
+            instants: At which references are planned.
+            references: How a track is planned, as the profile says it.
+            first: A track that is flown from time 0 on, until it is begun; None for none.
+        """
+        self._missions = missions
+        self._attitude = attitude
+        self._gravity_m_s2 = vehicle.gravity_m_s2
+        self._preview, self._instants = preview, instants
+        self._references = references
+        self._first = first
+        self._factories: dict[Mode, TaskFactory] = {
+            Mode.HOLD: lambda _: Stop(),
+            Mode.TAKEOFF: climb,
+            Mode.LAND: self._down,
+            Mode.RETURN: homeward,
+            Mode.MISSION: lambda _: missions.course(),
+            Mode.OFFBOARD: lambda _: Companion(attitude),
+            Mode.ORBIT: lambda _: Stop(),
+            Mode.FOLLOW: lambda _: Following(),
+            Mode.POSITION: lambda _: PositionSticks(),
+            Mode.TRACK: self._on_track,
+            Mode.STABILIZED: lambda _: Stop() if attitude is None else Stabilized(attitude),
+            Mode.ALTITUDE: self._altitude,
+        }
+
+    @property
+    def is_first(self) -> bool:
+        """Whether a track is to be flown from time 0 on."""
+        return self._first is not None
 
     @property
     def first_yaw_rad(self) -> float:
         """Heading of the vehicle at time 0."""
-        return start_yaw(self.first, self.references) if self.first else 0.0
+        return start_yaw(self._first, self._references) if self._first else 0.0
+
+    def forget_first(self) -> None:
+        """Fly no track from time 0 on: something else has been flown since."""
+        self._first = None
+
+    def adopt(self, vehicle: Vehicle) -> None:
+        """Go by other numbers of the vehicle, from the next course on."""
+        self._gravity_m_s2 = vehicle.gravity_m_s2
 
     def begin(self, mode: Mode, scene: Scene) -> Course:
         """Return how a mode begins."""
-        attitude = self.attitude
-        if mode is Mode.TAKEOFF:
-            behaviour = scene.behaviour
-            return Climb(self.pilot.ground_m + behaviour.takeoff_height_m, None, scene, behaviour.takeoff_speed_m_s)
-        if mode is Mode.LAND:
-            return self._down()
-        if mode is Mode.RETURN:
-            return homeward(scene)
-        if mode is Mode.MISSION:
-            return self.missions.course()
-        if mode is Mode.OFFBOARD:
-            return Companion(attitude)
-        if mode is Mode.FOLLOW:
-            return Following()
-        if mode is Mode.POSITION:
-            return PositionSticks()
-        if mode is Mode.TRACK:
-            return self._on_track(scene)
-        if mode is Mode.STABILIZED and attitude is not None:
-            return Stabilized(attitude)
-        if mode is Mode.ALTITUDE and attitude is not None:
-            return AltitudeSticks(attitude, self.loop.vehicle.gravity_m_s2)
-        return Stop()
+        return self._factories[mode](scene)
 
     def again(self, record: CourseRecord, mode: Mode, scene: Scene) -> Course:
         """Return how a mode goes on after a restart in which `record` was flown."""
-        if mode is Mode.TRACK and self.first is None and record.began_us is not None:
+        if mode is Mode.TRACK and self._first is None and record.began_us is not None:
             chosen = track(scene.behaviour.track)
             return Along(self._plan(chosen), chosen.duration_s, record.began_us)
         if mode is Mode.MISSION:
-            return self.missions.course_again(record.turns, record.legs)
+            return self._missions.course_again(record.turns, record.legs)
         course = _ordered(mode, record, scene) or self.begin(mode, scene)
         return course.skip(record.legs) if isinstance(course, Legs) else course
 
-    def _down(self) -> Course:
+    def _altitude(self, scene: Scene) -> Course:
+        del scene
+        return Stop() if self._attitude is None else AltitudeSticks(self._attitude, self._gravity_m_s2)
+
+    def _down(self, scene: Scene) -> Course:
         """Return how to land: level, where nobody knows the place; a law that takes no attitude sinks where it is."""
-        blind = self.pilot.saving is Action.DESCEND or not self.supervisor.knows_position
-        if blind and self.attitude is not None:
-            return Descent(self.attitude, self.loop.vehicle.gravity_m_s2)
+        if scene.blind and self._attitude is not None:
+            return Descent(self._attitude, self._gravity_m_s2)
         return landing(Land())
 
     def _on_track(self, scene: Scene) -> Course:
-        if self.first is not None:
-            first, self.first = self.first, None
+        if self._first is not None:
+            first, self._first = self._first, None
             planner = self._plan(first)
-            for_law = None if self.instants.rows is None else plan(first, self.references, self.loop.preview)
-            self.pilot.reference = _at_start(planner, scene.now_us)
-            return Along(planner, first.duration_s, 0, for_law)
+            for_law = None if self._instants.rows is None else plan(first, self._references, self._preview)
+            return Along(planner, first.duration_s, 0, for_law, start=_at_start(planner, scene.now_us))
         chosen = track(scene.behaviour.track)
         return to_track(self._plan(chosen), chosen.duration_s)
 
     def _plan(self, chosen: Track) -> Planner:
-        return plan(chosen, self.references, self.instants.preview)
+        return plan(chosen, self._references, self._instants.preview)
+
+
+def climb(scene: Scene) -> Course:
+    """Return how to take off where no height is asked for."""
+    behaviour = scene.behaviour
+    return Climb(scene.ground_m + behaviour.takeoff_height_m, None, scene, behaviour.takeoff_speed_m_s)
 
 
 def _ordered(mode: Mode, record: CourseRecord, scene: Scene) -> Course | None:

@@ -1,27 +1,30 @@
 """The pilot: modes, arming, take-off and landing; decides what the control law is given to follow."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from colibri.autopilot.commander.home import Home
+from colibri.autopilot.commander.missions import MissionCourse
 from colibri.autopilot.commander.rules.arming import Facts, refusals
+from colibri.autopilot.commander.rules.failsafe_rule import Flight
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, State, following
+from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon, VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.landing_detector import Landing, is_below, stands_at_first, watch
 from colibri.autopilot.guidance.reference import Reference, at_rest, lead, lead_along, moving_with, still_target
 from colibri.autopilot.guidance.sample_grid import Instants
-from colibri.autopilot.guidance.tasks.position import Stop
+from colibri.autopilot.guidance.tasks.position import Along, Stop
 from colibri.autopilot.guidance.tasks.task import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
 from colibri.common.types import Array, Vector
 from colibri.mavlink.services.statustext import EMERGENCY, INFO, NOTICE
 from colibri.mavlink.wire.refusal import Refusal
 
 CourseMaker: TypeAlias = Callable[[Mode, Scene], Course]
-_ORIGIN: Vector = (0.0, 0.0, 0.0)
 _SAVED_BY = {
     Action.HOLD: Event.SAVED_BY_HOLD,
     Action.RETURN: Event.SAVED_BY_RETURN,
@@ -29,18 +32,6 @@ _SAVED_BY = {
     Action.DESCEND: Event.SAVED_BY_LANDING,
     Action.TERMINATE: Event.TERMINATED,
 }
-
-
-class Said(NamedTuple):
-    """A line for the ground station.
-
-    Attributes:
-        severity: MAV_SEVERITY.
-        text: The line.
-    """
-
-    severity: int
-    text: str
 
 
 class Guidance(NamedTuple):
@@ -93,14 +84,14 @@ class Pilot:
 
     Attributes:
         state: Mode, and whether the rotors may turn.
-        behaviour: The numbers to fly by; whoever changes them replaces all of it.
-        home_enu_m: Where it took off, or was told to return to.
-        home_yaw_rad: Its heading there.
+        behaviour: The numbers to fly by.
+        home: Where it took off, or was told to return to.
         standing: Whether it stands on the ground.
         idles: Whether the rotors stand or idle.
         course: What is flown.
         reference: Where the reference stands.
         speed_m_s: Cruise speed that was asked for; None for the parameters'.
+        knows_position: Whether the vehicle knows where it is, as of the last control sample.
         armed_us: When the rotors were last armed; 0 before.
         takeoff_us: When it last left the ground; 0 before.
         landing_us: When it last stood again; 0 before.
@@ -116,7 +107,8 @@ class Pilot:
         instants: Instants,
         behaviour: Behaviour,
         make_course: CourseMaker,
-        missing: Callable[[], Sequence[Need]],
+        home: Home,
+        lines: StatusQueue,
     ) -> None:
         """Begin on the ground, or in the air: see `begin`. What is compiled is loaded here.
 
@@ -124,14 +116,15 @@ class Pilot:
             instants: At which references are planned, and which of them the control law previews.
             behaviour: The numbers to fly by.
             make_course: Says how each mode begins.
-            missing: Says which needs of modes nothing meets at the moment.
+            home: Moved by take-offs and by whoever chooses it.
+            lines: Take what a ground station is to know.
         """
         self._instants = instants
         self._make_course = make_course
         self.state = FIRST
         self.behaviour = behaviour
-        self.home_enu_m = _ORIGIN
-        self.home_yaw_rad = 0.0
+        self.home = home
+        self.knows_position = True
         self.standing = True
         self.course: Course = Stop()
         self.reference: Reference | None = None
@@ -142,16 +135,14 @@ class Pilot:
         self.terminated = False
         self.rotor_failed = ""
         self.ground_m = 0.0
-        self._home_is_chosen = False
         self._course_is_chosen = False
         self.idles = True
         self._landing = Landing()
         self._now_us = 0
         self._vehicle: VehicleState | None = None
         self._facts = Facts(None, standing=True, charge=1.0, thrust_stick=None)
-        self._missing = missing
         self._steered = NOT_STEERED
-        self._said: list[Said] = []
+        self._lines = lines
         self._warm_up()
 
     def _warm_up(self) -> None:
@@ -170,8 +161,7 @@ class Pilot:
         self.standing = self.idles = mode is None and (rests or stands_at_first(vehicle, 0.0))
         self.reference = moving_with(vehicle)
         if self.standing:
-            if not self._home_is_chosen:
-                self.set_home(vehicle.position_enu_m, vehicle.euler[2], chosen=False)
+            self.home.propose(vehicle.position_enu_m, vehicle.euler[2])
             self.state = FIRST
         else:
             self.state = State(mode or Mode.HOLD, armed=True)
@@ -185,9 +175,9 @@ class Pilot:
             *self.state,
             self.standing,
             self.idles,
-            self.home_enu_m,
-            self.home_yaw_rad,
-            self._home_is_chosen,
+            self.home.position_enu_m,
+            self.home.yaw_rad,
+            self.home.chosen,
             self.speed_m_s,
             self.armed_us,
             self.takeoff_us,
@@ -213,8 +203,8 @@ class Pilot:
         vehicle is. One that has come down meanwhile stays there. `again` says how a mode goes on.
         """
         self._now_us, self._vehicle = now_us, vehicle
-        self.home_enu_m, self.home_yaw_rad = record.home_enu_m, record.home_yaw_rad
-        self._home_is_chosen, self.speed_m_s = record.home_is_chosen, record.speed_m_s
+        self.home.resume(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
+        self.speed_m_s = record.speed_m_s
         self.armed_us, self.takeoff_us, self.landing_us = record.armed_us, record.takeoff_us, record.landing_us
         self.flights, self.ground_m = record.flights, record.ground_m
         came_down = not closely and not record.standing and stands_at_first(vehicle, record.ground_m)
@@ -223,17 +213,27 @@ class Pilot:
         self.saving = Action.NONE if came_down else record.saving
         self.idles = record.idles or came_down
         self.reference = Reference(record.motion, record.heading) if closely else moving_with(vehicle)
-        self.course = (self._make_course if came_down else again)(self.state.mode, self.scene())
+        self._take((self._make_course if came_down else again)(self.state.mode, self.scene()))
         self._course_is_chosen = not came_down
 
-    def sense(self, now_us: int, vehicle: VehicleState, steered: Steered = NOT_STEERED) -> None:
+    def adopt(self, behaviour: Behaviour) -> None:
+        """Fly by other numbers from now on; without landing on three rotors, none counts as failed."""
+        self.behaviour = behaviour
+        if not behaviour.land_on_three:
+            self.trust_rotors()
+
+    def sense(
+        self, now_us: int, vehicle: VehicleState, steered: Steered = NOT_STEERED, *, knows_position: bool = True
+    ) -> None:
         """Take in what a control sample needs.
 
         Args:
             now_us: Simulated time.
             vehicle: The vehicle.
             steered: What clients ask for.
+            knows_position: Whether `vehicle` is known well enough to fly to places.
         """
+        self.knows_position = knows_position
         self._now_us, self._vehicle, self._steered = now_us, vehicle, steered
 
     @property
@@ -260,32 +260,41 @@ class Pilot:
             self._now_us,
             self._vehicle,
             self.reference,
-            self.home_enu_m,
+            self.home.position_enu_m,
             behaviour,
             interval_s,
             samples,
             self._steered,
+            self.standing,
+            self.ground_m,
+            blind=self.saving is Action.DESCEND or not self.knows_position,
         )
+
+    @property
+    def flight(self) -> Flight:
+        """What failsafes are weighed against."""
+        return Flight(self.state.armed, self.standing, self.state.mode, self.saving)
 
     def refusals(self) -> list[str]:
         """Return why the rotors may not be armed; empty if they may."""
         return refusals(self._facts) + ([self.rotor_failed] if self.rotor_failed else [])
 
-    def arm(self, *, force: bool = False) -> Refusal | None:
-        """Let the rotors turn; return why not."""
+    def arm(self, missing: Collection[Need], *, force: bool = False) -> Refusal | None:
+        """Let the rotors turn; return why not. `missing` are the needs of modes that nothing meets now."""
         if self.state.armed:
             return None
         forced = force and self._vehicle is not None and not self.rotor_failed
         reasons = [] if forced else self.refusals()
         if reasons:
             return Refusal("not armed: " + "; ".join(reasons))
-        refusal = self._follow(Event.ARM, "rotors armed", met=(Need.POSITION,))  # a check of its own, and by force
+        unmet = [need for need in missing if need is not Need.POSITION]  # a check of its own, and by force
+        refusal = self._follow(Event.ARM, "rotors armed", missing=unmet)
         if refusal is None:
             self.armed_us = self._now_us
             self.flights += 1
             self.terminated = False
-            if not self._home_is_chosen and self._vehicle is not None:
-                self.set_home(self._vehicle.position_enu_m, self._vehicle.euler[2], chosen=False)
+            if self._vehicle is not None:
+                self.home.propose(self._vehicle.position_enu_m, self._vehicle.euler[2])
             if not self._course_is_chosen:
                 self._engage(self.state.mode)
         return refusal
@@ -298,19 +307,22 @@ class Pilot:
             return Refusal("not disarmed: the vehicle is flying")
         return self._stop_rotors(Event.DISARM, "rotors stopped" if self.standing else "rotors stopped in the air")
 
-    def select(self, mode: Mode) -> Refusal | None:
-        """Change the mode; return why not."""
+    def select(self, mode: Mode, missing: Collection[Need]) -> Refusal | None:
+        """Change the mode; return why not. `missing` are the needs of modes that nothing meets now."""
         if mode is self.state.mode and mode is not Mode.HOLD:
             return None
-        refusal = self._follow(Event.SELECT, "", mode)
+        refusal = self._follow(Event.SELECT, "", mode, missing)
         if refusal is None:
             self.saving = Action.NONE
             self._engage(mode)
         return refusal
 
-    def fly(self, mode: Mode, course: Course) -> Refusal | None:
-        """Change to `mode` and fly `course` in it, now or once the rotors are armed; return why not."""
-        refusal = self._follow(Event.SELECT, "", mode, met=(Need.CIRCLE,))
+    def fly(self, mode: Mode, course: Course, missing: Collection[Need]) -> Refusal | None:
+        """Change to `mode` and fly `course` in it, now or once the rotors are armed; return why not.
+
+        `missing` are the needs of modes that nothing meets now; where a circle leads, the course says.
+        """
+        refusal = self._follow(Event.SELECT, "", mode, [need for need in missing if need is not Need.CIRCLE])
         if refusal is None:
             self.saving = Action.NONE
             self.course, self._course_is_chosen = course, True
@@ -328,10 +340,9 @@ class Pilot:
         self._follow(_SAVED_BY[action], "")
         self._engage(self.state.mode)
 
-    def set_home(self, position_enu_m: Vector, yaw_rad: float, *, chosen: bool = True) -> None:
-        """Say where home is; where somebody chose it, a take-off does not move it."""
-        self.home_enu_m, self.home_yaw_rad = position_enu_m, yaw_rad
-        self._home_is_chosen = self._home_is_chosen or chosen
+    def fly_at(self, speed_m_s: float | None) -> None:
+        """Cruise at another speed for this flight; None for the parameters'."""
+        self.speed_m_s = speed_m_s
 
     def happened(self, event: Event) -> None:
         """Tell of an event that may change the mode: what is finished."""
@@ -345,6 +356,10 @@ class Pilot:
         self.rotor_failed = f"rotor {rotor + 1} failed"
         self.say(EMERGENCY, f"{self.rotor_failed}: landing on three rotors")
 
+    def trust_rotors(self) -> None:
+        """Take all rotors for whole again."""
+        self.rotor_failed = ""
+
     def touch_down(self) -> None:
         """Stand, and stop the rotors: something else than the reference tells of the ground."""
         self._stand()
@@ -357,6 +372,8 @@ class Pilot:
             return RESTS
         scene = self.scene()
         asked = self.course.ask(scene)
+        if isinstance(self.course, MissionCourse) and self.course.says_return:
+            self.happened(Event.RETURN_ITEM)
         if self.standing:
             if not (asked.lifts if isinstance(asked, Lean) else lifts(asked.target, scene.state)):
                 self._idle()
@@ -368,14 +385,9 @@ class Pilot:
             self._arrive()
         return guidance
 
-    def take_said(self) -> list[Said]:
-        """Return the lines for the ground station, and forget them."""
-        said, self._said = self._said, []
-        return said
-
     def say(self, severity: int, text: str) -> None:
         """Add a line for the ground station."""
-        self._said.append(Said(severity, text))
+        self._lines.say(severity, text)
 
     def _move(self, scene: Scene, asked: Motion | Planned, begins: bool) -> Guidance:
         horizon = self._lead(scene, asked)
@@ -456,14 +468,20 @@ class Pilot:
 
     def _engage(self, mode: Mode) -> None:
         if self.reference is not None:
-            self.course, self._course_is_chosen = self._make_course(mode, self.scene()), False
+            self._take(self._make_course(mode, self.scene()))
+            self._course_is_chosen = False
+
+    def _take(self, course: Course) -> None:
+        """Fly a course from now on; one that was begun in mid-flight says where the reference is."""
+        self.course = course
+        if isinstance(course, Along) and course.start is not None:
+            self.reference = course.start
 
     def _follow(
-        self, event: Event, text: str, selected: Mode | None = None, met: Sequence[Need] = ()
+        self, event: Event, text: str, selected: Mode | None = None, missing: Collection[Need] = ()
     ) -> Refusal | None:
         if event is Event.SELECT and self.state.armed and self.rotor_failed:
             return Refusal(f"{selected} refused: {self.rotor_failed}")
-        missing = [need for need in self._missing() if need not in met]
         after = following(self.state, event, selected, missing)
         if isinstance(after, Refusal):
             return after

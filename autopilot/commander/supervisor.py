@@ -1,10 +1,11 @@
-"""The supervisor: has the pilot do what the failsafes' table says, and tells what the ground station is to know."""
+"""The supervisor: decides by the failsafes' table what is to be done, and tells what the ground station is to know."""
 
-from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.failsafe_conditions import Conditions, Seen, knows_position
 from colibri.autopilot.commander.rules.failsafe_parameters import Limits, limits, settings
 from colibri.autopilot.commander.rules.failsafe_rule import Flight, Memory, following
 from colibri.autopilot.commander.rules.failsafe_table import Action, Condition
+from colibri.autopilot.commander.status_queue import StatusQueue
+from colibri.autopilot.estimation.estimate import Estimate
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.wire.dialect import mav
 
@@ -16,38 +17,40 @@ _CHARGE_STATES: tuple[tuple[Condition, int], ...] = (
 
 
 class Supervisor:
-    """Supervises one pilot.
+    """Supervises one flight.
 
     Attributes:
         limits: What the parameters say of limits and delays.
-        knows_position: Whether the vehicle knows where it is.
-        memory: What is lost already; after a restart in flight it is what was kept.
+        memory: What is lost already.
     """
 
-    def __init__(self, pilot: Pilot, parameters: Parameters) -> None:
-        """Begin with nothing lost."""
-        self._pilot = pilot
+    def __init__(self, parameters: Parameters, lines: StatusQueue) -> None:
+        """Begin with nothing lost; what a ground station is to know goes to `lines`."""
+        self._lines = lines
         self._conditions = Conditions()
         self.memory = Memory()
         self.limits: Limits = {}
-        self.knows_position = True
         self.adopt(parameters)
 
     def adopt(self, parameters: Parameters) -> None:
         """Go by the parameters as they are now."""
         self.limits, self._settings = limits(parameters), settings(parameters)
 
-    def step(self, seen: Seen) -> None:
-        """Do what is to be done at this control sample, before the pilot's step."""
-        pilot = self._pilot
-        self.knows_position = knows_position(seen.estimate, self.limits)
-        flight = Flight(pilot.state.armed, pilot.standing, pilot.state.mode, pilot.saving)
+    def resume(self, memory: Memory) -> None:
+        """Take for lost after a restart in flight what was lost before."""
+        self.memory = memory
+
+    def knows_position(self, estimate: Estimate | None) -> bool:
+        """Whether an estimate tells the position well enough to fly to places; a state that is told does."""
+        return knows_position(estimate, self.limits)
+
+    def step(self, seen: Seen, flight: Flight) -> Action:
+        """Return what is to begin at this control sample, before the pilot's step; NONE to go on as before."""
         since_us = self._conditions.look(seen, self.limits, self.memory.held_us)
         self.memory, action, said = following(self.memory, seen.now_us, since_us, self._settings, flight)
         for severity, text in said:
-            pilot.say(severity, text)
-        if action is not Action.NONE:
-            pilot.save(action)
+            self._lines.say(severity, text)
+        return action
 
     def holds(self, condition: Condition) -> bool:
         """Whether a condition holds, beyond its delay."""

@@ -135,13 +135,12 @@ class Keeper:
 
     def record(self, time_us: int) -> Kept:
         """Return the flight as it is now."""
-        missions = self._stations.missions
         return Kept(
             self._maker,
             time_us,
-            self._stations.commands.origin,
-            missions.ids,
-            missions.executor.record(),
+            self._pilot.home.origin,
+            self._stations.plans.ids,
+            self._stations.missions.record(),
             self._pilot.record(),
             course_record(self._pilot.course),
             self._loop.record(),
@@ -161,8 +160,10 @@ class Keeper:
         closely = kept.is_close_to(frame.time_us) and kept.maker == self._maker
         self._loop.resume(kept.loop, closely=closely)
         self._power.resume(kept.charge_ah, kept.energy_wh)
-        stations.commands.origin = kept.origin
-        stations.missions.resume(plans, kept.plan_ids, kept.mission)
+        pilot.home.move_origin(kept.origin)
+        stations.plans.restore(plans)
+        same = stations.plans.ids == kept.plan_ids
+        stations.missions.resume(stations.plans.plans, kept.mission if same else None)
         if kept.had_station:
             stations.expect_station(frame.time_us)
         state = self._loop.state(frame)
@@ -171,7 +172,7 @@ class Keeper:
         )
         stations.missions.moved_origin()
         if pilot.state.armed:
-            self._supervisor.memory = kept.failsafes
+            self._supervisor.resume(kept.failsafes)
         if kept.rotor_lost is not None:
             flying = pilot.state.armed and not pilot.standing
             self._rotor_loss.resume(kept.rotor_lost, kept.rotor_speeds, state, pilot.ground_m, flying=flying)

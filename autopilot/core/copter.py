@@ -2,12 +2,16 @@
 
 from collections.abc import Iterable
 
-from colibri.autopilot.commander.mode_tasks import ModeCourses
+from colibri.autopilot.commander.fence import Fence
+from colibri.autopilot.commander.home import Home
+from colibri.autopilot.commander.missions import Missions
+from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.pilot import RESTS, Guidance, Pilot
 from colibri.autopilot.commander.rules.arming import Facts, battery_fault
 from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, Seen
-from colibri.autopilot.commander.rules.failsafe_table import Condition
-from colibri.autopilot.commander.rules.modes import MANUAL, Mode, Need
+from colibri.autopilot.commander.rules.failsafe_table import Action, Condition
+from colibri.autopilot.commander.rules.modes import MANUAL, Mode
+from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.commander.supervisor import Supervisor
 from colibri.autopilot.control.interface import Clock, Decision, VehicleState
 from colibri.autopilot.control.loop import ControlLoop
@@ -20,10 +24,9 @@ from colibri.autopilot.estimation.health import HealthWatch, not_known
 from colibri.autopilot.estimation.state_source import Estimator, Senses
 from colibri.autopilot.ground.battery_monitor import PowerMeter
 from colibri.autopilot.ground.snapshots import Photographer
-from colibri.autopilot.ground.stations import REBOOT, Stations, StationSettings
+from colibri.autopilot.ground.stations import Stations, StationSettings
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference, attitude_limits
 from colibri.autopilot.guidance.sample_grid import instants
-from colibri.autopilot.guidance.tasks.task import Steered
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
 from colibri.autopilot.parameters.retuning import Tuning, builder
@@ -33,12 +36,10 @@ from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.mavlink.services.statustext import INFO, WARNING
-from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks
 from colibri.mavlink.telemetry.snapshot import BatteryState
 from colibri.plant.vehicle.description import Vehicle
 
 FALLS = "restarted in the air, knowing nothing: found falling"
-_LEADER_LOST_US = 10_000_000
 _EVER_US = 10**15
 
 
@@ -109,20 +110,24 @@ class Copter:
         if self._loop.takes_attitude:
             self._attitude = AttitudeReference(believed, self._loop.preview, attitude_limits(flies_by))
         planned_at = instants(self._loop.preview, self._loop.control_interval_us)
-        self.pilot = Pilot(planned_at, flies_by, lambda mode, scene: self._courses.begin(mode, scene), self._missing)
-        self.stations = Stations(settings, self.pilot, self.parameters)
-        self.power = PowerMeter(believed)
-        self.supervisor = Supervisor(self.pilot, self.parameters)
-        self._courses = ModeCourses(
-            self.pilot,
-            self.supervisor,
-            self.stations.missions,
-            self._loop,
-            self._attitude,
-            planned_at,
-            profile.references,
-            first,
+        home, lines = Home(settings.origin), StatusQueue()
+        fence = Fence(home, flies_by)
+        missions = Missions(home, fence, lines, flies_by)
+        self._tasks = ModeTasks(
+            missions, self._attitude, believed, self._loop.preview, planned_at, profile.references, first
         )
+        self.pilot = Pilot(planned_at, flies_by, self._tasks.begin, home, lines)
+        self.stations = Stations(
+            settings,
+            self.pilot,
+            missions,
+            fence,
+            lines,
+            self.parameters,
+            takes_attitude=self._attitude is not None,
+        )
+        self.power = PowerMeter(believed)
+        self.supervisor = Supervisor(self.parameters, lines)
         self._missed_us: int | None = None
         self._waiting_us: int | None = None
         self._solving = SolveTime(self._loop.control_interval_us)
@@ -169,7 +174,7 @@ class Copter:
         if known is None:
             self._waiting_us = frame.time_us
             if self._time_us is not None:  # another flight, of which nothing is known yet
-                self.stations.restart = REBOOT
+                self.stations.reboot()
             return nothing_known(frame.time_us, self._clock() - started_s)
         if not goes_on:
             self._missed_us = self._time_us if self._missed_us is None else self._missed_us
@@ -232,9 +237,9 @@ class Copter:
         """Go on with the flight in which the autopilot was killed."""
         pilot, kept = self.pilot, past.kept
         if kept.pilot.mode is not Mode.TRACK or kept.course.began_us != 0:
-            self._courses.first = None
+            self._tasks.forget_first()
         self._resumed_us = frame.time_us
-        self._keeper.resume(past, frame, self._courses.again)
+        self._keeper.resume(past, frame, self._tasks.again)
         self._sent = self._loop.controls if pilot.state.armed and not pilot.idles else STILL
         self._solving.at_once(self._sent)
         self.rotor_loss.begin(self._sent)
@@ -243,7 +248,7 @@ class Copter:
             return
         if self._senses.estimate is not None and not self._senses.rests:
             pilot.say(WARNING, FALLS)
-        self.resumed = goes_on(pilot.state.mode, self.stations.missions.executor.progress.seq)
+        self.resumed = goes_on(pilot.state.mode, self.stations.missions.progress().seq)
         pilot.say(WARNING, self.resumed)
 
     def _begin(self, frame: StateFrame) -> None:
@@ -258,29 +263,31 @@ class Copter:
             self.rotor_loss.begin(loop.controls)
             return
         if self._time_us is not None:  # another flight: nothing that any service remembers is of any use
-            self.stations.restart = REBOOT
+            self.stations.reboot()
         speed = self._start_speed if frame.time_us == 0 else hover_speed
         rests = self._senses.rests
         if rests:
             speed = loop.vehicle.rotors.idle_speed
-        loop.begin(speed, self._courses.first_yaw_rad)
-        mode = Mode.TRACK if self._courses.first else None
+        loop.begin(speed, self._tasks.first_yaw_rad)
+        mode = Mode.TRACK if self._tasks.is_first else None
         self.pilot.begin(frame.time_us, loop.state(frame), mode=mode, rests=rests)
         self._sent = STILL if self.pilot.standing else loop.controls
         self._solving.at_once(self._sent)
         self.rotor_loss.forget()
         self.rotor_loss.begin(self._sent)
-        self.pilot.rotor_failed = ""
+        self.pilot.trust_rotors()
         if self._senses.estimate is not None and not rests:
             self.pilot.say(WARNING, FALLS)
         self.stations.say(INFO, self.stations.banner())
 
     def _sense(self, now_us: int, state: VehicleState) -> None:
         """Take in what steers the vehicle, and what has ceased to."""
-        pilot, stations = self.pilot, self.stations
-        sticks, setpoint = self._heard(now_us)
-        pilot.sense(now_us, state, Steered(sticks, setpoint, stations.follow.latest(now_us, _LEADER_LOST_US)))
-        self.supervisor.step(self._seen(now_us, state))
+        pilot, supervisor = self.pilot, self.supervisor
+        knows_position = supervisor.knows_position(self._senses.estimate)
+        pilot.sense(now_us, state, self.stations.needs.steered(now_us), knows_position=knows_position)
+        action = supervisor.step(self._seen(now_us, state), pilot.flight)
+        if action is not Action.NONE:
+            pilot.save(action)
         self._missed_us = None
 
     def _seen(self, now_us: int, state: VehicleState) -> Seen:
@@ -299,7 +306,7 @@ class Copter:
             listening_us=NEVER_US if self._resumed_us is None else self._resumed_us,
             station_us=stations.station_us,
             battery=self.power.state(),
-            fence=stations.missions.margin_m if stations.missions.has_fence else None,
+            fence=stations.fence.margin_m if stations.fence.exists else None,
             decided=None if self._decision is None else self._decision.diagnostics,
             late=pilot.behaviour.solve_time_s * 1e6 > self._loop.control_interval_us,
             rotor_lost=self.rotor_loss.lost,
@@ -323,7 +330,7 @@ class Copter:
         pilot = self.pilot
         sticks = pilot.scene().steered.sticks
         thrust = sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None
-        outside = self.stations.missions.breach(state.position_enu_m, self._time_us or 0)
+        outside = self.stations.fence.breach(state.position_enu_m, self._time_us or 0)
         estimate = self._senses.estimate
         unknown = not_known(estimate.health) if estimate is not None else ""
         facts = Facts(state, pilot.standing, self.power.left, thrust, outside, unknown, self._battery_fault())
@@ -337,30 +344,6 @@ class Copter:
         if any(map(self.supervisor.holds, (Condition.BATTERY_EMERGENCY, Condition.BATTERY_CRITICAL))):
             return f"battery critical: {battery.voltage_v:.1f} V"
         return battery_fault(battery.voltage_v, model.empty_voltage_v, model.full_voltage_v)
-
-    def _missing(self) -> list[Need]:
-        """Return needs of modes that nothing meets now: the message before the one that asks may have met one."""
-        sticks, setpoint = self._heard(self._time_us or 0)
-        missions = self.stations.missions
-        met = {
-            Need.ATTITUDE_CONTROL: self._attitude is not None,
-            Need.STICKS: sticks is not None,
-            Need.SETPOINTS: setpoint is not None,
-            Need.MISSION: missions.has_mission,
-            Need.INSIDE_FENCE: not missions.leaves_fence,
-            Need.CIRCLE: False,
-            Need.FLYING: not self.pilot.standing,
-            Need.POSITION: self.supervisor.knows_position,
-        }
-        return [need for need, there in met.items() if not there]
-
-    def _heard(self, now_us: int) -> tuple[Sticks | None, OffboardSetpoint | None]:
-        """Return the sticks and the setpoint that are obeyed, where they are fresh."""
-        stations, behaviour = self.stations, self.pilot.behaviour
-        return (
-            stations.manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6)),
-            stations.offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6)),
-        )
 
     def _decide(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
         loop = self._loop
@@ -419,17 +402,19 @@ class Copter:
 
     def _adopt(self) -> None:
         """Fly by the parameters as they are now."""
-        self.pilot.behaviour = behaviour(self.parameters)
+        flies_by = behaviour(self.parameters)
+        self.pilot.adopt(flies_by)
+        self.stations.missions.adopt(flies_by)
         self.supervisor.adopt(self.parameters)
-        self.rotor_loss.enabled = self.pilot.behaviour.land_on_three
+        self.rotor_loss.enabled = flies_by.land_on_three
         if not self.rotor_loss.enabled:
             self.rotor_loss.forget()
-            self.pilot.rotor_failed = ""
         if self._attitude is not None:
-            self._attitude.limits = attitude_limits(self.pilot.behaviour)
+            self._attitude.limits = attitude_limits(flies_by)
         tuned = self._tuning.take()
         if tuned is not None:
             self._loop.adopt(tuned.controller, tuned.vehicle)
+            self._tasks.adopt(tuned.vehicle)
             self.rotor_loss.adopt(tuned.vehicle)
             self._photographer = Photographer(tuned.vehicle, self._interval_s)
             if self._attitude is not None:

@@ -101,11 +101,11 @@ class Photographer:
             acceleration_enu_m_s2=(ax, ay, az),
             attitude=state.attitude,
             rate_flu_rad_s=state.rate_flu_rad_s,
-            origin=stations.commands.origin,
+            origin=pilot.home.origin,
             gps_ok=senses.has_gps(now_us),
-            fence_enabled=stations.missions.has_fence,
-            fence_breached=bool(stations.missions.breach(state.position_enu_m, now_us)),
-            home=Home(pilot.home_enu_m, pilot.home_yaw_rad),
+            fence_enabled=stations.fence.exists,
+            fence_breached=stations.fence.breach(state.position_enu_m, now_us) is not None,
+            home=Home(pilot.home.position_enu_m, pilot.home.yaw_rad),
             rotor_speeds_rad_s=(c1 * speed, c2 * speed, c3 * speed, c4 * speed),
             controls=controls,
             battery=battery,
@@ -116,7 +116,7 @@ class Photographer:
             takeoff_us=pilot.takeoff_us,
             landing_us=pilot.landing_us,
             flights=pilot.flights,
-            ground_m=pilot.home_enu_m[2],
+            ground_m=pilot.home.position_enu_m[2],
             load=min(duration_s / self._interval_s, 1.0),
             sensed=senses.sensed,
             fix=senses.fix,
@@ -159,7 +159,7 @@ def landed_state(pilot: Pilot, state: VehicleState) -> int:
     if mode is Mode.TAKEOFF:
         return int(mav.MAV_LANDED_STATE_TAKEOFF)
     sinking = pilot.reference is not None and float(pilot.reference.motion[1, 2]) < -0.1
-    near = state.position_enu_m[2] - pilot.home_enu_m[2] < _NEAR_GROUND_M
+    near = state.position_enu_m[2] - pilot.home.position_enu_m[2] < _NEAR_GROUND_M
     if mode is Mode.LAND or (mode is Mode.RETURN and sinking and near):
         return int(mav.MAV_LANDED_STATE_LANDING)
     return int(mav.MAV_LANDED_STATE_IN_AIR)

@@ -6,11 +6,16 @@ from importlib.metadata import version as version_of_package
 from math import pi
 
 from colibri.autopilot.commander.commands import HIGHEST_M, Commands
+from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.missions import Missions
+from colibri.autopilot.commander.needs import ModeNeeds
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import MODES, custom_mode, mode_of_custom
+from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.ground.calibration import Calibration
 from colibri.autopilot.ground.fault_injection import Failures
+from colibri.autopilot.guidance.mission.geofence import FENCE_RULES
+from colibri.autopilot.guidance.mission.items import MISSION_RULES, RALLY_RULES
 from colibri.common.earth.geodesy import Geodetic, is_on_earth
 from colibri.mavlink.files.flight_log import FlightLog
 from colibri.mavlink.files.ftp import Ftp
@@ -19,6 +24,8 @@ from colibri.mavlink.files.memory import Memory
 from colibri.mavlink.files.tree import Files, Tree
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import PlantStatus
+from colibri.mavlink.mission.items import FENCE, MISSION, RALLY
+from colibri.mavlink.mission.service import MissionService, Vehicle
 from colibri.mavlink.node.hub import Hub, Outgoing
 from colibri.mavlink.node.service import to
 from colibri.mavlink.parameters.metadata import Metadata
@@ -61,6 +68,7 @@ LOGS = "logs"
 LOG_LINK = -1
 """The link on which the flight log is a listener like any other."""
 REBOOT, SHUT_DOWN = 1.0, 2.0
+PLAN_RULES = {MISSION: MISSION_RULES, FENCE: FENCE_RULES, RALLY: RALLY_RULES}
 _COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT"})
 
 
@@ -99,16 +107,40 @@ class Stations:
         offboard: The setpoints of companions.
         manual: The sticks of a pilot.
         follow: The target to follow.
-        missions: The plans.
+        plans: The plans that were uploaded, and the protocol about them.
+        missions: What flies them.
+        fence: What holds the vehicle back.
+        needs: Which needs of modes are met.
         commands: What obeys.
         failures: What is injected.
         log: Of each flight.
-        restart: 1 once a ground station has asked for a restart, 2 for the end; 0 before.
+        restart: 1 once somebody has asked for a restart, 2 for the end; 0 before.
     """
 
-    def __init__(self, settings: StationSettings, pilot: Pilot, parameters: Parameters) -> None:
-        """Serve for `pilot`, with `parameters`."""
+    def __init__(
+        self,
+        settings: StationSettings,
+        pilot: Pilot,
+        missions: Missions,
+        fence: Fence,
+        lines: StatusQueue,
+        parameters: Parameters,
+        *,
+        takes_attitude: bool,
+    ) -> None:
+        """Serve for `pilot` and the `missions` that it flies.
+
+        Args:
+            settings: Towards ground stations.
+            pilot: Does what is commanded.
+            missions: Take the plans.
+            fence: Says which places are out of reach.
+            lines: What these parts say.
+            parameters: All numbers that can be changed.
+            takes_attitude: Whether the control law takes attitude setpoints.
+        """
         self._settings = settings
+        self._lines = lines
         self._identity = IDENTITIES[settings.identity]
         self._pilot = pilot
         self._parameters = parameters
@@ -117,8 +149,11 @@ class Stations:
         self.failures = Failures(settings.feedback, relays=settings.relays_faults)
         self.restart = 0.0
         self.offboard, self.manual, self.follow = Offboard(), Manual(settings.system_id), Follow()
-        self.commands = Commands(pilot, settings.origin, lambda place: self.missions.fence_refusal(place))
-        self.missions = Missions(pilot, self.commands, self._text)
+        self.missions, self.fence = missions, fence
+        self.needs = ModeNeeds(pilot, missions, self.manual, self.offboard, self.follow, takes_attitude=takes_attitude)
+        self.commands = Commands(pilot, fence, self.needs)
+        vehicle = Vehicle(missions.load, missions.progress, missions.set_current, self.commands.guided_goto)
+        self.plans = MissionService(PLAN_RULES, vehicle, self._text)
         self._heartbeat = HeartbeatService(self._identity)
         self._streams = StreamService(telemetry(Constants(boot_unix_us=settings.boot_unix_us)))
         modes = [ModeInfo(row.mode.title(), custom_mode(row.mode), row.standard, row.selectable) for row in MODES]
@@ -134,7 +169,7 @@ class Stations:
             self._modes,
             TimeService(),
             ParameterService(parameters),
-            self.missions.service,
+            self.plans,
             self.offboard,
             self.manual,
             self.follow,
@@ -167,7 +202,11 @@ class Stations:
 
     def expect_station(self, now_us: int) -> None:
         """Take a ground station for heard now: one that was heard before a restart is to be heard again."""
-        self._heartbeat.expected_us = now_us
+        self._heartbeat.expect(now_us)
+
+    def reboot(self) -> None:
+        """Ask for a restart, as a ground station may."""
+        self.restart = REBOOT
 
     def update(self, snapshot: Snapshot) -> None:
         """Take in the vehicle as it is now. Called once a control sample."""
@@ -181,7 +220,8 @@ class Stations:
             self._streams.use(self._log_channel, SDK if snapshot.armed else SILENT)
 
     def hear_plant(self, plant_status: PlantStatus, now_us: int) -> None:
-        """Take in what the plant says of faults that were asked for."""
+        """Take in what the plant says of faults that were asked for, and the time of the messages that follow."""
+        self.needs.at(now_us)
         ended = self.failures.poll(plant_status.results, now_us)
         if ended is not None:
             command, outcome = ended
@@ -189,7 +229,9 @@ class Stations:
 
     def poll(self, now_us: int) -> list[Outgoing]:
         """Do what is due; return what to send. Called once a frame."""
-        for severity, text in self._pilot.take_said():
+        for seq in self.missions.take_reached():
+            self.plans.reached(seq)
+        for severity, text in self._lines.take():
             self.say(severity, text)
         for text in self._calibration.poll(now_us):
             self.say(INFO, text)
@@ -229,14 +271,12 @@ class Stations:
         streams.provide("AVAILABLE_MODES", self._modes.available_modes)
         streams.provide("AVAILABLE_MODES_MONITOR", self._modes.monitor)
         streams.provide("COMPONENT_METADATA", lambda command: self._metadata.provide(command.peer, command.now_us))
-        streams.provide(
-            "MISSION_CURRENT", lambda command: [to(command.peer, "MISSION_CURRENT", *self.missions.service.current())]
-        )
+        streams.provide("MISSION_CURRENT", lambda command: [to(command.peer, "MISSION_CURRENT", *self.plans.current())])
         return {
             **self.commands.handlers(),
             **streams.handlers(),
             **self._modes.handlers(),
-            mav.MAV_CMD_DO_SET_MISSION_CURRENT: self.missions.service.do_set_mission_current,
+            mav.MAV_CMD_DO_SET_MISSION_CURRENT: self.plans.do_set_mission_current,
             mav.MAV_CMD_DO_SET_MODE: self._engaging(self.commands.handlers()[mav.MAV_CMD_DO_SET_MODE]),
             mav.MAV_CMD_PREFLIGHT_CALIBRATION: Entry(self._calibrate, frames=None, interruptible=True),
             mav.MAV_CMD_INJECT_FAILURE: lambda command: self.failures.inject(
@@ -277,7 +317,7 @@ class Stations:
             return Refusal("origin refused: not a latitude, longitude and altitude")
         if self._pilot.state.armed:
             return Refusal("origin refused: the rotors are armed")
-        self.commands.origin = place
+        self._pilot.home.move_origin(place)
         self.missions.moved_origin()
         return None
 

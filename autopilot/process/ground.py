@@ -126,7 +126,7 @@ class Ground:
         if copter.samples - self._kept_samples < (1 if armed or changed else _STANDING_SAMPLES):
             return
         if changes != self._kept_plans:
-            plans = copter.stations.missions.service.plans
+            plans = copter.stations.plans.plans
             self._state.save_plans({plan_type: plan.items for plan_type, plan in plans.items()})
         record = copter.record()
         if record is not None and not self._state.keep(record) and not self._said_too_much:

@@ -136,6 +136,15 @@ class MissionService:
         ids = (self.plans[plan_type].id for plan_type in (MISSION, FENCE, RALLY))
         return (progress.seq, total, progress.state, progress.mode, *ids)
 
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Opaque ids of the plans."""
+        return tuple(plan.id for plan in self.plans.values())
+
+    def restore(self, plans: Mapping[int, Sequence[MissionItem]]) -> None:
+        """Hold the plans that were kept over a restart; the vehicle that flies them is told by whoever kept them."""
+        self.plans.update({plan_type: plan_of(plans.get(plan_type, ())) for plan_type in PLAN_TYPES})
+
     def load(self, plan_type: int, items: Sequence[MissionItem]) -> Plan:
         """Replace a plan by valid items, as an upload does."""
         plan = plan_of(items)

@@ -49,6 +49,10 @@ class HeartbeatService:
         self._heard: dict[tuple[int, int], Heard] = {}
         self.expected_us: int | None = None
 
+    def expect(self, now_us: int) -> None:
+        """Wait from now on for a ground station that was heard before a restart."""
+        self.expected_us = now_us
+
     def update(self, snapshot: Snapshot) -> None:
         """Take in how the vehicle is."""
         self._snapshot = snapshot

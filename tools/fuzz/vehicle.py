@@ -116,7 +116,7 @@ class Target:
         copter.parameters.reset()
         copter.parameters.set("MIS_TAKEOFF_ALT", 40.0)
         for plan in (FENCE, RALLY, MISSION):
-            copter.stations.missions.service.load(plan, ())
+            copter.stations.plans.load(plan, ())
         self._order(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE)
         flight.put(STANDING)
         flight.run(0.8)
@@ -127,7 +127,7 @@ class Target:
             flight.put(HIGH)
             copter.pilot.standing = False
             self._order(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE)
-        copter.stations.missions.service.load(MISSION, PLAN)
+        copter.stations.plans.load(MISSION, PLAN)
         self._meet(state.mode)
         if state.mode is not Mode.ORBIT:
             self._select(state.mode)
@@ -182,7 +182,7 @@ def check(flight: CopterFlight) -> None:
     _must(bool(np.isfinite(reference.motion).all() and np.isfinite(reference.heading).all()), "a reference of nan")
     fast = float(np.linalg.norm(reference.motion[1]))
     _must(fast < _FASTEST_REFERENCE_M_S, f"a reference of {fast:.0f} m/s")
-    _must(hypot(*pilot.home_enu_m) <= _FARTHEST_HOME_M, "home is nowhere")
+    _must(hypot(*pilot.home.position_enu_m) <= _FARTHEST_HOME_M, "home is nowhere")
 
 
 def _must(holds: bool, otherwise: str) -> None:

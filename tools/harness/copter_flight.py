@@ -117,7 +117,7 @@ class CopterFlight:
         """Return what is kept of the flight, as it comes from a disk."""
         kept = of_bytes(Kept, to_bytes(self.copter.record()))
         assert kept is not None
-        plans = self.copter.stations.missions.service.plans
+        plans = self.copter.stations.plans.plans
         return Past(kept, {plan_type: plan.items for plan_type, plan in plans.items()})
 
     def _copter(self, values: dict[str, Value] | None, first: Track | None, past: Past | None = None) -> Copter:

@@ -167,8 +167,8 @@ def _take_off(copter: Copter, plant: Plant) -> None:
     while not copter.pilot.has_seen or copter.pilot.refusals():
         _step(copter, plant)
         assert plant.world.time_us < _LONGEST_S * 1e6, "it must be ready to arm"
-    copter.pilot.select(Mode.TAKEOFF)
-    copter.pilot.arm()
+    copter.pilot.select(Mode.TAKEOFF, ())
+    copter.pilot.arm(())
     began_us = plant.world.time_us
     while copter.pilot.state.mode is not Mode.HOLD:
         _step(copter, plant)

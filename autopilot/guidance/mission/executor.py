@@ -108,7 +108,7 @@ class MissionExecutor:
 
     Attributes:
         progress: State, current item; a new object whenever that changes.
-        defaults: Where items do not say; whoever changes them replaces all of it.
+        defaults: Where items do not say.
     """
 
     def __init__(self, items: Sequence[MissionItem] = (), defaults: Defaults = _DEFAULTS) -> None:
@@ -143,6 +143,10 @@ class MissionExecutor:
         self._items = tuple(items)
         self._reset()
         self._show(0, NO_MISSION if not items else ACTIVE if flying else NOT_STARTED)
+
+    def adopt(self, defaults: Defaults) -> None:
+        """Take other defaults, from the next item on."""
+        self.defaults = defaults
 
     def start(self) -> Refusal | None:
         """Fly the mission: go on at the current item, from the first if it is complete. Return why not."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import dist, hypot
 from typing import TypeAlias
 
-from colibri.autopilot.guidance.reference import Kind, still_target
+from colibri.autopilot.guidance.reference import Kind, Reference, still_target
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Order, TakeOff
 from colibri.autopilot.guidance.tasks.task import Asked, Course, Endless, Motion, Planned, Scene
 from colibri.autopilot.guidance.trajectories.planner import Planner
@@ -185,15 +185,22 @@ class Along:
 
     Attributes:
         began_us: That moment.
+        start: Where the reference is set as the track is begun in mid-flight; None where it is led there.
     """
 
     def __init__(
-        self, planner: Planner, duration_s: float, began_us: int, planner_for_law: Planner | None = None
+        self,
+        planner: Planner,
+        duration_s: float,
+        began_us: int,
+        planner_for_law: Planner | None = None,
+        start: Reference | None = None,
     ) -> None:
         """Fly a track that began, or begins, at `began_us`.
 
         A control law that previews references other than a control sample apart has a planner of its own.
         """
+        self.start = start
         self._planner = planner
         self._planner_for_law = planner_for_law
         self._duration_s = duration_s

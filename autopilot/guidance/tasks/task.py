@@ -41,6 +41,9 @@ class Scene(NamedTuple):
         interval_s: Between two instants of a target.
         samples: How many instants a target has.
         steered: What clients ask for from moment to moment.
+        standing: Whether the vehicle stands on the ground.
+        ground_m: Height of where it last stood, z of ENU.
+        blind: Whether the position is not to be flown by: a landing is level then.
     """
 
     now_us: int
@@ -51,6 +54,9 @@ class Scene(NamedTuple):
     interval_s: float
     samples: int
     steered: Steered = NOT_STEERED
+    standing: bool = False
+    ground_m: float = 0.0
+    blind: bool = False
 
     @property
     def yaw_rad(self) -> float:

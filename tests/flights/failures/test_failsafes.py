@@ -40,10 +40,10 @@ def heard_every_second(flight: CopterFlight, seconds: float) -> None:
 
 def fence_of(flight: CopterFlight, radius_m: float) -> None:
     """Load a fence: a circle around the origin."""
-    origin = flight.copter.stations.commands.origin
+    origin = flight.copter.pilot.home.origin
     place = (round(origin.latitude_deg * 1e7), round(origin.longitude_deg * 1e7), 0.0)
     item = MissionItem(mav.MAV_FRAME_GLOBAL, CIRCLE, 0, radius_m, 0.0, 0.0, 0.0, *place)
-    flight.copter.stations.missions.service.load(FENCE, (item,))
+    flight.copter.stations.plans.load(FENCE, (item,))
 
 
 def test_a_lost_ground_station_leads_home_after_the_time_that_is_set_and_clears() -> None:

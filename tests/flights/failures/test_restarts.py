@@ -228,19 +228,19 @@ def test_a_failsafe_that_the_pilot_has_overridden_does_not_begin_again() -> None
 def test_plans_and_home_are_kept_on_the_ground_too() -> None:
     flight = CopterFlight()
     load(flight, waypoint(5.0, 0.0), waypoint(0.0, 5.0))
-    service = flight.copter.stations.missions.service
+    service = flight.copter.stations.plans
     service.load(RALLY, [waypoint(1.0, 1.0)._replace(command=mav.MAV_CMD_NAV_RALLY_POINT)])
     circle = waypoint(0.0, 0.0)._replace(command=mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, p1=50.0)
     service.load(FENCE, [circle])
-    flight.copter.pilot.set_home((1.0, 2.0, 0.0), 0.5)
+    flight.copter.pilot.home.move((1.0, 2.0, 0.0), 0.5)
     plans = dict(service.plans)
     flight.restart(flight.past())
-    missions, pilot = flight.copter.stations.missions, flight.copter.pilot
-    assert missions.service.plans == plans
-    refusal = missions.fence_refusal((60.0, 0.0, 1.0))
+    stations, pilot = flight.copter.stations, flight.copter.pilot
+    assert stations.plans.plans == plans
+    refusal = stations.fence.refusal((60.0, 0.0, 1.0))
     assert refusal is not None
     assert "fence" in refusal.reason
-    assert (pilot.home_enu_m, pilot.standing, flight.armed) == ((1.0, 2.0, 0.0), True, False)
+    assert (pilot.home.position_enu_m, pilot.standing, flight.armed) == ((1.0, 2.0, 0.0), True, False)
     assert not flight.client.said("restarted in flight")
     assert flight.arm() == ACCEPTED
     flight.restart(flight.past())

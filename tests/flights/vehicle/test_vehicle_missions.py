@@ -36,7 +36,7 @@ def waypoint(east: float, north: float, up: float = 3.0, stay_s: float = 0.0) ->
 
 
 def load(flight: CopterFlight, *items: MissionItem) -> None:
-    flight.copter.stations.missions.service.load(MISSION, items)
+    flight.copter.stations.plans.load(MISSION, items)
 
 
 def reached(flight: CopterFlight) -> list[int]:

@@ -212,20 +212,20 @@ def test_home_and_origin() -> None:
     x, y = degrees_e7(1.0, -2.0)
     above_sea = DEFAULT_ORIGIN.altitude_m + 0.5
     assert flight.command_int(home, 0.0, 0.0, 0.0, 0.0, frame=RELATIVE, x=x, y=y, z=above_sea) == ACCEPTED
-    assert flight.copter.pilot.home_enu_m == pytest.approx((1.0, -2.0, 0.5), abs=0.02)
+    assert flight.copter.pilot.home.position_enu_m == pytest.approx((1.0, -2.0, 0.5), abs=0.02)
     flight.run(1.1)
     told = flight.client.latest("HOME_POSITION")
     assert (told.latitude, told.longitude) == pytest.approx((x, y), abs=2)
     for bad_x, bad_y, z in ((950000000, y, 500.0), (x, y, nan), (0, 0, 500.0), (NOT_GIVEN, NOT_GIVEN, 500.0)):
         assert flight.command_int(home, 0.0, 0.0, 0.0, 0.0, frame=RELATIVE, x=bad_x, y=bad_y, z=z) == DENIED
     assert flight.command(home, 2.0) == DENIED
-    assert flight.copter.pilot.home_enu_m == pytest.approx((1.0, -2.0, 0.5), abs=0.02)
+    assert flight.copter.pilot.home.position_enu_m == pytest.approx((1.0, -2.0, 0.5), abs=0.02)
     assert flight.command(home, 1.0) == ACCEPTED
-    assert flight.copter.pilot.home_enu_m == pytest.approx((3.0, 4.0, 5.0), abs=0.1)
+    assert flight.copter.pilot.home.position_enu_m == pytest.approx((3.0, 4.0, 5.0), abs=0.1)
     flight.send("SET_GPS_GLOBAL_ORIGIN", SYSTEM, 473000000, 85000000, 500000)
     flight.run(0.05)
     assert flight.client.said("origin refused: the rotors are armed")
-    assert flight.copter.stations.commands.origin == DEFAULT_ORIGIN
+    assert flight.copter.pilot.home.origin == DEFAULT_ORIGIN
 
 
 def test_the_origin_is_set_on_the_ground_and_told_to_the_digit() -> None:
@@ -234,14 +234,14 @@ def test_the_origin_is_set_on_the_ground_and_told_to_the_digit() -> None:
     flight.run(0.05)
     told = flight.client.latest("GPS_GLOBAL_ORIGIN")
     assert (told.latitude, told.longitude, told.altitude) == (473000001, -85000003, 500004)
-    assert flight.copter.stations.commands.origin == pytest.approx(Geodetic(47.3000001, -8.5000003, 500.004))
+    assert flight.copter.pilot.home.origin == pytest.approx(Geodetic(47.3000001, -8.5000003, 500.004))
     origin = mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN
     assert flight.command_int(origin, frame=GLOBAL) == DENIED
     assert flight.command_int(origin, frame=GLOBAL, x=473977420, y=85455940, z=inf) == DENIED
     assert flight.command_int(origin, frame=GLOBAL, x=473977420, y=85455940, z=488.0) == ACCEPTED
     flight.send("SET_HOME_POSITION", SYSTEM, *degrees_e7(5.0, 5.0), 490000, 0, 0, 0, [1.0, 0.0, 0.0, 0.0], 0, 0, 0)
     flight.run(0.05)
-    assert flight.copter.pilot.home_enu_m == pytest.approx((5.0, 5.0, 2.0), abs=0.02)
+    assert flight.copter.pilot.home.position_enu_m == pytest.approx((5.0, 5.0, 2.0), abs=0.02)
 
 
 def test_modes_by_message_and_by_standard_number() -> None:
@@ -271,7 +271,7 @@ def fence(*places: tuple[float, float]) -> tuple[MissionItem, ...]:
 
 def test_nothing_is_flown_to_outside_the_geofence() -> None:
     flight = in_the_air()
-    flight.copter.stations.missions.service.load(FENCE, fence((-8.0, -8.0), (8.0, -8.0), (8.0, 8.0), (-8.0, 8.0)))
+    flight.copter.stations.plans.load(FENCE, fence((-8.0, -8.0), (8.0, -8.0), (8.0, 8.0), (-8.0, 8.0)))
     assert flight.go(9.0, 0.0, 5.0) == DENIED
     assert flight.client.said("reposition refused: outside the geofence")
     assert flight.command_int(ORBIT, 9.0, 2.0, nan, nan, frame=RELATIVE) == DENIED  # its centre alone is inside
@@ -282,7 +282,7 @@ def test_nothing_is_flown_to_outside_the_geofence() -> None:
     assert flight.command_int(home, 0.0, 0.0, 0.0, 0.0, frame=RELATIVE, x=x, y=y, z=488.0) == DENIED
     flight.disarm(FORCE)
     flight.put(STANDING)
-    flight.copter.stations.missions.service.load(FENCE, fence((20.0, 20.0), (30.0, 20.0), (30.0, 30.0)))
+    flight.copter.stations.plans.load(FENCE, fence((20.0, 20.0), (30.0, 20.0), (30.0, 30.0)))
     assert flight.command(mav.MAV_CMD_NAV_TAKEOFF, *(nan,) * 7) == DENIED
     flight.until(lambda: flight.copter.pilot.standing, 4.0)
     flight.run(0.2)
@@ -294,7 +294,7 @@ def test_home_beyond_the_geofence_is_returned_to_all_the_same() -> None:
     flight = in_the_air(2.0, values={"RTL_RETURN_ALT": 2.0, "RTL_MIN_DIST": 1.0, "COM_DISARM_LAND": 0.1})
     flight.go(5.0, 0.0, 2.0)
     flight.run(2.5)
-    flight.copter.stations.missions.service.load(FENCE, fence((4.0, -8.0), (9.0, -8.0), (9.0, 8.0), (4.0, 8.0)))
+    flight.copter.stations.plans.load(FENCE, fence((4.0, -8.0), (9.0, -8.0), (9.0, 8.0), (4.0, 8.0)))
     assert flight.select(Mode.RETURN) == ACCEPTED
     flight.until(lambda: not flight.armed, 25.0)
     assert hypot(*flight.position[:2]) < 0.1

@@ -1,0 +1,68 @@
+"""Which needs of flight modes are met, and what clients ask for from moment to moment."""
+
+from typing import Protocol, TypeVar
+
+from colibri.autopilot.commander.missions import Missions
+from colibri.autopilot.commander.pilot import Pilot
+from colibri.autopilot.commander.rules.modes import Need
+from colibri.autopilot.guidance.tasks.task import Steered
+from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
+
+_LEADER_LOST_US = 10_000_000
+_T = TypeVar("_T", covariant=True)
+
+
+class Latest(Protocol[_T]):
+    """A service that keeps the newest of what a client sends."""
+
+    def latest(self, now_us: int, timeout_us: int) -> _T | None:
+        """Return the newest, if it is no older than `timeout_us`."""
+        ...
+
+
+class ModeNeeds:
+    """Judges the needs of modes for one pilot."""
+
+    def __init__(
+        self,
+        pilot: Pilot,
+        missions: Missions,
+        manual: Latest[Sticks],
+        offboard: Latest[OffboardSetpoint],
+        follow: Latest[TargetState],
+        *,
+        takes_attitude: bool,
+    ) -> None:
+        """Judge by these parts; `takes_attitude` says whether the control law takes attitude setpoints."""
+        self._pilot, self._missions = pilot, missions
+        self._manual, self._offboard, self._follow = manual, offboard, follow
+        self._takes_attitude = takes_attitude
+        self._now_us = 0
+
+    def at(self, now_us: int) -> None:
+        """Take in the time at which the messages come that are obeyed next."""
+        self._now_us = now_us
+
+    def missing(self) -> tuple[Need, ...]:
+        """Return the needs that nothing meets now. The message before may have changed that."""
+        sticks, setpoint, _ = self.steered(self._now_us)
+        met = {
+            Need.ATTITUDE_CONTROL: self._takes_attitude,
+            Need.STICKS: sticks is not None,
+            Need.SETPOINTS: setpoint is not None,
+            Need.MISSION: self._missions.has_mission,
+            Need.INSIDE_FENCE: not self._missions.leaves_fence,
+            Need.CIRCLE: False,
+            Need.FLYING: not self._pilot.standing,
+            Need.POSITION: self._pilot.knows_position,
+        }
+        return tuple(need for need, there in met.items() if not there)
+
+    def steered(self, now_us: int) -> Steered:
+        """Return what is obeyed of what clients send, where that is fresh."""
+        behaviour = self._pilot.behaviour
+        return Steered(
+            self._manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6)),
+            self._offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6)),
+            self._follow.latest(now_us, _LEADER_LOST_US),
+        )
