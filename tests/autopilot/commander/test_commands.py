@@ -1,0 +1,273 @@
+"""Commands alone: what each does with good numbers, and that bad ones are denied and change nothing."""
+
+from math import inf, nan, radians
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Mode, Need, State, custom_mode
+from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.tasks.orbit import Round
+from colibri.autopilot.guidance.tasks.position import Climb, Stop, Way
+from colibri.common.earth.geodesy import Geodetic
+from colibri.mavlink.mission.items import FENCE, MISSION
+from colibri.mavlink.services.command import (
+    ACCEPTED,
+    DENIED,
+    FAILED,
+    TEMPORARILY_REJECTED,
+    UNSUPPORTED,
+    Command,
+)
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
+from tests.autopilot.commander.cockpit import FLYING, GROUND, Cockpit, item
+
+FORCE = 21196.0
+CUSTOM = float(mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
+
+
+@pytest.fixture
+def flying() -> Cockpit:
+    cockpit = Cockpit(FLYING)
+    cockpit.load(MISSION, item("NAV_WAYPOINT", place=(20.0, 0.0, 10.0)))
+    cockpit.step()
+    return cockpit
+
+
+@pytest.fixture
+def standing() -> Cockpit:
+    return Cockpit()
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "mode"),
+    [
+        ("NAV_LAND", (), Mode.LAND),
+        ("NAV_RETURN_TO_LAUNCH", (), Mode.RETURN),
+        ("NAV_LOITER_UNLIM", (), Mode.HOLD),
+        ("MISSION_START", (), Mode.MISSION),
+        ("DO_PAUSE_CONTINUE", (0.0,), Mode.HOLD),
+        ("DO_PAUSE_CONTINUE", (1.0,), Mode.MISSION),
+        ("DO_REPOSITION", (-1.0, 1.0), Mode.HOLD),
+        ("CONDITION_YAW", (90.0, 0.0, 1.0, 0.0), Mode.HOLD),
+        ("DO_ORBIT", (5.0, 2.0), Mode.ORBIT),
+    ],
+)
+def test_a_command_changes_the_mode(flying: Cockpit, command: str, params: tuple[float, ...], mode: Mode) -> None:
+    flying.pilot.select(Mode.OFFBOARD, ())
+    assert flying.do(command, *params).result == ACCEPTED
+    assert flying.pilot.state == State(mode, armed=True)
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_do_set_mode_takes_every_number_of_the_table(flying: Cockpit, mode: Mode) -> None:
+    flying.unmet = ()
+    row = ROWS[mode]
+    assert flying.do("DO_SET_MODE", CUSTOM, float(row.main), float(row.sub)).result == ACCEPTED
+    assert flying.pilot.state.mode is mode
+    assert flying.commands.set_custom_mode(int(CUSTOM), custom_mode(Mode.LAND)) is None
+    assert flying.pilot.state.mode is Mode.LAND
+
+
+@pytest.mark.parametrize("need", Need)
+def test_what_a_mode_needs_is_asked_for_at_each_command(flying: Cockpit, need: Need) -> None:
+    flying.unmet = (need,)
+    for mode in Mode:
+        flying.pilot.select(Mode.LAND, ())
+        refusal = flying.commands.select(mode)
+        assert (refusal is not None) is (need in ROWS[mode].needs)
+        assert refusal is None or need.value in refusal.reason
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "result"),
+    [
+        ("COMPONENT_ARM_DISARM", (0.0,), DENIED),
+        ("COMPONENT_ARM_DISARM", (2.0,), DENIED),
+        ("DO_SET_MODE", (CUSTOM, 77.0, 0.0), UNSUPPORTED),
+        ("DO_SET_MODE", (CUSTOM, 0.5, 0.0), DENIED),
+        ("DO_SET_MODE", (CUSTOM, nan, 0.0), DENIED),
+        ("DO_SET_MODE", (0.0, 4.0, 3.0), UNSUPPORTED),
+        ("DO_PAUSE_CONTINUE", (2.0,), DENIED),
+        ("DO_REPOSITION", (-1.0, 2.0), DENIED),
+        ("DO_REPOSITION", (-1.0, 0.0, 0.0, 20.0), DENIED),
+        ("DO_REPOSITION", (99.0,), DENIED),
+        ("DO_ORBIT", (0.5,), DENIED),
+        ("DO_ORBIT", (1e6,), DENIED),
+        ("DO_ORBIT", (5.0, 99.0), DENIED),
+        ("DO_ORBIT", (5.0, 1.0, 17.0), DENIED),
+        ("DO_CHANGE_SPEED", (1.0, 99.0), DENIED),
+        ("DO_CHANGE_SPEED", (1.0, -5.0), DENIED),
+        ("DO_CHANGE_SPEED", (2.0, 5.0), UNSUPPORTED),
+        ("DO_CHANGE_SPEED", (1.0, 5.0, 0.0, 1.0), UNSUPPORTED),
+        ("DO_SET_HOME", (2.0,), DENIED),
+        ("DO_SET_HOME", (0.0,), DENIED),
+        ("DO_FLIGHTTERMINATION", (0.0,), DENIED),
+        ("CONDITION_YAW", (nan,), DENIED),
+        ("CONDITION_YAW", (400.0,), DENIED),
+        ("CONDITION_YAW", (90.0, 0.0, 3.0), DENIED),
+        ("CONDITION_YAW", (90.0, 0.0, 1.0, 2.0), DENIED),
+    ],
+)
+def test_bad_numbers_change_nothing(flying: Cockpit, command: str, params: tuple[float, ...], result: int) -> None:
+    state, course, home = flying.pilot.state, flying.pilot.course, flying.home.position_enu_m
+    outcome = flying.do(command, *params)
+    assert outcome.result == result
+    assert outcome.reason
+    assert (flying.pilot.state, flying.home.position_enu_m, flying.pilot.speed_m_s) == (state, home, None)
+    assert flying.pilot.course is course
+
+
+@pytest.mark.parametrize("command", ["DO_REPOSITION", "DO_ORBIT"])
+@pytest.mark.parametrize("place", [{"x": 91.0, "y": 8.0}, {"x": 47.0}, {"x": inf, "y": 8.0}, {"x": 0.0, "y": 0.0}])
+def test_nowhere_is_flown_to(flying: Cockpit, command: str, place: dict[str, float]) -> None:
+    assert flying.do(command, frame=mav.MAV_FRAME_GLOBAL, **place).result == DENIED
+    assert flying.pilot.state.mode is Mode.HOLD
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "result"),
+    [("DO_REPOSITION", (3.0,), DENIED), ("DO_ORBIT", (), DENIED), ("CONDITION_YAW", (90.0,), TEMPORARILY_REJECTED)],
+)
+def test_what_stands_is_not_sent_anywhere(
+    standing: Cockpit, command: str, params: tuple[float, ...], result: int
+) -> None:
+    outcome = standing.do(command, *params, z=5.0)
+    assert outcome.result == result
+    assert "the vehicle is not flying" in outcome.reason
+    assert standing.pilot.state == FIRST
+
+
+def test_arming_and_disarming(standing: Cockpit) -> None:
+    assert standing.do("COMPONENT_ARM_DISARM", 1.0).result == ACCEPTED
+    assert standing.do("COMPONENT_ARM_DISARM", 1.0).result == ACCEPTED
+    assert standing.pilot.flights == 1
+    assert standing.do("COMPONENT_ARM_DISARM", 0.0).result == ACCEPTED
+    standing.stock(charge=0.0)
+    assert standing.do("COMPONENT_ARM_DISARM", 1.0).result == DENIED
+    assert standing.do("RUN_PREARM_CHECKS").result == FAILED
+    assert standing.do("COMPONENT_ARM_DISARM", 1.0, FORCE).result == ACCEPTED
+    standing.stock()
+    assert standing.do("RUN_PREARM_CHECKS").result == ACCEPTED
+
+
+def test_in_flight_rotors_stop_by_force_or_termination(flying: Cockpit) -> None:
+    assert flying.do("COMPONENT_ARM_DISARM", 0.0).result == DENIED
+    assert flying.do("DO_FLIGHTTERMINATION", 1.0).result == ACCEPTED
+    assert not flying.pilot.state.armed
+
+
+@pytest.mark.parametrize(
+    ("params", "frame", "z", "height_m"),
+    [
+        ((), None, nan, 2.5),
+        ((), None, 7.0, 7.0),
+        ((0.0,), mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, 7.0, 7.0),
+        ((-1.0,), None, 507.0, None),
+        ((0.0,), mav.MAV_FRAME_GLOBAL, 507.0, None),
+    ],
+)
+def test_a_takeoff_climbs_to_the_height_that_is_meant(
+    standing: Cockpit, params: tuple[float, ...], frame: int | None, z: float, height_m: float | None
+) -> None:
+    assert standing.do("NAV_TAKEOFF", *params, frame=frame, z=z).result == ACCEPTED
+    course = standing.pilot.course
+    assert isinstance(course, Climb)
+    above_sea_m = z - standing.home.origin.altitude_m
+    assert course.order.height_enu_m == pytest.approx(above_sea_m if height_m is None else height_m)
+
+
+@pytest.mark.parametrize("z", [0.0, -3.0, 0.1, inf, 2e4])
+def test_a_takeoff_to_no_height_is_denied(standing: Cockpit, z: float) -> None:
+    assert standing.do("NAV_TAKEOFF", z=z).result == DENIED
+    assert isinstance(standing.pilot.course, Stop)
+
+
+def test_places_heights_and_headings_of_a_reposition(flying: Cockpit) -> None:
+    there = flying.place(30.0, 40.0)
+    frame = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
+    params = (3.0, 1.0, 0.0, radians(90.0))
+    assert flying.do("DO_REPOSITION", *params, frame=frame, x=there.latitude_deg, y=there.longitude_deg, z=12.0)
+    course = flying.pilot.course
+    assert isinstance(course, Way)
+    assert course.order.position_enu_m == pytest.approx((30.0, 40.0, 12.0), abs=0.01)
+    assert course.order.yaw_rad == pytest.approx(0.0)
+    assert course.order.speed_m_s == 3.0
+    assert flying.do("DO_REPOSITION", z=15.0 + flying.home.origin.altitude_m).result == ACCEPTED
+    assert isinstance(flying.pilot.course, Way)
+    assert flying.pilot.course.order.position_enu_m == pytest.approx((0.0, 0.0, 15.0), abs=0.01)
+
+
+def test_a_circle_is_as_wide_and_as_fast_as_it_was_asked_for(flying: Cockpit) -> None:
+    assert flying.do("DO_ORBIT", -7.0, 2.0).result == ACCEPTED
+    course = flying.pilot.course
+    assert isinstance(course, Round)
+    assert course.order.radius_m == -7.0
+    assert course.order.speed_m_s == 2.0
+
+
+def test_the_speed_that_is_asked_for(flying: Cockpit) -> None:
+    assert flying.do("DO_CHANGE_SPEED", 1.0, 4.0).result == ACCEPTED
+    assert flying.pilot.speed_m_s == 4.0
+    assert flying.do("DO_CHANGE_SPEED", 1.0, -1.0).result == ACCEPTED
+    assert flying.pilot.speed_m_s == 4.0
+    assert flying.do("DO_CHANGE_SPEED", 1.0, -2.0).result == ACCEPTED
+    assert flying.pilot.speed_m_s is None
+
+
+def test_home_here_there_and_too_far_away(flying: Cockpit) -> None:
+    assert flying.do("DO_SET_HOME", 1.0).result == ACCEPTED
+    assert flying.home.position_enu_m == pytest.approx(FLYING, abs=0.01)
+    there = flying.place(5.0, 6.0)
+    altitude_m = flying.home.origin.altitude_m
+    outcome = flying.do("DO_SET_HOME", 0.0, x=there.latitude_deg, y=there.longitude_deg, z=altitude_m + 1.0)
+    assert outcome.result == ACCEPTED
+    assert flying.home.position_enu_m == pytest.approx((5.0, 6.0, 1.0), abs=0.01)
+    assert flying.home.chosen
+    far = Geodetic(there.latitude_deg + 5.0, there.longitude_deg, altitude_m)
+    assert flying.commands.move_home(far) == Refusal("home refused: too far away")
+
+
+def test_no_command_leads_over_the_fence() -> None:
+    cockpit = Cockpit(FLYING, behaviour=Behaviour(farthest_m=15.0))
+    cockpit.step()
+    there = cockpit.place(20.0, 0.0)
+    assert "15 m from home" in cockpit.do("DO_REPOSITION", frame=0, x=there.latitude_deg, y=there.longitude_deg).reason
+    assert "15 m from home" in cockpit.do("DO_ORBIT", 16.0, 2.0).reason
+    refusal = cockpit.commands.guided_goto(there.latitude_deg, there.longitude_deg, 10.0, 3)
+    assert refusal is not None
+    assert "15 m from home" in refusal.reason
+    centre = item("NAV_FENCE_CIRCLE_EXCLUSION", 3.0, place=(8.0, 0.0, 0.0))
+    cockpit.load(FENCE, centre)
+    inside = cockpit.place(8.0, 0.0)
+    outcome = cockpit.do("DO_REPOSITION", frame=0, x=inside.latitude_deg, y=inside.longitude_deg)
+    assert outcome.reason == "reposition refused: outside the geofence"
+    assert cockpit.pilot.state.mode is Mode.HOLD
+
+
+ANYTHING = st.one_of(st.floats(width=32), st.sampled_from([0.0, 1.0, -1.0, nan, 47.4, 8.5]))
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.integers(0, 14),
+    st.tuples(*(ANYTHING for _ in range(7))),
+    st.one_of(st.none(), st.sampled_from([0, 2, 3, 5, 6])),
+    st.booleans(),
+)
+def test_whatever_a_command_holds_it_is_answered_and_the_flight_goes_on(
+    index: int, numbers: tuple[float, ...], frame: int | None, flies: bool
+) -> None:
+    cockpit = AIRBORNE if flies else AT_REST
+    handlers = list(cockpit.commands.handlers().items())
+    number, handler = handlers[index % len(handlers)]
+    p1, p2, p3, p4, x, y, z = numbers
+    outcome = handler(Command(number, p1, p2, p3, p4, x, y, z, frame, GROUND, cockpit.now_us))
+    assert outcome.result in (ACCEPTED, DENIED, FAILED, UNSUPPORTED, TEMPORARILY_REJECTED)
+    assert (outcome.result == ACCEPTED) is (outcome.reason == "")
+    cockpit.step()
+
+
+AIRBORNE, AT_REST = Cockpit(FLYING), Cockpit()

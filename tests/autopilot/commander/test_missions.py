@@ -1,0 +1,146 @@
+"""Missions alone: plans, the fence that they must keep to, and what a mission does to home, mode and progress."""
+
+import pytest
+
+from colibri.autopilot.commander.home import Home
+from colibri.autopilot.commander.rules.modes import FIRST, Mode, State
+from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.mission.executor import ACTIVE, COMPLETE, NO_MISSION, NOT_STARTED, PAUSED
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, plan_of
+from colibri.mavlink.wire.refusal import Refusal
+from tests.autopilot.commander.cockpit import FLYING, Cockpit, at, item
+
+PLAN = (
+    item("NAV_WAYPOINT", place=(5.0, 0.0, 10.0)),
+    item("NAV_WAYPOINT", place=(5.0, 5.0, 10.0)),
+)
+
+
+def test_a_mission_is_flown_item_after_item_and_then_held() -> None:
+    cockpit = Cockpit(FLYING)
+    assert not cockpit.missions.has_mission
+    cockpit.load(MISSION, *PLAN)
+    assert cockpit.said("mission of 2 items")
+    assert (cockpit.missions.has_mission, cockpit.missions.progress().state) == (True, NOT_STARTED)
+    assert cockpit.pilot.select(Mode.MISSION, ()) is None
+    cockpit.step()
+    assert cockpit.missions.progress().state == ACTIVE
+    cockpit.fly_for(15.0)
+    assert cockpit.missions.take_reached() == [0, 1]
+    assert cockpit.missions.take_reached() == []
+    assert cockpit.missions.progress().state == COMPLETE
+    assert cockpit.pilot.state == State(Mode.HOLD, armed=True)
+    assert cockpit.said("finished: hold")
+    assert cockpit.state.position_enu_m == pytest.approx((5.0, 5.0, 10.0), abs=0.3)
+
+
+def test_another_mode_pauses_it_and_it_goes_on_where_it_was() -> None:
+    cockpit = Cockpit(FLYING)
+    cockpit.load(MISSION, *PLAN)
+    cockpit.pilot.select(Mode.MISSION, ())
+    cockpit.fly_for(1.0)
+    cockpit.pilot.select(Mode.HOLD, ())
+    cockpit.step()
+    assert cockpit.missions.progress().state == PAUSED
+    cockpit.pilot.select(Mode.MISSION, ())
+    cockpit.fly_for(15.0)
+    assert cockpit.missions.progress().state == COMPLETE
+
+
+def test_a_return_item_leaves_the_rest_to_mode_return() -> None:
+    cockpit = Cockpit(FLYING)
+    cockpit.load(MISSION, PLAN[0], item("NAV_RETURN_TO_LAUNCH"))
+    cockpit.pilot.select(Mode.MISSION, ())
+    cockpit.fly_for(8.0)
+    assert cockpit.pilot.state == State(Mode.RETURN, armed=True)
+    assert cockpit.said("mission says return: return")
+    cockpit.fly_for(60.0)
+    assert cockpit.pilot.state == FIRST
+
+
+def test_a_takeoff_item_leaves_the_ground_and_a_landing_item_stands_again() -> None:
+    cockpit = Cockpit()
+    cockpit.load(MISSION, item("NAV_TAKEOFF", place=(0.0, 0.0, 3.0)), item("NAV_LAND", place=(0.0, 0.0, 0.0)))
+    cockpit.pilot.select(Mode.MISSION, ())
+    assert cockpit.pilot.arm(()) is None
+    cockpit.fly_for(5.0)
+    assert not cockpit.pilot.standing
+    cockpit.fly_for(25.0)
+    assert cockpit.pilot.state == FIRST
+
+
+def test_a_mission_moves_home() -> None:
+    cockpit = Cockpit(FLYING)
+    cockpit.load(MISSION, item("DO_SET_HOME", 1.0), PLAN[0])
+    cockpit.pilot.select(Mode.MISSION, ())
+    cockpit.step(2)
+    assert cockpit.home.position_enu_m == pytest.approx(FLYING, abs=0.01)
+    assert cockpit.home.chosen
+
+
+def test_an_item_outside_the_fence_is_told_once_and_holds_the_mission_back() -> None:
+    cockpit = Cockpit(FLYING)
+    cockpit.load(FENCE, item("NAV_FENCE_CIRCLE_INCLUSION", 8.0, place=(0.0, 0.0, 0.0)))
+    cockpit.load(MISSION, PLAN[0], item("NAV_WAYPOINT", place=(9.0, 0.0, 10.0)))
+    assert cockpit.missions.leaves_fence
+    assert cockpit.said("item 1 of the mission: outside the geofence")
+    cockpit.missions.moved_origin()
+    assert not cockpit.said("item 1")
+    cockpit.load(FENCE)
+    assert not cockpit.missions.leaves_fence
+
+
+def test_the_fence_around_home_moves_with_home_and_with_its_parameters() -> None:
+    cockpit = Cockpit()
+    assert not cockpit.fence.exists
+    cockpit.missions.adopt(Behaviour(farthest_m=10.0, highest_m=20.0))
+    assert cockpit.fence.exists
+    assert cockpit.fence.refusal((11.0, 0.0, 0.0)) == Refusal("more than 10 m from home")
+    assert cockpit.fence.refusal((0.0, 0.0, 21.0)) == Refusal("more than 20 m above home")
+    cockpit.home.move((5.0, 0.0, 0.0), 0.0)
+    assert cockpit.fence.refusal((11.0, 0.0, 0.0)) is None
+    assert cockpit.fence.margin_m((11.0, 0.0, 0.0)) == pytest.approx(4.0)
+
+
+def test_a_breach_is_judged_ten_times_a_second() -> None:
+    cockpit = Cockpit(behaviour=Behaviour(farthest_m=10.0))
+    assert cockpit.fence.breach((11.0, 0.0, 0.0), 0) is not None
+    assert cockpit.fence.breach((0.0, 0.0, 0.0), 99_000) is not None
+    assert cockpit.fence.breach((0.0, 0.0, 0.0), 100_000) is None
+
+
+def test_plans_that_were_kept_go_on_where_the_mission_stood() -> None:
+    before = Cockpit(FLYING)
+    before.load(MISSION, *PLAN)
+    before.pilot.select(Mode.MISSION, ())
+    before.fly_for(4.0)
+    record = before.missions.record()
+    plans = {RALLY: plan_of(()), FENCE: plan_of(()), MISSION: plan_of(PLAN)}
+    after = Cockpit(FLYING)
+    after.missions.resume(plans, record)
+    assert after.missions.progress() == before.missions.progress()
+    after.missions.resume(plans, None)
+    assert after.missions.progress().seq == 0
+    after.missions.resume({**plans, MISSION: plan_of(())}, record)
+    assert after.missions.progress().state == NO_MISSION
+
+
+def test_every_plan_counts_as_a_change_and_a_current_item_must_exist() -> None:
+    cockpit = Cockpit()
+    for plan_type in (MISSION, FENCE, RALLY):
+        cockpit.load(plan_type)
+    assert cockpit.missions.changes == 3
+    assert cockpit.missions.set_current(0, False) == Refusal("mission: there is none")
+    cockpit.load(MISSION, *PLAN)
+    assert cockpit.missions.set_current(1, False) is None
+    assert cockpit.missions.progress().seq == 1
+
+
+def test_home_that_is_chosen_is_not_moved_by_a_proposal() -> None:
+    home = Home(DEFAULT_ORIGIN)
+    home.propose((1.0, 0.0, 0.0), 0.1)
+    assert (home.position_enu_m, home.chosen) == ((1.0, 0.0, 0.0), False)
+    home.move((2.0, 0.0, 0.0), 0.2)
+    home.propose(at((3.0, 0.0, 0.0)).position_enu_m, 0.3)
+    assert (home.position_enu_m, home.yaw_rad, home.chosen) == ((2.0, 0.0, 0.0), 0.2, True)

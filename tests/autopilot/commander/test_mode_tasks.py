@@ -1,0 +1,120 @@
+"""The table of modes and what each begins with, and which of their needs are met."""
+
+import pytest
+
+from colibri.autopilot.commander.missions import MissionCourse
+from colibri.autopilot.commander.needs import Latest, ModeNeeds
+from colibri.autopilot.commander.rules.modes import Mode, Need
+from colibri.autopilot.guidance.tasks.attitude import AltitudeSticks, Descent, Stabilized
+from colibri.autopilot.guidance.tasks.follow import Following
+from colibri.autopilot.guidance.tasks.offboard import Companion
+from colibri.autopilot.guidance.tasks.position import Along, Climb, Legs, Stop
+from colibri.autopilot.guidance.tasks.sticks import PositionSticks
+from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.mavlink.mission.items import FENCE, MISSION
+from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
+from tests.autopilot.commander.cockpit import FLYING, Cockpit, item
+
+BEGINS = {
+    Mode.STABILIZED: Stabilized,
+    Mode.ALTITUDE: AltitudeSticks,
+    Mode.POSITION: PositionSticks,
+    Mode.HOLD: Stop,
+    Mode.TAKEOFF: Climb,
+    Mode.LAND: Legs,
+    Mode.RETURN: Legs,
+    Mode.MISSION: MissionCourse,
+    Mode.OFFBOARD: Companion,
+    Mode.ORBIT: Stop,
+    Mode.FOLLOW: Following,
+    Mode.TRACK: Legs,
+}
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_every_mode_begins_with_its_course(mode: Mode) -> None:
+    cockpit = Cockpit(FLYING)
+    assert type(cockpit.tasks.begin(mode, cockpit.pilot.scene())) is BEGINS[mode]
+
+
+@pytest.mark.parametrize("mode", [Mode.STABILIZED, Mode.ALTITUDE])
+def test_a_law_that_takes_no_attitude_stops_instead(mode: Mode) -> None:
+    cockpit = Cockpit(FLYING, takes_attitude=False)
+    assert isinstance(cockpit.tasks.begin(mode, cockpit.pilot.scene()), Stop)
+
+
+@pytest.mark.parametrize("takes_attitude", [False, True])
+def test_who_does_not_know_the_place_sinks_level_where_the_law_can(takes_attitude: bool) -> None:
+    cockpit = Cockpit(FLYING, takes_attitude=takes_attitude)
+    cockpit.step(knows_position=False)
+    assert cockpit.pilot.scene().blind
+    assert isinstance(cockpit.tasks.begin(Mode.LAND, cockpit.pilot.scene()), Descent if takes_attitude else Legs)
+
+
+def test_a_track_from_time_0_begins_at_its_start_and_is_flown_once() -> None:
+    cockpit = Cockpit((0.0, 0.0, 0.0), first=track("spiral"), mode=Mode.TRACK)
+    course = cockpit.pilot.course
+    assert isinstance(course, Along)
+    assert course.start is not None
+    assert cockpit.pilot.reference is course.start
+    assert not cockpit.tasks.is_first
+    assert isinstance(cockpit.tasks.begin(Mode.TRACK, cockpit.pilot.scene()), Legs)
+
+
+def test_a_first_track_can_be_forgotten() -> None:
+    cockpit = Cockpit(first=track("spiral"))
+    assert cockpit.tasks.is_first
+    cockpit.tasks.forget_first()
+    assert not cockpit.tasks.is_first
+    assert cockpit.tasks.first_yaw_rad == 0.0
+
+
+class Nobody:
+    """A service of which nothing is heard."""
+
+    def latest(self, now_us: int, timeout_us: int) -> None:
+        """Return nothing."""
+
+
+class Somebody:
+    """A service that is heard, with sticks, until an age."""
+
+    def __init__(self, time_us: int) -> None:
+        self.sticks = Sticks(0.0, 0.0, 0.5, 0.0, time_us)
+
+    def latest(self, now_us: int, timeout_us: int) -> Sticks | None:
+        return self.sticks if now_us - self.sticks.time_us <= timeout_us else None
+
+
+def needs_of(
+    cockpit: Cockpit,
+    manual: Latest[Sticks] | None = None,
+    offboard: Latest[OffboardSetpoint] | None = None,
+    follow: Latest[TargetState] | None = None,
+) -> ModeNeeds:
+    nobody = Nobody()
+    services = (manual or nobody, offboard or nobody, follow or nobody)
+    return ModeNeeds(cockpit.pilot, cockpit.missions, *services, takes_attitude=True)
+
+
+def test_where_nobody_is_heard_and_nothing_is_loaded_most_needs_are_missing() -> None:
+    cockpit = Cockpit()
+    missing = needs_of(cockpit).missing()
+    assert set(missing) == {Need.STICKS, Need.SETPOINTS, Need.MISSION, Need.CIRCLE, Need.FLYING}
+
+
+def test_needs_are_met_one_by_one() -> None:
+    cockpit = Cockpit(FLYING)
+    needs = needs_of(cockpit, manual=Somebody(1_000_000))
+    needs.at(1_000_000)
+    assert Need.STICKS not in needs.missing()
+    assert Need.FLYING not in needs.missing()
+    needs.at(2_000_000)
+    assert Need.STICKS in needs.missing()
+    assert needs.steered(1_100_000).sticks is not None
+    cockpit.load(MISSION, item("NAV_WAYPOINT", place=(20.0, 0.0, 10.0)))
+    assert Need.MISSION not in needs.missing()
+    cockpit.load(FENCE, item("NAV_FENCE_CIRCLE_INCLUSION", 8.0, place=(0.0, 0.0, 0.0)))
+    assert Need.INSIDE_FENCE in needs.missing()
+    cockpit.step(knows_position=False)
+    assert Need.POSITION in needs.missing()

@@ -1,0 +1,295 @@
+"""The pilot alone: every change of mode, every failsafe, arming, take-off and landing, on a vehicle that obeys."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from colibri.autopilot.commander.pilot import RESTS
+from colibri.autopilot.commander.rules.arming import Facts
+from colibri.autopilot.commander.rules.failsafe_table import Action
+from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Event, Mode, Need, State
+from colibri.autopilot.commander.task_record import course_record
+from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.tasks.position import Stop
+from colibri.autopilot.guidance.tasks.task import Steered
+from colibri.mavlink.mission.items import MISSION
+from colibri.mavlink.setpoints.setpoints import Sticks
+from tests.autopilot.commander.cockpit import FLYING, Cockpit, at, item
+
+STICKS = Steered(sticks=Sticks(0.0, 0.0, 0.5, 0.0))
+LEADS = {
+    Action.HOLD: Mode.HOLD,
+    Action.RETURN: Mode.RETURN,
+    Action.LAND: Mode.LAND,
+    Action.DESCEND: Mode.LAND,
+    Action.TERMINATE: Mode.HOLD,
+}
+
+
+def in_the_air() -> Cockpit:
+    """Return a pilot in hold, with a mission and sticks at hand."""
+    cockpit = Cockpit(FLYING)
+    cockpit.load(MISSION, item("NAV_WAYPOINT", place=(20.0, 0.0, 10.0)))
+    cockpit.steered = STICKS
+    cockpit.step()
+    return cockpit
+
+
+@pytest.fixture(scope="module")
+def flying() -> Cockpit:
+    return in_the_air()
+
+
+@pytest.mark.parametrize("target", Mode)
+@pytest.mark.parametrize("source", Mode)
+def test_in_flight_every_mode_follows_every_other(flying: Cockpit, source: Mode, target: Mode) -> None:
+    for mode in (source, target):
+        assert flying.pilot.select(mode, ()) is None
+        assert flying.pilot.state == State(mode, armed=True)
+    assert flying.step() is not RESTS
+
+
+@pytest.mark.parametrize(("mode", "need"), [(mode, need) for mode in Mode for need in ROWS[mode].needs])
+def test_a_mode_whose_need_nothing_meets_is_refused_and_what_is_flown_goes_on(
+    flying: Cockpit, mode: Mode, need: Need
+) -> None:
+    flying.pilot.select(Mode.LAND, ())
+    course = flying.pilot.course
+    refusal = flying.pilot.select(mode, (need,))
+    assert refusal is not None
+    assert refusal.reason == f"{mode} refused: {need.value}"
+    assert flying.pilot.state == State(Mode.LAND, armed=True)
+    assert flying.pilot.course is course
+
+
+@pytest.mark.parametrize("mode", Mode)
+@pytest.mark.parametrize("action", LEADS)
+def test_a_failsafe_leads_where_its_action_says_whatever_is_flown(action: Action, mode: Mode) -> None:
+    cockpit = in_the_air()
+    cockpit.pilot.select(mode, ())
+    cockpit.pilot.save(action)
+    if action is Action.TERMINATE:
+        assert cockpit.pilot.state == FIRST
+        assert cockpit.pilot.terminated
+        return
+    assert cockpit.pilot.state == State(LEADS[action], armed=True)
+    assert cockpit.pilot.saving is action
+    assert cockpit.pilot.scene().blind is (action is Action.DESCEND)
+    assert cockpit.pilot.select(Mode.HOLD, ()) is None
+    assert cockpit.pilot.saving is Action.NONE
+
+
+@pytest.mark.parametrize("action", LEADS)
+def test_no_failsafe_moves_rotors_that_stand(action: Action) -> None:
+    cockpit = Cockpit()
+    cockpit.pilot.save(action)
+    assert cockpit.pilot.state == FIRST
+    assert cockpit.pilot.saving is Action.NONE
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_on_the_ground_the_table_says_in_which_modes_rotors_are_armed(mode: Mode) -> None:
+    cockpit = Cockpit()
+    cockpit.load(MISSION, item("NAV_WAYPOINT", place=(20.0, 0.0, 10.0)))
+    assert cockpit.pilot.select(mode, ()) is None
+    refusal = cockpit.pilot.arm(())
+    assert (refusal is None) is ROWS[mode].to_arm
+    assert cockpit.pilot.state == State(mode, armed=ROWS[mode].to_arm)
+
+
+@pytest.mark.parametrize(("mode", "need"), [(mode, need) for mode in Mode for need in ROWS[mode].needs])
+def test_a_missing_need_holds_back_arming_but_for_the_position_which_is_checked_by_itself(
+    mode: Mode, need: Need
+) -> None:
+    cockpit = Cockpit()
+    cockpit.load(MISSION, item("NAV_WAYPOINT", place=(20.0, 0.0, 10.0)))
+    cockpit.pilot.select(mode, ())
+    armed = cockpit.pilot.arm((need,)) is None
+    assert armed is (ROWS[mode].to_arm and need is Need.POSITION)
+
+
+def test_a_check_that_fails_holds_back_arming_unless_by_force() -> None:
+    cockpit = Cockpit()
+    cockpit.pilot.take_stock(Facts(cockpit.state, standing=True, charge=0.05, thrust_stick=None))
+    refusal = cockpit.pilot.arm(())
+    assert refusal is not None
+    assert refusal.reason == "not armed: battery at 5%"
+    assert cockpit.pilot.arm((), force=True) is None
+    assert cockpit.pilot.flights == 1
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_a_flying_vehicle_is_disarmed_by_force_alone(mode: Mode) -> None:
+    cockpit = in_the_air()
+    cockpit.pilot.select(mode, ())
+    refusal = cockpit.pilot.disarm()
+    assert refusal is not None
+    assert refusal.reason == "not disarmed: the vehicle is flying"
+    assert cockpit.pilot.disarm(force=True) is None
+    assert not cockpit.pilot.state.armed
+    assert ROWS[cockpit.pilot.state.mode].to_arm
+
+
+def test_a_takeoff_climbs_and_holds() -> None:
+    cockpit = Cockpit()
+    assert cockpit.pilot.select(Mode.TAKEOFF, ()) is None
+    assert cockpit.pilot.arm(()) is None
+    cockpit.step()
+    assert cockpit.guidance.begins
+    assert not cockpit.pilot.standing
+    cockpit.fly_for(6.0)
+    assert cockpit.pilot.state == State(Mode.HOLD, armed=True)
+    assert cockpit.state.position_enu_m[2] == pytest.approx(2.5, abs=0.1)
+    assert isinstance(cockpit.pilot.course, Stop) is False, "the climb holds its end"
+    assert cockpit.said("height reached: hold")
+
+
+def test_a_landing_is_noticed_and_stops_the_rotors() -> None:
+    cockpit = Cockpit((0.0, 0.0, 3.0))
+    assert cockpit.pilot.select(Mode.LAND, ()) is None
+    cockpit.fly_for(11.0)
+    assert cockpit.pilot.standing
+    assert cockpit.pilot.state == FIRST
+    assert cockpit.guidance is RESTS
+    assert [text for _, text in cockpit.lines.take()][-2:] == ["landing detected", "landed, rotors stopped"]
+
+
+def test_rotors_that_are_armed_and_do_not_lift_stop() -> None:
+    cockpit = Cockpit(behaviour=Behaviour(disarm_on_ground_s=1.0))
+    assert cockpit.pilot.arm(()) is None
+    cockpit.fly_for(0.9)
+    assert cockpit.pilot.state.armed
+    cockpit.fly_for(0.2)
+    assert cockpit.pilot.state == FIRST
+    assert cockpit.said("no take-off, rotors stopped")
+
+
+def test_a_return_flies_home_and_lands() -> None:
+    cockpit = Cockpit((20.0, 0.0, 5.0))
+    cockpit.home.move((0.0, 0.0, 0.0), 0.0)
+    assert cockpit.pilot.select(Mode.RETURN, ()) is None
+    cockpit.fly_for(60.0)
+    assert cockpit.pilot.state == FIRST
+    assert cockpit.state.position_enu_m == pytest.approx((0.0, 0.0, 0.0), abs=0.3)
+
+
+def test_home_is_where_the_rotors_were_armed_unless_somebody_chose_it() -> None:
+    cockpit = Cockpit()
+    cockpit.state = at((3.0, 4.0, 0.0), yaw_rad=1.0)
+    cockpit.step()
+    cockpit.pilot.arm(())
+    assert (cockpit.home.position_enu_m, cockpit.home.yaw_rad) == ((3.0, 4.0, 0.0), 1.0)
+    cockpit.pilot.disarm()
+    cockpit.home.move((1.0, 1.0, 0.0), 0.5)
+    cockpit.pilot.arm(())
+    assert (cockpit.home.position_enu_m, cockpit.home.yaw_rad) == ((1.0, 1.0, 0.0), 0.5)
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_with_a_rotor_lost_no_mode_is_chosen_and_nothing_is_armed(mode: Mode) -> None:
+    cockpit = in_the_air()
+    cockpit.pilot.lose_rotor(2)
+    refusal = cockpit.pilot.select(mode, ()) if mode is not Mode.HOLD else cockpit.pilot.fly(mode, Stop(), ())
+    assert refusal is not None
+    assert refusal.reason == f"{mode} refused: rotor 3 failed"
+    cockpit.pilot.disarm(force=True)
+    assert cockpit.pilot.arm((), force=True) is not None
+    cockpit.pilot.adopt(replace(cockpit.pilot.behaviour, land_on_three=False))
+    assert cockpit.pilot.rotor_failed == ""
+
+
+def test_who_asks_for_another_speed_gets_it_for_this_flight_and_no_more_than_is_allowed() -> None:
+    cockpit = in_the_air()
+    cockpit.pilot.fly_at(3.0)
+    assert cockpit.pilot.scene().behaviour.limits.speed_m_s == 3.0
+    cockpit.pilot.fly_at(99.0)
+    assert cockpit.pilot.scene().behaviour.limits.speed_m_s == cockpit.pilot.behaviour.fastest_m_s
+    cockpit.pilot.disarm(force=True)
+    assert cockpit.pilot.speed_m_s is None
+
+
+@pytest.mark.parametrize("closely", [False, True])
+@pytest.mark.parametrize("mode", Mode)
+def test_after_a_restart_every_mode_goes_on(mode: Mode, closely: bool) -> None:
+    before = in_the_air()
+    before.pilot.select(mode, ())
+    before.step()
+    record, course = before.pilot.record(), course_record(before.pilot.course)
+    after = in_the_air()
+    after.pilot.resume(
+        before.now_us + 4_000,
+        before.state,
+        record,
+        lambda again, scene: after.tasks.again(course, again, scene),
+        closely=closely,
+    )
+    assert after.pilot.state == before.pilot.state
+    if before.pilot.state.mode is not Mode.HOLD:  # there a stop goes on as the place where it came to rest
+        assert type(after.pilot.course) is type(before.pilot.course)
+    assert after.home.position_enu_m == before.home.position_enu_m
+    after.steered = STICKS
+    assert after.step() is not RESTS
+
+
+def test_after_a_restart_a_vehicle_that_has_come_down_stays_down() -> None:
+    before = in_the_air()
+    after = Cockpit()
+    after.pilot.resume(10_000_000, at((0.0, 0.0, 0.0)), before.pilot.record(), after.tasks.begin, closely=False)
+    assert after.pilot.state == FIRST
+    assert after.pilot.standing
+
+
+ORDERS = st.one_of(
+    st.sampled_from(Mode),
+    st.sampled_from([action for action in Action if action in LEADS]),
+    st.sampled_from(["arm", "disarm", "force", "step", "second", "lose", "touch"]),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(ORDERS, max_size=12), st.booleans())
+def test_whatever_comes_the_pilot_stays_of_one_mind(orders: list[Mode | Action | str], flies: bool) -> None:
+    cockpit = in_the_air() if flies else Cockpit()
+    for order in orders:
+        was_armed = cockpit.pilot.state.armed
+        obey(cockpit, order)
+        pilot = cockpit.pilot
+        assert pilot.state.armed <= (was_armed or order == "arm")
+        assert pilot.saving is Action.NONE or pilot.state.armed
+        assert (cockpit.step() is RESTS) or pilot.state.armed
+        assert pilot.idles or pilot.state.armed
+
+
+def obey(cockpit: Cockpit, order: Mode | Action | str) -> None:
+    pilot = cockpit.pilot
+    if isinstance(order, Mode):
+        pilot.select(order, cockpit.unmet)
+    elif isinstance(order, Action):
+        pilot.save(order)
+    elif order == "arm":
+        pilot.arm(cockpit.unmet)
+    elif order == "lose":
+        pilot.lose_rotor(0)
+    elif order == "touch" and pilot.state.armed:
+        pilot.touch_down()
+    elif order in ("disarm", "force"):
+        pilot.disarm(force=order == "force")
+    elif order == "second":
+        cockpit.fly_for(1.0)
+
+
+@pytest.mark.parametrize("event", [Event.ARRIVED, Event.FINISHED, Event.RETURN_ITEM])
+@pytest.mark.parametrize("mode", Mode)
+def test_what_is_finished_ends_the_modes_that_the_table_names_alone(event: Event, mode: Mode) -> None:
+    ends = {
+        (Event.ARRIVED, Mode.TAKEOFF): Mode.HOLD,
+        (Event.FINISHED, Mode.MISSION): Mode.HOLD,
+        (Event.FINISHED, Mode.TRACK): Mode.HOLD,
+        (Event.RETURN_ITEM, Mode.MISSION): Mode.RETURN,
+    }
+    cockpit = in_the_air()
+    cockpit.pilot.select(mode, ())
+    cockpit.pilot.happened(event)
+    assert cockpit.pilot.state == State(ends.get((event, mode), mode), armed=True)

@@ -1,0 +1,157 @@
+"""The supervisor alone: for each condition and each choice of action, what begins, is said and remembered."""
+
+import pytest
+
+from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, Seen
+from colibri.autopilot.commander.rules.failsafe_parameters import settings
+from colibri.autopilot.commander.rules.failsafe_rule import Flight, Memory
+from colibri.autopilot.commander.rules.failsafe_table import NAMES, TABLE, Action, Condition, Row
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.commander.status_queue import StatusQueue
+from colibri.autopilot.commander.supervisor import Supervisor
+from colibri.autopilot.control.interface import Diagnostics, Fallback
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.guidance.integrator_chain import Limits
+from colibri.autopilot.parameters.definitions import definitions
+from colibri.mavlink.parameters.store import Parameters
+from colibri.mavlink.telemetry.snapshot import BatteryState
+from colibri.mavlink.wire.dialect import mav
+from colibri.plant.vehicle.description import load_vehicle
+from tests.autopilot.commander.cockpit import FLYING, at
+
+FULL = BatteryState(3, 12.0, 5.0, 0.1, 0.9, 600.0, 1.0)
+WELL = Seen(
+    now_us=10_000_000,
+    missed_us=None,
+    state=at(FLYING),
+    mode=Mode.HOLD,
+    standing=False,
+    estimate=None,
+    setpoint=None,
+    sticks_us=None,
+    listening_us=NEVER_US,
+    station_us=None,
+    battery=FULL,
+    fence=None,
+    decided=Diagnostics(),
+    late=False,
+    rotor_lost=None,
+    pace=Limits(),
+)
+HOLDING = Flight(armed=True, standing=False, mode=Mode.HOLD, saving=Action.NONE)
+LOST: dict[Condition, Seen] = {
+    Condition.TILTED: WELL._replace(state=WELL.state._replace(euler=(1.5, 0.0, 0.0))),
+    Condition.ROTOR_FAILED: WELL._replace(rotor_lost=0),
+    Condition.BATTERY_EMERGENCY: WELL._replace(battery=FULL._replace(remaining=0.01)),
+    Condition.BATTERY_CRITICAL: WELL._replace(battery=FULL._replace(remaining=0.06)),
+    Condition.BATTERY_LOW: WELL._replace(battery=FULL._replace(remaining=0.14)),
+    Condition.PLAN_FAILED: WELL._replace(decided=Diagnostics(fallback=Fallback.LQR)),
+    Condition.STATION_LOST: WELL._replace(station_us=0),
+    Condition.FENCE_BREACHED: WELL._replace(fence=lambda _: -5.0),
+    Condition.DEADLINE_MISSED: WELL._replace(late=True),
+}
+DEFINITIONS = definitions(load_profile("flight"), load_vehicle("hummingbird"))
+CHOICES = [
+    (row, value, action) for row in TABLE if row.condition in LOST and row.parameter for value, action in row.choices
+]
+
+
+def supervisor(**values: int) -> tuple[Supervisor, StatusQueue]:
+    """Return a supervisor, and what it says, where parameters have these values."""
+    parameters, lines = Parameters(DEFINITIONS), StatusQueue()
+    for name, value in values.items():
+        assert parameters.set(name, value) is None
+    return Supervisor(parameters, lines), lines
+
+
+def look(of: Supervisor, seen: Seen, flight: Flight = HOLDING, for_s: float = 100.0) -> list[Action]:
+    """Show it the same for a while; return what begins."""
+    times = range(seen.now_us, seen.now_us + round(for_s * 1e6), 500_000)
+    begun = [of.step(seen._replace(now_us=now_us), flight) for now_us in times]
+    return [action for action in begun if action is not Action.NONE]
+
+
+def test_of_a_flight_that_is_well_nothing_begins_and_nothing_is_said() -> None:
+    well, lines = supervisor()
+    assert look(well, WELL) == []
+    assert lines.take() == []
+    assert well.knows_position(None)
+
+
+@pytest.mark.parametrize(
+    ("row", "value", "action"), CHOICES, ids=[f"{row.condition}: {NAMES[action]}" for row, _, action in CHOICES]
+)
+def test_what_is_lost_begins_what_its_parameter_says(row: Row, value: int, action: Action) -> None:
+    saves, lines = supervisor(**{other.parameter: nothing(other) for other in TABLE if nothing_is_a_choice(other)})
+    assert saves.limits
+    saves, lines = supervisor(**{row.parameter: value})
+    begun = look(saves, LOST[row.condition])
+    texts = [text for _, text in lines.take()]
+    if action in (Action.NONE, Action.WARN):
+        assert action not in begun
+    else:
+        assert action in begun
+        assert not row.said or any(text.startswith(f"{row.condition}: ") for text in texts)
+    assert saves.holds(row.condition) is (action is not Action.NONE)
+
+
+def nothing_is_a_choice(row: Row) -> bool:
+    return bool(row.parameter) and any(action is Action.NONE for _, action in row.choices)
+
+
+def nothing(row: Row) -> int:
+    return next(value for value, action in row.choices if action is Action.NONE)
+
+
+@pytest.mark.parametrize("condition", LOST)
+def test_what_is_lost_begins_once_and_is_remembered_over_a_restart(condition: Condition) -> None:
+    first, _ = supervisor()
+    begun = look(first, LOST[condition])
+    assert look(first, LOST[condition]._replace(now_us=WELL.now_us + 100_000_000)) == []
+    again, _ = supervisor()
+    again.resume(first.memory)
+    assert again.memory == first.memory
+    assert len(begun) <= 1 or condition is Condition.BATTERY_EMERGENCY
+
+
+@pytest.mark.parametrize("condition", LOST)
+def test_with_the_rotors_standing_nothing_begins(condition: Condition) -> None:
+    saves, _ = supervisor()
+    resting = HOLDING._replace(armed=False, standing=True)
+    assert [action for action in look(saves, LOST[condition], resting) if action > Action.WARN] == []
+
+
+@pytest.mark.parametrize("condition", LOST)
+def test_what_is_flown_already_by_a_higher_action_goes_on(condition: Condition) -> None:
+    saves, _ = supervisor()
+    landing = HOLDING._replace(mode=Mode.LAND, saving=Action.DESCEND)
+    assert all(action > Action.DESCEND for action in look(saves, LOST[condition], landing))
+
+
+@pytest.mark.parametrize(
+    ("remaining", "state"),
+    [
+        (0.9, mav.MAV_BATTERY_CHARGE_STATE_OK),
+        (0.14, mav.MAV_BATTERY_CHARGE_STATE_LOW),
+        (0.06, mav.MAV_BATTERY_CHARGE_STATE_CRITICAL),
+        (0.01, mav.MAV_BATTERY_CHARGE_STATE_EMERGENCY),
+    ],
+)
+def test_the_charge_state_is_that_of_the_failsafes(remaining: float, state: int) -> None:
+    watches, _ = supervisor()
+    look(watches, WELL._replace(battery=FULL._replace(remaining=remaining)))
+    assert watches.charge_state == state
+
+
+def test_parameters_are_gone_by_once_they_are_adopted() -> None:
+    parameters, lines = Parameters(DEFINITIONS), StatusQueue()
+    watches = Supervisor(parameters, lines)
+    assert watches.memory == Memory()
+    parameters.set("BAT_LOW_THR", 0.2)
+    seen = WELL._replace(battery=FULL._replace(remaining=0.19))
+    look(watches, seen)
+    assert not watches.holds(Condition.BATTERY_LOW)
+    watches.adopt(parameters)
+    look(watches, seen)
+    assert watches.holds(Condition.BATTERY_LOW)
+    assert settings(parameters)
