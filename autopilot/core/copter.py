@@ -30,6 +30,7 @@ from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
 from colibri.autopilot.parameters.retuning import Tuning, builder
+from colibri.autopilot.parameters.subscription import Subscribers
 from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
@@ -95,10 +96,10 @@ class Copter:
         self.parameters.load(values or {})
         flown, believed = numbers.applied(self.parameters.values)
         self._loop = ControlLoop(flown, believed, clock)
-        self._tuning = Tuning(
+        tuning = Tuning(
             numbers, builder(profile.controller, clock), self._loop, lambda words: self.stations.say(WARNING, words)
         )
-        self.parameters.check = self._tuning.check
+        self.parameters.prepare = tuning.prepare
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock
         self.frame_interval_us = self._loop.frame_interval_us
@@ -134,8 +135,9 @@ class Copter:
         self._plant_status = NOTHING
         self._sent = STILL
         self.rotor_loss = RotorLoss(believed, self._loop.control_interval_us)
-        self.rotor_loss.enabled = flies_by.land_on_three
+        self.rotor_loss.obey(flies_by)
         self._photographer = Photographer(believed, self._interval_s)
+        self._subscribers = self._subscribe()
         parts = (self._loop, self._senses, self.pilot, self.stations, self.power, self.rotor_loss, self.supervisor)
         self._keeper = Keeper(maker_of(profile, vehicle), *parts)
         self._past = past
@@ -147,6 +149,26 @@ class Copter:
         self._sample: tuple[int, VehicleState, Guidance, Decision | None] | None = None
         self._step_time_s = 0.0
         self.solve_time_s = 0.0
+
+    def _subscribe(self) -> Subscribers:
+        """Return who is handed changes of the parameters."""
+        attitude, stations = self._attitude, self.stations
+        return Subscribers(
+            parameters=(self.supervisor.adopt,),
+            behaviour=(
+                self.pilot.adopt,
+                stations.missions.adopt,
+                self.rotor_loss.obey,
+                *(() if attitude is None else (attitude.obey,)),
+            ),
+            law=(self._loop.adopt,),
+            vehicle=(
+                self._tasks.adopt,
+                self.rotor_loss.adopt,
+                self._photographer.adopt,
+                *(() if attitude is None else (attitude.adopt,)),
+            ),
+        )
 
     @property
     def deadlines_missed(self) -> int:
@@ -209,8 +231,7 @@ class Copter:
         hub = self.stations.hub
         for datagram, link, address, loopback in inbox:
             hub.receive(datagram, link, address, now_us, loopback=loopback)
-        if self.parameters.take_changed():
-            self._adopt()
+        self._subscribers.adopt(self.parameters)
         return self.stations.poll(now_us)
 
     def _put_off(self, inbox: Iterable[Received]) -> list[Outgoing]:
@@ -399,23 +420,3 @@ class Copter:
         """Return the battery as it is told."""
         battery = self.power.state()
         return None if battery is None else battery._replace(charge_state=self.supervisor.charge_state)
-
-    def _adopt(self) -> None:
-        """Fly by the parameters as they are now."""
-        flies_by = behaviour(self.parameters)
-        self.pilot.adopt(flies_by)
-        self.stations.missions.adopt(flies_by)
-        self.supervisor.adopt(self.parameters)
-        self.rotor_loss.enabled = flies_by.land_on_three
-        if not self.rotor_loss.enabled:
-            self.rotor_loss.forget()
-        if self._attitude is not None:
-            self._attitude.limits = attitude_limits(flies_by)
-        tuned = self._tuning.take()
-        if tuned is not None:
-            self._loop.adopt(tuned.controller, tuned.vehicle)
-            self._tasks.adopt(tuned.vehicle)
-            self.rotor_loss.adopt(tuned.vehicle)
-            self._photographer = Photographer(tuned.vehicle, self._interval_s)
-            if self._attitude is not None:
-                self._attitude.adopt(tuned.vehicle)

@@ -45,9 +45,13 @@ class Photographer:
 
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
         """Expect a control sample every `interval_s`."""
-        self._vehicle = vehicle
         self._interval_s = interval_s
-        self._forecaster = Forecaster(vehicle, interval_s)
+        self.adopt(vehicle)
+
+    def adopt(self, vehicle: Vehicle) -> None:
+        """Go by other numbers of the vehicle, with nothing remembered of the samples before."""
+        self._vehicle = vehicle
+        self._forecaster = Forecaster(vehicle, self._interval_s)
         self._velocity: Vector | None = None
         self._solver = NOT_SOLVED
 

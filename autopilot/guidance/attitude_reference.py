@@ -101,7 +101,7 @@ class AttitudeReference:
 
     Attributes:
         weight_n: Of the vehicle.
-        limits: How far; whoever changes them replaces all of it.
+        limits: How far.
         most_thrust_n: Of all rotors at their top speed.
     """
 
@@ -113,6 +113,10 @@ class AttitudeReference:
         self.limits = limits
         level = VehicleState(_NOWHERE, _NOWHERE, (1.0, 0.0, 0.0, 0.0), _NOWHERE, _NOWHERE)
         self.step(self.initial(level), level, lean(0.0, 0.0, 0.0, self.weight_n))
+
+    def obey(self, behaviour: Behaviour) -> None:
+        """Keep to other limits from now on."""
+        self.limits = attitude_limits(behaviour)
 
     def adopt(self, vehicle: Vehicle) -> None:
         """Go on for a vehicle of other numbers."""

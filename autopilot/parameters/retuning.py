@@ -1,4 +1,4 @@
-"""The control law, built anew whenever a number of its own or of its vehicle changes in flight."""
+"""The control law, built anew before a number of its own or of its vehicle changes in flight."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, TypeAlias
@@ -14,7 +14,7 @@ from colibri.autopilot.control.registry import (
 )
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers
 from colibri.common.errors import Error
-from colibri.mavlink.parameters.store import Refusal, Value
+from colibri.mavlink.parameters.store import ParamError, Prepared, Value
 from colibri.plant.vehicle.description import Vehicle
 
 Build: TypeAlias = Callable[[Profile, Vehicle], Controller[Any]]
@@ -49,36 +49,31 @@ class Tuning:
         self._build = build
         self._say = say
         self._rhythm = _rhythm(running)
-        self._tuned: Tuned | None = None
 
-    def check(self, name: str, values: Mapping[str, Value]) -> Refusal | None:
-        """Return why a parameter cannot change so; for `colibri.mavlink.parameters.store.Parameters.check`.
+    def prepare(self, name: str, values: Mapping[str, Value]) -> Prepared | ParamError:
+        """Return the control law for a change as a `Tuned`, or why a parameter cannot change so; nothing is kept.
+
+        For `colibri.mavlink.parameters.store.Parameters.prepare`.
 
         Args:
             name: The parameter that is to change.
             values: Of all of them, the new one in.
         """
         if name not in self._numbers.defaults:
-            return None
+            return Prepared()
         try:
             profile, vehicle = self._numbers.applied(values)
         except ImpossibleError:
-            return Refusal.VALUE_OUT_OF_RANGE
+            return ParamError.VALUE_OUT_OF_RANGE
         try:
             controller = self._build(profile, vehicle)
             _try(profile.controller, controller, vehicle)
         except Exception as error:  # whatever somebody else's law raises, the flight goes on with the old one
             self._say(f"{name} not changed: {_in_words(error)}")
-            return Refusal.VALUE_OUT_OF_RANGE
+            return ParamError.VALUE_OUT_OF_RANGE
         if _rhythm(controller) != self._rhythm:
-            return Refusal.PERMISSION_DENIED
-        self._tuned = Tuned(profile, vehicle, controller)
-        return None
-
-    def take(self) -> Tuned | None:
-        """Return the newest control law, if there is one since this was last asked."""
-        tuned, self._tuned = self._tuned, None
-        return tuned
+            return ParamError.PERMISSION_DENIED
+        return Prepared(Tuned(profile, vehicle, controller))
 
 
 def builder(controller: str, clock: Clock) -> Build:

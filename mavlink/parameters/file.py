@@ -4,7 +4,7 @@ A line is vehicle id, component id, name, value and MAV_PARAM_TYPE, with tabs be
 """
 
 from colibri.mavlink.errors import MavlinkError
-from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, Refusal, Value, float32
+from colibri.mavlink.parameters.store import Kind, ParamError, Parameter, Parameters, Value, float32
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT
 
 _COLUMNS = 5
@@ -77,7 +77,7 @@ def _value(parameter: Parameter, text: str, kind: str) -> Value:
         value = int(text) if parameter.kind == Kind.INT else float32(float(text))
     except ValueError:
         raise ValueError(f"no number: {text!r}") from None
-    if parameter.refusal(value) == Refusal.VALUE_OUT_OF_RANGE:
+    if parameter.refusal(value) == ParamError.VALUE_OUT_OF_RANGE:
         raise ValueError(f"{text} is not {_choices(parameter)}")
     return value
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from colibri.mavlink.node.service import Peer, Send, to
-from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, Refusal, Value, bits_of, value_of
+from colibri.mavlink.parameters.store import Kind, ParamError, Parameter, Parameters, Value, bits_of, value_of
 from colibri.mavlink.wire.dialect import Bits, Message, param_bits
 
 INTERVAL_US = 2_000
@@ -87,7 +87,7 @@ class ParameterService:
         else:
             known = None if self._parameters.at(index) is None else index
         if known is None:
-            return _refuse(peer, name, index, Refusal.DOES_NOT_EXIST)
+            return _refuse(peer, name, index, ParamError.DOES_NOT_EXIST)
         return self._value(known, peer.channel)
 
     def _set(self, name: str, wire_type: int, bits: int, peer: Peer) -> Iterable[Send]:
@@ -95,9 +95,9 @@ class ParameterService:
         index = self._parameters.index(name)
         definition = None if index is None else self._parameters.at(index)
         if index is None or definition is None:
-            return (_refuse(peer, name, BY_ID, Refusal.DOES_NOT_EXIST),)
+            return (_refuse(peer, name, BY_ID, ParamError.DOES_NOT_EXIST),)
         value = _meant(definition, wire_type, bits)
-        refusal = value if isinstance(value, Refusal) else self._parameters.set(name, value)
+        refusal = value if isinstance(value, ParamError) else self._parameters.set(name, value)
         answer = self._value(index)
         return (answer,) if refusal is None else (_refuse(peer, name, index, refusal), answer)
 
@@ -110,7 +110,7 @@ class ParameterService:
         return Send("PARAM_VALUE", fields, channel)
 
 
-def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | Refusal:
+def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | ParamError:
     """Return the value that somebody sent.
 
     The type must be the parameter's, with one exception. Who has read the packed file (MAVProxy), or knows no types
@@ -119,14 +119,14 @@ def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | Refusal:
     but one integer.
     """
     if wire_type not in tuple(Kind):
-        return Refusal.TYPE_UNSUPPORTED
+        return ParamError.TYPE_UNSUPPORTED
     value = value_of(Kind(wire_type), bits)
     if wire_type == definition.kind:
         return value
     if isinstance(value, float) and value.is_integer() and abs(value) < _NOT_EXACT_IN_FLOAT:
         return int(value)
-    return Refusal.TYPE_MISMATCH
+    return ParamError.TYPE_MISMATCH
 
 
-def _refuse(peer: Peer, name: str, index: int, refusal: Refusal) -> Send:
+def _refuse(peer: Peer, name: str, index: int, refusal: ParamError) -> Send:
     return to(peer, "PARAM_ERROR", peer.system, peer.component, name, index, refusal)

@@ -6,7 +6,7 @@ from enum import IntEnum
 from math import copysign, inf, isfinite
 from re import fullmatch
 from struct import Struct
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from colibri.mavlink.wire.dialect import mav
 
@@ -26,7 +26,7 @@ class Kind(IntEnum):
     REAL = mav.MAV_PARAM_TYPE_REAL32
 
 
-class Refusal(IntEnum):
+class ParamError(IntEnum):
     """Why a parameter is not what somebody wants: MAV_PARAM_ERROR, of which pymavlink knows only the first half."""
 
     DOES_NOT_EXIST = 1
@@ -37,8 +37,30 @@ class Refusal(IntEnum):
     TYPE_MISMATCH = 7
 
 
-Check: TypeAlias = Callable[[str, Mapping[str, Value]], Refusal | None]
-"""(the parameter that is to change, all values with that one in) -> why not; None if it may."""
+class Prepared(NamedTuple):
+    """A change that may be made.
+
+    Attributes:
+        made: What was made for it, which whoever adopts the change needs not make again; None for nothing.
+    """
+
+    made: object | None = None
+
+
+Prepare: TypeAlias = Callable[[str, Mapping[str, Value]], Prepared | ParamError]
+"""(the parameter that is to change, all values with that one in) -> that it may, or why not. It changes nothing."""
+
+
+class Changes(NamedTuple):
+    """What has changed.
+
+    Attributes:
+        names: Of the parameters.
+        made: The newest that was made for one of them; None for nothing.
+    """
+
+    names: tuple[str, ...]
+    made: object | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,14 +114,14 @@ class Parameter:
         if self.refusal(self.default) is not None:
             raise ValueError(f"{self.name}: its default {self.default} is not among the values that it may have")
 
-    def refusal(self, value: Value) -> Refusal | None:
+    def refusal(self, value: Value) -> ParamError | None:
         """Return why this value cannot be; None if it can."""
         if self.kind == Kind.INT and not isinstance(value, int):
-            return Refusal.TYPE_MISMATCH
+            return ParamError.TYPE_MISMATCH
         if not isfinite(value) or not self.minimum <= value <= self.maximum:
-            return Refusal.VALUE_OUT_OF_RANGE
+            return ParamError.VALUE_OUT_OF_RANGE
         if self.values and all(value != choice for choice, _ in self.values):
-            return Refusal.VALUE_OUT_OF_RANGE
+            return ParamError.VALUE_OUT_OF_RANGE
         return None
 
 
@@ -107,11 +129,11 @@ class Parameters:
     """The parameters in the order of their names, and their values.
 
     Attributes:
-        check: Asked before a value changes, after the parameter's own bounds.
+        prepare: Asked before a value changes, after the parameter's own bounds; None: all may be.
         revision: Counts the changes.
     """
 
-    def __init__(self, definitions: Iterable[Parameter], check: Check | None = None) -> None:
+    def __init__(self, definitions: Iterable[Parameter], prepare: Prepare | None = None) -> None:
         """Begin with every parameter at its default.
 
         Raises:
@@ -123,7 +145,8 @@ class Parameters:
             raise ValueError("two parameters have one name")
         self._values = {parameter.name: parameter.default for parameter in self._definitions}
         self._changed: dict[str, None] = {}
-        self.check = check
+        self._made: object | None = None
+        self.prepare = prepare
         self.revision = 0
 
     def __len__(self) -> int:
@@ -167,25 +190,29 @@ class Parameters:
         """Return the place of a parameter; None where there is none of that name."""
         return self._index.get(name)
 
-    def set(self, name: str, value: Value) -> Refusal | None:
+    def set(self, name: str, value: Value) -> ParamError | None:
         """Change a value, if it may be that; return why not. What it is already, it may always be."""
         index = self._index.get(name)
         if index is None:
-            return Refusal.DOES_NOT_EXIST
+            return ParamError.DOES_NOT_EXIST
         definition = self._definitions[index]
         if definition.kind == Kind.REAL:
             value = float32(value)
         if value == self._values[name] and isinstance(value, type(self._values[name])):
             return None
-        refusal = definition.refusal(value) or (Refusal.READ_ONLY if definition.read_only else None)
-        if refusal is None and self.check is not None:
-            refusal = self.check(name, {**self._values, name: value})
-        if refusal is None:
-            self._change(name, value)
-        return refusal
+        refusal = definition.refusal(value) or (ParamError.READ_ONLY if definition.read_only else None)
+        if refusal is not None:
+            return refusal
+        prepared = self.prepare(name, {**self._values, name: value}) if self.prepare is not None else Prepared()
+        if isinstance(prepared, ParamError):
+            return prepared
+        if prepared.made is not None:
+            self._made = prepared.made
+        self._change(name, value)
+        return None
 
     def load(self, values: Mapping[str, Value]) -> None:
-        """Take over values that `parameter_file.read` found fit, all at once: `check` is not asked."""
+        """Take over values that `parameter_file.read` found fit, all at once: `prepare` is not asked."""
         for name, value in values.items():
             if value != self._values[name]:
                 self._change(name, value)
@@ -195,13 +222,13 @@ class Parameters:
         for definition in self._definitions:
             self.set(definition.name, definition.default)
 
-    def take_changed(self) -> tuple[str, ...]:
-        """Return the names of the parameters that changed since this was last asked."""
+    def take_changes(self) -> Changes | None:
+        """Return what has changed since this was last asked; None if nothing has."""
         if not self._changed:
-            return ()
-        changed = tuple(self._changed)
+            return None
+        changes, self._made = Changes(tuple(self._changed), self._made), None
         self._changed.clear()
-        return changed
+        return changes
 
     def _change(self, name: str, value: Value) -> None:
         self._values[name] = value

@@ -103,6 +103,14 @@ class RotorWatch:
         _evidence(still, still, self.speeds, self.speeds, interval_s, self._signature, self._residual, self._noise)
         self.begin((0.0, 0.0, 0.0, 0.0))
 
+    def resume(self, lost: int, speeds: Array) -> None:
+        """Go on after a restart without a rotor that was lost before, the others turning at `speeds`."""
+        self.lost, self.speeds = lost, speeds
+
+    def forget(self) -> None:
+        """Take all rotors for whole again."""
+        self.lost = None
+
     def adopt(self, vehicle: Vehicle) -> None:
         """Go on with other numbers of the vehicle."""
         self._signature = signature_of(vehicle)

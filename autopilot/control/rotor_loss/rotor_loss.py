@@ -1,5 +1,7 @@
 """A rotor is lost: noticed, and flown down on the other three, whatever control law flew before."""
 
+from typing import Protocol
+
 from colibri.autopilot.control.interface import Decision, VehicleState
 from colibri.autopilot.control.rotor_loss.detector import RotorWatch
 from colibri.autopilot.control.rotor_loss.three_rotors import ThreeRotors
@@ -10,6 +12,15 @@ LONGEST_INTERVAL_S = 0.02
 """A vehicle that spins at four turns a second turns half a radian in so long: who decides less often cannot do it."""
 _CLEAR_M = 0.3
 """Closer to the ground than this it may touch, and the ground pushes as a rotor does."""
+
+
+class Permission(Protocol):
+    """What says whether a vehicle may be landed on three rotors."""
+
+    @property
+    def land_on_three(self) -> bool:
+        """Whether a rotor that is lost is noticed, and the vehicle landed on the others."""
+        ...
 
 
 class RotorLoss:
@@ -48,19 +59,26 @@ class RotorLoss:
         self._vehicle = vehicle
         self.watch.adopt(vehicle)
 
+    def obey(self, permission: Permission) -> None:
+        """Watch, and land on three rotors, from now on only where that is allowed."""
+        self.enabled = permission.land_on_three
+        if not self.enabled:
+            self.forget()
+
     def begin(self, controls: FourRotors) -> None:
         """Begin after frames that were missed, the rotors turning at `controls`."""
         self.watch.begin(controls)
 
     def resume(self, lost: int, speeds: Array, state: VehicleState, ground_m: float, *, flying: bool) -> None:
         """Go on after a restart without a rotor that was lost before, the others turning at `speeds`."""
-        self.watch.lost, self.watch.speeds = lost, speeds
+        self.watch.resume(lost, speeds)
         if flying and self._possible:
             self._three = ThreeRotors(self._vehicle, lost, self._interval_s, speeds, state, ground_m)
 
     def forget(self) -> None:
         """Take all rotors for whole again."""
-        self.watch.lost, self._three = None, None
+        self.watch.forget()
+        self._three = None
 
     def look(
         self, state: VehicleState, controls: FourRotors, charge_ah: float, *, airborne: bool, ground_m: float

@@ -18,7 +18,7 @@ from colibri.autopilot.parameters.control_law import STRUCTURE, law_numbers
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, applied, behaviour, definitions
 from colibri.autopilot.parameters.number_paths import described, named, paths, read
 from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
-from colibri.mavlink.parameters.store import Kind, Parameters, Refusal, float32
+from colibri.mavlink.parameters.store import Kind, ParamError, Parameters, float32
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 FLIGHT, HUMMINGBIRD = load_profile("flight"), load_vehicle("hummingbird")
@@ -164,7 +164,7 @@ def test_every_track_that_can_be_chosen_flies(name: str) -> None:
 def test_the_system_id_cannot_be_changed() -> None:
     parameters = Parameters(definitions(FLIGHT, HUMMINGBIRD, system_id=3))
     assert parameters["MAV_SYS_ID"] == 3
-    assert parameters.set("MAV_SYS_ID", 4) == Refusal.READ_ONLY
+    assert parameters.set("MAV_SYS_ID", 4) == ParamError.READ_ONLY
 
 
 def test_names_for_a_law_that_nobody_described() -> None:

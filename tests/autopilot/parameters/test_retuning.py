@@ -9,9 +9,10 @@ import pytest
 from colibri.autopilot.control.interface import Decision, Horizon, Preview, VehicleState
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.parameters.definitions import Numbers, definitions
-from colibri.autopilot.parameters.retuning import Tuning, builder
+from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
+from colibri.autopilot.parameters.subscription import Subscribers
 from colibri.common.config import SettingsError
-from colibri.mavlink.parameters.store import Parameters, Refusal, Value
+from colibri.mavlink.parameters.store import ParamError, Parameters, Prepared, Value
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 NOTHING = (0.0, 0.0, 0.0)
@@ -29,7 +30,7 @@ class Flight:
         self.law = self.build(profile, vehicle)
         self.said: list[str] = []
         self.tuning = Tuning(Numbers(profile, vehicle), self.build, self.law, self.said.append)
-        self.parameters = Parameters(definitions(profile, vehicle), self.tuning.check)
+        self.parameters = Parameters(definitions(profile, vehicle), self.tuning.prepare)
         self.memory = self.law.initial(vehicle.hover_speed)
         self.samples = 0
 
@@ -44,6 +45,14 @@ class Flight:
         return decision
 
 
+def made(parameters: Parameters) -> Tuned | None:
+    """Return the control law that was made for the newest change, if one was."""
+    changes = parameters.take_changes()
+    tuned = None if changes is None else changes.made
+    assert tuned is None or isinstance(tuned, Tuned)
+    return tuned
+
+
 @pytest.fixture
 def flight() -> Flight:
     return Flight(load_profile("flight"), load_vehicle("hummingbird"))
@@ -54,9 +63,9 @@ def test_a_change_gives_a_new_law_that_goes_on_with_the_old_ones_memory(flight: 
         flight.step()
     assert flight.parameters.set("LPV_POLE1", -8.0) is None
     assert flight.parameters.set("VEH_MASS", 0.75) is None
-    tuned = flight.tuning.take()
+    tuned = made(flight.parameters)
     assert tuned is not None
-    assert flight.tuning.take() is None
+    assert made(flight.parameters) is None
     assert tuned.vehicle.body.mass_kg == 0.75
     assert tuned.profile.table("lpv-mpc")["guidance"]["poles"] == [-8.0, -6.0]
     memory, before = flight.memory, flight.step()
@@ -71,9 +80,9 @@ def test_a_change_gives_a_new_law_that_goes_on_with_the_old_ones_memory(flight: 
 @pytest.mark.parametrize(("name", "value"), [("VEH_MASS", 50.0), ("VEH_IZZ", 900.0), ("VEH_BAT_EMPTY", 99.0)])
 def test_what_cannot_be_together_is_refused(flight: Flight, name: str, value: float) -> None:
     before = flight.parameters.values
-    assert flight.parameters.set(name, value) == Refusal.VALUE_OUT_OF_RANGE
+    assert flight.parameters.set(name, value) == ParamError.VALUE_OUT_OF_RANGE
     assert flight.parameters.values == before
-    assert flight.tuning.take() is None
+    assert made(flight.parameters) is None
 
 
 def test_each_number_can_be_at_its_bounds_or_is_refused(flight: Flight) -> None:
@@ -89,23 +98,53 @@ def test_each_number_can_be_at_its_bounds_or_is_refused(flight: Flight) -> None:
     assert all(name.startswith("VEH_") for name in refused)
 
 
+def test_what_is_only_asked_about_is_not_kept(flight: Flight) -> None:
+    """A check makes the law that would be flown, and leaves all as it is."""
+    values = {**flight.parameters.values, "VEH_MASS": 0.75}
+    prepared = flight.tuning.prepare("VEH_MASS", values)
+    assert isinstance(prepared, Prepared)
+    assert isinstance(prepared.made, Tuned)
+    assert prepared.made.vehicle.body.mass_kg == 0.75
+    assert flight.parameters.take_changes() is None
+
+
+def test_subscribers_are_handed_each_change_once_and_the_law_only_where_it_has_changed(flight: Flight) -> None:
+    handed: list[str] = []
+    subscribers = Subscribers(
+        parameters=(lambda _: handed.append("parameters"),),
+        behaviour=(lambda flies_by: handed.append(f"cruise {flies_by.limits.speed_m_s:g}"),),
+        law=(lambda _, vehicle: handed.append(f"law for {vehicle.body.mass_kg:g} kg"),),
+        vehicle=(lambda vehicle: handed.append(f"vehicle of {vehicle.body.mass_kg:g} kg"),),
+    )
+    subscribers.adopt(flight.parameters)
+    assert handed == []
+    flight.parameters.set("MPC_XY_CRUISE", 3.0)
+    subscribers.adopt(flight.parameters)
+    assert handed == ["parameters", "cruise 3"]
+    handed.clear()
+    flight.parameters.set("VEH_MASS", 0.75)
+    subscribers.adopt(flight.parameters)
+    subscribers.adopt(flight.parameters)
+    assert handed == ["parameters", "cruise 3", "law for 0.75 kg", "vehicle of 0.75 kg"]
+
+
 def test_the_way_back_is_bit_for_bit(flight: Flight) -> None:
     flight.parameters.set("VEH_MASS", 0.75)
     flight.parameters.set("VEH_MASS", flight.parameters.default("VEH_MASS"))
-    tuned = flight.tuning.take()
+    tuned = made(flight.parameters)
     assert tuned is not None
     assert tuned.vehicle == load_vehicle("hummingbird")
 
 
 def test_behaviour_builds_nothing(flight: Flight) -> None:
     assert flight.parameters.set("MPC_XY_CRUISE", 3.0) is None
-    assert flight.tuning.take() is None
+    assert made(flight.parameters) is None
 
 
 @pytest.mark.parametrize("value", [0.0, -4.0])
 def test_a_law_that_nobody_described_refuses_for_itself(value: float) -> None:
     flight = Flight(load_profile("se3"), load_vehicle("hummingbird-thesis"))
-    assert flight.parameters.set("GEO_POSIT_FREQU", value) == Refusal.VALUE_OUT_OF_RANGE
+    assert flight.parameters.set("GEO_POSIT_FREQU", value) == ParamError.VALUE_OUT_OF_RANGE
     assert flight.said == ["GEO_POSIT_FREQU not changed: position_frequency_rad_s: Expected `float` > 0.0"]
     assert flight.parameters.set("GEO_POSIT_FREQU", 5.0) is None
 
@@ -113,7 +152,7 @@ def test_a_law_that_nobody_described_refuses_for_itself(value: float) -> None:
 def test_the_rhythm_of_a_law_cannot_change() -> None:
     flight = Flight(load_profile("thesis"), load_vehicle("hummingbird-thesis"))
     (name,) = (parameter.name for parameter in flight.parameters if "position.samples" in parameter.details)
-    assert flight.parameters.set(name, 2) == Refusal.PERMISSION_DENIED
+    assert flight.parameters.set(name, 2) == ParamError.PERMISSION_DENIED
     assert flight.parameters[name] == 4
 
 
@@ -153,22 +192,22 @@ class Faulty:
     ],
 )
 def test_a_law_that_fails_is_not_flown_and_says_why(way: Value, said: str) -> None:
-    tuning, parameters, words = faulty()
-    assert parameters.set("FAU_WAY", way) == Refusal.VALUE_OUT_OF_RANGE
+    parameters, words = faulty()
+    assert parameters.set("FAU_WAY", way) == ParamError.VALUE_OUT_OF_RANGE
     assert parameters["FAU_WAY"] == 0.0
-    assert tuning.take() is None
+    assert made(parameters) is None
     assert words == [f"FAU_WAY not changed: {said}"]
 
 
 def test_a_law_that_does_not_fail_is_flown() -> None:
-    tuning, parameters, words = faulty()
+    parameters, words = faulty()
     assert parameters.set("FAU_WAY", 0.5) is None
     assert parameters["FAU_WAY"] == 0.5
-    assert tuning.take() is not None
+    assert made(parameters) is not None
     assert words == []
 
 
-def faulty() -> tuple[Tuning, Parameters, list[str]]:
+def faulty() -> tuple[Parameters, list[str]]:
     vehicle = load_vehicle("hummingbird")
     table = {"way": 0.0}
     profile = Profile(
@@ -181,4 +220,4 @@ def faulty() -> tuple[Tuning, Parameters, list[str]]:
     words: list[str] = []
     numbers = Numbers(profile, vehicle)
     tuning = Tuning(numbers, lambda profile, _: Faulty(profile.table("faulty")), Faulty(table), words.append)
-    return tuning, Parameters(definitions(profile, vehicle), tuning.check), words
+    return Parameters(definitions(profile, vehicle), tuning.prepare), words

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.parameters.service import ParameterService
-from colibri.mavlink.parameters.store import LARGEST_INT, LEAST_INT, Kind, Parameter, Parameters, Refusal
+from colibri.mavlink.parameters.store import LARGEST_INT, LEAST_INT, Kind, ParamError, Parameter, Parameters
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Bits, Codec, Message, mav, param_bits
 
 VEHICLE = Codec(1, AUTOPILOT_COMPONENT)
@@ -118,22 +118,22 @@ def test_a_set_is_told_to_everybody() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "kind", "refusal"),
     [
-        ("REAL", float("nan"), REAL32, Refusal.VALUE_OUT_OF_RANGE),
-        ("REAL", float("inf"), REAL32, Refusal.VALUE_OUT_OF_RANGE),
-        ("REAL", 2e9, REAL32, Refusal.VALUE_OUT_OF_RANGE),
-        ("REAL", bits_of_int(1), INT32, Refusal.TYPE_MISMATCH),
-        ("LIMITED", bits_of_int(3), INT32, Refusal.VALUE_OUT_OF_RANGE),
-        ("LIMITED", 1.5, REAL32, Refusal.TYPE_MISMATCH),
-        ("LIMITED", float("nan"), REAL32, Refusal.TYPE_MISMATCH),
-        ("LIMITED", 3.0, REAL32, Refusal.VALUE_OUT_OF_RANGE),
-        ("INTEGER", 16777216.0, REAL32, Refusal.TYPE_MISMATCH),
-        ("INTEGER", 1.0, mav.MAV_PARAM_TYPE_UINT8, Refusal.TYPE_UNSUPPORTED),
-        ("INTEGER", 1.0, 0, Refusal.TYPE_UNSUPPORTED),
-        ("INTEGER", 1.0, 255, Refusal.TYPE_UNSUPPORTED),
-        ("FIXED", 2.0, REAL32, Refusal.READ_ONLY),
+        ("REAL", float("nan"), REAL32, ParamError.VALUE_OUT_OF_RANGE),
+        ("REAL", float("inf"), REAL32, ParamError.VALUE_OUT_OF_RANGE),
+        ("REAL", 2e9, REAL32, ParamError.VALUE_OUT_OF_RANGE),
+        ("REAL", bits_of_int(1), INT32, ParamError.TYPE_MISMATCH),
+        ("LIMITED", bits_of_int(3), INT32, ParamError.VALUE_OUT_OF_RANGE),
+        ("LIMITED", 1.5, REAL32, ParamError.TYPE_MISMATCH),
+        ("LIMITED", float("nan"), REAL32, ParamError.TYPE_MISMATCH),
+        ("LIMITED", 3.0, REAL32, ParamError.VALUE_OUT_OF_RANGE),
+        ("INTEGER", 16777216.0, REAL32, ParamError.TYPE_MISMATCH),
+        ("INTEGER", 1.0, mav.MAV_PARAM_TYPE_UINT8, ParamError.TYPE_UNSUPPORTED),
+        ("INTEGER", 1.0, 0, ParamError.TYPE_UNSUPPORTED),
+        ("INTEGER", 1.0, 255, ParamError.TYPE_UNSUPPORTED),
+        ("FIXED", 2.0, REAL32, ParamError.READ_ONLY),
     ],
 )
-def test_who_is_refused_hears_why_and_what_holds(name: str, value: Any, kind: int, refusal: Refusal) -> None:
+def test_who_is_refused_hears_why_and_what_holds(name: str, value: Any, kind: int, refusal: ParamError) -> None:
     parameters = parameters_of()
     held = parameters[name]
     error, value_message = Talk(parameters).set(name, value, kind)
@@ -156,7 +156,7 @@ def test_an_integer_as_a_float_is_obeyed_where_it_can_mean_but_one() -> None:
 def test_setting_what_does_not_exist() -> None:
     (error,) = Talk(parameters_of()).set("NOTHING", 1.0, REAL32)
     assert (error.name, error.fields.param_id) == ("PARAM_ERROR", "NOTHING")
-    assert (error.fields.error, error.fields.param_index) == (Refusal.DOES_NOT_EXIST, -1)
+    assert (error.fields.error, error.fields.param_index) == (ParamError.DOES_NOT_EXIST, -1)
 
 
 def test_reading_by_id_and_by_index() -> None:
@@ -172,7 +172,7 @@ def test_reading_by_id_and_by_index() -> None:
 @pytest.mark.parametrize(("name", "index"), [("NOTHING", -1), ("", 7), ("REAL", -2), ("", -32768), ("", 32767)])
 def test_reading_what_does_not_exist(name: str, index: int) -> None:
     (error,) = Talk(parameters_of(3)).read(name, index)
-    assert (error.name, error.fields.error) == ("PARAM_ERROR", Refusal.DOES_NOT_EXIST)
+    assert (error.name, error.fields.error) == ("PARAM_ERROR", ParamError.DOES_NOT_EXIST)
     assert (error.fields.param_id, error.fields.param_index) == (name, index)
 
 

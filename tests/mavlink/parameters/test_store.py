@@ -9,9 +9,10 @@ from colibri.mavlink.parameters.store import (
     LARGEST_INT,
     LEAST_INT,
     Kind,
+    ParamError,
     Parameter,
     Parameters,
-    Refusal,
+    Prepared,
     Value,
     float32,
 )
@@ -42,26 +43,26 @@ def test_they_come_in_the_order_of_their_names(parameters: Parameters) -> None:
     [
         ("COUNT", -5, None),
         ("COUNT", 9, None),
-        ("COUNT", 10, Refusal.VALUE_OUT_OF_RANGE),
-        ("COUNT", -6, Refusal.VALUE_OUT_OF_RANGE),
-        ("COUNT", 4.0, Refusal.TYPE_MISMATCH),
+        ("COUNT", 10, ParamError.VALUE_OUT_OF_RANGE),
+        ("COUNT", -6, ParamError.VALUE_OUT_OF_RANGE),
+        ("COUNT", 4.0, ParamError.TYPE_MISMATCH),
         ("ANY", LEAST_INT, None),
         ("ANY", LARGEST_INT, None),
-        ("ANY", LARGEST_INT + 1, Refusal.VALUE_OUT_OF_RANGE),
+        ("ANY", LARGEST_INT + 1, ParamError.VALUE_OUT_OF_RANGE),
         ("SPEED", 0.1, None),
         ("SPEED", 0.7, None),
-        ("SPEED", 0.71, Refusal.VALUE_OUT_OF_RANGE),
-        ("SPEED", nan, Refusal.VALUE_OUT_OF_RANGE),
-        ("SPEED", inf, Refusal.VALUE_OUT_OF_RANGE),
-        ("SPEED", 1e300, Refusal.VALUE_OUT_OF_RANGE),
+        ("SPEED", 0.71, ParamError.VALUE_OUT_OF_RANGE),
+        ("SPEED", nan, ParamError.VALUE_OUT_OF_RANGE),
+        ("SPEED", inf, ParamError.VALUE_OUT_OF_RANGE),
+        ("SPEED", 1e300, ParamError.VALUE_OUT_OF_RANGE),
         ("TRACK", 2, None),
-        ("TRACK", 1, Refusal.VALUE_OUT_OF_RANGE),
-        ("ID", 8, Refusal.READ_ONLY),
+        ("TRACK", 1, ParamError.VALUE_OUT_OF_RANGE),
+        ("ID", 8, ParamError.READ_ONLY),
         ("ID", 7, None),
-        ("NONE", 1, Refusal.DOES_NOT_EXIST),
+        ("NONE", 1, ParamError.DOES_NOT_EXIST),
     ],
 )
-def test_what_may_be_set(parameters: Parameters, name: str, value: Value, refusal: Refusal | None) -> None:
+def test_what_may_be_set(parameters: Parameters, name: str, value: Value, refusal: ParamError | None) -> None:
     before = parameters.values
     assert parameters.set(name, value) == refusal
     if refusal is None:
@@ -72,28 +73,45 @@ def test_what_may_be_set(parameters: Parameters, name: str, value: Value, refusa
 
 
 def test_changes_are_counted_and_handed_out_once(parameters: Parameters) -> None:
-    assert parameters.take_changed() == ()
+    assert parameters.take_changes() is None
     for value in (4, 4, 5):
         parameters.set("COUNT", value)
     parameters.set("SPEED", 0.5)
     assert parameters.revision == 3
-    assert parameters.take_changed() == ("COUNT", "SPEED")
-    assert parameters.take_changed() == ()
+    assert parameters.take_changes() == (("COUNT", "SPEED"), None)
+    assert parameters.take_changes() is None
+
+
+def test_what_was_made_for_a_change_is_handed_out_with_it_and_only_for_one_that_is_made(parameters: Parameters) -> None:
+    def prepare(name: str, values: Mapping[str, Value]) -> Prepared | ParamError:
+        return (
+            ParamError.PERMISSION_DENIED
+            if values["COUNT"] == 5
+            else Prepared(values[name] if name == "COUNT" else None)
+        )
+
+    parameters.prepare = prepare
+    assert parameters.set("COUNT", 4) is None
+    assert parameters.set("COUNT", 5) == ParamError.PERMISSION_DENIED
+    assert parameters.set("ANY", 1) is None
+    assert parameters.take_changes() == (("COUNT", "ANY"), 4)
+    assert parameters.set("ANY", 2) is None
+    assert parameters.take_changes() == (("ANY",), None)
 
 
 def test_the_check_sees_all_values_and_can_refuse(parameters: Parameters) -> None:
     seen: list[tuple[str, Mapping[str, Value]]] = []
 
-    def check(name: str, values: Mapping[str, Value]) -> Refusal | None:
+    def prepare(name: str, values: Mapping[str, Value]) -> Prepared | ParamError:
         seen.append((name, values))
-        return Refusal.PERMISSION_DENIED if values["COUNT"] + values["ANY"] > 8 else None
+        return ParamError.PERMISSION_DENIED if values["COUNT"] + values["ANY"] > 8 else Prepared()
 
-    parameters.check = check
+    parameters.prepare = prepare
     assert parameters.set("COUNT", 5) is None
-    assert parameters.set("ANY", 4) == Refusal.PERMISSION_DENIED
+    assert parameters.set("ANY", 4) == ParamError.PERMISSION_DENIED
     assert parameters["ANY"] == 0
     assert parameters.set("ANY", 3) is None
-    assert parameters.set("COUNT", 99) == Refusal.VALUE_OUT_OF_RANGE
+    assert parameters.set("COUNT", 99) == ParamError.VALUE_OUT_OF_RANGE
     assert seen[1] == ("ANY", {**parameters.values, "ANY": 4})
     assert len(seen) == 3
 
