@@ -110,6 +110,22 @@ class Active(NamedTuple):
     rates: int = 0
 
 
+class PlanColumns(NamedTuple):
+    """Where the predicted outputs of a control law hold the attitude.
+
+    Attributes:
+        phi: Column of roll, rad.
+        theta: Column of pitch, rad.
+        psi: Column of yaw, rad, unwrapped.
+        yaw_rate: Column of the body rate r, rad/s.
+    """
+
+    phi: int
+    theta: int
+    psi: int
+    yaw_rate: int
+
+
 class Diagnostics(NamedTuple):
     """How a decision came about; a control law without a QP leaves the defaults.
 
@@ -195,3 +211,34 @@ class AttitudeController(Controller[Memory], Protocol[Memory]):
             demand: At the samples that `preview` asks for.
         """
         ...
+
+
+@runtime_checkable
+class ChargeController(Controller[Memory], Protocol[Memory]):
+    """A control law that counts what its battery gives; optional.
+
+    A law that has this goes on with the charge that is left where it begins anew in mid-flight, and with what the
+    battery itself tells, where it does.
+    """
+
+    def charge_ah(self, memory: Memory) -> float:
+        """Return the charge that the law remembers as taken from its battery, Ah."""
+        ...
+
+    def with_charge(self, memory: Memory, charge_ah: float) -> Memory:
+        """Return the memory with another charge taken from the battery, Ah."""
+        ...
+
+
+@runtime_checkable
+class PlanController(Controller[Memory], Protocol[Memory]):
+    """A control law that plans attitudes and thrusts over its horizon; optional.
+
+    Ground stations are shown where its plan leads: its diagnostics hold `predicted` with the attitude in these columns,
+    a control sample apart from now on, and `planned_squared`.
+
+    Attributes:
+        plan_columns: Where `predicted` holds the attitude.
+    """
+
+    plan_columns: PlanColumns

@@ -7,10 +7,12 @@ import numpy as np
 from colibri.autopilot.control.interface import (
     AttitudeController,
     AttitudeDemand,
+    ChargeController,
     Clock,
     Controller,
     Decision,
     Horizon,
+    PlanController,
     VehicleState,
 )
 from colibri.autopilot.control.profile import Profile, ProfileError
@@ -48,6 +50,7 @@ class ControlLoop:
         control_interval_us: Its sample.
         frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
         takes_attitude: Whether the law can be told an attitude and a thrust.
+        plan_columns: Where the law's plan holds the attitude; None for a law that plans none.
         controls: Rotor speeds commanded now, in parts of the largest.
     """
 
@@ -64,6 +67,8 @@ class ControlLoop:
         self.vehicle = vehicle
         self.preview = self._controller.preview
         self.takes_attitude = isinstance(self._controller, AttitudeController)
+        self.plan_columns = self._controller.plan_columns if isinstance(self._controller, PlanController) else None
+        self._charged = _charged(self._controller)
         self.control_interval_us = self._controller.control_interval_us
         self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
         self._memory: Any = None
@@ -79,19 +84,18 @@ class ControlLoop:
         what the battery has told of it.
         """
         before, self._memory = self._memory, self._controller.initial(rotor_speed)
-        if hasattr(before, "charge_ah") and not afresh:
-            self._memory = self._memory._replace(charge_ah=before.charge_ah)
-        elif hasattr(self._memory, "charge_ah"):
-            self._memory = self._memory._replace(charge_ah=self._told_ah)
+        if self._charged is not None:
+            charge_ah = self._told_ah if afresh or before is None else self._charged.charge_ah(before)
+            self._memory = self._charged.with_charge(self._memory, charge_ah)
         self._yaw_rad = yaw_rad
         self._command(np.full(4, rotor_speed))
 
     def know_charge(self, used_ah: float) -> None:
         """Take in the charge that the battery itself tells, Ah: a law that remembers another goes on with this."""
         self._told_ah = used_ah
-        if hasattr(self._memory, "charge_ah"):
-            charge_ah = believed(self._memory.charge_ah, used_ah, self.vehicle)
-            self._memory = self._memory._replace(charge_ah=charge_ah)
+        if self._charged is not None and self._memory is not None:
+            charge_ah = believed(self._charged.charge_ah(self._memory), used_ah, self.vehicle)
+            self._memory = self._charged.with_charge(self._memory, charge_ah)
 
     def record(self) -> LoopRecord:
         """Return what is remembered; a law of somebody else's may remember what cannot be kept."""
@@ -148,13 +152,18 @@ class ControlLoop:
 
     def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
         """Go on with a law of the same kind and rhythm, built from other numbers; it takes over what is remembered."""
-        self._controller = controller
+        self._controller, self._charged = controller, _charged(controller)
         self.vehicle = vehicle
 
     def _command(self, rotor_speeds: Array) -> None:
         check_rotor_speeds(self._name, rotor_speeds, self.vehicle.rotors.max_speed)
         c1, c2, c3, c4 = (rotor_speeds / self.vehicle.rotors.max_speed).tolist()
         self.controls = (c1, c2, c3, c4)
+
+
+def _charged(controller: Controller[Any]) -> ChargeController[Any] | None:
+    """Return the law as one that counts what its battery gives; None if it does not."""
+    return controller if isinstance(controller, ChargeController) else None
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:

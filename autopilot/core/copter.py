@@ -136,7 +136,7 @@ class Copter:
         self._sent = STILL
         self.rotor_loss = RotorLoss(believed, self._loop.control_interval_us)
         self.rotor_loss.obey(flies_by)
-        self._photographer = Photographer(believed, self._interval_s)
+        self._photographer = Photographer(believed, self._interval_s, self._loop.plan_columns)
         self._subscribers = self._subscribe()
         parts = (self._loop, self._senses, self.pilot, self.stations, self.power, self.rotor_loss, self.supervisor)
         self._keeper = Keeper(maker_of(profile, vehicle), *parts)

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from colibri.autopilot.control.interface import Diagnostics, Horizon, VehicleState
-from colibri.autopilot.control.lpv_mpc import prediction
+from colibri.autopilot.control.interface import Diagnostics, Horizon, PlanColumns, VehicleState
 from colibri.common.elementary import square
 from colibri.common.elementwise import cos, sin
 from colibri.common.matrices import matvec
@@ -18,8 +17,9 @@ POINTS = 5
 class Forecaster:
     """Integrates the plans of one vehicle's control law."""
 
-    def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
-        """Take plans whose steps are `interval_s` apart."""
+    def __init__(self, vehicle: Vehicle, interval_s: float, columns: PlanColumns | None) -> None:
+        """Take plans whose steps are `interval_s` apart, and hold the attitude in `columns`; None: they hold none."""
+        self._columns = columns
         self._full_thrust_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
         self._mass_kg = vehicle.body.mass_kg
         self._gravity_m_s2 = vehicle.gravity_m_s2
@@ -28,17 +28,19 @@ class Forecaster:
     def forecast(self, state: VehicleState, references: Horizon | None, how: Diagnostics) -> tuple[Forecast, ...]:
         """Return points of the plan, the last at its end; of the references where the law predicts no attitude."""
         plan, squared = how.predicted, how.planned_squared
-        if plan is not None and squared is not None and plan.shape[1] == prediction.STATES:
-            return self._integrated(state, plan, squared)
+        if plan is not None and squared is not None and self._columns is not None:
+            return self._integrated(state, plan, squared, self._columns)
         if references is None or len(references.position_enu_m) < POINTS:
             return ()
         columns = references.position_enu_m, references.velocity_enu_m_s, references.acceleration_enu_m_s2
         return self._points(*columns, references.yaw_rad, references.yaw_rate_rad_s)
 
-    def _integrated(self, state: VehicleState, plan: Array, squared: Array) -> tuple[Forecast, ...]:
+    def _integrated(
+        self, state: VehicleState, plan: Array, squared: Array, columns: PlanColumns
+    ) -> tuple[Forecast, ...]:
         """Integrate thrust along the body's z axis and gravity; drag does not matter in so short a time."""
         ahead = plan[1:]
-        phi, theta, psi = (ahead[:, column] for column in prediction.ANGLES)
+        phi, theta, psi, yaw_rate = (ahead[:, column] for column in columns)
         x = cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi)
         y = cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi)
         up = np.stack([x, y, cos(phi) * cos(theta)], axis=1)
@@ -46,7 +48,7 @@ class Forecaster:
         acceleration[:, 2] -= self._gravity_m_s2
         velocity = np.array(state.velocity_enu_m_s) + self._interval_s * np.cumsum(acceleration, axis=0)
         position = np.array(state.position_enu_m) + self._interval_s * np.cumsum(velocity, axis=0)
-        return self._points(position, velocity, acceleration, psi, ahead[:, prediction.R])
+        return self._points(position, velocity, acceleration, psi, yaw_rate)
 
     def _points(self, p: Array, v: Array, a: Array, yaw: Array, rate: Array) -> tuple[Forecast, ...]:
         last = len(p) - 1

@@ -11,6 +11,7 @@ from colibri.autopilot.control.interface import (
     AttitudeDemand,
     Decision,
     Horizon,
+    PlanColumns,
     VehicleState,
 )
 from colibri.autopilot.estimation.health import told
@@ -43,15 +44,16 @@ _NEAR_GROUND_M = 1.0
 class Photographer:
     """Takes the snapshots of one vehicle."""
 
-    def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
-        """Expect a control sample every `interval_s`."""
+    def __init__(self, vehicle: Vehicle, interval_s: float, columns: PlanColumns | None) -> None:
+        """Expect a control sample every `interval_s`; `columns` say where the law's plan holds the attitude."""
         self._interval_s = interval_s
+        self._columns = columns
         self.adopt(vehicle)
 
     def adopt(self, vehicle: Vehicle) -> None:
         """Go by other numbers of the vehicle, with nothing remembered of the samples before."""
         self._vehicle = vehicle
-        self._forecaster = Forecaster(vehicle, self._interval_s)
+        self._forecaster = Forecaster(vehicle, self._interval_s, self._columns)
         self._velocity: Vector | None = None
         self._solver = NOT_SOLVED
 

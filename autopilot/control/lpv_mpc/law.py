@@ -13,6 +13,7 @@ from colibri.autopilot.control.interface import (
     Diagnostics,
     Fallback,
     Horizon,
+    PlanColumns,
     Preview,
     VehicleState,
 )
@@ -113,7 +114,10 @@ class LpvMpc:
     Attributes:
         control_interval_us: The control sample.
         preview: From now to one sample past the horizon.
+        plan_columns: Of the attitude in its predicted outputs.
     """
+
+    plan_columns = PlanColumns(prediction.PHI, prediction.THETA, prediction.PSI, prediction.R)
 
     def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
         """Control `vehicle` as the profile's `table` says; `clock` only measures.
@@ -179,6 +183,14 @@ class LpvMpc:
         return Memory(
             speeds, wrench[1:].copy(), wrench, wrench, None, np.zeros(disturbance_observer.ESTIMATES), 0.0, None, 0
         )
+
+    def charge_ah(self, memory: Memory) -> float:
+        """Return the charge taken from the battery, Ah."""
+        return memory.charge_ah
+
+    def with_charge(self, memory: Memory, charge_ah: float) -> Memory:
+        """Return the memory with another charge taken from the battery, Ah."""
+        return memory._replace(charge_ah=charge_ah)
 
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample."""

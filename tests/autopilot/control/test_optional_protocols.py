@@ -1,0 +1,149 @@
+"""What a control law may have beside its interface: a charge that it counts, and a plan of attitudes."""
+
+import re
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from msgspec import structs
+
+from colibri.autopilot.control.interface import (
+    ChargeController,
+    Controller,
+    Decision,
+    Diagnostics,
+    Horizon,
+    PlanColumns,
+    PlanController,
+    Preview,
+    VehicleState,
+)
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.control.lpv_mpc import prediction
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.registry import load_controller
+from colibri.autopilot.ground.forecast import POINTS, Forecaster
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
+
+DOCS = Path(__file__).parents[3] / "docs" / "controllers.md"
+HUMMINGBIRD = load_vehicle("hummingbird")
+NOTHING = (0.0, 0.0, 0.0)
+LEVEL = VehicleState(NOTHING, NOTHING, (1.0, 0.0, 0.0, 0.0), NOTHING, NOTHING)
+STAYING = Horizon(*(np.zeros((8, 3)) for _ in range(5)), *(np.zeros(8) for _ in range(3)))
+LAWS = {"lpv-mpc": "flight", "cascade": "thesis", "global-lpv-mpc": "thesis", "geometric-se3": "se3"}
+
+
+def law(name: str) -> Controller[Any]:
+    return load_controller(name)(load_profile(LAWS[name]).table(name), HUMMINGBIRD, lambda: 0.0)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_one_of_those_that_come_along_counts_its_charge_and_plans_attitudes(name: str) -> None:
+    controller = law(name)
+    assert isinstance(controller, ChargeController) is (name == "lpv-mpc")
+    assert isinstance(controller, PlanController) is (name == "lpv-mpc")
+
+
+def test_the_flight_profiles_law_remembers_the_charge_that_it_is_told() -> None:
+    controller = law("lpv-mpc")
+    assert isinstance(controller, ChargeController)
+    memory = controller.initial(HUMMINGBIRD.hover_speed)
+    assert controller.charge_ah(memory) == 0.0
+    assert controller.charge_ah(controller.with_charge(memory, 0.3)) == 0.3
+    assert isinstance(controller, PlanController)
+    assert controller.plan_columns[:3] == prediction.ANGLES
+
+
+class Counted(NamedTuple):
+    """A memory that calls its charge as it likes."""
+
+    taken: float
+
+
+class Counting:
+    """A law that hovers and counts one ampere hour a step."""
+
+    control_interval_us = 10_000
+    preview = Preview(10_000, 1)
+
+    def __init__(self, settings: object, vehicle: Vehicle, clock: object) -> None:
+        del settings, clock
+        self.speeds = np.full(4, vehicle.hover_speed)
+
+    def initial(self, rotor_speed: float) -> Counted:
+        del rotor_speed
+        return Counted(0.0)
+
+    def step(self, memory: Counted, time_us: int, state: VehicleState, references: Horizon) -> tuple[Counted, Decision]:
+        del time_us, state, references
+        return Counted(memory.taken + 1.0), Decision(self.speeds, NOTHING)
+
+    def charge_ah(self, memory: Counted) -> float:
+        return memory.taken
+
+    def with_charge(self, memory: Counted, charge_ah: float) -> Counted:
+        return memory._replace(taken=charge_ah)
+
+
+def loop_of(monkeypatch: pytest.MonkeyPatch, factory: Any) -> ControlLoop:
+    monkeypatch.setattr("colibri.autopilot.control.loop.load_controller", lambda _: factory)
+    profile = load_profile("flight")
+    own = structs.replace(profile, controller="own", controllers={**profile.controllers, "own": {}})
+    return ControlLoop(own, HUMMINGBIRD, lambda: 0.0)
+
+
+def test_a_law_of_somebody_elses_goes_on_with_the_charge_that_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = loop_of(monkeypatch, Counting)
+    loop.begin(HUMMINGBIRD.hover_speed, 0.0)
+    loop.decide(0, LEVEL, STAYING)
+    loop.begin(HUMMINGBIRD.hover_speed, 0.0, afresh=False)
+    assert loop.record().memory == counted(1, monkeypatch)
+    loop.begin(HUMMINGBIRD.hover_speed, 0.0)
+    assert loop.record().memory == counted(0, monkeypatch)
+
+
+def counted(steps: int, monkeypatch: pytest.MonkeyPatch) -> bytes:
+    """Return the memory of a loop that has flown so many samples."""
+    loop = loop_of(monkeypatch, Counting)
+    loop.begin(HUMMINGBIRD.hover_speed, 0.0)
+    for sample in range(steps):
+        loop.decide(sample * 10_000, LEVEL, STAYING)
+    return loop.record().memory
+
+
+def test_a_law_begins_with_what_its_battery_has_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = loop_of(monkeypatch, Counting)
+    loop.know_charge(0.5)
+    loop.begin(HUMMINGBIRD.hover_speed, 0.0)
+    before = loop.record().memory
+    loop.know_charge(0.5)
+    assert loop.record().memory == before
+    empty = loop_of(monkeypatch, Counting)
+    empty.begin(HUMMINGBIRD.hover_speed, 0.0)
+    assert empty.record().memory != before
+
+
+def test_a_plan_is_shown_where_the_law_says_that_it_holds_the_attitude() -> None:
+    plan, squared = np.zeros((21, 6)), np.full((20, 4), HUMMINGBIRD.hover_speed**2 / HUMMINGBIRD.rotors.max_speed**2)
+    plan[:, 1] = 0.2
+    how = Diagnostics(predicted=plan, planned_squared=squared)
+    pitched = Forecaster(HUMMINGBIRD, 0.01, PlanColumns(0, 1, 2, 3)).forecast(LEVEL, None, how)
+    assert len(pitched) == POINTS
+    assert pitched[-1].position_enu_m[0] > 0.0
+    level = Forecaster(HUMMINGBIRD, 0.01, PlanColumns(0, 4, 2, 3)).forecast(LEVEL, None, how)
+    assert level[-1].position_enu_m[0] == 0.0
+
+
+def test_of_a_law_without_a_plan_the_references_are_shown() -> None:
+    how = Diagnostics(predicted=np.ones((21, 9)), planned_squared=np.ones((20, 4)))
+    shown = Forecaster(HUMMINGBIRD, 0.01, None).forecast(LEVEL, STAYING, how)
+    assert [point.position_enu_m for point in shown] == [NOTHING] * POINTS
+    assert Forecaster(HUMMINGBIRD, 0.01, None).forecast(LEVEL, None, how) == ()
+
+
+def test_the_page_names_what_a_law_may_have() -> None:
+    rows = re.findall(r"^\| (`.*`) \|", DOCS.read_text(encoding="utf-8"), re.MULTILINE)
+    words = " ".join(rows)
+    for name in ("step_attitude", "charge_ah", "with_charge", "plan_columns"):
+        assert f"`{name}" in words
