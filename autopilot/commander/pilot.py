@@ -51,6 +51,38 @@ class Guidance(NamedTuple):
 RESTS = Guidance()
 
 
+class FlightTimes(NamedTuple):
+    """When what happened, simulated time; 0 before.
+
+    Attributes:
+        armed_us: When the rotors were last armed.
+        takeoff_us: When the vehicle last left the ground.
+        landing_us: When it last stood again.
+        flights: How often the rotors were armed.
+    """
+
+    armed_us: int = 0
+    takeoff_us: int = 0
+    landing_us: int = 0
+    flights: int = 0
+
+
+class Sensed(NamedTuple):
+    """What is known at a control sample.
+
+    Attributes:
+        now_us: Simulated time.
+        vehicle: The vehicle; None as long as nothing is known of it.
+        steered: What clients ask for.
+        knows_position: Whether the vehicle is known well enough to fly to places.
+    """
+
+    now_us: int = 0
+    vehicle: VehicleState | None = None
+    steered: Steered = NOT_STEERED
+    knows_position: bool = True
+
+
 class PilotRecord(NamedTuple):
     """What a pilot needs to go on after a restart, as plain data; but for the course, what `Pilot` says of each.
 
@@ -91,12 +123,8 @@ class Pilot:
         course: What is flown.
         reference: Where the reference stands.
         speed_m_s: Cruise speed that was asked for; None for the parameters'.
-        knows_position: Whether the vehicle knows where it is, as of the last control sample.
-        armed_us: When the rotors were last armed; 0 before.
-        takeoff_us: When it last left the ground; 0 before.
-        landing_us: When it last stood again; 0 before.
+        times: Of the last arming, take-off and landing.
         ground_m: Height of where it last stood, z of ENU.
-        flights: How often the rotors were armed.
         saving: The failsafe that is flown, until somebody chooses a mode or the rotors stop.
         terminated: Whether a failsafe stopped the rotors in the air.
         rotor_failed: Which rotor has failed, in words; empty if none has. Nothing but landing is possible then.
@@ -124,13 +152,11 @@ class Pilot:
         self.state = FIRST
         self.behaviour = behaviour
         self.home = home
-        self.knows_position = True
         self.standing = True
         self.course: Course = Stop()
         self.reference: Reference | None = None
         self.speed_m_s: float | None = None
-        self.armed_us = self.takeoff_us = self.landing_us = 0
-        self.flights = 0
+        self.times = FlightTimes()
         self.saving = Action.NONE
         self.terminated = False
         self.rotor_failed = ""
@@ -138,10 +164,8 @@ class Pilot:
         self._course_is_chosen = False
         self.idles = True
         self._landing = Landing()
-        self._now_us = 0
-        self._vehicle: VehicleState | None = None
+        self._sensed = Sensed()
         self._facts = Facts(None, standing=True, charge=1.0, thrust_stick=None)
-        self._steered = NOT_STEERED
         self._lines = lines
         self._warm_up()
 
@@ -156,8 +180,8 @@ class Pilot:
 
         Where it is known that it `rests` it stands, however high it seems to be: an estimate of height is not exact.
         """
-        self._now_us, self._vehicle = now_us, vehicle
-        self.armed_us = self.takeoff_us = self.landing_us = 0
+        self._sensed = self._sensed._replace(now_us=now_us, vehicle=vehicle)
+        self.times = FlightTimes(flights=self.times.flights)
         self.standing = self.idles = mode is None and (rests or stands_at_first(vehicle, 0.0))
         self.reference = moving_with(vehicle)
         if self.standing:
@@ -179,10 +203,7 @@ class Pilot:
             self.home.yaw_rad,
             self.home.chosen,
             self.speed_m_s,
-            self.armed_us,
-            self.takeoff_us,
-            self.landing_us,
-            self.flights,
+            *self.times,
             self.ground_m,
             self.saving,
             *self.reference,
@@ -202,11 +223,11 @@ class Pilot:
         The reference goes on where it was if the restart took no time, that is `closely`, and else from where the
         vehicle is. One that has come down meanwhile stays there. `again` says how a mode goes on.
         """
-        self._now_us, self._vehicle = now_us, vehicle
+        self._sensed = self._sensed._replace(now_us=now_us, vehicle=vehicle)
         self.home.resume(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
         self.speed_m_s = record.speed_m_s
-        self.armed_us, self.takeoff_us, self.landing_us = record.armed_us, record.takeoff_us, record.landing_us
-        self.flights, self.ground_m = record.flights, record.ground_m
+        self.times = FlightTimes(record.armed_us, record.takeoff_us, record.landing_us, record.flights)
+        self.ground_m = record.ground_m
         came_down = not closely and not record.standing and stands_at_first(vehicle, record.ground_m)
         self.standing = record.standing or came_down
         self.state = FIRST if came_down else State(record.mode, record.armed)
@@ -233,13 +254,17 @@ class Pilot:
             steered: What clients ask for.
             knows_position: Whether `vehicle` is known well enough to fly to places.
         """
-        self.knows_position = knows_position
-        self._now_us, self._vehicle, self._steered = now_us, vehicle, steered
+        self._sensed = Sensed(now_us, vehicle, steered, knows_position)
 
     @property
     def has_seen(self) -> bool:
         """Whether it has ever known where the vehicle is: on sensors that takes a while."""
-        return self._vehicle is not None
+        return self._sensed.vehicle is not None
+
+    @property
+    def knows_position(self) -> bool:
+        """Whether the vehicle knows where it is, as of the last control sample."""
+        return self._sensed.knows_position
 
     def take_stock(self, facts: Facts) -> None:
         """Take in what arming is judged by."""
@@ -247,7 +272,8 @@ class Pilot:
 
     def scene(self) -> Scene:
         """Return what a course sees now."""
-        assert self._vehicle is not None, "the pilot has seen the vehicle"
+        now_us, vehicle, steered, knows_position = self._sensed
+        assert vehicle is not None, "the pilot has seen the vehicle"
         assert self.reference is not None, "the pilot has seen the vehicle"
         interval_us, samples = self._instants.preview
         behaviour = self.behaviour
@@ -257,17 +283,17 @@ class Pilot:
             behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed))
         interval_s = interval_us * 1e-6
         return Scene(
-            self._now_us,
-            self._vehicle,
+            now_us,
+            vehicle,
             self.reference,
             self.home.position_enu_m,
             behaviour,
             interval_s,
             samples,
-            self._steered,
+            steered,
             self.standing,
             self.ground_m,
-            blind=self.saving is Action.DESCEND or not self.knows_position,
+            blind=self.saving is Action.DESCEND or not knows_position,
         )
 
     @property
@@ -283,18 +309,18 @@ class Pilot:
         """Let the rotors turn; return why not. `missing` are the needs of modes that nothing meets now."""
         if self.state.armed:
             return None
-        forced = force and self._vehicle is not None and not self.rotor_failed
+        forced = force and self.has_seen and not self.rotor_failed
         reasons = [] if forced else self.refusals()
         if reasons:
             return Refusal("not armed: " + "; ".join(reasons))
         unmet = [need for need in missing if need is not Need.POSITION]  # a check of its own, and by force
         refusal = self._follow(Event.ARM, "rotors armed", missing=unmet)
         if refusal is None:
-            self.armed_us = self._now_us
-            self.flights += 1
+            now_us, vehicle, _, _ = self._sensed
+            self.times = self.times._replace(armed_us=now_us, flights=self.times.flights + 1)
             self.terminated = False
-            if self._vehicle is not None:
-                self.home.propose(self._vehicle.position_enu_m, self._vehicle.euler[2])
+            if vehicle is not None:
+                self.home.propose(vehicle.position_enu_m, vehicle.euler[2])
             if not self._course_is_chosen:
                 self._engage(self.state.mode)
         return refusal
@@ -407,18 +433,19 @@ class Pilot:
         return self._instants.for_law(horizon)
 
     def _lean(self, asked: Lean, begins: bool) -> Guidance:
-        assert self._vehicle is not None, "the pilot has seen the vehicle"
+        vehicle = self._sensed.vehicle
+        assert vehicle is not None, "the pilot has seen the vehicle"
         self.reference = asked.reference
-        self._watch_ground(self._vehicle, sinks=asked.sinks, drifts=asked.drifts)
+        self._watch_ground(vehicle, sinks=asked.sinks, drifts=asked.drifts)
         return Guidance(attitude=asked.demand, begins=begins)
 
     def _rest(self) -> None:
         """Lie, or fall, with the rotors standing still or idle."""
-        vehicle = self._vehicle
+        now_us, vehicle, _, _ = self._sensed
         assert vehicle is not None, "the pilot has seen the vehicle"
         self.idles = True
         self.reference = at_rest(vehicle)
-        self._landing, lies = watch(self._landing, self._now_us, vehicle, sinks=True)
+        self._landing, lies = watch(self._landing, now_us, vehicle, sinks=True)
         self.standing = self.standing or lies
         if self.standing:
             self.ground_m = vehicle.position_enu_m[2]
@@ -426,8 +453,9 @@ class Pilot:
     def _idle(self) -> None:
         """Stand with idling rotors; not for ever."""
         self._rest()
-        on_ground_us = self._now_us - max(self.armed_us, self.landing_us)
-        landed = self.landing_us > self.armed_us
+        times = self.times
+        on_ground_us = self._sensed.now_us - max(times.armed_us, times.landing_us)
+        landed = times.landing_us > times.armed_us
         behaviour = self.behaviour
         allowed_s = behaviour.disarm_after_landing_s if landed else behaviour.disarm_on_ground_s
         if allowed_s > 0.0 and on_ground_us >= allowed_s * 1e6:
@@ -447,17 +475,17 @@ class Pilot:
     def _begin_flight(self) -> None:
         self.standing = False
         self._landing = Landing()
-        self.takeoff_us = self._now_us
+        self.times = self.times._replace(takeoff_us=self._sensed.now_us)
         self.say(INFO, "take-off")
 
     def _watch_ground(self, vehicle: VehicleState, *, sinks: bool, drifts: bool = False) -> None:
-        self._landing, stands = watch(self._landing, self._now_us, vehicle, sinks, drifts=drifts)
+        self._landing, stands = watch(self._landing, self._sensed.now_us, vehicle, sinks, drifts=drifts)
         if stands:
             self._stand()
 
     def _stand(self) -> None:
         self.standing = True
-        self.landing_us = self._now_us
+        self.times = self.times._replace(landing_us=self._sensed.now_us)
         self.say(NOTICE, "landing detected")
 
     def _arrive(self) -> None:

@@ -117,7 +117,7 @@ def test_a_check_that_fails_holds_back_arming_unless_by_force() -> None:
     assert refusal is not None
     assert refusal.reason == "not armed: battery at 5%"
     assert cockpit.pilot.arm((), force=True) is None
-    assert cockpit.pilot.flights == 1
+    assert cockpit.pilot.times.flights == 1
 
 
 @pytest.mark.parametrize("mode", Mode)
