@@ -62,7 +62,7 @@ class Needs(Protocol):
 
 
 class Commands:
-    """Obeys what a ground station commands."""
+    """Obeys what a ground station commands: a method a command."""
 
     def __init__(self, pilot: Pilot, fence: Limit, needs: Needs) -> None:
         """Hand commands to `pilot`, as far as `fence` and the needs of modes let it fly."""

@@ -114,6 +114,9 @@ class PilotRecord(NamedTuple):
 class Pilot:
     """Flies courses, one mode after another.
 
+    One state machine with many doors: its attributes are its state, all of it in `record`; its methods are what may
+    happen to it, and what is asked about it.
+
     Attributes:
         state: Mode, and whether the rotors may turn.
         behaviour: The numbers to fly by.

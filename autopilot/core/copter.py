@@ -47,6 +47,9 @@ _EVER_US = 10**15
 class Copter:
     """A vehicle that ground stations fly.
 
+    It puts the parts together and hands values from one to the next: its attributes are the parts, and what of one
+    frame the next one needs.
+
     Attributes:
         frame_interval_us: How often it wants a frame.
         pilot: Decides what is flown.
@@ -96,10 +99,6 @@ class Copter:
         self.parameters.load(values or {})
         flown, believed = numbers.applied(self.parameters.values)
         self._loop = ControlLoop(flown, believed, clock)
-        tuning = Tuning(
-            numbers, builder(profile.controller, clock), self._loop, lambda words: self.stations.say(WARNING, words)
-        )
-        self.parameters.prepare = tuning.prepare
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock
         self.frame_interval_us = self._loop.frame_interval_us
@@ -127,6 +126,8 @@ class Copter:
             self.parameters,
             takes_attitude=self._attitude is not None,
         )
+        tuning = Tuning(numbers, builder(profile.controller, clock), self._loop, self.stations.warn)
+        self.parameters.ask(tuning.prepare)
         self.power = PowerMeter(believed)
         self.supervisor = Supervisor(self.parameters, lines)
         self._missed_us: int | None = None

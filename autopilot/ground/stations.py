@@ -47,7 +47,7 @@ from colibri.mavlink.services.identity import IDENTITIES, autopilot_version, ban
 from colibri.mavlink.services.origin import OriginService, Setters
 from colibri.mavlink.services.shell import Shell
 from colibri.mavlink.services.standard_modes import ModeInfo, StandardModes
-from colibri.mavlink.services.statustext import INFO, StatusText
+from colibri.mavlink.services.statustext import INFO, WARNING, StatusText
 from colibri.mavlink.services.timesync import TimeService
 from colibri.mavlink.setpoints.follow_target import Follow
 from colibri.mavlink.setpoints.manual_control import Manual
@@ -101,6 +101,8 @@ class StationSettings:
 
 class Stations:
     """Serves any number of ground stations.
+
+    It puts services together and decides nothing: most of its attributes are services.
 
     Attributes:
         hub: Where the links meet.
@@ -247,12 +249,16 @@ class Stations:
 
     def wait(self, reason: str) -> None:
         """Deny every command for a reason, and hear nothing else; without one, serve."""
-        self.hub.hears_only = _COMMANDS if reason else None
-        self._obeys.closed = reason
+        self.hub.hear_only(_COMMANDS if reason else None)
+        self._obeys.close(reason)
 
     def take_outbox(self) -> list[Outgoing]:
         """Return what to send now, while nothing is known of the vehicle that could be told, or logged."""
         return [outgoing for outgoing in self.hub.take_outbox() if outgoing.link != LOG_LINK]
+
+    def warn(self, text: str) -> None:
+        """Tell everybody a warning."""
+        self.say(WARNING, text)
 
     def say(self, severity: int, text: str) -> None:
         """Tell everybody a line."""

@@ -6,7 +6,7 @@ The format is that of ground stations' telemetry logs: each frame behind its tim
 from collections.abc import Iterable
 from struct import Struct
 
-from colibri.mavlink.files.tree import Entry, Files, Names, Refusal
+from colibri.mavlink.files.tree import Entry, FileRefusal, Files, Names
 
 SUFFIX = ".tlog"
 KEPT = 50
@@ -30,7 +30,7 @@ class FlightLog:
         self._folder = folder
         self._kept = kept
         self.name: str | None = None
-        self.refusal: Refusal | None = None
+        self.refusal: FileRefusal | None = None
         self._armed = False
         self._waiting = bytearray()
         self._size = 0
@@ -70,7 +70,7 @@ class FlightLog:
         name = f"{number:05}{SUFFIX}"
         place = (*self._folder, name)
         self.refusal = self._files.create(place)
-        if self.refusal is Refusal.NOT_FOUND and self._folder:  # a ground station removed it
+        if self.refusal is FileRefusal.NOT_FOUND and self._folder:  # a ground station removed it
             self.refusal = self._files.make_folder(self._folder) or self._files.create(place)
         self.name = name if self.refusal is None else None
         self._size = 0
@@ -85,10 +85,10 @@ class FlightLog:
             return
         place = (*self._folder, self.name)
         refusal = self._files.write(place, self._size, data)
-        for log in self._logs()[:-1] if refusal is Refusal.NO_SPACE else ():
+        for log in self._logs()[:-1] if refusal is FileRefusal.NO_SPACE else ():
             self._files.remove((*self._folder, log.name))
             refusal = self._files.write(place, self._size, data)
-            if refusal is not Refusal.NO_SPACE:
+            if refusal is not FileRefusal.NO_SPACE:
                 break
         self._size += len(data)
         if refusal is not None:
@@ -98,7 +98,7 @@ class FlightLog:
     def _logs(self) -> list[Entry]:
         """Return the logs, the oldest first."""
         found = self._files.list(self._folder)
-        entries = [] if isinstance(found, Refusal) else found
+        entries = [] if isinstance(found, FileRefusal) else found
         return sorted((entry for entry in entries if _number(entry.name)), key=lambda entry: _number(entry.name))
 
 

@@ -13,7 +13,7 @@ from functools import partial, wraps
 from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 
-from colibri.mavlink.files.tree import Entry, Names, Quota, Reading, Refusal, can_be_new
+from colibri.mavlink.files.tree import Entry, FileRefusal, Names, Quota, Reading, can_be_new
 
 DEFAULT_QUOTA = Quota(64 << 20, 1000)
 
@@ -22,18 +22,18 @@ _SAFELY = os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | _SAFELY
 
 _REFUSALS = {
-    EACCES: Refusal.PROTECTED,
-    EEXIST: Refusal.EXISTS,
-    EINVAL: Refusal.BAD_NAME,
-    EISDIR: Refusal.IS_FOLDER,
-    ELOOP: Refusal.PROTECTED,
-    ENAMETOOLONG: Refusal.BAD_NAME,
-    ENOENT: Refusal.NOT_FOUND,
-    ENOSPC: Refusal.NO_SPACE,
-    ENOTDIR: Refusal.NOT_A_FOLDER,
-    ENOTEMPTY: Refusal.NOT_EMPTY,
-    EPERM: Refusal.PROTECTED,
-    EROFS: Refusal.PROTECTED,
+    EACCES: FileRefusal.PROTECTED,
+    EEXIST: FileRefusal.EXISTS,
+    EINVAL: FileRefusal.BAD_NAME,
+    EISDIR: FileRefusal.IS_FOLDER,
+    ELOOP: FileRefusal.PROTECTED,
+    ENAMETOOLONG: FileRefusal.BAD_NAME,
+    ENOENT: FileRefusal.NOT_FOUND,
+    ENOSPC: FileRefusal.NO_SPACE,
+    ENOTDIR: FileRefusal.NOT_A_FOLDER,
+    ENOTEMPTY: FileRefusal.NOT_EMPTY,
+    EPERM: FileRefusal.PROTECTED,
+    EROFS: FileRefusal.PROTECTED,
 }
 
 _Arguments = ParamSpec("_Arguments")
@@ -43,26 +43,26 @@ _Result = TypeVar("_Result")
 class _RefusedError(Exception):
     """Ends what cannot be done, with the reason."""
 
-    def __init__(self, refusal: Refusal) -> None:
+    def __init__(self, refusal: FileRefusal) -> None:
         super().__init__(refusal.value)
         self.refusal = refusal
 
 
 def _refusing(
     method: Callable[Concatenate["Folder", _Arguments], _Result],
-) -> Callable[Concatenate["Folder", _Arguments], _Result | Refusal]:
+) -> Callable[Concatenate["Folder", _Arguments], _Result | FileRefusal]:
     """Return `method` with every error of the system as a refusal."""
 
     @wraps(method)
-    def refusing(self: "Folder", /, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result | Refusal:
+    def refusing(self: "Folder", /, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result | FileRefusal:
         try:
             return method(self, *args, **kwargs)
         except _RefusedError as error:
             return error.refusal
         except OSError as error:
-            return _REFUSALS.get(error.errno or 0, Refusal.FAILED)
+            return _REFUSALS.get(error.errno or 0, FileRefusal.FAILED)
         except (ValueError, OverflowError):  # a NUL in a name, a name that is no text, an offset beyond the system's
-            return Refusal.BAD_NAME
+            return FileRefusal.BAD_NAME
 
     return refusing
 
@@ -117,9 +117,9 @@ class Folder:
         with self._open_file(names, os.O_WRONLY) as file:
             more = max(offset + len(data) - os.fstat(file).st_size, 0) if data else 0
             if self._size + more > self._quota.size:
-                raise _RefusedError(Refusal.NO_SPACE)
+                raise _RefusedError(FileRefusal.NO_SPACE)
             if os.pwrite(file, data, offset) != len(data):
-                raise _RefusedError(Refusal.NO_SPACE)
+                raise _RefusedError(FileRefusal.NO_SPACE)
             self._size += more
 
     @_refusing
@@ -133,7 +133,7 @@ class Folder:
         with self._open_parent(names) as (folder, name):
             status = self._existing(folder, name)
             if stat.S_ISDIR(status.st_mode):
-                raise _RefusedError(Refusal.IS_FOLDER)
+                raise _RefusedError(FileRefusal.IS_FOLDER)
             os.unlink(name, dir_fd=folder)
             self._size -= status.st_size
             self._entries -= 1
@@ -144,9 +144,9 @@ class Folder:
         with self._open_parent(old) as (old_folder, old_name), self._open_parent(new) as (new_folder, new_name):
             self._existing(old_folder, old_name)
             if _kind(new_folder, new_name) is not None:
-                raise _RefusedError(Refusal.EXISTS)
+                raise _RefusedError(FileRefusal.EXISTS)
             if not can_be_new(new_name):
-                raise _RefusedError(Refusal.BAD_NAME)
+                raise _RefusedError(FileRefusal.BAD_NAME)
             os.rename(old_name, new_name, src_dir_fd=old_folder, dst_dir_fd=new_folder)
 
     @_refusing
@@ -154,7 +154,7 @@ class Folder:
         """Make a folder."""
         with self._open_parent(names) as (folder, name):
             if _kind(folder, name) is not None:
-                raise _RefusedError(Refusal.EXISTS)
+                raise _RefusedError(FileRefusal.EXISTS)
             self._allow_new(name)
             os.mkdir(name, 0o755, dir_fd=folder)
             self._entries += 1
@@ -180,15 +180,15 @@ class Folder:
 
     def _allow_new(self, name: str) -> None:
         if not can_be_new(name):
-            raise _RefusedError(Refusal.BAD_NAME)
+            raise _RefusedError(FileRefusal.BAD_NAME)
         if self._entries >= self._quota.entries:
-            raise _RefusedError(Refusal.NO_SPACE)
+            raise _RefusedError(FileRefusal.NO_SPACE)
 
     def _existing(self, folder: int, name: str) -> os.stat_result:
         """Return what the system knows of a file or folder that is shown."""
         status = os.stat(name, dir_fd=folder, follow_symlinks=False)
         if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
-            raise _RefusedError(Refusal.NOT_FOUND)
+            raise _RefusedError(FileRefusal.NOT_FOUND)
         return status
 
     @contextmanager
@@ -208,22 +208,22 @@ class Folder:
     def _open_parent(self, names: Names) -> Iterator[tuple[int, str]]:
         """Open the folder that holds `names`; the root itself cannot be changed."""
         if not names:
-            raise _RefusedError(Refusal.PROTECTED)
+            raise _RefusedError(FileRefusal.PROTECTED)
         with self._open_folder(names[:-1]) as folder:
             yield folder, _plain(names[-1])
 
     @contextmanager
     def _open_file(self, names: Names, how: int) -> Iterator[int]:
         if not names:
-            raise _RefusedError(Refusal.IS_FOLDER)
+            raise _RefusedError(FileRefusal.IS_FOLDER)
         with self._open_folder(names[:-1]) as folder:
             name = _plain(names[-1])
             if stat.S_ISDIR(self._existing(folder, name).st_mode):
-                raise _RefusedError(Refusal.IS_FOLDER)
+                raise _RefusedError(FileRefusal.IS_FOLDER)
             file = os.open(name, how | _SAFELY, dir_fd=folder)
         try:
             if not stat.S_ISREG(os.fstat(file).st_mode):
-                raise _RefusedError(Refusal.NOT_FOUND)
+                raise _RefusedError(FileRefusal.NOT_FOUND)
             yield file
         finally:
             os.close(file)
@@ -240,7 +240,7 @@ class Folder:
 def _plain(name: str) -> str:
     """Return `name` if it names something in its folder, and nothing elsewhere."""
     if name in ("", ".", "..") or "/" in name:
-        raise _RefusedError(Refusal.NOT_FOUND)
+        raise _RefusedError(FileRefusal.NOT_FOUND)
     return name
 
 

@@ -28,7 +28,7 @@ from colibri.mavlink.files.ftp_wire import (
     path_in,
     request_of,
 )
-from colibri.mavlink.files.tree import Files, Names, Reading, Refusal
+from colibri.mavlink.files.tree import FileRefusal, Files, Names, Reading
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.wire.dialect import Message
 
@@ -48,7 +48,7 @@ CHECKSUM_BYTES_A_POLL = 256 << 10
 
 _LARGEST = 0xFFFFFFFF
 
-Outcome: TypeAlias = bytes | Nak | Refusal | None
+Outcome: TypeAlias = bytes | Nak | FileRefusal | None
 """Data of the ACK, a refusal, or None where the answer comes by and by."""
 
 
@@ -203,7 +203,7 @@ class Ftp:
 
     def _list(self, request: Request, names: Names) -> Outcome:
         found = self._files.list(names)
-        if isinstance(found, Refusal):
+        if isinstance(found, FileRefusal):
             return found
         if request.offset >= len(found):
             return Nak(Error.END_OF_FILE)
@@ -217,13 +217,13 @@ class Ftp:
 
     def _open_to_read(self, request: Request, names: Names) -> Outcome:
         reading = self._files.open(names)
-        if isinstance(reading, Refusal):
+        if isinstance(reading, FileRefusal):
             return reading
         refused = self._opened(request, names, reading)
         return refused or SIZE.pack(min(reading.size, _LARGEST))
 
     def _open_to_write(self, request: Request, names: Names) -> Outcome:
-        if self._files.open(names) is Refusal.NOT_FOUND:
+        if self._files.open(names) is FileRefusal.NOT_FOUND:
             return self._create(request, names)
         # Nothing is written here, but so it is known whether it may be.
         return self._files.write(names, 0, b"") or self._opened(request, names, None) or b""
@@ -287,7 +287,7 @@ class Ftp:
         size = burst.request.size or DATA_BYTES
         wanted = min(most * size, burst.reading.size - burst.request.offset)
         data = burst.reading.read(burst.request.offset, wanted)
-        if isinstance(data, Refusal) or not data:  # removed, or cut, since it was opened
+        if isinstance(data, FileRefusal) or not data:  # removed, or cut, since it was opened
             burst.packets_left = 0
             yield answer(burst.request, data or Nak(Error.END_OF_FILE))
             return
@@ -311,7 +311,7 @@ class Ftp:
 
     def _truncate(self, request: Request, names: Names) -> Outcome:
         reading = self._files.open(names)
-        if isinstance(reading, Refusal):
+        if isinstance(reading, FileRefusal):
             return reading
         if request.offset > reading.size:
             return Nak(Error.END_OF_FILE)
@@ -320,7 +320,7 @@ class Ftp:
     def _rename(self, request: Request, old: Names) -> Outcome:
         _, _, rest = request.data.partition(b"\0")
         new = path_in(rest)
-        if isinstance(new, Refusal):
+        if isinstance(new, FileRefusal):
             return new
         if not new:
             return Nak(Error.INVALID_DATA_SIZE)
@@ -332,7 +332,7 @@ class Ftp:
             running.request = request  # the client lost patience and asks again
             return None
         reading = self._files.open(names)
-        if isinstance(reading, Refusal):
+        if isinstance(reading, FileRefusal):
             return reading
         if len(self._checksums) >= MOST_SESSIONS:
             return Nak(Error.NO_SESSIONS)
@@ -348,16 +348,16 @@ def _on_path(obey: Callable[[Request, Names], Outcome]) -> Callable[[Request], O
 
     def obey_request(request: Request) -> Outcome:
         names = path_in(request.data)
-        return names if isinstance(names, Refusal) else obey(request, names)
+        return names if isinstance(names, FileRefusal) else obey(request, names)
 
     return obey_request
 
 
-def _sum(checksum: _Checksum) -> bytes | Refusal | None:
+def _sum(checksum: _Checksum) -> bytes | FileRefusal | None:
     """Add some of the file; return the answer once it is all."""
     reading = checksum.reading
     data = reading.read(checksum.done, min(CHECKSUM_BYTES_A_POLL, reading.size - checksum.done))
-    if isinstance(data, Refusal):
+    if isinstance(data, FileRefusal):
         return data
     checksum.register = crc32(data, checksum.register)
     checksum.done += len(data)

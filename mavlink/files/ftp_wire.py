@@ -8,7 +8,7 @@ from errno import EINVAL, EIO, EISDIR, ENOSPC, ENOTDIR, ENOTEMPTY
 from struct import Struct
 from typing import NamedTuple, TypeAlias
 
-from colibri.mavlink.files.tree import Entry, Names, Refusal, names_of
+from colibri.mavlink.files.tree import Entry, FileRefusal, Names, names_of
 from colibri.mavlink.node.service import Peer, Send, to
 
 PAYLOAD_BYTES = 251
@@ -100,15 +100,15 @@ class Nak(NamedTuple):
 
 
 _NAKS = {
-    Refusal.NOT_FOUND: Nak(Error.NOT_FOUND),
-    Refusal.EXISTS: Nak(Error.EXISTS),
-    Refusal.PROTECTED: Nak(Error.PROTECTED),
-    Refusal.NO_SPACE: Nak(Error.FAIL_ERRNO, ENOSPC),
-    Refusal.IS_FOLDER: Nak(Error.FAIL_ERRNO, EISDIR),
-    Refusal.NOT_A_FOLDER: Nak(Error.FAIL_ERRNO, ENOTDIR),
-    Refusal.NOT_EMPTY: Nak(Error.FAIL_ERRNO, ENOTEMPTY),
-    Refusal.BAD_NAME: Nak(Error.FAIL_ERRNO, EINVAL),
-    Refusal.FAILED: Nak(Error.FAIL_ERRNO, EIO),
+    FileRefusal.NOT_FOUND: Nak(Error.NOT_FOUND),
+    FileRefusal.EXISTS: Nak(Error.EXISTS),
+    FileRefusal.PROTECTED: Nak(Error.PROTECTED),
+    FileRefusal.NO_SPACE: Nak(Error.FAIL_ERRNO, ENOSPC),
+    FileRefusal.IS_FOLDER: Nak(Error.FAIL_ERRNO, EISDIR),
+    FileRefusal.NOT_A_FOLDER: Nak(Error.FAIL_ERRNO, ENOTDIR),
+    FileRefusal.NOT_EMPTY: Nak(Error.FAIL_ERRNO, ENOTEMPTY),
+    FileRefusal.BAD_NAME: Nak(Error.FAIL_ERRNO, EINVAL),
+    FileRefusal.FAILED: Nak(Error.FAIL_ERRNO, EIO),
 }
 
 
@@ -120,10 +120,10 @@ def request_of(payload: bytes, peer: Peer, now_us: int) -> Request:
     return Request(peer, now_us, payload, sequence, session, opcode, size, offset, data)
 
 
-def answer(request: Request, outcome: bytes | Nak | Refusal, *, last: bool = False) -> Send:
+def answer(request: Request, outcome: bytes | Nak | FileRefusal, *, last: bool = False) -> Send:
     """Answer with data, or with why not."""
     opcode = Opcode.ACK
-    if isinstance(outcome, Refusal):
+    if isinstance(outcome, FileRefusal):
         outcome = _NAKS[outcome]
     if isinstance(outcome, Nak):
         opcode = Opcode.NAK
@@ -135,12 +135,12 @@ def answer(request: Request, outcome: bytes | Nak | Refusal, *, last: bool = Fal
     return to(peer, "FILE_TRANSFER_PROTOCOL", 0, peer.system, peer.component, payload)
 
 
-def path_in(data: bytes) -> Names | Refusal:
+def path_in(data: bytes) -> Names | FileRefusal:
     """Return the path that data begins with."""
     try:
         return names_of(data.split(b"\0", 1)[0].decode())
     except UnicodeDecodeError:
-        return Refusal.NOT_FOUND
+        return FileRefusal.NOT_FOUND
 
 
 def line_of(entry: Entry, *, with_time: bool) -> bytes:

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from colibri.mavlink.files.tree import Entry, Files, Names, Reading, Refusal
+from colibri.mavlink.files.tree import Entry, FileRefusal, Files, Names, Reading
 from colibri.mavlink.node.service import Peer, Send, to
 from colibri.mavlink.wire.dialect import Message
 
@@ -133,7 +133,7 @@ class Logs:
     def _look(self, peer: Peer) -> list[Entry]:
         """Return the logs that there are now, and stay with their ids for this client."""
         found = self._files.list(self._folder)
-        logs = [] if isinstance(found, Refusal) else [entry for entry in found if not entry.is_folder]
+        logs = [] if isinstance(found, FileRefusal) else [entry for entry in found if not entry.is_folder]
         self._shown.pop(peer, None)
         if len(self._shown) >= MOST_PEERS:
             forgotten = next(iter(self._shown))
@@ -144,8 +144,8 @@ class Logs:
 
     def _transfer(self, peer: Peer, number: int, offset: int, count: int) -> Iterable[Send]:
         logs = self._shown[peer] if peer in self._shown else self._look(peer)
-        reading = self._files.open((*self._folder, logs[number].name)) if number < len(logs) else Refusal.NOT_FOUND
-        if isinstance(reading, Refusal) or offset >= reading.size or count == 0:
+        reading = self._files.open((*self._folder, logs[number].name)) if number < len(logs) else FileRefusal.NOT_FOUND
+        if isinstance(reading, FileRefusal) or offset >= reading.size or count == 0:
             return (_block(peer, number, offset, b""),)  # "zero for end of log"
         transfer = _Transfer(peer, number, reading, offset, offset + count)
         # A client that asks for another log has turned away from the one before.
@@ -165,7 +165,7 @@ class Logs:
     def _erase(self) -> None:
         found = self._files.list(self._folder)
         kept = self._being_written()
-        for entry in () if isinstance(found, Refusal) else found:
+        for entry in () if isinstance(found, FileRefusal) else found:
             if not entry.is_folder and entry.name != kept:
                 self._files.remove((*self._folder, entry.name))
         self._shown.clear()
@@ -177,7 +177,7 @@ def _blocks(transfer: _Transfer, most: int) -> Iterator[Send]:
     """Send the next blocks; where the log ends with a full one, an empty one tells so."""
     wanted = min(most * BLOCK_BYTES, transfer.end - transfer.offset)
     data = transfer.reading.read(transfer.offset, wanted)
-    if isinstance(data, Refusal):
+    if isinstance(data, FileRefusal):
         data = b""
     for start in range(0, len(data), BLOCK_BYTES):
         yield _block(transfer.peer, transfer.id, transfer.offset + start, data[start : start + BLOCK_BYTES])

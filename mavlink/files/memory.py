@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from colibri.mavlink.files.tree import Entry, Names, Quota, Reading, Refusal, can_be_new
+from colibri.mavlink.files.tree import Entry, FileRefusal, Names, Quota, Reading, can_be_new
 
 DEFAULT_QUOTA = Quota(8 << 20, 1000)
 
@@ -17,28 +17,28 @@ class Memory:
         self._folders: set[Names] = {()}
         self._size = 0
 
-    def list(self, names: Names) -> list[Entry] | Refusal:
+    def list(self, names: Names) -> list[Entry] | FileRefusal:
         """Return what a folder holds, by name."""
         if names not in self._folders:
-            return self._no_way(names) or (Refusal.NOT_A_FOLDER if names in self._files else Refusal.NOT_FOUND)
+            return self._no_way(names) or (FileRefusal.NOT_A_FOLDER if names in self._files else FileRefusal.NOT_FOUND)
         found = [Entry(path[-1], True) for path in self._folders if path and path[:-1] == names]
         found += [Entry(path[-1], False, len(data)) for path, data in self._files.items() if path[:-1] == names]
         return sorted(found)
 
-    def open(self, names: Names) -> Reading | Refusal:
+    def open(self, names: Names) -> Reading | FileRefusal:
         """Open a file to read it."""
         return self._no_file(names) or Reading(len(self._files[names]), partial(self._read, names))
 
-    def create(self, names: Names) -> Refusal | None:
+    def create(self, names: Names) -> FileRefusal | None:
         """Make an empty file; one that exists is emptied."""
         if names in self._files:
             return self.truncate(names, 0)
         refusal = self._no_room(names)
         if refusal is None:
             self._files[names] = bytearray()
-        return Refusal.IS_FOLDER if refusal is Refusal.EXISTS else refusal
+        return FileRefusal.IS_FOLDER if refusal is FileRefusal.EXISTS else refusal
 
-    def write(self, names: Names, offset: int, data: bytes) -> Refusal | None:
+    def write(self, names: Names, offset: int, data: bytes) -> FileRefusal | None:
         """Put `data` into a file; a gap before it is zeros."""
         refusal = self._no_file(names)
         if refusal is not None:
@@ -46,13 +46,13 @@ class Memory:
         file = self._files[names]
         more = max(offset + len(data) - len(file), 0) if data else 0
         if self._size + more > self._quota.size:
-            return Refusal.NO_SPACE
+            return FileRefusal.NO_SPACE
         self._size += more
         file.extend(bytes(more))
         file[offset : offset + len(data)] = data
         return None
 
-    def truncate(self, names: Names, size: int) -> Refusal | None:
+    def truncate(self, names: Names, size: int) -> FileRefusal | None:
         """Keep the first `size` bytes of a file; nothing where it has fewer."""
         refusal = self._no_file(names)
         if refusal is None:
@@ -60,79 +60,79 @@ class Memory:
             del self._files[names][size:]
         return refusal
 
-    def remove(self, names: Names) -> Refusal | None:
+    def remove(self, names: Names) -> FileRefusal | None:
         """Remove a file."""
-        refusal = self._no_file(names) if names else Refusal.PROTECTED
+        refusal = self._no_file(names) if names else FileRefusal.PROTECTED
         if refusal is None:
             self._size -= len(self._files.pop(names))
         return refusal
 
-    def rename(self, old: Names, new: Names) -> Refusal | None:
+    def rename(self, old: Names, new: Names) -> FileRefusal | None:
         """Give a file or folder another place, where nothing is yet."""
-        refusal = self._no_way(old) if old else Refusal.PROTECTED
-        refusal = refusal or (self._no_way(new) if new else Refusal.PROTECTED)
+        refusal = self._no_way(old) if old else FileRefusal.PROTECTED
+        refusal = refusal or (self._no_way(new) if new else FileRefusal.PROTECTED)
         if refusal is not None:
             return refusal
         if old not in self._files and old not in self._folders:
-            return Refusal.NOT_FOUND
+            return FileRefusal.NOT_FOUND
         refusal = self._no_place(new)
         if refusal is not None:
             return refusal
         if new[: len(old)] == old:
-            return Refusal.BAD_NAME
+            return FileRefusal.BAD_NAME
         self._files = {_moved(path, old, new): data for path, data in self._files.items()}
         self._folders = {_moved(path, old, new) for path in self._folders}
         return None
 
-    def make_folder(self, names: Names) -> Refusal | None:
+    def make_folder(self, names: Names) -> FileRefusal | None:
         """Make a folder."""
         refusal = self._no_room(names)
         if refusal is None:
             self._folders.add(names)
         return refusal
 
-    def remove_folder(self, names: Names) -> Refusal | None:
+    def remove_folder(self, names: Names) -> FileRefusal | None:
         """Remove an empty folder."""
         if not names:
-            return Refusal.PROTECTED
+            return FileRefusal.PROTECTED
         found = self.list(names)
-        if isinstance(found, Refusal):
+        if isinstance(found, FileRefusal):
             return found
         if found:
-            return Refusal.NOT_EMPTY
+            return FileRefusal.NOT_EMPTY
         self._folders.remove(names)
         return None
 
-    def _read(self, names: Names, offset: int, count: int) -> bytes | Refusal:
+    def _read(self, names: Names, offset: int, count: int) -> bytes | FileRefusal:
         return self._no_file(names) or bytes(self._files[names][offset : offset + count])
 
-    def _no_way(self, names: Names) -> Refusal | None:
+    def _no_way(self, names: Names) -> FileRefusal | None:
         """Return why nothing can be at `names`: the folders that lead there."""
         for depth in range(1, len(names)):
             if names[:depth] not in self._folders:
-                return Refusal.NOT_A_FOLDER if names[:depth] in self._files else Refusal.NOT_FOUND
+                return FileRefusal.NOT_A_FOLDER if names[:depth] in self._files else FileRefusal.NOT_FOUND
         return None
 
-    def _no_file(self, names: Names) -> Refusal | None:
+    def _no_file(self, names: Names) -> FileRefusal | None:
         """Return why there is no file."""
         if names in self._files:
             return None
         if names in self._folders:
-            return Refusal.IS_FOLDER
-        return self._no_way(names) or Refusal.NOT_FOUND
+            return FileRefusal.IS_FOLDER
+        return self._no_way(names) or FileRefusal.NOT_FOUND
 
-    def _no_place(self, names: Names) -> Refusal | None:
+    def _no_place(self, names: Names) -> FileRefusal | None:
         """Return why nothing can be put there."""
         if not names:
-            return Refusal.PROTECTED
+            return FileRefusal.PROTECTED
         if names in self._files or names in self._folders:
-            return Refusal.EXISTS
-        return self._no_way(names) or (None if can_be_new(names[-1]) else Refusal.BAD_NAME)
+            return FileRefusal.EXISTS
+        return self._no_way(names) or (None if can_be_new(names[-1]) else FileRefusal.BAD_NAME)
 
-    def _no_room(self, names: Names) -> Refusal | None:
+    def _no_room(self, names: Names) -> FileRefusal | None:
         """Return why nothing new can be made there."""
         full = len(self._files) + len(self._folders) > self._quota.entries  # the root is no entry
-        return self._no_place(names) or (Refusal.NO_SPACE if full else None)
+        return self._no_place(names) or (FileRefusal.NO_SPACE if full else None)
 
 
 def _moved(path: Names, old: Names, new: Names) -> Names:

@@ -14,7 +14,7 @@ LONGEST_NAME_BYTES = 255
 MOST_FOLDERS_DEEP = 16
 
 
-class Refusal(Enum):
+class FileRefusal(Enum):
     """Why something was not done."""
 
     NOT_FOUND = "no such file or folder"
@@ -53,7 +53,7 @@ class Reading(NamedTuple):
     """
 
     size: int
-    read: Callable[[int, int], bytes | Refusal]
+    read: Callable[[int, int], bytes | FileRefusal]
 
 
 class Quota(NamedTuple):
@@ -71,53 +71,53 @@ class Quota(NamedTuple):
 class Files(Protocol):
     """Some files in folders."""
 
-    def list(self, names: Names) -> list[Entry] | Refusal:
+    def list(self, names: Names) -> list[Entry] | FileRefusal:
         """Return what a folder holds, by name."""
         ...
 
-    def open(self, names: Names) -> Reading | Refusal:
+    def open(self, names: Names) -> Reading | FileRefusal:
         """Open a file to read it."""
         ...
 
-    def create(self, names: Names) -> Refusal | None:
+    def create(self, names: Names) -> FileRefusal | None:
         """Make an empty file; one that exists is emptied."""
         ...
 
-    def write(self, names: Names, offset: int, data: bytes) -> Refusal | None:
+    def write(self, names: Names, offset: int, data: bytes) -> FileRefusal | None:
         """Put `data` into a file; a gap before it is zeros."""
         ...
 
-    def truncate(self, names: Names, size: int) -> Refusal | None:
+    def truncate(self, names: Names, size: int) -> FileRefusal | None:
         """Keep the first `size` bytes of a file; nothing where it has fewer."""
         ...
 
-    def remove(self, names: Names) -> Refusal | None:
+    def remove(self, names: Names) -> FileRefusal | None:
         """Remove a file."""
         ...
 
-    def rename(self, old: Names, new: Names) -> Refusal | None:
+    def rename(self, old: Names, new: Names) -> FileRefusal | None:
         """Give a file or folder another place, where nothing is yet."""
         ...
 
-    def make_folder(self, names: Names) -> Refusal | None:
+    def make_folder(self, names: Names) -> FileRefusal | None:
         """Make a folder."""
         ...
 
-    def remove_folder(self, names: Names) -> Refusal | None:
+    def remove_folder(self, names: Names) -> FileRefusal | None:
         """Remove an empty folder."""
         ...
 
 
-def names_of(path: str) -> Names | Refusal:
+def names_of(path: str) -> Names | FileRefusal:
     """Return the names in a path; what begins with a slash and what does not are the same.
 
     There is no way up: a path with ".." leads nowhere.
     """
     names = tuple(name for name in path.split("/") if name not in ("", "."))
     if ".." in names or "\0" in path:
-        return Refusal.NOT_FOUND
+        return FileRefusal.NOT_FOUND
     if len(names) > MOST_FOLDERS_DEEP or not all(map(_fits, names)):
-        return Refusal.BAD_NAME
+        return FileRefusal.BAD_NAME
     return names
 
 
@@ -142,33 +142,33 @@ class ReadOnly:
         """Show `files`."""
         self._files = files
 
-    def list(self, names: Names) -> list[Entry] | Refusal:
+    def list(self, names: Names) -> list[Entry] | FileRefusal:
         """Return what a folder holds, by name."""
         return self._files.list(names)
 
-    def open(self, names: Names) -> Reading | Refusal:
+    def open(self, names: Names) -> Reading | FileRefusal:
         """Open a file to read it."""
         return self._files.open(names)
 
-    def create(self, names: Names) -> Refusal:
+    def create(self, names: Names) -> FileRefusal:
         """Refuse."""
         del names
-        return Refusal.PROTECTED
+        return FileRefusal.PROTECTED
 
-    def write(self, names: Names, offset: int, data: bytes) -> Refusal:
+    def write(self, names: Names, offset: int, data: bytes) -> FileRefusal:
         """Refuse."""
         del names, offset, data
-        return Refusal.PROTECTED
+        return FileRefusal.PROTECTED
 
-    def truncate(self, names: Names, size: int) -> Refusal:
+    def truncate(self, names: Names, size: int) -> FileRefusal:
         """Refuse."""
         del names, size
-        return Refusal.PROTECTED
+        return FileRefusal.PROTECTED
 
-    def rename(self, old: Names, new: Names) -> Refusal:
+    def rename(self, old: Names, new: Names) -> FileRefusal:
         """Refuse."""
         del old, new
-        return Refusal.PROTECTED
+        return FileRefusal.PROTECTED
 
     remove = make_folder = remove_folder = create
 
@@ -202,13 +202,13 @@ class Tree:
         fixed = (*self._mounts, *self._generated, *self._aliases)
         self._folders = {names[:depth] for names in fixed for depth in range(1, len(names))}
 
-    def list(self, names: Names) -> list[Entry] | Refusal:
+    def list(self, names: Names) -> list[Entry] | FileRefusal:
         """Return what a folder holds, by name."""
         if names in self._generated:
-            return Refusal.NOT_A_FOLDER
+            return FileRefusal.NOT_A_FOLDER
         files, rest = self._at(names)
         found = files.list(rest)
-        if isinstance(found, Refusal):
+        if isinstance(found, FileRefusal):
             if names not in self._folders:
                 return found
             found = []
@@ -216,7 +216,7 @@ class Tree:
         entries |= {entry.name: entry for entry in self._fixed_in(names)}
         return [entries[name] for name in sorted(entries)]
 
-    def open(self, names: Names) -> Reading | Refusal:
+    def open(self, names: Names) -> Reading | FileRefusal:
         """Open a file to read it; what is generated stays as it was when it was opened."""
         if names:
             name, _, query = names[-1].partition("?")
@@ -224,59 +224,59 @@ class Tree:
             if generator is not None:
                 return reading_of(generator(query))
         if names in self._folders:
-            return Refusal.IS_FOLDER
+            return FileRefusal.IS_FOLDER
         files, rest = self._at(names)
         return files.open(rest)
 
-    def create(self, names: Names) -> Refusal | None:
+    def create(self, names: Names) -> FileRefusal | None:
         """Make an empty file; one that exists is emptied."""
         if self._is_fixed(names):
-            return Refusal.PROTECTED
+            return FileRefusal.PROTECTED
         files, rest = self._at(names)
         return files.create(rest)
 
-    def write(self, names: Names, offset: int, data: bytes) -> Refusal | None:
+    def write(self, names: Names, offset: int, data: bytes) -> FileRefusal | None:
         """Put `data` into a file; a gap before it is zeros."""
         if self._is_fixed(names):
-            return Refusal.PROTECTED
+            return FileRefusal.PROTECTED
         files, rest = self._at(names)
         return files.write(rest, offset, data)
 
-    def truncate(self, names: Names, size: int) -> Refusal | None:
+    def truncate(self, names: Names, size: int) -> FileRefusal | None:
         """Keep the first `size` bytes of a file; nothing where it has fewer."""
         if self._is_fixed(names):
-            return Refusal.PROTECTED
+            return FileRefusal.PROTECTED
         files, rest = self._at(names)
         return files.truncate(rest, size)
 
-    def remove(self, names: Names) -> Refusal | None:
+    def remove(self, names: Names) -> FileRefusal | None:
         """Remove a file."""
         if self._is_fixed(names):
-            return Refusal.PROTECTED
+            return FileRefusal.PROTECTED
         files, rest = self._at(names)
         return files.remove(rest)
 
-    def rename(self, old: Names, new: Names) -> Refusal | None:
+    def rename(self, old: Names, new: Names) -> FileRefusal | None:
         """Give a file or folder another place, where nothing is yet, in the same mount."""
         if self._is_fixed(old):
-            return Refusal.PROTECTED
+            return FileRefusal.PROTECTED
         if self._is_fixed(new):
-            return Refusal.EXISTS
+            return FileRefusal.EXISTS
         files, rest = self._at(old)
         new_files, new_rest = self._at(new)
-        return files.rename(rest, new_rest) if files is new_files else Refusal.PROTECTED
+        return files.rename(rest, new_rest) if files is new_files else FileRefusal.PROTECTED
 
-    def make_folder(self, names: Names) -> Refusal | None:
+    def make_folder(self, names: Names) -> FileRefusal | None:
         """Make a folder."""
         if self._is_fixed(names):
-            return Refusal.EXISTS
+            return FileRefusal.EXISTS
         files, rest = self._at(names)
         return files.make_folder(rest)
 
-    def remove_folder(self, names: Names) -> Refusal | None:
+    def remove_folder(self, names: Names) -> FileRefusal | None:
         """Remove an empty folder."""
         if self._is_fixed(names):
-            return Refusal.PROTECTED
+            return FileRefusal.PROTECTED
         files, rest = self._at(names)
         return files.remove_folder(rest)
 
@@ -308,6 +308,6 @@ class Tree:
 def _known(path: str) -> Names:
     """Return the names of a path that the program itself gives."""
     names = names_of(path)
-    if isinstance(names, Refusal) or not names:
+    if isinstance(names, FileRefusal) or not names:
         raise ValueError(path)
     return names

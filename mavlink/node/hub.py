@@ -107,6 +107,10 @@ class Hub:
         if number is not None:
             self._forget(number)
 
+    def hear_only(self, names: frozenset[str] | None) -> None:
+        """Hand only messages of these names to services for the time being; None: all."""
+        self.hears_only = names
+
     def receive(
         self, datagram: bytes, link: int, address: Address | None, now_us: int, *, loopback: bool = True
     ) -> None:

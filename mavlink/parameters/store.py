@@ -149,6 +149,10 @@ class Parameters:
         self.prepare = prepare
         self.revision = 0
 
+    def ask(self, prepare: Prepare) -> None:
+        """Have `prepare` asked before a value changes from now on."""
+        self.prepare = prepare
+
     def __len__(self) -> int:
         """Return how many there are."""
         return len(self._definitions)

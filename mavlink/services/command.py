@@ -165,6 +165,10 @@ class CommandService:
         self._answered: dict[tuple[Peer, int], _Answered] = {}
         self._said: tuple[str, int] = ("", -SAME_REASON_AFTER_US)
 
+    def close(self, reason: str) -> None:
+        """Deny every command for the time being, for a reason; without one, obey."""
+        self.closed = reason
+
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         """Obey a command, or cancel one."""
         fields = message.fields

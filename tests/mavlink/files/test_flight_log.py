@@ -6,7 +6,7 @@ import pytest
 
 from colibri.mavlink.files.flight_log import WRITE_BYTES, WRITE_EVERY_US, FlightLog
 from colibri.mavlink.files.memory import Memory
-from colibri.mavlink.files.tree import Quota, Reading, Refusal
+from colibri.mavlink.files.tree import FileRefusal, Quota, Reading
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_the_oldest_logs_give_their_space() -> None:
     refusals = [log.refusal]
     fly(log, b"z" * 2000)
     assert names(memory) == ["00005.tlog"]
-    assert [*refusals, log.refusal] == [None, Refusal.NO_SPACE]
+    assert [*refusals, log.refusal] == [None, FileRefusal.NO_SPACE]
 
 
 def test_a_log_that_is_removed_ends_and_the_next_one_begins(memory: Memory) -> None:
@@ -103,7 +103,7 @@ def test_a_log_that_is_removed_ends_and_the_next_one_begins(memory: Memory) -> N
     memory.remove(("logs", "00001.tlog"))
     memory.remove_folder(("logs",))
     log.update(False, 1)
-    assert (log.name, log.refusal) == (None, Refusal.NOT_FOUND)
+    assert (log.name, log.refusal) == (None, FileRefusal.NOT_FOUND)
     fly(log, b"again")
     assert log.refusal is None
     assert content(memory, "00001.tlog") == stamped((1, b"again"))
@@ -113,7 +113,7 @@ def test_without_a_place_nothing_is_logged(memory: Memory) -> None:
     memory.create(("file",))
     log = FlightLog(memory, ("file",))
     fly(log, b"x")
-    assert (log.name, log.refusal) == (None, Refusal.NOT_A_FOLDER)
+    assert (log.name, log.refusal) == (None, FileRefusal.NOT_A_FOLDER)
 
 
 @pytest.mark.parametrize("name", ["", "x.tlog", "-1.tlog", "².tlog", "00000.tlog", "7.txt", "12"])

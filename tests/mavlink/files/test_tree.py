@@ -12,12 +12,12 @@ from colibri.mavlink.files.folder import Folder
 from colibri.mavlink.files.memory import Memory
 from colibri.mavlink.files.tree import (
     Entry,
+    FileRefusal,
     Files,
     Names,
     Quota,
     Reading,
     ReadOnly,
-    Refusal,
     Tree,
     can_be_new,
     names_of,
@@ -66,7 +66,7 @@ def test_memory_and_disk_do_the_same(operations: list[tuple[object, ...]], tmp_p
         of_disk = getattr(folder, str(name))(*arguments)
         of_memory = getattr(memory, str(name))(*arguments)
         if LONG in str(arguments):  # the disk may find out earlier
-            assert isinstance(of_disk, Refusal) == isinstance(of_memory, Refusal)
+            assert isinstance(of_disk, FileRefusal) == isinstance(of_memory, FileRefusal)
         else:
             assert plain(of_disk) == plain(of_memory), (name, arguments)
     again = Folder(path, QUOTA)  # which counts what the first one left
@@ -130,16 +130,16 @@ def test_quota(make: object, tmp_path: Path) -> None:
     for name in "abcde":
         assert files.create((name,)) is None
     assert files.make_folder(("f",)) is None
-    assert files.create(("g",)) is Refusal.NO_SPACE
-    assert files.make_folder(("g",)) is Refusal.NO_SPACE
+    assert files.create(("g",)) is FileRefusal.NO_SPACE
+    assert files.make_folder(("g",)) is FileRefusal.NO_SPACE
     assert files.create(("a",)) is None  # which exists
     assert files.write(("a",), 199, b"x") is None
-    assert files.write(("b",), 0, b"x") is Refusal.NO_SPACE
-    assert files.write(("a",), 0xFFFFFFFF, b"x") is Refusal.NO_SPACE
+    assert files.write(("b",), 0, b"x") is FileRefusal.NO_SPACE
+    assert files.write(("a",), 0xFFFFFFFF, b"x") is FileRefusal.NO_SPACE
     assert files.write(("a",), 100, b"y" * 100) is None
     assert files.truncate(("a",), 150) is None
     assert files.write(("b",), 0, b"x" * 50) is None
-    assert files.write(("b",), 50, b"x") is Refusal.NO_SPACE
+    assert files.write(("b",), 50, b"x") is FileRefusal.NO_SPACE
     assert files.remove(("a",)) is None
     assert files.write(("b",), 50, b"x" * 150) is None
     assert files.create(("g",)) is None
@@ -193,7 +193,7 @@ def test_nothing_leads_out_of_a_folder(tmp_path: Path) -> None:
     ]
     for names in hostile:
         outcomes = changes(folder, names)
-        assert all(isinstance(outcome, Refusal) for outcome in outcomes), (names, outcomes)
+        assert all(isinstance(outcome, FileRefusal) for outcome in outcomes), (names, outcomes)
     assert folder.list(()) == [Entry("mine", False, 0, int((root / "mine").stat().st_mtime))]
     assert (outside / "secret").read_bytes() == b"secret"
     assert [path.name for path in outside.iterdir()] == ["secret"]
@@ -211,8 +211,8 @@ def test_a_folder_swapped_for_a_link_leads_nowhere(tmp_path: Path) -> None:
     assert isinstance(reading, Reading)
     (tmp_path / "root" / "a").rename(tmp_path / "root" / "b")
     (tmp_path / "root" / "a").symlink_to(tmp_path / "outside")
-    assert isinstance(reading.read(0, 6), Refusal)
-    assert isinstance(folder.write(("a", "secret"), 0, b"x"), Refusal)
+    assert isinstance(reading.read(0, 6), FileRefusal)
+    assert isinstance(folder.write(("a", "secret"), 0, b"x"), FileRefusal)
     folder.close()
 
 
@@ -230,15 +230,15 @@ def test_what_vanishes_is_not_found(tmp_path: Path) -> None:
     assert isinstance(reading, Reading)
     assert reading.read(1, 3) == b"ell"
     (tmp_path / "a").unlink()
-    assert reading.read(0, 5) is Refusal.NOT_FOUND
+    assert reading.read(0, 5) is FileRefusal.NOT_FOUND
     folder.close()
-    assert folder.list(()) is Refusal.FAILED  # whatever the system says: a handle that is closed
+    assert folder.list(()) is FileRefusal.FAILED  # whatever the system says: a handle that is closed
 
 
 @given(st.text())
 def test_no_path_leads_up(path: str) -> None:
     names = names_of(path)
-    if not isinstance(names, Refusal):
+    if not isinstance(names, FileRefusal):
         assert not {"", ".", ".."} & set(names)
         assert not any("/" in name or "\0" in name for name in names)
 
@@ -251,10 +251,10 @@ def test_no_path_leads_up(path: str) -> None:
         (".", ()),
         ("a/b", ("a", "b")),
         ("//a//./b/", ("a", "b")),
-        ("a/../b", Refusal.NOT_FOUND),
-        ("a\0b", Refusal.NOT_FOUND),
-        ("a/" * 17, Refusal.BAD_NAME),
-        ("ü" * 128, Refusal.BAD_NAME),
+        ("a/../b", FileRefusal.NOT_FOUND),
+        ("a\0b", FileRefusal.NOT_FOUND),
+        ("a/" * 17, FileRefusal.BAD_NAME),
+        ("ü" * 128, FileRefusal.BAD_NAME),
     ],
 )
 def test_paths(path: str, names: object) -> None:
@@ -264,7 +264,7 @@ def test_paths(path: str, names: object) -> None:
 @pytest.mark.parametrize("name", ["", ".", "..", "a/b", "a\tb", "a\nb", "\x1b[2J", "\ud800", "x" * 256])
 def test_names_that_nobody_could_list_again_are_refused(name: str) -> None:
     assert not can_be_new(name)
-    assert isinstance(Memory().create((name,)), Refusal)
+    assert isinstance(Memory().create((name,)), FileRefusal)
 
 
 class TestTree:
@@ -298,17 +298,17 @@ class TestTree:
         ]
         assert tree.list(("@PARAM",)) == [Entry("param.pck", False, 2)]
         assert tree.list(("logs",)) == tree.list(("@MAV_LOG",)) == [Entry("1.tlog", False, 3)]
-        assert tree.list(("general.json",)) is Refusal.NOT_A_FOLDER
-        assert tree.list(("nope",)) is Refusal.NOT_FOUND
+        assert tree.list(("general.json",)) is FileRefusal.NOT_A_FOLDER
+        assert tree.list(("nope",)) is FileRefusal.NOT_FOUND
 
     def test_it_opens_everything(self, tree: Tree) -> None:
         assert content(tree, ("general.json",)) == b"{}"
         assert content(tree, ("@PARAM", "param.pck?withdefaults=1")) == b"<withdefaults=1>"
         assert content(tree, ("logs", "1.tlog")) == content(tree, ("@MAV_LOG", "1.tlog")) == b"log"
-        assert tree.open(("@PARAM",)) is Refusal.IS_FOLDER
-        assert tree.open(("logs",)) is Refusal.IS_FOLDER
-        assert tree.open(("logs", "hidden")) is Refusal.NOT_FOUND
-        assert tree.open(("mine?query",)) is Refusal.NOT_FOUND
+        assert tree.open(("@PARAM",)) is FileRefusal.IS_FOLDER
+        assert tree.open(("logs",)) is FileRefusal.IS_FOLDER
+        assert tree.open(("logs", "hidden")) is FileRefusal.NOT_FOUND
+        assert tree.open(("mine?query",)) is FileRefusal.NOT_FOUND
 
     def test_a_folder_has_a_second_path(self) -> None:
         root = Memory()
@@ -318,7 +318,7 @@ class TestTree:
         assert content(tree, ("logs", "a")) == b""
         assert tree.list(("@MAV_LOG",)) == tree.list(("logs",)) == [Entry("a", False, 0)]
         assert tree.rename(("@MAV_LOG", "a"), ("b",)) is None
-        assert tree.remove_folder(("@MAV_LOG",)) is Refusal.PROTECTED
+        assert tree.remove_folder(("@MAV_LOG",)) is FileRefusal.PROTECTED
         assert tree.list(()) == [Entry("@MAV_LOG", True), Entry("b", False), Entry("logs", True)]
 
     def test_what_is_generated_stays_as_it_was_when_opened(self) -> None:
@@ -332,13 +332,13 @@ class TestTree:
     @pytest.mark.parametrize("names", [(), ("logs",), ("@PARAM",), ("general.json",), ("@PARAM", "param.pck")])
     def test_what_it_is_made_of_stays(self, tree: Tree, names: Names) -> None:
         before = tree.list(())
-        assert all(isinstance(outcome, Refusal) for outcome in changes(tree, names)[:8])
+        assert all(isinstance(outcome, FileRefusal) for outcome in changes(tree, names)[:8])
         assert tree.list(()) == before
 
     def test_a_read_only_mount_is_protected(self, tree: Tree, logs: Memory) -> None:
         names = ("logs", "1.tlog")
-        assert set(changes(tree, names)[:5]) == {Refusal.PROTECTED}
-        assert changes(tree, ("logs", "new"))[6:8] == [Refusal.PROTECTED, Refusal.PROTECTED]
+        assert set(changes(tree, names)[:5]) == {FileRefusal.PROTECTED}
+        assert changes(tree, ("logs", "new"))[6:8] == [FileRefusal.PROTECTED, FileRefusal.PROTECTED]
         assert content(logs, ("1.tlog",)) == b"log"
 
     def test_mounts_can_be_written_to(self, tree: Tree, root: Memory, logs: Memory) -> None:
@@ -348,7 +348,7 @@ class TestTree:
         assert tree.rename(("mine",), ("d", "mine")) is None
         assert tree.write(("d", "mine"), 0, b"data") is None
         assert content(root, ("d", "mine")) == b"data"
-        assert tree.rename(("d", "mine"), ("@MAV_LOG", "mine")) is Refusal.PROTECTED
+        assert tree.rename(("d", "mine"), ("@MAV_LOG", "mine")) is FileRefusal.PROTECTED
         assert tree.truncate(("d", "mine"), 2) is None
         assert content(root, ("d", "mine")) == b"da"
         assert tree.remove(("d", "mine")) is None
