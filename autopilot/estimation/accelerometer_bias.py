@@ -93,13 +93,11 @@ class AccelerometerWatch:
 
         `state` (10,) is the filter's nominal state before that.
         """
-        velocity = filter_.velocity
+        velocity, barometer = filter_.velocity, filter_.barometer
         if velocity.resets != self._resets:
             self._resets = velocity.resets
             self._fixes.clear()
-        self._fixes.append(
-            (time_us, state, velocity.test.innovation, filter_.pressure.test.time_us, filter_.pressure_height_m)
-        )
+        self._fixes.append((time_us, state, velocity.test.innovation, barometer.kind.test.time_us, barometer.height_m))
         if velocity.rejected_us is None:
             self._rejected = 0
             return None

@@ -5,9 +5,8 @@ first, so that it is taken anew. For a magnetic field that is the field of the v
 pressure it is the offset of the barometer, and height stays; for GPS it is position or velocity.
 """
 
-from collections.abc import Callable
-from math import hypot, inf, isfinite, nan, radians
-from typing import Any, NamedTuple
+from math import hypot, inf, isfinite, nan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,18 +25,17 @@ from colibri.autopilot.estimation.eskf_predict import (
     Noise,
     predict,
 )
-from colibri.autopilot.estimation.estimate import Test, Tests
+from colibri.autopilot.estimation.estimate import Tests
+from colibri.autopilot.estimation.measurements.kind import FIVE_SIGMA, Kind, KindRecord
+from colibri.autopilot.estimation.measurements.table import instruments_of, kinds_of
 from colibri.autopilot.estimation.sensing.alignment import Aligned
 from colibri.autopilot.estimation.sensing.free_fall import Caught
 from colibri.autopilot.estimation.sensing.rejection import Reason
-from colibri.common.earth.atmosphere import METRES_PER_PASCAL, altitude_m, altitude_slope_m_pa
+from colibri.common.earth.atmosphere import METRES_PER_PASCAL
 from colibri.common.elementary import square
 from colibri.common.types import Array, Vector
 from colibri.mavlink.hil.sensors import GpsFix
 from colibri.plant.vehicle.sensors import Sensors
-
-FIVE_SIGMA = (25.0, 28.74, 31.81)
-"""χ² of one, two and three degrees of freedom that is exceeded as rarely as five standard deviations are."""
 
 _FIX_GATES = np.array([FIVE_SIGMA[2], FIVE_SIGMA[1], FIVE_SIGMA[0]])
 _FIRST_POSITION_M, _FIRST_VELOCITY_M_S, _FIRST_ATTITUDE_RAD, _FIRST_OFFSET_M = 100.0, 0.02, 0.5, 1000.0
@@ -49,8 +47,6 @@ _LEAST_NOISE = 1e-6
 _PLACE_STEP_M, _HEIGHT_STEP_M, _SPEED_STEP_M_S = 0.011, 0.001, 0.01
 """HIL_GPS has degE7, mm and cm/s."""
 _CLAIM_STEP_M = 0.01
-_STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)
-"""By how much the field may differ from the earth's in strength and inclination."""
 _IRON_WALK_GAUSS = 1e-5
 _UNSURE_PART = 0.3
 """Of what position lacked by a bias, as well as that is known."""
@@ -60,15 +56,8 @@ _UNSURE_TURN = 2.0
 """The field does not see a turn about itself: it may be larger than what it sees."""
 _UNSURE_S = 0.5
 """For how long a velocity that has grown wrong was, in the mean."""
-_DOUBTED_M, _DOUBTED_M_S, _DOUBTED_GAUSS = 100.0, 10.0, 0.3
-
-
-class KindRecord(NamedTuple):
-    """When a kind of measurement was last believed, since when it is not, and how often it had to be."""
-
-    accepted_us: int
-    rejected_us: int | None
-    resets: int
+_PATIENCE_US = 7_000_000
+_DOUBTED_M, _DOUBTED_M_S = 100.0, 10.0
 
 
 class FilterRecord(NamedTuple):
@@ -81,80 +70,16 @@ class FilterRecord(NamedTuple):
     gyro_bias_us: int | None
 
 
-class Kind:
-    """One kind of measurement: its last test, and for how long it has been rejected.
-
-    Attributes:
-        test: The last.
-        accepted_us: When it was last believed.
-        rejected_us: Since when it is not; None while it is.
-        resets: How often it had to be believed.
-        nis: Sum of the normalised innovations squared that were believed at once.
-        believed: How many they are.
-    """
-
-    def __init__(self, numbers: int, patience_us: int, doubted: tuple[int, int, float]) -> None:
-        """Measure `numbers` at once; after `patience_us` of rejections, doubt (first state, count, σ) and believe."""
-        self.gate = FIVE_SIGMA[numbers - 1]
-        self.test = Test(-1, (0.0,) * numbers, 0.0, self.gate)
-        self.accepted_us = 0
-        self.rejected_us: int | None = None
-        self._patience_us = patience_us
-        self._doubted = doubted
-        self._y = np.zeros(numbers)
-        self.resets = 0
-        self.nis = 0.0
-        self.believed = 0
-
-    def fuse(self, filter_: "Filter", time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
-        """Fuse a measurement; return whether it was believed."""
-        nis = kernel(filter_.x, filter_.P, *arguments, self.gate, self._y)
-        if self.note(time_us, tuple(self._y.tolist()), nis):
-            return True
-        return self.insist(filter_, time_us, kernel, *arguments)
-
-    def note(self, time_us: int, innovation: tuple[float, ...], nis: float) -> bool:
-        """Note a test; return whether the measurement was believed."""
-        self.test = Test(time_us, innovation, nis, self.gate)
-        if nis <= self.gate:
-            self.accepted_us, self.rejected_us = time_us, None
-            self.nis += nis
-            self.believed += 1
-            return True
-        return False
-
-    def insist(self, filter_: "Filter", time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
-        """Reject a measurement, but believe it if this has lasted too long; return whether it was believed."""
-        if not self.reject(time_us):
-            return False
-        first, count, sigma = self._doubted
-        update.doubt(filter_.P, first, count, sigma * sigma)
-        kernel(filter_.x, filter_.P, *arguments, inf, self._y)
-        self.resets += 1
-        self.accept(time_us)
-        return True
-
-    def accept(self, time_us: int) -> None:
-        """Note that a measurement was believed."""
-        self.accepted_us = time_us
-        self.rejected_us = None
-
-    def reject(self, time_us: int) -> bool:
-        """Note that a measurement was not believed; return whether this has lasted too long."""
-        if self.rejected_us is None:
-            self.rejected_us = time_us
-        return time_us - self.rejected_us >= self._patience_us
-
-
 class Filter:
     """State and covariance, at a time some way behind the vehicle's.
 
     Attributes:
         x: Nominal state, (23,).
         P: Covariance of its error, (22, 22).
-        position, velocity, height, pressure, field: What is measured.
-        kinds: All of them, in the order of `Tests`.
-        pressure_height_m: What pressure told last.
+        position, velocity, height: What GPS measures.
+        magnetometer, barometer: What every vehicle has beside.
+        instruments: All that is fused as it comes, with these two.
+        kinds: Of all measurements, in the order of `table.KINDS`.
         field_gauss: Strength of the earth's field.
         accel_bias_us: When the accelerometer's bias was last taken anew; None if never.
         gyro_bias_us: When the gyroscope's was.
@@ -173,17 +98,16 @@ class Filter:
         self._fix, self._fix_y, self._fix_nis = np.zeros(6), np.zeros(6), np.zeros(3)
         self._claims = (nan, nan)
         self._fix_variances = np.array([speed, self._horizontal, self._vertical])
-        self._field_variance = square(max(sensors.magnetometer.noise_gauss, _LEAST_NOISE))
         self.x, self.P = np.zeros(NOMINAL), np.zeros((ERRORS, ERRORS))
-        self.velocity = Kind(3, 7_000_000, (VELOCITY, 3, _DOUBTED_M_S))
-        self.position = Kind(2, 7_000_000, (POSITION, 2, _DOUBTED_M))
-        self.height = Kind(1, 7_000_000, (POSITION + 2, 1, _DOUBTED_M))
-        self.pressure = Kind(1, 7_000_000, (BARO_OFFSET, 1, _DOUBTED_M))
-        self.field = Kind(3, 10_000_000, (HARD_IRON, 3, _DOUBTED_GAUSS))
-        self.pressure_height_m = 0.0
+        self.velocity = Kind("velocity", 3, _PATIENCE_US, (VELOCITY, 3, _DOUBTED_M_S))
+        self.position = Kind("position", 2, _PATIENCE_US, (POSITION, 2, _DOUBTED_M))
+        self.height = Kind("height", 1, _PATIENCE_US, (POSITION + 2, 1, _DOUBTED_M))
+        self.magnetometer, self.barometer, self.instruments = instruments_of(sensors, field_enu_gauss)
+        of_gps, of_others = (self.velocity, self.position, self.height), (one.kind for one in self.instruments)
+        by_name = {kind.name: kind for kind in (*of_gps, *of_others)}
+        self.kinds = tuple(by_name[name] for name in kinds_of(sensors))
         self.accel_bias_us: int | None = None
         self.gyro_bias_us: int | None = None
-        self.kinds = (self.velocity, self.position, self.height, self.pressure, self.field)
 
     def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
         """Begin at rest: each mean is fused as a measurement, so that the covariance knows what it took from where.
@@ -207,8 +131,7 @@ class Filter:
         update.fuse_height(x, P, place, 0.0, vertical, inf, y1)
         if aligned.pressure_height_m is not None:
             x[19] = aligned.pressure_height_m - x[2]
-            sigma = self._sensors.barometer.noise_pa * METRES_PER_PASCAL
-            variance = square(max(sigma, _LEAST_NOISE)) / aligned.heights
+            variance = self.barometer.variance / aligned.heights
             update.fuse_pressure_height(x, P, aligned.pressure_height_m, variance, inf, y1)
 
     def start_in_air(self, caught: Caught, place_enu_m: Vector, time_us: int) -> None:
@@ -247,7 +170,7 @@ class Filter:
         x, P, sensors = self.x, self.P, self._sensors
         force = square(max(sensors.accelerometer.noise_density_m_s2_rthz, _LEAST_NOISE)) / aligned.duration_s
         rate = square(max(sensors.gyroscope.noise_density_rad_s_rthz, _LEAST_NOISE)) / aligned.duration_s
-        field, y = self._field_variance / aligned.fields, np.zeros(6)
+        field, y = self.magnetometer.variance / aligned.fields, np.zeros(6)
         mean_force, mean_field = np.array(aligned.force), np.array(aligned.field)
         update.fuse_rest(x, P, mean_force, self._gravity, force, mean_field, self._field, field, y)
         for i in range(3):
@@ -258,8 +181,9 @@ class Filter:
 
     def record(self) -> FilterRecord:
         """Return state, covariance and what was believed."""
-        kinds = [KindRecord(kind.accepted_us, kind.rejected_us, kind.resets) for kind in self.kinds]
-        return FilterRecord(self.x, self.P, kinds, self.accel_bias_us, self.gyro_bias_us)
+        return FilterRecord(
+            self.x, self.P, [kind.record() for kind in self.kinds], self.accel_bias_us, self.gyro_bias_us
+        )
 
     def resume(self, record: FilterRecord) -> bool:
         """Go on from a record; return whether it is one of such a filter."""
@@ -267,8 +191,8 @@ class Filter:
             return False
         self.x[:], self.P[:] = record.x, record.P
         self.accel_bias_us, self.gyro_bias_us = record.accel_bias_us, record.gyro_bias_us
-        for kind, (accepted_us, rejected_us, resets) in zip(self.kinds, record.kinds, strict=True):
-            kind.accepted_us, kind.rejected_us, kind.resets = accepted_us, rejected_us, resets
+        for kind, before in zip(self.kinds, record.kinds, strict=True):
+            kind.resume(before)
         return True
 
     def predict(self, samples: Array, row: int) -> None:
@@ -288,28 +212,11 @@ class Filter:
         moves, lies, stands = self._fix_nis.tolist()
         believed = True
         if not self.velocity.note(time_us, (ve, vn, vu), moves):
-            believed &= self.velocity.insist(self, time_us, update.fuse_velocity, z[3:], variances[0])
+            believed &= self.velocity.insist(x, P, time_us, update.fuse_velocity, z[3:], variances[0])
         if not self.position.note(time_us, (e, n), lies):
-            believed &= self.position.insist(self, time_us, update.fuse_horizontal, z[:3], after_s, variances[1])
+            believed &= self.position.insist(x, P, time_us, update.fuse_horizontal, z[:3], after_s, variances[1])
         if not self.height.note(time_us, (u,), stands):
-            believed &= self.height.insist(self, time_us, update.fuse_height, z[:3], after_s, variances[2])
-        return None if believed else Reason.INNOVATION
-
-    def fuse_pressure(self, pressure_pa: float, time_us: int) -> Reason | None:
-        """Fuse a pressure; return why it was rejected, if it was."""
-        height = self.pressure_height_m = altitude_m(pressure_pa)
-        sigma = self._sensors.barometer.noise_pa * altitude_slope_m_pa(pressure_pa)
-        variance = square(max(-sigma, _LEAST_NOISE))
-        believed = self.pressure.fuse(self, time_us, update.fuse_pressure_height, height, variance)
-        return None if believed else Reason.INNOVATION
-
-    def fuse_field(self, field: Vector, time_us: int) -> Reason | None:
-        """Fuse a magnetic field; return why it was rejected, if it was."""
-        measured = np.array(field)
-        is_of_earth = update.is_of_earth(self.x, measured, self._field, _STRENGTH_PART, _DIP_RAD)
-        if not is_of_earth and not self.field.reject(time_us):
-            return Reason.FIELD
-        believed = self.field.fuse(self, time_us, update.fuse_field, measured, self._field, self._field_variance)
+            believed &= self.height.insist(x, P, time_us, update.fuse_height, z[:3], after_s, variances[2])
         return None if believed else Reason.INNOVATION
 
     def take_accel_bias_anew(
@@ -352,13 +259,13 @@ class Filter:
         update.doubt(P, VELOCITY, 3, speed_m_s * speed_m_s)
         self.velocity.resets += 1
         self.velocity.accept(time_us)
-        self.field.accept(self.field.test.time_us)
+        self.magnetometer.kind.accept(self.magnetometer.kind.test.time_us)
         self.gyro_bias_us = time_us
 
     @property
     def tests(self) -> Tests:
         """The last test of each kind."""
-        return Tests(self.velocity.test, self.position.test, self.height.test, self.pressure.test, self.field.test)
+        return {kind.name: kind.test for kind in self.kinds}
 
     @property
     def resets(self) -> int:

@@ -36,7 +36,7 @@ def fuse_horizontal(x: Array, P: Array, place: Array, after_s: float, variance: 
     for i in range(2):
         H[i, POSITION + i], H[i, GPS_DRIFT + i], H[i, VELOCITY + i] = 1.0, 1.0, after_s
         y[i] = place[i] - (x[i] + after_s * x[3 + i] + x[16 + i])
-    return _fuse(x, P, H, y, variance, gate)
+    return fuse_rows(x, P, H, y, variance, gate)
 
 
 @compiled
@@ -45,7 +45,7 @@ def fuse_height(x: Array, P: Array, place: Array, after_s: float, variance: floa
     H = np.zeros((1, ERRORS))
     H[0, POSITION + 2], H[0, GPS_DRIFT + 2], H[0, VELOCITY + 2] = 1.0, 1.0, after_s
     y[0] = place[2] - (x[2] + after_s * x[5] + x[18])
-    return _fuse(x, P, H, y, variance, gate)
+    return fuse_rows(x, P, H, y, variance, gate)
 
 
 @compiled
@@ -55,7 +55,7 @@ def fuse_velocity(x: Array, P: Array, velocity: Array, variance: float, gate: fl
     for i in range(3):
         H[i, VELOCITY + i] = 1.0
         y[i] = velocity[i] - x[3 + i]
-    return _fuse(x, P, H, y, variance, gate)
+    return fuse_rows(x, P, H, y, variance, gate)
 
 
 @compiled
@@ -85,7 +85,7 @@ def fuse_pressure_height(x: Array, P: Array, height: float, variance: float, gat
     H = np.zeros((1, ERRORS))
     H[0, POSITION + 2], H[0, BARO_OFFSET] = 1.0, 1.0
     y[0] = height - (x[2] + x[19])
-    return _fuse(x, P, H, y, variance, gate)
+    return fuse_rows(x, P, H, y, variance, gate)
 
 
 @compiled
@@ -97,7 +97,7 @@ def fuse_field(x: Array, P: Array, measured: Array, field: Array, variance: floa
     for i in range(3):
         H[i, HARD_IRON + i] = 1.0
         y[i] = measured[i] - (body[i] + x[20 + i])
-    return _fuse(x, P, H, y, variance, gate)
+    return fuse_rows(x, P, H, y, variance, gate)
 
 
 @compiled
@@ -127,7 +127,7 @@ def fuse_rest(
         y[3 + i] = (measured[i] - (body[i] + x[20 + i])) / sqrt(field_variance)
     H[:3] /= sqrt(force_variance)
     H[3:] /= sqrt(field_variance)
-    return _fuse(x, P, H, y, 1.0, inf)
+    return fuse_rows(x, P, H, y, 1.0, inf)
 
 
 @compiled
@@ -154,7 +154,8 @@ def is_of_earth(x: Array, measured: Array, field: Array, strength_part: float, d
 
 
 @compiled
-def _fuse(x: Array, P: Array, H: Array, y: Array, variance: float, gate: float) -> float:
+def fuse_rows(x: Array, P: Array, H: Array, y: Array, variance: float, gate: float) -> float:
+    """Correct by an innovation (m,) of linearised measurements H (m, 22), each of this variance."""
     m = len(H)
     C = np.zeros((ERRORS, m))
     for k in range(m):

@@ -1,7 +1,8 @@
 """What the estimator knows of the vehicle, how well, and what it trusts."""
 
+from collections.abc import Mapping
 from enum import IntFlag
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.estimation.sensing.rejection import Rejections
 from colibri.common.types import Vector
@@ -29,14 +30,8 @@ class Test(NamedTuple):
         return self.nis / self.gate
 
 
-class Tests(NamedTuple):
-    """The last test of each kind of measurement."""
-
-    velocity: Test
-    position: Test
-    height: Test
-    pressure: Test
-    field: Test
+Tests: TypeAlias = Mapping[str, Test]
+"""The last test of each kind of measurement that the vehicle has, by name."""
 
 
 class StatusFlags(IntFlag):
@@ -69,10 +64,9 @@ class Health(NamedTuple):
         gps_glitch: Fixes come, and are not believed.
         accelerometer: Its values can be used.
         gyroscope: Its values can be used.
-        magnetometer: It is believed.
-        barometer: It is believed.
         accel_bias: The accelerometer's bias was not taken anew lately.
         gyro_bias: Nor the gyroscope's.
+        not_believed: Other sensors whose values are missing or rejected since long.
     """
 
     attitude: bool
@@ -86,10 +80,9 @@ class Health(NamedTuple):
     gps_glitch: bool
     accelerometer: bool
     gyroscope: bool
-    magnetometer: bool
-    barometer: bool
     accel_bias: bool
     gyro_bias: bool
+    not_believed: tuple[str, ...]
 
     @property
     def flags(self) -> StatusFlags:

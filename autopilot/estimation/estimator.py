@@ -8,7 +8,9 @@ so too, with an observer in place of the second integration, which is exact and 
 """
 
 from collections import deque
+from functools import reduce
 from math import ceil, isfinite
+from operator import or_
 from typing import NamedTuple
 
 import numpy as np
@@ -16,29 +18,25 @@ import numpy as np
 from colibri.autopilot.estimation.accelerometer_bias import AccelerometerWatch
 from colibri.autopilot.estimation.eskf import Filter, FilterRecord
 from colibri.autopilot.estimation.eskf_predict import SAMPLE, look_ahead
-from colibri.autopilot.estimation.estimate import Check, Estimate, Health
+from colibri.autopilot.estimation.estimate import Check, Estimate, Health, Tests
 from colibri.autopilot.estimation.gyroscope_bias import turned_since
+from colibri.autopilot.estimation.measurements.instrument import Instrument, Value
 from colibri.autopilot.estimation.output_smoothing import Blending
 from colibri.autopilot.estimation.sensing.alignment import Aligned, Alignment
 from colibri.autopilot.estimation.sensing.clock_resets import LONGEST_GAP_US, Strays
 from colibri.autopilot.estimation.sensing.free_fall import Caught, Falling
 from colibri.autopilot.estimation.sensing.inertial import Inertial, Reading, sample_between
-from colibri.autopilot.estimation.sensing.plausibility import GpsWatch, Watch
+from colibri.autopilot.estimation.sensing.plausibility import GpsWatch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
 from colibri.common.earth.atmosphere import altitude_m
 from colibri.common.earth.geodesy import Geodetic, enu_of
 from colibri.common.earth.magnetic_field import field_enu_gauss
 from colibri.common.serialization import of_bytes, to_bytes
 from colibri.common.types import Array, Vector
-from colibri.mavlink.hil.sensors import GpsFix, SensorFrame, Updated
+from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
 from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.sensors import Sensors
 
-_FIELD, _PRESSURE = Updated.MAGNETOMETER, Updated.BAROMETER
-"""Plain numbers: flags of an enumeration cost a microsecond."""
-_LARGEST_GAUSS = 4.0
-_LEAST_PA, _MOST_PA = 20e3, 115e3
-_PATIENCE_US = 500_000
 _BRIDGED_S = 0.1
 """A longer gap between two frames is crossed without what was measured at its ends."""
 _SPARE_SAMPLES = 8
@@ -52,7 +50,6 @@ _KNOWN_TILT_RAD, _KNOWN_YAW_RAD = 0.17, 0.26
 _KNOWN_M_S = 1.0
 _KNOWN_M = 5.0
 _FASTEST_M_S = 500.0
-_TYPICAL_PA = 95e3
 _CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000
 """Between two fixes: a frame with one has enough to do."""
 _UPPER = np.triu_indices(9)
@@ -60,11 +57,10 @@ _NOTHING = Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
 
 class _Waiting(NamedTuple):
-    """What was measured at the end of a sample that the filter has not come to."""
+    """What each instrument measured at the end of a sample that the filter has not come to."""
 
     time_us: int
-    field: Vector | None
-    pressure_pa: float | None
+    values: list[Value | None] | None
 
 
 class EstimatorRecord(NamedTuple):
@@ -139,11 +135,14 @@ class Estimator:
         self._strays.clear()
         self._time_us = frame.time_us
         before, self._reading = self._reading, self._inertial.read(frame)
-        field, pressure_pa, fix = self._field_of(frame), self._pressure_of(frame), self._fix_of(frame)
+        rejected = self._rejected
+        reads = frame.updated & self._groups or self._reads_messages
+        values = [read(frame, rejected) for read in self._reads] if reads else None
+        fix = self._fix_of(frame)
         if self._estimate is None or last_us is None:
-            height = None if pressure_pa is None else altitude_m(pressure_pa)
-            aligned = self._alignment.feed(frame.time_us, self._reading, field, height, fix)
-            caught = self._falling.feed(frame.time_us, self._reading, field, height, fix)
+            told = self._told_at_rest(values)
+            aligned = self._alignment.feed(frame.time_us, self._reading, *told, fix)
+            caught = self._falling.feed(frame.time_us, self._reading, *told, fix)
             if aligned is not None:
                 self._start(aligned, frame.time_us)
             elif caught is not None:
@@ -151,7 +150,7 @@ class Estimator:
             else:
                 return None
         else:
-            self._wait(before, (frame.time_us - last_us) * 1e-6, _Waiting(frame.time_us, field, pressure_pa))
+            self._wait(before, (frame.time_us - last_us) * 1e-6, _Waiting(frame.time_us, values))
             self._catch_up(frame.time_us)
             if fix is not None:
                 self._fuse(fix, frame.time_us)
@@ -209,13 +208,15 @@ class Estimator:
         """Forget everything but what was counted."""
         sensors = self._sensors
         self._inertial = Inertial(sensors, self._rejected)
-        self._field_watch = Watch(-_LARGEST_GAUSS, _LARGEST_GAUSS, _PATIENCE_US)
-        self._pressure_watch = Watch(_LEAST_PA, _MOST_PA, _PATIENCE_US)
         self._gps_watch = GpsWatch()
         self._falling = Falling(self._gravity, self._field, sensors.gps.delay_s)
         self.caught = False
         self._alignment = Alignment(sensors, self._gravity, self._field, self._interval_us * 1e-6)
         self.filter = Filter(sensors, self._gravity, self._field)
+        instruments = self.filter.instruments
+        self._reads = [instrument.read for instrument in instruments]
+        self._groups = reduce(or_, (instrument.group for instrument in instruments))
+        self._reads_messages = not all(instrument.group for instrument in instruments)
         self._accelerometer_watch = AccelerometerWatch(sensors, self._gravity)
         self._blending = Blending()
         self._strays = Strays()
@@ -226,24 +227,15 @@ class Estimator:
         self._time_us = None
         self._published_us = 0
         self._estimate: Estimate | None = None
+        self._tests: Tests | None = None
 
-    def _field_of(self, frame: SensorFrame) -> Vector | None:
-        if frame.updated & _FIELD != _FIELD:
-            return None
-        reason = self._field_watch.reason(frame.magnetic_field_flu_gauss, frame.time_us)
-        if reason is not None:
-            self._rejected.add(Source.MAGNETOMETER, reason)
-            return None
-        return frame.magnetic_field_flu_gauss if self._field_watch.is_new else None
-
-    def _pressure_of(self, frame: SensorFrame) -> float | None:
-        if frame.updated & _PRESSURE != _PRESSURE:
-            return None
-        reason = self._pressure_watch.reason((frame.pressure_pa,), frame.time_us)
-        if reason is not None:
-            self._rejected.add(Source.BAROMETER, reason)
-            return None
-        return frame.pressure_pa if self._pressure_watch.is_new else None
+    def _told_at_rest(self, values: list[Value | None] | None) -> tuple[Vector | None, float | None]:
+        """Return magnetic field and height of the barometer, by which a vehicle is aligned."""
+        if values is None:
+            return None, None
+        field, pressure, *_ = values
+        height_m = None if pressure is None else altitude_m(pressure[0])
+        return None if field is None else (field[0], field[1], field[2]), height_m
 
     def _fix_of(self, frame: SensorFrame) -> GpsFix | None:
         if frame.gps is None:
@@ -283,20 +275,33 @@ class Estimator:
 
     def _take(self) -> None:
         """Bring the filter on by one sample."""
-        time_us, field, pressure_pa = self._waiting.popleft()
-        self.filter.predict(self._samples, self._first)
+        time_us, values = self._waiting.popleft()
+        filter_ = self.filter
+        filter_.predict(self._samples, self._first)
         self._first = (self._first + 1) % len(self._samples)
         self.filter_us = time_us
-        if field is not None and (reason := self.filter.fuse_field(field, time_us)) is not None:
-            self._rejected.add(Source.MAGNETOMETER, reason)
-        if pressure_pa is not None and (reason := self.filter.fuse_pressure(pressure_pa, time_us)) is not None:
-            self._rejected.add(Source.BAROMETER, reason)
+        if values is None:
+            return
+        self._tests = None
+        for instrument, value in zip(filter_.instruments, values, strict=True):
+            if value is not None:
+                self._fuse_value(instrument, value, time_us)
+
+    def _fuse_value(self, instrument: Instrument, value: Value, time_us: int) -> None:
+        x = self.filter.x
+        before = x[:6].tolist() if instrument.smoothed else None
+        reason = instrument.fuse(x, self.filter.P, value, time_us)
+        if reason is not None:
+            self._rejected.add(instrument.source, reason)
+        elif before is not None and self._time_us is not None:
+            self._blending.absorb(before, x[:6].tolist(), (self._time_us - time_us) * 1e-6)
 
     def _fuse(self, fix: GpsFix, now_us: int) -> None:
         after_s = (fix.time_us - self._delay_us - self.filter_us) * 1e-6
         if abs(after_s) > _OLDEST_FIX_S:
             self._rejected.add(Source.GPS, Reason.TIME)
             return
+        self._tests = None
         before = self.filter.x[:10].tolist()
         reason = self.filter.fuse_fix(fix, enu_of(fix.place, self._origin), after_s, now_us)
         if reason is not None:
@@ -324,6 +329,7 @@ class Estimator:
         bx, by, bz, ax, ay, az = filter_.x[10:16].tolist()
         p, q, r = self._reading.rate if self._reading.rate_good else (bx, by, bz)
         position, velocity, attitude = sigma[:3], sigma[3:6], sigma[6:9]
+        tests = self._tests = self._tests or filter_.tests
         self._estimate = Estimate(
             StateFrame(
                 now_us,
@@ -338,7 +344,7 @@ class Estimator:
             (bx, by, bz),
             (ax, ay, az),
             self._health(now_us, sigma),
-            filter_.tests,
+            tests,
             self._rejected.counts,
             filter_.resets,
             (-de, -dn, -du),
@@ -365,9 +371,8 @@ class Estimator:
         position_us, velocity_us = filter_.position.accepted_us, filter_.velocity.accepted_us
         believed_us = min(position_us, velocity_us)
         lost = now_us - believed_us > _LATE_US
-        filter_age_us = now_us - self.filter_us
-        field_good = now_us - filter_.field.accepted_us <= _LATE_US + filter_age_us
-        pressure_good = now_us - filter_.pressure.accepted_us <= _LATE_US + filter_age_us
+        late_us = self.filter_us - _LATE_US
+        not_believed = [one.source for one in filter_.instruments if one.kind.accepted_us < late_us]
         return Health(
             reading.rate_good and sigma[6] <= _KNOWN_TILT_RAD and sigma[7] <= _KNOWN_TILT_RAD,
             sigma[8] <= _KNOWN_YAW_RAD,
@@ -380,10 +385,9 @@ class Estimator:
             filter_.position.rejected_us is not None or filter_.velocity.rejected_us is not None,
             reading.force_good,
             reading.rate_good,
-            field_good,
-            pressure_good,
             filter_.accel_bias_us is None or now_us - filter_.accel_bias_us > _LEARNING_US,
             filter_.gyro_bias_us is None or now_us - filter_.gyro_bias_us > _LEARNING_US,
+            tuple(not_believed) if not_believed else (),
         )
 
     def _warm_up(self) -> None:
@@ -393,7 +397,8 @@ class Estimator:
         aligned = Aligned(1.0, force, (0.0, 0.0, 0.0), self._field, 50, 0.0, 50, fix, (1.0, 0.0, 0.0, 0.0))
         self.filter.start(aligned, (0.0, 0.0, 0.0), 0)
         rest = Reading(force, (0.0, 0.0, 0.0), True, True)
-        self._wait(rest, self._interval_us * 1e-6, _Waiting(self._interval_us, self._field, _TYPICAL_PA))
+        typical: list[Value | None] = [instrument.typical() for instrument in self.filter.instruments]
+        self._wait(rest, self._interval_us * 1e-6, _Waiting(self._interval_us, typical))
         self._take()
         self._fuse(fix, self._interval_us)
         self._publish(self._interval_us)

@@ -27,7 +27,7 @@ class Turned(NamedTuple):
 
 def turned_since(filter_: Filter, now_us: int) -> Turned | None:
     """Look at a filter after it has tested a fix; return what a gyroscope that is off has done, if it has."""
-    velocity, field = filter_.velocity, filter_.field
+    velocity, field = filter_.velocity, filter_.magnetometer.kind
     if velocity.rejected_us is None or now_us - velocity.rejected_us < _REJECTED_US:
         return None
     if field.rejected_us is None or field.test.time_us <= field.rejected_us:

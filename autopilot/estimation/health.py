@@ -1,10 +1,13 @@
 """What the estimator's health means to people: lines when it changes, and reasons not to arm."""
 
 from collections.abc import Callable
+from functools import partial
 from math import hypot
 from typing import NamedTuple
 
 from colibri.autopilot.estimation.estimate import Estimate, Health
+from colibri.autopilot.estimation.measurements.instrument import Ratio
+from colibri.autopilot.estimation.measurements.table import RATIOS, ROWS
 from colibri.mavlink.services.statustext import INFO, WARNING
 from colibri.mavlink.telemetry.snapshot import EstimatorState
 from colibri.mavlink.wire.dialect import mav
@@ -24,13 +27,19 @@ class _Matter(NamedTuple):
     again: str
 
 
+def _is_believed(source: str, health: Health) -> bool:
+    return source not in health.not_believed
+
+
 _MATTERS = (
     _Matter(lambda health: health.accelerometer, "accelerometer failed", "accelerometer is back"),
     _Matter(lambda health: health.accel_bias, "accelerometer off: bias learned anew", "accelerometer believed again"),
     _Matter(lambda health: health.gyroscope, "gyroscope failed", "gyroscope is back"),
     _Matter(lambda health: health.gyro_bias, "gyroscope off: bias learned anew", "gyroscope believed again"),
-    _Matter(lambda health: health.magnetometer, "magnetometer not believed", "magnetometer believed again"),
-    _Matter(lambda health: health.barometer, "barometer not believed", "barometer believed again"),
+    *(
+        _Matter(partial(_is_believed, row.source), f"{row.source} not believed", f"{row.source} believed again")
+        for row in ROWS
+    ),
 )
 
 _UNKNOWN: tuple[tuple[Callable[[Health], bool], str], ...] = (
@@ -44,8 +53,7 @@ _UNKNOWN: tuple[tuple[Callable[[Health], bool], str], ...] = (
 _SENSORS: tuple[tuple[Callable[[Health], bool], int], ...] = (
     (lambda health: health.gyroscope, mav.MAV_SYS_STATUS_SENSOR_3D_GYRO),
     (lambda health: health.accelerometer, mav.MAV_SYS_STATUS_SENSOR_3D_ACCEL),
-    (lambda health: health.magnetometer, mav.MAV_SYS_STATUS_SENSOR_3D_MAG),
-    (lambda health: health.barometer, mav.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE),
+    *((partial(_is_believed, row.source), row.bit) for row in ROWS),
     (lambda health: health.gps_lost_since_us is None, mav.MAV_SYS_STATUS_SENSOR_GPS),
 )
 
@@ -74,16 +82,17 @@ def not_known(health: Health) -> str:
 
 def told(estimate: Estimate) -> EstimatorState:
     """Return an estimate's worth as telemetry tells it."""
-    tests, health = estimate.tests, estimate.health
+    health = estimate.health
     east, north, up = estimate.position_std_m
-    failed = sum(bit for well, bit in _SENSORS if not well(health))
+    ratios = [0.0] * len(Ratio)
+    for kind, test in estimate.tests.items():
+        ratio = RATIOS[kind]
+        ratios[ratio] = max(ratios[ratio], test.ratio)
     return EstimatorState(
         flags=int(health.flags),
-        velocity_ratio=tests.velocity.ratio,
-        position_ratio=tests.position.ratio,
-        height_ratio=max(tests.height.ratio, tests.pressure.ratio),
-        field_ratio=tests.field.ratio,
+        ratios=tuple(ratios),
         horizontal_accuracy_m=hypot(east, north),
         vertical_accuracy_m=up,
-        failed_sensors=failed,
+        sensors=sum(row.bit for row in ROWS if row.kind in estimate.tests),
+        failed_sensors=sum(bit for well, bit in _SENSORS if not well(health)),
     )

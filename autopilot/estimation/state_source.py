@@ -1,12 +1,12 @@
 """What the autopilot knows of its vehicle: the state that it is told, or the one that it estimates from sensors."""
 
 from collections.abc import Callable
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.sensors import FixType, Frame, GpsFix, SensorFrame
+from colibri.mavlink.hil.sensors import OWN_MESSAGES, FixType, Frame, GpsFix, SensorFrame
 from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import Vehicle, VehicleError
 
@@ -64,7 +64,7 @@ class Senses:
     Attributes:
         estimate: The last one; None before the first, and where the state is told.
         sensed: What was measured on board last.
-        fix: The last of GPS.
+        latest: The last of each sensor that tells in a message of its own, by the frame's field.
     """
 
     def __init__(self, estimator: Estimator | None, interval_us: int) -> None:
@@ -78,8 +78,14 @@ class Senses:
         self._time_us: int | None = None
         self.estimate: Estimate | None = None
         self.sensed: SensorFrame | None = None
-        self.fix: GpsFix | None = None
+        self.latest: dict[str, Any] = {}
         self._fix_us = 0
+
+    @property
+    def fix(self) -> GpsFix | None:
+        """The last of GPS."""
+        fix: GpsFix | None = self.latest.get("gps")
+        return fix
 
     @property
     def rests(self) -> bool:
@@ -107,8 +113,12 @@ class Senses:
             self._estimating, self.estimate = self._make(self._interval_us), None
         self._time_us = frame.time_us
         self.sensed = frame
+        for row in OWN_MESSAGES:
+            value = getattr(frame, row.field)
+            if value is not None:
+                self.latest[row.field] = value
         if frame.gps is not None:
-            self.fix, self._fix_us = frame.gps, frame.time_us
+            self._fix_us = frame.time_us
         self.estimate = self._estimating.step(frame, asked=asked)
         return None if self.estimate is None else self.estimate.frame
 
@@ -116,7 +126,8 @@ class Senses:
         """Whether there is GPS; where the state is told there is what it would tell."""
         if self._make is None:
             return True
-        return self.fix is not None and self.fix.fix_type >= FixType.FIX_3D and now_us < self._fix_us + _NO_FIX_AFTER_US
+        fix = self.fix
+        return fix is not None and fix.fix_type >= FixType.FIX_3D and now_us < self._fix_us + _NO_FIX_AFTER_US
 
     def _begins_again(self, frame: SensorFrame) -> bool:
         if self._time_us is None:

@@ -126,6 +126,7 @@ class Photographer:
             load=min(duration_s / self._interval_s, 1.0),
             sensed=senses.sensed,
             fix=senses.fix,
+            latest=dict(senses.latest),
             estimator=None if senses.estimate is None else told(senses.estimate),
         )
 

@@ -1,6 +1,6 @@
 """The autopilot's own logs of a flight."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,11 +8,13 @@ import msgspec
 
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Active
 from colibri.autopilot.core.step import Step
-from colibri.autopilot.estimation.estimate import Estimate, Tests
+from colibri.autopilot.estimation.estimate import Estimate
+from colibri.autopilot.estimation.measurements.table import kinds_of
 from colibri.autopilot.process.recorded_inputs import Heard, Setup, line
 from colibri.common.process.log_files import CsvLog, LineLog
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
+from colibri.plant.vehicle.description import load_vehicle
 
 if TYPE_CHECKING:
     from colibri.autopilot.core.step import Received
@@ -30,12 +32,15 @@ ESTIMATE_COLUMNS = (
     *("gyro_bias_x", "gyro_bias_y", "gyro_bias_z", "accel_bias_x", "accel_bias_y", "accel_bias_z"),
     *("flags", "rejected", "resets"),
 )
-CHECK_COLUMNS = (
+_CHECK_COLUMNS = (
     *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz"),
     *(f"P{row}{column}" for row in range(9) for column in range(row, 9)),
-    *(f"nis_{kind}" for kind in Tests._fields),
-    *(f"believed_{kind}" for kind in Tests._fields),
 )
+
+
+def check_columns(kinds: Sequence[str]) -> tuple[str, ...]:
+    """Return the columns of `filter.csv` for a vehicle that has these kinds of measurements."""
+    return (*_CHECK_COLUMNS, *(f"nis_{kind}" for kind in kinds), *(f"believed_{kind}" for kind in kinds))
 
 
 class AutopilotLog:
@@ -54,7 +59,7 @@ class AutopilotLog:
         self._estimates = self._checks = None
         if setup.feedback is Feedback.SENSORS:
             self._estimates = CsvLog(folder / "estimate.csv", ESTIMATE_COLUMNS)
-            self._checks = CsvLog(folder / "filter.csv", CHECK_COLUMNS)
+            self._checks = CsvLog(folder / "filter.csv", check_columns(_kinds_of(setup.vehicle)))
 
     def write(self, step: Step) -> None:
         """Append a control sample; a frame between two of them has nothing to tell but how the filter stands."""
@@ -103,3 +108,8 @@ class AutopilotLog:
         biases = (*estimate.gyro_bias_rad_s, *estimate.accel_bias_m_s2)
         counts = (int(estimate.health.flags), sum(estimate.rejected.values()), estimate.resets)
         log.write((frame.time_us / 1e6, *state, *deviations, *biases, *counts))
+
+
+def _kinds_of(vehicle: str) -> list[str]:
+    sensors = load_vehicle(vehicle).sensors
+    return [] if sensors is None else kinds_of(sensors)

@@ -5,19 +5,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.analysis.consistency import NAVIGATION, Errors
-from colibri.analysis.recording import RecordingError, read_csv
+from colibri.analysis.recording import RecordingError, read_columns, read_csv
+from colibri.autopilot.estimation.measurements.table import KINDS
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.rotations import earth_from_body, euler_from_quaternion, nearest_turn, rotation_matrix
 from colibri.common.types import Array, Vector
 from colibri.flights.plan import FlightPlan
 
 FIGURES = ("control_rmse_m", "estimation_rmse_m", "attitude_rmse_deg", "nees_mean", "nis_mean")
-MEASURED = {"velocity": 3, "position": 2, "height": 1, "pressure": 1, "field": 3}
-"""Each kind of measurement, and how many numbers it has."""
+MEASURED = KINDS
+"""Each kind of measurement that there is, and how many numbers it has; a vehicle need not have all."""
 _UPPER = np.triu_indices(NAVIGATION)
 _COVARIANCE = slice(11, 56)
-_NIS = slice(56, 61)
-_BELIEVED = slice(61, 66)
 
 
 class Estimation(NamedTuple):
@@ -31,8 +30,9 @@ class Estimation(NamedTuple):
         deviation: Standard deviations that the estimator claims: of position (m) and attitude (rad), (n, 6).
         checked_s: Times of the filter, (m,).
         nees: Its normalised estimation error squared at them: position, velocity and attitude together, (m,).
-        nis: Sums of the normalised innovations squared up to them, a column for each of `MEASURED`, (m, 5).
-        believed: How many innovations these are, (m, 5).
+        nis: Sums of the normalised innovations squared up to them, a column for each of `kinds`, (m, k).
+        believed: How many innovations these are, (m, k).
+        kinds: What of `MEASURED` the vehicle has, k names.
     """
 
     t: Array
@@ -44,6 +44,7 @@ class Estimation(NamedTuple):
     nees: Array
     nis: Array
     believed: Array
+    kinds: tuple[str, ...]
 
     def after(self, start_s: float) -> "Estimation":
         """Return what there is from `start_s` on."""
@@ -58,6 +59,7 @@ class Estimation(NamedTuple):
             nees=self.nees[checked],
             nis=self.nis[checked],
             believed=self.believed[checked],
+            kinds=self.kinds,
         )
 
     def figures(self) -> dict[str, Any]:
@@ -80,10 +82,9 @@ class Estimation(NamedTuple):
 
     def _mean_nis(self) -> dict[str, dict[str, float | None]]:
         sums, counts = self.nis[-1] - self.nis[0], self.believed[-1] - self.believed[0]
-        of_kinds = zip(MEASURED.items(), sums.tolist(), counts.tolist(), strict=True)
         return {
-            kind: {"mean": total / count / numbers if count > 0 else None, "innovations": max(int(count), 0)}
-            for (kind, numbers), total, count in of_kinds
+            kind: {"mean": total / count / MEASURED[kind] if count > 0 else None, "innovations": max(int(count), 0)}
+            for kind, total, count in zip(self.kinds, sums.tolist(), counts.tolist(), strict=True)
         }
 
 
@@ -103,6 +104,8 @@ def read_estimation(plan: FlightPlan) -> Estimation:
         _angles_off(estimated, true)
         for estimated, true in zip(said[:, 7:11].tolist(), real[:, 10:14].tolist(), strict=True)
     ]
+    columns = read_columns(plan.out / "filter.csv")
+    kinds = tuple(kind for kind in MEASURED if f"nis_{kind}" in columns)
     checks = _within(read_csv(plan.out / "filter.csv"), truth)
     return Estimation(
         t=said[:, 0],
@@ -114,8 +117,9 @@ def read_estimation(plan: FlightPlan) -> Estimation:
         nees=np.array(
             [_errors(check, real).nees() for check, real in zip(checks, _at(truth, checks[:, 0]), strict=True)]
         ),
-        nis=checks[:, _NIS],
-        believed=checks[:, _BELIEVED],
+        nis=checks[:, [columns.index(f"nis_{kind}") for kind in kinds]],
+        believed=checks[:, [columns.index(f"believed_{kind}") for kind in kinds]],
+        kinds=kinds,
     )
 
 

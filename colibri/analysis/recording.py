@@ -135,6 +135,12 @@ def _euler(quaternions: Array, start_yaw_rad: float) -> Array:
     return np.array(angles)
 
 
+def read_columns(path: Path) -> list[str]:
+    """Return the names of a log's columns."""
+    with path.open(encoding="utf-8") as log:
+        return log.readline().rstrip("\n").split(",")
+
+
 def read_csv(path: Path) -> Array:
     """Return the complete rows of a log; a process that was killed may leave half of one."""
     header, *lines = path.read_text(encoding="utf-8").split("\n")

@@ -17,7 +17,7 @@ from colibri.flights.in_process import SYSTEM_ID, fly_locally
 from colibri.flights.plan import FlightPlan
 from colibri.flights.processes import FlightError, fly_processes
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.sensors import SensorFrame, decode_sensors
+from colibri.mavlink.hil.sensors import OWN_MESSAGES, SensorFrame, decode_sensors
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message
 from colibri.mavlink.wire.tlog import decode
@@ -62,18 +62,18 @@ def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int
 def sensor_frames(tlog: bytes) -> Iterator[SensorFrame]:
     """Read the sensors' frames of a telemetry log, in order."""
     codec = Codec(SYSTEM_ID, dialect.AUTOPILOT_COMPONENT)
-    sensor: Message | None = None
+    parts: list[Message] = []
+    own = {row.message for row in OWN_MESSAGES}
     for _, frame in decode(tlog):
         for message in codec.decode(frame):
             if message.name == "HIL_SENSOR":
-                if sensor is not None:
-                    yield decode_sensors(sensor)
-                sensor = message
-            elif message.name == "HIL_GPS" and sensor is not None:
-                yield decode_sensors(sensor, message)
-                sensor = None
-    if sensor is not None:
-        yield decode_sensors(sensor)
+                if parts:
+                    yield decode_sensors(*parts)
+                parts = [message]
+            elif message.name in own and parts:
+                parts.append(message)
+    if parts:
+        yield decode_sensors(*parts)
 
 
 def _timed(profile: Profile, frames: list[SensorFrame], asked: Callable[[int], bool]) -> list[float]:

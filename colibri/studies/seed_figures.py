@@ -76,7 +76,7 @@ def _draw_nis(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, s
     """Draw the mean NIS of each flight in parts of how many numbers it has, and between which bounds 95 % belong."""
     for number, (quantity, (kind, numbers)) in enumerate(zip(INNOVATIONS, MEASURED.items(), strict=True)):
         shift = _shift(number, len(MEASURED))
-        _strips(axes, flights, cases, quantity, _NIS_COLORS[number], kind, shift)
+        _strips(axes, flights, cases, quantity, _NIS_COLORS[number % len(_NIS_COLORS)], kind, shift)
         for place, case in enumerate(cases):
             of_case = [flown for flown in flights if (flown.contender, flown.track) == case and not flown.lost]
             innovations = max((flown.innovations[number] for flown in of_case), default=0)

@@ -113,7 +113,7 @@ def fly_once(job: Job) -> Flown:
     values, sha256 = _values(figures), figures["trajectory_sha256"]
     lost = f"{values[1]:.1f} m off" if values[1] > LOST_M or figures["max_error_after_20s_m"] > LOST_M else ""
     nis = figures["nis_mean"]
-    innovations = _NO_INNOVATIONS if nis is None else tuple(kind["innovations"] for kind in nis.values())
+    innovations = _NO_INNOVATIONS if nis is None else _of_each(nis, "innovations", 0)
     return Flown(job.contender, job.track, job.seed, lost, values, innovations, sha256)
 
 
@@ -129,9 +129,14 @@ def _values(figures: dict[str, Any]) -> tuple[float, ...]:
     off, turned = figures["estimation_rmse_m"], figures["attitude_rmse_deg"]
     estimated = (np.nan,) * 5 if off is None else (*off.values(), *turned.values())
     nees, nis = figures["nees_mean"], figures["nis_mean"]
-    means = (None,) * len(MEASURED) if nis is None else (kind["mean"] for kind in nis.values())
+    means = (None,) * len(MEASURED) if nis is None else _of_each(nis, "mean", None)
     normalised = (np.nan if value is None else value for value in (nees, *means))
     return (figures["control_rmse_m"], figures["rmse_after_20s_m"], *estimated, *normalised)
+
+
+def _of_each(nis: dict[str, dict[str, Any]], figure: str, without: Any) -> tuple[Any, ...]:
+    """Return a figure of each of `MEASURED`; `without` of what the vehicle does not measure."""
+    return tuple(nis[kind][figure] if kind in nis else without for kind in MEASURED)
 
 
 def _row(flights: Sequence[Flown]) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ is newer than the last. The autopilot then goes on from whatever newer frame it 
 """
 
 from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.hil.sensors import OWN_MESSAGES
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 
@@ -42,7 +43,7 @@ ASKED_BY = {Feedback.STATE: dialect.MSG_ATTITUDE_QUATERNION, Feedback.SENSORS: d
 ASKS_FOR = {message_id: feedback for feedback, message_id in ASKED_BY.items()}
 MADE_OF = {
     Feedback.STATE: ("ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"),
-    Feedback.SENSORS: ("HIL_SENSOR", "HIL_GPS"),
+    Feedback.SENSORS: ("HIL_SENSOR", *(row.message for row in OWN_MESSAGES)),
 }
 
 

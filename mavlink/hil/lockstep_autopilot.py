@@ -111,12 +111,13 @@ class AutopilotEnd:
         return outbox
 
     def _decoded(self, parts: dict[str, Message]) -> Frame | None:
-        first, second = (parts.get(name) for name in self._made_of)
+        first, *others = (parts.get(name) for name in self._made_of)
         if first is None:
             return None
+        came = [message for message in others if message is not None]
         if self._feedback is Feedback.SENSORS:
-            return decode_sensors(first, second)
-        return None if second is None else decode_state(first, second)
+            return decode_sensors(first, *came)
+        return decode_state(first, *came) if came else None
 
     def _next(self, frame: Frame, now_s: float) -> Frame | None:
         lost = self.silence_s(now_s) >= CALL_AFTER_S

@@ -1,15 +1,16 @@
 """What sensors tell the autopilot: dataclasses in SI, ENU/FLU, and the messages of PX4's simulator interface.
 
 HIL_SENSOR has what is measured on board; its `fields_updated` says which groups are new. HIL_GPS comes at its own rate,
-and tells of the past. Units and frames are those that PX4 reads: https://docs.px4.io/main/en/simulation/ and
-https://mavlink.io/en/messages/common.html. Nothing is judged here: an autopilot must cope with any
-number that a broken sensor sends.
+and tells of the past; what else tells in a message of its own is a row of `OWN_MESSAGES`. Units and frames are those
+that PX4 reads: https://docs.px4.io/main/en/simulation/ and https://mavlink.io/en/messages/common.html. Nothing is
+judged here: an autopilot must cope with any number that a broken sensor sends.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from math import degrees, hypot, nan
-from typing import TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from colibri.common.earth.atmosphere import altitude_m
 from colibri.common.earth.geodesy import Geodetic
@@ -96,12 +97,30 @@ class SensorFrame:
         return self.updated & group == group
 
 
+class OwnMessage(NamedTuple):
+    """A sensor that tells in a message of its own, beside HIL_SENSOR, whenever it has something new.
+
+    Attributes:
+        field: Of `SensorFrame`; None there where nothing is new.
+        message: Its name.
+        encoded: (value, simulated time in µs) -> fields of the message.
+        decoded: Message -> value.
+        passed_on: Whether ground stations are told the same message.
+    """
+
+    field: str
+    message: str
+    encoded: Callable[[Any, int], tuple[Any, ...]]
+    decoded: Callable[[Message], Any]
+    passed_on: bool
+
+
 Frame: TypeAlias = StateFrame | SensorFrame
 """What a plant tells its autopilot at one instant of simulated time."""
 
 
 def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
-    """Encode a frame as HIL_SENSOR, and HIL_GPS if there is a fix; the pressure altitude is the standard's."""
+    """Encode a frame as HIL_SENSOR, and the messages of what else is new; the pressure altitude is the standard's."""
     messages = [
         codec.encode(
             "HIL_SENSOR",
@@ -116,14 +135,17 @@ def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
             frame.updated,
         )
     ]
-    if frame.gps is not None:
-        messages.append(_encode_gps(codec, frame.gps))
+    for row in OWN_MESSAGES:
+        value = getattr(frame, row.field)
+        if value is not None:
+            messages.append(codec.encode(row.message, *row.encoded(value, frame.time_us)))
     return messages
 
 
-def decode_sensors(sensor: Message, gps: Message | None = None) -> SensorFrame:
-    """Decode a HIL_SENSOR, and the HIL_GPS that came with it."""
+def decode_sensors(sensor: Message, *others: Message) -> SensorFrame:
+    """Decode a HIL_SENSOR, and those of `OWN_MESSAGES` that came with it."""
     s = sensor.fields
+    told = {row.field: row.decoded(other) for other in others for row in OWN_MESSAGES if row.message == other.name}
     return SensorFrame(
         time_us=s.time_usec,
         updated=s.fields_updated,
@@ -132,14 +154,13 @@ def decode_sensors(sensor: Message, gps: Message | None = None) -> SensorFrame:
         magnetic_field_flu_gauss=frd_from_flu((s.xmag, s.ymag, s.zmag)),
         pressure_pa=s.abs_pressure * 100.0,
         temperature_c=s.temperature,
-        gps=None if gps is None else decode_gps(gps),
+        **told,
     )
 
 
-def _encode_gps(codec: Codec, fix: GpsFix) -> bytes:
+def _gps_fields(fix: GpsFix, _time_us: int) -> tuple[Any, ...]:
     east, north, up = fix.velocity_enu_m_s
-    return codec.encode(
-        "HIL_GPS",
+    return (
         fix.time_us,
         fix.fix_type,
         round(fix.place.latitude_deg * 1e7),
@@ -180,3 +201,7 @@ def _signed_in(speed_m_s: float) -> int:
 
 def _accuracy_m(cm: int) -> float:
     return nan if cm == 65535 else cm / 100.0
+
+
+OWN_MESSAGES: tuple[OwnMessage, ...] = (OwnMessage("gps", "HIL_GPS", _gps_fields, decode_gps, passed_on=False),)
+"""In the order of the frame's datagram."""

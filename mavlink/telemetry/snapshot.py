@@ -1,8 +1,9 @@
 """The vehicle as its telemetry sees it at one instant: plain values in SI, ENU and FLU."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from math import nan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
 from colibri.common.types import FourRotors, Quaternion, Vector
@@ -127,22 +128,19 @@ class EstimatorState(NamedTuple):
 
     Attributes:
         flags: ESTIMATOR_STATUS_FLAGS.
-        velocity_ratio: Of the last test of a velocity: above 1 it was rejected.
-        position_ratio: Of a horizontal position.
-        height_ratio: Of a height.
-        field_ratio: Of the magnetic field.
+        ratios: Of the last tests of velocity, horizontal position, height, magnetic field, height above the ground and
+            airspeed: above 1 one was rejected.
         horizontal_accuracy_m: Standard deviation.
         vertical_accuracy_m: Standard deviation.
+        sensors: MAV_SYS_STATUS_SENSOR bits of those that it reads.
         failed_sensors: MAV_SYS_STATUS_SENSOR bits of those that are not believed.
     """
 
     flags: int
-    velocity_ratio: float
-    position_ratio: float
-    height_ratio: float
-    field_ratio: float
+    ratios: tuple[float, ...]
     horizontal_accuracy_m: float
     vertical_accuracy_m: float
+    sensors: int
     failed_sensors: int
 
 
@@ -192,6 +190,7 @@ class Snapshot:
         load: Part of the time between two frames that the autopilot computes, 0..1.
         sensed: What was measured on board last; None where the state is told.
         fix: The last of GPS; None before it.
+        latest: The last of each sensor that tells in a message of its own, by the field of `SensorFrame`.
         estimator: How well the state is known; None where it is told.
     """
 
@@ -232,4 +231,5 @@ class Snapshot:
     load: float = 0.0
     sensed: SensorFrame | None = None
     fix: GpsFix | None = None
+    latest: Mapping[str, Any] = field(default_factory=dict)
     estimator: EstimatorState | None = None

@@ -47,6 +47,8 @@ def sys_status(s: Snapshot) -> Fields:
         parts |= mav.MAV_SYS_STATUS_SENSOR_BATTERY
     if s.sticks:
         parts |= mav.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+    if s.estimator is not None:
+        parts |= s.estimator.sensors
     fence = mav.MAV_SYS_STATUS_GEOFENCE
     present, enabled = parts | fence, parts | (fence if s.fence_enabled else 0)
     health = parts | (0 if s.fence_breached else fence)
@@ -82,8 +84,8 @@ def flight_information(s: Snapshot) -> Fields:
 def estimator_status(s: Snapshot) -> Fields:
     """ESTIMATOR_STATUS (230). A state that is told is known, and nothing contradicts it."""
     if s.estimator is not None:
-        flags, velocity, position, height, field, horizontal_m, vertical_m, _ = s.estimator
-        return (s.time_us, flags, velocity, position, height, field, 0.0, 0.0, horizontal_m, vertical_m)
+        told = s.estimator
+        return (s.time_us, told.flags, *told.ratios, told.horizontal_accuracy_m, told.vertical_accuracy_m)
     finite = all(map(isfinite, (*s.position_enu_m, *s.velocity_enu_m_s, *s.attitude)))
     return (s.time_us, ESTIMATED if finite else 0, *(0.0,) * 8)
 

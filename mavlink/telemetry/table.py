@@ -3,9 +3,11 @@
 from collections.abc import Callable
 from functools import partial
 
+from colibri.mavlink.hil.sensors import OWN_MESSAGES, OwnMessage
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry import attitude, controller, position, power, sensors, status
 from colibri.mavlink.telemetry.encoder import Constants, Encoder, fitted
+from colibri.mavlink.telemetry.snapshot import Snapshot
 
 
 def telemetry(constants: Constants | None = None) -> dict[str, Encoder]:
@@ -16,7 +18,22 @@ def telemetry(constants: Constants | None = None) -> dict[str, Encoder]:
     c = Constants() if constants is None else constants
     encoders = {name: encoder for module in _PLAIN for name, encoder in module.items()}
     encoders |= {name: partial(encoder, c=c) for name, encoder in _WITH_CONSTANTS.items()}
+    for row in OWN_MESSAGES:
+        if row.passed_on:
+            encoders[row.message] = _passed_on(row, encoders.get(row.message))
     return {name: fitted(name, encoder) for name, encoder in encoders.items()}
+
+
+def _passed_on(row: OwnMessage, otherwise: Encoder | None) -> Encoder:
+    """Return what tells a message as a sensor told it; as it would be `otherwise` where there is no such sensor."""
+
+    def encoder(s: Snapshot) -> Fields | list[Fields] | None:
+        value = s.latest.get(row.field)
+        if value is not None:
+            return row.encoded(value, s.time_us)
+        return None if otherwise is None else otherwise(s)
+
+    return encoder
 
 
 _POSITION: dict[str, Encoder] = {

@@ -5,7 +5,6 @@ from math import sqrt
 
 from colibri.common.kernels import exp
 from colibri.common.types import Vector
-from colibri.plant.vehicle.sensors import Accelerometer, Gyroscope
 
 
 class GaussMarkov:
@@ -76,15 +75,3 @@ class Triad:
         y += truth[1] + noise * next(chance)
         z += truth[2] + noise * next(chance)
         return (min(max(x, -most), most), min(max(y, -most), most), min(max(z, -most), most))
-
-
-def accelerometer(part: Accelerometer, interval_s: float, chance: Iterator[float]) -> Triad:
-    """Return the errors of an accelerometer, m/s²."""
-    walk, turn_on = part.bias_walk_m_s3_rthz, part.turn_on_bias_m_s2
-    return Triad(part.noise_density_m_s2_rthz, walk, turn_on, part.range_m_s2, interval_s, chance)
-
-
-def gyroscope(part: Gyroscope, interval_s: float, chance: Iterator[float]) -> Triad:
-    """Return the errors of a gyroscope, rad/s."""
-    walk, turn_on = part.bias_walk_rad_s2_rthz, part.turn_on_bias_rad_s
-    return Triad(part.noise_density_rad_s_rthz, walk, turn_on, part.range_rad_s, interval_s, chance)

@@ -3,41 +3,20 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Generic, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
-from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.types import Vector
-from colibri.mavlink.hil.faults import (
-    ACCELEROMETER,
-    BAROMETER,
-    DELAYED,
-    GARBAGE,
-    GPS,
-    GYROSCOPE,
-    MAGNETOMETER,
-    OFF,
-    OK,
-    SENSORS,
-    SLOW,
-    STUCK,
-    WRONG,
-    Fault,
-)
-from colibri.mavlink.hil.sensors import GpsFix, SensorFrame, Updated
+from colibri.mavlink.hil.faults import DELAYED, GARBAGE, OFF, OK, SENSORS, SLOW, STUCK, WRONG, Fault
+from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.plant.environment.random_streams import Source, streams
+from colibri.plant.sensors.table import ROWS, is_fitted
+from colibri.plant.vehicle.sensors import Sensors
 
 T = TypeVar("T")
 Add: TypeAlias = Callable[[T, Vector], T]
 """(value, error) -> value with that error."""
 At: TypeAlias = Callable[[T, int], T]
 """(value, simulated time in µs) -> value that claims to be of that time."""
-
-_GROUPS = {
-    GYROSCOPE: Updated.GYROSCOPE,
-    ACCELEROMETER: Updated.ACCELEROMETER,
-    MAGNETOMETER: Updated.MAGNETOMETER,
-    BAROMETER: Updated.BAROMETER,
-}
 
 
 class Reading(Generic[T]):
@@ -92,74 +71,44 @@ class Reading(Generic[T]):
 
 
 class SensorFaults:
-    """The faults of all sensors of one vehicle."""
+    """The faults of all sensors of one vehicle.
 
-    def __init__(self, seed: int) -> None:
+    Attributes:
+        units: FAILURE_UNIT of what it has.
+    """
+
+    def __init__(self, seed: int, parts: Sensors | None) -> None:
         """Have none; more noise will be by chance of `seed`."""
-        chance = dict(zip(SENSORS, streams(seed, Source.FAULTS, len(SENSORS)), strict=True))
-        vectors = (GYROSCOPE, ACCELEROMETER, MAGNETOMETER)
-        self._vectors = {unit: Reading[Vector](_sum, _as_it_is, chance[unit]) for unit in vectors}
-        self._pressure = Reading[float](lambda pa, error: pa + error[0], _as_it_is, chance[BAROMETER])
-        self._gps = Reading[GpsFix](_moved, lambda fix, now_us: replace(fix, time_us=now_us), chance[GPS])
+        chances = dict(zip(SENSORS, streams(seed, Source.FAULTS, len(SENSORS)), strict=True))
+        rows = [] if parts is None else [row for row in ROWS if is_fitted(row, parts)]
+        self._readings = {row.unit: (row, Reading[Any](row.add, row.at, chances[row.unit])) for row in rows}
+        self.units = frozenset(self._readings)
         self._told: SensorFrame | None = None
-        self._fix: GpsFix | None = None
+        self._last: dict[str, Any] = {}
         self._any = False
 
     def begin(self, fault: Fault, now_us: int) -> None:
         """Begin or end a fault; it shows from the next frame on."""
         self._any = True
-        last = self._told
-        if fault.unit == GPS:
-            self._gps.begin(fault, now_us, self._fix)
-        elif fault.unit == BAROMETER:
-            self._pressure.begin(fault, now_us, None if last is None else last.pressure_pa)
-        else:
-            self._vectors[fault.unit].begin(fault, now_us, None if last is None else _vectors_of(last)[fault.unit])
+        row, reading = self._readings[fault.unit]
+        held = self._told is not None and row.group
+        reading.begin(fault, now_us, getattr(self._told, row.field) if held else self._last.get(row.field))
 
     def through(self, frame: SensorFrame) -> SensorFrame:
         """Return what is told of a frame; each is the next one."""
         told = self._changed(frame, self._told or frame) if self._any else frame
-        self._told, self._fix = told, told.gps or self._fix
+        self._told = told
+        for row, _ in self._readings.values():
+            if not row.group and (value := getattr(told, row.field)) is not None:
+                self._last[row.field] = value
         return told
 
     def _changed(self, frame: SensorFrame, before: SensorFrame) -> SensorFrame:
-        now_us, updated = frame.time_us, 0
-        measured, told = _vectors_of(frame), _vectors_of(before)
-        for unit, reading in self._vectors.items():
-            vector = reading.tell(now_us, measured[unit] if frame.has(_GROUPS[unit]) else None)
-            if vector is not None:
-                told[unit] = vector
-                updated |= _GROUPS[unit]
-        pressure_pa = self._pressure.tell(now_us, frame.pressure_pa if frame.has(Updated.BAROMETER) else None)
-        if pressure_pa is not None:
-            updated |= Updated.BAROMETER
-        return replace(
-            frame,
-            updated=updated,
-            specific_force_flu_m_s2=told[ACCELEROMETER],
-            rate_flu_rad_s=told[GYROSCOPE],
-            magnetic_field_flu_gauss=told[MAGNETOMETER],
-            pressure_pa=before.pressure_pa if pressure_pa is None else pressure_pa,
-            gps=self._gps.tell(now_us, frame.gps),
-        )
-
-
-def _vectors_of(frame: SensorFrame) -> dict[int, Vector]:
-    return {
-        GYROSCOPE: frame.rate_flu_rad_s,
-        ACCELEROMETER: frame.specific_force_flu_m_s2,
-        MAGNETOMETER: frame.magnetic_field_flu_gauss,
-    }
-
-
-def _as_it_is(value: T, _now_us: int) -> T:
-    return value
-
-
-def _sum(value: Vector, error: Vector) -> Vector:
-    return (value[0] + error[0], value[1] + error[1], value[2] + error[2])
-
-
-def _moved(fix: GpsFix, error: Vector) -> GpsFix:
-    """Return a fix that is off by metres east, north and up; it claims to be as good as ever."""
-    return replace(fix, place=geodetic_of(error, fix.place))
+        now_us, updated, changes = frame.time_us, 0, dict[str, Any]()
+        for row, reading in self._readings.values():
+            is_new = frame.has(row.group)  # a message of its own is None where it is not
+            value = reading.tell(now_us, getattr(frame, row.field) if is_new else None)
+            if value is not None:
+                updated |= row.group
+            changes[row.field] = getattr(before, row.field) if value is None and row.group else value
+        return replace(frame, updated=updated, **changes)

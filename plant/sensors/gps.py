@@ -2,12 +2,18 @@
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from math import hypot
 
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.common.rotations import earth_from_body
 from colibri.common.types import Vector
+from colibri.mavlink.hil.faults import GPS
 from colibri.mavlink.hil.sensors import GpsFix
+from colibri.plant.physics.equations import attitude_of
+from colibri.plant.physics.world import World
 from colibri.plant.sensors.errors import GaussMarkov
+from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting
 from colibri.plant.vehicle.sensors import Gps
 
 
@@ -61,3 +67,31 @@ class GpsReceiver:
         if self._untold and self._untold[0].time_us <= time_us:
             return self._untold.popleft()
         return None
+
+
+def _switched_on(part: Gps, setting: Setting, chance: Iterator[float]) -> Measure:
+    receiver, rate = GpsReceiver(part, setting.origin, chance), Rate(part.rate_hz)
+
+    def measure(world: World) -> GpsFix | None:
+        if rate.is_due(world.time_us):
+            u, v, w, _, _, _, x, y, z = world.state[:9]
+            receiver.measure(world.time_us, (x, y, z), earth_from_body(attitude_of(world.state), (u, v, w)))
+        return receiver.tell(world.time_us)
+
+    return measure
+
+
+def _moved(fix: GpsFix, error: Vector) -> GpsFix:
+    """Return a fix that is off by metres east, north and up; it claims to be as good as ever."""
+    return replace(fix, place=geodetic_of(error, fix.place))
+
+
+ROW = Instrument(
+    part="gps",
+    field="gps",
+    group=0,
+    unit=GPS,
+    switched_on=_switched_on,
+    add=_moved,
+    at=lambda fix, now_us: replace(fix, time_us=now_us),
+)

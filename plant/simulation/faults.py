@@ -6,10 +6,10 @@ A fault happens at an instant between two frames; what it does then depends on t
 from collections.abc import Sequence
 from dataclasses import replace
 
-from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, STUCK, WRONG, Fault, Part, judged
+from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, SENSORS, STUCK, WRONG, Fault, Part, judged
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult
-from colibri.mavlink.wire.dialect import RESULT_ACCEPTED
+from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_UNSUPPORTED
 from colibri.mavlink.wire.refusal import Refusal
 from colibri.plant.physics.world import Physics, World
 from colibri.plant.sensors.faults import SensorFaults
@@ -35,7 +35,7 @@ class Faults:
         """
         self._physics = physics
         self._battery = vehicle.battery
-        self.sensors = SensorFaults(seed)
+        self.sensors = SensorFaults(seed, vehicle.sensors)
         self.parts = {Part.ROTORS}
         if vehicle.battery is not None:
             self.parts.add(Part.BATTERY)
@@ -48,6 +48,8 @@ class Faults:
         fault = judged(asked, self.parts)
         if isinstance(fault, Refusal):
             return world, FaultResult(asked.unit, asked.kind, fault.result)
+        if fault.unit in SENSORS and fault.unit not in self.sensors.units:
+            return world, FaultResult(asked.unit, asked.kind, RESULT_UNSUPPORTED)
         if fault.unit == MOTOR:
             self._on_rotors(fault, world)
         elif fault.unit == BATTERY:

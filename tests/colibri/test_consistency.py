@@ -42,7 +42,7 @@ def run(path: source.Path) -> Run:
             estimate = estimator.step(frame)
             if estimate is None or k < SETTLED:
                 continue
-            for kind, test in estimate.tests._asdict().items():
+            for kind, test in estimate.tests.items():
                 if test.time_us != last.get(kind):
                     last[kind] = test.time_us
                     nis.setdefault(kind, []).append(test.nis)

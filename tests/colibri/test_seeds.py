@@ -6,10 +6,15 @@ from pathlib import Path
 import pytest
 
 from colibri.analysis.estimation import MEASURED
-from colibri.autopilot.estimation import estimate
+from colibri.autopilot.estimation.measurements.table import kinds_of
 from colibri.cli.main import main
+from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import seeds
 from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, Flown, kept_flights
+
+_SENSORS = load_vehicle("hummingbird").sensors
+assert _SENSORS is not None
+MEASURED_HERE = kinds_of(_SENSORS)
 
 
 def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -32,24 +37,25 @@ def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, capsys: py
     assert len({flight["trajectory_sha256"] for flight in flights}) == 2
     for flight in flights:
         assert flight["lost"] == ""
-        assert all(0.0 < float(flight[quantity]) < 50.0 for quantity in QUANTITIES)
+        assert all(0.0 < float(flight[quantity]) < 50.0 for quantity in set(QUANTITIES) - set(INNOVATIONS))
         assert float(flight["control"]) < float(flight["true"])
-        assert all(0.4 < float(flight[quantity]) < 2.0 for quantity in INNOVATIONS)  # of 20 innovations and more
+        assert all(0.4 < float(flight[f"nis {kind}"]) < 2.0 for kind in MEASURED_HERE)  # of 20 innovations and more
     table = (tmp_path / "seeds.md").read_text(encoding="utf-8")
     assert "| flight | hover | 2 | 0 |" in table
     assert (tmp_path / "seeds.png").stat().st_size > 10_000
     assert "hover" in capsys.readouterr().out
 
 
-def test_the_log_of_the_filter_has_the_kinds_of_its_tests() -> None:
-    assert tuple(MEASURED) == estimate.Tests._fields
+def test_a_vehicle_has_some_of_the_kinds_in_their_order() -> None:
+    assert [kind for kind in MEASURED if kind in MEASURED_HERE] == MEASURED_HERE
+    assert tuple(f"nis {kind}" for kind in MEASURED) == INNOVATIONS
 
 
 def test_what_is_there_is_not_flown_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     values = tuple(0.1 * number for number in range(len(QUANTITIES)))
-    kept = [Flown("flight", "hover", seed, "", values, (1, 2, 3, 4, 5), f"hash {seed}") for seed in (1, 2)]
+    kept = [Flown("flight", "hover", seed, "", values, tuple(range(len(MEASURED))), f"hash {seed}") for seed in (1, 2)]
     options = ["compare", "--quiet", "--track", "hover", "--seeds", "1-2", "--duration", "22", "--out", str(tmp_path)]
 
     def fly_none(_work: object, jobs: list[object], *_: object, **__: object) -> list[object]:

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 
 class Source(StrEnum):
-    """Where a value came from that was rejected."""
+    """Where a value came from that was rejected; a sensor that only some vehicles have is a word beside."""
 
     CLOCK = "clock"
     ACCELEROMETER = "accelerometer"
@@ -28,7 +28,7 @@ class Reason(StrEnum):
     INNOVATION = "innovation"
 
 
-Rejections = Mapping[tuple[Source, Reason], int]
+Rejections = Mapping[tuple[str, Reason], int]
 
 
 class Rejected:
@@ -36,10 +36,10 @@ class Rejected:
 
     def __init__(self) -> None:
         """Begin with nothing."""
-        self._counts: dict[tuple[Source, Reason], int] = {}
+        self._counts: dict[tuple[str, Reason], int] = {}
         self._published: Rejections = MappingProxyType({})
 
-    def add(self, source: Source, reason: Reason) -> None:
+    def add(self, source: str, reason: Reason) -> None:
         """Count one value."""
         key = (source, reason)
         self._counts[key] = self._counts.get(key, 0) + 1

@@ -2,9 +2,10 @@
 
 from colibri.autopilot.estimation.estimate import Health
 from colibri.autopilot.estimation.health import HealthWatch, not_known
+from colibri.autopilot.estimation.sensing.rejection import Source
 from colibri.mavlink.services.statustext import INFO, WARNING
 
-WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True, True, True)
+WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True, ())
 
 
 def test_nothing_is_said_while_all_is_well() -> None:
@@ -13,10 +14,12 @@ def test_nothing_is_said_while_all_is_well() -> None:
 
 def test_each_change_is_said_once() -> None:
     watch = HealthWatch()
-    lost = WELL._replace(magnetometer=False)
+    lost = WELL._replace(not_believed=(Source.MAGNETOMETER,))
     assert watch.lines(lost) == [(WARNING, "magnetometer not believed")]
     assert watch.lines(lost) == []
-    assert watch.lines(lost._replace(barometer=False)) == [(WARNING, "barometer not believed")]
+    assert watch.lines(lost._replace(not_believed=(Source.MAGNETOMETER, Source.BAROMETER))) == [
+        (WARNING, "barometer not believed")
+    ]
     assert watch.lines(WELL) == [(INFO, "magnetometer believed again"), (INFO, "barometer believed again")]
 
 

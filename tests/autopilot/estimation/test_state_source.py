@@ -5,7 +5,6 @@ import pytest
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.track_autopilot import Autopilot
-from colibri.autopilot.estimation import estimate
 from colibri.autopilot.estimation.estimate import Estimate, Health
 from colibri.autopilot.estimation.state_source import Senses, estimator_for
 from colibri.autopilot.ground.stations import StationSettings
@@ -23,12 +22,11 @@ ALIGNED_US = 10 * FRAME_US
 ZERO = (0.0, 0.0, 0.0)
 
 
-UNTESTED = estimate.Test(-1, (), 0.0, 1.0)
-WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True, True, True)
+WELL = Health(True, True, True, True, True, True, False, None, False, True, True, True, True, ())
 
 
 def known(frame: StateFrame) -> Estimate:
-    return Estimate(frame, ZERO, ZERO, ZERO, ZERO, ZERO, WELL, estimate.Tests(*[UNTESTED] * 5), {}, 0, ZERO, None)
+    return Estimate(frame, ZERO, ZERO, ZERO, ZERO, ZERO, WELL, {}, {}, 0, ZERO, None)
 
 
 class Standing:

@@ -20,7 +20,8 @@ from colibri.mavlink.hil.sensors import GpsFix, SensorFrame, Updated
 from colibri.plant.environment.weather import NO_WEATHER
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world
-from colibri.plant.sensors.suite import Rate, SensorSuite
+from colibri.plant.sensors.instrument import Rate
+from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.plant.vehicle.sensors import Sensors
 from tests.strategies import quaternions, reals
@@ -53,6 +54,7 @@ def flawless() -> Sensors:
             if any(flaw in field for flaw in FLAWS) and field != "drift_time_s"
         }
         for sensor in whole.__struct_fields__
+        if getattr(whole, sensor) is not None
     }
     return parts(**without)
 

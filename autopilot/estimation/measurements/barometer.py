@@ -1,0 +1,83 @@
+"""The barometer: height, up to an offset that drifts."""
+
+from colibri.autopilot.estimation import eskf_update as update
+from colibri.autopilot.estimation.eskf_predict import BARO_OFFSET
+from colibri.autopilot.estimation.measurements.instrument import Ratio, Row, Value
+from colibri.autopilot.estimation.measurements.kind import Kind
+from colibri.autopilot.estimation.sensing.plausibility import Watch
+from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
+from colibri.common.earth.atmosphere import METRES_PER_PASCAL, altitude_m, altitude_slope_m_pa
+from colibri.common.elementary import square
+from colibri.common.types import Array, Vector
+from colibri.mavlink.hil.sensors import SensorFrame, Updated
+from colibri.mavlink.wire.dialect import mav
+from colibri.plant.vehicle.sensors import Sensors
+
+_LEAST_PA, _MOST_PA = 20e3, 115e3
+_FROZEN_US = 500_000
+_LEAST_NOISE_M = 1e-6
+_PATIENCE_US = 7_000_000
+_DOUBTED_M = 100.0
+_TYPICAL_PA = 95e3
+
+
+class Barometer:
+    """The barometer of one flight.
+
+    Attributes:
+        source: Whose rejections are counted.
+        kind: Its tests.
+        group: Of `Updated`.
+        smoothed: Its corrections are not given in with time.
+        height_m: What pressure told last.
+    """
+
+    source: str = Source.BAROMETER
+    group = Updated.BAROMETER
+    smoothed = False
+
+    def __init__(self, sensors: Sensors, _field_enu_gauss: Vector) -> None:
+        """Expect any weather."""
+        self._noise_pa = sensors.barometer.noise_pa
+        self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (BARO_OFFSET, 1, _DOUBTED_M))
+        self._watch = Watch(_LEAST_PA, _MOST_PA, _FROZEN_US)
+        self.height_m = 0.0
+
+    @property
+    def variance(self) -> float:
+        """Of a height near the sea, m²."""
+        return square(max(self._noise_pa * METRES_PER_PASCAL, _LEAST_NOISE_M))
+
+    def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
+        """Return a pressure, Pa."""
+        if frame.updated & self.group != self.group:
+            return None
+        value = (frame.pressure_pa,)
+        reason = self._watch.reason(value, frame.time_us)
+        if reason is not None:
+            rejected.add(self.source, reason)
+            return None
+        return value if self._watch.is_new else None
+
+    def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
+        """Fuse a pressure, Pa."""
+        (pressure_pa,) = value
+        height = self.height_m = altitude_m(pressure_pa)
+        variance = square(max(-self._noise_pa * altitude_slope_m_pa(pressure_pa), _LEAST_NOISE_M))
+        believed = self.kind.fuse(x, P, time_us, update.fuse_pressure_height, height, variance)
+        return None if believed else Reason.INNOVATION
+
+    def typical(self) -> Value:
+        """Return the pressure of a place that is not high."""
+        return (_TYPICAL_PA,)
+
+
+ROW = Row(
+    part="barometer",
+    kind="pressure",
+    numbers=1,
+    source=Source.BAROMETER,
+    bit=mav.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE,
+    ratio=Ratio.HEIGHT,
+    fit=Barometer,
+)

@@ -1,0 +1,97 @@
+"""One kind of measurement: its gate and its last test, and when what is rejected for long is accepted again."""
+
+from collections.abc import Callable
+from math import inf
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.estimation import eskf_update as update
+from colibri.autopilot.estimation.estimate import Test
+from colibri.common.types import Array
+
+FIVE_SIGMA = (25.0, 28.74, 31.81)
+"""χ² of one, two and three degrees of freedom that is exceeded as rarely as five standard deviations are."""
+
+
+class KindRecord(NamedTuple):
+    """When a kind of measurement was last believed, since when it is not, and how often it had to be."""
+
+    accepted_us: int
+    rejected_us: int | None
+    resets: int
+
+
+class Kind:
+    """One kind of measurement: its last test, and for how long it has been rejected.
+
+    Attributes:
+        name: In tests and logs.
+        test: The last.
+        accepted_us: When it was last believed.
+        rejected_us: Since when it is not; None while it is.
+        resets: How often it had to be believed.
+        nis: Sum of the normalised innovations squared that were believed at once.
+        believed: How many they are.
+    """
+
+    def __init__(self, name: str, numbers: int, patience_us: int, doubted: tuple[int, int, float]) -> None:
+        """Measure `numbers` at once; after `patience_us` of rejections, doubt (first state, count, σ) and believe."""
+        self.name = name
+        self.gate = FIVE_SIGMA[numbers - 1]
+        self.test = Test(-1, (0.0,) * numbers, 0.0, self.gate)
+        self.accepted_us = 0
+        self.rejected_us: int | None = None
+        self._patience_us = patience_us
+        self._doubted = doubted
+        self._y = np.zeros(numbers)
+        self.resets = 0
+        self.nis = 0.0
+        self.believed = 0
+
+    def fuse(self, x: Array, P: Array, time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
+        """Fuse a measurement into state and covariance; return whether it was believed."""
+        nis = kernel(x, P, *arguments, self.gate, self._y)
+        if self.note(time_us, tuple(self._y.tolist()), nis):
+            return True
+        return self.insist(x, P, time_us, kernel, *arguments)
+
+    def note(self, time_us: int, innovation: tuple[float, ...], nis: float) -> bool:
+        """Note a test; return whether the measurement was believed."""
+        self.test = Test(time_us, innovation, nis, self.gate)
+        if nis <= self.gate:
+            self.accepted_us, self.rejected_us = time_us, None
+            self.nis += nis
+            self.believed += 1
+            return True
+        return False
+
+    def insist(self, x: Array, P: Array, time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
+        """Reject a measurement, but believe it if this has lasted too long; return whether it was believed."""
+        if not self.reject(time_us):
+            return False
+        first, count, sigma = self._doubted
+        update.doubt(P, first, count, sigma * sigma)
+        kernel(x, P, *arguments, inf, self._y)
+        self.resets += 1
+        self.accept(time_us)
+        return True
+
+    def accept(self, time_us: int) -> None:
+        """Note that a measurement was believed."""
+        self.accepted_us = time_us
+        self.rejected_us = None
+
+    def reject(self, time_us: int) -> bool:
+        """Note that a measurement was not believed; return whether this has lasted too long."""
+        if self.rejected_us is None:
+            self.rejected_us = time_us
+        return time_us - self.rejected_us >= self._patience_us
+
+    def record(self) -> KindRecord:
+        """Return when it was believed."""
+        return KindRecord(self.accepted_us, self.rejected_us, self.resets)
+
+    def resume(self, record: KindRecord) -> None:
+        """Go on from a record."""
+        self.accepted_us, self.rejected_us, self.resets = record

@@ -1,0 +1,82 @@
+"""The magnetometer: the earth's field, and the vehicle's own."""
+
+from math import radians
+
+import numpy as np
+
+from colibri.autopilot.estimation import eskf_update as update
+from colibri.autopilot.estimation.eskf_predict import HARD_IRON
+from colibri.autopilot.estimation.measurements.instrument import Ratio, Row, Value
+from colibri.autopilot.estimation.measurements.kind import Kind
+from colibri.autopilot.estimation.sensing.plausibility import Watch
+from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
+from colibri.common.elementary import square
+from colibri.common.types import Array, Vector
+from colibri.mavlink.hil.sensors import SensorFrame, Updated
+from colibri.mavlink.wire.dialect import mav
+from colibri.plant.vehicle.sensors import Sensors
+
+_LARGEST_GAUSS = 4.0
+_FROZEN_US = 500_000
+_LEAST_NOISE_GAUSS = 1e-6
+_STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)
+"""By how much the field may differ from the earth's in strength and inclination."""
+_PATIENCE_US = 10_000_000
+_DOUBTED_GAUSS = 0.3
+
+
+class Magnetometer:
+    """The magnetometer of one flight.
+
+    Attributes:
+        source: Whose rejections are counted.
+        kind: Its tests.
+        group: Of `Updated`.
+        smoothed: Its corrections are not given in with time.
+        variance: Of a value, gauss².
+    """
+
+    source: str = Source.MAGNETOMETER
+    group = Updated.MAGNETOMETER
+    smoothed = False
+
+    def __init__(self, sensors: Sensors, field_enu_gauss: Vector) -> None:
+        """Expect the field of the earth."""
+        self._field = np.array(field_enu_gauss)
+        self.variance = square(max(sensors.magnetometer.noise_gauss, _LEAST_NOISE_GAUSS))
+        self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (HARD_IRON, 3, _DOUBTED_GAUSS))
+        self._watch = Watch(-_LARGEST_GAUSS, _LARGEST_GAUSS, _FROZEN_US)
+
+    def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
+        """Return a field, gauss FLU."""
+        if frame.updated & self.group != self.group:
+            return None
+        reason = self._watch.reason(frame.magnetic_field_flu_gauss, frame.time_us)
+        if reason is not None:
+            rejected.add(self.source, reason)
+            return None
+        return frame.magnetic_field_flu_gauss if self._watch.is_new else None
+
+    def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
+        """Fuse a field, gauss FLU."""
+        measured = np.array(value)
+        is_of_earth = update.is_of_earth(x, measured, self._field, _STRENGTH_PART, _DIP_RAD)
+        if not is_of_earth and not self.kind.reject(time_us):
+            return Reason.FIELD
+        believed = self.kind.fuse(x, P, time_us, update.fuse_field, measured, self._field, self.variance)
+        return None if believed else Reason.INNOVATION
+
+    def typical(self) -> Value:
+        """Return the earth's field of a level vehicle that looks east."""
+        return tuple(self._field.tolist())
+
+
+ROW = Row(
+    part="magnetometer",
+    kind="field",
+    numbers=3,
+    source=Source.MAGNETOMETER,
+    bit=mav.MAV_SYS_STATUS_SENSOR_3D_MAG,
+    ratio=Ratio.FIELD,
+    fit=Magnetometer,
+)

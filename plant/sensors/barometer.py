@@ -1,0 +1,39 @@
+"""The plant's barometer: the standard atmosphere, a slow drift, and noise."""
+
+from collections.abc import Iterator
+
+from colibri.common.earth.atmosphere import pressure_pa
+from colibri.mavlink.hil.faults import BAROMETER
+from colibri.mavlink.hil.sensors import Updated
+from colibri.plant.physics.world import World
+from colibri.plant.sensors.errors import GaussMarkov
+from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting, as_it_is
+from colibri.plant.vehicle.sensors import Barometer
+
+
+def _switched_on(part: Barometer, setting: Setting, chance: Iterator[float]) -> Measure:
+    drift, rate = GaussMarkov(part.drift_pa, part.drift_time_s, chance), Rate(part.rate_hz)
+    ground_m, measured_us = setting.origin.altitude_m, None
+
+    def measure(world: World) -> float | None:
+        nonlocal measured_us
+        if not rate.is_due(world.time_us):
+            return None
+        if measured_us is not None:
+            drift.after((world.time_us - measured_us) * 1e-6)
+        measured_us = world.time_us
+        noise_pa = part.noise_pa * next(chance)
+        return pressure_pa(ground_m + world.state[8]) + drift.value + noise_pa
+
+    return measure
+
+
+ROW = Instrument(
+    part="barometer",
+    field="pressure_pa",
+    group=Updated.BAROMETER,
+    unit=BAROMETER,
+    switched_on=_switched_on,
+    add=lambda pascal, error: pascal + error[0],
+    at=as_it_is,
+)

@@ -1,0 +1,48 @@
+"""The plant's accelerometer and gyroscope: they tell at every frame."""
+
+from collections.abc import Iterator
+
+from colibri.mavlink.hil.faults import ACCELEROMETER, GYROSCOPE
+from colibri.mavlink.hil.sensors import Updated
+from colibri.plant.physics.world import World
+from colibri.plant.sensors.errors import Triad
+from colibri.plant.sensors.instrument import Instrument, Measure, Setting, as_it_is, vector_sum
+from colibri.plant.vehicle.sensors import Accelerometer, Gyroscope
+
+
+def _accelerometer(part: Accelerometer, setting: Setting, chance: Iterator[float]) -> Measure:
+    walk, turn_on = part.bias_walk_m_s3_rthz, part.turn_on_bias_m_s2
+    errors = Triad(part.noise_density_m_s2_rthz, walk, turn_on, part.range_m_s2, setting.interval_s, chance)
+    specific_force = setting.physics.specific_force
+    return lambda world: errors.measure(specific_force(world))
+
+
+def _gyroscope(part: Gyroscope, setting: Setting, chance: Iterator[float]) -> Measure:
+    walk, turn_on = part.bias_walk_rad_s2_rthz, part.turn_on_bias_rad_s
+    errors = Triad(part.noise_density_rad_s_rthz, walk, turn_on, part.range_rad_s, setting.interval_s, chance)
+
+    def measure(world: World) -> tuple[float, float, float]:
+        p, q, r = world.state[3:6]
+        return errors.measure((p, q, r))
+
+    return measure
+
+
+ACCELEROMETER_ROW = Instrument(
+    part="accelerometer",
+    field="specific_force_flu_m_s2",
+    group=Updated.ACCELEROMETER,
+    unit=ACCELEROMETER,
+    switched_on=_accelerometer,
+    add=vector_sum,
+    at=as_it_is,
+)
+GYROSCOPE_ROW = Instrument(
+    part="gyroscope",
+    field="rate_flu_rad_s",
+    group=Updated.GYROSCOPE,
+    unit=GYROSCOPE,
+    switched_on=_gyroscope,
+    add=vector_sum,
+    at=as_it_is,
+)

@@ -1,0 +1,76 @@
+"""What the plant asks of a sensor: the truth in, what it tells at that frame out; and what faults do to that."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple, TypeAlias, TypeVar
+
+from colibri.common.earth.geodesy import Geodetic
+from colibri.common.types import Vector
+from colibri.plant.physics.world import Physics, World
+
+T = TypeVar("T")
+Measure: TypeAlias = Callable[[World], Any]
+"""The world at a frame, each the next one -> what a sensor tells; None where that is nothing new."""
+
+_ROUNDING = 1e-9
+
+
+class Setting(NamedTuple):
+    """Where the sensors of one vehicle are.
+
+    Attributes:
+        physics: Of the world that they measure.
+        origin: Of the ENU frame.
+        interval_s: Between two frames.
+    """
+
+    physics: Physics
+    origin: Geodetic
+    interval_s: float
+
+
+class Instrument(NamedTuple):
+    """A sensor that a vehicle may have.
+
+    Attributes:
+        part: Its table in the vehicle file's sensors; a vehicle without it has no such sensor.
+        field: Of `SensorFrame`.
+        group: Of `Updated`: its field then holds what was told last; 0 where that is None between two values.
+        unit: FAILURE_UNIT.
+        switched_on: (table, setting, standard normal numbers of its own) -> what it tells.
+        add: (value, error of a fault) -> value with that error.
+        at: (value, simulated time in µs) -> value that claims to be of that time.
+    """
+
+    part: str
+    field: str
+    group: int
+    unit: int
+    switched_on: Callable[[Any, Setting, Iterator[float]], Measure]
+    add: Callable[[Any, Vector], Any]
+    at: Callable[[Any, int], Any]
+
+
+class Rate:
+    """Samples at the first frame at or after each multiple of its interval."""
+
+    def __init__(self, rate_hz: float) -> None:
+        """Be due first at the first frame."""
+        self._rate_mhz = rate_hz * 1e-6
+        self._samples = -1
+
+    def is_due(self, time_us: int) -> bool:
+        """Whether there is a sample at this frame; to be asked once a frame."""
+        samples = int(time_us * self._rate_mhz + _ROUNDING)
+        due = samples > self._samples
+        self._samples = samples
+        return due
+
+
+def as_it_is(value: T, _now_us: int) -> T:
+    """Return a value that says nothing of its time."""
+    return value
+
+
+def vector_sum(value: Vector, error: Vector) -> Vector:
+    """Return a vector with an error."""
+    return (value[0] + error[0], value[1] + error[1], value[2] + error[2])

@@ -1,0 +1,43 @@
+"""The plant's magnetometer: the earth's field in the body, the vehicle's own, and noise."""
+
+from collections.abc import Iterator
+
+from colibri.common.earth.magnetic_field import field_enu_gauss
+from colibri.common.rotations import earth_from_body
+from colibri.common.types import Vector
+from colibri.mavlink.hil.faults import MAGNETOMETER
+from colibri.mavlink.hil.sensors import Updated
+from colibri.plant.physics.equations import attitude_of
+from colibri.plant.physics.world import World
+from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting, as_it_is, vector_sum
+from colibri.plant.vehicle.sensors import Magnetometer
+
+
+def _switched_on(part: Magnetometer, setting: Setting, chance: Iterator[float]) -> Measure:
+    earth_gauss, rate, noise = field_enu_gauss(setting.origin), Rate(part.rate_hz), part.noise_gauss
+    own = part.hard_iron_gauss
+    iron = (own * next(chance), own * next(chance), own * next(chance))
+
+    def measure(world: World) -> Vector | None:
+        if not rate.is_due(world.time_us):
+            return None
+        qw, qx, qy, qz = attitude_of(world.state)
+        x, y, z = earth_from_body((qw, -qx, -qy, -qz), earth_gauss)
+        return (
+            x + iron[0] + noise * next(chance),
+            y + iron[1] + noise * next(chance),
+            z + iron[2] + noise * next(chance),
+        )
+
+    return measure
+
+
+ROW = Instrument(
+    part="magnetometer",
+    field="magnetic_field_flu_gauss",
+    group=Updated.MAGNETOMETER,
+    unit=MAGNETOMETER,
+    switched_on=_switched_on,
+    add=vector_sum,
+    at=as_it_is,
+)
