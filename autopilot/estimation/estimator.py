@@ -111,6 +111,7 @@ class Estimator:
         self._now = np.zeros(19)
         self._rejected = Rejected()
         self._time_us: int | None = None
+        self._at_rest: list[Value | None] = []
         self._reading = _NOTHING
         self._restart()
         self._warm_up()
@@ -141,6 +142,8 @@ class Estimator:
         fix = self._fix_of(frame)
         if self._estimate is None or last_us is None:
             told = self._told_at_rest(values)
+            if values is not None:
+                self._at_rest = [new or old for new, old in zip(values, self._at_rest, strict=True)]
             aligned = self._alignment.feed(frame.time_us, self._reading, *told, fix)
             caught = self._falling.feed(frame.time_us, self._reading, *told, fix)
             if aligned is not None:
@@ -216,6 +219,7 @@ class Estimator:
         instruments = self.filter.instruments
         self._reads = [instrument.read for instrument in instruments]
         self._groups = reduce(or_, (instrument.group for instrument in instruments))
+        self._at_rest = [None] * len(instruments)
         self._reads_messages = not all(instrument.group for instrument in instruments)
         self._accelerometer_watch = AccelerometerWatch(sensors, self._gravity)
         self._blending = Blending()
@@ -249,6 +253,9 @@ class Estimator:
     def _start(self, aligned: Aligned, time_us: int) -> None:
         self._published_us = time_us
         self.filter.start(aligned, enu_of(aligned.fix.place, self._origin), time_us)
+        for instrument, value in zip(self.filter.instruments, self._at_rest, strict=True):
+            if instrument.smoothed and value is not None:
+                instrument.fuse(self.filter.x, self.filter.P, value, time_us)
         self.filter_us = time_us
 
     def _start_in_air(self, caught: Caught, time_us: int) -> None:
