@@ -20,6 +20,7 @@ ACCELEROMETER: int = mav.FAILURE_UNIT_SENSOR_ACCEL
 MAGNETOMETER: int = mav.FAILURE_UNIT_SENSOR_MAG
 BAROMETER: int = mav.FAILURE_UNIT_SENSOR_BARO
 GPS: int = mav.FAILURE_UNIT_SENSOR_GPS
+RANGEFINDER: int = mav.FAILURE_UNIT_SENSOR_DISTANCE_SENSOR
 BATTERY: int = mav.FAILURE_UNIT_SYSTEM_BATTERY
 MOTOR: int = mav.FAILURE_UNIT_SYSTEM_MOTOR
 OK: int = mav.FAILURE_TYPE_OK
@@ -30,7 +31,7 @@ WRONG: int = mav.FAILURE_TYPE_WRONG
 SLOW: int = mav.FAILURE_TYPE_SLOW
 DELAYED: int = mav.FAILURE_TYPE_DELAYED
 
-SENSORS = (GYROSCOPE, ACCELEROMETER, MAGNETOMETER, BAROMETER, GPS)
+SENSORS = (GYROSCOPE, ACCELEROMETER, MAGNETOMETER, BAROMETER, GPS, RANGEFINDER)
 ALL = 0
 """The instance that stands for all of a part."""
 MOTORS = 4
@@ -161,6 +162,13 @@ ROWS: tuple[Row, ...] = (
         _vector("drift", "m/s", "xyz", 100.0, (0.5, 0.0, 0.0)),
         _scalar("standard deviation", "m", 0.01, 1000.0, 10.0),
         "a distance, east-north-up",
+    ),
+    *_sensor(
+        RANGEFINDER,
+        (_scalar("bias", "m", -100.0, 100.0, 1.0),),
+        (_scalar("drift", "m/s", -10.0, 10.0, 0.05),),
+        _scalar("standard deviation", "m", 0.001, 100.0, 0.5),
+        "a distance",
     ),
     Row(BATTERY, OK, Part.BATTERY, "is well again, and has back what a fault took"),
     Row(BATTERY, OFF, Part.BATTERY, "is empty: its voltage falls to that of no charge"),

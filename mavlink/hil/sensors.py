@@ -9,7 +9,7 @@ judged here: an autopilot must cope with any number that a broken sensor sends.
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from math import degrees, hypot, nan
+from math import degrees, hypot, inf, isfinite, nan
 from typing import Any, NamedTuple, TypeAlias
 
 from colibri.common.earth.atmosphere import altitude_m
@@ -17,8 +17,12 @@ from colibri.common.earth.geodesy import Geodetic
 from colibri.common.kernels import atan2
 from colibri.common.types import Vector
 from colibri.mavlink.hil.state import StateFrame
-from colibri.mavlink.wire.dialect import Codec, Message
+from colibri.mavlink.wire.dialect import Codec, Message, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
+
+_UNKNOWN_COVARIANCE = 255
+_INVALID, _PERFECT = 1, 100
+"""DISTANCE_SENSOR.signal_quality."""
 
 
 class Updated:
@@ -66,6 +70,22 @@ class GpsFix:
     satellites: int
 
 
+class Distance(NamedTuple):
+    """What a rangefinder that looks down tells.
+
+    Attributes:
+        distance_m: To the ground, along the vehicle's own axis; infinite where it sees none.
+        min_m: What is nearer it does not see.
+        max_m: What is farther it does not see.
+        field_of_view_rad: Angle of its beam's cone.
+    """
+
+    distance_m: float
+    min_m: float
+    max_m: float
+    field_of_view_rad: float
+
+
 @dataclass(frozen=True, slots=True)
 class SensorFrame:
     """What is measured on board at one instant of simulated time, and what GPS has told since the frame before.
@@ -81,6 +101,7 @@ class SensorFrame:
         pressure_pa: Static pressure.
         temperature_c: Of the barometer, degrees Celsius.
         gps: None between two fixes.
+        distance: Of the rangefinder; None between two samples, and without one.
     """
 
     time_us: int
@@ -91,6 +112,7 @@ class SensorFrame:
     pressure_pa: float
     temperature_c: float
     gps: GpsFix | None = None
+    distance: Distance | None = None
 
     def has(self, group: int) -> bool:
         """Whether a group is new."""
@@ -203,5 +225,25 @@ def _accuracy_m(cm: int) -> float:
     return nan if cm == 65535 else cm / 100.0
 
 
-OWN_MESSAGES: tuple[OwnMessage, ...] = (OwnMessage("gps", "HIL_GPS", _gps_fields, decode_gps, passed_on=False),)
+def _distance_fields(told: Distance, time_us: int) -> tuple[Any, ...]:
+    """DISTANCE_SENSOR: cm; a laser that looks down. What sees nothing has a quality of 1, "invalid"."""
+    sees = isfinite(told.distance_m)
+    limits_cm = (_in(told.min_m, 1e2, 65534), _in(told.max_m, 1e2, 65534))
+    distance_cm = _in(told.distance_m, 1e2, 65535) if sees else limits_cm[1] + 1
+    sensor = (mav.MAV_DISTANCE_SENSOR_LASER, 0, mav.MAV_SENSOR_ROTATION_PITCH_270, _UNKNOWN_COVARIANCE)
+    beam = (told.field_of_view_rad, told.field_of_view_rad, (0.0,) * 4)
+    quality = _PERFECT if sees else _INVALID
+    return ((time_us // 1000) % 2**32, *limits_cm, distance_cm, *sensor, *beam, quality)
+
+
+def _decode_distance(message: Message) -> Distance:
+    d = message.fields
+    distance_m = inf if d.signal_quality == _INVALID else d.current_distance / 100.0
+    return Distance(distance_m, d.min_distance / 100.0, d.max_distance / 100.0, d.horizontal_fov)
+
+
+OWN_MESSAGES: tuple[OwnMessage, ...] = (
+    OwnMessage("gps", "HIL_GPS", _gps_fields, decode_gps, passed_on=False),
+    OwnMessage("distance", "DISTANCE_SENSOR", _distance_fields, _decode_distance, passed_on=True),
+)
 """In the order of the frame's datagram."""

@@ -1,6 +1,6 @@
 """The table of sensors that a vehicle may have: one that is added is a row here and a file beside."""
 
-from colibri.plant.sensors import barometer, gps, inertial, magnetometer
+from colibri.plant.sensors import barometer, gps, inertial, magnetometer, rangefinder
 from colibri.plant.sensors.instrument import Instrument
 from colibri.plant.vehicle.sensors import Sensors
 
@@ -10,6 +10,7 @@ ROWS: tuple[Instrument, ...] = (
     magnetometer.ROW,
     barometer.ROW,
     gps.ROW,
+    rangefinder.ROW,
 )
 """The place of a row is that of its stream of chance: what is new belongs at the end."""
 

@@ -101,11 +101,36 @@ class Gps(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
     satellites: Annotated[int, msgspec.Meta(ge=4, le=64)]
 
 
+class Rangefinder(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Measures the distance to the ground along the vehicle's own axis, downward."""
+
+    rate_hz: Positive
+    min_m: NotNegative
+    """What is nearer is not seen."""
+    max_m: Positive
+    """What is farther is not seen."""
+    noise_m: NotNegative
+    """White, standard deviation of a sample near by."""
+    noise_part: NotNegative
+    """Of the distance, standard deviation: adds to that in square."""
+    field_of_view_rad: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+    """Angle of the beam's cone; what is nearest in it is measured."""
+    height_m: Positive
+    """Of the sensor above the ground while the vehicle stands on its feet."""
+
+    def __post_init__(self) -> None:
+        """Check what a range cannot say."""
+        super().__post_init__()
+        if self.min_m >= self.max_m:
+            raise ValueError("min_m: must lie below max_m")
+
+
 class Sensors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """All sensors of a vehicle."""
+    """All sensors of a vehicle; what is None it has not."""
 
     accelerometer: Accelerometer
     gyroscope: Gyroscope
     magnetometer: Magnetometer
     barometer: Barometer
     gps: Gps
+    rangefinder: Rangefinder | None = None

@@ -1,13 +1,13 @@
 """The table of what the filter fuses: a sensor that is added is a row here and a file beside."""
 
-from colibri.autopilot.estimation.measurements import barometer, magnetometer
+from colibri.autopilot.estimation.measurements import barometer, magnetometer, rangefinder
 from colibri.autopilot.estimation.measurements.barometer import Barometer
 from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio, Row
 from colibri.autopilot.estimation.measurements.magnetometer import Magnetometer
 from colibri.common.types import Vector
 from colibri.plant.vehicle.sensors import Sensors
 
-ROWS: tuple[Row, ...] = (magnetometer.ROW, barometer.ROW)
+ROWS: tuple[Row, ...] = (magnetometer.ROW, barometer.ROW, rangefinder.ROW)
 """In the order in which what was measured at one instant is fused. Every vehicle has the first two."""
 
 GPS_KINDS = {"velocity": 3, "position": 2, "height": 1}

@@ -1,0 +1,142 @@
+"""The rangefinder: height above the ground, which is flat, seen down the vehicle's own axis.
+
+Near the ground, and upright, its distance is that height over the cosine of the tilt, less half of the beam. The ground
+is where the vehicle stands at the start, height 0, until the distance contradicts that for long: it is then taken anew,
+and height stays.
+"""
+
+from math import cos, inf, sin, sqrt
+
+import numpy as np
+
+from colibri.autopilot.estimation.eskf_predict import ATTITUDE, ERRORS, POSITION
+from colibri.autopilot.estimation.eskf_update import fuse_rows
+from colibri.autopilot.estimation.measurements.instrument import Ratio, Row, Value
+from colibri.autopilot.estimation.measurements.kind import Kind
+from colibri.autopilot.estimation.sensing.plausibility import Watch
+from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected
+from colibri.common.elementary import square
+from colibri.common.jit import compiled
+from colibri.common.types import Array, Vector
+from colibri.mavlink.hil.sensors import SensorFrame
+from colibri.mavlink.wire.dialect import mav
+from colibri.plant.vehicle.sensors import Sensors
+
+_USED_BELOW_M = 5.0
+"""Of height above the ground, as PX4's EKF2_RNG_A_HMAX: farther below, the ground need not be that of the start."""
+_LEAST_COSINE = 0.7
+"""Of the tilt: beyond 45° the beam meets the ground somewhere else."""
+_ROUGHNESS_M = 0.01
+_WIRE_STEP_M = 0.01
+_FROZEN_US = 500_000
+_PATIENCE_US = 7_000_000
+
+
+class RangefinderBelow:
+    """The rangefinder of one flight.
+
+    Attributes:
+        source: Whose rejections are counted.
+        kind: Its tests.
+        group: It tells in a message of its own.
+        smoothed: Its corrections are given in with time: one that comes near the ground again may be off by decimetres.
+        ground_m: Where the ground is, z of ENU, less what the vehicle stands on.
+    """
+
+    source = "rangefinder"
+    group = 0
+    smoothed = True
+
+    def __init__(self, sensors: Sensors, _field_enu_gauss: Vector) -> None:
+        """Expect the ground at height 0."""
+        part = sensors.rangefinder
+        assert part is not None, "what is fitted is described"
+        self._part = part
+        self._beam = np.array([cos(0.5 * part.field_of_view_rad), sin(0.5 * part.field_of_view_rad)])
+        self._watch = Watch(part.min_m, part.max_m, _FROZEN_US if part.noise_m > 0.0 else inf)
+        self._y = np.zeros(1)
+        self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (POSITION, 0, 0.0))
+        self.ground_m = 0.0
+
+    def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
+        """Return a distance, m; infinity where it sees nothing."""
+        if frame.distance is None:
+            return None
+        value = (frame.distance.distance_m,)
+        reason = None if value == (inf,) else self._watch.reason(value, frame.time_us)
+        if reason is not None:
+            rejected.add(self.source, reason)
+            return None
+        return value
+
+    def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
+        """Fuse a distance, m, where it is that of the ground below."""
+        (distance_m,) = value
+        height_m = float(x[2]) + self._part.height_m - self.ground_m
+        if distance_m == inf or distance_m > _USED_BELOW_M or height_m > _USED_BELOW_M or not is_upright(x):
+            self.kind.accept(time_us)  # it works, and there is nothing to learn from it
+            return None
+        variance = square(self._part.noise_m) + square(self._part.noise_part * distance_m)
+        variance += square(_ROUGHNESS_M) + square(_WIRE_STEP_M) / 12.0
+        nis = fuse_distance(x, P, distance_m, height_m, self._beam, variance, self.kind.gate, self._y)
+        if self.kind.note(time_us, tuple(self._y.tolist()), nis):
+            return None
+        if self.kind.reject(time_us):
+            self.ground_m -= float(self._y[0])
+            self.kind.resets += 1
+            self.kind.accept(time_us)
+        return Reason.INNOVATION
+
+    def typical(self) -> Value:
+        """Return the distance of a vehicle that stands."""
+        return (self._part.height_m,)
+
+
+def is_upright(x: Array) -> bool:
+    """Whether the beam points near enough to straight down."""
+    return bool(1.0 - 2.0 * (x[7] * x[7] + x[8] * x[8]) >= _LEAST_COSINE)
+
+
+@compiled
+def fuse_distance(
+    x: Array, P: Array, measured: float, height: float, beam: Array, variance: float, gate: float, y: Array
+) -> float:
+    """Correct by the distance to flat ground along -z of the body; return NIS.
+
+    d = h / cos(ϑ - β), with the tilt ϑ and half the beam β; of a tilt within the beam, d = h.
+
+    Args:
+        x: Nominal state, (23,).
+        P: Covariance, (22, 22).
+        measured: m.
+        height: Of the sensor above the ground by the state, m.
+        beam: Cosine and sine of β, (2,).
+        variance: m².
+        gate: Of NIS.
+        y: Innovation, m, (1,).
+    """
+    w, a, b, c = x[6:10]
+    up_x, up_y, up_z = 2.0 * (a * c - w * b), 2.0 * (b * c + w * a), 1.0 - 2.0 * (a * a + b * b)
+    along, slope = 1.0, 0.0
+    if up_z < beam[0]:
+        sine = sqrt(1.0 - up_z * up_z)
+        along = up_z * beam[0] + sine * beam[1]
+        slope = beam[0] - up_z / sine * beam[1]
+    distance = height / along
+    H = np.zeros((1, ERRORS))
+    H[0, POSITION + 2] = 1.0 / along
+    H[0, ATTITUDE] = distance / along * slope * up_y
+    H[0, ATTITUDE + 1] = -distance / along * slope * up_x
+    y[0] = measured - distance
+    return fuse_rows(x, P, H, y, variance, gate)
+
+
+ROW = Row(
+    part="rangefinder",
+    kind="distance",
+    numbers=1,
+    source=RangefinderBelow.source,
+    bit=mav.MAV_SYS_STATUS_SENSOR_LASER_POSITION,
+    ratio=Ratio.ABOVE_GROUND,
+    fit=RangefinderBelow,
+)
