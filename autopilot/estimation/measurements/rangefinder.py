@@ -5,7 +5,7 @@ is where the vehicle stands at the start, height 0, until the distance contradic
 and height stays.
 """
 
-from math import cos, inf, sin, sqrt
+from math import inf, sqrt
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected
 from colibri.common.elementary import square
 from colibri.common.jit import compiled
+from colibri.common.kernels import cos, sin
 from colibri.common.types import Array, Vector
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.mavlink.wire.dialect import mav
