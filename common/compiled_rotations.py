@@ -1,4 +1,4 @@
-"""The rotations of `frames`, compiled: for kernels, and for whoever turns attitudes many times a second."""
+"""The rotations of `rotations`, compiled: for kernels, and for whoever turns attitudes many times a second."""
 
 from colibri.common import kernels, rotations
 from colibri.common.jit import compiled, compiled_for

@@ -111,28 +111,26 @@ def arctangent(x: Real, c: Real, head: Real, tail: Real) -> Real:
     return head + (t + (tail + t * z * series(_ARCTANGENT, z)))
 
 
-def sin(x: float) -> float:
-    """Return the sine of `x`, rad; nan of what is not finite."""
+def turned_sine(x: float, quarters: int) -> float:
+    """Return the sine of `x` rad and `quarters` right angles more; nan of what is not finite."""
     if not abs(x) < inf:
         return nan
     if abs(x) > MAX_RAD:
         x = x % (2.0 * pi)
     n = floor(x * QUARTERS_PER_RAD + 0.5)
     head, tail = reduced(x, n)
-    value = cosine(head, tail) if n & 1 else sine(head, tail)
-    return -value if n & 2 else value
+    value = cosine(head, tail) if (n + quarters) & 1 else sine(head, tail)
+    return -value if (n + quarters) & 2 else value
+
+
+def sin(x: float) -> float:
+    """Return the sine of `x`, rad; nan of what is not finite."""
+    return turned_sine(x, 0)
 
 
 def cos(x: float) -> float:
     """Return the cosine of `x`, rad; nan of what is not finite."""
-    if not abs(x) < inf:
-        return nan
-    if abs(x) > MAX_RAD:
-        x = x % (2.0 * pi)
-    n = floor(x * QUARTERS_PER_RAD + 0.5)
-    head, tail = reduced(x, n)
-    value = sine(head, tail) if n & 1 else cosine(head, tail)
-    return -value if (n + 1) & 2 else value
+    return turned_sine(x, 1)
 
 
 def tan(x: float) -> float:
