@@ -34,7 +34,7 @@ HALF_PI_TAIL = 6.123233995736766e-17
 _LN2 = 0.6931471805599453
 _LN2_1, _LN2_2 = float.fromhex("0x1.62e42fee00000p-1"), 1.9082149292705877e-10
 """The first has 32 bits."""
-_MOST_EXP, _LEAST_EXP = 709.782712893384, -745.2
+_MAX_EXPONENT, _MIN_EXPONENT = 709.782712893384, -745.2
 _SMALL_EXP = 0.35
 _HALF_SQRT2 = sqrt(0.5)
 
@@ -181,9 +181,9 @@ def exp(x: float) -> float:
     """Return e to the power of `x`; infinite beyond what a double holds."""
     if isnan(x):
         return x
-    if x > _MOST_EXP:
+    if x > _MAX_EXPONENT:
         return inf
-    if x < _LEAST_EXP:
+    if x < _MIN_EXPONENT:
         return 0.0
     n = floor(x / _LN2 + 0.5)
     first, taken = x - n * _LN2_1, n * _LN2_2

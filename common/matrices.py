@@ -93,20 +93,20 @@ def inverse(A: Array) -> Array:
 
 
 @compiled
-def _largest_column_sum(A: Array) -> float:
-    largest = 0.0
+def _max_column_sum(A: Array) -> float:
+    maximum = 0.0
     for j in range(A.shape[1]):
         total = 0.0
         for i in range(A.shape[0]):
             total += abs(A[i, j])
-        largest = max(largest, total)
-    return largest
+        maximum = max(maximum, total)
+    return maximum
 
 
 @compiled_for(f"{_NEW_MATRIX}({_MATRIX})")
 def expm(A: Array) -> Array:
     """Return the exponential of A, (n, n), by scaling and squaring of Taylor's series."""
-    squarings, size = 0, _largest_column_sum(A)
+    squarings, size = 0, _max_column_sum(A)
     while _TAYLOR_NORM < size < np.inf:
         size, squarings = 0.5 * size, squarings + 1
     scaled = A * 0.5**squarings

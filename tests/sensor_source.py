@@ -168,7 +168,7 @@ def _inertial(
 ) -> tuple[Array, Array]:
     if gyro:
         g = sensors.gyroscope
-        density, walk, turn_on, most = (
+        density, walk, turn_on, maximum = (
             g.noise_density_rad_s_rthz,
             g.bias_walk_rad_s2_rthz,
             g.turn_on_bias_rad_s,
@@ -176,7 +176,7 @@ def _inertial(
         )
     else:
         a = sensors.accelerometer
-        density, walk, turn_on, most = (
+        density, walk, turn_on, maximum = (
             a.noise_density_m_s2_rthz,
             a.bias_walk_m_s3_rthz,
             a.turn_on_bias_m_s2,
@@ -184,7 +184,7 @@ def _inertial(
         )
     first = chance.normal(size=3) * turn_on if bias is None else np.array(bias)
     biases = first + np.cumsum(chance.normal(size=truth.shape) * walk * sqrt(dt), axis=0)
-    return np.clip(truth + biases + chance.normal(size=truth.shape) * density / sqrt(dt), -most, most), biases
+    return np.clip(truth + biases + chance.normal(size=truth.shape) * density / sqrt(dt), -maximum, maximum), biases
 
 
 def _fields(motion: Motion, sensors: Sensors, chance: np.random.Generator, origin: Geodetic) -> Array:

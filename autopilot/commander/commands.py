@@ -28,13 +28,13 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
 FORCE_MAGIC = 21196
-FARTHEST_M = 100_000.0
-HIGHEST_M = 10_000.0
-LEAST_CLIMB_M = 0.2
+MAX_DISTANCE_M = 100_000.0
+MAX_HEIGHT_M = 10_000.0
+MIN_CLIMB_M = 0.2
 """Less would not lift the feet for sure."""
-SMALLEST_RADIUS_M = 1.0
-LARGEST_YAW_RAD = 4.0 * pi
-LARGEST_TURN_DEG = 360.0
+MIN_RADIUS_M = 1.0
+MAX_YAW_RAD = 4.0 * pi
+MAX_TURN_DEG = 360.0
 _YAW_BEHAVIOURS = range(mav.ORBIT_YAW_BEHAVIOUR_UNCHANGED + 1)
 _POINTS = 72
 """Of a circle, that must all be inside the fence."""
@@ -135,7 +135,7 @@ class Commands:
         height_m = pilot.ground_m + pilot.behaviour.takeoff_height_m
         if not isnan(command.z):
             height_m = self._height_of_takeoff(command)
-        if not pilot.ground_m + LEAST_CLIMB_M <= height_m < HIGHEST_M:
+        if not pilot.ground_m + MIN_CLIMB_M <= height_m < MAX_HEIGHT_M:
             return _denied("take-off", "not a height above the ground")
         scene = pilot.scene()
         x, y, _ = scene.place
@@ -158,7 +158,7 @@ class Commands:
         """Fly to a place, or stop where none is given. Whoever asks means it, with or without the flag that says so."""
         if command.p2 not in (0.0, 1.0) and not isnan(command.p2):
             return _denied("reposition", f"a flag of {command.p2:g} is not known")
-        if not (isnan(command.p4) or abs(command.p4) <= LARGEST_YAW_RAD):
+        if not (isnan(command.p4) or abs(command.p4) <= MAX_YAW_RAD):
             return _denied("reposition", "yaw is in radians")
         speed = nan if command.p1 in (-1.0, 0.0) else command.p1
         if not (isnan(speed) or self._may_fly_at(speed)):
@@ -192,12 +192,12 @@ class Commands:
         return self._pilot.state.armed and not self._pilot.standing
 
     def _may_fly_at(self, speed_m_s: float) -> bool:
-        return 0.0 < speed_m_s <= self._pilot.behaviour.fastest_m_s
+        return 0.0 < speed_m_s <= self._pilot.behaviour.max_speed_m_s
 
     def unreachable(self, place: Vector) -> Refusal | None:
         """Return why the vehicle may not fly to a place; None if it may."""
         away = hypot(place[0], place[1])
-        if not isfinite(away) or away > FARTHEST_M or not -HIGHEST_M < place[2] < HIGHEST_M:
+        if not isfinite(away) or away > MAX_DISTANCE_M or not -MAX_HEIGHT_M < place[2] < MAX_HEIGHT_M:
             return Refusal("too far away")
         return self._fence.refusal(place)
 
@@ -226,7 +226,7 @@ class Commands:
     def _no_circle(self, circle: Circle) -> Refusal | None:
         """Return why the vehicle may not fly a circle; None if it may."""
         (x, y, z), radius, speed, yaw_behaviour = circle
-        if not SMALLEST_RADIUS_M <= abs(radius) <= FARTHEST_M:
+        if not MIN_RADIUS_M <= abs(radius) <= MAX_DISTANCE_M:
             return Refusal(f"a radius of {radius:g} m")
         if speed is not None and not self._may_fly_at(speed):
             return Refusal(f"a speed of {speed:g} m/s")
@@ -279,7 +279,7 @@ class Commands:
     def _turn(self, command: Command) -> Outcome:
         """Turn on the spot; the angle counts clockwise from north, or from the heading now where p4 is 1."""
         angle, _, way, relative = (0.0 if isnan(value) else value for value in command[1:5])
-        if isnan(command.p1) or abs(angle) > LARGEST_TURN_DEG or way not in (-1.0, 0.0, 1.0):
+        if isnan(command.p1) or abs(angle) > MAX_TURN_DEG or way not in (-1.0, 0.0, 1.0):
             return _denied("turn", "not an angle and a direction")
         if relative not in (0.0, 1.0):
             return _denied("turn", "1 counts from the heading, 0 from north")

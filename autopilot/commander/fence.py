@@ -46,7 +46,7 @@ class Fence:
     @property
     def _around_home(self) -> AroundHome:
         behaviour = self._behaviour
-        return AroundHome(self._home.position_enu_m, behaviour.farthest_m, behaviour.highest_m)
+        return AroundHome(self._home.position_enu_m, behaviour.max_distance_m, behaviour.max_height_m)
 
     def refusal(self, place: Vector) -> Refusal | None:
         """Return why the vehicle may not fly to a place; None if it may."""

@@ -281,7 +281,7 @@ class Pilot:
         interval_us, samples = self._instants.preview
         behaviour = self.behaviour
         speed = behaviour.limits.speed_m_s if self.speed_m_s is None else self.speed_m_s
-        speed = min(speed, behaviour.fastest_m_s)
+        speed = min(speed, behaviour.max_speed_m_s)
         if speed != behaviour.limits.speed_m_s:
             behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed))
         interval_s = interval_us * 1e-6

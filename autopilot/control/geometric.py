@@ -24,7 +24,7 @@ from colibri.common.rotations import nearest_turn, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-_LEAST_FORCE = 0.05
+_MIN_FORCE = 0.05
 """The demanded force never falls below this part of the weight: its direction would mean nothing."""
 
 
@@ -110,7 +110,7 @@ class GeometricController:
         velocity_error = np.array(state.velocity_enu_m_s) - references.velocity_enu_m_s[0]
         wanted = references.acceleration_enu_m_s2[0]
         force = -self._k_position * position_error - self._k_velocity * velocity_error + wanted + gravity
-        floor = _LEAST_FORCE * self._gravity_m_s2
+        floor = _MIN_FORCE * self._gravity_m_s2
         if norm(force) < floor:
             force = floor * R[:, 2]
         lifted = dot(force, R[:, 2]) * R[:, 2] - gravity

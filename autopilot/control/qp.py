@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 IN_SOLVERS_EXTRA = ("highs", "osqp", "piqp", "proxqp", "quadprog", "scs")
 """What `pip install colibri-sitl[solvers]` brings, by the names that qpsolvers uses."""
 
-LARGEST_RESIDUAL = 1e-6
+MAX_RESIDUAL = 1e-6
 """A solution that misses its optimality conditions by more is not accurate."""
 
-MOST_ITERATIONS = 100_000
+MAX_ITERATIONS = 100_000
 
 
 _NONE = np.empty(0)
@@ -71,7 +71,7 @@ class QpResult(NamedTuple):
 class QpSolver:
     """One solver of qpsolvers, held to a tolerance."""
 
-    def __init__(self, name: str, tolerance: float, max_iterations: int = MOST_ITERATIONS) -> None:
+    def __init__(self, name: str, tolerance: float, max_iterations: int = MAX_ITERATIONS) -> None:
         """Use solver `name`; those that work to a tolerance stop at `tolerance`, all at `max_iterations`.
 
         Raises:
@@ -100,7 +100,7 @@ class QpSolver:
             return QpResult(why_none(qp), None)
         x = np.array(solution.x, dtype=np.float64)  # of our own: some solvers give what cannot be written to
         lower, upper, z, z_box = map(_some, (qp.lower, qp.upper, solution.z, solution.z_box))
-        if self._residual(qp.H, qp.f, qp.G, qp.h, lower, upper, x, z, z_box) > LARGEST_RESIDUAL:
+        if self._residual(qp.H, qp.f, qp.G, qp.h, lower, upper, x, z, z_box) > MAX_RESIDUAL:
             return QpResult(QpStatus.NOT_ACCURATE, None)
         return QpResult(QpStatus.SOLVED, x)
 

@@ -398,8 +398,8 @@ class Copter:
             for severity, line in self._health.lines(self._senses.estimate.health):
                 stations.say(severity, line)
         idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
-        least = idle if pilot.state.armed else 0.0
-        c1, c2, c3, c4 = (max(control, least) for control in self._solving.controls(now_us))
+        minimum = idle if pilot.state.armed else 0.0
+        c1, c2, c3, c4 = (max(control, minimum) for control in self._solving.controls(now_us))
         self.power.run((c1, c2, c3, c4), self._interval_s)
         stations.missions.watch_mode(pilot.state.mode)
         stations.update(

@@ -38,13 +38,13 @@ ROW = 15
 """A fix as a row of numbers: s, the state (10,), innovation of velocity, m/s ENU, and the barometer's height, m."""
 
 _FEWEST_FIXES = 3
-_LONGEST_US = 2_500_000
+_MAX_WINDOW_US = 2_500_000
 """Since the first rejected fix: what is not seen by then is no sudden bias, and left to the filter's patience."""
 _KEPT_S = 6.0
 _BEFORE_S, _FEWEST_BEFORE = 1.0, 4
 """What is felt in flight is compared with that of so long before the fault, of so many fixes at least."""
 _ONSET_S = 0.05
-_LONGEST_GAP_S = 0.35
+_MAX_GAP_S = 0.35
 _ALONG_PART = 0.5
 """The part of the bias along body z from which on the barometer is asked."""
 _ALIKE_PART = 0.5
@@ -53,7 +53,7 @@ _CLEAR = 9.0
 """How much two hypotheses must differ, σ², before a test can choose between them."""
 _FOUR_SIGMA = 22.06
 """χ² of three degrees of freedom: a bias beyond that is one. The velocity was rejected at five already."""
-_LEAST_SIGMA = 1e-3
+_MIN_SIGMA = 1e-3
 _STEPS = 4
 """Of the least squares: the rest falls by the square of the angle turned, and a few find it to what noise leaves."""
 
@@ -79,8 +79,8 @@ class AccelerometerWatch:
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float) -> None:
         """Begin with nothing seen. What is compiled is loaded here."""
-        self._velocity_variance = square(max(sensors.gps.velocity_noise_m_s, _LEAST_SIGMA))
-        self._height_variance = square(max(sensors.barometer.noise_pa * METRES_PER_PASCAL, _LEAST_SIGMA))
+        self._velocity_variance = square(max(sensors.gps.velocity_noise_m_s, _MIN_SIGMA))
+        self._height_variance = square(max(sensors.barometer.noise_pa * METRES_PER_PASCAL, _MIN_SIGMA))
         self._gravity = gravity_m_s2
         self._fixes: deque[_Fix] = deque(maxlen=ceil(_KEPT_S * sensors.gps.rate_hz))
         self._rejected = 0
@@ -104,7 +104,7 @@ class AccelerometerWatch:
         if self._rejected == 0:
             self._first_us = time_us
         self._rejected += 1
-        if self._rejected < _FEWEST_FIXES or time_us - self._first_us > _LONGEST_US:
+        if self._rejected < _FEWEST_FIXES or time_us - self._first_us > _MAX_WINDOW_US:
             return None
         return self._judge(len(self._fixes) - 1 - self._rejected)
 
@@ -138,7 +138,7 @@ def find_bias(
     """
     n = len(rows) - first
     for k in range(1, len(rows)):
-        if rows[k, TIME] - rows[k - 1, TIME] > _LONGEST_GAP_S:
+        if rows[k, TIME] - rows[k - 1, TIME] > _MAX_GAP_S:
             return 0.0
     A, d = _turned(rows, first), rows[first:, INNOVATION : INNOVATION + 3].copy()
     middle = _centred(d)

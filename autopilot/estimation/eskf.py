@@ -42,7 +42,7 @@ _FIRST_POSITION_M, _FIRST_VELOCITY_M_S, _FIRST_ATTITUDE_RAD, _FIRST_OFFSET_M = 1
 _CAUGHT_M, _CAUGHT_M_S, _CAUGHT_RAD = 3.0, 1.0, 0.4
 """How well a vehicle that falls is known: it need not have been level."""
 _ITERATIONS = 4
-_LEAST_NOISE = 1e-6
+_MIN_NOISE = 1e-6
 """Of anything, in its own unit: a perfect sensor would leave nothing to divide by."""
 _PLACE_STEP_M, _HEIGHT_STEP_M, _SPEED_STEP_M_S = 0.011, 0.001, 0.01
 """HIL_GPS has degE7, mm and cm/s."""
@@ -156,10 +156,10 @@ class Filter:
             (POSITION, 3, _FIRST_POSITION_M),
             (VELOCITY, 3, _FIRST_VELOCITY_M_S),
             (ATTITUDE, 3, _FIRST_ATTITUDE_RAD),
-            (GYRO_BIAS, 3, max(sensors.gyroscope.turn_on_bias_rad_s, _LEAST_NOISE)),
-            (ACCEL_BIAS, 3, max(sensors.accelerometer.turn_on_bias_m_s2, _LEAST_NOISE)),
+            (GYRO_BIAS, 3, max(sensors.gyroscope.turn_on_bias_rad_s, _MIN_NOISE)),
+            (ACCEL_BIAS, 3, max(sensors.accelerometer.turn_on_bias_m_s2, _MIN_NOISE)),
             (BARO_OFFSET, 1, _FIRST_OFFSET_M),
-            (HARD_IRON, 3, max(sensors.magnetometer.hard_iron_gauss, _LEAST_NOISE)),
+            (HARD_IRON, 3, max(sensors.magnetometer.hard_iron_gauss, _MIN_NOISE)),
         ):
             update.doubt(P, first, count, sigma * sigma)
         for i, variance in enumerate(self._noise.gps_drift):
@@ -168,8 +168,8 @@ class Filter:
     def _rest(self, aligned: Aligned) -> None:
         """Fuse the means of specific force, field and rate."""
         x, P, sensors = self.x, self.P, self._sensors
-        force = square(max(sensors.accelerometer.noise_density_m_s2_rthz, _LEAST_NOISE)) / aligned.duration_s
-        rate = square(max(sensors.gyroscope.noise_density_rad_s_rthz, _LEAST_NOISE)) / aligned.duration_s
+        force = square(max(sensors.accelerometer.noise_density_m_s2_rthz, _MIN_NOISE)) / aligned.duration_s
+        rate = square(max(sensors.gyroscope.noise_density_rad_s_rthz, _MIN_NOISE)) / aligned.duration_s
         field, y = self.magnetometer.variance / aligned.fields, np.zeros(6)
         mean_force, mean_field = np.array(aligned.force), np.array(aligned.field)
         update.fuse_rest(x, P, mean_force, self._gravity, force, mean_field, self._field, field, y)
@@ -284,15 +284,13 @@ class Filter:
 def noise_of(sensors: Sensors) -> Noise:
     """Return what drives the errors of a vehicle with `sensors`."""
     accel, gyro, gps, barometer = sensors.accelerometer, sensors.gyroscope, sensors.gps, sensors.barometer
-    horizontal, vertical = (
-        square(max(sigma, _LEAST_NOISE)) for sigma in (gps.horizontal_drift_m, gps.vertical_drift_m)
-    )
-    drift_m = max(barometer.drift_pa * METRES_PER_PASCAL, _LEAST_NOISE)
+    horizontal, vertical = (square(max(sigma, _MIN_NOISE)) for sigma in (gps.horizontal_drift_m, gps.vertical_drift_m))
+    drift_m = max(barometer.drift_pa * METRES_PER_PASCAL, _MIN_NOISE)
     return Noise(
-        force=square(max(accel.noise_density_m_s2_rthz, _LEAST_NOISE)),
-        rate=square(max(gyro.noise_density_rad_s_rthz, _LEAST_NOISE)),
-        gyro_bias=square(max(gyro.bias_walk_rad_s2_rthz, _LEAST_NOISE)),
-        accel_bias=square(max(accel.bias_walk_m_s3_rthz, _LEAST_NOISE)),
+        force=square(max(accel.noise_density_m_s2_rthz, _MIN_NOISE)),
+        rate=square(max(gyro.noise_density_rad_s_rthz, _MIN_NOISE)),
+        gyro_bias=square(max(gyro.bias_walk_rad_s2_rthz, _MIN_NOISE)),
+        accel_bias=square(max(accel.bias_walk_m_s3_rthz, _MIN_NOISE)),
         gps_drift=(horizontal, horizontal, vertical),
         gps_drift_time_s=gps.drift_time_s,
         baro_offset=2.0 * square(drift_m) / barometer.drift_time_s,

@@ -34,7 +34,7 @@ _BLIND_RATE_DENSITY = 0.5**2
 """(rad/s)²/Hz."""
 _SMALL_TURN = 0.05
 """Half a turn, rad, below which the series of sine and cosine are exact to the last bits."""
-_MOST_POSITION, _MOST_VELOCITY, _MOST_ATTITUDE = 1e6, 1e4, 1.0
+_MAX_POSITION_VARIANCE, _MAX_VELOCITY_VARIANCE, _MAX_ATTITUDE_VARIANCE = 1e6, 1e4, 1.0
 """Variances beyond which a part is unknown: it forgets what it had to do with the others, and all stays positive."""
 
 
@@ -129,9 +129,9 @@ def predict(x: Array, P: Array, samples: Array, row: int, noise: Noise, gravity:
         P[GPS_DRIFT + i, GPS_DRIFT + i] += noise.gps_drift[i] * (1.0 - decay * decay)
         P[HARD_IRON + i, HARD_IRON + i] += noise.hard_iron * dt
     P[BARO_OFFSET, BARO_OFFSET] += noise.baro_offset * dt
-    _bound(P, POSITION, _MOST_POSITION)
-    _bound(P, VELOCITY, _MOST_VELOCITY)
-    _bound(P, ATTITUDE, _MOST_ATTITUDE)
+    _bound(P, POSITION, _MAX_POSITION_VARIANCE)
+    _bound(P, VELOCITY, _MAX_VELOCITY_VARIANCE)
+    _bound(P, ATTITUDE, _MAX_ATTITUDE_VARIANCE)
 
 
 @compiled
@@ -193,12 +193,12 @@ def _carry(P: Array, push: Array, lever: Array, back: Array, half_s: float, deca
 
 
 @compiled
-def _bound(P: Array, part: int, most: float) -> None:
+def _bound(P: Array, part: int, maximum: float) -> None:
     for i in range(part, part + 3):
-        if P[i, i] > most:
+        if P[i, i] > maximum:
             P[i, :] = 0.0
             P[:, i] = 0.0
-            P[i, i] = most
+            P[i, i] = maximum
 
 
 @compiled

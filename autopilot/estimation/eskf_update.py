@@ -25,7 +25,7 @@ from colibri.common.jit import compiled
 from colibri.common.kernels import asin
 from colibri.common.types import Array
 
-_LEAST_VARIANCE = 1e-18
+_MIN_VARIANCE = 1e-18
 """What rounding leaves of a variance that a measurement has taken away."""
 
 
@@ -234,7 +234,7 @@ def _join(P: Array, C: Array, K: Array, S: Array) -> None:
                     change += K[i, k] * S[k, other] * K[j, other]
             P[i, j] = 0.5 * (P[i, j] + P[j, i]) + change
             P[j, i] = P[i, j]
-        P[i, i] = max(P[i, i], _LEAST_VARIANCE)
+        P[i, i] = max(P[i, i], _MIN_VARIANCE)
 
 
 @compiled

@@ -23,7 +23,7 @@ from colibri.autopilot.estimation.gyroscope_bias import turned_since
 from colibri.autopilot.estimation.measurements.instrument import Instrument, Value
 from colibri.autopilot.estimation.output_smoothing import Blending
 from colibri.autopilot.estimation.sensing.alignment import Aligned, Alignment
-from colibri.autopilot.estimation.sensing.clock_resets import LONGEST_GAP_US, Strays
+from colibri.autopilot.estimation.sensing.clock_resets import MAX_GAP_US, Strays
 from colibri.autopilot.estimation.sensing.free_fall import Caught, Falling
 from colibri.autopilot.estimation.sensing.inertial import Inertial, Reading, sample_between
 from colibri.autopilot.estimation.sensing.plausibility import GpsWatch
@@ -44,12 +44,12 @@ _LATE_US = 1_000_000
 """Since when nothing was believed that comes several times a second: its source is lost."""
 _LEARNING_US = 5_000_000
 """How long a bias taken anew is doubted."""
-_OLDEST_FIX_S = 0.5
+_MAX_FIX_AGE_S = 0.5
 """How far from the filter's time a fix may have been measured."""
 _KNOWN_TILT_RAD, _KNOWN_YAW_RAD = 0.17, 0.26
 _KNOWN_M_S = 1.0
 _KNOWN_M = 5.0
-_FASTEST_M_S = 500.0
+_MAX_SPEED_M_S = 500.0
 _CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000
 """Between two fixes: a frame with one has enough to do."""
 _UPPER = np.triu_indices(9)
@@ -127,7 +127,7 @@ class Estimator:
         simulator has begun anew, and so does the estimator.
         """
         last_us = self._time_us
-        if last_us is not None and not 0 < frame.time_us - last_us <= LONGEST_GAP_US:
+        if last_us is not None and not 0 < frame.time_us - last_us <= MAX_GAP_US:
             self._rejected.add(Source.CLOCK, Reason.TIME)
             if not self._strays.settle(frame.time_us):
                 return self._estimate
@@ -186,11 +186,7 @@ class Estimator:
         A frame that came before, and whose answer was lost with the process, comes again.
         """
         kept = of_bytes(EstimatorRecord, record)
-        if (
-            kept is None
-            or not 0 <= time_us - kept.time_us <= LONGEST_GAP_US
-            or kept.samples.shape != self._samples.shape
-        ):
+        if kept is None or not 0 <= time_us - kept.time_us <= MAX_GAP_US or kept.samples.shape != self._samples.shape:
             return False
         if not self.filter.resume(kept.filter):
             return False
@@ -305,7 +301,7 @@ class Estimator:
 
     def _fuse(self, fix: GpsFix, now_us: int) -> None:
         after_s = (fix.time_us - self._delay_us - self.filter_us) * 1e-6
-        if abs(after_s) > _OLDEST_FIX_S:
+        if abs(after_s) > _MAX_FIX_AGE_S:
             self._rejected.add(Source.GPS, Reason.TIME)
             return
         self._tests = None
@@ -326,7 +322,7 @@ class Estimator:
         filter_ = self.filter
         look_ahead(filter_.x, filter_.P, self._samples, self._first, len(self._waiting), self._gravity, self._now)
         e, n, u, ve, vn, vu, qw, qx, qy, qz, *sigma = self._now.tolist()
-        if not isfinite(sum(sigma) + e + n + u + qw) or not abs(ve) + abs(vn) + abs(vu) < _FASTEST_M_S:
+        if not isfinite(sum(sigma) + e + n + u + qw) or not abs(ve) + abs(vn) + abs(vu) < _MAX_SPEED_M_S:
             self._restart()
             return None
         (de, dn, du), (dve, dvn, dvu) = self._blending.position_m, self._blending.velocity_m_s

@@ -14,7 +14,7 @@ from colibri.autopilot.estimation.eskf import Filter
 
 _REJECTED_US = 200_000
 """Of GPS velocity, before it is a witness: three fixes at 10 Hz."""
-_MOST_TURNED_RAD = 0.3
+_MAX_TURN_RAD = 0.3
 """Beyond that the field is not believable either."""
 
 
@@ -33,4 +33,4 @@ def turned_since(filter_: Filter, now_us: int) -> Turned | None:
     if field.rejected_us is None or field.test.time_us <= field.rejected_us:
         return None
     angle_rad = hypot(*field.test.innovation) / filter_.field_gauss
-    return Turned(angle_rad, (field.test.time_us - field.rejected_us) * 1e-6) if angle_rad <= _MOST_TURNED_RAD else None
+    return Turned(angle_rad, (field.test.time_us - field.rejected_us) * 1e-6) if angle_rad <= _MAX_TURN_RAD else None

@@ -14,7 +14,7 @@ from colibri.common.types import Vector
 _TIME_CONSTANT_S = 1.0
 _USUAL_M_S = 0.05
 _GIVEN_IN_M_S, _GIVEN_IN_M_S2 = 0.5, 1.0
-_SMALLEST_M = 1e-6
+_MIN_M = 1e-6
 _NONE: Vector = (0.0, 0.0, 0.0)
 
 
@@ -51,7 +51,7 @@ def _faded(vector: Vector, interval_s: float) -> Vector:
     """Return what is left of a vector after an interval: less by its time constant, but never faster than allowed."""
     x, y, z = vector
     norm = sqrt(x * x + y * y + z * z)
-    if norm <= _SMALLEST_M:
+    if norm <= _MIN_M:
         return _NONE
     left = max(exp(-interval_s / _TIME_CONSTANT_S), 1.0 - _GIVEN_IN_M_S * interval_s / norm)
     return (left * x, left * y, left * z)

@@ -15,7 +15,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 _CELL_V = 4.2
 _SECONDS_PER_HOUR = 3600.0
-_LEAST_CURRENT_A = 0.01
+_MIN_CURRENT_A = 0.01
 _SAG = 0.03
 """Voltages that differ by less than this part of the full one are the same: the model's rotors do not lag."""
 
@@ -75,7 +75,7 @@ class PowerMeter:
             return None
         voltage_v, current_a = self._now
         left_ah = self.left * self._battery.capacity_ah
-        left_s = left_ah / current_a * _SECONDS_PER_HOUR if current_a > _LEAST_CURRENT_A else nan
+        left_s = left_ah / current_a * _SECONDS_PER_HOUR if current_a > _MIN_CURRENT_A else nan
         cells = max(1, round(self._battery.full_voltage_v / _CELL_V))
         voltage_v = max(0.0, voltage_v + self._sag_v)
         return BatteryState(cells, voltage_v, current_a, self.charge_ah, self.left, left_s, self.energy_wh)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from importlib.metadata import version as version_of_package
 from math import pi
 
-from colibri.autopilot.commander.commands import HIGHEST_M, Commands
+from colibri.autopilot.commander.commands import MAX_HEIGHT_M, Commands
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.needs import ModeNeeds
@@ -319,7 +319,7 @@ class Stations:
         return Setters(self._set_origin, self.commands.move_home, self.commands.set_custom_mode)
 
     def _set_origin(self, place: Geodetic) -> Refusal | None:
-        if not is_on_earth(place.latitude_deg, place.longitude_deg) or not abs(place.altitude_m) <= HIGHEST_M:
+        if not is_on_earth(place.latitude_deg, place.longitude_deg) or not abs(place.altitude_m) <= MAX_HEIGHT_M:
             return Refusal("origin refused: not a latitude, longitude and altitude")
         if self._pilot.state.armed:
             return Refusal("origin refused: the rotors are armed")

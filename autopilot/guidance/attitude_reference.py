@@ -39,7 +39,7 @@ class AttitudeLimits(NamedTuple):
     stick_yaw_rate_rad_s: float = radians(100.0)
     yaw_ahead_rad: float = radians(30.0)
     slew: Slew = Slew(
-        largest_tilt_rad=radians(60.0),
+        max_tilt_rad=radians(60.0),
         tilt_frequency_rad_s=14.0,
         tilt_rate_rad_s=4.0,
         tilt_acceleration_rad_s2=60.0,
@@ -58,7 +58,7 @@ def attitude_limits(behaviour: Behaviour) -> AttitudeLimits:
     yaw_rate_rad_s = behaviour.stick_yaw_rate_rad_s
     slew = DEFAULT_LIMITS.slew
     return DEFAULT_LIMITS._replace(
-        stick_tilt_rad=radians(behaviour.largest_tilt_deg),
+        stick_tilt_rad=radians(behaviour.max_tilt_deg),
         stick_yaw_rate_rad_s=yaw_rate_rad_s,
         slew=slew._replace(yaw_rate_rad_s=max(slew.yaw_rate_rad_s, yaw_rate_rad_s)),
     )
@@ -102,7 +102,7 @@ class AttitudeReference:
     Attributes:
         weight_n: Of the vehicle.
         limits: How far.
-        most_thrust_n: Of all rotors at their top speed.
+        max_thrust_n: Of all rotors at their top speed.
     """
 
     def __init__(self, vehicle: Vehicle, preview: Preview, limits: AttitudeLimits = DEFAULT_LIMITS) -> None:
@@ -121,12 +121,12 @@ class AttitudeReference:
     def adopt(self, vehicle: Vehicle) -> None:
         """Go on for a vehicle of other numbers."""
         self.weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
-        self.most_thrust_n = float(vehicle.allocation()[0].sum()) * square(vehicle.rotors.max_speed)
+        self.max_thrust_n = float(vehicle.allocation()[0].sum()) * square(vehicle.rotors.max_speed)
 
     def initial(self, state: VehicleState, thrust_n: float | None = None) -> ReferenceMemory:
         """Begin with the attitude that the vehicle has, and the thrust that it makes, N: its weight if None."""
         angles, rates = np.array(state.euler), np.zeros(3)
-        limit_tilt(angles, rates, self.limits.slew.largest_tilt_rad)
+        limit_tilt(angles, rates, self.limits.slew.max_tilt_rad)
         return ReferenceMemory(angles, rates, self.weight_n if thrust_n is None else thrust_n)
 
     def step(self, memory: ReferenceMemory, state: VehicleState, wish: Wish) -> tuple[ReferenceMemory, AttitudeDemand]:
@@ -177,12 +177,12 @@ class AttitudeReference:
         if stick <= STICK_MIDDLE:
             return self.weight_n * max(stick, 0.0) / STICK_MIDDLE
         part = (min(stick, 1.0) - STICK_MIDDLE) / (1.0 - STICK_MIDDLE)
-        return self.weight_n + (self.most_thrust_n - self.weight_n) * part
+        return self.weight_n + (self.max_thrust_n - self.weight_n) * part
 
     def _near(self, psi: float, yaw_rad: float) -> float:
         """Return the demanded yaw in the vehicle's own full turn, no further from its yaw than allowed."""
-        furthest = self.limits.yaw_ahead_rad
-        return min(max(nearest_turn(psi, yaw_rad), yaw_rad - furthest), yaw_rad + furthest)
+        max_ahead = self.limits.yaw_ahead_rad
+        return min(max(nearest_turn(psi, yaw_rad), yaw_rad - max_ahead), yaw_rad + max_ahead)
 
 
 def lean(phi: float, theta: float, yaw_rate_rad_s: float, thrust_n: float) -> Wish:

@@ -22,7 +22,7 @@ class Slew(NamedTuple):
     """How far and how fast a demand goes.
 
     Attributes:
-        largest_tilt_rad: Of the thrust axis, whoever asks.
+        max_tilt_rad: Of the thrust axis, whoever asks.
         tilt_frequency_rad_s: w of roll and pitch.
         tilt_rate_rad_s: Their largest rate.
         tilt_acceleration_rad_s2: Their largest acceleration.
@@ -32,7 +32,7 @@ class Slew(NamedTuple):
         thrust_rate_n_s: Fastest change of thrust.
     """
 
-    largest_tilt_rad: float
+    max_tilt_rad: float
     tilt_frequency_rad_s: float
     tilt_rate_rad_s: float
     tilt_acceleration_rad_s2: float
@@ -81,23 +81,33 @@ def slew_on(
         else:
             wanted_rate[2] = yaw_rate_rad_s
         towards = here[2] if kind != POSE else yaw_rad - 2.0 * pi * floor((yaw_rad - here[2]) / (2.0 * pi) + 0.5)
-        w, fastest, hardest = slew.yaw_frequency_rad_s, slew.yaw_rate_rad_s, slew.yaw_acceleration_rad_s2
-        _move(2, w * w * (towards - here[2]), wanted_rate[2], w, fastest, hardest, interval_s, there, rates[n + 1])
+        w, max_rate, max_acceleration = slew.yaw_frequency_rad_s, slew.yaw_rate_rad_s, slew.yaw_acceleration_rad_s2
+        _move(
+            2,
+            w * w * (towards - here[2]),
+            wanted_rate[2],
+            w,
+            max_rate,
+            max_acceleration,
+            interval_s,
+            there,
+            rates[n + 1],
+        )
         if kind == LEAN:
             wanted[:2] = vector[:2]
         elif kind == POSE:
-            _point(vector, there[2], slew.largest_tilt_rad, wanted)
+            _point(vector, there[2], slew.max_tilt_rad, wanted)
             after = wanted[:2].copy()
-            _point(vector, here[2], slew.largest_tilt_rad, wanted)
+            _point(vector, here[2], slew.max_tilt_rad, wanted)
             wanted_rate[:2] = (after - wanted[:2]) / interval_s
-        w, fastest, hardest = slew.tilt_frequency_rad_s, slew.tilt_rate_rad_s, slew.tilt_acceleration_rad_s2
+        w, max_rate, max_acceleration = slew.tilt_frequency_rad_s, slew.tilt_rate_rad_s, slew.tilt_acceleration_rad_s2
         for i in range(2):
             pull = 0.0 if kind == SPIN else w * w * (wanted[i] - here[i])
-            _move(i, pull, wanted_rate[i], w, fastest, hardest, interval_s, there, rates[n + 1])
-        limit_tilt(there, rates[n + 1], slew.largest_tilt_rad)
+            _move(i, pull, wanted_rate[i], w, max_rate, max_acceleration, interval_s, there, rates[n + 1])
+        limit_tilt(there, rates[n + 1], slew.max_tilt_rad)
         thrust = weight_n / (cos(there[0]) * cos(there[1])) if isnan(thrust_n) else thrust_n
-        most = slew.thrust_rate_n_s * interval_s
-        thrusts[n + 1] = thrusts[n] + min(max(thrust - thrusts[n], -most), most)
+        maximum = slew.thrust_rate_n_s * interval_s
+        thrusts[n + 1] = thrusts[n] + min(max(thrust - thrusts[n], -maximum), maximum)
 
 
 @compiled
@@ -106,15 +116,15 @@ def _move(
     pull: float,
     wanted_rate: float,
     w: float,
-    fastest: float,
-    hardest: float,
+    max_rate: float,
+    max_acceleration: float,
     interval_s: float,
     angles: Array,
     rates: Array,
 ) -> None:
     """Move angle i and its rate on by one interval, in place."""
-    acceleration = min(max(pull + 2.0 * w * (wanted_rate - rates[i]), -hardest), hardest)
-    rate = min(max(rates[i] + interval_s * acceleration, -fastest), fastest)
+    acceleration = min(max(pull + 2.0 * w * (wanted_rate - rates[i]), -max_acceleration), max_acceleration)
+    rate = min(max(rates[i] + interval_s * acceleration, -max_rate), max_rate)
     angles[i] += 0.5 * interval_s * (rates[i] + rate)
     rates[i] = rate
 
@@ -130,14 +140,14 @@ def _euler_rates(angles: Array, rate: Array, out: Array) -> None:
 
 
 @compiled
-def _point(direction: Array, psi: float, largest_tilt_rad: float, angles: Array) -> None:
+def _point(direction: Array, psi: float, max_tilt_rad: float, angles: Array) -> None:
     """Write roll and pitch, rad, that point body z along `direction`, ENU, (3,), at yaw `psi`; less where too steep."""
     x, y, z = direction[0], direction[1], direction[2]
     horizontal = sqrt(x * x + y * y)
     if horizontal < _NO_DIRECTION:
         x, y, z = 0.0, 0.0, 1.0
-    elif z < cos(largest_tilt_rad) * sqrt(horizontal * horizontal + z * z):
-        x, y, z = x / horizontal * sin(largest_tilt_rad), y / horizontal * sin(largest_tilt_rad), cos(largest_tilt_rad)
+    elif z < cos(max_tilt_rad) * sqrt(horizontal * horizontal + z * z):
+        x, y, z = x / horizontal * sin(max_tilt_rad), y / horizontal * sin(max_tilt_rad), cos(max_tilt_rad)
     c, s = cos(psi), sin(psi)
     ahead = x * c + y * s
     angles[0] = atan2(x * s - y * c, sqrt(ahead * ahead + z * z))
@@ -145,25 +155,25 @@ def _point(direction: Array, psi: float, largest_tilt_rad: float, angles: Array)
 
 
 @compiled
-def limit_tilt(angles: Array, rates: Array, largest_tilt_rad: float) -> None:
+def limit_tilt(angles: Array, rates: Array, max_tilt_rad: float) -> None:
     """Bring the thrust axis back to the largest tilt, in place, and take from the rates what leads beyond.
 
     Args:
         angles: phi, theta, psi, rad, (3,).
         rates: Their derivatives, rad/s, (3,).
-        largest_tilt_rad: Of the thrust axis.
+        max_tilt_rad: Of the thrust axis.
     """
     s, c, st, ct = sin(angles[0]), cos(angles[0]), sin(angles[1]), cos(angles[1])
-    if c * ct >= cos(largest_tilt_rad):
+    if c * ct >= cos(max_tilt_rad):
         return
     across = sqrt(s * s + c * c * st * st)
     if across < _NO_DIRECTION:
         angles[0], angles[1] = 0.0, 0.0
     else:
-        scale = sin(largest_tilt_rad) / across
+        scale = sin(max_tilt_rad) / across
         left, ahead = -s * scale, c * st * scale
-        angles[0] = atan2(-left, sqrt(ahead * ahead + cos(largest_tilt_rad) ** 2))
-        angles[1] = atan2(ahead, cos(largest_tilt_rad))
+        angles[0] = atan2(-left, sqrt(ahead * ahead + cos(max_tilt_rad) ** 2))
+        angles[1] = atan2(ahead, cos(max_tilt_rad))
     s, c, st, ct = sin(angles[0]), cos(angles[0]), sin(angles[1]), cos(angles[1])
     outwards, steeper = s * ct, c * st
     squared = outwards * outwards + steeper * steeper

@@ -15,7 +15,7 @@ class Behaviour:
 
     Attributes:
         limits: How fast the reference moves.
-        fastest_m_s: No command may ask for a higher horizontal speed.
+        max_speed_m_s: No command may ask for a higher horizontal speed.
         takeoff_height_m: Above where it stands.
         takeoff_speed_m_s: Of the climb.
         land_speed_m_s: Close to the ground.
@@ -26,9 +26,9 @@ class Behaviour:
         disarm_on_ground_s: They stop if it does not take off for so long; 0 never.
         setpoints_lost_s: An offboard companion may be silent for so long.
         sticks_lost_s: A pilot may be silent for so long.
-        farthest_m: No farther from home than this, horizontally; 0: no limit.
-        highest_m: No higher above home than this; 0: no limit.
-        largest_tilt_deg: Of full sticks.
+        max_distance_m: No farther from home than this, horizontally; 0: no limit.
+        max_height_m: No higher above home than this; 0: no limit.
+        max_tilt_deg: Of full sticks.
         stick_yaw_rate_rad_s: Of full sticks.
         stick_speed_m_s: Horizontally, of full sticks.
         track: Which track mode `track` flies.
@@ -43,7 +43,7 @@ class Behaviour:
     """
 
     limits: Limits = _LIMITS
-    fastest_m_s: float = 12.0
+    max_speed_m_s: float = 12.0
     takeoff_height_m: float = 2.5
     takeoff_speed_m_s: float = 1.5
     land_speed_m_s: float = 0.7
@@ -54,9 +54,9 @@ class Behaviour:
     disarm_on_ground_s: float = 10.0
     setpoints_lost_s: float = 1.0
     sticks_lost_s: float = 0.5
-    farthest_m: float = 0.0
-    highest_m: float = 0.0
-    largest_tilt_deg: float = 35.0
+    max_distance_m: float = 0.0
+    max_height_m: float = 0.0
+    max_tilt_deg: float = 35.0
     stick_yaw_rate_rad_s: float = _STICK_YAW_RATE_RAD_S
     stick_speed_m_s: float = 5.0
     track: str = "spiral"

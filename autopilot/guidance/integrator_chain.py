@@ -26,7 +26,7 @@ Integers: TypeAlias = NDArray[np.int64]
 K_POSITION, K_VELOCITY, K_ACCELERATION, K_JERK = 1.5, 4.0, 12.0, 36.0
 """Each loop about three times as fast as the one around it, 1/s."""
 K_YAW, K_YAW_RATE = 2.0, 8.0
-_LONGEST_STEP_S = 0.02
+_MAX_STEP_S = 0.02
 """The quickest loop, of the jerk, must not answer to itself: 36 / s times this is below 1."""
 _STOPPING = 0.6
 """Part of the acceleration that stopping may count on; the rest is for keeping to it."""
@@ -73,7 +73,7 @@ def advance(
 
     Between instants that are too far apart for its loops the chain takes several steps.
     """
-    steps = ceil(dt / _LONGEST_STEP_S)
+    steps = ceil(dt / _MAX_STEP_S)
     step = dt / steps
     p, v, a, j = motion[0].copy(), motion[1].copy(), motion[2].copy(), motion[3].copy()
     snap = np.empty(3)
@@ -113,8 +113,8 @@ def _drive_axes(
     kinds: Integers,
     first: int,
     last: int,
-    fastest: float,
-    strongest: float,
+    max_speed: float,
+    max_acceleration: float,
     jerkiest: float,
     snap: Array,
 ) -> None:
@@ -125,9 +125,9 @@ def _drive_axes(
         if kinds[i] == 0:
             distance_squared += (p[i] - target[0, i]) ** 2
     distance = sqrt(distance_squared)
-    strongest = min(strongest, jerkiest / K_VELOCITY)
-    stopping = _STOPPING * strongest
-    speed, slope = _approach(distance, stopping, fastest, K_POSITION)
+    max_acceleration = min(max_acceleration, jerkiest / K_VELOCITY)
+    stopping = _STOPPING * max_acceleration
+    speed, slope = _approach(distance, stopping, max_speed, K_POSITION)
     for i in range(first, last):
         if kinds[i] == 0:
             along = (target[0, i] - p[i]) / distance if distance > 0.0 else 0.0
@@ -135,7 +135,7 @@ def _drive_axes(
             wanted[i] = lead + K_VELOCITY * (target[1, i] + speed * along - v[i])
         elif kinds[i] == 1:
             wanted[i] = K_VELOCITY * (target[1, i] - v[i])
-    _bound(wanted, first, last, strongest)
+    _bound(wanted, first, last, max_acceleration)
     for i in range(first, last):
         wanted[i] = K_ACCELERATION * (target[2, i] + wanted[i] - a[i])
     _bound(wanted, first, last, jerkiest)
@@ -144,7 +144,7 @@ def _drive_axes(
 
 
 @compiled
-def _approach(distance: float, stopping: float, fastest: float, gain: float) -> tuple[float, float]:
+def _approach(distance: float, stopping: float, max_speed: float, gain: float) -> tuple[float, float]:
     """Return the speed towards a place at `distance`, and how it changes with it."""
     near = stopping / gain**2
     if distance <= near:
@@ -152,20 +152,20 @@ def _approach(distance: float, stopping: float, fastest: float, gain: float) -> 
     else:
         speed = sqrt(stopping * (2.0 * distance - near))
         slope = stopping / speed
-    if speed > fastest:
-        return fastest, 0.0
+    if speed > max_speed:
+        return max_speed, 0.0
     return speed, slope
 
 
 @compiled
-def _bound(vector: Array, first: int, last: int, most: float) -> None:
-    """Shorten the part of a vector from `first` to before `last` to `most`, in place."""
+def _bound(vector: Array, first: int, last: int, maximum: float) -> None:
+    """Shorten the part of a vector from `first` to before `last` to `maximum`, in place."""
     squared = 0.0
     for i in range(first, last):
         squared += vector[i] ** 2
-    if squared > most**2:
+    if squared > maximum**2:
         for i in range(first, last):
-            vector[i] *= most / sqrt(squared)
+            vector[i] *= maximum / sqrt(squared)
 
 
 @compiled
@@ -179,7 +179,7 @@ def _turn(yaw: float, rate: float, target: Array, turns: bool, limits: Limits) -
         stopping = _STOPPING * limits.yaw_acceleration_rad_s2
         speed, slope = _approach(abs(left), stopping, limits.yaw_rate_rad_s, K_YAW)
         wanted += speed if left > 0.0 else -speed
-    most = limits.yaw_acceleration_rad_s2
+    maximum = limits.yaw_acceleration_rad_s2
     added = slope * (target[1] - rate) + K_YAW_RATE * (wanted - rate)
-    acceleration: float = target[2] + min(max(added, -most), most)
+    acceleration: float = target[2] + min(max(added, -maximum), maximum)
     return acceleration

@@ -65,7 +65,9 @@ class Row(NamedTuple):
 ROWS = (
     Row("MIS_TAKEOFF_ALT", "takeoff_height_m", "m", 0.5, 1000.0, "Height of a takeoff", "Above where it stands."),
     Row("MPC_XY_CRUISE", "speed_m_s", "m/s", 0.1, 25.0, "Horizontal speed", "Of what flies by itself."),
-    Row("MPC_XY_VEL_MAX", "fastest_m_s", "m/s", 0.1, 25.0, "Largest horizontal speed", "No command may ask for more."),
+    Row(
+        "MPC_XY_VEL_MAX", "max_speed_m_s", "m/s", 0.1, 25.0, "Largest horizontal speed", "No command may ask for more."
+    ),
     Row("MPC_Z_VEL_MAX_UP", "climb_m_s", "m/s", 0.1, 10.0, "Speed of climbs"),
     Row("MPC_Z_VEL_MAX_DN", "sink_m_s", "m/s", 0.1, 6.0, "Speed of descents"),
     Row("MPC_ACC_HOR", "acceleration_m_s2", "m/s^2", 0.5, 12.0, "Horizontal acceleration"),
@@ -75,7 +77,7 @@ ROWS = (
     Row("MPC_YAWRAUTO_ACC", "yaw_acceleration_rad_s2", "deg/s^2", 10.0, 720.0, "Acceleration of turns", "", _DEG, 1),
     Row("MPC_TKO_SPEED", "takeoff_speed_m_s", "m/s", 0.2, 5.0, "Speed of a takeoff"),
     Row("MPC_LAND_SPEED", "land_speed_m_s", "m/s", 0.2, 2.0, "Speed of a landing", "Close to the ground."),
-    Row("MPC_MAN_TILT_MAX", "largest_tilt_deg", "deg", 1.0, 60.0, "Tilt of full sticks", "Stabilized.", 1.0, 1),
+    Row("MPC_MAN_TILT_MAX", "max_tilt_deg", "deg", 1.0, 60.0, "Tilt of full sticks", "Stabilized.", 1.0, 1),
     Row("MPC_MAN_Y_MAX", "stick_yaw_rate_rad_s", "deg/s", 1.0, 400.0, "Turn rate of full sticks", "", _DEG, 1),
     Row("MPC_VEL_MANUAL", "stick_speed_m_s", "m/s", 0.1, 20.0, "Horizontal speed of full sticks", "Position mode."),
     Row("RTL_RETURN_ALT", "return_height_m", "m", 0.0, 1000.0, "Height of a return", "Above home, on the way there."),
@@ -101,8 +103,8 @@ ROWS = (
         "A companion may be silent so long.",
     ),
     Row("COM_RC_LOSS_T", "sticks_lost_s", "s", 0.1, 35.0, "Pilot loss timeout", "Sticks may be silent so long."),
-    Row("GF_MAX_HOR_DIST", "farthest_m", "m", 0.0, 100e3, "Fence around home", "Horizontal distance; 0: none."),
-    Row("GF_MAX_VER_DIST", "highest_m", "m", 0.0, 10e3, "Fence above home", "Height; 0: none."),
+    Row("GF_MAX_HOR_DIST", "max_distance_m", "m", 0.0, 100e3, "Fence around home", "Horizontal distance; 0: none."),
+    Row("GF_MAX_VER_DIST", "max_height_m", "m", 0.0, 10e3, "Fence above home", "Height; 0: none."),
     Row("ORBIT_RADIUS", "orbit_radius_m", "m", 1.0, 1000.0, "Radius of an orbit", "Where the command does not say."),
     Row("FLW_TGT_HT", "follow_height_m", "m", 1.0, 1000.0, "Follow: height", "Above home."),
     Row("FLW_TGT_DST", "follow_distance_m", "m", 1.0, 1000.0, "Follow: distance to the target"),
@@ -196,13 +198,13 @@ def _follow_answers() -> list[Parameter]:
             kind=Kind.REAL,
             default=default,
             minimum=0.0,
-            maximum=most,
+            maximum=maximum,
             unit=unit,
             description=description,
             details=_ANSWERS,
             group=_group(name),
         )
-        for name, default, most, unit, description in what
+        for name, default, maximum, unit, description in what
     ]
 
 

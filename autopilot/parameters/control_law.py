@@ -22,10 +22,12 @@ def law_numbers(controller: str, table: Mapping[str, Any]) -> list[Number]:
     return named(start[:_PREFIX_LENGTH], table, STRUCTURE)
 
 
-def _axes(names: str, key: Path, unit: str, least: float, most: float, what: str, decimals: int = 3) -> list[Number]:
+def _axes(
+    names: str, key: Path, unit: str, minimum: float, maximum: float, what: str, decimals: int = 3
+) -> list[Number]:
     """Return three numbers, of roll, pitch and yaw; `what` says of what."""
     return [
-        Number(name, (*key, place), unit, least, most, what.format(_MOMENTS[place]), decimals=decimals)
+        Number(name, (*key, place), unit, minimum, maximum, what.format(_MOMENTS[place]), decimals=decimals)
         for place, name in enumerate(names.split())
     ]
 
@@ -36,24 +38,28 @@ LPV_MPC = [
         for place, turn in enumerate(_TURN)
     ),
     Number("LPV_APPROACH", ("guidance", "approach_speed_m_s"), "m/s", 0.1, 30.0, "Speed towards a far reference"),
-    Number("LPV_TILT_MAX", ("guidance", "largest_tilt_deg"), "deg", 5.0, 80.0, "Largest tilt asked for", decimals=1),
+    Number("LPV_TILT_MAX", ("guidance", "max_tilt_deg"), "deg", 5.0, 80.0, "Largest tilt asked for", decimals=1),
     Number("LPV_THR_MARGIN", ("guidance", "thrust_margin"), "norm", 0.0, 0.45, "Thrust range kept for moments"),
     Number("LPV_OBS_ACC", ("observer", "acceleration_rad_s"), "rad/s", 0.1, 60.0, "Poles of the force observer"),
     Number("LPV_OBS_MOM", ("observer", "moment_rad_s"), "rad/s", 0.1, 60.0, "Poles of the moment observer"),
-    Number("LPV_OBS_ACC_MAX", ("observer", "most_m_s2"), "m/s^2", 0.01, 20.0, "Largest disturbance believed"),
-    Number("LPV_OBS_MOM_MAX", ("observer", "most_n_m"), "N m", 0.001, 10.0, "Largest disturbance moment believed"),
+    Number(
+        "LPV_OBS_ACC_MAX", ("observer", "max_acceleration_m_s2"), "m/s^2", 0.01, 20.0, "Largest disturbance believed"
+    ),
+    Number(
+        "LPV_OBS_MOM_MAX", ("observer", "max_moment_n_m"), "N m", 0.001, 10.0, "Largest disturbance moment believed"
+    ),
     *_axes("LPV_Q_PHI LPV_Q_THETA LPV_Q_PSI", ("attitude", "output_weight"), "", 1e-3, 1e3, "Weight on {} error"),
     *_axes("LPV_R_U2 LPV_R_U3 LPV_R_U4", ("attitude", "increment_weight"), "", 1e-3, 1e4, "Weight on {} changes"),
     *_axes(
         "LPV_DU2_MAX LPV_DU3_MAX LPV_DU4_MAX",
-        ("attitude", "largest_increment_n_m"),
+        ("attitude", "max_increment_n_m"),
         *("N m", 1e-3, 10.0, "Largest change of the {} moment"),
         decimals=4,
     ),
-    Number("LPV_ANGLE_MAX", ("attitude", "largest_angle_deg"), "deg", 10.0, 85.0, "Soft limit of roll, pitch", 1.0, 1),
+    Number("LPV_ANGLE_MAX", ("attitude", "max_angle_deg"), "deg", 10.0, 85.0, "Soft limit of roll, pitch", 1.0, 1),
     *_axes(
         "LPV_RATE_P LPV_RATE_Q LPV_RATE_R",
-        ("attitude", "largest_rate_rad_s"),
+        ("attitude", "max_rate_rad_s"),
         *("rad/s", 0.5, 50.0, "Soft limit of the {} rate"),
     ),
     Number("LPV_SLACK", ("attitude", "slack_weight"), "", 1.0, 1e6, "Weight on exceeded soft limits", decimals=1),
@@ -64,7 +70,7 @@ LPV_MPC = [
     ),
     Number("LPV_FB_TURN", ("fallback", "turn_1_s"), "1/s", 0.1, 50.0, "Recovery: turn for each rad left"),
     Number("LPV_FB_RATE", ("fallback", "rate_1_s"), "1/s", 0.1, 100.0, "Recovery: how fast the turn is reached"),
-    Number("LPV_FB_FASTEST", ("fallback", "fastest_rad_s"), "rad/s", 0.1, 50.0, "Recovery: fastest turn"),
+    Number("LPV_FB_FASTEST", ("fallback", "max_rate_rad_s"), "rad/s", 0.1, 50.0, "Recovery: fastest turn"),
     Number("LPV_QP_ITER", ("qp", "max_iterations"), "", 20, 100_000, "Iterations of the QP's solver at most"),
 ]
 """Of `colibri.autopilot.control.lpv_mpc.law`: all but its samples and the solver."""

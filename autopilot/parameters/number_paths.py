@@ -5,7 +5,7 @@ from itertools import count
 from math import isfinite
 from typing import Any, NamedTuple, TypeAlias
 
-from colibri.mavlink.parameters.store import LARGEST_INT, LARGEST_REAL, LEAST_INT, Kind, Parameter, Value
+from colibri.mavlink.parameters.store import FLOAT32_MAX, INT32_MAX, INT32_MIN, Kind, Parameter, Value
 
 Path: TypeAlias = tuple[str | int, ...]
 """Keys, and places in lists, from the outside in."""
@@ -25,8 +25,8 @@ _UNITS = {
     "_n": "N",
 }
 """Endings of keys, longer ones first."""
-_LONGEST = 16
-_LONGEST_WORD = 8
+_MAX_NAME_CHARS = 16
+_MAX_WORD_CHARS = 8
 
 
 class Number(NamedTuple):
@@ -46,8 +46,8 @@ class Number(NamedTuple):
     name: str
     path: Path
     unit: str = ""
-    minimum: float = -LARGEST_REAL
-    maximum: float = LARGEST_REAL
+    minimum: float = -FLOAT32_MAX
+    maximum: float = FLOAT32_MAX
     description: str = ""
     scale: float = 1.0
     decimals: int = 3
@@ -125,8 +125,8 @@ def is_number(value: Any) -> bool:
     if isinstance(value, bool):
         return False
     if isinstance(value, int):
-        return LEAST_INT <= value <= LARGEST_INT
-    return isinstance(value, float) and isfinite(value) and abs(value) <= LARGEST_REAL
+        return INT32_MIN <= value <= INT32_MAX
+    return isinstance(value, float) and isfinite(value) and abs(value) <= FLOAT32_MAX
 
 
 def paths(tree: Any, before: Path = ()) -> Iterator[Path]:
@@ -178,15 +178,15 @@ def _names(prefix: str, path: Path) -> Iterator[str]:
     """Yield names for a path, the most telling first."""
     words = [_plain(word) for key in path if isinstance(key, str) for word in key.split("_")]
     places = "".join(str(key + 1) for key in path if isinstance(key, int))
-    room = _LONGEST - len(prefix) - 1 - len(places)
-    for length in range(_LONGEST_WORD, 0, -1):
+    room = _MAX_NAME_CHARS - len(prefix) - 1 - len(places)
+    for length in range(_MAX_WORD_CHARS, 0, -1):
         text = "_".join(filter(None, (word[:length] for word in words)))
         if len(text) <= room:
             yield f"{prefix}_{text}{places}"
     text = "_".join(filter(None, words))
     for number in count(1):
         end = f"_{number}"
-        yield f"{prefix}_{text[: max(_LONGEST - len(prefix) - 1 - len(end), 0)].rstrip('_')}{end}"
+        yield f"{prefix}_{text[: max(_MAX_NAME_CHARS - len(prefix) - 1 - len(end), 0)].rstrip('_')}{end}"
 
 
 def _plain(word: str) -> str:

@@ -21,9 +21,11 @@ def vehicle_numbers(tree: Mapping[str, Any]) -> list[Number]:
     ]
 
 
-def _axes(name: str, key: Path, unit: str, most: float, what: str, scale: float, least: float = 0.0) -> list[Number]:
+def _axes(
+    name: str, key: Path, unit: str, maximum: float, what: str, scale: float, minimum: float = 0.0
+) -> list[Number]:
     return [
-        Number(name.format(axis), (*key, place), unit, least, most, what.format(axis.lower()), scale, 4)
+        Number(name.format(axis), (*key, place), unit, minimum, maximum, what.format(axis.lower()), scale, 4)
         for place, axis in enumerate(_AXES)
     ]
 

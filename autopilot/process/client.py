@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 _SILENCE_SAID_AFTER_S = 2.0
-_WAIT_AT_MOST_S = 0.1
+_MAX_WAIT_S = 0.1
 _UNKNOWN_SAID_AFTER_US = 3_000_000
 """Of simulated time: who rests is known after a second."""
 _UNKNOWN = "no estimate yet: the vehicle must rest for a second, with a GPS fix; until then the rotors stand"
@@ -60,7 +60,7 @@ class Client:
         self._status.say("calling", "waiting for the plant at " + self._link.url.partition(":")[2])
         due_s = 0.0
         while not self._stop:
-            received = self._link.receive(min(max(0.0, due_s - perf_counter()), _WAIT_AT_MOST_S))
+            received = self._link.receive(min(max(0.0, due_s - perf_counter()), _MAX_WAIT_S))
             step = self._answer(autopilot, received[0]) if received else None
             due_s = self._end.poll(perf_counter())
             for datagram in self._end.take_outbox():

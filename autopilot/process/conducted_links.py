@@ -13,7 +13,7 @@ from colibri.mavlink.node.hub import Outgoing
 
 HOST = "127.0.0.1"
 """Ground stations of a conductor have their number for a port here."""
-_WAIT_AT_MOST_S = 0.1
+_MAX_WAIT_S = 0.1
 
 
 class Conductor(Protocol):
@@ -45,7 +45,7 @@ class UdpConductor:
     def hear(self) -> Turn | None:
         """Wait for its turn."""
         while not self._ended():
-            received = self._link.receive(_WAIT_AT_MOST_S)
+            received = self._link.receive(_MAX_WAIT_S)
             turn = None if received is None else self._gathering.take(received[0])
             if turn is not None:
                 return turn

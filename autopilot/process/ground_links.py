@@ -18,7 +18,7 @@ SDK_PORTS = range(14540, 14550)
 """Where SDKs wait for a PX4, and so for us: they ask for nothing, and expect everything."""
 SHARE = 0.25
 """Part of all time that hearing others may take: at real time a frame leaves more than half of its time to that."""
-MOST_SAVED_S = 0.005
+MAX_SAVED_S = 0.005
 
 
 def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[GroundLink]:
@@ -54,12 +54,12 @@ class Allowance:
         self._processor_clock = processor_clock
         self._earned_s = clock()
         self._began_s = 0.0
-        self._left_s = MOST_SAVED_S
+        self._left_s = MAX_SAVED_S
 
     def earn(self) -> None:
         """Take in the share of the time that has passed."""
         now_s = self._clock()
-        self._left_s = min(self._left_s + SHARE * (now_s - self._earned_s), MOST_SAVED_S)
+        self._left_s = min(self._left_s + SHARE * (now_s - self._earned_s), MAX_SAVED_S)
         self._earned_s = now_s
 
     def begin(self) -> bool:

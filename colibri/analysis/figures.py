@@ -32,7 +32,7 @@ _TITLE_IN, _LABEL_IN = 0.45, 0.6
 _TIME_MARGIN = 0.015
 _FLATTEST = 0.4
 _NOTHING = 1e-12
-_LONGEST_NAME = 36
+_MAX_NAME_CHARS = 36
 _ROOM_FOR_TALL = 0.8
 
 
@@ -176,8 +176,8 @@ def draw_trajectory(series: Series, title: str) -> Figure:
 
 def shortened(name: str) -> str:
     """Return a name that fits into a title: of one that is too long, its beginning and its end."""
-    half = _LONGEST_NAME // 2
-    return name if len(name) <= _LONGEST_NAME else f"{name[:half]}…{name[-half:]}"
+    half = _MAX_NAME_CHARS // 2
+    return name if len(name) <= _MAX_NAME_CHARS else f"{name[:half]}…{name[-half:]}"
 
 
 def write_figure(figure: Figure, path: Path, formats: Iterable[str] = ("png",)) -> list[Path]:

@@ -23,15 +23,15 @@ from colibri.bench.stages import MOVES, STAGES, stage_figures
 from colibri.common.process.lifecycle import fail
 
 PROFILE = "flight"
-SHORTEST_S, LONGEST_S = 0.1, 1000.0
+MIN_DURATION_S, MAX_DURATION_S = 0.1, 1000.0
 _SERVED = ("p50 µs", "p99 µs", "messages a second")
 
 
 def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
     """Measure what the command line says, flights beside `peer`; print tables, write JSON; return the exit code."""
     wanted = args.only or ["stages", "flights", "sensors", "ground", "thesis"]
-    if not SHORTEST_S <= args.duration <= LONGEST_S:
-        fail(f"--duration: {SHORTEST_S:g} to {LONGEST_S:g} s, not {args.duration:g}")
+    if not MIN_DURATION_S <= args.duration <= MAX_DURATION_S:
+        fail(f"--duration: {MIN_DURATION_S:g} to {MAX_DURATION_S:g} s, not {args.duration:g}")
     if args.out:
         _check_writable(args.out)
     figures: dict[str, Any] = {"settings": _settings(args)}

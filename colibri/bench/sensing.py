@@ -27,7 +27,7 @@ TRACK = "spiral"
 FRAME_US, CONTROL_US = 4_000, 8_000
 LINKS = ("memory", "udp")
 ALWAYS, IN_FLIGHT = "asked at every frame", "asked at every control sample"
-_LEAST_S = 4.0
+_MIN_S = 4.0
 """A flight on sensors begins with a second of standing; the estimator then is still loading what it needs."""
 _SETTLED = 500
 """Frames that are not counted: the estimator aligns itself, and meets everything for the first time."""
@@ -36,7 +36,7 @@ FLIGHTS_A_RUN = len(LINKS) * len(Feedback)
 
 def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int, tell: Tell) -> dict[str, Any]:
     """Time the estimator on the frames of a flight; fly on sensors and on the state, in turn, in every run."""
-    duration_s = max(duration_s, _LEAST_S)
+    duration_s = max(duration_s, _MIN_S)
     tell("estimator")
     fly_locally(_plan(profile, folder, duration_s, "memory", Feedback.SENSORS), _unseen)
     frames = list(sensor_frames((folder / "flight.tlog").read_bytes()))

@@ -30,7 +30,7 @@ KINDS = (GCS, SDK)
 STATIONS = 2
 ALONE, WATCHED = "alone", f"{STATIONS} stations"
 
-_LEAST_FRAMES = 4
+_MIN_FRAMES = 4
 """Before these all is loaded."""
 
 
@@ -69,7 +69,7 @@ def served(plan: FlightPlan, channels: int) -> Figures:
             copter.serve(())
             times_us.append((perf_counter() - began_s) * 1e6)
     sent = sum(channel.sent for channel in copter.stations.hub.channels if channel.link >= 0)
-    return {**summary(times_us[_LEAST_FRAMES:]), "messages_hz": sent / plan.duration_s}
+    return {**summary(times_us[_MIN_FRAMES:]), "messages_hz": sent / plan.duration_s}
 
 
 def control_steps_us(plan: FlightPlan, stations: int) -> Figures:

@@ -25,7 +25,7 @@ CONTROL_S: Mapping[int, float] = {100: 0.01, 250: 0.008, 500: 0.008}
 LINKS = ("memory", "udp")
 THESIS_LINKS = ("udp", "memory")
 
-_PEER_LONGEST_S = 2.0
+_PEER_MAX_S = 2.0
 """A peer may take longer than the time that it simulates."""
 _WARM_UP_S = 0.5
 
@@ -62,7 +62,7 @@ def rate_figures(
                 flown.setdefault(link, []).append(_real_time_factor(chosen, folder, duration_s, link))
             if peer is not None:
                 tell(f"{frames_hz} Hz, {peer.name}, {run + 1} of {runs}")
-                factor = peer.real_time_factor(frames_hz, min(duration_s, _PEER_LONGEST_S))
+                factor = peer.real_time_factor(frames_hz, min(duration_s, _PEER_MAX_S))
                 flown.setdefault(peer.name, []).append(factor)
     rates = {str(frames_hz): _with_ratios(flown, peer) for frames_hz, flown in samples.items()}
     return {"track": TRACK, "control_interval_s": {str(hz): s for hz, s in CONTROL_S.items()}, "rates_hz": rates}

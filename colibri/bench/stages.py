@@ -37,7 +37,7 @@ PROFILE_HORIZON = 20
 _QPS = 100
 """How many QPs of a flight each solver solves."""
 _QPS_TO_WARM_UP = 5
-_LEAST_SAMPLES = 50
+_MIN_SAMPLES = 50
 _REPLY_WITHIN_S = 1.0
 _ECHO_ENDS_AFTER_S = 10.0
 
@@ -165,7 +165,7 @@ def exchange_times_us(frames: Sequence[bytes], commands: Sequence[bytes]) -> lis
     answering.start()
     try:
         link = open_link(here.recv())
-        times_us = _round_trips_us(link, [*frames[:_LEAST_SAMPLES], *frames])[_LEAST_SAMPLES:]
+        times_us = _round_trips_us(link, [*frames[:_MIN_SAMPLES], *frames])[_MIN_SAMPLES:]
         link.close()
     finally:
         answering.terminate()

@@ -23,7 +23,7 @@ from colibri.plant.vehicle.description import load_vehicle
 PLANT_PORT = 14560
 GROUND_PORT = 14550
 SDK_PORT = 14540
-LARGEST_FLEET = 100
+MAX_FLEET = 100
 
 
 @dataclass(slots=True)
@@ -90,8 +90,8 @@ def _check(args: argparse.Namespace) -> None:
         fail(f"--feedback sensors: vehicle {(believed if vehicle.sensors else vehicle).name} has no table sensors")
     if vehicle.ground is None and "z" not in args.start:
         fail(f"vehicle {name} has no ground to stand on: fly a vehicle with a table ground, or give --start z=...")
-    if not 1 <= args.count <= LARGEST_FLEET - args.instance:
-        fail(f"--instance and --count: at least one vehicle, instances from 0 to {LARGEST_FLEET - 1}")
+    if not 1 <= args.count <= MAX_FLEET - args.instance:
+        fail(f"--instance and --count: at least one vehicle, instances from 0 to {MAX_FLEET - 1}")
     if args.count > 1 and any(url.startswith(("udpin:", "tcpin:")) and not url.endswith(":0") for url in args.gcs):
         fail("--gcs: several vehicles cannot wait on one port; let them call, by udpout: or tcp:, or fly one")
     for instance in range(args.instance, args.instance + args.count):

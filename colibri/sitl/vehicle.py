@@ -182,9 +182,9 @@ class Sitl(View):
         if not self.armed:
             self.arm()
         if wait:
-            most_s = 5.0 + 2.0 * height_m if within is None else within
+            max_s = 5.0 + 2.0 * height_m if within is None else within
             up = lambda: self.mode is Mode.HOLD and self.position[2] > high_m  # noqa: E731
-            self.wait_until(up, within=most_s, what="the climb")
+            self.wait_until(up, within=max_s, what="the climb")
 
     def land(self, *, wait: bool = True, within: float | None = None) -> None:
         """Land here, and wait until the rotors have stopped.
@@ -193,10 +193,10 @@ class Sitl(View):
             RefusedError: The vehicle says why not.
             NotInTimeError: They do not stop `within` s; where nothing is said, 8 s and 2 s a metre.
         """
-        most_s = 8.0 + 2.0 * self.position[2] if within is None else within
+        max_s = 8.0 + 2.0 * self.position[2] if within is None else within
         self.select(Mode.LAND)
         if wait:
-            self.wait_until(lambda: not self.armed, within=most_s, what="landing")
+            self.wait_until(lambda: not self.armed, within=max_s, what="landing")
 
     def goto(
         self,
@@ -239,8 +239,8 @@ class Sitl(View):
         self.gcs.check(result, said, "going there")
         if wait:
             goal = (east, north, up)
-            most_s = 10.0 + dist(goal, self.position) if within is None else within
-            self.wait_until(lambda: self.is_at(goal), within=most_s, what=f"the way to {goal}")
+            max_s = 10.0 + dist(goal, self.position) if within is None else within
+            self.wait_until(lambda: self.is_at(goal), within=max_s, what=f"the way to {goal}")
 
     def fly_track(self, name: str) -> None:
         """Fly a track of parameter TRACK: arm if need be, and go there first.

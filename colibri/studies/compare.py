@@ -75,8 +75,8 @@ def folder_name(track: str) -> str:
 def _cells(figures: dict[str, Any]) -> tuple[str, ...]:
     solve = figures["solve_time_us"]
     times = ("-", "-") if figures["solver"] is None else (f"{solve['p50']:.0f}", f"{solve['p99']:.0f}")
-    rms, largest = figures["rmse_after_20s_m"], figures["max_error_m"]
-    return (f"{rms:.4g}", f"{largest:.4g}", f"{figures['effort_n_m']:.4g}", *times)
+    rms, maximum = figures["rmse_after_20s_m"], figures["max_error_m"]
+    return (f"{rms:.4g}", f"{maximum:.4g}", f"{figures['effort_n_m']:.4g}", *times)
 
 
 def _print(rows: list[tuple[str, ...]], out: Path) -> None:

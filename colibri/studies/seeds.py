@@ -56,7 +56,7 @@ class Job(NamedTuple):
         return FlightPlan.of_options(out, **chosen, **asked)
 
 
-_WIDEST = 400
+_MAX_WIDTH = 400
 _COMMON = ("vehicle", "feedback", "link", "duration")
 _WEATHER = ("wind", "gusts", "turbulence")
 _KEPT_AS = {"gusts": "gust"}
@@ -173,5 +173,5 @@ def _print(rows: Sequence[tuple[str, ...]], out: Path) -> None:
         table.add_column(column, justify="left" if number < 2 else "right", no_wrap=True)
     for row in rows:
         table.add_row(*row)
-    needed = Console(width=_WIDEST).measure(table).maximum
+    needed = Console(width=_MAX_WIDTH).measure(table).maximum
     Console(width=max(Console().width, needed)).print(table)

@@ -97,7 +97,7 @@ def bound(column: int) -> Callable[[Flown], str]:
 
 
 RMS = Measure("RMS (m)", unless_lost(lambda flown: flown.rms_m))
-LARGEST = Measure("maximum (m)", unless_lost(lambda flown: flown.largest_m))
+MAX_ERROR = Measure("maximum (m)", unless_lost(lambda flown: flown.max_error_m))
 
 
 def _tracks() -> Iterable[Case]:
@@ -187,14 +187,14 @@ _BINDING = tuple(
 )
 
 STUDIES = (
-    Study("tracks", ("track",), (RMS, LARGEST), tuple(_tracks()), study_figures.tracks),
+    Study("tracks", ("track",), (RMS, MAX_ERROR), tuple(_tracks()), study_figures.tracks),
     Study(
         "speed",
         ("lap (s)", "top speed (m/s)", "battery"),
         (
             Measure("RMS (m)", unless_crashed(lambda flown: flown.rms_m)),
-            Measure("maximum (m)", unless_crashed(lambda flown: flown.largest_m)),
-            Measure("least cos tilt", unless_crashed(lambda flown: flown.least_upright)),
+            Measure("maximum (m)", unless_crashed(lambda flown: flown.max_error_m)),
+            Measure("least cos tilt", unless_crashed(lambda flown: flown.min_upright)),
         ),
         tuple(_speed()),
         study_figures.speed,
@@ -215,11 +215,11 @@ STUDIES = (
         tuple(_recovery()),
         study_figures.recovery,
     ),
-    Study("robustness", ("plant",), (RMS, LARGEST), tuple(_robustness()), study_figures.robustness),
+    Study("robustness", ("plant",), (RMS, MAX_ERROR), tuple(_robustness()), study_figures.robustness),
     Study(
         "limits",
         ("track", "largest rotor speed (rad/s)", "battery"),
-        (RMS, LARGEST, *_BINDING),
+        (RMS, MAX_ERROR, *_BINDING),
         tuple(_limits()),
         study_figures.limits,
     ),

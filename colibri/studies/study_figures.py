@@ -44,7 +44,7 @@ def tracks(results: Sequence[Result]) -> dict[str, Figure]:
     figure.subplots_adjust(left=0.17)
     for group in groups:
         color = _CONTENDERS[group]
-        places, rms, largest, lost = [], [], [], []
+        places, rms, max_error, lost = [], [], [], []
         for result in results:
             if result.group != group:
                 continue
@@ -54,10 +54,10 @@ def tracks(results: Sequence[Result]) -> dict[str, Figure]:
             else:
                 places.append(place)
                 rms.append(result.flown.rms_m)
-                largest.append(result.flown.largest_m)
-        axes.hlines(places, rms, largest, color=color, linewidth=1.4)
+                max_error.append(result.flown.max_error_m)
+        axes.hlines(places, rms, max_error, color=color, linewidth=1.4)
         axes.plot(rms, places, "o", color=color, markersize=7, label=f"{_CALLED.get(group, group)}: RMS")
-        axes.plot(largest, places, "|", color=color, markersize=10, markeredgewidth=1.8)
+        axes.plot(max_error, places, "|", color=color, markersize=10, markeredgewidth=1.8)
         for place in lost:
             axes.text(0.99, place, "lost", transform=axes.get_yaxis_transform(), ha="right", va="center", color=color)
     axes.plot([], [], "k|", markersize=10, markeredgewidth=1.8, label="maximum")
@@ -75,7 +75,7 @@ def speed(results: Sequence[Result]) -> dict[str, Figure]:
     figure, grid = axes_grid(3, 1, TOP_IN + _LEGEND_ROW_IN, row_in=1.7)
     quantities: tuple[tuple[str, Callable[[Flown], float]], ...] = (
         ("RMS (m)", lambda flown: flown.rms_m),
-        ("maximum (m)", lambda flown: flown.largest_m),
+        ("maximum (m)", lambda flown: flown.max_error_m),
         ("largest tilt (°)", lambda flown: float(flown.tilt_deg[flown.settled].max(initial=0.0))),
     )
     for (axes,), (quantity, of) in zip(grid, quantities, strict=True):
@@ -228,9 +228,9 @@ def _limits(result: Result) -> Figure:
 
 
 def _rotors(axes: Axes, flown: Flown, shown: Any) -> None:
-    least, most = flown.rotor_limits
-    axes.axhline(least, label="limits", **line_style(LIMIT))
-    axes.plot(flown.t[shown], most[shown], **line_style(LIMIT))
+    minimum, maximum = flown.rotor_limits
+    axes.axhline(minimum, label="limits", **line_style(LIMIT))
+    axes.plot(flown.t[shown], maximum[shown], **line_style(LIMIT))
     for number, name in enumerate(ROTORS):
         style = Style(_FOUR[number], 1.2)
         axes.plot(flown.t[shown], flown.recording[name][shown], label=f"Ω{number + 1}", **line_style(style))

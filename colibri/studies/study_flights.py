@@ -148,13 +148,13 @@ class Flown:
         return float(np.sqrt(np.mean(error**2))) if len(error) else nan
 
     @property
-    def largest_m(self) -> float:
+    def max_error_m(self) -> float:
         """Largest position error once settled, m; not a number for a flight too short."""
         error = self.recording.position_error_m[self.settled]
         return float(error.max()) if len(error) else nan
 
     @property
-    def least_upright(self) -> float:
+    def min_upright(self) -> float:
         """Least upright part of the body's z axis once settled; not a number for a flight too short."""
         upright = self.upright[self.settled]
         return float(upright.min()) if len(upright) else nan
@@ -162,7 +162,7 @@ class Flown:
     @property
     def lost(self) -> bool:
         """Whether it ended early, or ended up far off its reference."""
-        return self.failure is not None or (not isnan(self.largest_m) and self.largest_m > LOST_M)
+        return self.failure is not None or (not isnan(self.max_error_m) and self.max_error_m > LOST_M)
 
     @property
     def crashed(self) -> bool:
@@ -186,9 +186,9 @@ class Flown:
 
     def falls_below(self, values: Array, bound: float) -> float:
         """Return the time, s, at which `values` (n,) first are below `bound` after their largest; else not a number."""
-        largest = int(values.argmax())
-        below = np.flatnonzero(values[largest:] < bound)
-        return float(self.t[largest + below[0]]) if len(below) else nan
+        peak = int(values.argmax())
+        below = np.flatnonzero(values[peak:] < bound)
+        return float(self.t[peak + below[0]]) if len(below) else nan
 
     def stays_below(self, values: Array, bound: float) -> float:
         """Return the time, s, from which `values` (n,) stay below `bound`; not a number if they do not."""

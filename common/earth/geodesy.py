@@ -11,8 +11,8 @@ from colibri.common.elementary import acos, asin, atan2, cos, sin
 from colibri.common.types import Vector
 
 EARTH_RADIUS_M = 6371000.0
-LARGEST_LATITUDE_DEG = 90.0
-LARGEST_LONGITUDE_DEG = 180.0
+MAX_LATITUDE_DEG = 90.0
+MAX_LONGITUDE_DEG = 180.0
 
 
 class Geodetic(NamedTuple):
@@ -38,8 +38,8 @@ def is_on_earth(latitude_deg: float, longitude_deg: float) -> bool:
     return (
         isfinite(latitude_deg)
         and isfinite(longitude_deg)
-        and abs(latitude_deg) <= LARGEST_LATITUDE_DEG
-        and abs(longitude_deg) <= LARGEST_LONGITUDE_DEG
+        and abs(latitude_deg) <= MAX_LATITUDE_DEG
+        and abs(longitude_deg) <= MAX_LONGITUDE_DEG
     )
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, is_on_earth
 
-_LOWEST_M, _HIGHEST_M = -500.0, 10_000.0
+_MIN_HEIGHT_M, _MAX_HEIGHT_M = -500.0, 10_000.0
 
 
 class HomePlace(NamedTuple):
@@ -50,6 +50,10 @@ def home(text: str) -> HomePlace:
         raise ArgumentTypeError(f"expected LAT,LON,ALT,YAW in degrees and metres, not {text}") from None
     if not is_on_earth(place.latitude_deg, place.longitude_deg):
         raise ArgumentTypeError(f"not a latitude of -90 to 90 and a longitude of -180 to 180: {text}")
-    if not _LOWEST_M <= place.altitude_m <= _HIGHEST_M or not isfinite(place.yaw_deg) or abs(place.yaw_deg) > 360.0:
+    if (
+        not _MIN_HEIGHT_M <= place.altitude_m <= _MAX_HEIGHT_M
+        or not isfinite(place.yaw_deg)
+        or abs(place.yaw_deg) > 360.0
+    ):
         raise ArgumentTypeError(f"not an altitude of -500 to 10000 m and a yaw of -360 to 360 degrees: {text}")
     return place

@@ -16,7 +16,7 @@ YEAR = 2026.0
 
 _GAUSS_PER_NT = 1e-5
 _DECIMALS_NT = 6
-_LOWEST_KM, _HIGHEST_KM = -1.0, 850.0
+_MIN_HEIGHT_KM, _MAX_HEIGHT_KM = -1.0, 850.0
 
 
 @lru_cache(maxsize=64)
@@ -27,7 +27,7 @@ def field_enu_gauss(place: Geodetic, year: float = YEAR) -> Vector:
         place: On earth; its altitude is taken within what the model is made for, -1 to 850 km.
         year: Decimal year, 2025 to 2030.
     """
-    altitude_km = min(max(place.altitude_m / 1e3, _LOWEST_KM), _HIGHEST_KM)
+    altitude_km = min(max(place.altitude_m / 1e3, _MIN_HEIGHT_KM), _MAX_HEIGHT_KM)
     field = GeoMag(coefficients_data=WMM_2025).calculate(
         glat=place.latitude_deg, glon=place.longitude_deg, alt=altitude_km, time=year
     )

@@ -14,7 +14,7 @@ SLOT = 256 << 10
 _HEAD = Struct("<QII")
 """Number, from 1 on; length; checksum of both and of the content."""
 _COUNTED = Struct("<QI")
-MOST = SLOT - _HEAD.size
+MAX_BYTES = SLOT - _HEAD.size
 """Bytes that fit."""
 
 
@@ -41,7 +41,7 @@ class Slots:
 
     def write(self, content: bytes) -> bool:
         """Keep `content` in place of what was written before the last; return whether it fits."""
-        if len(content) > MOST:
+        if len(content) > MAX_BYTES:
             return False
         number = self._number + 1
         at = SLOT * (number % 2)
@@ -59,7 +59,7 @@ class Slots:
         slots = []
         for at in (0, SLOT):
             number, length, checksum = _HEAD.unpack_from(self._map, at)
-            if number and length <= MOST:
+            if number and length <= MAX_BYTES:
                 content = self._map[at + _HEAD.size : at + _HEAD.size + length]
                 if _checksum(number, content) == checksum:
                     slots.append((number, content))

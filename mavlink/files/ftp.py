@@ -32,21 +32,21 @@ from colibri.mavlink.files.tree import FileRefusal, Files, Names, Reading
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.wire.dialect import Message
 
-MOST_SESSIONS = 32
-MOST_SESSIONS_OF_A_PEER = 8
+MAX_SESSIONS = 32
+MAX_SESSIONS_OF_A_PEER = 8
 SESSION_ENDS_AFTER_US = 20_000_000
 TAKEN_OVER_AFTER_US = 1_000_000
 """Twice the time after which MAVSDK repeats a request."""
 
 REMEMBERED_FOR_US = 3_000_000
-MOST_REMEMBERED = 64
+MAX_REMEMBERED = 64
 
 BURST_PACKETS_A_POLL = 8
-LONGEST_BURST = 1000
+MAX_BURST_PACKETS = 1000
 """Packets: a client that is gone gets no more than these."""
 CHECKSUM_BYTES_A_POLL = 256 << 10
 
-_LARGEST = 0xFFFFFFFF
+_UINT32_MAX = 0xFFFFFFFF
 
 Outcome: TypeAlias = bytes | Nak | FileRefusal | None
 """Data of the ACK, a refusal, or None where the answer comes by and by."""
@@ -67,7 +67,7 @@ class _Burst:
 
     request: Request
     reading: Reading
-    packets_left: int = LONGEST_BURST
+    packets_left: int = MAX_BURST_PACKETS
 
 
 @dataclass(slots=True)
@@ -78,7 +78,7 @@ class _Checksum:
     names: Names
     reading: Reading
     done: int = 0
-    register: int = _LARGEST
+    register: int = _UINT32_MAX
 
 
 class Ftp:
@@ -166,7 +166,7 @@ class Ftp:
         assert outcome is not None, "changes are made at once"
         done = answer(request, outcome)
         if isinstance(outcome, bytes):
-            if len(self._remembered) >= MOST_REMEMBERED:
+            if len(self._remembered) >= MAX_REMEMBERED:
                 del self._remembered[next(iter(self._remembered))]
             self._remembered[asked] = (request.now_us + REMEMBERED_FOR_US, done)
         return done
@@ -220,7 +220,7 @@ class Ftp:
         if isinstance(reading, FileRefusal):
             return reading
         refused = self._opened(request, names, reading)
-        return refused or SIZE.pack(min(reading.size, _LARGEST))
+        return refused or SIZE.pack(min(reading.size, _UINT32_MAX))
 
     def _open_to_write(self, request: Request, names: Names) -> Outcome:
         if self._files.open(names) is FileRefusal.NOT_FOUND:
@@ -252,7 +252,7 @@ class Ftp:
             idle_us = request.now_us - session.used_us
             return None if again or idle_us >= TAKEN_OVER_AFTER_US else Nak(Error.NO_SESSIONS)
         of_peer = sum(peer == request.peer for peer, _ in self._sessions)
-        full = len(self._sessions) >= MOST_SESSIONS or of_peer >= MOST_SESSIONS_OF_A_PEER
+        full = len(self._sessions) >= MAX_SESSIONS or of_peer >= MAX_SESSIONS_OF_A_PEER
         return Nak(Error.NO_SESSIONS) if full else None
 
     def _used(self, request: Request) -> _Session | None:
@@ -282,10 +282,10 @@ class Ftp:
         self._bursts[request.key] = _Burst(request, session.reading)
         return None
 
-    def _packets(self, burst: _Burst, most: int) -> Iterator[Send]:
+    def _packets(self, burst: _Burst, maximum: int) -> Iterator[Send]:
         """Send the next packets of a burst."""
         size = burst.request.size or DATA_BYTES
-        wanted = min(most * size, burst.reading.size - burst.request.offset)
+        wanted = min(maximum * size, burst.reading.size - burst.request.offset)
         data = burst.reading.read(burst.request.offset, wanted)
         if isinstance(data, FileRefusal) or not data:  # removed, or cut, since it was opened
             burst.packets_left = 0
@@ -334,7 +334,7 @@ class Ftp:
         reading = self._files.open(names)
         if isinstance(reading, FileRefusal):
             return reading
-        if len(self._checksums) >= MOST_SESSIONS:
+        if len(self._checksums) >= MAX_SESSIONS:
             return Nak(Error.NO_SESSIONS)
         checksum = _Checksum(request, names, reading)
         outcome = _sum(checksum)
@@ -364,4 +364,4 @@ def _sum(checksum: _Checksum) -> bytes | FileRefusal | None:
     if data and checksum.done < reading.size:
         return None
     # MAVLink's CRC32 begins with 0 and inverts nothing: https://mavlink.io/en/guide/crc.html.
-    return SIZE.pack(checksum.register ^ _LARGEST)
+    return SIZE.pack(checksum.register ^ _UINT32_MAX)

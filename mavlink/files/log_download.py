@@ -19,11 +19,11 @@ MESSAGES_A_POLL_OF_A_LONG_PART = 8
 SHORT_BYTES = 256 * BLOCK_BYTES
 """What a client's socket surely holds until it is read: MAVSDK and QGroundControl ask for no more at once. MAVProxy
 asks for a whole log, and cannot read it as fast as it could be sent."""
-MOST_TRANSFERS_OF_A_PEER = 32
-MOST_PEERS = 16
+MAX_TRANSFERS_OF_A_PEER = 32
+MAX_PEERS = 16
 LAST_ID = 0xFFFF
 
-_LARGEST = 0xFFFFFFFF
+_UINT32_MAX = 0xFFFFFFFF
 
 
 @dataclass(slots=True)
@@ -124,7 +124,7 @@ class Logs:
         until = min(last + 1, listing.next + MESSAGES_A_POLL)
         for number in range(listing.next, until):
             log = logs[number]
-            facts = (len(logs), len(logs) - 1, log.modified_s & _LARGEST, min(log.size, _LARGEST))
+            facts = (len(logs), len(logs) - 1, log.modified_s & _UINT32_MAX, min(log.size, _UINT32_MAX))
             yield to(listing.peer, "LOG_ENTRY", number, *facts)
         listing.next = until
         if until > last:
@@ -135,7 +135,7 @@ class Logs:
         found = self._files.list(self._folder)
         logs = [] if isinstance(found, FileRefusal) else [entry for entry in found if not entry.is_folder]
         self._shown.pop(peer, None)
-        if len(self._shown) >= MOST_PEERS:
+        if len(self._shown) >= MAX_PEERS:
             forgotten = next(iter(self._shown))
             del self._shown[forgotten]
             self._stop(forgotten)
@@ -154,7 +154,7 @@ class Logs:
         asked_again = any(
             (known.id, known.end) == (number, transfer.end) and known.offset <= offset for known in of_peer
         )
-        if not asked_again and len(of_peer) < MOST_TRANSFERS_OF_A_PEER:
+        if not asked_again and len(of_peer) < MAX_TRANSFERS_OF_A_PEER:
             self._transfers.append(transfer)
         return ()
 
@@ -173,9 +173,9 @@ class Logs:
         self._transfers.clear()
 
 
-def _blocks(transfer: _Transfer, most: int) -> Iterator[Send]:
+def _blocks(transfer: _Transfer, maximum: int) -> Iterator[Send]:
     """Send the next blocks; where the log ends with a full one, an empty one tells so."""
-    wanted = min(most * BLOCK_BYTES, transfer.end - transfer.offset)
+    wanted = min(maximum * BLOCK_BYTES, transfer.end - transfer.offset)
     data = transfer.reading.read(transfer.offset, wanted)
     if isinstance(data, FileRefusal):
         data = b""

@@ -10,8 +10,8 @@ from typing import NamedTuple, Protocol, TypeAlias
 Names: TypeAlias = tuple[str, ...]
 """Where something is: the names of the folders that lead there, and its own. The root is ()."""
 
-LONGEST_NAME_BYTES = 255
-MOST_FOLDERS_DEEP = 16
+MAX_NAME_BYTES = 255
+MAX_DEPTH = 16
 
 
 class FileRefusal(Enum):
@@ -116,7 +116,7 @@ def names_of(path: str) -> Names | FileRefusal:
     names = tuple(name for name in path.split("/") if name not in ("", "."))
     if ".." in names or "\0" in path:
         return FileRefusal.NOT_FOUND
-    if len(names) > MOST_FOLDERS_DEEP or not all(map(_fits, names)):
+    if len(names) > MAX_DEPTH or not all(map(_fits, names)):
         return FileRefusal.BAD_NAME
     return names
 
@@ -127,7 +127,7 @@ def can_be_new(name: str) -> bool:
 
 
 def _fits(name: str) -> bool:
-    return len(name.encode(errors="surrogatepass")) <= LONGEST_NAME_BYTES
+    return len(name.encode(errors="surrogatepass")) <= MAX_NAME_BYTES
 
 
 def reading_of(data: bytes) -> Reading:

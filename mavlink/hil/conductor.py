@@ -17,7 +17,7 @@ _PIECE = Struct("<QBB")
 """Simulated time in µs, number of the piece, how many there are."""
 _PIECE_BYTES = 4000
 """Of a link's largest datagram."""
-LARGEST_PARCEL = 4096
+MAX_PARCEL_BYTES = 4096
 """A longer datagram is cut, as a link cuts it."""
 
 
@@ -57,7 +57,7 @@ def packets(turn: Turn) -> list[bytes]:
     """
     parts = [_HEAD.pack(turn.time_us, turn.custom_mode, turn.armed, len(turn.parcels))]
     for station, whole in turn.parcels:
-        datagram = whole[:LARGEST_PARCEL]
+        datagram = whole[:MAX_PARCEL_BYTES]
         parts += (_PARCEL.pack(station, len(datagram)), datagram)
     content = b"".join(parts)
     pieces = [content[at : at + _PIECE_BYTES] for at in range(0, len(content), _PIECE_BYTES)]

@@ -71,16 +71,16 @@ class Value(NamedTuple):
     Attributes:
         name: What it is.
         unit: SI, or the sensor's.
-        least: Smallest that is taken.
-        most: Largest that is taken.
+        minimum: Smallest that is taken.
+        maximum: Largest that is taken.
         usual: Taken where none of a fault's numbers is given.
         rest: Taken where another is given and this is not.
     """
 
     name: str
     unit: str
-    least: float
-    most: float
+    minimum: float
+    maximum: float
     usual: float
     rest: float
 
@@ -105,12 +105,14 @@ class Row(NamedTuple):
     instances: int = 1
 
 
-def _scalar(name: str, unit: str, least: float, most: float, usual: float) -> Value:
-    return Value(name, unit, least, most, usual, usual)
+def _scalar(name: str, unit: str, minimum: float, maximum: float, usual: float) -> Value:
+    return Value(name, unit, minimum, maximum, usual, usual)
 
 
-def _vector(name: str, unit: str, axes: str, most: float, usual: tuple[float, float, float]) -> tuple[Value, ...]:
-    return tuple(Value(f"{name} {axis}", unit, -most, most, it, 0.0) for axis, it in zip(axes, usual, strict=True))
+def _vector(name: str, unit: str, axes: str, maximum: float, usual: tuple[float, float, float]) -> tuple[Value, ...]:
+    return tuple(
+        Value(f"{name} {axis}", unit, -maximum, maximum, it, 0.0) for axis, it in zip(axes, usual, strict=True)
+    )
 
 
 def _sensor(unit: int, wrong: tuple[Value, ...], drift: tuple[Value, ...], noise: Value, what: str) -> tuple[Row, ...]:
@@ -239,9 +241,9 @@ def _with_values(row: Row, fault: Fault) -> Fault | Refusal:
     some = any(given)
     taken = [value or (it.rest if some else it.usual) for value, it in zip(given, row.values, strict=True)]
     for value, it in zip(taken, row.values, strict=True):
-        slack = _ROUNDING * max(abs(it.least), abs(it.most))
-        if value and not it.least - slack <= value <= it.most + slack:
+        slack = _ROUNDING * max(abs(it.minimum), abs(it.maximum))
+        if value and not it.minimum - slack <= value <= it.maximum + slack:
             unit = "" if it.unit == "1" else f" {it.unit}"
-            return Refusal(f"{it.name} must be {it.least:g} to {it.most:g}{unit}")
+            return Refusal(f"{it.name} must be {it.minimum:g} to {it.maximum:g}{unit}")
     a, b, c, d = (*taken, *_NOT_GIVEN)[: len(_NOT_GIVEN)]
     return fault._replace(values=(a, b, c, d))

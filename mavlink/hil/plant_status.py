@@ -8,7 +8,7 @@ from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.wire.dialect import Codec, Message, mav
 
 _NO_CELL = 65535
-_LARGEST_MV = 65534
+_MAX_MV = 65534
 _UNKNOWN_TEMPERATURE = 32767
 
 
@@ -66,7 +66,7 @@ class ReceivedFrame(NamedTuple):
 
 def encode_battery(codec: Codec, battery: PlantBattery) -> bytes:
     """Encode a battery as BATTERY_STATUS: the whole pack as its first cell, mV; cA, mAh, percent."""
-    voltages = (min(round(1e3 * battery.voltage_v), _LARGEST_MV), *(_NO_CELL,) * 9)
+    voltages = (min(round(1e3 * battery.voltage_v), _MAX_MV), *(_NO_CELL,) * 9)
     kind = (0, mav.MAV_BATTERY_FUNCTION_ALL, mav.MAV_BATTERY_TYPE_LIPO, _UNKNOWN_TEMPERATURE)
     current = min(round(100.0 * battery.current_a), 32767)
     return codec.encode(

@@ -30,7 +30,7 @@ HEARTBEAT_EVERY_US = 1_000_000
 _BEGINNING = ("HEARTBEAT", "COMMAND_LONG")
 _STOPPED: FourRotors = (0.0, 0.0, 0.0, 0.0)
 _G_M_S2 = 9.80665
-_LARGEST_SIGNED, _LARGEST = 32767, 65535
+_INT16_MAX, _UINT16_MAX = 32767, 65535
 
 
 class Motors(NamedTuple):
@@ -192,7 +192,7 @@ class SimulatorEnd:
         state, place = truth.state, truth.place
         assert self._truth_every_us is not None, "it is told to who wants it"
         self._truth_at_us = state.time_us + self._truth_every_us
-        airspeed = min(round(truth.airspeed_m_s * 1e2), _LARGEST)
+        airspeed = min(round(truth.airspeed_m_s * 1e2), _UINT16_MAX)
         return self._codec.encode(
             "HIL_STATE_QUATERNION",
             state.time_us,
@@ -209,4 +209,4 @@ class SimulatorEnd:
 
 
 def _signed(value: float) -> int:
-    return max(-_LARGEST_SIGNED, min(_LARGEST_SIGNED, round(value)))
+    return max(-_INT16_MAX, min(_INT16_MAX, round(value)))

@@ -213,8 +213,8 @@ def decode_gps(message: Message) -> GpsFix:
     )
 
 
-def _in(value: float, scale: float, largest: int) -> int:
-    return min(round(value * scale), largest)
+def _in(value: float, scale: float, maximum: int) -> int:
+    return min(round(value * scale), maximum)
 
 
 def _signed_in(speed_m_s: float) -> int:

@@ -7,7 +7,7 @@ from time import perf_counter
 from colibri.common.types import Address
 from colibri.mavlink.links.link import SPIN_S, LinkError, give_way
 
-_LARGEST_DATAGRAM = 4096
+_MAX_DATAGRAM_BYTES = 4096
 _DATAGRAMS_AT_ONCE = 64
 """So that whoever sends without a pause cannot hold the process up."""
 
@@ -69,7 +69,7 @@ class UdpLink:
         received = []
         for _ in range(_DATAGRAMS_AT_ONCE):
             try:
-                datagram, sender = self._socket.recvfrom(_LARGEST_DATAGRAM)
+                datagram, sender = self._socket.recvfrom(_MAX_DATAGRAM_BYTES)
             except ConnectionRefusedError:
                 continue
             except BlockingIOError:
@@ -97,7 +97,7 @@ class UdpLink:
 
     def _receive_now(self) -> tuple[bytes, Address] | None:
         try:
-            datagram, sender = self._socket.recvfrom(_LARGEST_DATAGRAM)
+            datagram, sender = self._socket.recvfrom(_MAX_DATAGRAM_BYTES)
         except (BlockingIOError, ConnectionRefusedError):
             return None
         if self.target is not None and sender != self.target:

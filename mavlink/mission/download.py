@@ -14,7 +14,7 @@ from colibri.mavlink.wire.dialect import mav
 
 FORGOTTEN_AFTER_US = 5_000_000
 """A reader that asks for nothing so long is told the newest plan after."""
-MOST_READERS = 32
+MAX_READERS = 32
 
 
 class _Reading(NamedTuple):
@@ -60,5 +60,5 @@ class Downloads:
         self._readings.pop((peer, plan_type), None)
         if plan is not NO_PLAN:
             self._readings[peer, plan_type] = _Reading(plan, now_us)
-        if len(self._readings) > MOST_READERS:
+        if len(self._readings) > MAX_READERS:
             del self._readings[next(iter(self._readings))]

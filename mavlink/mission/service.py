@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite, isnan
 from typing import Any, NamedTuple, TypeAlias
 
-from colibri.common.earth.geodesy import LARGEST_LATITUDE_DEG, LARGEST_LONGITUDE_DEG
+from colibri.common.earth.geodesy import MAX_LATITUDE_DEG, MAX_LONGITUDE_DEG
 from colibri.mavlink.mission.download import Downloads
 from colibri.mavlink.mission.items import (
     ACCEPTED,
@@ -198,9 +198,9 @@ class MissionService:
             return mav.MAV_MISSION_UNSUPPORTED, ""
         if fields.frame not in GLOBAL_FRAMES:
             return mav.MAV_MISSION_UNSUPPORTED_FRAME, ""
-        if not abs(latitude) <= LARGEST_LATITUDE_DEG:
+        if not abs(latitude) <= MAX_LATITUDE_DEG:
             return mav.MAV_MISSION_INVALID_PARAM5_X, ""
-        if not abs(longitude) <= LARGEST_LONGITUDE_DEG:
+        if not abs(longitude) <= MAX_LONGITUDE_DEG:
             return mav.MAV_MISSION_INVALID_PARAM6_Y, ""
         if not isfinite(fields.z):
             return mav.MAV_MISSION_INVALID_PARAM7, ""

@@ -32,12 +32,12 @@ class Rules(NamedTuple):
     Attributes:
         check_item: (item) -> MAV_MISSION_RESULT, of an item by itself.
         check_plan: (items) -> MAV_MISSION_RESULT, of all of them, each checked before.
-        most: Items there is space for.
+        maximum: Items there is space for.
     """
 
     check_item: Callable[[MissionItem], int]
     check_plan: Callable[[Sequence[MissionItem]], int]
-    most: int = 1000
+    maximum: int = 1000
 
 
 class _Answer(NamedTuple):
@@ -117,7 +117,7 @@ class Uploads:
             return ack(peer, mav.MAV_MISSION_DENIED, plan_type)
         self.drop(peer, PLAN_TYPES)
         self._answers.pop(plan_type, None)
-        if count > self._rules[plan_type].most:
+        if count > self._rules[plan_type].maximum:
             return ack(peer, mav.MAV_MISSION_NO_SPACE, plan_type)
         if count == 0:  # "has the same effect as clearing the mission"
             return ack(peer, ACCEPTED, plan_type, self._store(plan_type, ()).id)

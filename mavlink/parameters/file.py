@@ -8,7 +8,7 @@ from colibri.mavlink.parameters.store import Kind, ParamError, Parameter, Parame
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT
 
 _COLUMNS = 5
-_LARGEST_ID = 255
+_MAX_ID = 255
 _HEADER = "# Onboard parameters for Vehicle {system}\n#\n# Vehicle-Id Component-Id Name Value Type\n"
 
 
@@ -59,7 +59,7 @@ def read(text: str, parameters: Parameters) -> dict[str, Value]:
 def _parameter(cells: list[str], parameters: Parameters) -> Parameter | None:
     """Return which parameter a line is about; None where it is another component's."""
     for what, cell in zip(("vehicle", "component"), cells, strict=False):
-        if not cell.isascii() or not cell.isdigit() or int(cell) > _LARGEST_ID:
+        if not cell.isascii() or not cell.isdigit() or int(cell) > _MAX_ID:
             raise ValueError(f"no {what} id: {cell!r}")
     if int(cells[1]) != AUTOPILOT_COMPONENT:
         return None

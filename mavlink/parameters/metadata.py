@@ -15,7 +15,7 @@ PARAMETERS = "parameter.json"
 TYPE_PARAMETER = 1
 """COMP_METADATA_TYPE_PARAMETER."""
 
-_LARGEST = 0xFFFFFFFF
+_UINT32_MAX = 0xFFFFFFFF
 
 
 class Metadata:
@@ -38,10 +38,10 @@ class Metadata:
 
     def provide(self, peer: Peer, now_us: int) -> list[Send]:
         """Answer MAV_CMD_REQUEST_MESSAGE for COMPONENT_METADATA (397)."""
-        time_boot_ms = now_us // 1000 & _LARGEST
+        time_boot_ms = now_us // 1000 & _UINT32_MAX
         return [to(peer, "COMPONENT_METADATA", time_boot_ms, checksum(self.general), f"mftp:///{GENERAL}".encode())]
 
 
 def checksum(data: bytes) -> int:
     """Return MAVLink's CRC32, which begins with 0 and inverts nothing: https://mavlink.io/en/guide/crc.html."""
-    return crc32(data, _LARGEST) ^ _LARGEST
+    return crc32(data, _UINT32_MAX) ^ _UINT32_MAX

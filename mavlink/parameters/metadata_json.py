@@ -8,7 +8,7 @@ import json
 from collections.abc import Iterable
 from typing import Any
 
-from colibri.mavlink.parameters.store import LARGEST_INT, LARGEST_REAL, LEAST_INT, Kind, Parameter
+from colibri.mavlink.parameters.store import FLOAT32_MAX, INT32_MAX, INT32_MIN, Kind, Parameter
 
 _VERSION = 1
 _TYPES = {Kind.INT: "Int32", Kind.REAL: "Float"}
@@ -31,9 +31,9 @@ def _entry(parameter: Parameter) -> dict[str, Any]:
         "group": parameter.group,
         "units": parameter.unit,
     }
-    if parameter.minimum not in (LEAST_INT, -LARGEST_REAL):
+    if parameter.minimum not in (INT32_MIN, -FLOAT32_MAX):
         entry["min"] = _shortest(parameter, parameter.minimum)
-    if parameter.maximum not in (LARGEST_INT, LARGEST_REAL):
+    if parameter.maximum not in (INT32_MAX, FLOAT32_MAX):
         entry["max"] = _shortest(parameter, parameter.maximum)
     if parameter.kind == Kind.REAL:
         entry["decimalPlaces"] = parameter.decimals

@@ -17,7 +17,7 @@ _MAGIC, _MAGIC_WITH_DEFAULTS = 0x671B, 0x671C
 _TYPES = {Kind.INT: 3, Kind.REAL: 4}
 _HAS_DEFAULT = 0x10
 _VALUE_BYTES = 4
-_LONGEST_COMMON = 15
+_MAX_COMMON_CHARS = 15
 
 
 def packed(parameters: Parameters, with_defaults: bool = False, start: int = 0, count: int = 0) -> bytes | None:
@@ -63,8 +63,8 @@ def packed_for(parameters: Parameters, query: str) -> bytes | None:
 
 def _name(parameter: Parameter, before: str, has_default: bool) -> bytes:
     """Return type, lengths, and what of the name is not as in the one before: at least a character."""
-    most = min(len(before), len(parameter.name) - 1, _LONGEST_COMMON)
-    common = next((i for i in range(most) if before[i] != parameter.name[i]), most)
+    maximum = min(len(before), len(parameter.name) - 1, _MAX_COMMON_CHARS)
+    common = next((i for i in range(maximum) if before[i] != parameter.name[i]), maximum)
     own = parameter.name[common:].encode()
     kind = _TYPES[parameter.kind] | (_HAS_DEFAULT if has_default else 0)
     return bytes((kind, (len(own) - 1) << 4 | common)) + own

@@ -13,7 +13,7 @@ from colibri.mavlink.wire.dialect import Bits, Message, param_bits
 
 INTERVAL_US = 2_000
 """Between two parameters of a list: 150 of them take 0.3 s."""
-MOST_AT_ONCE = 20
+MAX_AT_ONCE = 20
 BY_ID = -1
 """param_index of who names a parameter by its id."""
 _NOT_EXACT_IN_FLOAT = 2**24
@@ -72,7 +72,7 @@ class ParameterService:
         due = (now_us - listing.last_us) // INTERVAL_US
         listing.last_us += due * INTERVAL_US
         sends = []
-        for _ in range(min(due, listing.left, MOST_AT_ONCE)):
+        for _ in range(min(due, listing.left, MAX_AT_ONCE)):
             sends.append(self._value(listing.index, channel))
             listing.index = (listing.index + 1) % len(self._parameters)
             listing.left -= 1

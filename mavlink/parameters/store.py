@@ -13,8 +13,8 @@ from colibri.mavlink.wire.dialect import mav
 Value: TypeAlias = int | float
 """An int of 32 bits, or a float that a float of 32 bits holds exactly."""
 
-LEAST_INT, LARGEST_INT = -(2**31), 2**31 - 1
-LARGEST_REAL = 3.4028234663852886e38
+INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
+FLOAT32_MAX = 3.4028234663852886e38
 _NAME = "[A-Z][A-Z0-9_]{0,15}"
 _INT, _REAL, _BITS = Struct("<i"), Struct("<f"), Struct("<I")
 
@@ -86,8 +86,8 @@ class Parameter:
     name: str
     kind: Kind
     default: Value
-    minimum: Value = -LARGEST_REAL
-    maximum: Value = LARGEST_REAL
+    minimum: Value = -FLOAT32_MAX
+    maximum: Value = FLOAT32_MAX
     unit: str = ""
     decimals: int = 3
     description: str
@@ -106,8 +106,8 @@ class Parameter:
         if not fullmatch(_NAME, self.name):
             raise ValueError(f"{self.name}: no name of a parameter")
         if self.kind == Kind.INT:
-            object.__setattr__(self, "minimum", max(self.minimum, LEAST_INT))
-            object.__setattr__(self, "maximum", min(self.maximum, LARGEST_INT))
+            object.__setattr__(self, "minimum", max(self.minimum, INT32_MIN))
+            object.__setattr__(self, "maximum", min(self.maximum, INT32_MAX))
         else:
             for field in ("default", "minimum", "maximum"):
                 object.__setattr__(self, field, float32(getattr(self, field)))

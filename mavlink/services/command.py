@@ -48,7 +48,7 @@ PLACES: frozenset[int] = GLOBAL_FRAMES | {mav.MAV_FRAME_MISSION}
 
 PROGRESS_EVERY_US = 1_000_000
 REMEMBERED_FOR_US = 10_000_000
-MOST_REMEMBERED = 64
+MAX_REMEMBERED = 64
 SAME_REASON_AFTER_US = 1_000_000
 _REFUSED = (TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED)
 
@@ -273,7 +273,7 @@ class CommandService:
     def _remember(self, command: Command, confirmation: int, outcome: Outcome, at_us: int) -> None:
         key = (command.peer, command.id)
         self._answered.pop(key, None)
-        if len(self._answered) >= MOST_REMEMBERED:
+        if len(self._answered) >= MAX_REMEMBERED:
             del self._answered[next(iter(self._answered))]
         self._answered[key] = _Answered(_parameters(command), confirmation, at_us, outcome)
 

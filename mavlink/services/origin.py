@@ -13,7 +13,7 @@ from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message
 from colibri.mavlink.wire.refusal import Refusal
 
-_LOWEST_MM, _HIGHEST_MM = -1_000_000, 20_000_000
+_MIN_HEIGHT_MM, _MAX_HEIGHT_MM = -1_000_000, 20_000_000
 
 
 class Setters(NamedTuple):
@@ -52,7 +52,7 @@ class OriginService:
             return self._refused(self._setters.mode(fields.base_mode, fields.custom_mode))
         place = Geodetic(fields.latitude * 1e-7, fields.longitude * 1e-7, fields.altitude * 1e-3)
         on_earth = is_on_earth(place.latitude_deg, place.longitude_deg)
-        if not on_earth or not _LOWEST_MM <= fields.altitude <= _HIGHEST_MM:
+        if not on_earth or not _MIN_HEIGHT_MM <= fields.altitude <= _MAX_HEIGHT_MM:
             return self._refused(Refusal("refused: not a latitude, longitude and altitude"))
         if message.name == "SET_HOME_POSITION":
             return self._refused(self._setters.home(place))

@@ -10,10 +10,10 @@ from colibri.mavlink.node.service import Peer, Send, to
 from colibri.mavlink.wire.dialect import Message, mav
 
 DATA_BYTES = 70
-LONGEST_LINE_BYTES = 200
-LONGEST_ANSWER_BYTES = 20_000
+MAX_LINE_BYTES = 200
+MAX_ANSWER_BYTES = 20_000
 MESSAGES_A_POLL = 10
-MOST_PEERS = 16
+MAX_PEERS = 16
 PROMPT = "colibri> "
 
 _SHELL: int = mav.SERIAL_CONTROL_DEV_SHELL
@@ -45,16 +45,16 @@ class Shell:
         fields = message.fields
         if fields.device != _SHELL or fields.flags & _REPLY:
             return ()
-        if peer not in self._lines and len(self._lines) >= MOST_PEERS:
+        if peer not in self._lines and len(self._lines) >= MAX_PEERS:
             forgotten = next(iter(self._lines))
             del self._lines[forgotten]
             self._answers.pop(forgotten, None)
         typed = bytes(fields.data)[: fields.count]
         *lines, begun = (self._lines.pop(peer, b"") + typed.replace(b"\r", b"\n")).split(b"\n")
-        self._lines[peer] = begun[:LONGEST_LINE_BYTES]
+        self._lines[peer] = begun[:MAX_LINE_BYTES]
         for line in lines if fields.flags & _RESPOND else ():
             text = self._answer(line) + PROMPT
-            self._answers[peer] = (self._answers.get(peer, b"") + text.encode(errors="replace"))[:LONGEST_ANSWER_BYTES]
+            self._answers[peer] = (self._answers.get(peer, b"") + text.encode(errors="replace"))[:MAX_ANSWER_BYTES]
         return ()
 
     def poll(self, now_us: int) -> Iterable[Send]:

@@ -8,7 +8,7 @@ from colibri.mavlink.node.service import Send, to_all
 from colibri.mavlink.wire.dialect import mav
 
 CHUNK_BYTES = 50
-LONGEST_BYTES = 254
+MAX_TEXT_BYTES = 254
 
 EMERGENCY: int = mav.MAV_SEVERITY_EMERGENCY
 ERROR: int = mav.MAV_SEVERITY_ERROR
@@ -27,7 +27,7 @@ class StatusText:
 
     def say(self, severity: int, text: str) -> list[Send]:
         """Return the messages that tell everybody `text`."""
-        data = text.encode()[:LONGEST_BYTES]
+        data = text.encode()[:MAX_TEXT_BYTES]
         if len(data) <= CHUNK_BYTES:
             return [to_all("STATUSTEXT", severity, data, 0, 0)]
         number, self._next = self._next, self._next % 0xFFFF + 1

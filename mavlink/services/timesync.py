@@ -9,7 +9,7 @@ from colibri.mavlink.node.service import Peer, Send, to
 from colibri.mavlink.wire.dialect import Message
 
 NS_PER_US = 1000
-LARGEST_INT64 = 2**63 - 1
+INT64_MAX = 2**63 - 1
 
 
 class TimeService:
@@ -21,7 +21,7 @@ class TimeService:
         """Answer requests; what answers a request of somebody else is ignored, as is SYSTEM_TIME."""
         fields = message.fields
         if message.name == "TIMESYNC" and fields.tc1 == 0:  # "tc1 is set to 0 in the request"
-            return (to(peer, "TIMESYNC", min(now_us * NS_PER_US, LARGEST_INT64), fields.ts1),)
+            return (to(peer, "TIMESYNC", min(now_us * NS_PER_US, INT64_MAX), fields.ts1),)
         if message.name == "PING" and fields.target_system == 0 and fields.target_component == 0:
             # "The response has the same time and sequence, and the target of whoever sent the request."
             return (to(peer, "PING", fields.time_usec, fields.seq, peer.system, peer.component),)

@@ -11,7 +11,7 @@ from colibri.mavlink.node.service import Peer
 
 SILENT_AFTER_US = 500_000
 """A stream without a valid message for longer than this has ended; MAVLink asks clients for 2 Hz at least."""
-MOST_CLIENTS = 16
+MAX_CLIENTS = 16
 
 Value = TypeVar("Value")
 
@@ -38,9 +38,9 @@ class Streams(Generic[Value]):
 
     def hear(self, peer: Peer, value: Value, now_us: int) -> bool:
         """Take in a valid value; return whether it is from the client that is obeyed."""
-        if peer not in self._heard and len(self._heard) >= MOST_CLIENTS:
+        if peer not in self._heard and len(self._heard) >= MAX_CLIENTS:
             self._forget_silent(now_us)
-            if len(self._heard) >= MOST_CLIENTS:
+            if len(self._heard) >= MAX_CLIENTS:
                 return False
         self._heard[peer] = Heard(value, now_us)
         if self.source is None or not self._fresh(self.source, now_us):

@@ -23,12 +23,12 @@ from colibri.mavlink.telemetry.snapshot import Home
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
-FASTEST_M_S = 50.0
-MOST_ACCELERATION_M_S2 = 50.0
-FURTHEST_M = 1e6
-FASTEST_TURN_RAD_S = 35.0
+MAX_SPEED_M_S = 50.0
+MAX_ACCELERATION_M_S2 = 50.0
+MAX_DISTANCE_M = 1e6
+MAX_YAW_RATE_RAD_S = 35.0
 """Body rates: 2000 degrees a second, the range of a vehicle's gyroscopes."""
-LARGEST_YAW_RAD = 1e3
+MAX_YAW_RAD = 1e3
 UNIT_WITHIN = 0.01
 """How far the length of a quaternion may be from 1: clients compute in single precision, some round."""
 
@@ -119,7 +119,7 @@ def decode_local(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoin
     if frame is None:
         raise Refused("frame")
     velocity, acceleration = _derivatives(fields, body=frame.body, up=frame.up)
-    place = group((fields.x, fields.y, fields.z), fields.type_mask >> _POSITION, FURTHEST_M)
+    place = group((fields.x, fields.y, fields.z), fields.type_mask >> _POSITION, MAX_DISTANCE_M)
     yaw_rad, yaw_rate_rad_s = _yaw(fields, here.yaw_rad if frame.turned_yaw else 0.5 * pi, up=frame.up)
     position = _position_from(place, frame, here)
     return _checked(PositionSetpoint(position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, frame.body, now_us))
@@ -152,7 +152,7 @@ def decode_attitude(fields: Any, here: Whereabouts, now_us: int) -> AttitudeSetp
     mask = fields.type_mask
     masked = sum(1 << axis for axis, bit in enumerate(_NO_RATE) if mask & bit)
     wire = (fields.body_roll_rate, fields.body_pitch_rate, fields.body_yaw_rate)
-    rate = frd_from_flu(group(wire, masked, FASTEST_TURN_RAD_S))
+    rate = frd_from_flu(group(wire, masked, MAX_YAW_RATE_RAD_S))
     attitude = None if mask & _NO_ATTITUDE else _attitude(fields.q)
     thrust = nan if mask & _NO_THRUST else fields.thrust
     if not mask & _NO_THRUST and not 0.0 <= thrust <= 1.0:
@@ -193,9 +193,9 @@ def _position_of(fields: Any, here: Whereabouts) -> Vector:
     if not is_on_earth(latitude, longitude):
         raise Refused("out of range")
     east, north, _ = enu_of(Geodetic(latitude, longitude, 0.0), here.origin)
-    if hypot(east, north) > FURTHEST_M:
+    if hypot(east, north) > MAX_DISTANCE_M:
         raise Refused("out of range")
-    altitude_m = single(fields.alt, no_altitude, FURTHEST_M)
+    altitude_m = single(fields.alt, no_altitude, MAX_DISTANCE_M)
     up = altitude_m if isnan(altitude_m) else altitude_m + _counted_from_m(fields.coordinate_frame, here)
     return (nan if no_longitude else east, nan if no_latitude else north, up)
 
@@ -209,13 +209,13 @@ def _counted_from_m(frame: int, here: Whereabouts) -> float:
     return here.home.position_enu_m[2]
 
 
-def group(wire: Vector, masked: int, most: float) -> Vector:
+def group(wire: Vector, masked: int, maximum: float) -> Vector:
     """Return a group's fields, nan where masked.
 
     Args:
         wire: As they came.
         masked: Bit n is set where field n is masked.
-        most: Largest length of those that are not.
+        maximum: Largest length of those that are not.
 
     Raises:
         Refused: A field that is not masked cannot be flown, unless all of them are NaN.
@@ -225,23 +225,23 @@ def group(wire: Vector, masked: int, most: float) -> Vector:
         return NOWHERE
     if not all(map(isfinite, given)):
         raise Refused("not finite")
-    if hypot(*given) > most:
+    if hypot(*given) > maximum:
         raise Refused("out of range")
     x, y, z = (nan if masked >> axis & 1 else value for axis, value in enumerate(wire))
     return (x, y, z)
 
 
-def single(wire: float, masked: int, most: float) -> float:
+def single(wire: float, masked: int, maximum: float) -> float:
     """Return the one field of a group of its own, likewise."""
-    value, _, _ = group((wire, nan, nan), 0b110 | bool(masked), most)
+    value, _, _ = group((wire, nan, nan), 0b110 | bool(masked), maximum)
     return value
 
 
 def _derivatives(fields: Any, *, body: bool, up: bool) -> tuple[Vector, Vector]:
     """Return velocity and acceleration, in ENU or, where `body`, FLU."""
     mask = fields.type_mask
-    velocity = group((fields.vx, fields.vy, fields.vz), mask >> _VELOCITY, FASTEST_M_S)
-    acceleration = group((fields.afx, fields.afy, fields.afz), mask >> _ACCELERATION, MOST_ACCELERATION_M_S2)
+    velocity = group((fields.vx, fields.vy, fields.vz), mask >> _VELOCITY, MAX_SPEED_M_S)
+    acceleration = group((fields.afx, fields.afy, fields.afz), mask >> _ACCELERATION, MAX_ACCELERATION_M_S2)
     if mask & _FORCE and not all(map(isnan, acceleration)):
         raise Refused("force")
     if not body:
@@ -261,8 +261,8 @@ def _whole(flu: Vector) -> Vector:
 
 def _yaw(fields: Any, zero_rad: float, *, up: bool) -> tuple[float, float]:
     """Return yaw, which the frame counts from `zero_rad`, and its rate, both counter-clockwise."""
-    yaw = single(fields.yaw, fields.type_mask & _NO_YAW, LARGEST_YAW_RAD)
-    rate = single(fields.yaw_rate, fields.type_mask & _NO_YAW_RATE, FASTEST_TURN_RAD_S)
+    yaw = single(fields.yaw, fields.type_mask & _NO_YAW, MAX_YAW_RAD)
+    rate = single(fields.yaw_rate, fields.type_mask & _NO_YAW_RATE, MAX_YAW_RATE_RAD_S)
     turn = 1.0 if up else -1.0
     return (nan if isnan(yaw) else nearest_turn(zero_rad + turn * yaw, 0.0), turn * rate)
 

@@ -19,9 +19,9 @@ from colibri.mavlink.wire.dialect import Message
 from colibri.mavlink.wire.ned import ned_from_enu
 
 POSITION_KNOWN = 1
-FURTHEST_M = 1e6
-FASTEST_M_S = 100.0
-MOST_ACCELERATION_M_S2 = 100.0
+MAX_DISTANCE_M = 1e6
+MAX_SPEED_M_S = 100.0
+MAX_ACCELERATION_M_S2 = 100.0
 SILENT_AFTER_US = 3_000_000
 """Trackers tell a position once a second."""
 GOES_ON_US = 2_000_000
@@ -86,9 +86,9 @@ class Follow:
         if not all(map(isfinite, (*velocity, *acceleration))):
             return "not finite"
         if (
-            hypot(*position) > FURTHEST_M
-            or hypot(*velocity) > FASTEST_M_S
-            or hypot(*acceleration) > MOST_ACCELERATION_M_S2
+            hypot(*position) > MAX_DISTANCE_M
+            or hypot(*velocity) > MAX_SPEED_M_S
+            or hypot(*acceleration) > MAX_ACCELERATION_M_S2
         ):
             return "out of range"
         return TargetState(position, velocity, acceleration, now_us, now_us)

@@ -20,8 +20,8 @@ UNUSED = 0x7FFF
 
 RELEASED, UNCHANGED = 0, 0xFFFF
 """Of channels 1 to 8: 0 gives a channel back to the radio, UINT16_MAX leaves it as it is."""
-LEAST_US, MIDDLE_US, MOST_US = 1000, 1500, 2000
-WIDEST_US = (800, 2200)
+MIN_US, MIDDLE_US, MAX_US = 1000, 1500, 2000
+VALID_US = (800, 2200)
 """Transmitters go beyond 1000 and 2000 µs; what lies in here counts as a full stick."""
 ROLL, PITCH, THRUST, YAW = range(4)
 """The order of the first four channels: aileron, elevator, throttle, rudder."""
@@ -95,8 +95,8 @@ class Manual:
 
     def _hear_channels(self, fields: Any, peer: Peer, now_us: int) -> None:
         wire = (fields.chan1_raw, fields.chan2_raw, fields.chan3_raw, fields.chan4_raw)
-        least, most = WIDEST_US
-        if not all(value in (RELEASED, UNCHANGED) or least <= value <= most for value in wire):
+        minimum, maximum = VALID_US
+        if not all(value in (RELEASED, UNCHANGED) or minimum <= value <= maximum for value in wire):
             self.dropped["out of range"] += 1
             return
         before = self._streams.value(peer, now_us)
@@ -119,7 +119,7 @@ def sticks_of(channels: Channels, now_us: int) -> Sticks:
     A low value of the elevator's channel is its stick forward, as transmitters for copters have it.
     """
     roll, pitch, thrust, yaw = (
-        0.0 if value == RELEASED else (min(max(value, LEAST_US), MOST_US) - MIDDLE_US) / (MOST_US - MIDDLE_US)
+        0.0 if value == RELEASED else (min(max(value, MIN_US), MAX_US) - MIDDLE_US) / (MAX_US - MIDDLE_US)
         for value in channels
     )
     return Sticks(-pitch, roll, 0.5 + 0.5 * thrust, yaw, now_us)

@@ -99,12 +99,12 @@ class TargetState(NamedTuple):
     told_us: int = 0
     time_us: int = 0
 
-    def at(self, now_us: int, longest_us: int) -> "TargetState":
-        """Return it at `now_us`: it goes on at its velocity until `longest_us` after it was told, then it stands."""
-        after_s = max(min(now_us, self.told_us + longest_us) - self.time_us, 0) * 1e-6
+    def at(self, now_us: int, max_us: int) -> "TargetState":
+        """Return it at `now_us`: it goes on at its velocity until `max_us` after it was told, then it stands."""
+        after_s = max(min(now_us, self.told_us + max_us) - self.time_us, 0) * 1e-6
         (x, y, z), (vx, vy, vz) = self.position_enu_m, self.velocity_enu_m_s
         there = self._replace(position_enu_m=(x + after_s * vx, y + after_s * vy, z + after_s * vz), time_us=now_us)
-        if now_us <= self.told_us + longest_us:
+        if now_us <= self.told_us + max_us:
             return there
         return there._replace(velocity_enu_m_s=STILL, acceleration_enu_m_s2=STILL)
 

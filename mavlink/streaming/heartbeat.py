@@ -13,7 +13,7 @@ from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, TYPE_QUADROTOR
 
 EVERY_US = 1_000_000
 MAVLINK_VERSION = 3
-MOST_HEARD = 64
+MAX_HEARD = 64
 """Others that are remembered: whoever was silent longest is forgotten first."""
 
 
@@ -61,7 +61,7 @@ class HeartbeatService:
         """Remember who is there."""
         key = (peer.system, peer.component)
         self._heard.pop(key, None)
-        if len(self._heard) >= MOST_HEARD:
+        if len(self._heard) >= MAX_HEARD:
             del self._heard[next(iter(self._heard))]
         self._heard[key] = Heard(peer, message.fields.type, now_us)
         return ()

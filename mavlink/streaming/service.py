@@ -18,14 +18,14 @@ from colibri.mavlink.wire.dialect import Message, mav
 Provider: TypeAlias = Callable[[Command], list[Send] | Outcome]
 """Answers REQUEST_MESSAGE for a message of another service: param2 to param6 are the command's; or says why not."""
 
-SHORTEST_US = 1_000
-SHORTEST_OF_GROUP_US = 20_000
+MIN_INTERVAL_US = 1_000
+MIN_GROUP_INTERVAL_US = 20_000
 """All groups at the rate of the frames would take a good part of the time that the control law needs."""
-LONGEST_US = 2**31 - 1
+MAX_INTERVAL_US = 2**31 - 1
 DISABLED = -1.0
 DEFAULT = 0.0
 HEARTBEAT_US = 1_000_000
-MOST_WAITING = 256
+MAX_WAITING = 256
 """Messages on request between two frames of the plant; who asks for more is told to come back."""
 
 _OLD_REQUESTS = {
@@ -102,7 +102,7 @@ class StreamService:
         fields = message.fields
         names = ALL_GROUPS if fields.req_stream_id == mav.MAV_DATA_STREAM_ALL else GROUPS.get(fields.req_stream_id, ())
         rate_hz = fields.req_message_rate if fields.start_stop else 0
-        interval_us = max(SHORTEST_OF_GROUP_US, round(1e6 / rate_hz)) if rate_hz else None
+        interval_us = max(MIN_GROUP_INTERVAL_US, round(1e6 / rate_hz)) if rate_hz else None
         for name in names:
             self._set(peer.channel, name, interval_us, now_us)
         return ()
@@ -139,8 +139,8 @@ class StreamService:
             self._set(command.peer.channel, name, None, command.now_us)
         elif interval_us == DEFAULT:
             self._set(command.peer.channel, name, self._default(command.peer.channel, name), command.now_us)
-        elif 0.0 < interval_us <= LONGEST_US:
-            whole_us = max(SHORTEST_US, round(interval_us))
+        elif 0.0 < interval_us <= MAX_INTERVAL_US:
+            whole_us = max(MIN_INTERVAL_US, round(interval_us))
             self._set(command.peer.channel, name, whole_us, command.now_us)
         else:
             return Outcome(DENIED)
@@ -188,7 +188,7 @@ class StreamService:
 
     def _post(self, sends: list[Send]) -> Outcome:
         """Send behind the COMMAND_ACK: with what is due next."""
-        if len(self._waiting) + len(sends) > MOST_WAITING:
+        if len(self._waiting) + len(sends) > MAX_WAITING:
             return Outcome(TEMPORARILY_REJECTED)
         self._waiting.extend(sends)
         return Outcome()

@@ -22,7 +22,7 @@ UNKNOWN_I16 = 0x7FFF
 STANDARD_GRAVITY_M_S2 = 9.80665
 MILLI_G = 1000.0 / STANDARD_GRAVITY_M_S2
 FULL_TURN_CDEG = 36_000
-LARGEST_FLOAT32 = 3.4028234663852886e38
+FLOAT32_MAX = 3.4028234663852886e38
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,9 +65,9 @@ def fitted(name: str, encoder: Encoder) -> Encoder:
 
 
 def _float32(value: float) -> float:
-    if -LARGEST_FLOAT32 <= value <= LARGEST_FLOAT32 or not isfinite(value):
+    if -FLOAT32_MAX <= value <= FLOAT32_MAX or not isfinite(value):
         return value
-    return LARGEST_FLOAT32 if value > 0.0 else -LARGEST_FLOAT32
+    return FLOAT32_MAX if value > 0.0 else -FLOAT32_MAX
 
 
 def _integer(low: int, high: int) -> Callable[[float], int]:

@@ -10,7 +10,7 @@ _PREFIX_BYTES = 3
 """What tells how long a frame is: marker, payload length, incompatibility flags (of MAVLink 2)."""
 _OTHER_BYTES_V1 = 8
 _OTHER_BYTES = 12
-LONGEST_FRAME = _OTHER_BYTES + 255 + SIGNATURE_BYTES
+MAX_FRAME_BYTES = _OTHER_BYTES + 255 + SIGNATURE_BYTES
 
 
 class Framer:

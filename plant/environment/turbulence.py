@@ -22,10 +22,10 @@ FEET_PER_M = 1.0 / 0.3048
 KNOT_M_S = 1852.0 / 3600.0
 W20_KNOTS: dict[Intensity, float] = {"light": 15.0, "moderate": 30.0, "severe": 45.0}
 """Wind at 20 feet, which says how strong the turbulence is."""
-LEAST_HEIGHT_M = 10.0 / FEET_PER_M
-LARGEST_HEIGHT_M = 1000.0 / FEET_PER_M
+MIN_HEIGHT_M = 10.0 / FEET_PER_M
+MAX_HEIGHT_M = 1000.0 / FEET_PER_M
 """The formulas hold between these; what is lower or higher is as at the nearer one."""
-LEAST_AIRSPEED_M_S = 1.0
+MIN_AIRSPEED_M_S = 1.0
 """Frozen eddies must be flown through to be felt: what hangs in calm air would feel the same forever."""
 
 _SQRT_3 = sqrt(3.0)
@@ -67,7 +67,7 @@ class Scales(NamedTuple):
 
 def scales(intensity: Intensity, height_m: float) -> Scales:
     """Return intensities and lengths at a height above ground, MIL-F-8785C, 3.7.3.4."""
-    height_m = min(max(height_m, LEAST_HEIGHT_M), LARGEST_HEIGHT_M)
+    height_m = min(max(height_m, MIN_HEIGHT_M), MAX_HEIGHT_M)
     slope = 0.177 + 0.000823 * height_m * FEET_PER_M
     sigma_w = 0.1 * W20_KNOTS[intensity] * KNOT_M_S
     return Scales(sigma_w / power(slope, 0.4), sigma_w, height_m / power(slope, 1.2), height_m)
@@ -94,7 +94,7 @@ class Turbulence:
 
     def step(self, eddies: Eddies, scale: Scales, airspeed_m_s: float, duration_s: float) -> Eddies:
         """Return the eddies that meet the vehicle after `duration_s`."""
-        way_m = max(airspeed_m_s, LEAST_AIRSPEED_M_S) * duration_s
+        way_m = max(airspeed_m_s, MIN_AIRSPEED_M_S) * duration_s
         n1, n2, n3, n4, n5 = self._noise(eddies.frame)
         along, up = way_m / scale.length_uv_m, way_m / scale.length_w_m
         u = exp(-along) * eddies.u + sqrt(-expm1(-2.0 * along)) * n1

@@ -14,7 +14,7 @@ from colibri.common.types import Vector
 Intensity: TypeAlias = Literal["light", "moderate", "severe"]
 
 INTENSITIES: tuple[Intensity, ...] = ("light", "moderate", "severe")
-FASTEST_M_S = 150.0
+MAX_SPEED_M_S = 150.0
 """No wind on Earth's ground was ever faster."""
 
 

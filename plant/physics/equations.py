@@ -320,12 +320,12 @@ def _write_motion(change: Array, x: Array, R: Matrix, wrench: Wrench, parameters
 @compiled
 def _speed_rates(speeds: FourRotors, target: FourRotors, voltage_v: float, parameters: Parameters) -> FourRotors:
     """Return how fast the rotor speeds change: first-order lags towards what the voltage allows of the command."""
-    most = parameters.top_speed * (voltage_v / parameters.full_voltage_v)
+    maximum = parameters.top_speed * (voltage_v / parameters.full_voltage_v)
     return (
-        _lag(speeds[0], min(target[0], most), parameters),
-        _lag(speeds[1], min(target[1], most), parameters),
-        _lag(speeds[2], min(target[2], most), parameters),
-        _lag(speeds[3], min(target[3], most), parameters),
+        _lag(speeds[0], min(target[0], maximum), parameters),
+        _lag(speeds[1], min(target[1], maximum), parameters),
+        _lag(speeds[2], min(target[2], maximum), parameters),
+        _lag(speeds[3], min(target[3], maximum), parameters),
     )
 
 
@@ -352,8 +352,8 @@ def _share_held(target: FourRotors, charge_ah: float, parameters: Parameters) ->
 @compiled
 def _voltage_share(target: FourRotors, share: float, charge_ah: float, parameters: Parameters) -> float:
     """Return terminal over full voltage while the rotors turn at `target`, but at most at `share` of the top speed."""
-    most = share * parameters.top_speed
-    speeds = (min(target[0], most), min(target[1], most), min(target[2], most), min(target[3], most))
+    maximum = share * parameters.top_speed
+    speeds = (min(target[0], maximum), min(target[1], maximum), min(target[2], maximum), min(target[3], maximum))
     return battery(speeds, charge_ah, parameters)[0] / parameters.full_voltage_v
 
 

@@ -12,7 +12,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.errors import PlantError
 from colibri.plant.vehicle.description import Vehicle, VehicleError
 
-_DEEPEST_START_M = 0.01
+_MAX_START_DEPTH_M = 0.01
 
 
 class IntegrationError(PlantError, InFlightError):
@@ -79,9 +79,9 @@ def check_start(start: Start, vehicle: Vehicle) -> None:
     if vehicle.ground is None:
         return
     _, _, up = rotation_matrix(start.attitude)
-    lowest_m = start.z + float((vehicle.ground.contacts_m(vehicle.rotors) * np.array(up)).sum(axis=1).min())
-    depth_m = vehicle.ground_height_m - lowest_m
-    if depth_m > _DEEPEST_START_M:
+    min_height_m = start.z + float((vehicle.ground.contacts_m(vehicle.rotors) * np.array(up)).sum(axis=1).min())
+    depth_m = vehicle.ground_height_m - min_height_m
+    if depth_m > _MAX_START_DEPTH_M:
         raise VehicleError(f"{vehicle.name} would start {depth_m:.3g} m below the ground: start it higher")
 
 

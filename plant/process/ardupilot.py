@@ -28,9 +28,9 @@ PEER_LOST_AFTER_S = 0.5
 _MAGIC = {Struct("<HHI16H"): 18458, Struct("<HHI32H"): 29569}
 _FORMATS = {form.size: form for form in _MAGIC}
 _ROTORS = slice(3, 7)
-_LEAST_PULSE_US, _PULSE_RANGE_US = 1000.0, 1000.0
+_MIN_PULSE_US, _PULSE_RANGE_US = 1000.0, 1000.0
 _SECOND_US = 1_000_000
-_SLOWEST_HZ = 10
+_MIN_RATE_HZ = 10
 
 
 class ArduPilotEnd:
@@ -72,7 +72,7 @@ class ArduPilotEnd:
             self.dropped["malformed"] += 1
             return None
         _, rate_hz, count = fields[:3]
-        if rate_hz < _SLOWEST_HZ:
+        if rate_hz < _MIN_RATE_HZ:
             self.dropped["frame rate"] += 1
             return None
         if sender != self.peer and self.peer is not None and now_s - self._heard_s < PEER_LOST_AFTER_S:
@@ -95,7 +95,7 @@ class ArduPilotEnd:
 
     def _advance(self, rate_hz: int, pulses_us: tuple[int, ...]) -> None:
         duration_us, self._carried = divmod(_SECOND_US + self._carried, rate_hz)
-        a, b, c, d = (min(max((pulse - _LEAST_PULSE_US) / _PULSE_RANGE_US, 0.0), 1.0) for pulse in pulses_us)
+        a, b, c, d = (min(max((pulse - _MIN_PULSE_US) / _PULSE_RANGE_US, 0.0), 1.0) for pulse in pulses_us)
         turning = any((a, b, c, d))  # disarmed, ArduPilot sends the least pulse or none
         speeds = self._rotors.speeds_of(self._motors.to_vehicle((a, b, c, d)))
         command = ActuatorCommand(self.world.time_us, speeds, turning)

@@ -18,7 +18,7 @@ from colibri.plant.process.options import nudged
 from colibri.plant.vehicle.description import load_vehicle
 
 _SILENCE_SAID_AFTER_S = 2.0
-_WAIT_AT_MOST_S = 0.1
+_MAX_WAIT_S = 0.1
 
 
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
@@ -55,7 +55,7 @@ def _serve(
     began_s = heard_s = perf_counter()
     progress, silence_said, logged = Progress(status), False, None
     while not stop and end.world.time_us < duration_s * 1e6:
-        received = link.receive(_WAIT_AT_MOST_S)
+        received = link.receive(_MAX_WAIT_S)
         now_s = perf_counter()
         if received is None:
             if end.peer and not silence_said and now_s - heard_s > _SILENCE_SAID_AFTER_S:

@@ -6,13 +6,13 @@ from pathlib import Path
 
 from colibri.common.process.arguments import ArgumentParser, number
 from colibri.common.process.lifecycle import nudge_m
-from colibri.plant.environment.weather import FASTEST_M_S, INTENSITIES, NO_WIND, Gust, RecordedWind, Wind
+from colibri.plant.environment.weather import INTENSITIES, MAX_SPEED_M_S, NO_WIND, Gust, RecordedWind, Wind
 from colibri.plant.physics.start import Start
 
 PARTS = ("rotor-lag", "drag", "ground", "battery")
 """What `Vehicle.without` can leave out."""
 
-LARGEST_LATENCY_MS = 1000.0
+MAX_LATENCY_MS = 1000.0
 
 
 def nudged(start: Start) -> Start:
@@ -38,8 +38,8 @@ def _start_value(pair: str) -> tuple[str, float]:
 def latency(text: str) -> float:
     """Read a latency of the command line, ms: none is negative, and a second is more than anything could fly with."""
     value = number(text)
-    if not 0.0 <= value <= LARGEST_LATENCY_MS:
-        raise ArgumentTypeError(f"must be 0 to {LARGEST_LATENCY_MS:g} ms, not {text}")
+    if not 0.0 <= value <= MAX_LATENCY_MS:
+        raise ArgumentTypeError(f"must be 0 to {MAX_LATENCY_MS:g} ms, not {text}")
     return value
 
 
@@ -132,8 +132,8 @@ def _row(path: Path, line: int, text: str) -> tuple[int, tuple[float, float, flo
         t, east, north, up = map(number, text.split(","))
     except ValueError:
         raise ArgumentTypeError(f"{path}: line {line}: must be four numbers, {_COLUMNS}") from None
-    if max(abs(east), abs(north), abs(up)) > FASTEST_M_S:
-        raise ArgumentTypeError(f"{path}: line {line}: no wind is faster than {FASTEST_M_S:g} m/s")
+    if max(abs(east), abs(north), abs(up)) > MAX_SPEED_M_S:
+        raise ArgumentTypeError(f"{path}: line {line}: no wind is faster than {MAX_SPEED_M_S:g} m/s")
     return line, (t, east, north, up)
 
 
@@ -145,8 +145,8 @@ def _constant(text: str) -> Wind:
         raise ArgumentTypeError(f"must be SPEED@FROM in m/s and degrees, 5@270 say, not {text}") from None
     if value.speed_m_s < 0.0 or not 0.0 <= value.from_deg <= _FULL_TURN_DEG:
         raise ArgumentTypeError(f"the speed must not be negative, the direction 0 to 360 degrees, not {text}")
-    if value.speed_m_s > FASTEST_M_S:
-        raise ArgumentTypeError(f"no wind is faster than {FASTEST_M_S:g} m/s, not {text}")
+    if value.speed_m_s > MAX_SPEED_M_S:
+        raise ArgumentTypeError(f"no wind is faster than {MAX_SPEED_M_S:g} m/s, not {text}")
     return value
 
 

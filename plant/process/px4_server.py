@@ -23,7 +23,7 @@ from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
 
 _SILENCE_SAID_AFTER_S = 2.0
-_WAIT_AT_MOST_S = 0.1
+_MAX_WAIT_S = 0.1
 
 
 def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> int:
@@ -75,7 +75,7 @@ class Simulator:
         while not self._stop and not over:
             if self._link.target is not None:
                 self._end.call(self._link.target, perf_counter())
-            self._exchange(_WAIT_AT_MOST_S)
+            self._exchange(_MAX_WAIT_S)
             if self._end.peer is not None:
                 self._status.say("connected", "PX4 has called")
                 over = self._fly()
@@ -139,7 +139,7 @@ class Simulator:
         """Wait for the answer to a frame; return False if there will be none."""
         asked_s, silence_said, call = perf_counter(), False, self._end.calls
         while not self._end.answered and not self._stop:
-            self._exchange(_WAIT_AT_MOST_S)
+            self._exchange(_MAX_WAIT_S)
             if self._end.peer is None or self._end.calls != call:
                 return False
             self._end.poll(perf_counter())
@@ -177,6 +177,6 @@ class Simulator:
         """Wait, and hear all that comes before: an answer must not be taken for that to the next frame."""
         while not self._stop and (early_s := due_s - perf_counter()) > 0.0:
             if self._end.lockstep:
-                sleep(min(early_s, _WAIT_AT_MOST_S))
+                sleep(min(early_s, _MAX_WAIT_S))
             else:
-                self._exchange(min(early_s, _WAIT_AT_MOST_S))
+                self._exchange(min(early_s, _MAX_WAIT_S))

@@ -12,7 +12,7 @@ from colibri.plant.process.logs import PlantLogs
 from colibri.plant.simulation.plant import Plant
 
 _SILENCE_SAID_AFTER_S = 2.0
-_WAIT_AT_MOST_S = 0.1
+_MAX_WAIT_S = 0.1
 _CATCH_UP_S = 0.1
 
 
@@ -61,7 +61,7 @@ class Server:
     def wait(self) -> bool:
         """Wait for an autopilot; return False if told to stop first."""
         while not self._stop and self._end.peer is None:
-            self._receive(_WAIT_AT_MOST_S)
+            self._receive(_MAX_WAIT_S)
         return self._end.peer is not None
 
     def fly(self, plant: Plant, *, duration_s: float, speed: float) -> None:
@@ -102,7 +102,7 @@ class Server:
         silence_said = False
         due_s = offered_s
         while not self._stop:
-            command = self._receive(min(max(0.0, due_s - perf_counter()), _WAIT_AT_MOST_S))
+            command = self._receive(min(max(0.0, due_s - perf_counter()), _MAX_WAIT_S))
             if command is not None:
                 if silence_said:
                     self._status.say("answered", "the autopilot answers again")
@@ -138,4 +138,4 @@ class Server:
 
     def _wait_until(self, due_s: float) -> None:
         while not self._stop and (early_s := due_s - perf_counter()) > 0.0:
-            sleep(min(early_s, _WAIT_AT_MOST_S))
+            sleep(min(early_s, _MAX_WAIT_S))

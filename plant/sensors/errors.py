@@ -46,7 +46,7 @@ class Triad:
     """
 
     def __init__(
-        self, density: float, walk: float, turn_on: float, largest: float, interval_s: float, chance: Iterator[float]
+        self, density: float, walk: float, turn_on: float, limit: float, interval_s: float, chance: Iterator[float]
     ) -> None:
         """Switch on.
 
@@ -54,19 +54,19 @@ class Triad:
             density: White noise, units / √Hz.
             walk: Of the bias, units / s / √Hz.
             turn_on: Standard deviation of the bias at the start, units.
-            largest: What is larger is cut, units.
+            limit: What is larger is cut, units.
             interval_s: Between two samples.
             chance: Standard normal numbers.
         """
         self._noise = density / sqrt(interval_s)
         self._walk = walk * sqrt(interval_s)
-        self._largest = largest
+        self._limit = limit
         self._chance = chance
         self.bias: Vector = (turn_on * next(chance), turn_on * next(chance), turn_on * next(chance))
 
     def measure(self, truth: Vector) -> Vector:
         """Return the sample of `truth`, one interval after the one before."""
-        chance, noise, walk, most = self._chance, self._noise, self._walk, self._largest
+        chance, noise, walk, limit = self._chance, self._noise, self._walk, self._limit
         x = self.bias[0] + walk * next(chance)
         y = self.bias[1] + walk * next(chance)
         z = self.bias[2] + walk * next(chance)
@@ -74,4 +74,4 @@ class Triad:
         x += truth[0] + noise * next(chance)
         y += truth[1] + noise * next(chance)
         z += truth[2] + noise * next(chance)
-        return (min(max(x, -most), most), min(max(y, -most), most), min(max(z, -most), most))
+        return (min(max(x, -limit), limit), min(max(y, -limit), limit), min(max(z, -limit), limit))

@@ -23,7 +23,7 @@ PointInPlane: TypeAlias = tuple[float, float]
 
 _FOLDER = Path(__file__).parent / "models"
 _RAD_S_PER_UNIT = {"rad/s": 1.0, "rpm": 2.0 * pi / 60.0}
-_FASTEST_CONTACT_RAD_S = 2500.0
+_MAX_CONTACT_FREQUENCY_RAD_S = 2500.0
 """Runge-Kutta 4 in steps of 1 ms is stable up to 2785."""
 
 
@@ -207,7 +207,7 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         _check_finite(self.gravity_m_s2)
         if self.hover_speed >= self.rotors.max_speed:
             raise ValueError(f"rotors.max_speed: hover needs {self.hover_speed:.0f} {self.rotors.speed_unit}")
-        if self.ground is not None and _fastest_contact_rad_s(self, self.ground) > _FASTEST_CONTACT_RAD_S:
+        if self.ground is not None and _max_contact_frequency_rad_s(self, self.ground) > _MAX_CONTACT_FREQUENCY_RAD_S:
             raise ValueError("ground: stiffness or damping too large for the plant's integration step of 1 ms")
 
     def without(self, parts: Iterable[str]) -> "Vehicle":
@@ -248,10 +248,10 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         """Return the 4 x 4 matrix that maps squared rotor speeds to (U1 N, U2, U3, U4 N m), THESIS [2.2]."""
         return _allocation(self.rotors)
 
-    def largest_wrench(self) -> Array:
+    def max_wrench(self) -> Array:
         """Return the largest U1 (N), U2, U3, U4 (N m) that the rotors can make, each on its own, (4,)."""
-        largest: Array = np.clip(self.allocation(), 0.0, None).sum(axis=1) * square(self.rotors.max_speed)
-        return largest
+        max_wrench: Array = np.clip(self.allocation(), 0.0, None).sum(axis=1) * square(self.rotors.max_speed)
+        return max_wrench
 
     def rotor_momentum(self) -> Array:
         """Return the row (4,) that maps rotor speeds to their angular momentum along body z, N m s.
@@ -291,18 +291,18 @@ def _spin(rotors: Rotors) -> Array:
     return np.array([1.0 if direction == "ccw" else -1.0 for direction in rotors.direction])
 
 
-def _fastest_contact_rad_s(vehicle: Vehicle, ground: Ground) -> float:
+def _max_contact_frequency_rad_s(vehicle: Vehicle, ground: Ground) -> float:
     """Return a bound on the poles of the level vehicle on its feet, and of the one that lies on its rotors, rad/s."""
     inertia = np.diag([vehicle.body.mass_kg] * 3 + [*vehicle.body.inertia_kg_m2])
     points_m = ground.contacts_m(vehicle.rotors)
     slip = ground.slip_damping_n_s_m
-    fastest = 0.0
+    max_rate = 0.0
     for contacts_m in (points_m[:4], points_m[4:]):
         damping = np.linalg.solve(inertia, _contact_matrix(contacts_m, (slip, slip, ground.damping_n_s_m)))
         stiffness = np.linalg.solve(inertia, _contact_matrix(contacts_m, (0.0, 0.0, ground.stiffness_n_m)))
         rates = (np.abs(np.linalg.eigvals(damping)).max(), np.sqrt(np.abs(np.linalg.eigvals(stiffness)).max()))
-        fastest = max(fastest, *map(float, rates))
-    return fastest
+        max_rate = max(max_rate, *map(float, rates))
+    return max_rate
 
 
 def _contact_matrix(contacts_m: Array, along_axes: tuple[float, float, float]) -> Array:

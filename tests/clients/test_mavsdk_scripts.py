@@ -90,8 +90,8 @@ def test_takeoff_and_land(tmp_path: Path) -> None:
     with after("takeoff_and_land", tmp_path) as flown:
         lands(flown.seen, HOME)
         assert flown.seen.modes()[-3:] == [Mode.TAKEOFF, Mode.HOLD, Mode.LAND]
-        highest_m = max(sight.height_m for sight in flown.seen.sights)
-        assert highest_m == pytest.approx(takeoff_and_land.HEIGHT_M, abs=ACCEPTANCE_M)
+        max_height_m = max(sight.height_m for sight in flown.seen.sights)
+        assert max_height_m == pytest.approx(takeoff_and_land.HEIGHT_M, abs=ACCEPTANCE_M)
 
 
 def test_offboard_position(tmp_path: Path) -> None:

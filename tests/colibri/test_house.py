@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-LARGEST = 12
+MAX_FILES = 12
 """Files of a room, without `__init__.py`."""
 ROOMS = sorted(
     {
@@ -21,7 +21,7 @@ ROOMS = sorted(
 def test_a_room_is_small_and_says_what_it_is_for(room: str) -> None:
     files = {path.name for path in (ROOT / room).glob("*.py")}
     assert "__init__.py" in files
-    assert len(files) - 1 <= LARGEST
+    assert len(files) - 1 <= MAX_FILES
     assert ast.get_docstring(ast.parse((ROOT / room / "__init__.py").read_text(encoding="utf-8")))
 
 

@@ -17,7 +17,7 @@ FACES = (
     *("colibri.plant", "colibri.sitl"),
 )
 PACKAGES = (*FACES, "colibri.bench", "colibri.cli", "colibri.studies", "colibri.verification")
-LARGEST_MS = 50.0
+MAX_IMPORT_MS = 50.0
 TRIES = 5
 IMPORT = "import sys, time; t = time.process_time(); import colibri; print((time.process_time() - t) * 1e3)"
 
@@ -75,7 +75,7 @@ def test_every_name_at_once() -> None:
 
 def test_colibri_itself_is_imported_in_no_time() -> None:
     took_ms = [float(subprocess.check_output([sys.executable, "-c", IMPORT], text=True)) for _ in range(TRIES)]
-    assert min(took_ms) < LARGEST_MS, took_ms
+    assert min(took_ms) < MAX_IMPORT_MS, took_ms
 
 
 def test_colibri_itself_imports_nothing_that_is_large() -> None:

@@ -93,8 +93,8 @@ def test_figures_of_merit(short: Flown) -> None:
     late = moved(short, to_t_s=30.0, by_m=1.0)
     error = late.recording.position_error_m
     assert late.rms_m == pytest.approx(np.sqrt(np.mean(error**2)))
-    assert late.largest_m == error.max()
-    assert late.least_upright == late.upright.min()
+    assert late.max_error_m == error.max()
+    assert late.min_upright == late.upright.min()
 
 
 def test_far_off_is_lost(short: Flown) -> None:

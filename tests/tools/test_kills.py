@@ -12,7 +12,7 @@ from tools.kills.__main__ import failures_of
 @pytest.mark.long
 @pytest.mark.parametrize("feedback", list(Feedback))
 def test_autopilots_killed_in_a_mission(tmp_path: Path, feedback: Feedback) -> None:
-    flight = autopilots.fly(tmp_path / "flight", feedback, seed=4, most_kills=2, legs=1)
+    flight = autopilots.fly(tmp_path / "flight", feedback, seed=4, max_kills=2, legs=1)
     assert failures_of(1, flight) == []
     assert len(flight.kills) == 2
     assert max(kill.tilt_deg for kill in flight.kills) < 45.0

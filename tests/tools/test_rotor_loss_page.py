@@ -30,7 +30,7 @@ def test_the_measures_of_a_flight() -> None:
     assert flight.upright_s == pytest.approx(0.2)
     assert flight.settled_deg == 15.0
     assert flight.landed_m == pytest.approx(0.4, abs=0.01)
-    assert flight.farthest_m == pytest.approx(0.4, abs=0.01)
+    assert flight.max_distance_m == pytest.approx(0.4, abs=0.01)
     assert flight.touched_m_s == 1.0
     assert flight.spin_rad_s == pytest.approx(20.0, abs=0.1)
     assert flight.rest_deg == 0.0

@@ -14,7 +14,7 @@ from tools.fuzz.datagrams import FRAME_US
 from tools.fuzz.relay import FuzzingRelay, unreadable
 from tools.harness.processes import Process, fly_thesis, running, start_autopilot, start_plant, states
 
-MOST_GROWTH_MIB = 4.0
+MAX_GROWTH_MIB = 4.0
 _MARGIN = 1.05
 _STALLED_AFTER_S = 60.0
 _LOOK_EVERY_S = 0.1
@@ -69,7 +69,7 @@ def campaign(
     failures += ["not all was sent"] * (set(relay.sent.values()) != {quota})
     failures += [f"{name} said: {process.errors()}" for name, process in processes.items() if process.errors()]
     memory = {name: (before[name], after[name]) for name in processes}
-    failures += [f"the {name} grew" for name, (was, now) in memory.items() if now - was > MOST_GROWTH_MIB]
+    failures += [f"the {name} grew" for name, (was, now) in memory.items() if now - was > MAX_GROWTH_MIB]
     return Outcome(relay.sent, lost, memory, failures)
 
 

@@ -17,7 +17,7 @@ from tools.fuzz.frames import (
     COMMAND,
     HEARTBEAT,
     KNOWN,
-    LARGEST_ID,
+    MAX_MESSAGE_ID,
     POSITION,
     Ids,
     frame,
@@ -97,7 +97,7 @@ class Fuzzer:
         return frame(self._chance.choice(_CONVERSATION), payload, self._peer)
 
     def _unknown_id(self) -> bytes:
-        message_id = self._chance.choice((LARGEST_ID, self._chance.randrange(60_000, LARGEST_ID)))
+        message_id = self._chance.choice((MAX_MESSAGE_ID, self._chance.randrange(60_000, MAX_MESSAGE_ID)))
         return frame(message_id, self._chance.randbytes(self._chance.randrange(256)), self._peer)
 
     def _foreign(self) -> bytes:

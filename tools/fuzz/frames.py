@@ -11,7 +11,7 @@ PLANT: Ids = (1, common.MAV_COMP_ID_USER1)
 HEARTBEAT, ATTITUDE, POSITION, COMMAND, ACK, ACTUATORS = 0, 31, 32, 76, 77, 93
 """The messages of the conversation."""
 KNOWN: tuple[int, ...] = tuple(sorted(common.mavlink_map))
-LARGEST_ID = 0xFFFFFF
+MAX_MESSAGE_ID = 0xFFFFFF
 
 _CRC_EXTRA_OF_THE_UNKNOWN = 0
 

@@ -11,7 +11,7 @@ from colibri.autopilot.commander.rules.modes import State
 from colibri.mavlink.files.tree import Files
 from tools.fuzz.vehicle import SITUATIONS, BrokenError, Target
 
-MOST_GROWTH_MIB = 4.0
+MAX_GROWTH_MIB = 4.0
 FEWEST_FOR_MEMORY = 200_000
 """Messages: after fewer, resident memory shows how the allocator takes it from the system, not what is kept."""
 _A_FRAME = 40
@@ -66,7 +66,7 @@ def ground_campaign(
             before = _memory_mib()
     after = _memory_mib()
     failures += [f"{state} never met a message" for state in SITUATIONS if not target.sent[state]]
-    failures += ["it grew"] * (quota >= FEWEST_FOR_MEMORY and after - (before or after) > MOST_GROWTH_MIB)
+    failures += ["it grew"] * (quota >= FEWEST_FOR_MEMORY and after - (before or after) > MAX_GROWTH_MIB)
     memory = (before or after, after)
     kinds, accepted = len(target.accepted), target.accepted.total()
     return GroundOutcome(dict(target.sent), accepted, kinds, target.flight.now_s, memory, failures)

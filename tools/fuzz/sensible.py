@@ -8,7 +8,7 @@ from colibri.common.earth.geodesy import is_on_earth
 from colibri.mavlink.wire.dialect import mav
 
 NOT_GIVEN = 2**31 - 1
-FASTEST_M_S = 25.0
+MAX_SPEED_M_S = 25.0
 """The most that parameter MPC_XY_VEL_MAX can be."""
 _WITHOUT_PLACE = mav.MAV_FRAME_MISSION
 
@@ -43,12 +43,12 @@ def _one_of(*allowed: float) -> Callable[[float], bool]:
     return lambda value: value in allowed
 
 
-def _whole(least: int, most: int) -> Callable[[float], bool]:
-    return lambda value: least <= value <= most and value == int(value)
+def _whole(minimum: int, maximum: int) -> Callable[[float], bool]:
+    return lambda value: minimum <= value <= maximum and value == int(value)
 
 
 def _speed(value: float) -> bool:
-    return 0.0 < value <= FASTEST_M_S
+    return 0.0 < value <= MAX_SPEED_M_S
 
 
 def _place(a: Asked) -> bool:

@@ -21,8 +21,8 @@ from tools.harness.copter_flight import ACCEPTED, FORCE, STANDING, CopterFlight
 
 HIGH = Start(z=15.0, vz=-1.0, rotors=4740.0)
 """Falling: what lies still has landed."""
-_FASTEST_REFERENCE_M_S = 60.0
-_FARTHEST_M, _FARTHEST_HOME_M = 2_000.0, 101_000.0
+_MAX_REFERENCE_M_S = 60.0
+_MAX_DISTANCE_M, _MAX_HOME_DISTANCE_M = 2_000.0, 101_000.0
 _ACK = mav.MAVLINK_MSG_ID_COMMAND_ACK
 _PORTS = (17001, 17002, 14540)
 _FRAME = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
@@ -160,7 +160,7 @@ class Target:
     def lost(self) -> bool:
         """Whether the vehicle is so far away that nothing more is to be learnt there."""
         x, y, z = self.flight.position
-        return hypot(x, y, z) > _FARTHEST_M or z < -1.0
+        return hypot(x, y, z) > _MAX_DISTANCE_M or z < -1.0
 
 
 def check(flight: CopterFlight) -> None:
@@ -181,8 +181,8 @@ def check(flight: CopterFlight) -> None:
     assert reference is not None
     _must(bool(np.isfinite(reference.motion).all() and np.isfinite(reference.heading).all()), "a reference of nan")
     fast = float(np.linalg.norm(reference.motion[1]))
-    _must(fast < _FASTEST_REFERENCE_M_S, f"a reference of {fast:.0f} m/s")
-    _must(hypot(*pilot.home.position_enu_m) <= _FARTHEST_HOME_M, "home is nowhere")
+    _must(fast < _MAX_REFERENCE_M_S, f"a reference of {fast:.0f} m/s")
+    _must(hypot(*pilot.home.position_enu_m) <= _MAX_HOME_DISTANCE_M, "home is nowhere")
 
 
 def _must(holds: bool, otherwise: str) -> None:

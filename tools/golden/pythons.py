@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-OLDEST, LATEST = 11, 19
+MIN_MINOR, MAX_MINOR = 11, 19
 """Minor versions of Python 3 to look for."""
 _SAYS_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
 
@@ -13,7 +13,7 @@ _SAYS_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
 def environments(root: Path) -> dict[str, Path]:
     """Return the interpreters of the environments that are set up beside .venv, by version."""
     found = {}
-    for minor in range(OLDEST, LATEST + 1):
+    for minor in range(MIN_MINOR, MAX_MINOR + 1):
         folder = root / f".venv-3.{minor}"
         if (folder / ".ready").exists():
             found[f"3.{minor}"] = folder / "bin" / "python"
@@ -23,7 +23,7 @@ def environments(root: Path) -> dict[str, Path]:
 def other_pythons() -> dict[str, Path]:
     """Return an interpreter of each version that the computer has, but of the one that runs this."""
     found = {}
-    for minor in range(OLDEST, LATEST + 1):
+    for minor in range(MIN_MINOR, MAX_MINOR + 1):
         for python in _candidates(minor):
             if minor != sys.version_info.minor and _version(python) == f"3.{minor}":
                 found[f"3.{minor}"] = python

@@ -175,11 +175,11 @@ class CopterFlight:
                 each_frame()
             self.step()
 
-    def until(self, condition: Callable[[], object], at_most_s: float, what: str = "") -> float:
+    def until(self, condition: Callable[[], object], max_s: float, what: str = "") -> float:
         """Fly until `condition()`; return how long that took, s of simulated time."""
         began_us = self.world.time_us
         while not condition():
-            assert self.world.time_us < began_us + at_most_s * 1e6, f"{what or 'it'} took longer than {at_most_s} s"
+            assert self.world.time_us < began_us + max_s * 1e6, f"{what or 'it'} took longer than {max_s} s"
             self.step()
         return (self.world.time_us - began_us) * 1e-6
 
@@ -188,7 +188,7 @@ class CopterFlight:
         end_us = self.world.time_us + round(seconds * 1e6)
         return self.path_until(lambda: self.world.time_us >= end_us, seconds + 1.0)
 
-    def path_until(self, condition: Callable[[], object], at_most_s: float) -> list[Vector]:
+    def path_until(self, condition: Callable[[], object], max_s: float) -> list[Vector]:
         """Fly until `condition()`; return where it was at each frame."""
         path = [self.position]
 
@@ -196,7 +196,7 @@ class CopterFlight:
             path.append(self.position)
             return condition()
 
-        self.until(note_and_ask, at_most_s)
+        self.until(note_and_ask, max_s)
         return path
 
     def send(self, name: str, *fields: Any) -> None:

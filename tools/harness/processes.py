@@ -52,7 +52,7 @@ def reference(track: str) -> dict[str, Array]:
     return rows(REFERENCE / f"{track}.csv")
 
 
-def largest_difference(flown: dict[str, Array], wanted: dict[str, Array], columns: tuple[str, ...]) -> float:
+def max_difference(flown: dict[str, Array], wanted: dict[str, Array], columns: tuple[str, ...]) -> float:
     """Return the largest difference in any of `columns` at any row."""
     assert set(columns) <= set(COLUMNS)
     return float(max(np.abs(flown[column] - wanted[column]).max() for column in columns))

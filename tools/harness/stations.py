@@ -49,7 +49,7 @@ class Station:
         sent: How often each MAV_CMD was sent.
         counts: How many messages of each name came from the vehicle.
         acks: How often each acknowledgement came.
-        longest_gap_s: The longest time between two heartbeats of the vehicle, by the clock that it is told.
+        max_gap_s: The longest time between two heartbeats of the vehicle, by the clock that it is told.
         time_s: Simulated time of the vehicle.
         position_ned_m: Where the vehicle is.
     """
@@ -70,7 +70,7 @@ class Station:
         self.sent: Counter[int] = Counter()
         self.counts: Counter[str] = Counter()
         self.acks: Counter[Ack] = Counter()
-        self.longest_gap_s = 0.0
+        self.max_gap_s = 0.0
         self.time_s = 0.0
         self.position_ned_m = (0.0, 0.0, 0.0)
         self._every = every
@@ -101,7 +101,7 @@ class Station:
         fields = message.fields
         if message.name == "HEARTBEAT":
             if self._heartbeat_s is not None:
-                self.longest_gap_s = max(self.longest_gap_s, now_s - self._heartbeat_s)
+                self.max_gap_s = max(self.max_gap_s, now_s - self._heartbeat_s)
             self._heartbeat_s = now_s
         elif message.name == "LOCAL_POSITION_NED":
             self.time_s = fields.time_boot_ms * 1e-3

@@ -14,9 +14,9 @@ from colibri.mavlink.hil.feedback import Feedback, feedback
 from tools.kills import autopilots, plants
 from tools.kills.between import HangsError
 
-MOST_TILT_DEG = 35.0 + 45.0
+MAX_TILT_DEG = 35.0 + 45.0
 """45° more than the largest tilt that a pilot may ask for."""
-MOST_LOST_M = 2.0
+MAX_LOST_M = 2.0
 _PLANTS_A_FLIGHT = 10
 
 
@@ -44,9 +44,9 @@ def failures_of(number: int, flight: autopilots.Flight) -> list[str]:
     found += [f"mission {number}: {flight.words}"] if flight.words else []
     for kill in flight.kills:
         where = f"mission {number}, t = {kill.time_s:.3f} s, {kill.phase.value}, item {kill.item}"
-        if kill.tilt_deg > MOST_TILT_DEG:
+        if kill.tilt_deg > MAX_TILT_DEG:
             found.append(f"{where}: tilted by {kill.tilt_deg:.0f} degrees")
-        if kill.lost_m > MOST_LOST_M:
+        if kill.lost_m > MAX_LOST_M:
             found.append(f"{where}: lost {kill.lost_m:.2f} m")
         if not kill.went_on:
             found.append(f"{where}: did not say that it goes on")
@@ -93,8 +93,8 @@ def _plants(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[
         flights += 1
         try:
             with _folder() as folder:
-                most = min(_PLANTS_A_FLIGHT, kills - len(done))
-                killed, words = plants.fly(folder, feedback, 1000 * seed + flights, most)
+                maximum = min(_PLANTS_A_FLIGHT, kills - len(done))
+                killed, words = plants.fly(folder, feedback, 1000 * seed + flights, maximum)
         except HangsError as error:
             failures.append(f"autopilot {flights}: {error}")
             break

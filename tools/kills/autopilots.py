@@ -68,7 +68,7 @@ class Flight(NamedTuple):
     words: str
 
 
-def fly(folder: Path, feedback: Feedback, seed: int, most_kills: int, legs: int = LEGS) -> Flight:
+def fly(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int = LEGS) -> Flight:
     """Fly a mission of so many legs once, the autopilot killed at random instants and started again at once."""
     folder.mkdir()
     station = Station(mission(legs))
@@ -81,7 +81,7 @@ def fly(folder: Path, feedback: Feedback, seed: int, most_kills: int, legs: int 
         processes = killer.processes
         processes.append(plant)
         killer.begin()
-        while len(killer.kills) < most_kills and killer.kill():
+        while len(killer.kills) < max_kills and killer.kill():
             pass
         between.fly_until(station, lambda: station.flown, "the end of the mission")
         between.close()

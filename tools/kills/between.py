@@ -13,7 +13,7 @@ from tools.kills.station import Station
 GIVE_UP_AFTER_S, COMPILES_S = 60.0, 900.0
 """By the clock: bounds for what hangs, never a part of a verdict; the first autopilot may have to compile."""
 ADDRESS = ("127.0.0.1", 0)
-_LARGEST = 65536
+_MAX_DATAGRAM_BYTES = 65536
 _LOOK_S = 0.02
 _HEAD = 10
 """Bytes of a frame of MAVLink 2 before its payload."""
@@ -101,7 +101,7 @@ class Between:
     def _pass_on(self, sock: socket.socket) -> None:
         while sock.fileno() >= 0:
             try:
-                datagram, sender = sock.recvfrom(_LARGEST)
+                datagram, sender = sock.recvfrom(_MAX_DATAGRAM_BYTES)
             except BlockingIOError:
                 return
             except ConnectionRefusedError:

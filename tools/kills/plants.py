@@ -10,7 +10,7 @@ from tools.kills.autopilots import start, start_plant
 from tools.kills.between import COMPILES_S, Between, Phase
 from tools.kills.station import Station, mission
 
-_LATEST_S = 12.0
+_MAX_DELAY_S = 12.0
 
 
 class Kill(NamedTuple):
@@ -76,7 +76,7 @@ class _Flights:
         between, station, chance = self._between, self._station, self._chance
         between.fly_until(station, lambda: station.armed is True, "the rotors to be armed", COMPILES_S)
         phase = chance.choice(list(Phase))
-        due_us = between.time_us + round(1e6 * chance.uniform(0.0, _LATEST_S))
+        due_us = between.time_us + round(1e6 * chance.uniform(0.0, _MAX_DELAY_S))
         between.at(due_us, phase, self._plant.process.kill)
         between.fly_until(station, lambda: not between.waits, "the instant of the kill")
         self._plant.process.wait()

@@ -13,7 +13,7 @@ from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Codec,
 from colibri.sitl.inbox import Hearing
 
 _VEHICLE = Peer(0, 1, AUTOPILOT_COMPONENT)
-_LARGEST = 65536
+_MAX_DATAGRAM_BYTES = 65536
 HOVER_S = 6.0
 HEIGHT_M = 6.0
 _PLACES = ((22.0, 0.0), (22.0, 18.0), (0.0, 18.0), (0.0, 0.0))
@@ -75,7 +75,7 @@ class Station:
         """Take in what has come, and answer it."""
         while True:
             try:
-                datagram, self._vehicle = self.socket.recvfrom(_LARGEST)
+                datagram, self._vehicle = self.socket.recvfrom(_MAX_DATAGRAM_BYTES)
             except BlockingIOError:
                 return
             for message in self._codec.decode(datagram):
@@ -86,7 +86,7 @@ class Station:
         """Forget what has come and was not heard."""
         while True:
             try:
-                self.socket.recv(_LARGEST)
+                self.socket.recv(_MAX_DATAGRAM_BYTES)
             except BlockingIOError:
                 return
 

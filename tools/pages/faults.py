@@ -76,7 +76,7 @@ def _numbers(row: Row) -> str:
 
 def _number(value: Value, name: str, usual: str) -> str:
     unit = "" if value.unit == "1" else f" {value.unit}"
-    return f"{name}: {value.least:g} to {value.most:g}{unit} ({usual})"
+    return f"{name}: {value.minimum:g} to {value.maximum:g}{unit} ({usual})"
 
 
 def main() -> int:

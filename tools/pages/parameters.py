@@ -7,7 +7,7 @@ from pathlib import Path
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.parameters.definitions import definitions
-from colibri.mavlink.parameters.store import LARGEST_REAL, Kind, Parameter
+from colibri.mavlink.parameters.store import FLOAT32_MAX, Kind, Parameter
 from colibri.plant.vehicle.description import load_vehicle
 
 _HEAD = """# Parameters
@@ -32,17 +32,17 @@ def page() -> str:
 
 def _rows(parameters: Iterator[Parameter]) -> Iterator[str]:
     for p in parameters:
-        least, most = (_number(p, bound) for bound in (p.minimum, p.maximum))
+        minimum, maximum = (_number(p, bound) for bound in (p.minimum, p.maximum))
         choices = "; ".join(f"{number} {meaning}" for number, meaning in p.values)
         notes = " ".join(filter(None, [p.description + ".", p.details, choices and f"({choices})"]))
         notes += " Read only." if p.read_only else " After a restart." if p.reboot_required else ""
-        yield f"| `{p.name}` | {_number(p, p.default)} | {least} | {most} | {p.unit} | {notes} |"
+        yield f"| `{p.name}` | {_number(p, p.default)} | {minimum} | {maximum} | {p.unit} | {notes} |"
 
 
 def _number(parameter: Parameter, value: float) -> str:
     if parameter.kind == Kind.INT:
         return str(int(value))
-    return "" if abs(value) >= LARGEST_REAL else f"{value:.6g}"
+    return "" if abs(value) >= FLOAT32_MAX else f"{value:.6g}"
 
 
 def main() -> int:

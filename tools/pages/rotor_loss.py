@@ -31,7 +31,7 @@ _MEASURES: tuple[tuple[str, Callable[[Flown], float], str], ...] = (
     ("largest tilt (°)", lambda flown: flown.peak_deg, ".1f"),
     ("below 20° for good after (s)", lambda flown: flown.upright_s, ".2f"),
     ("tilt from 1 s on (°)", lambda flown: flown.settled_deg, ".1f"),
-    ("farthest (m)", lambda flown: flown.farthest_m, ".2f"),
+    ("farthest (m)", lambda flown: flown.max_distance_m, ".2f"),
     ("landed at (m)", lambda flown: flown.landed_m, ".2f"),
     ("touch-down (m/s)", lambda flown: flown.touched_m_s, ".2f"),
     ("spin (rad/s)", lambda flown: flown.spin_rad_s, ".1f"),

@@ -33,7 +33,7 @@ COLUMNS = ("t", "x", "y", "z", "vz", "tilt", "spin", "c1", "c2", "c3", "c4")
 """Of a path: s since the loss, m from where that was (z above ground), m/s, degrees, rad/s, parts of the largest."""
 _T, _X, _Y, _Z, _VZ, _TILT, _SPIN = range(7)
 _BLADES_LEFT = 0.001
-_BEFORE_S, _AFTER_S, _LONGEST_S = 1.0, 1.5, 40.0
+_BEFORE_S, _AFTER_S, _MAX_DURATION_S = 1.0, 1.5, 40.0
 _WORKERS = 2
 _LOW_M = 0.3
 _FULL_TURN_DEG = 360.0
@@ -97,7 +97,7 @@ class Flown(NamedTuple):
         return float(self.lost[self.lost[:, _T] > SETTLED_S, _TILT].max())
 
     @property
-    def farthest_m(self) -> float:
+    def max_distance_m(self) -> float:
         """Largest horizontal distance from where the rotor was lost."""
         return float(np.hypot(self.lost[:, _X], self.lost[:, _Y]).max())
 
@@ -166,20 +166,20 @@ def _take_off(copter: Copter, plant: Plant) -> None:
     """Climb to the height, and stay for a moment."""
     while not copter.pilot.has_seen or copter.pilot.refusals():
         _step(copter, plant)
-        assert plant.world.time_us < _LONGEST_S * 1e6, "it must be ready to arm"
+        assert plant.world.time_us < _MAX_DURATION_S * 1e6, "it must be ready to arm"
     copter.pilot.select(Mode.TAKEOFF, ())
     copter.pilot.arm(())
     began_us = plant.world.time_us
     while copter.pilot.state.mode is not Mode.HOLD:
         _step(copter, plant)
-        assert plant.world.time_us < began_us + _LONGEST_S * 1e6, "it must reach its height"
+        assert plant.world.time_us < began_us + _MAX_DURATION_S * 1e6, "it must reach its height"
 
 
 def _lose(copter: Copter, plant: Plant, seed: int, fault: Fault) -> Flown:
     """Lose a rotor; fly until the vehicle rests."""
     lost_us = plant.world.time_us + round(_BEFORE_S * 1e6)
     rows: list[tuple[float, ...]] = []
-    ends_us, noticed_s = lost_us + round(_LONGEST_S * 1e6), nan
+    ends_us, noticed_s = lost_us + round(_MAX_DURATION_S * 1e6), nan
     while plant.world.time_us < ends_us:
         if plant.world.time_us == lost_us:
             plant.inject([fault])

@@ -17,9 +17,9 @@ from tools.harness.ports import OnPort
 from tools.harness.sitl_process import vehicle
 from tools.harness.stations import Companion, Station
 
-LONGEST_GAP_S = 1.5
-MOST_GROWTH_BYTES = 2_000_000
-MOST_OFF_M = 0.5
+MAX_GAP_S = 1.5
+MAX_GROWTH_BYTES = 2_000_000
+MAX_ERROR_M = 0.5
 WARM_UP_S = 60.0
 LOOK_EVERY_S = 5.0
 
@@ -52,13 +52,13 @@ def faults(crew: Iterable[Station]) -> list[str]:
     found = []
     for client in crew:
         name = f"{client.identity[0]}/{client.identity[1]}"
-        if client.longest_gap_s > LONGEST_GAP_S:
-            found.append(f"{name}: {client.longest_gap_s:.2f} s without a heartbeat")
+        if client.max_gap_s > MAX_GAP_S:
+            found.append(f"{name}: {client.max_gap_s:.2f} s without a heartbeat")
         found += [f"{name}: got {ack} of another" for ack in client.acks if ack.target != client.identity]
         acknowledged = sum(client.acks.values())
         if not sum(client.sent.values()) - 2 <= acknowledged <= sum(client.sent.values()):
             found.append(f"{name}: {acknowledged} of {sum(client.sent.values())} commands acknowledged")
-        if isinstance(client, Companion) and not 0.0 < client.off_m < MOST_OFF_M:
+        if isinstance(client, Companion) and not 0.0 < client.off_m < MAX_ERROR_M:
             found.append(f"{name}: {client.off_m:.2f} m off its circle")
     return found
 
@@ -91,7 +91,7 @@ def soak(duration_s: float) -> tuple[dict[str, Any], list[str]]:
     figures = _figures(clients, looks, warm)
     wrong = faults(clients) + ([] if ended is None else [f"the vehicle ended with exit code {ended}"])
     for name, growth in figures["growth_bytes"].items():
-        if growth > MOST_GROWTH_BYTES:
+        if growth > MAX_GROWTH_BYTES:
             wrong.append(f"{name} grew by {growth} bytes")
     return figures, wrong
 
@@ -107,7 +107,7 @@ def _figures(clients: Sequence[Station], looks: Sequence[Look], warm: Look) -> d
         "cpu_share": {name: (last.cpu_s[name] - warm.cpu_s[name]) / lasted_s for name in last.cpu_s},
         "clients": {
             f"{client.identity[0]}/{client.identity[1]}": {
-                "longest_gap_s": client.longest_gap_s,
+                "max_gap_s": client.max_gap_s,
                 "commands": sum(client.sent.values()),
                 "acks": sum(client.acks.values()),
                 "messages": sum(client.counts.values()),

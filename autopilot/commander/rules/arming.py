@@ -7,13 +7,13 @@ from colibri.autopilot.control.interface import VehicleState
 from colibri.common.rotations import tilt_deg
 from colibri.mavlink.wire.refusal import Refusal
 
-LARGEST_TILT_DEG = 45.0
-LARGEST_SPEED_M_S = 0.5
-LEAST_CHARGE = 0.1
+MAX_TILT_DEG = 45.0
+MAX_SPEED_M_S = 0.5
+MIN_CHARGE = 0.1
 """Part of the battery's charge."""
 VOLTAGE_OF = (0.5, 1.2)
 """Of the voltages empty and full: outside of these bounds a battery is not what tells its voltage."""
-LARGEST_THRUST_STICK = 0.6
+MAX_THRUST_STICK = 0.6
 
 
 class Facts(NamedTuple):
@@ -41,15 +41,15 @@ class Facts(NamedTuple):
 def _tilt(facts: Facts) -> str:
     assert facts.state is not None
     tilted_deg = tilt_deg(facts.state.attitude)
-    if tilted_deg <= LARGEST_TILT_DEG:
+    if tilted_deg <= MAX_TILT_DEG:
         return ""
-    return f"tilted by {tilted_deg:.0f} degrees, more than {LARGEST_TILT_DEG:.0f}"
+    return f"tilted by {tilted_deg:.0f} degrees, more than {MAX_TILT_DEG:.0f}"
 
 
 def _speed(facts: Facts) -> str:
     assert facts.state is not None
     fast = max(map(abs, facts.state.velocity_enu_m_s))
-    return f"moving at {fast:.1f} m/s" if fast > LARGEST_SPEED_M_S else ""
+    return f"moving at {fast:.1f} m/s" if fast > MAX_SPEED_M_S else ""
 
 
 def _standing(facts: Facts) -> str:
@@ -57,7 +57,7 @@ def _standing(facts: Facts) -> str:
 
 
 def _charge(facts: Facts) -> str:
-    return f"battery at {facts.charge:.0%}" if facts.charge < LEAST_CHARGE else ""
+    return f"battery at {facts.charge:.0%}" if facts.charge < MIN_CHARGE else ""
 
 
 def _battery(facts: Facts) -> str:
@@ -65,7 +65,7 @@ def _battery(facts: Facts) -> str:
 
 
 def _thrust_stick(facts: Facts) -> str:
-    high = facts.thrust_stick is not None and facts.thrust_stick > LARGEST_THRUST_STICK
+    high = facts.thrust_stick is not None and facts.thrust_stick > MAX_THRUST_STICK
     return "thrust stick is up" if high else ""
 
 
@@ -91,8 +91,8 @@ CHECKS: tuple[Callable[[Facts], str], ...] = (
 
 def battery_fault(voltage_v: float, empty_v: float, full_v: float) -> str:
     """Return why a battery of these voltages is not healthy; empty if it is."""
-    least, most = (part * bound for part, bound in zip(VOLTAGE_OF, (empty_v, full_v), strict=True))
-    return "" if least <= voltage_v <= most else f"battery not healthy: {voltage_v:.1f} V"
+    minimum, maximum = (part * bound for part, bound in zip(VOLTAGE_OF, (empty_v, full_v), strict=True))
+    return "" if minimum <= voltage_v <= maximum else f"battery not healthy: {voltage_v:.1f} V"
 
 
 def refusals(facts: Facts) -> list[str]:

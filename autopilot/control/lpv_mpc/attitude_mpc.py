@@ -22,7 +22,7 @@ PerAxis: TypeAlias = tuple[Positive, Positive, Positive]
 
 _BINDING = 1e-6
 """A limit counts as active where this part of it or less is left."""
-_MOST_SLACK = 100.0
+_MAX_SLACK = 100.0
 _KEPT = 1e-3
 """A limit of the tilt that is exceeded by this part of it or less counts as kept."""
 
@@ -36,10 +36,10 @@ class AttitudeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
     """At the present state, or along the last plan."""
     output_weight: PerAxis
     increment_weight: PerAxis
-    largest_increment_n_m: PerAxis
-    largest_angle_deg: Degrees
+    max_increment_n_m: PerAxis
+    max_angle_deg: Degrees
     """Of the tilt, and of phi and theta each."""
-    largest_rate_rad_s: PerAxis
+    max_rate_rad_s: PerAxis
     check_every: Count
     """Steps between those at which angles and rates are limited."""
     slack_weight: Positive
@@ -53,14 +53,14 @@ class Situation(NamedTuple):
         u: Moments last commanded, N m, (3,).
         disturbance_n_m: Moment that the model does not explain, (3,).
         momentum: h of the rotors along body z, N m s.
-        fastest: Largest rotor speed that can be had, in parts of the vehicle's largest.
+        max_speed: Largest rotor speed that can be had, in parts of the vehicle's largest.
     """
 
     x: Array
     u: Array
     disturbance_n_m: Array
     momentum: float
-    fastest: float
+    max_speed: float
 
 
 class Target(NamedTuple):
@@ -118,8 +118,8 @@ class AttitudeMpc:
         self._checked = np.arange(settings.check_every, self.horizon + 1, settings.check_every)
         self._output_weight = np.array(settings.output_weight)
         self._increment_weight = np.array(settings.increment_weight)
-        angle = radians(settings.largest_angle_deg)
-        self._limits = np.array([angle, angle, *settings.largest_rate_rad_s])
+        angle = radians(settings.max_angle_deg)
+        self._limits = np.array([angle, angle, *settings.max_rate_rad_s])
         self._lag = lag
         self._vehicle = vehicle
         self._from_thrust, self._from_moments = squared_speeds_from(vehicle)
@@ -139,10 +139,10 @@ class AttitudeMpc:
         self._H[moved:, moved:] = settings.slack_weight * np.eye(condensing.SLACKS)
         self._f[moved:] = settings.slack_weight
         self._G, self._h = np.zeros((rows, n)), np.zeros(rows)
-        self._largest_increment = np.array(settings.largest_increment_n_m)
-        largest = np.concatenate([self._largest_increment] * len(settings.moves))
-        self._lower = np.concatenate([-largest, np.zeros(condensing.SLACKS)])
-        self._upper = np.concatenate([largest, np.full(condensing.SLACKS, _MOST_SLACK)])
+        self._max_increment = np.array(settings.max_increment_n_m)
+        max_increment = np.concatenate([self._max_increment] * len(settings.moves))
+        self._lower = np.concatenate([-max_increment, np.zeros(condensing.SLACKS)])
+        self._upper = np.concatenate([max_increment, np.full(condensing.SLACKS, _MAX_SLACK)])
 
     def plan(self, now: Situation, target: Target, ahead: Array | None) -> tuple[Plan | None, Diagnostics]:
         """Plan from `now` towards `target`; no plan where the QP is not solved.
@@ -166,7 +166,7 @@ class AttitudeMpc:
 
     def _middle_thrust_n(self, now: Situation) -> float:
         """Return the thrust, N, that leaves the rotors most for moments of either sign."""
-        middle = 0.5 * (square(self._lag.least) + square(now.fastest))
+        middle = 0.5 * (square(self._lag.min_speed) + square(now.max_speed))
         return middle / float(self._from_thrust.max())
 
     def _solve(self, now: Situation, target: Target) -> tuple[Plan | None, Diagnostics]:
@@ -214,9 +214,9 @@ class AttitudeMpc:
             self._starts,
             self._checked,
             self._limits,
-            self._largest_increment,
-            square(self._lag.least),
-            square(now.fastest),
+            self._max_increment,
+            square(self._lag.min_speed),
+            square(now.max_speed),
             self._H,
             self._f,
             self._G,

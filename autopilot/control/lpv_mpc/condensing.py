@@ -99,18 +99,18 @@ def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f:
 
 
 @compiled
-def limit_first_move(u: Array, largest: Array, lower: Array, upper: Array) -> None:
-    """Bound the first increments by `largest`, but let them take back all of u.
+def limit_first_move(u: Array, max_increment: Array, lower: Array, upper: Array) -> None:
+    """Bound the first increments by `max_increment`, but let them take back all of u.
 
     Args:
         u: Moments last commanded, N m, (3,).
-        largest: Largest increments, N m, (3,).
+        max_increment: Largest increments, N m, (3,).
         lower: Of all variables, (n,); the first three are filled.
         upper: The same.
     """
     for i in range(INPUTS):
-        lower[i] = min(-largest[i], -u[i])
-        upper[i] = max(largest[i], -u[i])
+        lower[i] = min(-max_increment[i], -u[i])
+        upper[i] = max(max_increment[i], -u[i])
 
 
 @compiled
@@ -120,8 +120,8 @@ def limit_rotors(
     thrust_n: Array,
     u: Array,
     starts: Integers,
-    squared_least: float,
-    squared_most: float,
+    min_squared: float,
+    max_squared: float,
     G: Array,
     h: Array,
 ) -> int:
@@ -136,17 +136,17 @@ def limit_rotors(
         thrust_n: U1 commanded at each step, N, (N,).
         u: Moments last commanded, N m, (3,).
         starts: Step of each move, (b,).
-        squared_least: Least squared speed, in parts of the largest.
-        squared_most: Largest squared speed, in the same parts.
+        min_squared: Least squared speed, in parts of the largest.
+        max_squared: Largest squared speed, in the same parts.
         G: Is filled from row 0, (m, n), zeros where nothing is written.
         h: (m,).
     """
     count = 0
     for move in range(starts.shape[0]):
         end = starts[move + 1] if move + 1 < starts.shape[0] else thrust_n.shape[0]
-        least, most = thrust_n[starts[move]], thrust_n[starts[move]]
+        minimum, maximum = thrust_n[starts[move]], thrust_n[starts[move]]
         for step in range(starts[move], end):
-            least, most = min(least, thrust_n[step]), max(most, thrust_n[step])
+            minimum, maximum = min(minimum, thrust_n[step]), max(maximum, thrust_n[step])
         for rotor in range(ROTORS):
             turned = 0.0
             for i in range(INPUTS):
@@ -154,8 +154,8 @@ def limit_rotors(
                 for j in range(move + 1):
                     G[count, INPUTS * j + i] = rotors_from_moments[rotor, i]
                     G[count + 1, INPUTS * j + i] = -rotors_from_moments[rotor, i]
-            h[count] = squared_most - rotors_from_thrust[rotor] * most - turned
-            h[count + 1] = turned + rotors_from_thrust[rotor] * least - squared_least
+            h[count] = max_squared - rotors_from_thrust[rotor] * maximum - turned
+            h[count + 1] = turned + rotors_from_thrust[rotor] * minimum - min_squared
             count += _TWO_SIDES
     return count
 
@@ -322,9 +322,9 @@ def condense(
     starts: Integers,
     checked: Integers,
     limits: Array,
-    largest_increment: Array,
-    squared_least: float,
-    squared_most: float,
+    max_increment: Array,
+    min_squared: float,
+    max_squared: float,
     H: Array,
     f: Array,
     G: Array,
@@ -345,9 +345,9 @@ def condense(
         starts: Step of each move, (b,).
         checked: See `limit_motion`.
         limits: See `limit_motion`.
-        largest_increment: N m, (3,).
-        squared_least: Least squared speed, in parts of the largest.
-        squared_most: Largest squared speed, in the same parts.
+        max_increment: N m, (3,).
+        min_squared: Least squared speed, in parts of the largest.
+        max_squared: Largest squared speed, in the same parts.
         H: (n, n).
         f: (n,).
         G: (m, n).
@@ -355,9 +355,9 @@ def condense(
         lower: (n,).
         upper: (n,).
     """
-    limit_first_move(u, largest_increment, lower, upper)
+    limit_first_move(u, max_increment, lower, upper)
     quadratic_cost(responses, wanted[0], wanted[1], u, weights[0], weights[1], weights[2], H, f)
-    row = limit_rotors(from_moments, from_thrust, wanted[2], u, starts, squared_least, squared_most, G, h)
+    row = limit_rotors(from_moments, from_thrust, wanted[2], u, starts, min_squared, max_squared, G, h)
     limit_motion(responses, schedule, checked, limits, row, G, h)
 
 

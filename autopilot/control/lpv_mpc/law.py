@@ -145,7 +145,7 @@ class LpvMpc:
         self._prepare_guidance(settings.guidance)
         self._prepare_observer(settings.observer)
         self._turn = recovery.TurnGains(
-            settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.fastest_rad_s
+            settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s
         )
         self._warm_up()
 
@@ -166,14 +166,14 @@ class LpvMpc:
         self._errors_ahead = position_loop.error_transition(settings.poles, self._interval_s, self._samples)
         self._span_n = float(self._allocation[0].sum())
         self._thrust_margin = settings.thrust_margin
-        self._tilt_tangent = tan(radians(settings.largest_tilt_deg))
+        self._tilt_tangent = tan(radians(settings.max_tilt_deg))
         self._position_error_m = settings.approach_speed_m_s * self._gains[1] / self._gains[0]
 
     def _prepare_observer(self, settings: ObserverSettings) -> None:
         on_velocity, on_acceleration = disturbance_observer.gains(settings.acceleration_rad_s, self._interval_s)
         on_rate, on_turn = disturbance_observer.gains(settings.moment_rad_s, self._interval_s)
         self._observer = disturbance_observer.Observer(
-            on_velocity, on_acceleration, on_rate, on_turn, settings.most_m_s2, settings.most_n_m
+            on_velocity, on_acceleration, on_rate, on_turn, settings.max_acceleration_m_s2, settings.max_moment_n_m
         )
 
     def initial(self, rotor_speed: float) -> Memory:
@@ -216,7 +216,7 @@ class LpvMpc:
 
     def _decide(self, memory: Memory, seen: Seen, course: Course) -> tuple[Memory, Decision]:
         choice = self._choose(memory, seen.now, course, seen.rotation)
-        commands, speeds, wrench, mean_wrench = self.mix(memory, choice.squared, seen.now.fastest)
+        commands, speeds, wrench, mean_wrench = self.mix(memory, choice.squared, seen.now.max_speed)
         charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
         after = Memory(
             speeds,
@@ -285,7 +285,7 @@ class LpvMpc:
             estimate[6:],
             self._airframe,
             self._inertia,
-            self._limits(self._battery.fastest_together(memory.charge_ah)),
+            self._limits(self._battery.max_common_speed(memory.charge_ah)),
             self._lag.planned,
             self._interval_s,
             forces,
@@ -306,7 +306,7 @@ class LpvMpc:
             (demand.angles, demand.thrust_n),
             seen.estimate[9:],
             self._inertia,
-            self._limits(self._battery.fastest_together(memory.charge_ah)),
+            self._limits(self._battery.max_common_speed(memory.charge_ah)),
             self._lag.planned,
             self._interval_s,
             force,
@@ -316,15 +316,15 @@ class LpvMpc:
         )
         return Course(force, aligned, Target(angles[1:-1], end, thrusts))
 
-    def mix(self, memory: Memory, squared: Array, fastest: float) -> tuple[Array, Array, Array, Array]:
+    def mix(self, memory: Memory, squared: Array, max_speed: float) -> tuple[Array, Array, Array, Array]:
         """Return the rotors' commands, their speeds and wrench a sample later, the mean wrench until then, (4,) each.
 
         Args:
             memory: Of the sample before.
             squared: Squared speeds that the plan commands, in parts of the largest, (4,).
-            fastest: Largest speed that can be had, in parts of the largest.
+            max_speed: Largest speed that can be had, in parts of the largest.
         """
-        return rotor_lag.actuate(memory.speeds, squared, self._lag, fastest, self._allocation)
+        return rotor_lag.actuate(memory.speeds, squared, self._lag, max_speed, self._allocation)
 
     def _choose(self, memory: Memory, now: Situation, course: Course, rotation: Array) -> Choice:
         """Plan; where that cannot be had, fall back."""
@@ -355,15 +355,15 @@ class LpvMpc:
         thrust_n, *moments_n_m = memory.wrench.tolist()
         x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
         momentum = dot(self._momentum, memory.speeds)
-        fastest = self._battery.fastest_now(memory.charge_ah, memory.speeds)
-        return Situation(x, memory.moments, estimate[9:], momentum, fastest), thrust_n
+        max_speed = self._battery.max_speed_now(memory.charge_ah, memory.speeds)
+        return Situation(x, memory.moments, estimate[9:], momentum, max_speed), thrust_n
 
-    def _limits(self, fastest: float) -> Limits:
-        """Return what the outer loop may ask for while all rotors can turn at `fastest`, parts of the largest."""
+    def _limits(self, max_speed: float) -> Limits:
+        """Return what the outer loop may ask for while all rotors can turn at `max_speed`, parts of the largest."""
         span_n = self._span_n
-        least_n, most_n = span_n * square(self._lag.least), span_n * square(fastest)
-        margin_n = self._thrust_margin * (most_n - least_n)
-        return Limits(self._tilt_tangent, least_n + margin_n, most_n - margin_n, self._position_error_m)
+        min_n, max_n = span_n * square(self._lag.min_speed), span_n * square(max_speed)
+        margin_n = self._thrust_margin * (max_n - min_n)
+        return Limits(self._tilt_tangent, min_n + margin_n, max_n - margin_n, self._position_error_m)
 
     def _recover(self, now: Situation, force: Array, rotation: Array) -> Choice:
         """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
@@ -385,5 +385,5 @@ class LpvMpc:
         return Choice(squared, moments, None, age, how)
 
     def _mixed(self, thrust_n: float, moments: Array, now: Situation) -> Array:
-        least, most = square(self._lag.least), square(now.fastest)
-        return recovery.prioritised(thrust_n, moments, self._from_thrust, self._from_moments, least, most)
+        minimum, maximum = square(self._lag.min_speed), square(now.max_speed)
+        return recovery.prioritised(thrust_n, moments, self._from_thrust, self._from_moments, minimum, maximum)

@@ -25,16 +25,16 @@ class Limits(NamedTuple):
 
     Attributes:
         tilt_tangent: Tangent of the largest tilt.
-        least_thrust_n: Least thrust, N.
-        most_thrust_n: Largest thrust, N.
+        min_thrust_n: Least thrust, N.
+        max_thrust_n: Largest thrust, N.
         position_error_m: A larger error counts as this one, which limits the speed of an approach; velocity and
             acceleration of a reference that far away are followed in the same proportion, which keeps one that no
             vehicle can follow from leading this one astray.
     """
 
     tilt_tangent: float
-    least_thrust_n: float
-    most_thrust_n: float
+    min_thrust_n: float
+    max_thrust_n: float
     position_error_m: float
 
 
@@ -75,9 +75,9 @@ def drag_force(airframe: Airframe, velocity: Array, up: Array, thrust_n: float, 
 @compiled
 def limited_force(force: Array, limits: Limits) -> None:
     """Limit a force in place, its vertical part first: height before place."""
-    force[2] = min(max(force[2], limits.least_thrust_n), limits.most_thrust_n)
+    force[2] = min(max(force[2], limits.min_thrust_n), limits.max_thrust_n)
     horizontal = sqrt(force[0] * force[0] + force[1] * force[1])
-    left = sqrt(max(limits.most_thrust_n * limits.most_thrust_n - force[2] * force[2], 0.0))
+    left = sqrt(max(limits.max_thrust_n * limits.max_thrust_n - force[2] * force[2], 0.0))
     allowed = min(force[2] * limits.tilt_tangent, left)
     if horizontal > allowed:
         force[0] *= allowed / horizontal
@@ -173,7 +173,7 @@ def thrust_commands(thrust_n: float, forces: Array, up: Array, follows: float, l
         force = forces[n + 1]
         wanted = force[0] * up[0] + force[1] * up[1] + force[2] * up[2] if n == 0 else length(force)
         command = thrust_n + (wanted - thrust_n) / follows
-        command = min(max(command, limits.least_thrust_n), limits.most_thrust_n)
+        command = min(max(command, limits.min_thrust_n), limits.max_thrust_n)
         thrust_n += (command - thrust_n) * follows
         commands[n] = command
 
@@ -316,7 +316,7 @@ def hold_attitude(
     for n in range(angles.shape[0]):
         angles[n] = demanded[0][n]
         angles[n, 2] += turns
-        along[n, 2] = min(max(demanded[1][n], limits.least_thrust_n), limits.most_thrust_n)
+        along[n, 2] = min(max(demanded[1][n], limits.min_thrust_n), limits.max_thrust_n)
     thrust_commands(thrust_n, along, np.array([0.0, 0.0, 1.0]), follows, limits, thrusts)
     end_of_motion(angles, inertia, disturbance_n_m, interval_s, end)
     phi, theta, psi = angles[0]

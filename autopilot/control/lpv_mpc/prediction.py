@@ -31,7 +31,7 @@ SCHEDULE = (PHI, THETA, P, Q, R)
 
 _TAYLOR_TERMS = 4
 """What is left out is (h / lag)⁵ / 120: 3e-5 of the moment's effect at 8 ms and a lag of 25 ms."""
-_LEAST_COSINE = 0.1
+_MIN_COSINE = 0.1
 """The model knows no pitch above 84 degrees."""
 
 
@@ -64,7 +64,7 @@ def flow(schedule: Array, momentum: float, body: Body, X: Array, out: Array) -> 
     """
     phi, theta, p, q, r = schedule
     s, c = sin(phi), cos(phi)
-    cosine = max(cos(theta), _LEAST_COSINE)
+    cosine = max(cos(theta), _MIN_COSINE)
     t = sin(theta) / cosine
     px = 0.5 * (body.iy - body.iz) / body.ix
     py = 0.5 * (body.iz - body.ix) / body.iy

@@ -22,7 +22,7 @@ class TurnGains(NamedTuple):
 
     angle: float
     rate: float
-    fastest_rad_s: float
+    max_rate_rad_s: float
 
 
 @compiled
@@ -37,7 +37,7 @@ def turning_moment(direction: Array, rate: Array, inertia: Array, gains: TurnGai
     """
     across = sqrt(direction[0] * direction[0] + direction[1] * direction[1])
     wanted = np.zeros(3)
-    speed = min(gains.angle * atan2(across, direction[2]), gains.fastest_rad_s)
+    speed = min(gains.angle * atan2(across, direction[2]), gains.max_rate_rad_s)
     if across > _ANTIPARALLEL:
         wanted[0], wanted[1] = -direction[1] / across * speed, direction[0] / across * speed
     else:
@@ -57,8 +57,8 @@ def prioritised(
     moment_n_m: Array,
     rotors_from_thrust: Array,
     rotors_from_moments: Array,
-    squared_least: float,
-    squared_most: float,
+    min_squared: float,
+    max_squared: float,
 ) -> Array:
     """Return squared rotor speeds (4,) within their limits: tilting moments first, then thrust, then yaw.
 
@@ -67,26 +67,26 @@ def prioritised(
         moment_n_m: U2, U3, U4 wanted, N m, (3,).
         rotors_from_thrust: Squared speeds from U1, in parts of the largest, (4,).
         rotors_from_moments: The same from U2, U3, U4, (4, 3).
-        squared_least: Least squared speed, in the same parts.
-        squared_most: Largest squared speed.
+        min_squared: Least squared speed, in the same parts.
+        max_squared: Largest squared speed.
     """
     tilt = rotors_from_moments[:, 0] * moment_n_m[0] + rotors_from_moments[:, 1] * moment_n_m[1]
     yaw = rotors_from_moments[:, 2] * moment_n_m[2]
-    room = squared_most - squared_least
+    room = max_squared - min_squared
     spread = tilt.max() - tilt.min()
     if spread > room:
         tilt *= room / spread
     lift = rotors_from_thrust * thrust_n
-    lowest, highest = (lift + tilt).min(), (lift + tilt).max()
-    shift = max(squared_least - lowest, 0.0) + min(squared_most - highest, 0.0)
+    minimum, maximum = (lift + tilt).min(), (lift + tilt).max()
+    shift = max(min_squared - minimum, 0.0) + min(max_squared - maximum, 0.0)
     squared = lift + tilt + shift
     share = 1.0
     for i in range(squared.shape[0]):
         if yaw[i] > 0.0:
-            share = min(share, max(squared_most - squared[i], 0.0) / yaw[i])
+            share = min(share, max(max_squared - squared[i], 0.0) / yaw[i])
         elif yaw[i] < 0.0:
-            share = min(share, max(squared[i] - squared_least, 0.0) / -yaw[i])
+            share = min(share, max(squared[i] - min_squared, 0.0) / -yaw[i])
     result: Array = squared + share * yaw
     for i in range(result.shape[0]):
-        result[i] = min(max(result[i], squared_least), squared_most)
+        result[i] = min(max(result[i], min_squared), max_squared)
     return result

@@ -16,7 +16,7 @@ class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     poles: tuple[Negative, Negative]
     approach_speed_m_s: Positive
-    largest_tilt_deg: Degrees
+    max_tilt_deg: Degrees
     thrust_margin: Annotated[float, msgspec.Meta(ge=0.0, lt=0.5)]
 
 
@@ -25,8 +25,8 @@ class ObserverSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     acceleration_rad_s: Positive
     moment_rad_s: Positive
-    most_m_s2: Positive
-    most_n_m: Positive
+    max_acceleration_m_s2: Positive
+    max_moment_n_m: Positive
 
 
 class FallbackSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -37,7 +37,7 @@ class FallbackSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
     descent_thrust: Part
     turn_1_s: Positive
     rate_1_s: Positive
-    fastest_rad_s: Positive
+    max_rate_rad_s: Positive
 
 
 class LpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -25,7 +25,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 ALARM = 20.0
 """Logarithm of the odds: e²⁰ samples are a century."""
-MOST_EVIDENCE = 10.0
+MAX_EVIDENCE = 10.0
 """Of one sample: an alarm takes two."""
 _WEAK = 0.25
 """Part of its thrust that a weak rotor lacks. Half way from here to all of it lies what is told apart."""
@@ -86,7 +86,7 @@ class RotorWatch:
         lost: The rotor that is lost, 0..3; None while all turn. Once lost it stays so.
         evidence: What each rotor's CUSUM has come to, (4,).
         speeds: Rotor speeds now, as their lag has them, in parts of the largest, (4,).
-        largest: The most that any CUSUM has ever come to.
+        max_evidence: The most that any CUSUM has ever come to.
     """
 
     def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
@@ -95,7 +95,7 @@ class RotorWatch:
         self.lost: int | None = None
         self.evidence = np.zeros(4)
         self.speeds = np.zeros(4)
-        self.largest = 0.0
+        self.max_evidence = 0.0
         self._before: Array | None = None
         self._residual, self._noise = np.zeros(4), np.zeros(4)
         self.adopt(vehicle)
@@ -134,8 +134,8 @@ class RotorWatch:
             charge_ah: Charge taken from the battery.
             airborne: Whether nothing but air touches it.
         """
-        fastest = self._battery.fastest_now(charge_ah, self.speeds)
-        commands = np.minimum(np.maximum(np.array(controls), self._lag.least), fastest)
+        max_speed = self._battery.max_speed_now(charge_ah, self.speeds)
+        commands = np.minimum(np.maximum(np.array(controls), self._lag.min_speed), max_speed)
         before, self.speeds = self.speeds, follow(self.speeds, commands, self._lag)
         last = self._before
         R = rotation_matrix(state.attitude)
@@ -147,10 +147,10 @@ class RotorWatch:
             last, now, before, self.speeds, self._interval_s, self._signature, self._residual, self._noise
         )
         np.maximum(self.evidence, 0.0, out=self.evidence)
-        most = int(np.argmax(self.evidence))
-        self.largest = max(self.largest, float(self.evidence[most]))
-        if self.lost is None and self.evidence[most] >= ALARM:
-            self.lost = most
+        likeliest = int(np.argmax(self.evidence))
+        self.max_evidence = max(self.max_evidence, float(self.evidence[likeliest]))
+        if self.lost is None and self.evidence[likeliest] >= ALARM:
+            self.lost = likeliest
         return self.lost
 
 
@@ -206,10 +206,10 @@ def _evidence(
             missing = signature.effect[row, i] * thrust_n[i]
             weak, none = residual[row] + _WEAK * missing, residual[row] + missing
             if row > 0:
-                least, most = _INERT * expected[row], _AGILE * expected[row]
-                if least > most:
-                    least, most = most, least
-                weak -= min(max(weak, least), most)
+                minimum, maximum = _INERT * expected[row], _AGILE * expected[row]
+                if minimum > maximum:
+                    minimum, maximum = maximum, minimum
+                weak -= min(max(weak, minimum), maximum)
             evidence[i] += 0.5 * (weak * weak - none * none) / (signature.variances[row] + noise[row])
-        evidence[i] = min(evidence[i], MOST_EVIDENCE)
+        evidence[i] = min(evidence[i], MAX_EVIDENCE)
     return evidence

@@ -27,7 +27,7 @@ _SPINS_RAD_S = np.arange(-8.0, 45.0)
 """That gains are found for. The torque of the rotors that are left turns the vehicle towards positive ones."""
 _NO_CONE_RAD_S, _WHOLE_CONE_RAD_S = 5.0, 15.0
 """The cone opens between these: what spins slowly would tilt far for little thrust."""
-_LARGEST_CONE_RAD = 0.35
+_MAX_CONE_RAD = 0.35
 _SCARCE = 0.03
 """Of the cost's measure of f_o where the solution has none: there it can push, and not pull."""
 _TIGHTEST = 1e-3
@@ -111,7 +111,7 @@ class ReducedAttitude:
         opposite_n = balancing_thrust(vehicle, self.trio, spin_rad_s)
         self._momentum = _momentum(vehicle, self.trio, opposite_n)
         rate = self._steady_rate(spin_rad_s * self.trio.sign) * opposite_n
-        self.cone_rad = min(atan(hypot(rate[0], rate[1]) / spin_rad_s), _LARGEST_CONE_RAD)
+        self.cone_rad = min(atan(hypot(rate[0], rate[1]) / spin_rad_s), _MAX_CONE_RAD)
         self._gains = self._designed(interval_s, follows, weights)
 
     def command(self, direction: Array, rate: Array, forces: Array) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from colibri.autopilot.control.rotor_loss.three_rotors import ThreeRotors
 from colibri.common.types import Array, FourRotors
 from colibri.plant.vehicle.description import Vehicle
 
-LONGEST_INTERVAL_S = 0.02
+MAX_INTERVAL_S = 0.02
 """A vehicle that spins at four turns a second turns half a radian in so long: who decides less often cannot do it."""
 _CLEAR_M = 0.3
 """Closer to the ground than this it may touch, and the ground pushes as a rotor does."""
@@ -34,7 +34,7 @@ class RotorLoss:
     def __init__(self, vehicle: Vehicle, interval_us: int) -> None:
         """Look after `vehicle`, which is controlled every `interval_us`."""
         self._vehicle, self._interval_s = vehicle, interval_us * 1e-6
-        self._possible = self._interval_s <= LONGEST_INTERVAL_S
+        self._possible = self._interval_s <= MAX_INTERVAL_S
         self.watch = RotorWatch(vehicle, self._interval_s)
         self._three: ThreeRotors | None = None
         self.enabled = True

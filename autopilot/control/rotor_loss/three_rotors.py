@@ -17,13 +17,13 @@ from colibri.common.rotations import rotation_matrix
 from colibri.common.types import Array, Vector
 from colibri.plant.vehicle.description import Vehicle
 
-_FASTEST_SPIN_RAD_S = 28.0
+_MAX_SPIN_RAD_S = 28.0
 _SPIN_PART = 0.8
 """Of the gyroscope's range: the rest is for transients."""
 _SPUN_UP_RAD_S = 10.0
 _SPIN_UP_THRUST = 1.3
 """Parts of the weight: before it spins the thrust axis can only be turned one way, so the spin must come at once."""
-_LEAST_UPRIGHT = 0.5
+_MIN_UPRIGHT = 0.5
 _AT_LIMIT = 1e-9
 
 
@@ -34,13 +34,13 @@ class Descent(NamedTuple):
         place_rad_s: Frequency of the position loop, critically damped.
         climb_1_s: Gain on the vertical speed.
         lift_m_s2: Largest vertical acceleration asked for.
-        lean_deg: Largest tilt of the mean thrust for the sake of place.
-        most_lean_deg: The same for place and wind together; the cone comes on top.
+        tilt_deg: Largest tilt of the mean thrust for the sake of place.
+        max_tilt_deg: The same for place and wind together; the cone comes on top.
         farther_deg_m: More of it for each metre that the vehicle is too far from its place.
         far_m: How far that is.
-        blown_lean_deg: Largest tilt of the mean thrust at all.
+        wind_tilt_deg: Largest tilt of the mean thrust at all.
         wind_rad_s: Frequency at which what the model does not explain is observed: wind, most of all.
-        most_wind_m_s2: Largest of that believed.
+        max_wind_m_s2: Largest of that believed.
         settle_s: So long it stays at its height.
         sink_m_s: Then it sinks.
         land_m_s: At this speed close to the ground.
@@ -50,13 +50,13 @@ class Descent(NamedTuple):
     place_rad_s: float = 1.0
     climb_1_s: float = 3.0
     lift_m_s2: float = 4.0
-    lean_deg: float = 6.0
-    most_lean_deg: float = 8.0
+    tilt_deg: float = 6.0
+    max_tilt_deg: float = 8.0
     farther_deg_m: float = 2.0
     far_m: float = 1.5
-    blown_lean_deg: float = 16.0
+    wind_tilt_deg: float = 16.0
     wind_rad_s: float = 1.5
-    most_wind_m_s2: float = 2.0
+    max_wind_m_s2: float = 2.0
     settle_s: float = 1.5
     sink_m_s: float = 1.0
     land_m_s: float = 0.6
@@ -116,8 +116,8 @@ class ThreeRotors:
         """
         self._vehicle, self._interval_s, self._descent, self._contact = vehicle, interval_s, descent, contact
         self._lag = rotor_lag(vehicle, interval_s)
-        measured = vehicle.sensors.gyroscope.range_rad_s * _SPIN_PART if vehicle.sensors else _FASTEST_SPIN_RAD_S
-        spin_rad_s = min(_FASTEST_SPIN_RAD_S, measured)
+        measured = vehicle.sensors.gyroscope.range_rad_s * _SPIN_PART if vehicle.sensors else _MAX_SPIN_RAD_S
+        spin_rad_s = min(_MAX_SPIN_RAD_S, measured)
         self.law = ReducedAttitude(vehicle, lost, interval_s, self._lag.planned, spin_rad_s, weights)
         self._battery = BatteryModel(vehicle)
         self._full_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
@@ -125,9 +125,9 @@ class ThreeRotors:
         self._weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
         self._speeds = speeds.copy()
         self._speeds[lost] = 0.0
-        self._lean_m_s2 = self._gravity * tan(radians(descent.lean_deg))
+        self._tilt_m_s2 = self._gravity * tan(radians(descent.tilt_deg))
         self._ground_m = ground_m
-        self._place = stopping_place(state, 0.5 * self._lean_m_s2)
+        self._place = stopping_place(state, 0.5 * self._tilt_m_s2)
         self._gains = disturbance_observer.gains(descent.wind_rad_s, interval_s)
         self._velocity, self._wind = np.array(state.velocity_enu_m_s), np.zeros(3)
         self._explained = np.zeros(3)
@@ -149,7 +149,7 @@ class ThreeRotors:
         up = self._acceleration(state)
         up[2] += self._gravity
         direction = up / norm(up)
-        thrust_n = self._weight_n / self._gravity * float(up[2]) / max(float(R[2, 2]), _LEAST_UPRIGHT)
+        thrust_n = self._weight_n / self._gravity * float(up[2]) / max(float(R[2, 2]), _MIN_UPRIGHT)
         if abs(state.rate_flu_rad_s[2]) < _SPUN_UP_RAD_S:
             thrust_n = max(thrust_n, _SPIN_UP_THRUST * self._weight_n)
         commands = self._commands(thrust_n, matvec(R.T, direction), np.array(state.rate_flu_rad_s), charge_ah)
@@ -165,12 +165,14 @@ class ThreeRotors:
         lost, a, b, o, _ = self.law.trio
         forces = self._full_n * self._speeds**2
         d, f_o = self.law.command(direction, rate, np.array([forces[b] - forces[a], forces[o]]))
-        fastest = self._battery.fastest_now(charge_ah, self._speeds)
-        squared = shared(self.law.trio, thrust_n, d, f_o, self._full_n, (square(self._lag.least), square(fastest)))
-        commands = lead(self._speeds, squared, self._lag, fastest)
-        least = self._lag.least  # all that the rotor has, not the plan's
-        commands[squared <= square(least) + _AT_LIMIT] = least
-        commands[squared >= square(fastest) - _AT_LIMIT] = fastest
+        max_speed = self._battery.max_speed_now(charge_ah, self._speeds)
+        squared = shared(
+            self.law.trio, thrust_n, d, f_o, self._full_n, (square(self._lag.min_speed), square(max_speed))
+        )
+        commands = lead(self._speeds, squared, self._lag, max_speed)
+        minimum = self._lag.min_speed  # all that the rotor has, not the plan's
+        commands[squared <= square(minimum) + _AT_LIMIT] = minimum
+        commands[squared >= square(max_speed) - _AT_LIMIT] = max_speed
         commands[lost] = 0.0
         return commands
 
@@ -187,9 +189,9 @@ class ThreeRotors:
         missed = np.array(state.velocity_enu_m_s) - expected
         self._knock_m_s = state.velocity_enu_m_s[2] - self._climbed_m_s - self._interval_s * float(self._explained[2])
         self._climbed_m_s = state.velocity_enu_m_s[2]
-        most = self._descent.most_wind_m_s2
+        maximum = self._descent.max_wind_m_s2
         self._velocity = expected + self._gains[0] * missed
-        self._wind = np.clip(self._wind + self._gains[1] * missed, -most, most)
+        self._wind = np.clip(self._wind + self._gains[1] * missed, -maximum, maximum)
 
     def _acceleration(self, state: VehicleState) -> Array:
         """Return the acceleration to ask for, m/s², ENU, (3,)."""
@@ -197,18 +199,18 @@ class ThreeRotors:
         velocity = np.array(state.velocity_enu_m_s)
         error = self._place - np.array(state.position_enu_m)
         wanted: Array = w * w * error - 2.0 * w * velocity
-        _limit(wanted, self._lean_m_s2)
+        _limit(wanted, self._tilt_m_s2)
         wanted[2] = how.climb_1_s * (self._climb_m_s(state) - velocity[2])
         wanted -= self._wind
-        _limit(wanted, self._most_lean_m_s2(hypot(error[0], error[1])))
+        _limit(wanted, self._max_tilt_m_s2(hypot(error[0], error[1])))
         wanted[2] = min(max(wanted[2], -how.lift_m_s2), how.lift_m_s2)
         return wanted
 
-    def _most_lean_m_s2(self, off_m: float) -> float:
+    def _max_tilt_m_s2(self, off_m: float) -> float:
         """Return the largest horizontal acceleration so far from the place: upright first, unless it is blown away."""
         how = self._descent
-        lean_deg = how.most_lean_deg + how.farther_deg_m * max(off_m - how.far_m, 0.0)
-        return self._gravity * tan(radians(min(lean_deg, how.blown_lean_deg)))
+        tilt_deg = how.max_tilt_deg + how.farther_deg_m * max(off_m - how.far_m, 0.0)
+        return self._gravity * tan(radians(min(tilt_deg, how.wind_tilt_deg)))
 
     def _climb_m_s(self, state: VehicleState) -> float:
         how = self._descent
@@ -240,12 +242,12 @@ def shared(
         full_n: Of each rotor at its largest speed, N, (4,).
         squared_limits: Least and largest squared speed, parts of the largest.
     """
-    least, most = squared_limits
-    lowest_n = least * max(full_n[trio.a], full_n[trio.b])
-    highest_n = most * min(full_n[trio.a], full_n[trio.b])
-    f_o = min(max(f_o, least * full_n[trio.o]), most * full_n[trio.o])
-    d = min(max(d, lowest_n - highest_n), highest_n - lowest_n)
-    pair_n = min(max(thrust_n - f_o, 2.0 * lowest_n + abs(d)), 2.0 * highest_n - abs(d))
+    minimum, maximum = squared_limits
+    min_n = minimum * max(full_n[trio.a], full_n[trio.b])
+    max_n = maximum * min(full_n[trio.a], full_n[trio.b])
+    f_o = min(max(f_o, minimum * full_n[trio.o]), maximum * full_n[trio.o])
+    d = min(max(d, min_n - max_n), max_n - min_n)
+    pair_n = min(max(thrust_n - f_o, 2.0 * min_n + abs(d)), 2.0 * max_n - abs(d))
     forces = np.zeros(4)
     forces[trio.a], forces[trio.b], forces[trio.o] = 0.5 * (pair_n - d), 0.5 * (pair_n + d), f_o
     squared: Array = forces / full_n
@@ -260,11 +262,11 @@ def stopping_place(state: VehicleState, braking_m_s2: float) -> Array:
     return np.array([x + vx * time_s, y + vy * time_s, z])
 
 
-def _limit(acceleration: Array, most_m_s2: float) -> None:
+def _limit(acceleration: Array, max_acceleration_m_s2: float) -> None:
     """Shorten the horizontal part of an acceleration, (3,), in place."""
     flat = hypot(acceleration[0], acceleration[1])
-    if flat > most_m_s2:
-        acceleration[:2] *= most_m_s2 / flat
+    if flat > max_acceleration_m_s2:
+        acceleration[:2] *= max_acceleration_m_s2 / flat
 
 
 def _angles(direction: Array, psi: float) -> Vector:

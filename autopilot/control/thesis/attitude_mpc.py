@@ -40,7 +40,7 @@ class AttitudeMpc:
         self._weights = Weights(
             np.array(settings.output_weight), np.array(settings.terminal_weight), np.array(settings.increment_weight)
         )
-        self._largest_increment = 2.0 * vehicle.largest_wrench()[1:]
+        self._max_increment = 2.0 * vehicle.max_wrench()[1:]
 
     def step(
         self,
@@ -70,5 +70,5 @@ class AttitudeMpc:
         x = np.array([phi, phi_rate, theta, theta_rate, psi, psi_rate, *moment_n_m])
         references = np.array([reference] * horizon)
         return solve(
-            condense(model, horizon, x, references, self._weights), self._largest_increment, self._solver, self._clock
+            condense(model, horizon, x, references, self._weights), self._max_increment, self._solver, self._clock
         )

@@ -30,7 +30,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 PerOutput = tuple[Positive, Positive, Positive, Positive]
 
-_LEAST_THRUST = 0.01
+_MIN_THRUST = 0.01
 """The model divides by the last thrust: it never takes it for smaller than this part of the weight, of either sign."""
 
 _UNBOUNDED = 1e6
@@ -84,7 +84,7 @@ class GlobalMpc:
         self._clock = clock
         self._solver = QpSolver(self._settings.qp.solver, self._settings.qp.tolerance)
         self._mixer = Mixer(vehicle)
-        self._largest_increment = _UNBOUNDED * vehicle.largest_wrench()
+        self._max_increment = _UNBOUNDED * vehicle.max_wrench()
         self._weights = Weights(
             np.array(self._settings.output_weight),
             np.array(self._settings.terminal_weight),
@@ -111,7 +111,7 @@ class GlobalMpc:
         )
         wanted = np.column_stack([references.position_enu_m[1:], references.yaw_rad[1:]])
         qp = condense(model, self._settings.horizon, x, wanted, self._weights)
-        increment, diagnostics = solve(qp, self._largest_increment, self._solver, self._clock)
+        increment, diagnostics = solve(qp, self._max_increment, self._solver, self._clock)
         wrench = memory.wrench + increment
         speeds = self._mixer.rotor_speeds(wrench)
         return GlobalMemory(wrench, speeds), Decision(speeds, (0.0, 0.0, float(references.yaw_rad[1])), diagnostics)
@@ -121,7 +121,7 @@ class GlobalMpc:
     ) -> tuple[Array, Array]:
         """Return the LPV model at the present state and the last input."""
         body, gravity_m_s2 = self._vehicle.body, self._vehicle.gravity_m_s2
-        least_n = _LEAST_THRUST * body.mass_kg * gravity_m_s2
-        thrust_n = copysign(max(abs(thrust_n), least_n), thrust_n)
+        min_n = _MIN_THRUST * body.mass_kg * gravity_m_s2
+        thrust_n = copysign(max(abs(thrust_n), min_n), thrust_n)
         attitude = attitude_model(rates[0], rates[1], rotor_momentum_n_m_s, inertia_kg_m2=body.inertia_kg_m2)
         return global_model(attitude, state.euler, thrust_n, mass_kg=body.mass_kg, gravity_m_s2=gravity_m_s2)

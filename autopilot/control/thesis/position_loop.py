@@ -7,7 +7,7 @@ from colibri.common.kernels import atan, cos, sin
 from colibri.common.types import Vector
 from colibri.plant.vehicle.description import Vehicle
 
-_LEAST_LIFT = 0.05
+_MIN_LIFT = 0.05
 """The demanded lift never falls below this part of gravity: the law has no answer for a vehicle that must push down."""
 
 
@@ -56,7 +56,7 @@ class PositionController:
             self._k1 * (wanted - is_now) + self._k2 * (speed_wanted - speed)
             for (wanted, is_now), (speed_wanted, speed) in zip(errors, speed_errors, strict=True)
         )
-        lift = max(vz + self._gravity_m_s2, _LEAST_LIFT * self._gravity_m_s2)
+        lift = max(vz + self._gravity_m_s2, _MIN_LIFT * self._gravity_m_s2)
         a, b = vx / lift, vy / lift
         c, d = cos(yaw_reference_rad), sin(yaw_reference_rad)
         theta = atan(a * c + b * d)

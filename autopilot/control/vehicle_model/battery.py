@@ -40,7 +40,7 @@ class BatteryModel:
         drag_torque = vehicle.rotors.torque_coefficient * square(vehicle.rotors.max_speed)
         efficiency = vehicle.battery.efficiency if vehicle.battery else 1.0
         self._full_power_w = drag_torque * vehicle.rad_s_per_speed_unit * vehicle.rotors.max_speed / efficiency
-        self._fastest: dict[int, float] = {}
+        self._max_speeds: dict[int, float] = {}
         if self._battery:
             self._step_ah = self._battery.capacity_ah / _INTERVALS
 
@@ -60,7 +60,7 @@ class BatteryModel:
         voltage_v = _voltage_v(self._battery, charge_ah, power_w)
         return voltage_v, power_w / voltage_v
 
-    def fastest_now(self, charge_ah: float, speeds: Array) -> float:
+    def max_speed_now(self, charge_ah: float, speeds: Array) -> float:
         """Return the speed that a rotor can reach while all take the power that they take now, in parts of the largest.
 
         Args:
@@ -72,7 +72,7 @@ class BatteryModel:
         power_w = self._full_power_w * dot(speeds * speeds, speeds)
         return _voltage_v(self._battery, charge_ah, power_w) / self._battery.full_voltage_v
 
-    def fastest_together(self, charge_ah: float) -> float:
+    def max_common_speed(self, charge_ah: float) -> float:
         """Return the speed that all rotors can keep up together once `charge_ah` is taken, in parts of the largest."""
         if self._battery is None:
             return 1.0
@@ -84,9 +84,9 @@ class BatteryModel:
 
     def _balanced(self, battery: Battery, point: int) -> float:
         """Return the balance at so many steps of charge; found when first asked for, so that it is quick to begin."""
-        if point not in self._fastest:
-            self._fastest[point] = self._balance(battery, self._step_ah * point)
-        return self._fastest[point]
+        if point not in self._max_speeds:
+            self._max_speeds[point] = self._balance(battery, self._step_ah * point)
+        return self._max_speeds[point]
 
     def _balance(self, battery: Battery, charge_ah: float) -> float:
         """Find the speed, in parts of the largest, at which the voltage left is just in that proportion."""

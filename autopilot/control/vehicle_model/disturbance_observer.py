@@ -28,16 +28,16 @@ class Observer(NamedTuple):
         acceleration: Disturbance for each m/s missed, 1/s.
         rate: Part of a rate missed that is corrected at once.
         angular_acceleration: Disturbance for each rad/s missed, 1/s.
-        most_m_s2: Largest acceleration believed.
-        most_n_m: Largest moment believed.
+        max_acceleration_m_s2: Largest acceleration believed.
+        max_moment_n_m: Largest moment believed.
     """
 
     velocity: float
     acceleration: float
     rate: float
     angular_acceleration: float
-    most_m_s2: float
-    most_n_m: float
+    max_acceleration_m_s2: float
+    max_moment_n_m: float
 
 
 def gains(frequency_rad_s: float, interval_s: float) -> tuple[float, float]:
@@ -95,10 +95,10 @@ def observe(
         missed = now[i] - expected
         after[i] = expected + observer.velocity * missed
         disturbance = estimate[6 + i] + observer.acceleration * missed
-        after[6 + i] = min(max(disturbance, -observer.most_m_s2), observer.most_m_s2)
+        after[6 + i] = min(max(disturbance, -observer.max_acceleration_m_s2), observer.max_acceleration_m_s2)
         expected = estimate[3 + i] + interval_s * (turn[i] + estimate[9 + i] / inertia[i])
         missed = now[3 + i] - expected
         after[3 + i] = expected + observer.rate * missed
         disturbance = estimate[9 + i] + observer.angular_acceleration * missed * inertia[i]
-        after[9 + i] = min(max(disturbance, -observer.most_n_m), observer.most_n_m)
+        after[9 + i] = min(max(disturbance, -observer.max_moment_n_m), observer.max_moment_n_m)
     return after

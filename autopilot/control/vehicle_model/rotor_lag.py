@@ -23,13 +23,13 @@ class RotorLag(NamedTuple):
         up: Part of the way while it speeds up.
         down: Part of the way while it slows down.
         planned: Part of the way that the plan has force go.
-        least: Least speed.
+        min_speed: Least speed.
     """
 
     up: float
     down: float
     planned: float
-    least: float
+    min_speed: float
 
 
 def rotor_lag(vehicle: Vehicle, interval_s: float) -> RotorLag:
@@ -51,14 +51,14 @@ def follow(speeds: Array, commands: Array, lag: RotorLag) -> Array:
 
 
 @compiled
-def lead(speeds: Array, squared_commands: Array, lag: RotorLag, fastest: float) -> Array:
+def lead(speeds: Array, squared_commands: Array, lag: RotorLag, max_speed: float) -> Array:
     """Return the commands (4,) that bring squared speed where the plan has it after one control sample.
 
     Args:
         speeds: Now, (4,).
         squared_commands: Squared speeds that the plan commands, (4,).
         lag: Of the rotors.
-        fastest: Largest speed that can be had.
+        max_speed: Largest speed that can be had.
     """
     commands = np.empty_like(speeds)
     for i in range(speeds.shape[0]):
@@ -66,13 +66,13 @@ def lead(speeds: Array, squared_commands: Array, lag: RotorLag, fastest: float) 
         after = sqrt(max(squared + (squared_commands[i] - squared) * lag.planned, 0.0))
         way = after - speeds[i]
         command = speeds[i] + way / (lag.up if way > 0.0 else lag.down)
-        commands[i] = min(max(command, lag.least), fastest)
+        commands[i] = min(max(command, lag.min_speed), max_speed)
     return commands
 
 
 @compiled
 def actuate(
-    speeds: Array, squared_commands: Array, lag: RotorLag, fastest: float, allocation: Array
+    speeds: Array, squared_commands: Array, lag: RotorLag, max_speed: float, allocation: Array
 ) -> tuple[Array, Array, Array, Array]:
     """Return commands as `lead` does, speeds and wrench a sample later, and the mean wrench until then, (4,) each.
 
@@ -80,10 +80,10 @@ def actuate(
         speeds: Now, (4,).
         squared_commands: Squared speeds that the plan commands, (4,).
         lag: Of the rotors.
-        fastest: Largest speed that can be had.
+        max_speed: Largest speed that can be had.
         allocation: From squared speeds to U1 (N), U2, U3, U4 (N m), (4, 4).
     """
-    commands = lead(speeds, squared_commands, lag, fastest)
+    commands = lead(speeds, squared_commands, lag, max_speed)
     after = follow(speeds, commands, lag)
     wrench, mean = np.zeros(allocation.shape[0]), np.zeros(allocation.shape[0])
     for row in range(allocation.shape[0]):

@@ -13,9 +13,9 @@ from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.sensors import Sensors
 
-_LEAST_PA, _MOST_PA = 20e3, 115e3
+_MIN_PA, _MAX_PA = 20e3, 115e3
 _FROZEN_US = 500_000
-_LEAST_NOISE_M = 1e-6
+_MIN_NOISE_M = 1e-6
 _PATIENCE_US = 7_000_000
 _DOUBTED_M = 100.0
 _TYPICAL_PA = 95e3
@@ -40,13 +40,13 @@ class Barometer:
         """Expect any weather."""
         self._noise_pa = sensors.barometer.noise_pa
         self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (BARO_OFFSET, 1, _DOUBTED_M))
-        self._watch = Watch(_LEAST_PA, _MOST_PA, _FROZEN_US)
+        self._watch = Watch(_MIN_PA, _MAX_PA, _FROZEN_US)
         self.height_m = 0.0
 
     @property
     def variance(self) -> float:
         """Of a height near the sea, m²."""
-        return square(max(self._noise_pa * METRES_PER_PASCAL, _LEAST_NOISE_M))
+        return square(max(self._noise_pa * METRES_PER_PASCAL, _MIN_NOISE_M))
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
         """Return a pressure, Pa."""
@@ -63,7 +63,7 @@ class Barometer:
         """Fuse a pressure, Pa."""
         (pressure_pa,) = value
         height = self.height_m = altitude_m(pressure_pa)
-        variance = square(max(-self._noise_pa * altitude_slope_m_pa(pressure_pa), _LEAST_NOISE_M))
+        variance = square(max(-self._noise_pa * altitude_slope_m_pa(pressure_pa), _MIN_NOISE_M))
         believed = self.kind.fuse(x, P, time_us, update.fuse_pressure_height, height, variance)
         return None if believed else Reason.INNOVATION
 

@@ -16,9 +16,9 @@ from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.sensors import Sensors
 
-_LARGEST_GAUSS = 4.0
+_MAX_GAUSS = 4.0
 _FROZEN_US = 500_000
-_LEAST_NOISE_GAUSS = 1e-6
+_MIN_NOISE_GAUSS = 1e-6
 _STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)
 """By how much the field may differ from the earth's in strength and inclination."""
 _PATIENCE_US = 10_000_000
@@ -43,9 +43,9 @@ class Magnetometer:
     def __init__(self, sensors: Sensors, field_enu_gauss: Vector) -> None:
         """Expect the field of the earth."""
         self._field = np.array(field_enu_gauss)
-        self.variance = square(max(sensors.magnetometer.noise_gauss, _LEAST_NOISE_GAUSS))
+        self.variance = square(max(sensors.magnetometer.noise_gauss, _MIN_NOISE_GAUSS))
         self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (HARD_IRON, 3, _DOUBTED_GAUSS))
-        self._watch = Watch(-_LARGEST_GAUSS, _LARGEST_GAUSS, _FROZEN_US)
+        self._watch = Watch(-_MAX_GAUSS, _MAX_GAUSS, _FROZEN_US)
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
         """Return a field, gauss FLU."""

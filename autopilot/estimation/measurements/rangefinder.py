@@ -25,7 +25,7 @@ from colibri.plant.vehicle.sensors import Sensors
 
 _USED_BELOW_M = 5.0
 """Of height above the ground, as PX4's EKF2_RNG_A_HMAX: farther below, the ground need not be that of the start."""
-_LEAST_COSINE = 0.7
+_MIN_COSINE = 0.7
 """Of the tilt: beyond 45° the beam meets the ground somewhere else."""
 _ROUGHNESS_M = 0.01
 _WIRE_STEP_M = 0.01
@@ -95,7 +95,7 @@ class RangefinderBelow:
 
 def is_upright(x: Array) -> bool:
     """Whether the beam points near enough to straight down."""
-    return bool(1.0 - 2.0 * (x[7] * x[7] + x[8] * x[8]) >= _LEAST_COSINE)
+    return bool(1.0 - 2.0 * (x[7] * x[7] + x[8] * x[8]) >= _MIN_COSINE)
 
 
 @compiled

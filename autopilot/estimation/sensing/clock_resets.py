@@ -1,6 +1,6 @@
 """Frames whose time does not follow: some are strays; many that follow one another are a clock begun anew."""
 
-LONGEST_GAP_US = 1_000_000
+MAX_GAP_US = 1_000_000
 _SETTLED = 25
 
 
@@ -14,7 +14,7 @@ class Strays:
 
     def settle(self, time_us: int) -> bool:
         """Take the time of a stray frame; return whether enough of them agree on another clock."""
-        follows = self._time_us is not None and 0 < time_us - self._time_us <= LONGEST_GAP_US
+        follows = self._time_us is not None and 0 < time_us - self._time_us <= MAX_GAP_US
         self._count = self._count + 1 if follows else 1
         self._time_us = time_us
         return self._count >= _SETTLED

@@ -22,9 +22,9 @@ _BRIDGED_US = 20_000
 class _Axes:
     """One of the two, watched."""
 
-    def __init__(self, source: Source, group: int, largest: float, noise: float, rejected: Rejected) -> None:
+    def __init__(self, source: Source, group: int, maximum: float, noise: float, rejected: Rejected) -> None:
         self._source, self._group, self._rejected = source, int(group), rejected
-        self._watch = Watch(-largest, largest, _PATIENCE_US if noise > 0.0 else inf)
+        self._watch = Watch(-maximum, maximum, _PATIENCE_US if noise > 0.0 else inf)
         self._time_us: int | None = None
         self.value: Vector = (0.0, 0.0, 0.0)
 

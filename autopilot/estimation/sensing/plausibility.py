@@ -6,9 +6,9 @@ from colibri.autopilot.estimation.sensing.rejection import Reason
 from colibri.common.earth.geodesy import is_on_earth
 from colibri.mavlink.hil.sensors import GpsFix
 
-_FASTEST_M_S = 100.0
-_LOWEST_M, _HIGHEST_M = -1000.0, 30e3
-_LEAST_FIX, _BEST_FIX = 3, 6
+_MAX_SPEED_M_S = 100.0
+_MIN_HEIGHT_M, _MAX_HEIGHT_M = -1000.0, 30e3
+_MIN_FIX, _BEST_FIX = 3, 6
 _GPS_PATIENCE_US = 2_000_000
 _NOWHERE = (0.0, 0.0)
 """Latitude and longitude of who does not know them, in the Gulf of Guinea."""
@@ -21,9 +21,9 @@ class Watch:
         is_new: Whether the last value differs from the one before: what a simulator sends twice is measured once.
     """
 
-    def __init__(self, smallest: float, largest: float, patience_us: float) -> None:
-        """Take values from `smallest` to `largest`, unless they stay the same to the last bit for `patience_us`."""
-        self._smallest, self._largest, self._patience_us = smallest, largest, patience_us
+    def __init__(self, minimum: float, maximum: float, patience_us: float) -> None:
+        """Take values from `minimum` to `maximum`, unless they stay the same to the last bit for `patience_us`."""
+        self._minimum, self._maximum, self._patience_us = minimum, maximum, patience_us
         self._last: tuple[float, ...] = ()
         self._changed_us = 0
         self.is_new = False
@@ -31,7 +31,7 @@ class Watch:
     def reason(self, values: tuple[float, ...], time_us: int) -> Reason | None:
         """Return why `values`, measured at `time_us`, must be rejected; None if they need not."""
         for value in values:
-            if not self._smallest <= value <= self._largest:
+            if not self._minimum <= value <= self._maximum:
                 return Reason.RANGE if all(map(isfinite, values)) else Reason.NOT_FINITE
         self.is_new = values != self._last
         if self.is_new:
@@ -55,7 +55,7 @@ class GpsWatch:
 
     def reason(self, fix: GpsFix, now_us: int) -> Reason | None:
         """Return why a fix, told by `now_us`, must be rejected; None if it need not."""
-        if not _LEAST_FIX <= fix.fix_type <= _BEST_FIX or fix.place[:2] == _NOWHERE:
+        if not _MIN_FIX <= fix.fix_type <= _BEST_FIX or fix.place[:2] == _NOWHERE:
             return Reason.NO_FIX
         numbers = (*fix.place, *fix.velocity_enu_m_s)
         if not _possible(*numbers):
@@ -69,8 +69,8 @@ class GpsWatch:
 def _possible(latitude_deg: float, longitude_deg: float, altitude_m: float, ve: float, vn: float, vu: float) -> bool:
     return (
         is_on_earth(latitude_deg, longitude_deg)
-        and _LOWEST_M <= altitude_m <= _HIGHEST_M
-        and -_FASTEST_M_S <= ve <= _FASTEST_M_S
-        and -_FASTEST_M_S <= vn <= _FASTEST_M_S
-        and -_FASTEST_M_S <= vu <= _FASTEST_M_S
+        and _MIN_HEIGHT_M <= altitude_m <= _MAX_HEIGHT_M
+        and -_MAX_SPEED_M_S <= ve <= _MAX_SPEED_M_S
+        and -_MAX_SPEED_M_S <= vn <= _MAX_SPEED_M_S
+        and -_MAX_SPEED_M_S <= vu <= _MAX_SPEED_M_S
     )

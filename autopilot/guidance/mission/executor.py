@@ -23,7 +23,7 @@ ACTIVE: int = mav.MISSION_STATE_ACTIVE
 PAUSED: int = mav.MISSION_STATE_PAUSED
 COMPLETE: int = mav.MISSION_STATE_COMPLETE
 
-MOST_ITEMS_A_STEP = 16
+MAX_ITEMS_A_STEP = 16
 """A step looks at no more items than this; the next one goes on."""
 REST_US = 1_000_000
 """A mission that jumps again without having flown in between goes in a circle: it does so once in this time."""
@@ -191,7 +191,7 @@ class MissionExecutor:
     def step(self, situation: Situation, now_us: int) -> Step:
         """Return what to fly now."""
         events: list[MissionEvent] = []
-        for _ in range(MOST_ITEMS_A_STEP):
+        for _ in range(MAX_ITEMS_A_STEP):
             if not self.active or now_us < self._rest_until_us or not self._fly(situation, now_us, events):
                 break
         if not self.active and self.progress.state != COMPLETE:

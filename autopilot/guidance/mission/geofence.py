@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from colibri.autopilot.guidance.mission.items import FARTHEST_M, check_place
+from colibri.autopilot.guidance.mission.items import MAX_DISTANCE_M, check_place
 from colibri.common.earth.geodesy import Geodetic, enu_of
 from colibri.common.types import Array, Vector
 from colibri.mavlink.mission.items import ACCEPTED, DEGREES, GLOBAL_FRAMES, MissionItem
@@ -39,7 +39,7 @@ def check_fence_item(item: MissionItem) -> int:
         return int(mav.MAV_MISSION_UNSUPPORTED_FRAME)
     if item.command in POLYGONS and not (item.p1 >= FEWEST_VERTICES and isfinite(item.p1) and item.p1 == int(item.p1)):
         return int(mav.MAV_MISSION_INVALID_PARAM1)
-    if item.command in CIRCLES and not 0.0 <= item.p1 <= FARTHEST_M:
+    if item.command in CIRCLES and not 0.0 <= item.p1 <= MAX_DISTANCE_M:
         return int(mav.MAV_MISSION_INVALID_PARAM1)
     if item.command in INCLUSIONS and not (isnan(item.p2) or isfinite(item.p2)):
         return int(mav.MAV_MISSION_INVALID_PARAM2)
@@ -120,12 +120,12 @@ class Geofence:
 
     Attributes:
         return_point_enu_m: East and north of where to fly after a breach, m; None where the fence names no such place.
-        highest_m: No higher than this, z of ENU; infinite without limit.
+        max_height_m: No higher than this, z of ENU; infinite without limit.
     """
 
-    def __init__(self, items: Sequence[MissionItem], origin: Geodetic, *, highest_m: float = inf) -> None:
+    def __init__(self, items: Sequence[MissionItem], origin: Geodetic, *, max_height_m: float = inf) -> None:
         """Build the fence of valid items; without any it holds nothing back."""
-        self.highest_m = highest_m
+        self.max_height_m = max_height_m
         self.return_point_enu_m: tuple[float, float] | None = None
         self._groups: dict[float, list[Zone]] = {}
         self._exclusions: list[Zone] = []
@@ -153,7 +153,7 @@ class Geofence:
         east, north, up = position_enu_m
         if not (isfinite(east) and isfinite(north) and isfinite(up)):
             return -inf
-        margin = self.highest_m - up
+        margin = self.max_height_m - up
         if self._groups:
             groups: Mapping[float, list[Zone]] = self._groups
             margin = min(margin, max(min(zone.depth_m(east, north) for zone in zones) for zones in groups.values()))
@@ -165,8 +165,8 @@ class Geofence:
 
     def refusal(self, position_enu_m: Vector) -> Refusal | None:
         """Return why the vehicle may not fly to a position; None if it may."""
-        if position_enu_m[2] > self.highest_m + EDGE_M:
-            return Refusal(f"higher than the {self.highest_m:g} m of the geofence")
+        if position_enu_m[2] > self.max_height_m + EDGE_M:
+            return Refusal(f"higher than the {self.max_height_m:g} m of the geofence")
         return None if self.inside(position_enu_m) else Refusal("outside the geofence")
 
 
@@ -175,34 +175,36 @@ class AroundHome(NamedTuple):
 
     Attributes:
         home_enu_m: Where home is, m.
-        farthest_m: Radius of the circle; 0: none.
-        highest_m: Above home; 0: no limit.
+        max_distance_m: Radius of the circle; 0: none.
+        max_height_m: Above home; 0: no limit.
     """
 
     home_enu_m: Vector
-    farthest_m: float
-    highest_m: float
+    max_distance_m: float
+    max_height_m: float
 
     @property
     def exists(self) -> bool:
         """Whether there is any."""
-        return self.farthest_m > 0.0 or self.highest_m > 0.0
+        return self.max_distance_m > 0.0 or self.max_height_m > 0.0
 
     def margin_m(self, position_enu_m: Vector) -> float:
         """Return how far a position is inside, m; negative outside."""
         east, north, up = (place - home for place, home in zip(position_enu_m, self.home_enu_m, strict=True))
         if not (isfinite(east) and isfinite(north) and isfinite(up)):
             return -inf
-        away_m = self.farthest_m - hypot(east, north) if self.farthest_m > 0.0 else inf
-        return min(away_m, self.highest_m - up) if self.highest_m > 0.0 else away_m
+        away_m = self.max_distance_m - hypot(east, north) if self.max_distance_m > 0.0 else inf
+        return min(away_m, self.max_height_m - up) if self.max_height_m > 0.0 else away_m
 
     def refusal(self, position_enu_m: Vector) -> Refusal | None:
         """Return why the vehicle may not fly to a position; None if it may."""
         if self.margin_m(position_enu_m) >= -EDGE_M:
             return None
-        too_high = 0.0 < self.highest_m < position_enu_m[2] - self.home_enu_m[2]
+        too_high = 0.0 < self.max_height_m < position_enu_m[2] - self.home_enu_m[2]
         return Refusal(
-            f"more than {self.highest_m:g} m above home" if too_high else f"more than {self.farthest_m:g} m from home"
+            f"more than {self.max_height_m:g} m above home"
+            if too_high
+            else f"more than {self.max_distance_m:g} m from home"
         )
 
 

@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite, isnan
 from typing import NamedTuple, TypeAlias
 
-from colibri.common.earth.geodesy import LARGEST_LATITUDE_DEG, LARGEST_LONGITUDE_DEG, Geodetic, enu_of
+from colibri.common.earth.geodesy import MAX_LATITUDE_DEG, MAX_LONGITUDE_DEG, Geodetic, enu_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import ACCEPTED, DEGREES, GLOBAL_FRAMES, NOT_GIVEN, MissionItem
 from colibri.mavlink.mission.upload import Rules
 from colibri.mavlink.wire.dialect import mav
 
-HIGHEST_M = 10_000.0
-FARTHEST_M = 100_000.0
+MAX_HEIGHT_M = 10_000.0
+MAX_DISTANCE_M = 100_000.0
 
 _ABOVE_SEA = (mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT)
 """Altitudes of the other global frames are above home; above terrain is taken as that: there is no terrain map."""
@@ -92,15 +92,15 @@ def _not_negative(value: float) -> bool:
 
 
 def _a_radius(value: float) -> bool:
-    return isnan(value) or abs(value) <= FARTHEST_M
+    return isnan(value) or abs(value) <= MAX_DISTANCE_M
 
 
 def _one_of(*allowed: float) -> _Check:
     return lambda value: isnan(value) or value in allowed
 
 
-def _whole(least: int, most: int) -> _Check:
-    return lambda value: isfinite(value) and least <= value <= most and value == int(value)
+def _whole(minimum: int, maximum: int) -> _Check:
+    return lambda value: isfinite(value) and minimum <= value <= maximum and value == int(value)
 
 
 def _a_speed(value: float) -> bool:
@@ -185,14 +185,14 @@ def check_rally_item(item: MissionItem) -> int:
 
 def check_place(item: MissionItem) -> int:
     """Return the MAV_MISSION_RESULT of a latitude and a longitude."""
-    if abs(item.x * DEGREES) > LARGEST_LATITUDE_DEG:
+    if abs(item.x * DEGREES) > MAX_LATITUDE_DEG:
         return int(mav.MAV_MISSION_INVALID_PARAM5_X)
-    return int(mav.MAV_MISSION_INVALID_PARAM6_Y if abs(item.y * DEGREES) > LARGEST_LONGITUDE_DEG else ACCEPTED)
+    return int(mav.MAV_MISSION_INVALID_PARAM6_Y if abs(item.y * DEGREES) > MAX_LONGITUDE_DEG else ACCEPTED)
 
 
 def check_height(item: MissionItem) -> int:
     """Return the MAV_MISSION_RESULT of an altitude."""
-    return int(ACCEPTED if abs(item.z) <= HIGHEST_M else mav.MAV_MISSION_INVALID_PARAM7)
+    return int(ACCEPTED if abs(item.z) <= MAX_HEIGHT_M else mav.MAV_MISSION_INVALID_PARAM7)
 
 
 def is_here(item: MissionItem) -> bool:

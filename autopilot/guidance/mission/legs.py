@@ -11,7 +11,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
 from colibri.mavlink.wire.dialect import mav
 
-SMALLEST_RADIUS_M = 1.0
+MIN_RADIUS_M = 1.0
 _TURNED_RAD = radians(5.0)
 _TURN_WITHIN_S = 30.0
 """A turn that takes longer is not waited for."""
@@ -126,7 +126,7 @@ def _circle(item: MissionItem, context: Context) -> tuple[Phase, ...]:
     situation = context.situation
     center = place_of(item, situation.home_enu_m, situation.origin)
     radius = item.p3 if abs(item.p3) > 0.0 else context.defaults.orbit_radius_m
-    radius = max(radius, SMALLEST_RADIUS_M) if radius > 0.0 else min(radius, -SMALLEST_RADIUS_M)
+    radius = max(radius, MIN_RADIUS_M) if radius > 0.0 else min(radius, -MIN_RADIUS_M)
     turns = 1.0 if isnan(item.p1) else item.p1
     order = Circle(center, radius, context.speed_m_s, mav.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER)
     around = Phase(order, lambda now, _: abs(now.turns) >= turns, reaches=True)

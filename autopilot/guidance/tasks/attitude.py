@@ -15,8 +15,8 @@ _LIFTING, _SINKING = 0.9, 0.5
 """Thrust in parts of the weight from which on a vehicle takes off, and below which it must sink."""
 _HEIGHT_1_S2, _CLIMB_1_S, _INTEGRAL_1_S3 = 9.0, 6.0, 4.0
 """Poles of the height loop near -3 and -2, 1/s; the integral removes what a wrong mass or a tired battery leave."""
-_MOST_LIFT_M_S2, _MOST_OFFSET_M_S2 = 6.0, 4.0
-_LEAST_UPRIGHT = 0.5
+_MAX_LIFT_M_S2, _MAX_OFFSET_M_S2 = 6.0, 4.0
+_MIN_UPRIGHT = 0.5
 _RESTS_M_S = 0.025
 
 
@@ -129,10 +129,10 @@ class HeightLoop:
         state = scene.state
         height_error, climb_error = height_m - state.position_enu_m[2], climb_m_s - state.velocity_enu_m_s[2]
         self._offset_m_s2 += _INTEGRAL_1_S3 * height_error * scene.interval_s
-        self._offset_m_s2 = min(max(self._offset_m_s2, -_MOST_OFFSET_M_S2), _MOST_OFFSET_M_S2)
+        self._offset_m_s2 = min(max(self._offset_m_s2, -_MAX_OFFSET_M_S2), _MAX_OFFSET_M_S2)
         wanted = lift_m_s2 + _HEIGHT_1_S2 * height_error + _CLIMB_1_S * climb_error + self._offset_m_s2
-        lift = min(max(wanted, -_MOST_LIFT_M_S2), _MOST_LIFT_M_S2)
-        upright = max(cos(state.euler[0]) * cos(state.euler[1]), _LEAST_UPRIGHT)
+        lift = min(max(wanted, -_MAX_LIFT_M_S2), _MAX_LIFT_M_S2)
+        upright = max(cos(state.euler[0]) * cos(state.euler[1]), _MIN_UPRIGHT)
         return self._weight_n * (1.0 + lift / self._gravity_m_s2) / upright
 
 

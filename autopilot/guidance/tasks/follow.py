@@ -11,7 +11,7 @@ from colibri.autopilot.guidance.tasks.task import Endless, Motion, Scene
 from colibri.common.kernels import atan2, cos, sin
 
 _STANDS_M_S = 0.3
-LOWEST_M = 1.0
+MIN_HEIGHT_M = 1.0
 """Above home, however low the leader is thought to be: as PX4's MINIMUM_SAFETY_ALTITUDE has it."""
 ABOVE_TARGET = 2
 """Of `Behaviour.follow_altitude_mode`; the ground that the others count from is flat."""
@@ -42,9 +42,9 @@ class Following(Endless):
         x, y = x + behaviour.follow_distance_m * cos(side), y + behaviour.follow_distance_m * sin(side)
         if behaviour.follow_altitude_mode != ABOVE_TARGET:
             z, vz = scene.home_enu_m[2], 0.0
-        height_m, lowest_m = z + behaviour.follow_height_m, scene.home_enu_m[2] + LOWEST_M
-        if height_m < lowest_m:
-            height_m, vz = lowest_m, max(vz, 0.0)
+        height_m, min_height_m = z + behaviour.follow_height_m, scene.home_enu_m[2] + MIN_HEIGHT_M
+        if height_m < min_height_m:
+            height_m, vz = min_height_m, max(vz, 0.0)
         target = still_target((x, y, height_m), side + pi, scene.samples)
         target.motion[:, 1] = vx, vy, vz
         target.motion[:, 0] += np.outer(scene.interval_s * np.arange(scene.samples), (vx, vy, vz))

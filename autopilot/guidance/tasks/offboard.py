@@ -69,7 +69,7 @@ def allowed_velocity(velocity: Vector, scene: Scene) -> Vector:
     """Return a velocity, or the part of it that may be flown; nan stays nan."""
     x, y, z = velocity
     fast = hypot(*(0.0 if isnan(v) else v for v in (x, y)))
-    share = min(1.0, scene.behaviour.fastest_m_s / fast) if fast > 0.0 else 1.0
+    share = min(1.0, scene.behaviour.max_speed_m_s / fast) if fast > 0.0 else 1.0
     limits = scene.behaviour.limits
     return (share * x, share * y, z if isnan(z) else min(max(z, -limits.sink_m_s), limits.climb_m_s))
 
@@ -77,8 +77,8 @@ def allowed_velocity(velocity: Vector, scene: Scene) -> Vector:
 def allowed_acceleration(acceleration: float, axis: int, scene: Scene) -> float:
     """Return an acceleration, or the part of it that leads to no forbidden speed and that may be flown."""
     limits, speed = scene.behaviour.limits, scene.velocity[axis]
-    up, down, most = scene.behaviour.fastest_m_s, scene.behaviour.fastest_m_s, limits.acceleration_m_s2
+    up, down, maximum = scene.behaviour.max_speed_m_s, scene.behaviour.max_speed_m_s, limits.acceleration_m_s2
     if axis == UP:
-        up, down, most = limits.climb_m_s, limits.sink_m_s, limits.lift_m_s2
-    least = max(-most, _BRAKE_1_S * (-down - speed))
-    return min(max(acceleration, least), min(most, _BRAKE_1_S * (up - speed)))
+        up, down, maximum = limits.climb_m_s, limits.sink_m_s, limits.lift_m_s2
+    minimum = max(-maximum, _BRAKE_1_S * (-down - speed))
+    return min(max(acceleration, minimum), min(maximum, _BRAKE_1_S * (up - speed)))

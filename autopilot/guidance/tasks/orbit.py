@@ -66,8 +66,8 @@ class Round(Endless):
 
     def _towards(self, wanted: float, scene: Scene) -> float:
         """Return the rate of now, rad/s: no sooner the one that is wanted than the vehicle can gain that speed."""
-        most = _SHARE * scene.behaviour.limits.acceleration_m_s2 * scene.interval_s / self._radius_m
-        return min(max(wanted, self._rate - most), self._rate + most)
+        maximum = _SHARE * scene.behaviour.limits.acceleration_m_s2 * scene.interval_s / self._radius_m
+        return min(max(wanted, self._rate - maximum), self._rate + maximum)
 
     def _joins(self, scene: Scene) -> bool:
         """Whether the reference is on the circle, and not about to leave it but along it."""
@@ -81,7 +81,7 @@ class Round(Endless):
     def _speed_m_s(self, scene: Scene) -> float:
         behaviour, asked = scene.behaviour, self.order.speed_m_s
         wanted = behaviour.limits.speed_m_s if asked is None else asked
-        return min(wanted, behaviour.fastest_m_s, sqrt(_SHARE * behaviour.limits.acceleration_m_s2 * self._radius_m))
+        return min(wanted, behaviour.max_speed_m_s, sqrt(_SHARE * behaviour.limits.acceleration_m_s2 * self._radius_m))
 
     def _motion(self, angles: Array, rate: float) -> Array:
         motion = np.zeros((len(angles), 5, 3))

@@ -44,7 +44,7 @@ class Way:
         """Return the place."""
         limits = scene.behaviour.limits
         if self._speed_m_s is not None:
-            limits = limits._replace(speed_m_s=min(self._speed_m_s, scene.behaviour.fastest_m_s))
+            limits = limits._replace(speed_m_s=min(self._speed_m_s, scene.behaviour.max_speed_m_s))
         return Motion(still_target(self._place, self._yaw_rad, scene.samples), limits)
 
     def arrived(self, scene: Scene) -> bool:

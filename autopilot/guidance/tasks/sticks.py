@@ -66,7 +66,7 @@ def stick_velocity(sticks: Sticks, scene: Scene) -> tuple[float, float]:
     """Return the velocity east and north, m/s, that sticks ask for: of full sticks, in any direction, the largest."""
     ahead, left = dead(sticks.pitch), -dead(sticks.roll)
     behaviour = scene.behaviour
-    speed = min(behaviour.stick_speed_m_s, behaviour.fastest_m_s) / max(1.0, hypot(ahead, left))
+    speed = min(behaviour.stick_speed_m_s, behaviour.max_speed_m_s) / max(1.0, hypot(ahead, left))
     east, north, _ = turned((speed * ahead, speed * left, 0.0), scene.state.euler[2])
     return east, north
 

@@ -11,12 +11,12 @@ from colibri.autopilot.errors import AutopilotError
 from colibri.common.types import Array
 
 DEFAULT_SPEED_M_S = 2.0
-LEAST_LEG_S = 0.05
-LONGEST_S = 3600.0
+MIN_LEG_S = 0.05
+MAX_DURATION_S = 3600.0
 
 _REQUIRED = ("x", "y", "z")
 _COLUMNS = (*_REQUIRED, "t", "yaw")
-_FARTHEST = 1e4
+_MAX_DISTANCE_M = 1e4
 """Of every number in the file, in its unit."""
 
 
@@ -73,23 +73,23 @@ def _given_times(table: _Table) -> Array:
     times_s = table.values["t"]
     if times_s[0] != 0.0:
         raise table.error(0, "t", f"the first time must be 0, not {times_s[0]:g}")
-    for row in np.flatnonzero(np.diff(times_s) < LEAST_LEG_S)[:1] + 1:
-        raise table.error(row, "t", f"must be at least {LEAST_LEG_S:g} s after the line before")
+    for row in np.flatnonzero(np.diff(times_s) < MIN_LEG_S)[:1] + 1:
+        raise table.error(row, "t", f"must be at least {MIN_LEG_S:g} s after the line before")
     return _checked(table, "t", times_s)
 
 
 def _times(table: _Table, points: Array, speed_m_s: float) -> Array:
     steps = np.diff(points, axis=0)
     legs_s = np.sqrt((steps * steps).sum(axis=1)) / speed_m_s
-    for row in np.flatnonzero(legs_s < LEAST_LEG_S)[:1] + 1:
-        raise table.error(row, "x", f"less than {LEAST_LEG_S:g} s from the line before at {speed_m_s:g} m/s")
+    for row in np.flatnonzero(legs_s < MIN_LEG_S)[:1] + 1:
+        raise table.error(row, "x", f"less than {MIN_LEG_S:g} s from the line before at {speed_m_s:g} m/s")
     legs_s[[0, -1]] *= 2.0
     return _checked(table, "x", np.concatenate([[0.0], np.cumsum(legs_s)]))
 
 
 def _checked(table: _Table, column: str, times_s: Array) -> Array:
-    for row in np.flatnonzero(times_s > LONGEST_S)[:1]:
-        raise table.error(row, column, f"reached after {times_s[row]:g} s, and {LONGEST_S:g} s is the longest")
+    for row in np.flatnonzero(times_s > MAX_DURATION_S)[:1]:
+        raise table.error(row, column, f"reached after {times_s[row]:g} s, and {MAX_DURATION_S:g} s is the longest")
     return times_s
 
 
@@ -128,7 +128,7 @@ def _rows(path: Path, lines: list[str], header: list[str]) -> Iterator[tuple[int
             continue
         for column, cell in zip(header, cells, strict=False):
             if not _is_sane(cell):
-                limits = f"a number from {-_FARTHEST:g} to {_FARTHEST:g}"
+                limits = f"a number from {-_MAX_DISTANCE_M:g} to {_MAX_DISTANCE_M:g}"
                 raise WaypointsError(f"{path}: line {line}, column {column}: expected {limits}, not {cell!r}")
         if len(cells) != len(header):
             column = header[len(cells)] if len(cells) < len(header) else str(len(header) + 1)
@@ -142,4 +142,4 @@ def _is_sane(cell: str) -> bool:
         number = float(cell)
     except ValueError:
         return False
-    return isfinite(number) and abs(number) <= _FARTHEST
+    return isfinite(number) and abs(number) <= _MAX_DISTANCE_M

@@ -231,7 +231,7 @@ def test_home_here_there_and_too_far_away(flying: Cockpit) -> None:
 
 
 def test_no_command_leads_over_the_fence() -> None:
-    cockpit = Cockpit(FLYING, behaviour=Behaviour(farthest_m=15.0))
+    cockpit = Cockpit(FLYING, behaviour=Behaviour(max_distance_m=15.0))
     cockpit.step()
     there = cockpit.place(20.0, 0.0)
     assert "15 m from home" in cockpit.do("DO_REPOSITION", frame=0, x=there.latitude_deg, y=there.longitude_deg).reason

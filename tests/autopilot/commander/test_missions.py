@@ -94,7 +94,7 @@ def test_an_item_outside_the_fence_is_told_once_and_holds_the_mission_back() -> 
 def test_the_fence_around_home_moves_with_home_and_with_its_parameters() -> None:
     cockpit = Cockpit()
     assert not cockpit.fence.exists
-    cockpit.missions.adopt(Behaviour(farthest_m=10.0, highest_m=20.0))
+    cockpit.missions.adopt(Behaviour(max_distance_m=10.0, max_height_m=20.0))
     assert cockpit.fence.exists
     assert cockpit.fence.refusal((11.0, 0.0, 0.0)) == Refusal("more than 10 m from home")
     assert cockpit.fence.refusal((0.0, 0.0, 21.0)) == Refusal("more than 20 m above home")
@@ -104,7 +104,7 @@ def test_the_fence_around_home_moves_with_home_and_with_its_parameters() -> None
 
 
 def test_a_breach_is_judged_ten_times_a_second() -> None:
-    cockpit = Cockpit(behaviour=Behaviour(farthest_m=10.0))
+    cockpit = Cockpit(behaviour=Behaviour(max_distance_m=10.0))
     assert cockpit.fence.breach((11.0, 0.0, 0.0), 0) is not None
     assert cockpit.fence.breach((0.0, 0.0, 0.0), 99_000) is not None
     assert cockpit.fence.breach((0.0, 0.0, 0.0), 100_000) is None

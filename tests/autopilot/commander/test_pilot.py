@@ -205,7 +205,7 @@ def test_who_asks_for_another_speed_gets_it_for_this_flight_and_no_more_than_is_
     cockpit.pilot.fly_at(3.0)
     assert cockpit.pilot.scene().behaviour.limits.speed_m_s == 3.0
     cockpit.pilot.fly_at(99.0)
-    assert cockpit.pilot.scene().behaviour.limits.speed_m_s == cockpit.pilot.behaviour.fastest_m_s
+    assert cockpit.pilot.scene().behaviour.limits.speed_m_s == cockpit.pilot.behaviour.max_speed_m_s
     cockpit.pilot.disarm(force=True)
     assert cockpit.pilot.speed_m_s is None
 

@@ -53,7 +53,7 @@ def error_m(flight: Recording, of: list[Estimate | None], at_s: float) -> float:
     return float(np.linalg.norm(flight.motion.position[k] - one.frame.position_enu_m))
 
 
-def largest_jump_m(of: list[Estimate | None]) -> float:
+def max_jump_m(of: list[Estimate | None]) -> float:
     """Return the largest step of the published position beside what the published velocity explains."""
     positions = np.array([one.frame.position_enu_m for one in known(of)])
     velocities = np.array([one.frame.velocity_enu_m_s for one in known(of)])
@@ -158,7 +158,7 @@ def test_without_gps_a_hover_drifts_little_says_so_and_comes_back_smoothly(seed:
     assert not found.health.dead_reckoning
     assert found.health.gps_lost_since_us is None
     assert error_m(flight, of, 69.9) < 1.5
-    assert largest_jump_m(of[round(35e6 / INTERVAL_US) :]) < 0.06
+    assert max_jump_m(of[round(35e6 / INTERVAL_US) :]) < 0.06
 
 
 def test_a_glitch_is_not_followed() -> None:
@@ -192,7 +192,7 @@ def test_what_gps_says_for_long_is_believed_without_a_jump() -> None:
     assert last.resets == 1
     assert last.frame.position_enu_m[0] == pytest.approx(5.0, abs=1.0)
     assert hypot(*last.blending_m) < 0.05
-    assert largest_jump_m(of) < 0.06
+    assert max_jump_m(of) < 0.06
 
 
 @pytest.mark.parametrize(

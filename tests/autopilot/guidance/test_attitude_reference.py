@@ -194,9 +194,9 @@ def test_the_sticks_middle_hovers() -> None:
     assert REFERENCE.thrust_for_stick(0.0) == 0.0
     assert REFERENCE.thrust_for_stick(1.0) == pytest.approx(4.0 * 6.9472e-6 * 838.0**2)
     assert REFERENCE.thrust_for_stick(0.25) == pytest.approx(0.5 * WEIGHT_N)
-    assert REFERENCE.thrust_for_stick(0.75) == pytest.approx(0.5 * (WEIGHT_N + REFERENCE.most_thrust_n))
+    assert REFERENCE.thrust_for_stick(0.75) == pytest.approx(0.5 * (WEIGHT_N + REFERENCE.max_thrust_n))
     assert REFERENCE.thrust_for_stick(-1.0) == 0.0
-    assert REFERENCE.thrust_for_stick(2.0) == pytest.approx(REFERENCE.most_thrust_n)
+    assert REFERENCE.thrust_for_stick(2.0) == pytest.approx(REFERENCE.max_thrust_n)
 
 
 def test_sticks_say_what_pilots_mean() -> None:
@@ -259,4 +259,4 @@ def check(demand: AttitudeDemand) -> None:
     assert np.abs(demand.angle_rates_rad_s[:, :2]).max() <= SLEW.tilt_rate_rad_s * 1.5
     assert np.abs(demand.angle_rates_rad_s[:, 2]).max() <= SLEW.yaw_rate_rad_s + 1e-9
     assert demand.thrust_n.min() >= 0.0
-    assert demand.thrust_n.max() <= max(REFERENCE.most_thrust_n, 2.0 * WEIGHT_N) + 1e-9
+    assert demand.thrust_n.max() <= max(REFERENCE.max_thrust_n, 2.0 * WEIGHT_N) + 1e-9

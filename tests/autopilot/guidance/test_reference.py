@@ -162,8 +162,8 @@ def test_a_target_that_jumps_takes_the_reference_along_within_the_limits(
         motions, headings, _ = led(on_it, follow, limits, 2.0)
         assert within(limits, motions, headings)
         steps = np.diff(motions[:, 0], axis=0)
-        most = INTERVAL_S * hypot(limits.speed_m_s, max(limits.climb_m_s, limits.sink_m_s))
-        assert np.linalg.norm(steps, axis=1).max() <= SLACK * most
+        maximum = INTERVAL_S * hypot(limits.speed_m_s, max(limits.climb_m_s, limits.sink_m_s))
+        assert np.linalg.norm(steps, axis=1).max() <= SLACK * maximum
         plan = Horizon(*(follow.motion[:, order] for order in range(5)), *follow.heading.T)
         assert (lead_along(on_it, plan, limits, INTERVAL_S)[1].motion == motions[1]).all()
 

@@ -53,13 +53,13 @@ def takeoff_and_land(evidence: Evidence) -> None:
     """Up to the 2.5 m of MIS_TAKEOFF_ALT, then down at the same place."""
     lands(evidence, HOME)
     assert evidence.seen.modes()[-3:] == [Mode.TAKEOFF, Mode.HOLD, Mode.LAND], evidence.seen.modes()
-    assert abs(_highest_m(evidence.seen.sights) - 2.5) < 0.3
+    assert abs(_max_height_m(evidence.seen.sights) - 2.5) < 0.3
 
 
 def telemetry_takeoff_and_land(evidence: Evidence) -> None:
     """Up to the 10 m that the script sets, as it prints, then down."""
     lands(evidence, HOME)
-    assert abs(_highest_m(evidence.seen.sights) - 10.0) < 0.5
+    assert abs(_max_height_m(evidence.seen.sights) - 10.0) < 0.5
     assert evidence.seen.parameter("MIS_TAKEOFF_ALT") == 10.0
     for line in ("Altitude: 10", "Flight mode: TAKEOFF", "Flight mode: LAND"):
         evidence.client.wait_printed(line)
@@ -192,7 +192,7 @@ def failure_injection(evidence: Evidence) -> None:
     assert evidence.seen.parameter("SYS_FAILURE_EN") == 0.0
 
 
-def _highest_m(sights: list[Sight]) -> float:
+def _max_height_m(sights: list[Sight]) -> float:
     return max(sight.height_m for sight in sights)
 
 

@@ -17,7 +17,7 @@ GIVE_UP_AFTER_S = 60.0
 
 Message: TypeAlias = Any
 
-_LARGEST_DATAGRAM = 4096
+_MAX_DATAGRAM_BYTES = 4096
 _HEARTBEAT_EVERY_S = 1.0
 
 
@@ -82,7 +82,7 @@ class GroundStation:
             self.mav.heartbeat_send(mavlink2.MAV_TYPE_GCS, mavlink2.MAV_AUTOPILOT_INVALID, 0, 0, 0)
         if not select([self._socket], [], [], within_s)[0]:
             return []
-        datagram, sender = self._socket.recvfrom(_LARGEST_DATAGRAM)
+        datagram, sender = self._socket.recvfrom(_MAX_DATAGRAM_BYTES)
         if sender not in self.peers:
             self.peers.append(sender)
         came = self.mav.parse_buffer(datagram) or []

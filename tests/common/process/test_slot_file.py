@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colibri.common.process.slot_file import MOST, SLOT, Slots
+from colibri.common.process.slot_file import MAX_BYTES, SLOT, Slots
 from colibri.common.serialization import of_bytes, to_bytes
 
 
@@ -57,9 +57,9 @@ def test_a_strange_file_holds_nothing_and_is_used(tmp_path: Path, content: bytes
 
 def test_what_does_not_fit_leaves_what_is_there(tmp_path: Path) -> None:
     slots = Slots(tmp_path / "flight")
-    assert slots.write(bytes(MOST))
-    assert not slots.write(bytes(MOST + 1))
-    assert slots.newest() == bytes(MOST)
+    assert slots.write(bytes(MAX_BYTES))
+    assert not slots.write(bytes(MAX_BYTES + 1))
+    assert slots.newest() == bytes(MAX_BYTES)
 
 
 def test_arrays_are_plain_and_other_things_are_not() -> None:

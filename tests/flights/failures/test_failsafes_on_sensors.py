@@ -37,13 +37,13 @@ def test_a_lost_position_is_left_by_sinking_level_and_disarmed() -> None:
     assert flight.select(Mode.HOLD) == DENIED
     assert flight.client.said("the position is not known")
     lost_s = flight.now_s
-    fastest = 0.0
+    max_rate = 0.0
     while flight.armed:
         flight.run(0.1)
-        fastest = max(fastest, -flight.velocity[2])
+        max_rate = max(max_rate, -flight.velocity[2])
         assert max(map(abs, flight.euler[:2])) < 0.05
     assert flight.now_s - lost_s < 30.0
-    assert fastest < 1.7
+    assert max_rate < 1.7
     assert dist(flight.position[:2], place[:2]) < 3.0
     assert flight.copter.pilot.standing
 

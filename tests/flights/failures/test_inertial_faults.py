@@ -14,10 +14,10 @@ OFF, WELL = "accelerometer off: bias learned anew", "accelerometer believed agai
 TURNS = "gyroscope off: bias learned anew"
 
 
-def stays(flight: CopterFlight, seconds: float, most_m: Vector) -> None:
-    """Fly for so long, never farther from here than `most_m` up, down and sideways."""
+def stays(flight: CopterFlight, seconds: float, max_m: Vector) -> None:
+    """Fly for so long, never farther from here than `max_m` up, down and sideways."""
     x, y, z = flight.position
-    up_m, down_m, away_m = most_m
+    up_m, down_m, away_m = max_m
     path = flight.path(seconds)
     assert max(place[2] for place in path) - z < up_m
     assert z - min(place[2] for place in path) < down_m

@@ -79,7 +79,7 @@ def test_every_mode_goes_on(mode: Mode) -> None:
     assert max(map(dist, flown, wanted[1:])) < 0.01
 
 
-def largest_tilt_deg(flight: CopterFlight, seconds: float) -> float:
+def max_tilt_deg(flight: CopterFlight, seconds: float) -> float:
     """Fly for so long; return how far the vehicle was tilted at most."""
     tilts: list[float] = []
     flight.run(seconds, lambda: tilts.append(degrees(max(map(abs, flight.euler[:2])))))
@@ -96,7 +96,7 @@ def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int)
     past = flight.past()
     flight.skip(missed)
     flight.restart(past)
-    assert largest_tilt_deg(flight, 2.0) < (3.0 if missed == 1 else 20.0)
+    assert max_tilt_deg(flight, 2.0) < (3.0 if missed == 1 else 20.0)
     assert flight.position[2] == pytest.approx(height_m, abs=0.15)
     load(flight, waypoint(15.0, 0.0, 4.0), waypoint(0.0, 6.0, 4.0, stay_s=1.0))
     assert flight.select(Mode.MISSION) == ACCEPTED
@@ -104,7 +104,7 @@ def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int)
     past = flight.past()
     flight.skip(missed)
     flight.restart(past)
-    assert largest_tilt_deg(flight, 4.0) < 45.0
+    assert max_tilt_deg(flight, 4.0) < 45.0
     flight.until(lambda: flight.copter.pilot.state == HOLDING, 15.0, "the end of the mission")
     assert dist(flight.position, (0.0, 6.0, 4.0)) < (0.3 if feedback is Feedback.STATE else 3.0)
 
@@ -120,7 +120,7 @@ def test_a_vehicle_on_sensors_is_caught_by_an_autopilot_that_knows_nothing(flyin
     height_m = flight.position[2]
     flight.restart()
     flight.until(lambda: flight.armed, 0.5)
-    assert largest_tilt_deg(flight, 4.0) < 45.0
+    assert max_tilt_deg(flight, 4.0) < 45.0
     assert min(z for _, _, z in path_of(flight, 2.0)) > height_m - 3.0
     assert hypot(*flight.velocity) < 0.2
     assert flight.copter.pilot.state == HOLDING

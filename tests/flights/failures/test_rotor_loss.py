@@ -151,7 +151,7 @@ def test_a_weak_rotor_is_flown_on_and_a_parameter_turns_all_off() -> None:
     flight.run(3.0)
     assert flight.mode is Mode.HOLD
     assert flight.position[2] == pytest.approx(HEIGHT_M, abs=0.5)
-    assert flight.copter.rotor_loss.watch.largest == 0.0
+    assert flight.copter.rotor_loss.watch.max_evidence == 0.0
     flight.set("CA_FAILURE_MODE", 0)
     assert flight.inject(MOTOR, OFF, 1) == ACCEPTED
     flight.run(0.5)

@@ -12,7 +12,7 @@ from tools.harness.family import CAUGHT_UP_S, DURATION_S, LAPS_S, STARTS, Flown,
 from tools.harness.processes import fly, rows
 
 HUMMINGBIRD = Path(plant.__file__).parent / "vehicle" / "models" / "hummingbird.toml"
-IDLE, FASTEST = 83.8, 838.0
+IDLE, MAX_SPEED = 83.8, 838.0
 
 
 def vehicle_file(folder: Path, **changes: str) -> str:
@@ -50,7 +50,7 @@ def test_every_track_is_tracked(tmp_path: Path, track: str, duration_s: int, rea
     truth = rows(tmp_path / "plant.csv")
     speeds = np.array([truth[f"omega{number}"] for number in range(1, 5)])
     assert speeds.min() >= IDLE
-    assert speeds.max() <= FASTEST
+    assert speeds.max() <= MAX_SPEED
 
 
 def test_two_processes_fly_the_same_flight(tmp_path: Path) -> None:
@@ -88,18 +88,18 @@ def test_a_wrong_model_costs_little(tmp_path: Path, what: str) -> None:
     figures = fly(tmp_path / "out", "spiral", "--link", "memory", "--duration", "25", *other)
     error = rows(tmp_path / "out" / "flight.csv")
     assert figures["plant_vehicle"] == other[1]
-    assert largest_error_m(error, 20.0) < 0.001
+    assert max_error_m(error, 20.0) < 0.001
     assert figures["qp_failures"] == 0
 
 
 def test_constant_wind_leaves_no_offset(tmp_path: Path) -> None:
     fly(tmp_path, "hover:height=3", "--link", "memory", "--duration", "15", "--wind", "5@270")
     flown = rows(tmp_path / "flight.csv")
-    assert largest_error_m(flown, 10.0) < 0.001
+    assert max_error_m(flown, 10.0) < 0.001
     assert abs(flown["theta"][-1]) > 0.05  # it leans into the wind
 
 
-def largest_error_m(flown: dict[str, np.ndarray], after_s: float) -> float:
+def max_error_m(flown: dict[str, np.ndarray], after_s: float) -> float:
     """Return the largest distance to the reference of the same instant."""
     settled = flown["t"] >= after_s
     axes = [flown[axis][settled] - flown[f"{axis}_ref"][settled] for axis in "xyz"]
@@ -128,7 +128,7 @@ def test_any_start_is_recovered_from(tmp_path: Path, start: str) -> None:
     tilt_cosine = np.cos(flown["phi"]) * np.cos(flown["theta"])
     assert tilt_cosine[flown["t"] > 1.0].min() > np.cos(np.radians(65.0))
     assert flown["z"].min() > 17.0
-    assert largest_error_m(flown, 8.0) < 0.01
+    assert max_error_m(flown, 8.0) < 0.01
     if "170" in start:
         fallback = rows(tmp_path / "autopilot.csv")["fallback"]
         recovering = fallback == FALLBACK_CODES[Fallback.RECOVERY]
@@ -193,4 +193,4 @@ def test_it_stands_on_the_ground_until_it_is_time(tmp_path: Path) -> None:
     fly(tmp_path, "hover:height=1.5", "--link", "memory", "--duration", "8", "--start", "x=0,y=0,z=0,rotors=0")
     flown = rows(tmp_path / "flight.csv")
     assert flown["z"].min() > -0.003
-    assert largest_error_m(flown, 6.0) < 0.005
+    assert max_error_m(flown, 6.0) < 0.005

@@ -10,7 +10,7 @@ import pytest
 
 from colibri.analysis.recording import ATTITUDE_REFERENCE, COLUMNS, INPUT, STATE
 from colibri.plant.process.options import PARTS
-from tools.harness.processes import begins_as_recorded, fly_thesis, largest_difference, reference, rows
+from tools.harness.processes import begins_as_recorded, fly_thesis, max_difference, reference, rows
 
 TRACKS = ("spiral", "line")
 SETTLED_RMS_M = {"spiral": 0.1254, "line": 0.0578}
@@ -24,9 +24,9 @@ def test_direct_equals_the_reference(tmp_path: Path, track: str, integrator: str
     flown, wanted = rows(tmp_path / "flight.csv"), reference(track)
     assert tuple(flown) == COLUMNS
     assert len(flown["t"]) == 1001
-    assert largest_difference(flown, wanted, ("t", *STATE)) < 1e-8
-    assert largest_difference(flown, wanted, (*INPUT, *ATTITUDE_REFERENCE)) < 1e-8
-    assert largest_difference(flown, wanted, ("omega1", "omega2", "omega3", "omega4")) < 1e-4
+    assert max_difference(flown, wanted, ("t", *STATE)) < 1e-8
+    assert max_difference(flown, wanted, (*INPUT, *ATTITUDE_REFERENCE)) < 1e-8
+    assert max_difference(flown, wanted, ("omega1", "omega2", "omega3", "omega4")) < 1e-4
     assert figures["rmse_after_20s_m"] == pytest.approx(SETTLED_RMS_M[track], abs=5e-5)
     assert (figures["frames"], figures["resent"], figures["qp_failures"]) == (1000, 0, 0)
 
@@ -39,7 +39,7 @@ def test_udp_equals_the_reference_and_memory_bit_for_bit(tmp_path: Path, track: 
     ]
     assert len({figures["trajectory_sha256"] for figures in flights}) == 1
     flown = rows(tmp_path / "udp" / "flight.csv")
-    assert largest_difference(flown, reference(track), STATE) < 1e-4
+    assert max_difference(flown, reference(track), STATE) < 1e-4
     same = [(tmp_path / name / "flight.csv").read_bytes() for name in ("udp", "memory")]
     assert same[0] == same[1]
 

@@ -21,7 +21,7 @@ from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, positi
 from colibri.cli.main import main
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Array
-from tools.harness.processes import fly, fly_thesis, largest_difference, rows
+from tools.harness.processes import fly, fly_thesis, max_difference, rows
 
 OUTER_US = 400_000
 SETTLED_RMS_M = {"expanding-spiral": 0.903, "wave": 0.805, "crown": 0.339}
@@ -48,7 +48,7 @@ def test_a_track_over_udp_is_the_one_flown_directly(tmp_path: Path, name: str) -
     over_udp, (direct, wanted) = fly_thesis(tmp_path, name, "--link", "udp", "--duration", "40"), flown_directly(name)
     flown = rows(tmp_path / "flight.csv")
     wanted = {column: values[: len(flown["t"])] for column, values in wanted.items()}
-    assert largest_difference(flown, wanted, STATE) < (1e-3 if name == "wave" else 1e-4)
+    assert max_difference(flown, wanted, STATE) < (1e-3 if name == "wave" else 1e-4)
     assert over_udp["qp_failures"] == direct["qp_failures"] == 0
     assert direct["rmse_after_20s_m"] == pytest.approx(SETTLED_RMS_M[name], abs=1e-3)
 
@@ -100,7 +100,7 @@ def test_every_solver_flies_the_same_spiral(tmp_path: Path, solver: str) -> None
     assert figures["qp_failures"] == 0
     flown, by_clarabel = rows(tmp_path / "flight.csv"), flown_directly("spiral")[1]
     wanted = {name: column[: len(flown["t"])] for name, column in by_clarabel.items()}
-    assert largest_difference(flown, wanted, ("x", "y", "z")) < 1e-7
+    assert max_difference(flown, wanted, ("x", "y", "z")) < 1e-7
 
 
 def test_forward_euler_flies_a_little_worse() -> None:

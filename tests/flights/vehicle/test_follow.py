@@ -3,7 +3,7 @@ from math import hypot
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.guidance.tasks.follow import ABOVE_TARGET, LOWEST_M
+from colibri.autopilot.guidance.tasks.follow import ABOVE_TARGET, MIN_HEIGHT_M
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.mavlink.wire.dialect import mav
 from tools.harness.copter_flight import CopterFlight
@@ -23,7 +23,7 @@ def _follow(flown: CopterFlight, east_m: float, north_m: float, up_m: float, sec
 
 @pytest.mark.parametrize(
     ("above", "target_up_m", "height_m"),
-    [(0, 3.0, HEIGHT_M), (ABOVE_TARGET, 3.0, 3.0 + HEIGHT_M), (ABOVE_TARGET, -HEIGHT_M, LOWEST_M)],
+    [(0, 3.0, HEIGHT_M), (ABOVE_TARGET, 3.0, 3.0 + HEIGHT_M), (ABOVE_TARGET, -HEIGHT_M, MIN_HEIGHT_M)],
     ids=["above home", "above the target", "never into the ground"],
 )
 def test_the_target_is_followed_at_its_distance(above: int, target_up_m: float, height_m: float) -> None:

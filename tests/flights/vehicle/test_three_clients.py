@@ -10,7 +10,7 @@ from tools.soak.clients import crew, faults
 
 LASTS_S = 20.0
 WARM_S = 8.0
-MOST_NEW_OBJECTS = 100
+MAX_NEW_OBJECTS = 100
 
 
 class Talking(Client):
@@ -43,6 +43,6 @@ def test_three_clients_at_once_are_served_each_for_itself() -> None:
     flight.run(LASTS_S - WARM_S, tick)
     gc.collect()
     assert faults(clients) == []
-    assert len(gc.get_objects()) - before < MOST_NEW_OBJECTS
+    assert len(gc.get_objects()) - before < MAX_NEW_OBJECTS
     assert flight.mode is Mode.OFFBOARD
     assert all(sum(client.acks.values()) > 20 for client in clients)

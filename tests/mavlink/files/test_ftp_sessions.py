@@ -72,10 +72,10 @@ def test_memory_is_bounded(service: Ftp) -> None:
         client.ask(Opcode.CREATE, b"text")
         client.send(Opcode.BURST, size=1)
         client.send(Opcode.CHECKSUM, b"text")
-    assert len(service._sessions) <= ftp.MOST_SESSIONS  # noqa: SLF001
-    assert len(service._remembered) <= ftp.MOST_REMEMBERED  # noqa: SLF001
-    assert len(service._bursts) <= ftp.MOST_SESSIONS  # noqa: SLF001
-    assert len(service._checksums) <= ftp.MOST_SESSIONS  # noqa: SLF001
+    assert len(service._sessions) <= ftp.MAX_SESSIONS  # noqa: SLF001
+    assert len(service._remembered) <= ftp.MAX_REMEMBERED  # noqa: SLF001
+    assert len(service._bursts) <= ftp.MAX_SESSIONS  # noqa: SLF001
+    assert len(service._checksums) <= ftp.MAX_SESSIONS  # noqa: SLF001
 
 
 def test_every_client_has_its_own_sessions(service: Ftp, memory: Memory) -> None:
@@ -92,7 +92,7 @@ def test_every_client_has_its_own_sessions(service: Ftp, memory: Memory) -> None
 
 
 def test_a_client_may_have_several_sessions_but_not_too_many(service: Ftp) -> None:
-    for session in range(ftp.MOST_SESSIONS_OF_A_PEER):
+    for session in range(ftp.MAX_SESSIONS_OF_A_PEER):
         Client(service, PEER, session).do(Opcode.OPEN_TO_READ, b"text")
     full = Client(service, PEER, 200)
     assert full.ask(Opcode.OPEN_TO_READ, b"text").error == Error.NO_SESSIONS

@@ -185,9 +185,9 @@ def test_memory_is_bounded(logs: Logs) -> None:
         for offset in range(40):
             ask(logs, "LOG_REQUEST_DATA", 0, offset, ALL, peer=Peer(number, number, 1))
         ask(logs, "LOG_REQUEST_LIST", 0, 0xFFFF, peer=Peer(number, number, 1))
-    assert len(logs._shown) <= log_download.MOST_PEERS  # noqa: SLF001
-    assert len(logs._listings) <= log_download.MOST_PEERS  # noqa: SLF001
-    assert len(logs._transfers) <= log_download.MOST_PEERS * log_download.MOST_TRANSFERS_OF_A_PEER  # noqa: SLF001
+    assert len(logs._shown) <= log_download.MAX_PEERS  # noqa: SLF001
+    assert len(logs._listings) <= log_download.MAX_PEERS  # noqa: SLF001
+    assert len(logs._transfers) <= log_download.MAX_PEERS * log_download.MAX_TRANSFERS_OF_A_PEER  # noqa: SLF001
 
 
 U16, U32 = st.integers(0, 0xFFFF) | st.integers(0, 4), st.integers(0, ALL) | st.integers(0, 200)

@@ -57,7 +57,7 @@ def test_each_has_usual_numbers_within_its_limits(row: Row) -> None:
     assert isinstance(fault, Fault)
     assert fault.values[: len(row.values)] == tuple(value.usual for value in row.values)
     assert judged(fault, ALL_PARTS) == fault
-    assert all(value.least <= value.usual <= value.most for value in row.values)
+    assert all(value.minimum <= value.usual <= value.maximum for value in row.values)
 
 
 def test_a_number_that_is_not_given_is_none_beside_one_that_is() -> None:
@@ -93,8 +93,8 @@ def test_any_numbers_are_a_fault_within_limits_or_none(
     fault = judged(asked, ALL_PARTS)
     if isinstance(fault, Fault):
         for value, it in zip(fault.values, TABLE[fault.unit, fault.kind].values, strict=False):
-            assert it.least <= value * (1.0 - 1e-6) or it.least <= value * (1.0 + 1e-6) or value == it.rest
-            assert abs(value) <= 1.0001 * max(abs(it.least), abs(it.most))
+            assert it.minimum <= value * (1.0 - 1e-6) or it.minimum <= value * (1.0 + 1e-6) or value == it.rest
+            assert abs(value) <= 1.0001 * max(abs(it.minimum), abs(it.maximum))
 
 
 @given(st.floats(0.0625, 1.0, width=32), st.integers(0, 4))

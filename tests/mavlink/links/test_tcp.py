@@ -138,12 +138,12 @@ def test_a_slow_reader_loses_whole_frames_and_blocks_nobody(server: GroundLink) 
         ((_, address),) = awaited(server.receive_now)
         codec = Codec(1, 1)
         sent = [codec.encode("STATUSTEXT", 6, b"%08d" % i + b"x" * 42, 0, 0) for i in range(150_000)]
-        slowest_s = 0.0
+        max_s = 0.0
         for frame in sent:
             began_s = perf_counter()
             server.send(frame, address)
-            slowest_s = max(slowest_s, perf_counter() - began_s)
-        assert slowest_s < 0.5
+            max_s = max(max_s, perf_counter() - began_s)
+        assert max_s < 0.5
         stream = bytearray()
         slow.setblocking(False)
 

@@ -154,9 +154,9 @@ class Link:
         self._down: list[tuple[int, int, bytes]] = []
         self.datagrams = 0
 
-    def run(self, most_us: int, until: Callable[[], bool]) -> bool:
+    def run(self, max_us: int, until: Callable[[], bool]) -> bool:
         """Let time pass until something is so; return whether it came to be."""
-        end_us = self._ground.now_us + most_us
+        end_us = self._ground.now_us + max_us
         while self._ground.now_us < end_us and not until():
             self._step()
         return until()

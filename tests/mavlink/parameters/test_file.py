@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from colibri.mavlink.parameters.file import ParameterFileError, read, write
-from colibri.mavlink.parameters.store import LARGEST_INT, LEAST_INT, Kind, Parameter, Parameters, float32
+from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Kind, Parameter, Parameters, float32
 
 
 def parameters_of() -> Parameters:
@@ -22,7 +22,7 @@ def parameters_of() -> Parameters:
     )
 
 
-@given(st.integers(LEAST_INT, LARGEST_INT), st.floats(width=32, allow_nan=False, allow_infinity=False))
+@given(st.integers(INT32_MIN, INT32_MAX), st.floats(width=32, allow_nan=False, allow_infinity=False))
 def test_what_is_written_is_read(integer: int, real: float) -> None:
     parameters = parameters_of()
     parameters.set("INTEGER", integer)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pymavlink.mavftp import MAVFTP
 
 from colibri.mavlink.parameters.pack import BLOCK_BYTES, packed, packed_for
-from colibri.mavlink.parameters.store import LARGEST_INT, LEAST_INT, Kind, Parameter, Parameters
+from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Kind, Parameter, Parameters
 
 
 def unpacked(file: bytes | None) -> tuple[dict[str, Any], dict[str, Any] | None]:
@@ -33,7 +33,7 @@ def parameters_of(names: list[str]) -> Parameters:
         for i, name in enumerate(names)
     )
     for parameter in list(parameters)[::3]:
-        parameters.set(parameter.name, LEAST_INT if parameter.kind == Kind.INT else 1.7)
+        parameters.set(parameter.name, INT32_MIN if parameter.kind == Kind.INT else 1.7)
     return parameters
 
 
@@ -48,7 +48,7 @@ def test_values_and_defaults_come_back(names: list[str]) -> None:
     assert unpacked(packed(parameters, with_defaults=True)) == (parameters.values, defaults)
 
 
-@pytest.mark.parametrize("value", [LEAST_INT, LARGEST_INT, -8388607, -4194305, 2139095041, 2143289343, 0, -1])
+@pytest.mark.parametrize("value", [INT32_MIN, INT32_MAX, -8388607, -4194305, 2139095041, 2143289343, 0, -1])
 def test_integers_are_packed_as_integers(value: int) -> None:
     parameters = Parameters([Parameter(name="X", kind=Kind.INT, default=5, description="")])
     parameters.set("X", value)

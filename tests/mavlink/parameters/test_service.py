@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.parameters.service import ParameterService
-from colibri.mavlink.parameters.store import LARGEST_INT, LEAST_INT, Kind, ParamError, Parameter, Parameters
+from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Kind, ParamError, Parameter, Parameters
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Bits, Codec, Message, mav, param_bits
 
 VEHICLE = Codec(1, AUTOPILOT_COMPONENT)
@@ -77,9 +77,9 @@ TRAPS = (-8388607, -4194305, -5000000, 2139095041, 2143289343, 2141000000)
 """Integers whose bits are those of signalling NaNs."""
 
 
-@given(st.integers(LEAST_INT, LARGEST_INT) | st.integers(-8388607, -4194305) | st.integers(2139095041, 2143289343))
-@example(LEAST_INT)
-@example(LARGEST_INT)
+@given(st.integers(INT32_MIN, INT32_MAX) | st.integers(-8388607, -4194305) | st.integers(2139095041, 2143289343))
+@example(INT32_MIN)
+@example(INT32_MAX)
 @example(0)
 @example(-1)
 @example(TRAPS[0])

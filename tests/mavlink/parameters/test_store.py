@@ -6,8 +6,8 @@ from math import inf, nan
 import pytest
 
 from colibri.mavlink.parameters.store import (
-    LARGEST_INT,
-    LEAST_INT,
+    INT32_MAX,
+    INT32_MIN,
     Kind,
     ParamError,
     Parameter,
@@ -46,9 +46,9 @@ def test_they_come_in_the_order_of_their_names(parameters: Parameters) -> None:
         ("COUNT", 10, ParamError.VALUE_OUT_OF_RANGE),
         ("COUNT", -6, ParamError.VALUE_OUT_OF_RANGE),
         ("COUNT", 4.0, ParamError.TYPE_MISMATCH),
-        ("ANY", LEAST_INT, None),
-        ("ANY", LARGEST_INT, None),
-        ("ANY", LARGEST_INT + 1, ParamError.VALUE_OUT_OF_RANGE),
+        ("ANY", INT32_MIN, None),
+        ("ANY", INT32_MAX, None),
+        ("ANY", INT32_MAX + 1, ParamError.VALUE_OUT_OF_RANGE),
         ("SPEED", 0.1, None),
         ("SPEED", 0.7, None),
         ("SPEED", 0.71, ParamError.VALUE_OUT_OF_RANGE),

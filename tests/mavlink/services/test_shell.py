@@ -94,9 +94,9 @@ def test_memory_is_bounded() -> None:
         type_in(service, b"x" * 70, peer=Peer(number, 1, 1))
         for _ in range(5):
             type_in(service, b"\nflood\n" + b"x" * 63, peer=Peer(number, 1, 1))
-    assert len(service._lines) <= shell.MOST_PEERS  # noqa: SLF001
-    assert len(service._answers) <= shell.MOST_PEERS  # noqa: SLF001
-    assert all(len(text) <= shell.LONGEST_ANSWER_BYTES for text in service._answers.values())  # noqa: SLF001
+    assert len(service._lines) <= shell.MAX_PEERS  # noqa: SLF001
+    assert len(service._answers) <= shell.MAX_PEERS  # noqa: SLF001
+    assert all(len(text) <= shell.MAX_ANSWER_BYTES for text in service._answers.values())  # noqa: SLF001
 
 
 @given(st.lists(st.tuples(st.binary(max_size=70), st.integers(0, 255), st.integers(0, 31)), max_size=10))

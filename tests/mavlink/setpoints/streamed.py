@@ -51,5 +51,5 @@ def anything(kind: str) -> st.SearchStrategy[Any]:
     """Return values of a wire type."""
     if kind == "float":
         return st.floats(width=32) | st.floats(-60.0, 60.0, width=32) | st.floats(0.0, 1.0, width=32)
-    least, most = _RANGES[kind]
-    return st.integers(least, most) | st.integers(max(least, -1500), min(most, 2500))
+    minimum, maximum = _RANGES[kind]
+    return st.integers(minimum, maximum) | st.integers(max(minimum, -1500), min(maximum, 2500))

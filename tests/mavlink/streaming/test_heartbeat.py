@@ -6,7 +6,7 @@ import pytest
 
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.services.identity import GENERIC, PX4, Identity
-from colibri.mavlink.streaming.heartbeat import MOST_HEARD, HeartbeatService
+from colibri.mavlink.streaming.heartbeat import MAX_HEARD, HeartbeatService
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.wire.dialect import mav
 from tests.mavlink.services.peers import GROUND, OTHER, message, on_the_wire
@@ -93,5 +93,5 @@ def test_who_was_heard_has_a_limit(service: HeartbeatService) -> None:
     for system in range(200):
         hear(service, Peer(1, system, 1), system)
     heard = service.heard()
-    assert len(heard) == MOST_HEARD
+    assert len(heard) == MAX_HEARD
     assert heard[-1].peer.system == 199

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from colibri.mavlink.node.service import Fields, Peer, Send, to
 from colibri.mavlink.services.command import ACCEPTED, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Outcome
 from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SDK, SILENT
-from colibri.mavlink.streaming.service import MOST_WAITING, StreamService
+from colibri.mavlink.streaming.service import MAX_WAITING, StreamService
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.telemetry.table import TELEMETRY
 from colibri.mavlink.wire.dialect import mav
@@ -253,8 +253,8 @@ def test_older_requests_are_answered_alike(command: int, result: int, name: str 
 
 def test_requests_between_two_frames_have_a_limit() -> None:
     stream = flying()
-    results = Counter(ask(stream, REQUEST, HOME) for _ in range(MOST_WAITING + 5))
-    assert results == {ACCEPTED: MOST_WAITING, TEMPORARILY_REJECTED: 5}
+    results = Counter(ask(stream, REQUEST, HOME) for _ in range(MAX_WAITING + 5))
+    assert results == {ACCEPTED: MAX_WAITING, TEMPORARILY_REJECTED: 5}
 
 
 @pytest.mark.parametrize("group", [0, *GROUPS])

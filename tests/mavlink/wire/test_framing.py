@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
 from colibri.mavlink.wire.dialect import Codec
-from colibri.mavlink.wire.framing import LONGEST_FRAME, Framer
+from colibri.mavlink.wire.framing import MAX_FRAME_BYTES, Framer
 
 
 def signed_heartbeat() -> bytes:
@@ -70,7 +70,7 @@ def test_noise_hides_frames_for_no_longer_than_a_frame_lasts(noise: bytes) -> No
     framer.take(noise)
     heartbeat = FRAMES[0]
     found = [frame for _ in range(40) for frame in framer.take(heartbeat)]
-    assert found.count(heartbeat) >= 40 - LONGEST_FRAME // len(heartbeat) - 1
+    assert found.count(heartbeat) >= 40 - MAX_FRAME_BYTES // len(heartbeat) - 1
 
 
 def test_a_frame_with_a_wrong_checksum_does_not_take_its_neighbour_with_it() -> None:
@@ -94,4 +94,4 @@ def test_never_keeps_more_than_a_frame(stream: list[bytes]) -> None:
     for chunk in stream:
         given_bytes += len(chunk)
         cut += sum(map(len, framer.take(chunk)))
-        assert given_bytes - cut - framer.skipped < LONGEST_FRAME
+        assert given_bytes - cut - framer.skipped < MAX_FRAME_BYTES

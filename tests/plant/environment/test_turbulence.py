@@ -9,7 +9,7 @@ from scipy.signal import welch
 
 from colibri.common.types import Array
 from colibri.plant.environment.air import Air
-from colibri.plant.environment.turbulence import LEAST_AIRSPEED_M_S, Turbulence, eddy_velocity, scales
+from colibri.plant.environment.turbulence import MIN_AIRSPEED_M_S, Turbulence, eddy_velocity, scales
 from colibri.plant.environment.weather import Intensity, Weather
 from colibri.plant.process.options import wind
 
@@ -130,4 +130,4 @@ def test_the_eddies_are_along_the_wind() -> None:
 def test_who_drifts_with_the_air_still_meets_eddies() -> None:
     turbulence = Turbulence(1)
     begin = turbulence.begin()
-    assert turbulence.step(begin, SCALE, 0.0, 0.1) == turbulence.step(begin, SCALE, LEAST_AIRSPEED_M_S, 0.1)
+    assert turbulence.step(begin, SCALE, 0.0, 0.1) == turbulence.step(begin, SCALE, MIN_AIRSPEED_M_S, 0.1)

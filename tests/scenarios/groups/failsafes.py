@@ -81,20 +81,20 @@ def lands_on_three(number: int, *, tilt: float, within_s: float) -> Step:
         upright_s = sitl.time_s + within_s
         until(says(f"rotor {number} failed"), within=0.5)(sitl)
         until(DISARMED, within=40.0)(sitl)
-        measured("the tilt", most_tilted_in_the_air, tilt, last_s=sitl.time_s - upright_s)(sitl)
+        measured("the tilt", max_tilt_in_the_air, tilt, last_s=sitl.time_s - upright_s)(sitl)
 
     return step
 
 
-def most_tilted_in_the_air(columns: Columns) -> float:
+def max_tilt_in_the_air(columns: Columns) -> float:
     """Return the figure: the largest tilt off the ground, degrees."""
     return float(tilt_deg(columns)[columns["z"] > 0.1].max())
 
 
 def falls_like_a_stone(sitl: Sitl) -> None:
     """See that the rotors stop within 2 s and the time that a fall takes."""
-    most_s = 2.0 + sqrt(2.0 * sitl.position[2] / 10.0)
-    sitl.wait_until(lambda: not sitl.armed, within=most_s, what="the end of the flight")
+    max_s = 2.0 + sqrt(2.0 * sitl.position[2] / 10.0)
+    sitl.wait_until(lambda: not sitl.armed, within=max_s, what="the end of the flight")
 
 
 def stays_away(sitl: Sitl) -> None:
@@ -102,23 +102,23 @@ def stays_away(sitl: Sitl) -> None:
     sitl.hold(lambda: hypot(*sitl.position[:2]) >= 5.0, for_=15.0, what="at least 5 m from the origin")
 
 
-def descends_less(most_m: float, seconds: float) -> Step:
+def descends_less(max_m: float, seconds: float) -> Step:
     """See that it does not lose more than that."""
 
     def step(sitl: Sitl) -> None:
         began_m = sitl.position[2]
-        sitl.hold(lambda: sitl.position[2] > began_m - most_m, for_=seconds, what=f"at most {most_m:g} m lost")
+        sitl.hold(lambda: sitl.position[2] > began_m - max_m, for_=seconds, what=f"at most {max_m:g} m lost")
 
     return step
 
 
-def moves_less(most_m: float, seconds: float, tilt: float = 90.0) -> Step:
+def moves_less(max_m: float, seconds: float, tilt: float = 90.0) -> Step:
     """See that it stays about where it is."""
 
     def step(sitl: Sitl) -> None:
         began = sitl.position
-        near_and_level = lambda: dist(sitl.position, began) <= most_m and sitl.tilt_deg <= tilt  # noqa: E731
-        sitl.hold(near_and_level, for_=seconds, what=f"at most {most_m:g} m away")
+        near_and_level = lambda: dist(sitl.position, began) <= max_m and sitl.tilt_deg <= tilt  # noqa: E731
+        sitl.hold(near_and_level, for_=seconds, what=f"at most {max_m:g} m away")
 
     return step
 

@@ -8,11 +8,11 @@ from tests.scenarios.words.scenario import Scenario
 from tests.scenarios.words.steps import (
     by_hand,
     check,
-    farthest_from,
     goto,
     hold,
+    max_distance_from,
+    max_tilt,
     measured,
-    most_tilted,
     put,
     run,
     select,
@@ -78,7 +78,7 @@ SCENARIOS = (
         holds="at most 0.3 m, back within 0.02 m after 3 s",
         steps=(
             run(5.0),
-            measured("the distance", farthest_from(PLACE), 0.3),
+            measured("the distance", max_distance_from(PLACE), 0.3),
             run(1.0),
             hold(near(PLACE, 0.02), for_=1.0),
         ),
@@ -90,8 +90,8 @@ SCENARIOS = (
         holds="400°/s: roll between 1° and 20°, level within 1.5 s",
         steps=(
             run(1.5),
-            measured("the tilt", most_tilted, 20.0),
-            lambda sitl: kicked(most_tilted(sitl.flown())),
+            measured("the tilt", max_tilt, 20.0),
+            lambda sitl: kicked(max_tilt(sitl.flown())),
             check(every(tilted_less(1.0), near(PLACE, 0.3))),
         ),
         setting=KICKED,

@@ -12,8 +12,8 @@ from tests.scenarios.words.conditions import ARMED, DISARMED, above, every, mode
 from tests.scenarios.words.scenario import FleetScenario, Scenario, Step
 from tests.scenarios.words.steps import (
     check,
-    farthest_from,
     hold,
+    max_distance_from,
     measured,
     put,
     run,
@@ -24,7 +24,7 @@ from tests.scenarios.words.steps import (
 )
 
 PLACE = (0.0, 0.0, 5.0)
-LARGEST_TILT_DEG = 75.0
+MAX_TILT_DEG = 75.0
 ROUGH = {"loss": 0.3, "jitter_s": 0.05}
 """Of the ground link."""
 COMMANDED = {
@@ -126,7 +126,7 @@ SCENARIOS: tuple[Scenario | FleetScenario, ...] = (
         steps=(
             run(2.0),
             *(kill_autopilot, run(2.0), kill_autopilot, run(2.0)),
-            measured("the distance", farthest_from(PLACE), 0.05),
+            measured("the distance", max_distance_from(PLACE), 0.05),
             check(every(ARMED, mode(Mode.HOLD), tilted_less(5.0))),
         ),
         setting={"airborne": 5.0},

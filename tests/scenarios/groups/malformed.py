@@ -22,7 +22,7 @@ STAYS = hold(every(near(PLACE, 0.01), ARMED, mode(Mode.HOLD)), for_=1.0)
 FRAME: int = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 WAYPOINT: int = mav.MAV_CMD_NAV_WAYPOINT
 TOO_MANY = 65535
-MOST_COMMANDS = {mav.MAV_CMD_NAV_TAKEOFF: 7, mav.MAV_CMD_DO_CHANGE_SPEED: 7, mav.MAV_CMD_DO_SET_HOME: 7}
+MAX_COMMANDS = {mav.MAV_CMD_NAV_TAKEOFF: 7, mav.MAV_CMD_DO_CHANGE_SPEED: 7, mav.MAV_CMD_DO_SET_HOME: 7}
 
 
 def send_noise(sitl: Sitl) -> None:
@@ -41,7 +41,7 @@ def fire(count: int) -> Step:
     """Send messages that are right by their checksum, and mean anything."""
 
     def step(sitl: Sitl) -> None:
-        messages = Messages(Random(7), ("TRACK", "MPC_XY_CRUISE"), tuple(MOST_COMMANDS))
+        messages = Messages(Random(7), ("TRACK", "MPC_XY_CRUISE"), tuple(MAX_COMMANDS))
         for number in range(count):
             sitl.gcs.send_raw(messages.any().frame)
             if number % 20 == 0:

@@ -38,14 +38,14 @@ def begins(name: str, **more: object) -> dict[str, object]:
     return {"track": name, "airborne": z, "start": {"x": x, "y": y, "psi": psi}, **more}
 
 
-def follows_by_its_estimate(sitl: Sitl, most_m: float) -> None:
+def follows_by_its_estimate(sitl: Sitl, max_m: float) -> None:
     """See how far what it believes is from where it wants to be, as it says itself."""
     where, wanted = sitl.heard("LOCAL_POSITION_NED"), sitl.heard("POSITION_TARGET_LOCAL_NED")
     targets = {message.time_boot_ms: message for message in wanted}
     both = [(message, targets[message.time_boot_ms]) for message in where if message.time_boot_ms in targets]
     off = np.array([(a.x - b.x, a.y - b.y, a.z - b.z) for a, b in both[-50:]])
     assert len(off) == 50
-    assert np.sqrt(np.mean(np.sum(off**2, axis=1))) <= most_m
+    assert np.sqrt(np.mean(np.sum(off**2, axis=1))) <= max_m
 
 
 def circles_at(m_s: float, within_m_s: float) -> Step:
@@ -59,14 +59,14 @@ def circles_at(m_s: float, within_m_s: float) -> Step:
     return step
 
 
-def yaw_turns_through(least_deg: float) -> Step:
+def yaw_turns_through(min_deg: float) -> Step:
     """See that yaw has turned so far, without a jump."""
 
     def step(sitl: Sitl) -> None:
         columns = sitl.flown()
         w, x, y, z = (columns[name] for name in ("qw", "qx", "qy", "qz"))
         yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
-        assert degrees(abs(yaw[-1] - yaw[0])) >= least_deg
+        assert degrees(abs(yaw[-1] - yaw[0])) >= min_deg
         assert abs(columns["r"]).max() < 4.0
 
     return step

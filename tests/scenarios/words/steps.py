@@ -182,13 +182,13 @@ def silence(*, still: bool = True) -> Step:
     return step
 
 
-def measured(words: str, of: Callable[[Columns], float], most: float, *, last_s: float | None = None) -> Step:
+def measured(words: str, of: Callable[[Columns], float], maximum: float, *, last_s: float | None = None) -> Step:
     """See that a figure of what was flown, or of the last seconds of it, is at most so much."""
 
     def step(sitl: Sitl) -> None:
         columns = sitl.flown(0.0 if last_s is None else sitl.time_s - last_s)
         figure = of(columns)
-        assert figure <= most, f"{words} is {figure:.4g}, more than {most:g}: {sitl}"
+        assert figure <= maximum, f"{words} is {figure:.4g}, more than {maximum:g}: {sitl}"
 
     return step
 
@@ -208,7 +208,7 @@ def places(columns: Columns) -> Array:
     return np.stack([columns["x"], columns["y"], columns["z"]], axis=1)
 
 
-def farthest_from(place: Sequence[float]) -> Callable[[Columns], float]:
+def max_distance_from(place: Sequence[float]) -> Callable[[Columns], float]:
     """Return the figure: how far it was from a place at most."""
     return lambda columns: float(np.linalg.norm(places(columns) - place, axis=1).max())
 
@@ -218,6 +218,6 @@ def highest(columns: Columns) -> float:
     return float(columns["z"].max())
 
 
-def most_tilted(columns: Columns) -> float:
+def max_tilt(columns: Columns) -> float:
     """Return the figure: the largest tilt, degrees."""
     return float(tilt_deg(columns).max())

@@ -145,9 +145,9 @@ def test_who_is_steered_by_attitude_needs_no_position() -> None:
 
 
 @given(st.floats(0.0, 12.0), st.floats(0.5, 10.0), st.floats(1.0, 60.0))
-def test_the_way_to_rest_is_that_of_bounded_acceleration_and_jerk(speed: float, most: float, jerk: float) -> None:
+def test_the_way_to_rest_is_that_of_bounded_acceleration_and_jerk(speed: float, maximum: float, jerk: float) -> None:
     """Integrated: the acceleration rises to its bound, or to half of the change, and falls again."""
-    peak = min(most, sqrt(speed * jerk))
+    peak = min(maximum, sqrt(speed * jerk))
     rise_s, flat_s = peak / jerk, (speed / peak - peak / jerk) if peak > 0.0 else 0.0
     way, v, a, dt = 0.0, speed, 0.0, 1e-3
     duration_s = 2.0 * rise_s + max(flat_s, 0.0)
@@ -156,7 +156,7 @@ def test_the_way_to_rest_is_that_of_bounded_acceleration_and_jerk(speed: float, 
         a = min(jerk * t, peak, max(jerk * (duration_s - t), 0.0))
         way += max(v, 0.0) * dt
         v -= a * dt
-    assert stopping_m(speed, most, jerk) == pytest.approx(way, abs=0.02 * speed + 1e-3)
+    assert stopping_m(speed, maximum, jerk) == pytest.approx(way, abs=0.02 * speed + 1e-3)
 
 
 @settings(max_examples=20)

@@ -11,7 +11,7 @@ MOVED = INPUTS * len(STARTS)
 N = MOVED + condensing.SLACKS
 FROM_THRUST = np.full(4, 0.05)
 FROM_MOMENTS = np.array([[0.0, -0.6, -1.5], [-0.6, 0.0, 1.5], [0.0, 0.6, -1.5], [0.6, 0.0, 1.5]])
-LEAST, MOST = 0.01, 1.0
+MIN_SQUARED, MAX_SQUARED = 0.01, 1.0
 LIMITS = np.array([1.0, 1.1, 6.0, 7.0, 3.0])
 CHECKED = np.array([3, 6, 12])
 
@@ -65,14 +65,14 @@ def test_rotor_rows_hold_just_where_every_rotor_is_within_its_limits(rng: np.ran
     thrust = rng.uniform(4.0, 12.0, STEPS)
     rows = 2 * condensing.ROTORS * len(STARTS)
     G, h = np.zeros((rows, N)), np.zeros(rows)
-    count = condensing.limit_rotors(FROM_MOMENTS, FROM_THRUST, thrust, u, STARTS, LEAST, MOST, G, h)
+    count = condensing.limit_rotors(FROM_MOMENTS, FROM_THRUST, thrust, u, STARTS, MIN_SQUARED, MAX_SQUARED, G, h)
     assert count == rows
     verdicts = set()
     for size in (0.02, 0.1, 0.3, 0.6):
         for _ in range(20):
             z = rng.normal(size=N) * size
             squared = thrust[:, None] * FROM_THRUST + moments_of(u, z) @ FROM_MOMENTS.T
-            within = bool(((squared >= LEAST) & (squared <= MOST)).all())
+            within = bool(((squared >= MIN_SQUARED) & (squared <= MAX_SQUARED)).all())
             assert bool((G @ z <= h).all()) is within
             verdicts.add(within)
     assert verdicts == {True, False}

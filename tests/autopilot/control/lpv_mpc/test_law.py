@@ -108,19 +108,19 @@ def test_far_from_upright_the_recovery_law_flies(state: VehicleState) -> None:
     assert ((decision.rotor_speeds >= 83.8) & (decision.rotor_speeds <= 838.0)).all()
 
 
-@pytest.mark.parametrize("fastest", [600.0, 838.0])
-def test_the_plan_itself_respects_the_rotors(fastest: float) -> None:
+@pytest.mark.parametrize("max_speed", [600.0, 838.0])
+def test_the_plan_itself_respects_the_rotors(max_speed: float) -> None:
     """Of an upset vehicle, the first of whose plans bind: at every step of the horizon, to the QP's accuracy."""
-    rotors = msgspec.structs.replace(VEHICLE.rotors, max_speed=fastest)
+    rotors = msgspec.structs.replace(VEHICLE.rotors, max_speed=max_speed)
     vehicle = msgspec.structs.replace(VEHICLE, rotors=rotors)
     bound = 0
     for state in (turned(40, 0), turned(-30, 30, (4, -4, 2)), turned(0, -55, (0, 6, 0))):
         for decision in steps(*build(vehicle), state, 5):
             planned = decision.diagnostics.planned_squared
             assert planned is not None
-            assert planned.min() >= (83.8 / fastest) ** 2 - 1e-6
+            assert planned.min() >= (83.8 / max_speed) ** 2 - 1e-6
             assert planned.max() <= 1.0 + 1e-6
-            assert (decision.rotor_speeds <= fastest).all()
+            assert (decision.rotor_speeds <= max_speed).all()
             bound += decision.diagnostics.active.rotors
     assert bound > 10
 
@@ -138,7 +138,7 @@ def test_whatever_moments_a_fallback_left_the_next_qp_can_be_solved(u: tuple[flo
 
 def test_commands_within_the_plans_limits_are_never_cut() -> None:
     """The mixer's own clipping has nothing to do where a plan was had: without it, the same commands."""
-    lag = rotor_lag(VEHICLE, 0.008)._replace(least=-10.0)
+    lag = rotor_lag(VEHICLE, 0.008)._replace(min_speed=-10.0)
     controller, planner = build()
     for state in (turned(40, 0), turned(-30, 30, (4, -4, 2))):
         memory = controller.initial(VEHICLE.hover_speed)
@@ -162,7 +162,7 @@ def test_soft_limits_give_way_only_where_they_must() -> None:
 
 def test_an_excess_that_can_be_avoided_is_avoided_at_any_cost() -> None:
     """The slack's linear part: a reference at the limit, under weights that would rather cross it."""
-    eager = {"largest_rate_rad_s": [1.0, 1.0, 1.0], "output_weight": [100.0, 100.0, 1.0]}
+    eager = {"max_rate_rad_s": [1.0, 1.0, 1.0], "output_weight": [100.0, 100.0, 1.0]}
     diagnostics = steps(*build(attitude=eager), turned(30, 0), 1)[0].diagnostics
     assert diagnostics.active.rates > 0
     assert diagnostics.slack == pytest.approx(0.0, abs=1e-9)

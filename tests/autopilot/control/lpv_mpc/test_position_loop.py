@@ -99,7 +99,7 @@ def test_commanded_thrust_leads_its_lag() -> None:
     for wanted, command in zip((6.5, float(np.linalg.norm(forces[2]))), commands, strict=False):
         thrust += 0.3 * (command - thrust)
         assert thrust == pytest.approx(wanted)
-    assert commands[2] == LIMITS.most_thrust_n
+    assert commands[2] == LIMITS.max_thrust_n
 
 
 def test_the_end_of_the_horizon_moves_as_the_angles_do() -> None:

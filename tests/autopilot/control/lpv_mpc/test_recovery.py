@@ -15,20 +15,20 @@ from tests.strategies import quaternions, reals, vectors
 VEHICLE = load_vehicle("hummingbird")
 FROM_THRUST, FROM_MOMENTS = squared_speeds_from(VEHICLE)
 ALLOCATION = VEHICLE.allocation() * VEHICLE.rotors.max_speed**2
-LEAST, MOST = 0.01, 1.0
+MIN_SQUARED, MAX_SQUARED = 0.01, 1.0
 INERTIA = np.array(VEHICLE.body.inertia_kg_m2)
 GAINS = TurnGains(6.0, 20.0, 8.0)
 
 
 def mixed(thrust_n: float, moment: np.ndarray) -> np.ndarray:
-    return prioritised(thrust_n, moment, FROM_THRUST, FROM_MOMENTS, LEAST, MOST)
+    return prioritised(thrust_n, moment, FROM_THRUST, FROM_MOMENTS, MIN_SQUARED, MAX_SQUARED)
 
 
 @given(st.floats(-10.0, 40.0), reals(5.0), reals(5.0), reals(2.0))
 def test_what_is_mixed_is_within_the_limits(thrust: float, u2: float, u3: float, u4: float) -> None:
     squared = mixed(thrust, np.array([u2, u3, u4]))
-    assert (squared >= LEAST).all()
-    assert (squared <= MOST).all()
+    assert (squared >= MIN_SQUARED).all()
+    assert (squared <= MAX_SQUARED).all()
 
 
 @given(st.floats(3.0, 14.0), reals(0.1), reals(0.1), reals(0.02))

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colibri.autopilot.control.interface import VehicleState
-from colibri.autopilot.control.rotor_loss.detector import ALARM, MOST_EVIDENCE, RotorWatch
+from colibri.autopilot.control.rotor_loss.detector import ALARM, MAX_EVIDENCE, RotorWatch
 from colibri.common.rotations import euler_from_quaternion
 from colibri.common.types import FourRotors
 from colibri.mavlink.hil.state import ActuatorCommand
@@ -98,7 +98,7 @@ def test_a_weak_rotor_is_none_that_is_lost(
     start = Start(z=50.0, phi=phi, theta=theta, psi=psi, p=p, q=q, r=r, rotors=4740.0)
     flight = Watched(controls, start)
     assert flight.fly(lacking(rotor, part), 25) is None
-    assert flight.watch.largest < 0.5 * ALARM
+    assert flight.watch.max_evidence < 0.5 * ALARM
 
 
 @settings(max_examples=30, deadline=None)
@@ -111,7 +111,7 @@ def test_one_jump_is_no_rotor(jump: tuple[float, ...], after: int) -> None:
     state[:6] += jump
     flight.world = replace(flight.world, state=tuple(state.tolist()))
     assert flight.fly(WHOLE, 20) is None
-    assert flight.watch.largest <= MOST_EVIDENCE
+    assert flight.watch.max_evidence <= MAX_EVIDENCE
 
 
 @pytest.mark.parametrize("noise_rad_s", [0.05, 0.3, 2.0])
@@ -134,4 +134,4 @@ def test_on_the_ground_nothing_is_lost() -> None:
         flight.world = lacking(0).step(flight.world, ActuatorCommand(0, (0.6,) * 4, armed=True), SAMPLE_US)
         flight.watch.step(told(flight.world), (0.6, 0.6, 0.6, 0.6), 0.0, airborne=False)
     assert flight.watch.lost is None
-    assert flight.watch.largest == 0.0
+    assert flight.watch.max_evidence == 0.0

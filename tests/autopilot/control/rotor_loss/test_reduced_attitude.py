@@ -84,17 +84,17 @@ def test_on_the_solution_it_asks_for_the_solution(lost: int) -> None:
 
 @given(st.floats(0.0, 25.0), st.floats(-20.0, 20.0), st.floats(-5.0, 10.0), st.integers(0, 3), st.floats(0.7, 1.0))
 def test_what_is_shared_is_within_limits_and_keeps_the_moment(
-    thrust_n: float, d: float, f_o: float, lost: int, fastest: float
+    thrust_n: float, d: float, f_o: float, lost: int, max_speed: float
 ) -> None:
     trio = trio_without(HUMMINGBIRD, lost)
     full_n = HUMMINGBIRD.allocation()[0] * HUMMINGBIRD.rotors.max_speed**2
-    squared = shared(trio, thrust_n, d, f_o, full_n, (0.01, fastest**2))
+    squared = shared(trio, thrust_n, d, f_o, full_n, (0.01, max_speed**2))
     forces = squared * full_n
     left = [trio.a, trio.b, trio.o]
     assert squared[lost] == 0.0
     assert squared[left].min() >= 0.01 - 1e-12
-    assert squared[left].max() <= fastest**2 + 1e-12
-    room = float(full_n[0]) * (fastest**2 - 0.01)
+    assert squared[left].max() <= max_speed**2 + 1e-12
+    room = float(full_n[0]) * (max_speed**2 - 0.01)
     assert forces[trio.b] - forces[trio.a] == pytest.approx(min(max(d, -room), room), abs=1e-9)
-    if abs(d) < 2.0 and 0.1 < f_o < 2.0 and 6.0 < thrust_n < 6.0 + f_o and fastest > 0.95:
+    if abs(d) < 2.0 and 0.1 < f_o < 2.0 and 6.0 < thrust_n < 6.0 + f_o and max_speed > 0.95:
         assert forces.sum() == pytest.approx(thrust_n)

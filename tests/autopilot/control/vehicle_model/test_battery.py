@@ -26,24 +26,24 @@ def test_charge_and_top_speed_are_the_plants(part: float) -> None:
         world = physics.step(world, ActuatorCommand(world.time_us, (part, part, part, part), armed=True), 10_000)
     assert charge_ah == pytest.approx(world.charge_used_ah, rel=0.01)
     reached = world.rotor_speeds[0] / VEHICLE.rotors.max_speed
-    assert reached == pytest.approx(min(part, MODEL.fastest_together(charge_ah)), rel=2e-3)
+    assert reached == pytest.approx(min(part, MODEL.max_common_speed(charge_ah)), rel=2e-3)
 
 
 def test_without_a_battery_nothing_tires() -> None:
     endless = BatteryModel(msgspec.structs.replace(VEHICLE, battery=None))
     assert endless.charge_after(0.0, np.ones(4), 3600.0) == 0.0
-    assert endless.fastest_together(100.0) == endless.fastest_now(100.0, np.ones(4)) == 1.0
+    assert endless.max_common_speed(100.0) == endless.max_speed_now(100.0, np.ones(4)) == 1.0
 
 
 def test_an_empty_battery_stays_empty() -> None:
     assert VEHICLE.battery is not None
     capacity_ah = VEHICLE.battery.capacity_ah
-    fastest = MODEL.fastest_together
-    assert 0.0 < fastest(2.0 * capacity_ah) == fastest(capacity_ah) < fastest(0.0) < 1.0
+    max_speed = MODEL.max_common_speed
+    assert 0.0 < max_speed(2.0 * capacity_ah) == max_speed(capacity_ah) < max_speed(0.0) < 1.0
 
 
 def test_a_rotor_alone_can_turn_faster_than_all_together() -> None:
     """What is left to one depends on what all of them take: at the speed of all together, just that."""
-    together = MODEL.fastest_together(0.5)
-    assert MODEL.fastest_now(0.5, np.full(4, together)) == pytest.approx(together)
-    assert together < MODEL.fastest_now(0.5, np.full(4, 0.6)) < 1.0
+    together = MODEL.max_common_speed(0.5)
+    assert MODEL.max_speed_now(0.5, np.full(4, together)) == pytest.approx(together)
+    assert together < MODEL.max_speed_now(0.5, np.full(4, 0.6)) < 1.0

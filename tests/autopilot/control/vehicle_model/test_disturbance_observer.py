@@ -56,7 +56,7 @@ def test_both_poles_are_where_they_were_placed() -> None:
 
 
 def test_no_more_is_believed_than_the_limit() -> None:
-    cautious = OBSERVER._replace(most_m_s2=1.0, most_n_m=1e-3)
+    cautious = OBSERVER._replace(max_acceleration_m_s2=1.0, max_moment_n_m=1e-3)
     estimate = fly(np.array([5.0, 0.0, -5.0]), np.array([0.01, 0.0, 0.0]), 2.0, cautious)
     assert estimate[6:9] == pytest.approx([1.0, 0.0, -1.0])
     assert estimate[9] == pytest.approx(1e-3)

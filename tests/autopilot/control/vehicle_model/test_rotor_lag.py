@@ -30,11 +30,11 @@ def test_force_is_where_the_plan_has_it_after_one_sample(speed: float, commanded
     """One linear lag of the squared speed, whatever two lags and a square the rotor really has."""
     squared = speed**2 + (commanded**2 - speed**2) * (1.0 - exp(-INTERVAL_S / 0.025))
     commands = lead(four(speed), four(commanded**2), LAG, 1.0)
-    assume(LAG.least < commands[0] < 1.0)
+    assume(LAG.min_speed < commands[0] < 1.0)
     assert follow(four(speed), commands, LAG)[0] == pytest.approx(sqrt(squared))
 
 
-@given(st.floats(0.3, 1.0), st.floats(LAG.least, 1.0))
+@given(st.floats(0.3, 1.0), st.floats(LAG.min_speed, 1.0))
 def test_a_plan_within_the_limits_needs_no_cutting(speed: float, commanded: float) -> None:
     """The plan's lag is the slower one, so that what it asks for within the limits can be had within the limits."""
     squared = speed**2 + (commanded**2 - speed**2) * LAG.planned
@@ -45,7 +45,7 @@ def test_a_plan_within_the_limits_needs_no_cutting(speed: float, commanded: floa
 @given(parts, st.floats(-1.0, 2.0))
 def test_commands_stay_within_the_limits(speed: float, squared: float) -> None:
     commands = lead(four(speed), four(squared), LAG, 0.9)
-    assert (commands >= LAG.least).all()
+    assert (commands >= LAG.min_speed).all()
     assert (commands <= 0.9).all()
 
 

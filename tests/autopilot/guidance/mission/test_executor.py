@@ -108,8 +108,8 @@ class Flight:
                 self.arrived = True
 
     def _towards(self, place: Vector, speed: float) -> bool:
-        away, most = dist(self.position, place), speed * STEP_US * 1e-6
-        part = min(1.0, most / away) if away > 0.0 else 1.0
+        away, maximum = dist(self.position, place), speed * STEP_US * 1e-6
+        part = min(1.0, maximum / away) if away > 0.0 else 1.0
         x, y, z = (a + part * (b - a) for a, b in zip(self.position, place, strict=True))
         self.position = (x, y, z)
         return part == 1.0

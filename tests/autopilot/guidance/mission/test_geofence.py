@@ -31,10 +31,10 @@ def polygon(command: int, vertices: list[tuple[float, float]], **changes: Any) -
     return [item(command, east, north, float(len(vertices)), **changes) for east, north in vertices]
 
 
-def fence(*items: MissionItem, highest_m: float = inf) -> Geofence:
+def fence(*items: MissionItem, max_height_m: float = inf) -> Geofence:
     assert all(FENCE_RULES.check_item(each) == ACCEPTED for each in items)
     assert FENCE_RULES.check_plan(items) == ACCEPTED
-    return Geofence(items, DEFAULT_ORIGIN, highest_m=highest_m)
+    return Geofence(items, DEFAULT_ORIGIN, max_height_m=max_height_m)
 
 
 def test_no_fence_holds_nothing_back() -> None:
@@ -45,7 +45,7 @@ def test_no_fence_holds_nothing_back() -> None:
 
 
 def test_margins() -> None:
-    around = fence(*polygon(IN, SQUARE), *polygon(OUT, HOLE), item(DISC_OUT, 6.0, 6.0, 1.0), highest_m=30.0)
+    around = fence(*polygon(IN, SQUARE), *polygon(OUT, HOLE), item(DISC_OUT, 6.0, 6.0, 1.0), max_height_m=30.0)
     for place, margin in [
         ((-5.0, 0.0, 0.0), 3.0),
         ((-9.0, 0.0, 0.0), 1.0),
@@ -60,7 +60,7 @@ def test_margins() -> None:
 
 
 def test_what_is_refused_is_told() -> None:
-    around = fence(item(DISC_IN, 0.0, 0.0, 5.0), highest_m=30.0)
+    around = fence(item(DISC_IN, 0.0, 0.0, 5.0), max_height_m=30.0)
     assert around.refusal((0.0, 0.0, 10.0)) is None
     assert around.refusal((0.0, 6.0, 10.0)) == Refusal("outside the geofence")
     assert around.refusal((0.0, 0.0, 31.0)) == Refusal("higher than the 30 m of the geofence")

@@ -71,7 +71,7 @@ def test_every_derivative_up_to_twice_its_order_less_two_is_continuous(order: in
 def test_no_other_way_through_the_points_costs_less(order: int) -> None:
     """What is added is zero, with its derivatives below `order`, at both ends, and passes zero at every point."""
     best = minimise(order, TIMES_S, POINTS)
-    least = cost(best, order)
+    minimum = cost(best, order)
     rng = np.random.default_rng(0)
     for _ in range(3):
         values = rng.normal(size=(len(TIMES_S) * 2 - 1, 2))
@@ -79,8 +79,8 @@ def test_no_other_way_through_the_points_costs_less(order: int) -> None:
         finer = np.sort(np.concatenate([TIMES_S, TIMES_S[:-1] + 0.4 * np.diff(TIMES_S)]))
         detour = minimise(order, finer, values)
         rising = [_cost_of_sum(best, detour, share, order) for share in (-1e-3, 1e-3)]
-        assert min(rising) > least
-        assert rising[0] - least == pytest.approx(rising[1] - least, rel=1e-4), "no slope: it is stationary"
+        assert min(rising) > minimum
+        assert rising[0] - minimum == pytest.approx(rising[1] - minimum, rel=1e-4), "no slope: it is stationary"
 
 
 def _cost_of_sum(one: PiecewisePolynomial, other: PiecewisePolynomial, share: float, order: int) -> float:
