@@ -7,7 +7,7 @@ from pathlib import Path
 from colibri.common.earth.home import DEFAULT_HOME, home
 from colibri.common.process.arguments import ArgumentParser, add_common_arguments
 from colibri.mavlink.hil.feedback import Feedback, feedback
-from colibri.mavlink.links.link import OneByOne
+from colibri.mavlink.links.link import BlockingReceiver
 from colibri.mavlink.links.open import open_ground_link, open_link
 from colibri.mavlink.links.startup import begin
 
@@ -42,7 +42,7 @@ def command_line() -> ArgumentParser:
     )
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--gcs", action="append", default=[], metavar="URL", help="a ground station: udpout:, udpin:, tcp: or tcpin:")
-    add("--conducted", metavar="URL", help="a program that speaks for all ground stations, frame by frame (for tests)")
+    add("--stepped", metavar="URL", help="a program that speaks for all ground stations, frame by frame (for tests)")
     add("--home", type=home, default=DEFAULT_HOME, metavar="LAT,LON,ALT,YAW", help="the origin (default %(default)s)")
     add("--identity", default="px4", choices=("px4", "generic"), help="towards ground stations (default %(default)s)")
     add("--state", type=Path, metavar="DIR", help="keeps parameters, logs, files (default: nothing is kept)")
@@ -64,7 +64,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     simulator, status, stop = begin("autopilot", args.simulator, args, open_ground_link)
     from colibri.autopilot.process.run import run
 
-    return run(args, OneByOne(simulator), status, stop)
+    return run(args, BlockingReceiver(simulator), status, stop)
 
 
 if __name__ == "__main__":

@@ -6,10 +6,10 @@ from typing import Protocol
 
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Mode, Need, mode_of, mode_of_custom
-from colibri.autopilot.guidance.tasks.orbit import Round
+from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import Circle, GoTo
-from colibri.autopilot.guidance.tasks.position import Climb, Stop, Way
-from colibri.autopilot.guidance.tasks.task import Course
+from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask
+from colibri.autopilot.guidance.tasks.task import FlightTask
 from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
 from colibri.common.kernels import cos, sin
 from colibri.common.types import Vector
@@ -105,8 +105,8 @@ class Commands:
     def _select(self, mode: Mode) -> Outcome:
         return outcome_of(self._choose(mode))
 
-    def _fly(self, mode: Mode, course: Course) -> Refusal | None:
-        return self._pilot.fly(mode, course, self._needs.missing())
+    def _fly(self, mode: Mode, task: FlightTask) -> Refusal | None:
+        return self._pilot.fly(mode, task, self._needs.missing())
 
     def _arm_disarm(self, command: Command) -> Outcome:
         force = command.p2 == FORCE_MAGIC
@@ -137,12 +137,14 @@ class Commands:
             height_m = self._height_of_takeoff(command)
         if not pilot.ground_m + MIN_CLIMB_M <= height_m < MAX_HEIGHT_M:
             return _denied("take-off", "not a height above the ground")
-        scene = pilot.scene()
-        x, y, _ = scene.place
+        context = pilot.context()
+        x, y, _ = context.place
         refusal = self._fence.refusal((x, y, height_m))
         if refusal is not None:
             return _denied("take-off", refusal.reason)
-        return outcome_of(self._fly(Mode.TAKEOFF, Climb(height_m, None, scene, pilot.behaviour.takeoff_speed_m_s)))
+        return outcome_of(
+            self._fly(Mode.TAKEOFF, TakeoffTask(height_m, None, context, pilot.behaviour.takeoff_speed_m_s))
+        )
 
     def _height_of_takeoff(self, command: Command) -> float:
         """Take z as above home, as most mean it, but from who says otherwise: QGC, which sends a pitch of -1."""
@@ -164,7 +166,7 @@ class Commands:
         if not (isnan(speed) or self._may_fly_at(speed)):
             return _denied("reposition", f"a speed of {speed:g} m/s")
         if all(map(isnan, (command.x, command.y, command.z, command.p4))):
-            return outcome_of(self._fly(Mode.HOLD, Stop()))
+            return outcome_of(self._fly(Mode.HOLD, HoldTask()))
         frame = mav.MAV_FRAME_GLOBAL if command.frame is None else command.frame
         return outcome_of(self._go(command.x, command.y, command.z, frame, command.p4, speed))
 
@@ -172,8 +174,8 @@ class Commands:
         pilot = self._pilot
         if not self._flies:
             return Refusal("reposition refused: the vehicle is not flying")
-        scene = pilot.scene()
-        place, only_height = scene.place, isnan(x) and isnan(y)
+        context = pilot.context()
+        place, only_height = context.place, isnan(x) and isnan(y)
         if not only_height:
             if not is_on_earth(x, y):
                 return Refusal("reposition refused: not a latitude and longitude")
@@ -184,8 +186,8 @@ class Commands:
         refusal = self.unreachable(place)
         if refusal is not None:
             return Refusal(f"reposition refused: {refusal.reason}")
-        yaw = 0.5 * pi - yaw_ned if not isnan(yaw_ned) else scene.yaw_rad if only_height else None
-        return self._fly(Mode.HOLD, Way(GoTo(place, yaw, None if isnan(speed) else speed), scene))
+        yaw = 0.5 * pi - yaw_ned if not isnan(yaw_ned) else context.yaw_rad if only_height else None
+        return self._fly(Mode.HOLD, GoToTask(GoTo(place, yaw, None if isnan(speed) else speed), context))
 
     @property
     def _flies(self) -> bool:
@@ -206,8 +208,8 @@ class Commands:
         pilot = self._pilot
         if not self._flies:
             return _denied("orbit", "the vehicle is not flying")
-        scene = pilot.scene()
-        x, y, z = scene.place
+        context = pilot.context()
+        x, y, z = context.place
         if not (isnan(command.x) and isnan(command.y)):
             if not is_on_earth(command.x, command.y):
                 return _denied("orbit", "not a latitude and longitude")
@@ -221,7 +223,7 @@ class Commands:
         refusal = self._no_circle(circle)
         if refusal is not None:
             return _denied("orbit", refusal.reason)
-        return outcome_of(self._fly(Mode.ORBIT, Round(circle, scene)))
+        return outcome_of(self._fly(Mode.ORBIT, OrbitTask(circle, context)))
 
     def _no_circle(self, circle: Circle) -> Refusal | None:
         """Return why the vehicle may not fly a circle; None if it may."""
@@ -253,7 +255,7 @@ class Commands:
 
     def _set_home(self, command: Command) -> Outcome:
         if command.p1 == 1.0:
-            state = self._pilot.scene().state
+            state = self._pilot.context().state
             self._home.move(state.position_enu_m, state.euler[2])
             return Outcome()
         if command.p1 != 0.0 and not isnan(command.p1):
@@ -285,10 +287,10 @@ class Commands:
             return _denied("turn", "1 counts from the heading, 0 from north")
         if not self._flies:
             return Outcome(TEMPORARILY_REJECTED, "turn refused: the vehicle is not flying")
-        scene = self._pilot.scene()
-        zero_rad = scene.yaw_rad if relative else 0.5 * pi
+        context = self._pilot.context()
+        zero_rad = context.yaw_rad if relative else 0.5 * pi
         yaw = zero_rad - radians(-angle if relative and way < 0.0 else angle)
-        return outcome_of(self._fly(Mode.HOLD, Way(GoTo(scene.place, yaw), scene)))
+        return outcome_of(self._fly(Mode.HOLD, GoToTask(GoTo(context.place, yaw), context)))
 
     def _check(self, command: Command) -> Outcome:
         del command

@@ -1,4 +1,4 @@
-"""Missions in flight: the plans that were uploaded, and the course that flies a mission."""
+"""Missions in flight: the plans that were uploaded, and the task that flies a mission."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,11 +10,11 @@ from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.mission.executor import MissionExecutor, MissionRecord, Reached, SetHome
 from colibri.autopilot.guidance.mission.items import places
-from colibri.autopilot.guidance.mission.legs import Defaults, Situation
-from colibri.autopilot.guidance.tasks.orbit import Round
+from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
+from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Hold, Land, Order, Return, TakeOff
-from colibri.autopilot.guidance.tasks.position import Climb, Legs, Stop, Way, homeward, landing
-from colibri.autopilot.guidance.tasks.task import Asked, Course, Scene
+from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask, TaskSequence, homeward, landing
+from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext, TaskOutput
 from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem, Plan
 from colibri.mavlink.mission.service import Progress
 from colibri.mavlink.services.statustext import INFO, WARNING
@@ -79,13 +79,13 @@ class Missions:
         self._fence.measure_anew()
         self._check_mission()
 
-    def course(self) -> "MissionCourse":
-        """Start the mission, and return its course, from the current item on."""
+    def task(self) -> "MissionTask":
+        """Start the mission, and return its task, from the current item on."""
         self._executor.start()
-        return self.course_again()
+        return self.task_again()
 
-    def course_again(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionCourse":
-        """Return the course of a mission that is flown already, or that is over while the rotors still turn.
+    def task_again(self, turns: float = 0.0, legs: tuple[int, ...] = ()) -> "MissionTask":
+        """Return the task of a mission that is flown already, or that is over while the rotors still turn.
 
         Args:
             turns: How many turns of the current item were flown before.
@@ -95,7 +95,7 @@ class Missions:
         self._executor.adopt(
             Defaults(max(behaviour.acceptance_m, 0.1), behaviour.takeoff_height_m, behaviour.orbit_radius_m)
         )
-        return MissionCourse(self._executor, self, turns, legs)
+        return MissionTask(self._executor, self, turns, legs)
 
     def record(self) -> MissionRecord:
         """Return where the mission stands."""
@@ -127,17 +127,17 @@ class Missions:
         reached, self._reached = self._reached, []
         return reached
 
-    def situation(self, scene: Scene, *, arrived: bool, turns: float) -> Situation:
+    def mission_context(self, context: TaskContext, *, arrived: bool, turns: float) -> MissionContext:
         """Return what the mission sees."""
-        state = scene.state
-        return Situation(
+        state = context.state
+        return MissionContext(
             state.position_enu_m,
             state.velocity_enu_m_s,
             state.euler[2],
-            scene.standing,
+            context.standing,
             arrived,
             turns,
-            scene.home_enu_m,
+            context.home_enu_m,
             self._home.origin,
         )
 
@@ -151,8 +151,8 @@ class Missions:
             self._lines.say(WARNING, self._outside)
 
 
-class MissionCourse:
-    """Flies what the executor orders, one course after another.
+class MissionTask:
+    """Flies what the executor orders, one task after another.
 
     Attributes:
         says_return: Whether the mission leaves the rest of the flight to mode return.
@@ -166,59 +166,59 @@ class MissionCourse:
         self._missions = missions
         self._order: Order | None = None
         self._turns_before, self._legs_left = turns, legs
-        self._course: Course = Stop()
+        self._task: FlightTask = HoldTask()
         self._done = False
         self.says_return = False
 
-    def ask(self, scene: Scene) -> Asked:
+    def update(self, context: TaskContext) -> TaskOutput:
         """Return what the order of now asks for."""
-        arrived = self._course.arrived(scene)
-        situation = self._missions.situation(scene, arrived=arrived, turns=self.turns)
-        step = self._executor.step(situation, scene.now_us)
+        arrived = self._task.arrived(context)
+        mission_context = self._missions.mission_context(context, arrived=arrived, turns=self.turns)
+        step = self._executor.step(mission_context, context.now_us)
         for event in step.events:
-            self._missions.flown(event, scene.state)
+            self._missions.flown(event, context.state)
         if step.order is not self._order:
             if self._order is not None:
                 self._turns_before = 0.0
             self._order = step.order
-            self._course = course_of(step.order, scene)
-            if isinstance(self._course, Legs):
-                self._course.skip(self._legs_left)
+            self._task = task_of(step.order, context)
+            if isinstance(self._task, TaskSequence):
+                self._task.skip(self._legs_left)
             self._legs_left = ()
         self._done = not step.flying
-        if self._done and isinstance(self._course, Round):
-            self._course = Stop()
+        if self._done and isinstance(self._task, OrbitTask):
+            self._task = HoldTask()
         self.says_return = isinstance(step.order, Return) and step.flying
-        return self._course.ask(scene)
+        return self._task.update(context)
 
     @property
     def turns(self) -> float:
         """How often it went around the centre of the order that is flown."""
-        return self._turns_before + (self._course.turns if isinstance(self._course, Round) else 0.0)
+        return self._turns_before + (self._task.turns if isinstance(self._task, OrbitTask) else 0.0)
 
     @property
     def legs(self) -> tuple[int, ...]:
         """How many legs are left of the order that is flown."""
-        return self._course.left if isinstance(self._course, Legs) else ()
+        return self._task.left if isinstance(self._task, TaskSequence) else ()
 
-    def arrived(self, scene: Scene) -> bool:
+    def arrived(self, context: TaskContext) -> bool:
         """Whether the mission is flown to its end."""
-        del scene
+        del context
         return self._done
 
 
-def course_of(order: Order, scene: Scene) -> Course:
+def task_of(order: Order, context: TaskContext) -> FlightTask:
     """Return how an order is flown."""
     match order:
         case GoTo():
-            return Way(order, scene)
+            return GoToTask(order, context)
         case Circle():
-            return Round(order, scene)
+            return OrbitTask(order, context)
         case TakeOff():
-            return Climb(order.height_enu_m, order.yaw_rad, scene)
+            return TakeoffTask(order.height_enu_m, order.yaw_rad, context)
         case Land():
             return landing(order)
         case Return():
-            return homeward(scene)
+            return homeward(context)
         case Hold():
-            return Stop()
+            return HoldTask()

@@ -5,30 +5,39 @@ from typing import TypeAlias
 
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.commander.task_record import CourseRecord
+from colibri.autopilot.commander.task_record import TaskRecord
 from colibri.autopilot.control.interface import Preview
 from colibri.autopilot.control.profile import References
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference
 from colibri.autopilot.guidance.reference import Reference, target_of
 from colibri.autopilot.guidance.sample_grid import Instants
-from colibri.autopilot.guidance.tasks.attitude import AltitudeSticks, Descent, Stabilized
-from colibri.autopilot.guidance.tasks.follow import Following
-from colibri.autopilot.guidance.tasks.offboard import Companion
-from colibri.autopilot.guidance.tasks.orbit import Round
+from colibri.autopilot.guidance.tasks.attitude import AltitudeTask, DescentTask, StabilizedTask
+from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
+from colibri.autopilot.guidance.tasks.offboard import OffboardTask
+from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Land, TakeOff, order_of
-from colibri.autopilot.guidance.tasks.position import Along, Climb, Legs, Stop, Way, homeward, landing, to_track
-from colibri.autopilot.guidance.tasks.sticks import PositionSticks
-from colibri.autopilot.guidance.tasks.task import Course, Scene
+from colibri.autopilot.guidance.tasks.position import (
+    GoToTask,
+    HoldTask,
+    TakeoffTask,
+    TaskSequence,
+    TrackTask,
+    homeward,
+    landing,
+    to_track,
+)
+from colibri.autopilot.guidance.tasks.sticks import PositionTask
+from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import Planner, plan, start_yaw
 from colibri.autopilot.guidance.trajectories.tracks import Track, track
 from colibri.plant.vehicle.description import Vehicle
 
-TaskFactory: TypeAlias = Callable[[Scene], Course]
-"""Says how a mode begins to be flown from a scene."""
+TaskFactory: TypeAlias = Callable[[TaskContext], FlightTask]
+"""Says how a mode begins to be flown in a context."""
 
 
 class ModeTasks:
-    """Makes the courses of one vehicle: a table of modes, and what each begins with."""
+    """Makes the tasks of one vehicle: a table of modes, and what each begins with."""
 
     def __init__(
         self,
@@ -40,10 +49,10 @@ class ModeTasks:
         references: References,
         first: Track | None,
     ) -> None:
-        """Make courses of these parts.
+        """Make tasks of these parts.
 
         Args:
-            missions: Have the course of a mission.
+            missions: Have the task of a mission.
             attitude: Leads attitude and thrust; None for a law that takes neither.
             vehicle: As the control law knows it.
             preview: The references that the law wants.
@@ -58,17 +67,17 @@ class ModeTasks:
         self._references = references
         self._first = first
         self._factories: dict[Mode, TaskFactory] = {
-            Mode.HOLD: lambda _: Stop(),
+            Mode.HOLD: lambda _: HoldTask(),
             Mode.TAKEOFF: climb,
             Mode.LAND: self._down,
             Mode.RETURN: homeward,
-            Mode.MISSION: lambda _: missions.course(),
-            Mode.OFFBOARD: lambda _: Companion(attitude),
-            Mode.ORBIT: lambda _: Stop(),
-            Mode.FOLLOW: lambda _: Following(),
-            Mode.POSITION: lambda _: PositionSticks(),
+            Mode.MISSION: lambda _: missions.task(),
+            Mode.OFFBOARD: lambda _: OffboardTask(attitude),
+            Mode.ORBIT: lambda _: HoldTask(),
+            Mode.FOLLOW: lambda _: FollowTargetTask(),
+            Mode.POSITION: lambda _: PositionTask(),
             Mode.TRACK: self._on_track,
-            Mode.STABILIZED: lambda _: Stop() if attitude is None else Stabilized(attitude),
+            Mode.STABILIZED: lambda _: HoldTask() if attitude is None else StabilizedTask(attitude),
             Mode.ALTITUDE: self._altitude,
         }
 
@@ -87,61 +96,61 @@ class ModeTasks:
         self._first = None
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Go by other numbers of the vehicle, from the next course on."""
+        """Go by other numbers of the vehicle, from the next task on."""
         self._gravity_m_s2 = vehicle.gravity_m_s2
 
-    def begin(self, mode: Mode, scene: Scene) -> Course:
+    def begin(self, mode: Mode, context: TaskContext) -> FlightTask:
         """Return how a mode begins."""
-        return self._factories[mode](scene)
+        return self._factories[mode](context)
 
-    def again(self, record: CourseRecord, mode: Mode, scene: Scene) -> Course:
+    def again(self, record: TaskRecord, mode: Mode, context: TaskContext) -> FlightTask:
         """Return how a mode goes on after a restart in which `record` was flown."""
         if mode is Mode.TRACK and self._first is None and record.began_us is not None:
-            chosen = track(scene.behaviour.track)
-            return Along(self._plan(chosen), chosen.duration_s, record.began_us)
+            chosen = track(context.behaviour.track)
+            return TrackTask(self._plan(chosen), chosen.duration_s, record.began_us)
         if mode is Mode.MISSION:
-            return self._missions.course_again(record.turns, record.legs)
-        course = _ordered(mode, record, scene) or self.begin(mode, scene)
-        return course.skip(record.legs) if isinstance(course, Legs) else course
+            return self._missions.task_again(record.turns, record.legs)
+        task = _ordered(mode, record, context) or self.begin(mode, context)
+        return task.skip(record.legs) if isinstance(task, TaskSequence) else task
 
-    def _altitude(self, scene: Scene) -> Course:
-        del scene
-        return Stop() if self._attitude is None else AltitudeSticks(self._attitude, self._gravity_m_s2)
+    def _altitude(self, context: TaskContext) -> FlightTask:
+        del context
+        return HoldTask() if self._attitude is None else AltitudeTask(self._attitude, self._gravity_m_s2)
 
-    def _down(self, scene: Scene) -> Course:
+    def _down(self, context: TaskContext) -> FlightTask:
         """Return how to land: level, where nobody knows the place; a law that takes no attitude sinks where it is."""
-        if scene.blind and self._attitude is not None:
-            return Descent(self._attitude, self._gravity_m_s2)
+        if context.blind and self._attitude is not None:
+            return DescentTask(self._attitude, self._gravity_m_s2)
         return landing(Land())
 
-    def _on_track(self, scene: Scene) -> Course:
+    def _on_track(self, context: TaskContext) -> FlightTask:
         if self._first is not None:
             first, self._first = self._first, None
             planner = self._plan(first)
             for_law = None if self._instants.rows is None else plan(first, self._references, self._preview)
-            return Along(planner, first.duration_s, 0, for_law, start=_at_start(planner, scene.now_us))
-        chosen = track(scene.behaviour.track)
+            return TrackTask(planner, first.duration_s, 0, for_law, start=_at_start(planner, context.now_us))
+        chosen = track(context.behaviour.track)
         return to_track(self._plan(chosen), chosen.duration_s)
 
     def _plan(self, chosen: Track) -> Planner:
         return plan(chosen, self._references, self._instants.preview)
 
 
-def climb(scene: Scene) -> Course:
+def climb(context: TaskContext) -> FlightTask:
     """Return how to take off where no height is asked for."""
-    behaviour = scene.behaviour
-    return Climb(scene.ground_m + behaviour.takeoff_height_m, None, scene, behaviour.takeoff_speed_m_s)
+    behaviour = context.behaviour
+    return TakeoffTask(context.ground_m + behaviour.takeoff_height_m, None, context, behaviour.takeoff_speed_m_s)
 
 
-def _ordered(mode: Mode, record: CourseRecord, scene: Scene) -> Course | None:
-    """Return the course of an order that was flown in a mode; None where the mode itself says how it begins."""
+def _ordered(mode: Mode, record: TaskRecord, context: TaskContext) -> FlightTask | None:
+    """Return the task of an order that was flown in a mode; None where the mode itself says how it begins."""
     order = None if record.order is None else order_of(record.order)
     if mode is Mode.HOLD and isinstance(order, GoTo):
-        return Way(order, scene)
+        return GoToTask(order, context)
     if mode is Mode.TAKEOFF and isinstance(order, TakeOff):
-        return Climb(order.height_enu_m, order.yaw_rad, scene, scene.behaviour.takeoff_speed_m_s)
+        return TakeoffTask(order.height_enu_m, order.yaw_rad, context, context.behaviour.takeoff_speed_m_s)
     if mode is Mode.ORBIT and isinstance(order, Circle):
-        return Round(order, scene)
+        return OrbitTask(order, context)
     return None
 
 

@@ -8,7 +8,7 @@ from colibri.autopilot.commander.rules.modes import Need
 from colibri.autopilot.guidance.tasks.task import Steered
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
 
-_LEADER_LOST_US = 10_000_000
+_TARGET_LOST_US = 10_000_000
 _T = TypeVar("_T", covariant=True)
 
 
@@ -64,5 +64,5 @@ class ModeNeeds:
         return Steered(
             self._manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6)),
             self._offboard.latest(now_us, round(behaviour.setpoints_lost_s * 1e6)),
-            self._follow.latest(now_us, _LEADER_LOST_US),
+            self._follow.latest(now_us, _TARGET_LOST_US),
         )

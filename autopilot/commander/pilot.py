@@ -7,24 +7,33 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from colibri.autopilot.commander.home import Home
-from colibri.autopilot.commander.missions import MissionCourse
-from colibri.autopilot.commander.rules.arming import Facts, refusals
+from colibri.autopilot.commander.missions import MissionTask
+from colibri.autopilot.commander.rules.arming import ArmingInputs, refusals
 from colibri.autopilot.commander.rules.failsafe_rule import Flight
 from colibri.autopilot.commander.rules.failsafe_table import Action
-from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, State, following
+from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, State, next_state
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon, VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.landing_detector import Landing, is_below, stands_at_first, watch
 from colibri.autopilot.guidance.reference import Reference, at_rest, lead, lead_along, moving_with, still_target
 from colibri.autopilot.guidance.sample_grid import Instants
-from colibri.autopilot.guidance.tasks.position import Along, Stop
-from colibri.autopilot.guidance.tasks.task import NOT_STEERED, Course, Lean, Motion, Planned, Scene, Steered, lifts
+from colibri.autopilot.guidance.tasks.position import HoldTask, TrackTask
+from colibri.autopilot.guidance.tasks.task import (
+    NOT_STEERED,
+    AttitudeMotion,
+    FlightTask,
+    Motion,
+    PlannedMotion,
+    Steered,
+    TaskContext,
+    lifts,
+)
 from colibri.common.types import Array, Vector
 from colibri.mavlink.services.statustext import EMERGENCY, INFO, NOTICE
 from colibri.mavlink.wire.refusal import Refusal
 
-CourseMaker: TypeAlias = Callable[[Mode, Scene], Course]
+TaskFactory: TypeAlias = Callable[[Mode, TaskContext], FlightTask]
 _SAVED_BY = {
     Action.HOLD: Event.SAVED_BY_HOLD,
     Action.RETURN: Event.SAVED_BY_RETURN,
@@ -84,7 +93,7 @@ class Sensed(NamedTuple):
 
 
 class PilotRecord(NamedTuple):
-    """What a pilot needs to go on after a restart, as plain data; but for the course, what `Pilot` says of each.
+    """What a pilot needs to go on after a restart, as plain data; but for the task, what `Pilot` says of each.
 
     Attributes:
         idles: Whether the rotors stand or idle.
@@ -112,7 +121,7 @@ class PilotRecord(NamedTuple):
 
 
 class Pilot:
-    """Flies courses, one mode after another.
+    """Flies tasks, one mode after another.
 
     One state machine with many doors: its attributes are its state, all of it in `record`; its methods are what may
     happen to it, and what is asked about it.
@@ -123,7 +132,7 @@ class Pilot:
         home: Where it took off, or was told to return to.
         standing: Whether it stands on the ground.
         idles: Whether the rotors stand or idle.
-        course: What is flown.
+        task: What is flown.
         reference: Where the reference stands.
         speed_m_s: Cruise speed that was asked for; None for the parameters'.
         times: Of the last arming, take-off and landing.
@@ -137,7 +146,7 @@ class Pilot:
         self,
         instants: Instants,
         behaviour: Behaviour,
-        make_course: CourseMaker,
+        make_task: TaskFactory,
         home: Home,
         lines: StatusQueue,
     ) -> None:
@@ -146,17 +155,17 @@ class Pilot:
         Args:
             instants: At which references are planned, and which of them the control law previews.
             behaviour: The numbers to fly by.
-            make_course: Says how each mode begins.
+            make_task: Says how each mode begins.
             home: Moved by take-offs and by whoever chooses it.
             lines: Take what a ground station is to know.
         """
         self._instants = instants
-        self._make_course = make_course
+        self._make_task = make_task
         self.state = FIRST
         self.behaviour = behaviour
         self.home = home
         self.standing = True
-        self.course: Course = Stop()
+        self.task: FlightTask = HoldTask()
         self.reference: Reference | None = None
         self.speed_m_s: float | None = None
         self.times = FlightTimes()
@@ -164,11 +173,11 @@ class Pilot:
         self.terminated = False
         self.rotor_failed = ""
         self.ground_m = 0.0
-        self._course_is_chosen = False
+        self._task_is_chosen = False
         self.idles = True
         self._landing = Landing()
         self._sensed = Sensed()
-        self._facts = Facts(None, standing=True, charge=1.0, thrust_stick=None)
+        self._arming_inputs = ArmingInputs(None, standing=True, charge=1.0, thrust_stick=None)
         self._lines = lines
         self._warm_up()
 
@@ -196,7 +205,7 @@ class Pilot:
         self._engage(self.state.mode)
 
     def record(self) -> PilotRecord:
-        """Return what is needed to go on after a restart, but for the course."""
+        """Return what is needed to go on after a restart, but for the task."""
         assert self.reference is not None, "the pilot has seen the vehicle"
         return PilotRecord(
             *self.state,
@@ -217,13 +226,13 @@ class Pilot:
         now_us: int,
         vehicle: VehicleState,
         record: PilotRecord,
-        again: CourseMaker,
+        again: TaskFactory,
         *,
-        closely: bool,
+        seamless: bool,
     ) -> None:
         """See the vehicle for the first time since a restart: it goes on as it was.
 
-        The reference goes on where it was if the restart took no time, that is `closely`, and else from where the
+        The reference goes on where it was if the restart took no time, that is `seamless`, and else from where the
         vehicle is. One that has come down meanwhile stays there. `again` says how a mode goes on.
         """
         self._sensed = self._sensed._replace(now_us=now_us, vehicle=vehicle)
@@ -231,14 +240,14 @@ class Pilot:
         self.speed_m_s = record.speed_m_s
         self.times = FlightTimes(record.armed_us, record.takeoff_us, record.landing_us, record.flights)
         self.ground_m = record.ground_m
-        came_down = not closely and not record.standing and stands_at_first(vehicle, record.ground_m)
+        came_down = not seamless and not record.standing and stands_at_first(vehicle, record.ground_m)
         self.standing = record.standing or came_down
         self.state = FIRST if came_down else State(record.mode, record.armed)
         self.saving = Action.NONE if came_down else record.saving
         self.idles = record.idles or came_down
-        self.reference = Reference(record.motion, record.heading) if closely else moving_with(vehicle)
-        self._take((self._make_course if came_down else again)(self.state.mode, self.scene()))
-        self._course_is_chosen = not came_down
+        self.reference = Reference(record.motion, record.heading) if seamless else moving_with(vehicle)
+        self._take((self._make_task if came_down else again)(self.state.mode, self.context()))
+        self._task_is_chosen = not came_down
 
     def adopt(self, behaviour: Behaviour) -> None:
         """Fly by other numbers from now on; without landing on three rotors, none counts as failed."""
@@ -269,12 +278,12 @@ class Pilot:
         """Whether the vehicle knows where it is, as of the last control sample."""
         return self._sensed.knows_position
 
-    def take_stock(self, facts: Facts) -> None:
+    def take_stock(self, inputs: ArmingInputs) -> None:
         """Take in what arming is judged by."""
-        self._facts = facts
+        self._arming_inputs = inputs
 
-    def scene(self) -> Scene:
-        """Return what a course sees now."""
+    def context(self) -> TaskContext:
+        """Return what a task sees now."""
         now_us, vehicle, steered, knows_position = self._sensed
         assert vehicle is not None, "the pilot has seen the vehicle"
         assert self.reference is not None, "the pilot has seen the vehicle"
@@ -285,7 +294,7 @@ class Pilot:
         if speed != behaviour.limits.speed_m_s:
             behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed))
         interval_s = interval_us * 1e-6
-        return Scene(
+        return TaskContext(
             now_us,
             vehicle,
             self.reference,
@@ -306,7 +315,7 @@ class Pilot:
 
     def refusals(self) -> list[str]:
         """Return why the rotors may not be armed; empty if they may."""
-        return refusals(self._facts) + ([self.rotor_failed] if self.rotor_failed else [])
+        return refusals(self._arming_inputs) + ([self.rotor_failed] if self.rotor_failed else [])
 
     def arm(self, missing: Collection[Need], *, force: bool = False) -> Refusal | None:
         """Let the rotors turn; return why not. `missing` are the needs of modes that nothing meets now."""
@@ -324,7 +333,7 @@ class Pilot:
             self.terminated = False
             if vehicle is not None:
                 self.home.propose(vehicle.position_enu_m, vehicle.euler[2])
-            if not self._course_is_chosen:
+            if not self._task_is_chosen:
                 self._engage(self.state.mode)
         return refusal
 
@@ -346,15 +355,15 @@ class Pilot:
             self._engage(mode)
         return refusal
 
-    def fly(self, mode: Mode, course: Course, missing: Collection[Need]) -> Refusal | None:
-        """Change to `mode` and fly `course` in it, now or once the rotors are armed; return why not.
+    def fly(self, mode: Mode, task: FlightTask, missing: Collection[Need]) -> Refusal | None:
+        """Change to `mode` and fly `task` in it, now or once the rotors are armed; return why not.
 
-        `missing` are the needs of modes that nothing meets now; where a circle leads, the course says.
+        `missing` are the needs of modes that nothing meets now; where a circle leads, the task says.
         """
         refusal = self._follow(Event.SELECT, "", mode, [need for need in missing if need is not Need.CIRCLE])
         if refusal is None:
             self.saving = Action.NONE
-            self.course, self._course_is_chosen = course, True
+            self.task, self._task_is_chosen = task, True
         return refusal
 
     def save(self, action: Action) -> None:
@@ -376,7 +385,7 @@ class Pilot:
     def happened(self, event: Event) -> None:
         """Tell of an event that may change the mode: what is finished."""
         before = self.state
-        stays = event in (Event.ARRIVED, Event.FINISHED)  # where the course that ends has led
+        stays = event in (Event.ARRIVED, Event.FINISHED)  # where the task that ends has led
         if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode and not stays:
             self._engage(self.state.mode)
 
@@ -399,18 +408,22 @@ class Pilot:
         if not self.state.armed:
             self._rest()
             return RESTS
-        scene = self.scene()
-        asked = self.course.ask(scene)
-        if isinstance(self.course, MissionCourse) and self.course.says_return:
+        context = self.context()
+        wanted = self.task.update(context)
+        if isinstance(self.task, MissionTask) and self.task.says_return:
             self.happened(Event.RETURN_ITEM)
         if self.standing:
-            if not (asked.lifts if isinstance(asked, Lean) else lifts(asked.target, scene.state)):
+            if not (wanted.lifts if isinstance(wanted, AttitudeMotion) else lifts(wanted.target, context.state)):
                 self._idle()
                 return RESTS
             self._begin_flight()
         begins, self.idles = self.idles, False
-        guidance = self._lean(asked, begins) if isinstance(asked, Lean) else self._move(scene, asked, begins)
-        if self.course.arrived(scene):
+        guidance = (
+            self._attitude_guidance(wanted, begins)
+            if isinstance(wanted, AttitudeMotion)
+            else self._move(context, wanted, begins)
+        )
+        if self.task.arrived(context):
             self._arrive()
         return guidance
 
@@ -418,29 +431,29 @@ class Pilot:
         """Add a line for the ground station."""
         self._lines.say(severity, text)
 
-    def _move(self, scene: Scene, asked: Motion | Planned, begins: bool) -> Guidance:
-        horizon = self._lead(scene, asked)
-        self._watch_ground(scene.state, sinks=is_below(scene.reference, scene.state))
+    def _move(self, context: TaskContext, wanted: Motion | PlannedMotion, begins: bool) -> Guidance:
+        horizon = self._lead(context, wanted)
+        self._watch_ground(context.state, sinks=is_below(context.reference, context.state))
         return Guidance(horizon=horizon, begins=begins)
 
-    def _lead(self, scene: Scene, asked: Motion | Planned) -> Horizon:
+    def _lead(self, context: TaskContext, wanted: Motion | PlannedMotion) -> Horizon:
         """Move the reference on, and return what the control law previews of it."""
-        reference, limits, interval_s = scene.reference, asked.limits, scene.interval_s
-        if isinstance(asked, Planned):
-            horizon, self.reference = lead_along(reference, asked.horizon, limits, interval_s)
-            if asked.for_law is not None and horizon.position_enu_m is asked.horizon.position_enu_m:
-                turned = horizon.yaw_rad[0] - asked.horizon.yaw_rad[0]
-                return asked.for_law._replace(yaw_rad=asked.for_law.yaw_rad + turned)
+        reference, limits, interval_s = context.reference, wanted.limits, context.interval_s
+        if isinstance(wanted, PlannedMotion):
+            horizon, self.reference = lead_along(reference, wanted.horizon, limits, interval_s)
+            if wanted.for_law is not None and horizon.position_enu_m is wanted.horizon.position_enu_m:
+                turned = horizon.yaw_rad[0] - wanted.horizon.yaw_rad[0]
+                return wanted.for_law._replace(yaw_rad=wanted.for_law.yaw_rad + turned)
         else:
-            horizon, self.reference = lead(reference, asked.target, limits, interval_s)
+            horizon, self.reference = lead(reference, wanted.target, limits, interval_s)
         return self._instants.for_law(horizon)
 
-    def _lean(self, asked: Lean, begins: bool) -> Guidance:
+    def _attitude_guidance(self, wanted: AttitudeMotion, begins: bool) -> Guidance:
         vehicle = self._sensed.vehicle
         assert vehicle is not None, "the pilot has seen the vehicle"
-        self.reference = asked.reference
-        self._watch_ground(vehicle, sinks=asked.sinks, drifts=asked.drifts)
-        return Guidance(attitude=asked.demand, begins=begins)
+        self.reference = wanted.reference
+        self._watch_ground(vehicle, sinks=wanted.sinks, drifts=wanted.drifts)
+        return Guidance(attitude=wanted.demand, begins=begins)
 
     def _rest(self) -> None:
         """Lie, or fall, with the rotors standing still or idle."""
@@ -499,21 +512,21 @@ class Pilot:
 
     def _engage(self, mode: Mode) -> None:
         if self.reference is not None:
-            self._take(self._make_course(mode, self.scene()))
-            self._course_is_chosen = False
+            self._take(self._make_task(mode, self.context()))
+            self._task_is_chosen = False
 
-    def _take(self, course: Course) -> None:
-        """Fly a course from now on; one that was begun in mid-flight says where the reference is."""
-        self.course = course
-        if isinstance(course, Along) and course.start is not None:
-            self.reference = course.start
+    def _take(self, task: FlightTask) -> None:
+        """Fly a task from now on; one that was begun in mid-flight says where the reference is."""
+        self.task = task
+        if isinstance(task, TrackTask) and task.start is not None:
+            self.reference = task.start
 
     def _follow(
         self, event: Event, text: str, selected: Mode | None = None, missing: Collection[Need] = ()
     ) -> Refusal | None:
         if event is Event.SELECT and self.state.armed and self.rotor_failed:
             return Refusal(f"{selected} refused: {self.rotor_failed}")
-        after = following(self.state, event, selected, missing)
+        after = next_state(self.state, event, selected, missing)
         if isinstance(after, Refusal):
             return after
         if after != self.state and text:

@@ -1,6 +1,6 @@
 """The supervisor: decides by the failsafes' table what is to be done, and tells what the ground station is to know."""
 
-from colibri.autopilot.commander.rules.failsafe_conditions import Conditions, Seen, knows_position
+from colibri.autopilot.commander.rules.failsafe_conditions import Conditions, FailsafeInputs, knows_position
 from colibri.autopilot.commander.rules.failsafe_parameters import Limits, limits, settings
 from colibri.autopilot.commander.rules.failsafe_rule import Flight, Memory, following
 from colibri.autopilot.commander.rules.failsafe_table import Action, Condition
@@ -44,10 +44,10 @@ class Supervisor:
         """Whether an estimate tells the position well enough to fly to places; a state that is told does."""
         return knows_position(estimate, self.limits)
 
-    def step(self, seen: Seen, flight: Flight) -> Action:
+    def step(self, inputs: FailsafeInputs, flight: Flight) -> Action:
         """Return what is to begin at this control sample, before the pilot's step; NONE to go on as before."""
-        since_us = self._conditions.look(seen, self.limits, self.memory.held_us)
-        self.memory, action, said = following(self.memory, seen.now_us, since_us, self._settings, flight)
+        since_us = self._conditions.look(inputs, self.limits, self.memory.held_us)
+        self.memory, action, said = following(self.memory, inputs.now_us, since_us, self._settings, flight)
         for severity, text in said:
             self._lines.say(severity, text)
         return action

@@ -2,18 +2,18 @@
 
 from typing import NamedTuple
 
-from colibri.autopilot.commander.missions import MissionCourse
-from colibri.autopilot.guidance.tasks.orbit import Round
+from colibri.autopilot.commander.missions import MissionTask
+from colibri.autopilot.guidance.tasks.orbit import OrbitTask
 from colibri.autopilot.guidance.tasks.orders import OrderRecord, record_of
-from colibri.autopilot.guidance.tasks.position import Along, Climb, Legs, Stop, Way
-from colibri.autopilot.guidance.tasks.task import Course
+from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask, TaskSequence, TrackTask
+from colibri.autopilot.guidance.tasks.task import FlightTask
 
 
-class CourseRecord(NamedTuple):
+class TaskRecord(NamedTuple):
     """What is flown where the mode does not say it.
 
     Attributes:
-        order: By which a course can begin again; None where that is the mode's own.
+        order: By which a task can begin again; None where that is the mode's own.
         began_us: When the track that is flown began; None where none is.
         turns: How often the mission's circle was flown around.
         legs: How many legs are left of what is flown in legs.
@@ -25,14 +25,14 @@ class CourseRecord(NamedTuple):
     legs: tuple[int, ...] = ()
 
 
-def course_record(course: Course) -> CourseRecord:
+def task_record(task: FlightTask) -> TaskRecord:
     """Return what is flown."""
-    if isinstance(course, MissionCourse):
-        return CourseRecord(turns=course.turns, legs=course.legs)
-    if isinstance(course, Legs):
-        return course_record(course.course) if isinstance(course.course, Along) else CourseRecord(legs=course.left)
-    if isinstance(course, Along):
-        return CourseRecord(began_us=course.began_us)
-    if isinstance(course, Way | Round | Climb | Stop):
-        return CourseRecord(record_of(course.order))
-    return CourseRecord()
+    if isinstance(task, MissionTask):
+        return TaskRecord(turns=task.turns, legs=task.legs)
+    if isinstance(task, TaskSequence):
+        return task_record(task.task) if isinstance(task.task, TrackTask) else TaskRecord(legs=task.left)
+    if isinstance(task, TrackTask):
+        return TaskRecord(began_us=task.began_us)
+    if isinstance(task, GoToTask | OrbitTask | TakeoffTask | HoldTask):
+        return TaskRecord(record_of(task.order))
+    return TaskRecord()

@@ -17,7 +17,7 @@ from colibri.autopilot.control.interface import (
 )
 from colibri.autopilot.control.profile import Profile, ProfileError
 from colibri.autopilot.control.registry import check_controller, check_rotor_speeds, load_controller
-from colibri.autopilot.control.vehicle_model.battery import believed
+from colibri.autopilot.control.vehicle_model.battery import estimated
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.config import SettingsError
 from colibri.common.rotations import nearest_turn
@@ -72,7 +72,7 @@ class ControlLoop:
         self.control_interval_us = self._controller.control_interval_us
         self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
         self._memory: Any = None
-        self._told_ah = 0.0
+        self._reported_ah = 0.0
         self._is_plain = True
         self._yaw_rad = 0.0
         self.controls = (0.0, 0.0, 0.0, 0.0)
@@ -85,16 +85,16 @@ class ControlLoop:
         """
         before, self._memory = self._memory, self._controller.initial(rotor_speed)
         if self._charged is not None:
-            charge_ah = self._told_ah if afresh or before is None else self._charged.charge_ah(before)
+            charge_ah = self._reported_ah if afresh or before is None else self._charged.charge_ah(before)
             self._memory = self._charged.with_charge(self._memory, charge_ah)
         self._yaw_rad = yaw_rad
         self._command(np.full(4, rotor_speed))
 
     def know_charge(self, used_ah: float) -> None:
         """Take in the charge that the battery itself tells, Ah: a law that remembers another goes on with this."""
-        self._told_ah = used_ah
+        self._reported_ah = used_ah
         if self._charged is not None and self._memory is not None:
-            charge_ah = believed(self._charged.charge_ah(self._memory), used_ah, self.vehicle)
+            charge_ah = estimated(self._charged.charge_ah(self._memory), used_ah, self.vehicle)
             self._memory = self._charged.with_charge(self._memory, charge_ah)
 
     def record(self) -> LoopRecord:
@@ -107,13 +107,13 @@ class ControlLoop:
                 self._is_plain = False
         return LoopRecord(self._yaw_rad, self.controls, memory)
 
-    def resume(self, record: LoopRecord, *, closely: bool) -> None:
-        """Go on with what was remembered: `closely`, or as one begins in mid-flight, with the charge that is left."""
+    def resume(self, record: LoopRecord, *, seamless: bool) -> None:
+        """Go on with what was remembered: `seamless`, or as one begins in mid-flight, with the charge that is left."""
         hover_speed = self.vehicle.hover_speed
         first = self._controller.initial(hover_speed)
         kept = of_bytes(type(first), record.memory)
         self._memory = first if kept is None else kept
-        if closely and kept is not None:
+        if seamless and kept is not None:
             self._yaw_rad, self.controls = record.yaw_rad, record.controls
         else:
             self.begin(hover_speed, record.yaw_rad, afresh=False)

@@ -16,15 +16,15 @@ from colibri.autopilot.commander.pilot import Pilot, PilotRecord
 from colibri.autopilot.commander.rules.failsafe_rule import Memory
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.commander.supervisor import Supervisor
-from colibri.autopilot.commander.task_record import CourseRecord, course_record
+from colibri.autopilot.commander.task_record import TaskRecord, task_record
 from colibri.autopilot.control.loop import ControlLoop, LoopRecord
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
-from colibri.autopilot.estimation.state_source import Senses
-from colibri.autopilot.ground.battery_monitor import PowerMeter
+from colibri.autopilot.estimation.state_source import StateSource
+from colibri.autopilot.ground.battery_monitor import BatteryMonitor
 from colibri.autopilot.ground.stations import Stations
 from colibri.autopilot.guidance.mission.executor import MissionRecord
-from colibri.autopilot.guidance.tasks.task import Course, Scene
+from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Array
 from colibri.mavlink.hil.state import StateFrame
@@ -40,38 +40,38 @@ Plans: TypeAlias = Mapping[int, Sequence[MissionItem]]
 """Items by MAV_MISSION_TYPE."""
 
 
-class Kept(NamedTuple):
+class Checkpoint(NamedTuple):
     """A flight at one control sample.
 
     Attributes:
-        maker: Of profile and vehicle: what another law remembers is of no use.
+        fingerprint: Of profile and vehicle: what another law remembers is of no use.
         time_us: Simulated time.
         origin: Of the ENU frame.
         plan_ids: Opaque ids of mission, geofence and rally points, which are kept by themselves.
         mission: Where the mission stands.
         pilot: Mode, home, references.
-        course: What is flown.
+        task: What is flown.
         loop: The control law.
         charge_ah: Taken from the battery.
         energy_wh: The same as energy.
-        senses: Of the estimator; empty where the state is told.
+        state_source: Of the estimator; empty where the state is told.
         rotor_lost: 0..3; None while all turn.
         rotor_speeds: As their lag has them, parts of the largest, (4,).
         failsafes: What they remember.
         had_station: Whether a ground station was ever heard: its loss counts from the restart.
     """
 
-    maker: int
+    fingerprint: int
     time_us: int
     origin: Geodetic
     plan_ids: tuple[int, ...]
     mission: MissionRecord
     pilot: PilotRecord
-    course: CourseRecord
+    task: TaskRecord
     loop: LoopRecord
     charge_ah: float
     energy_wh: float
-    senses: bytes
+    state_source: bytes
     rotor_lost: int | None
     rotor_speeds: Array
     failsafes: Memory
@@ -86,19 +86,19 @@ class Kept(NamedTuple):
         return 0 <= time_us - self.time_us <= CLOSE_US
 
 
-class Past(NamedTuple):
+class History(NamedTuple):
     """What was kept of a flight.
 
     Attributes:
-        kept: Its last control sample.
+        checkpoint: Its last control sample.
         plans: Uploaded by ground stations.
     """
 
-    kept: Kept
+    checkpoint: Checkpoint
     plans: Plans
 
 
-def maker_of(profile: Profile, vehicle: Vehicle) -> int:
+def fingerprint_of(profile: Profile, vehicle: Vehicle) -> int:
     """Return a number that differs between profiles and vehicles that do."""
     return crc32(msgspec.msgpack.encode(profile) + repr(vehicle).encode())
 
@@ -109,71 +109,77 @@ def goes_on(mode: Mode, seq: int) -> str:
     return f"restarted in flight: {what}"
 
 
-Again: TypeAlias = Callable[[CourseRecord, Mode, Scene], Course]
+Again: TypeAlias = Callable[[TaskRecord, Mode, TaskContext], FlightTask]
 """Says how a mode goes on."""
 
 
-class Keeper:
+class Checkpointer:
     """Keeps one vehicle's flight."""
 
     def __init__(
         self,
-        maker: int,
+        fingerprint: int,
         loop: ControlLoop,
-        senses: Senses,
+        state_source: StateSource,
         pilot: Pilot,
         stations: Stations,
-        power: PowerMeter,
+        power: BatteryMonitor,
         rotor_loss: RotorLoss,
         supervisor: Supervisor,
     ) -> None:
-        """Keep what these parts of a vehicle know; `maker` is `maker_of` it."""
-        self._maker = maker
-        self._loop, self._senses = loop, senses
+        """Keep what these parts of a vehicle know; `fingerprint` is `fingerprint_of` it."""
+        self._fingerprint = fingerprint
+        self._loop, self._state_source = loop, state_source
         self._pilot, self._stations = pilot, stations
         self._power, self._rotor_loss, self._supervisor = power, rotor_loss, supervisor
 
-    def record(self, time_us: int) -> Kept:
+    def record(self, time_us: int) -> Checkpoint:
         """Return the flight as it is now."""
-        return Kept(
-            self._maker,
+        return Checkpoint(
+            self._fingerprint,
             time_us,
             self._pilot.home.origin,
             self._stations.plans.ids,
             self._stations.missions.record(),
             self._pilot.record(),
-            course_record(self._pilot.course),
+            task_record(self._pilot.task),
             self._loop.record(),
             self._power.charge_ah,
             self._power.energy_wh,
-            self._senses.record(),
+            self._state_source.record(),
             self._rotor_loss.lost,
             self._rotor_loss.watch.speeds,
             self._supervisor.memory,
             self._stations.station_us is not None,
         )
 
-    def resume(self, past: Past, frame: StateFrame, again: Again) -> None:
+    def resume(self, history: History, frame: StateFrame, again: Again) -> None:
         """Have every part but the senses, who come before, go on with a flight at its next frame."""
-        kept, plans = past
+        checkpoint, plans = history
         stations, pilot = self._stations, self._pilot
-        closely = kept.is_close_to(frame.time_us) and kept.maker == self._maker
-        self._loop.resume(kept.loop, closely=closely)
-        self._power.resume(kept.charge_ah, kept.energy_wh)
-        pilot.home.move_origin(kept.origin)
+        seamless = checkpoint.is_close_to(frame.time_us) and checkpoint.fingerprint == self._fingerprint
+        self._loop.resume(checkpoint.loop, seamless=seamless)
+        self._power.resume(checkpoint.charge_ah, checkpoint.energy_wh)
+        pilot.home.move_origin(checkpoint.origin)
         stations.plans.restore(plans)
-        same = stations.plans.ids == kept.plan_ids
-        stations.missions.resume(stations.plans.plans, kept.mission if same else None)
-        if kept.had_station:
+        same = stations.plans.ids == checkpoint.plan_ids
+        stations.missions.resume(stations.plans.plans, checkpoint.mission if same else None)
+        if checkpoint.had_station:
             stations.expect_station(frame.time_us)
         state = self._loop.state(frame)
         pilot.resume(
-            frame.time_us, state, kept.pilot, lambda mode, scene: again(kept.course, mode, scene), closely=closely
+            frame.time_us,
+            state,
+            checkpoint.pilot,
+            lambda mode, context: again(checkpoint.task, mode, context),
+            seamless=seamless,
         )
         stations.missions.moved_origin()
         if pilot.state.armed:
-            self._supervisor.resume(kept.failsafes)
-        if kept.rotor_lost is not None:
+            self._supervisor.resume(checkpoint.failsafes)
+        if checkpoint.rotor_lost is not None:
             flying = pilot.state.armed and not pilot.standing
-            self._rotor_loss.resume(kept.rotor_lost, kept.rotor_speeds, state, pilot.ground_m, flying=flying)
-            pilot.lose_rotor(kept.rotor_lost)
+            self._rotor_loss.resume(
+                checkpoint.rotor_lost, checkpoint.rotor_speeds, state, pilot.ground_m, flying=flying
+            )
+            pilot.lose_rotor(checkpoint.rotor_lost)

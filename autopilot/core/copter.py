@@ -7,8 +7,8 @@ from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.pilot import RESTS, Guidance, Pilot
-from colibri.autopilot.commander.rules.arming import Facts, battery_fault
-from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, Seen
+from colibri.autopilot.commander.rules.arming import ArmingInputs, battery_fault
+from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, FailsafeInputs
 from colibri.autopilot.commander.rules.failsafe_table import Action, Condition
 from colibri.autopilot.commander.rules.modes import MANUAL, Mode
 from colibri.autopilot.commander.status_queue import StatusQueue
@@ -17,13 +17,13 @@ from colibri.autopilot.control.interface import Clock, Decision, VehicleState
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
-from colibri.autopilot.core.checkpoint import Keeper, Kept, Past, goes_on, maker_of
+from colibri.autopilot.core.checkpoint import Checkpoint, Checkpointer, History, fingerprint_of, goes_on
 from colibri.autopilot.core.solve_time import SolveTime
 from colibri.autopilot.core.step import STILL, Received, Step, follows, nothing_known
 from colibri.autopilot.estimation.health import HealthWatch, not_known
-from colibri.autopilot.estimation.state_source import Estimator, Senses
-from colibri.autopilot.ground.battery_monitor import PowerMeter
-from colibri.autopilot.ground.snapshots import Photographer
+from colibri.autopilot.estimation.state_source import Estimator, StateSource
+from colibri.autopilot.ground.battery_monitor import BatteryMonitor
+from colibri.autopilot.ground.snapshots import SnapshotBuilder
 from colibri.autopilot.ground.stations import Stations, StationSettings
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference, attitude_limits
 from colibri.autopilot.guidance.sample_grid import instants
@@ -73,7 +73,7 @@ class Copter:
         values: dict[str, Value] | None = None,
         first: Track | None = None,
         estimator: Estimator | None = None,
-        past: Past | None = None,
+        history: History | None = None,
     ) -> None:
         """Fly `vehicle` by `profile`; `clock` only measures, it decides nothing.
 
@@ -86,7 +86,7 @@ class Copter:
             first: A track that is flown from time 0 on, the vehicle being in the air; None: it stands, or is picked
                 up in hold.
             estimator: Makes what turns frames of sensors into states; None: frames are states.
-            past: Of a flight in which an autopilot was killed; it goes on if the first frame is of the same flight.
+            history: Of a flight in which an autopilot was killed; it goes on if the first frame is of the same flight.
 
         Raises:
             ControllerError: The profile's control law cannot be used.
@@ -102,7 +102,7 @@ class Copter:
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock
         self.frame_interval_us = self._loop.frame_interval_us
-        self._senses = Senses(estimator, self.frame_interval_us)
+        self._state_source = StateSource(estimator, self.frame_interval_us)
         self._health = HealthWatch()
         self._interval_s = self._loop.control_interval_us * 1e-6
         flies_by = behaviour(self.parameters)
@@ -128,7 +128,7 @@ class Copter:
         )
         tuning = Tuning(numbers, builder(profile.controller, clock), self._loop, self.stations.warn)
         self.parameters.ask(tuning.prepare)
-        self.power = PowerMeter(believed)
+        self.power = BatteryMonitor(believed)
         self.supervisor = Supervisor(self.parameters, lines)
         self._missed_us: int | None = None
         self._waiting_us: int | None = None
@@ -137,12 +137,20 @@ class Copter:
         self._sent = STILL
         self.rotor_loss = RotorLoss(believed, self._loop.control_interval_us)
         self.rotor_loss.obey(flies_by)
-        self._photographer = Photographer(believed, self._interval_s, self._loop.plan_columns)
+        self._snapshots = SnapshotBuilder(believed, self._interval_s, self._loop.plan_columns)
         self._subscribers = self._subscribe()
-        parts = (self._loop, self._senses, self.pilot, self.stations, self.power, self.rotor_loss, self.supervisor)
-        self._keeper = Keeper(maker_of(profile, vehicle), *parts)
-        self._past = past
-        self._wakes = past is not None
+        parts = (
+            self._loop,
+            self._state_source,
+            self.pilot,
+            self.stations,
+            self.power,
+            self.rotor_loss,
+            self.supervisor,
+        )
+        self._checkpointer = Checkpointer(fingerprint_of(profile, vehicle), *parts)
+        self._history = history
+        self._wakes = history is not None
         self._resumed_us: int | None = None
         self.samples, self.resumed = 0, ""
         self._time_us: int | None = None
@@ -166,7 +174,7 @@ class Copter:
             vehicle=(
                 self._tasks.adopt,
                 self.rotor_loss.adopt,
-                self._photographer.adopt,
+                self._snapshots.adopt,
                 *(() if attitude is None else (attitude.adopt,)),
             ),
         )
@@ -188,12 +196,12 @@ class Copter:
         self._plant_status = plant_status
         if plant_status.battery is not None:
             self._loop.know_charge(plant_status.battery.used_ah)
-            self.power.hear(plant_status.battery)
+            self.power.receive(plant_status.battery)
         if self._wakes:
             self._wake(frame.time_us)
         due = self._loop.is_due(frame.time_us)
         goes_on = follows(frame.time_us, self._time_us, self.frame_interval_us)
-        known = self._senses.state(frame, asked=due or not goes_on)
+        known = self._state_source.state(frame, asked=due or not goes_on)
         if known is None:
             self._waiting_us = frame.time_us
             if self._time_us is not None:  # another flight, of which nothing is known yet
@@ -216,7 +224,7 @@ class Copter:
         self._sent = self._solving.controls(frame.time_us)
         command = ActuatorCommand(frame.time_us, self._sent, armed=self.pilot.state.armed)
         self._step_time_s = self._clock() - started_s
-        estimate = self._senses.estimate if due else None
+        estimate = self._state_source.estimate if due else None
         return Step(command, decision, self._step_time_s, estimate, self.stations.failures.take())
 
     def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
@@ -245,39 +253,39 @@ class Copter:
         self.stations.wait("")
         return self.stations.take_outbox()
 
-    def record(self) -> Kept | None:
+    def record(self) -> Checkpoint | None:
         """Return what the flight needs to go on after a restart; None as long as nothing is known of it."""
-        return None if self._time_us is None else self._keeper.record(self._time_us)
+        return None if self._time_us is None else self._checkpointer.record(self._time_us)
 
     def _wake(self, time_us: int) -> None:
         """Have the estimator go on before it sees the first frame."""
         self._wakes = False
-        if self._past is not None and self._past.kept.senses:
-            self._senses.resume(self._past.kept.senses, time_us)
+        if self._history is not None and self._history.checkpoint.state_source:
+            self._state_source.resume(self._history.checkpoint.state_source, time_us)
 
-    def _resume(self, past: Past, frame: StateFrame) -> None:
+    def _resume(self, history: History, frame: StateFrame) -> None:
         """Go on with the flight in which the autopilot was killed."""
-        pilot, kept = self.pilot, past.kept
-        if kept.pilot.mode is not Mode.TRACK or kept.course.began_us != 0:
+        pilot, checkpoint = self.pilot, history.checkpoint
+        if checkpoint.pilot.mode is not Mode.TRACK or checkpoint.task.began_us != 0:
             self._tasks.forget_first()
         self._resumed_us = frame.time_us
-        self._keeper.resume(past, frame, self._tasks.again)
+        self._checkpointer.resume(history, frame, self._tasks.again)
         self._sent = self._loop.controls if pilot.state.armed and not pilot.idles else STILL
         self._solving.at_once(self._sent)
         self.rotor_loss.begin(self._sent)
         self.stations.say(INFO, self.stations.banner())
         if not pilot.state.armed:
             return
-        if self._senses.estimate is not None and not self._senses.rests:
+        if self._state_source.estimate is not None and not self._state_source.rests:
             pilot.say(WARNING, FALLS)
         self.resumed = goes_on(pilot.state.mode, self.stations.missions.progress().seq)
         pilot.say(WARNING, self.resumed)
 
     def _begin(self, frame: StateFrame) -> None:
         """See the vehicle for the first time, or anew after frames were missed."""
-        past, self._past = self._past, None
-        if past is not None and past.kept.is_followed_by(frame.time_us):
-            self._resume(past, frame)
+        history, self._history = self._history, None
+        if history is not None and history.checkpoint.is_followed_by(frame.time_us):
+            self._resume(history, frame)
             return
         loop, hover_speed = self._loop, self._loop.vehicle.hover_speed
         if self._time_us is not None and frame.time_us > self._time_us:
@@ -287,7 +295,7 @@ class Copter:
         if self._time_us is not None:  # another flight: nothing that any service remembers is of any use
             self.stations.reboot()
         speed = self._start_speed if frame.time_us == 0 else hover_speed
-        rests = self._senses.rests
+        rests = self._state_source.rests
         if rests:
             speed = loop.vehicle.rotors.idle_speed
         loop.begin(speed, self._tasks.first_yaw_rad)
@@ -298,31 +306,31 @@ class Copter:
         self.rotor_loss.forget()
         self.rotor_loss.begin(self._sent)
         self.pilot.trust_rotors()
-        if self._senses.estimate is not None and not rests:
+        if self._state_source.estimate is not None and not rests:
             self.pilot.say(WARNING, FALLS)
         self.stations.say(INFO, self.stations.banner())
 
     def _sense(self, now_us: int, state: VehicleState) -> None:
         """Take in what steers the vehicle, and what has ceased to."""
         pilot, supervisor = self.pilot, self.supervisor
-        knows_position = supervisor.knows_position(self._senses.estimate)
+        knows_position = supervisor.knows_position(self._state_source.estimate)
         pilot.sense(now_us, state, self.stations.needs.steered(now_us), knows_position=knows_position)
-        action = supervisor.step(self._seen(now_us, state), pilot.flight)
+        action = supervisor.step(self._failsafe_inputs(now_us, state), pilot.flight)
         if action is not Action.NONE:
             pilot.save(action)
         self._missed_us = None
 
-    def _seen(self, now_us: int, state: VehicleState) -> Seen:
+    def _failsafe_inputs(self, now_us: int, state: VehicleState) -> FailsafeInputs:
         """Return what the failsafes' conditions are judged by."""
         pilot, stations = self.pilot, self.stations
         sticks = stations.manual.latest(now_us, _EVER_US)
-        return Seen(
+        return FailsafeInputs(
             now_us=now_us,
             missed_us=self._missed_us,
             state=state,
             mode=pilot.state.mode,
             standing=pilot.standing,
-            estimate=self._senses.estimate,
+            estimate=self._state_source.estimate,
             setpoint=stations.offboard.latest(now_us, _EVER_US),
             sticks_us=None if sticks is None else sticks.time_us,
             listening_us=NEVER_US if self._resumed_us is None else self._resumed_us,
@@ -337,7 +345,7 @@ class Copter:
 
     def _watch_rotors(self, state: VehicleState) -> None:
         """Notice whether a rotor is lost: then there is but one way to fly."""
-        pilot, estimate = self.pilot, self._senses.estimate
+        pilot, estimate = self.pilot, self._state_source.estimate
         if not pilot.state.armed:
             self.rotor_loss.end()
         feels = estimate is None or (estimate.health.gyroscope and estimate.health.accelerometer)
@@ -350,13 +358,13 @@ class Copter:
     def _take_stock(self, state: VehicleState) -> None:
         """Take in what orders of ground stations are judged by."""
         pilot = self.pilot
-        sticks = pilot.scene().steered.sticks
+        sticks = pilot.context().steered.sticks
         thrust = sticks.thrust if sticks is not None and pilot.state.mode in MANUAL else None
         outside = self.stations.fence.breach(state.position_enu_m, self._time_us or 0)
-        estimate = self._senses.estimate
+        estimate = self._state_source.estimate
         unknown = not_known(estimate.health) if estimate is not None else ""
-        facts = Facts(state, pilot.standing, self.power.left, thrust, outside, unknown, self._battery_fault())
-        pilot.take_stock(facts)
+        inputs = ArmingInputs(state, pilot.standing, self.power.left, thrust, outside, unknown, self._battery_fault())
+        pilot.take_stock(inputs)
 
     def _battery_fault(self) -> str:
         """Return why nobody may take off on the battery, apart from its charge; empty if one may."""
@@ -394,8 +402,8 @@ class Copter:
         pilot, stations = self.pilot, self.stations
         self.samples += 1
         self._take_stock(state)
-        if self._senses.estimate is not None:
-            for severity, line in self._health.lines(self._senses.estimate.health):
+        if self._state_source.estimate is not None:
+            for severity, line in self._health.lines(self._state_source.estimate.health):
                 stations.say(severity, line)
         idle = self._loop.vehicle.rotors.idle_speed / self._loop.vehicle.rotors.max_speed
         minimum = idle if pilot.state.armed else 0.0
@@ -403,7 +411,7 @@ class Copter:
         self.power.run((c1, c2, c3, c4), self._interval_s)
         stations.missions.watch_mode(pilot.state.mode)
         stations.update(
-            self._photographer.take(
+            self._snapshots.take(
                 now_us,
                 state,
                 pilot,
@@ -413,7 +421,7 @@ class Copter:
                 (c1, c2, c3, c4),
                 self._battery(),
                 stations,
-                self._senses,
+                self._state_source,
             )
         )
 

@@ -4,7 +4,7 @@ from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.step import Step, follows, nothing_known
-from colibri.autopilot.estimation.state_source import Estimator, Senses
+from colibri.autopilot.estimation.state_source import Estimator, StateSource
 from colibri.autopilot.guidance.trajectories.planner import plan
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
@@ -43,7 +43,7 @@ class Autopilot:
         self._clock = clock
         self._time_us: int | None = None
         self.frame_interval_us = self._loop.frame_interval_us
-        self._senses = Senses(estimator, self.frame_interval_us)
+        self._state_source = StateSource(estimator, self.frame_interval_us)
 
     def step(self, frame: Frame, plant_status: PlantStatus = NOTHING) -> Step:
         """Answer a frame and what the plant tells beside it.
@@ -60,7 +60,7 @@ class Autopilot:
         if plant_status.battery is not None:
             self._loop.know_charge(plant_status.battery.used_ah)
         due = self._loop.is_due(frame.time_us)
-        known = self._senses.state(frame, asked=due)
+        known = self._state_source.state(frame, asked=due)
         if known is None:
             self._time_us = None
             return nothing_known(frame.time_us, self._clock() - started_s)
@@ -72,11 +72,11 @@ class Autopilot:
             state = self._loop.state(known)
             decision = self._loop.decide(frame.time_us, state, self._planner.horizon(frame.time_us))
         command = ActuatorCommand(frame.time_us, self._loop.controls, armed=True)
-        return Step(command, decision, self._clock() - started_s, self._senses.estimate if due else None)
+        return Step(command, decision, self._clock() - started_s, self._state_source.estimate if due else None)
 
     def _begin(self, frame: Frame) -> None:
         vehicle = self._loop.vehicle
         speed = self._start_speed if frame.time_us == 0 else vehicle.hover_speed
-        if self._time_us is None and self._senses.rests:
+        if self._time_us is None and self._state_source.rests:
             speed = vehicle.rotors.idle_speed
         self._loop.begin(speed, float(self._planner.horizon(frame.time_us).yaw_rad[0]))

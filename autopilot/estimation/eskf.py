@@ -57,7 +57,7 @@ _UNSURE_TURN = 2.0
 _UNSURE_S = 0.5
 """For how long a velocity that has grown wrong was, in the mean."""
 _PATIENCE_US = 7_000_000
-_DOUBTED_M, _DOUBTED_M_S = 100.0, 10.0
+_INFLATED_M, _INFLATED_M_S = 100.0, 10.0
 
 
 class FilterRecord(NamedTuple):
@@ -99,9 +99,9 @@ class Filter:
         self._claims = (nan, nan)
         self._fix_variances = np.array([speed, self._horizontal, self._vertical])
         self.x, self.P = np.zeros(NOMINAL), np.zeros((ERRORS, ERRORS))
-        self.velocity = Kind("velocity", 3, _PATIENCE_US, (VELOCITY, 3, _DOUBTED_M_S))
-        self.position = Kind("position", 2, _PATIENCE_US, (POSITION, 2, _DOUBTED_M))
-        self.height = Kind("height", 1, _PATIENCE_US, (POSITION + 2, 1, _DOUBTED_M))
+        self.velocity = Kind("velocity", 3, _PATIENCE_US, (VELOCITY, 3, _INFLATED_M_S))
+        self.position = Kind("position", 2, _PATIENCE_US, (POSITION, 2, _INFLATED_M))
+        self.height = Kind("height", 1, _PATIENCE_US, (POSITION + 2, 1, _INFLATED_M))
         self.magnetometer, self.barometer, self.instruments = instruments_of(sensors, field_enu_gauss)
         of_gps, of_others = (self.velocity, self.position, self.height), (one.kind for one in self.instruments)
         by_name = {kind.name: kind for kind in (*of_gps, *of_others)}
@@ -161,7 +161,7 @@ class Filter:
             (BARO_OFFSET, 1, _FIRST_OFFSET_M),
             (HARD_IRON, 3, max(sensors.magnetometer.hard_iron_gauss, _MIN_NOISE)),
         ):
-            update.doubt(P, first, count, sigma * sigma)
+            update.inflate_covariance(P, first, count, sigma * sigma)
         for i, variance in enumerate(self._noise.gps_drift):
             P[GPS_DRIFT + i, GPS_DRIFT + i] = variance
 
@@ -210,16 +210,16 @@ class Filter:
         update.fuse_fix(x, P, z, after_s, variances, _FIX_GATES, y, self._fix_nis)
         ve, vn, vu, e, n, u = y.tolist()
         moves, lies, stands = self._fix_nis.tolist()
-        believed = True
+        accepted = True
         if not self.velocity.note(time_us, (ve, vn, vu), moves):
-            believed &= self.velocity.insist(x, P, time_us, update.fuse_velocity, z[3:], variances[0])
+            accepted &= self.velocity.force_accept(x, P, time_us, update.fuse_velocity, z[3:], variances[0])
         if not self.position.note(time_us, (e, n), lies):
-            believed &= self.position.insist(x, P, time_us, update.fuse_horizontal, z[:3], after_s, variances[1])
+            accepted &= self.position.force_accept(x, P, time_us, update.fuse_horizontal, z[:3], after_s, variances[1])
         if not self.height.note(time_us, (u,), stands):
-            believed &= self.height.insist(x, P, time_us, update.fuse_height, z[:3], after_s, variances[2])
-        return None if believed else Reason.INNOVATION
+            accepted &= self.height.force_accept(x, P, time_us, update.fuse_height, z[:3], after_s, variances[2])
+        return None if accepted else Reason.INNOVATION
 
-    def take_accel_bias_anew(
+    def reset_accel_bias(
         self, change_m_s2: Array, variance: float, velocity_m_s: Array, position_m: Array, time_us: int
     ) -> None:
         """Believe that the accelerometer's bias has changed, and undo what that has done since.
@@ -236,14 +236,14 @@ class Filter:
         x[3:6] += velocity_m_s
         x[13:16] += change_m_s2
         moved_m = _UNSURE_PART * float(np.abs(position_m).max())
-        update.doubt(P, POSITION, 3, moved_m * moved_m)
-        update.doubt(P, VELOCITY, 3, self._fix_variances[0])
-        update.doubt(P, ACCEL_BIAS, 3, _UNSURE_TIMES * variance)
+        update.inflate_covariance(P, POSITION, 3, moved_m * moved_m)
+        update.inflate_covariance(P, VELOCITY, 3, self._fix_variances[0])
+        update.inflate_covariance(P, ACCEL_BIAS, 3, _UNSURE_TIMES * variance)
         self.velocity.resets += 1
         self.velocity.accept(time_us)
         self.accel_bias_us = time_us
 
-    def take_gyro_bias_anew(self, turned_rad: float, since_s: float, time_us: int) -> None:
+    def reset_gyro_bias(self, turned_rad: float, since_s: float, time_us: int) -> None:
         """Doubt what a gyroscope that is off has spoilt: attitude and bias, and the velocity that is contradicted.
 
         Args:
@@ -252,11 +252,11 @@ class Filter:
             time_us: Now.
         """
         P, angle_rad = self.P, _UNSURE_TURN * turned_rad
-        update.doubt(P, ATTITUDE, 3, angle_rad * angle_rad)
-        update.doubt(P, GYRO_BIAS, 3, square(angle_rad / since_s))
+        update.inflate_covariance(P, ATTITUDE, 3, angle_rad * angle_rad)
+        update.inflate_covariance(P, GYRO_BIAS, 3, square(angle_rad / since_s))
         speed_m_s = hypot(*self.velocity.test.innovation)
-        update.doubt(P, POSITION, 3, square(_UNSURE_S * speed_m_s))
-        update.doubt(P, VELOCITY, 3, speed_m_s * speed_m_s)
+        update.inflate_covariance(P, POSITION, 3, square(_UNSURE_S * speed_m_s))
+        update.inflate_covariance(P, VELOCITY, 3, speed_m_s * speed_m_s)
         self.velocity.resets += 1
         self.velocity.accept(time_us)
         self.magnetometer.kind.accept(self.magnetometer.kind.test.time_us)

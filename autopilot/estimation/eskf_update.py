@@ -131,7 +131,7 @@ def fuse_rest(
 
 
 @compiled
-def doubt(P: Array, first: int, count: int, variance: float) -> None:
+def inflate_covariance(P: Array, first: int, count: int, variance: float) -> None:
     """Add to the variances of a part of the state, so that the next measurement of it is believed again."""
     for i in range(first, first + count):
         P[i, i] += variance

@@ -66,7 +66,7 @@ class Health(NamedTuple):
         gyroscope: Its values can be used.
         accel_bias: The accelerometer's bias was not taken anew lately.
         gyro_bias: Nor the gyroscope's.
-        not_believed: Other sensors whose values are missing or rejected since long.
+        not_accepted: Other sensors whose values are missing or rejected since long.
     """
 
     attitude: bool
@@ -82,7 +82,7 @@ class Health(NamedTuple):
     gyroscope: bool
     accel_bias: bool
     gyro_bias: bool
-    not_believed: tuple[str, ...]
+    not_accepted: tuple[str, ...]
 
     @property
     def flags(self) -> StatusFlags:
@@ -126,14 +126,14 @@ class Check(NamedTuple):
         covariance: Of position, velocity, and attitude as a rotation vector in the body frame: the upper triangle, 45
             numbers, row by row.
         nis: Of each kind of `Tests`, the sum of the normalised innovations squared that were believed up to now.
-        believed: How many they are.
+        accepted: How many they are.
     """
 
     time_us: int
     state: tuple[float, ...]
     covariance: tuple[float, ...]
     nis: tuple[float, ...]
-    believed: tuple[int, ...]
+    accepted: tuple[int, ...]
 
 
 class Estimate(NamedTuple):
@@ -150,7 +150,7 @@ class Estimate(NamedTuple):
         tests: How well the measurements agree with it.
         rejected: How many values were rejected since the start, by sensor and reason.
         resets: How often position, velocity or a reference was taken anew, because measurements had long said so.
-        blending_m: Part of the published position that is still to move to the filter's, east, north, up.
+        smoothing_m: Part of the published position that is still to move to the filter's, east, north, up.
         check: The filter with its covariance, ten times a second; None between.
     """
 
@@ -164,5 +164,5 @@ class Estimate(NamedTuple):
     tests: Tests
     rejected: Rejections
     resets: int
-    blending_m: Vector
+    smoothing_m: Vector
     check: Check | None

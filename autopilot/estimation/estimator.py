@@ -21,9 +21,9 @@ from colibri.autopilot.estimation.eskf_predict import SAMPLE, look_ahead
 from colibri.autopilot.estimation.estimate import Check, Estimate, Health, Tests
 from colibri.autopilot.estimation.gyroscope_bias import turned_since
 from colibri.autopilot.estimation.measurements.instrument import Instrument, Value
-from colibri.autopilot.estimation.output_smoothing import Blending
+from colibri.autopilot.estimation.output_smoothing import OutputSmoothing
 from colibri.autopilot.estimation.sensing.alignment import Aligned, Alignment
-from colibri.autopilot.estimation.sensing.clock_resets import MAX_GAP_US, Strays
+from colibri.autopilot.estimation.sensing.clock_resets import MAX_GAP_US, ClockResets
 from colibri.autopilot.estimation.sensing.free_fall import Caught, Falling
 from colibri.autopilot.estimation.sensing.inertial import Inertial, Reading, sample_between
 from colibri.autopilot.estimation.sensing.plausibility import GpsWatch
@@ -129,11 +129,11 @@ class Estimator:
         last_us = self._time_us
         if last_us is not None and not 0 < frame.time_us - last_us <= MAX_GAP_US:
             self._rejected.add(Source.CLOCK, Reason.TIME)
-            if not self._strays.settle(frame.time_us):
+            if not self._clock_resets.settle(frame.time_us):
                 return self._estimate
             self._restart()
             last_us = None
-        self._strays.clear()
+        self._clock_resets.clear()
         self._time_us = frame.time_us
         before, self._reading = self._reading, self._inertial.read(frame)
         rejected = self._rejected
@@ -175,8 +175,8 @@ class Estimator:
                 list(self._waiting),
                 self._reading,
                 self._gps_watch.time_us,
-                self._blending.position_m,
-                self._blending.velocity_m_s,
+                self._output_smoothing.position_m,
+                self._output_smoothing.velocity_m_s,
             )
         )
 
@@ -194,7 +194,7 @@ class Estimator:
         self._waiting.clear()
         self._waiting.extend(kept.waiting)
         self.filter_us, self._reading, self._gps_watch.time_us = kept.filter_us, kept.reading, kept.fix_us
-        self._blending.position_m, self._blending.velocity_m_s = kept.position_m, kept.velocity_m_s
+        self._output_smoothing.position_m, self._output_smoothing.velocity_m_s = kept.position_m, kept.velocity_m_s
         self._time_us = self._published_us = kept.time_us
         if self._publish(kept.time_us) is None:
             return False
@@ -218,8 +218,8 @@ class Estimator:
         self._at_rest = [None] * len(instruments)
         self._reads_messages = not all(instrument.group for instrument in instruments)
         self._accelerometer_watch = AccelerometerWatch(sensors, self._gravity)
-        self._blending = Blending()
-        self._strays = Strays()
+        self._output_smoothing = OutputSmoothing()
+        self._clock_resets = ClockResets()
         self._waiting: deque[_Waiting] = deque()
         self._first = 0
         self.filter_us = 0
@@ -297,7 +297,7 @@ class Estimator:
         if reason is not None:
             self._rejected.add(instrument.source, reason)
         elif before is not None and self._time_us is not None:
-            self._blending.absorb(before, x[:6].tolist(), (self._time_us - time_us) * 1e-6)
+            self._output_smoothing.absorb(before, x[:6].tolist(), (self._time_us - time_us) * 1e-6)
 
     def _fuse(self, fix: GpsFix, now_us: int) -> None:
         after_s = (fix.time_us - self._delay_us - self.filter_us) * 1e-6
@@ -309,13 +309,13 @@ class Estimator:
         reason = self.filter.fuse_fix(fix, enu_of(fix.place, self._origin), after_s, now_us)
         if reason is not None:
             self._rejected.add(Source.GPS, reason)
-        self._blending.absorb(before[:6], self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
+        self._output_smoothing.absorb(before[:6], self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
         found = self._accelerometer_watch.look(fix.time_us, before, self.filter)
         if found is not None:
-            self.filter.take_accel_bias_anew(*found, now_us)
+            self.filter.reset_accel_bias(*found, now_us)
         turned = turned_since(self.filter, now_us)
         if turned is not None:
-            self.filter.take_gyro_bias_anew(*turned, now_us)
+            self.filter.reset_gyro_bias(*turned, now_us)
 
     def _publish(self, now_us: int) -> Estimate | None:
         """Return the estimate now; None, and all anew, if it is of no vehicle."""
@@ -325,10 +325,10 @@ class Estimator:
         if not isfinite(sum(sigma) + e + n + u + qw) or not abs(ve) + abs(vn) + abs(vu) < _MAX_SPEED_M_S:
             self._restart()
             return None
-        (de, dn, du), (dve, dvn, dvu) = self._blending.position_m, self._blending.velocity_m_s
+        (de, dn, du), (dve, dvn, dvu) = self._output_smoothing.position_m, self._output_smoothing.velocity_m_s
         since_us = now_us - self._published_us
         self._published_us = now_us
-        self._blending.give_in(since_us * 1e-6)
+        self._output_smoothing.give_in(since_us * 1e-6)
         bx, by, bz, ax, ay, az = filter_.x[10:16].tolist()
         p, q, r = self._reading.rate if self._reading.rate_good else (bx, by, bz)
         position, velocity, attitude = sigma[:3], sigma[3:6], sigma[6:9]
@@ -366,16 +366,16 @@ class Estimator:
             tuple(self.filter.x[:10].tolist()),
             tuple(upper.tolist()),
             tuple(kind.nis for kind in kinds),
-            tuple(kind.believed for kind in kinds),
+            tuple(kind.accepted for kind in kinds),
         )
 
     def _health(self, now_us: int, sigma: list[float]) -> Health:
         filter_, reading = self.filter, self._reading
         position_us, velocity_us = filter_.position.accepted_us, filter_.velocity.accepted_us
-        believed_us = min(position_us, velocity_us)
-        lost = now_us - believed_us > _LATE_US
+        accepted_us = min(position_us, velocity_us)
+        lost = now_us - accepted_us > _LATE_US
         late_us = self.filter_us - _LATE_US
-        not_believed = [one.source for one in filter_.instruments if one.kind.accepted_us < late_us]
+        not_accepted = [one.source for one in filter_.instruments if one.kind.accepted_us < late_us]
         return Health(
             reading.rate_good and sigma[6] <= _KNOWN_TILT_RAD and sigma[7] <= _KNOWN_TILT_RAD,
             sigma[8] <= _KNOWN_YAW_RAD,
@@ -384,13 +384,13 @@ class Estimator:
             sigma[0] <= _KNOWN_M and sigma[1] <= _KNOWN_M,
             sigma[2] <= _KNOWN_M,
             now_us - max(position_us, velocity_us) > _LATE_US,
-            believed_us if lost else None,
+            accepted_us if lost else None,
             filter_.position.rejected_us is not None or filter_.velocity.rejected_us is not None,
             reading.force_good,
             reading.rate_good,
             filter_.accel_bias_us is None or now_us - filter_.accel_bias_us > _LEARNING_US,
             filter_.gyro_bias_us is None or now_us - filter_.gyro_bias_us > _LEARNING_US,
-            tuple(not_believed) if not_believed else (),
+            tuple(not_accepted) if not_accepted else (),
         )
 
     def _warm_up(self) -> None:

@@ -27,8 +27,8 @@ class _Matter(NamedTuple):
     again: str
 
 
-def _is_believed(source: str, health: Health) -> bool:
-    return source not in health.not_believed
+def _is_valid(source: str, health: Health) -> bool:
+    return source not in health.not_accepted
 
 
 _MATTERS = (
@@ -37,7 +37,7 @@ _MATTERS = (
     _Matter(lambda health: health.gyroscope, "gyroscope failed", "gyroscope is back"),
     _Matter(lambda health: health.gyro_bias, "gyroscope off: bias learned anew", "gyroscope believed again"),
     *(
-        _Matter(partial(_is_believed, row.source), f"{row.source} not believed", f"{row.source} believed again")
+        _Matter(partial(_is_valid, row.source), f"{row.source} not believed", f"{row.source} believed again")
         for row in ROWS
     ),
 )
@@ -53,7 +53,7 @@ _UNKNOWN: tuple[tuple[Callable[[Health], bool], str], ...] = (
 _SENSORS: tuple[tuple[Callable[[Health], bool], int], ...] = (
     (lambda health: health.gyroscope, mav.MAV_SYS_STATUS_SENSOR_3D_GYRO),
     (lambda health: health.accelerometer, mav.MAV_SYS_STATUS_SENSOR_3D_ACCEL),
-    *((partial(_is_believed, row.source), row.bit) for row in ROWS),
+    *((partial(_is_valid, row.source), row.bit) for row in ROWS),
     (lambda health: health.gps_lost_since_us is None, mav.MAV_SYS_STATUS_SENSOR_GPS),
 )
 

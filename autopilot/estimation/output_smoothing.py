@@ -18,7 +18,7 @@ _MIN_M = 1e-6
 _NONE: Vector = (0.0, 0.0, 0.0)
 
 
-class Blending:
+class OutputSmoothing:
     """What is still to be given in.
 
     Attributes:

@@ -58,7 +58,7 @@ _NO_FIX_AFTER_US = 500_000
 """Receivers of a few hertz are sometimes late, too."""
 
 
-class Senses:
+class StateSource:
     """Turns any frame into a state.
 
     Attributes:

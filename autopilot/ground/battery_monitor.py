@@ -7,7 +7,7 @@ from math import nan
 
 import numpy as np
 
-from colibri.autopilot.control.vehicle_model.battery import BatteryModel, believed
+from colibri.autopilot.control.vehicle_model.battery import BatteryModel, estimated
 from colibri.common.types import FourRotors
 from colibri.mavlink.hil.plant_status import PlantBattery
 from colibri.mavlink.telemetry.snapshot import BatteryState
@@ -20,7 +20,7 @@ _SAG = 0.03
 """Voltages that differ by less than this part of the full one are the same: the model's rotors do not lag."""
 
 
-class PowerMeter:
+class BatteryMonitor:
     """Counts what one vehicle's battery gives.
 
     Attributes:
@@ -39,13 +39,13 @@ class PowerMeter:
         self._sag_v = 0.0
         self.charge_ah = 0.0
 
-    def hear(self, told: PlantBattery) -> None:
+    def receive(self, reported: PlantBattery) -> None:
         """Take in what the battery says of itself."""
         if self._battery is None:
             return
-        model_ah = self.charge_ah if self._told else told.used_ah
-        self.charge_ah, self._told = believed(model_ah, told.used_ah, self._vehicle), True
-        sag_v = told.voltage_v - self._now[0]
+        model_ah = self.charge_ah if self._told else reported.used_ah
+        self.charge_ah, self._told = estimated(model_ah, reported.used_ah, self._vehicle), True
+        sag_v = reported.voltage_v - self._now[0]
         self._sag_v = sag_v if abs(sag_v) > _SAG * self._battery.full_voltage_v else 0.0
 
     def resume(self, charge_ah: float, energy_wh: float) -> None:

@@ -15,7 +15,7 @@ from colibri.autopilot.control.interface import (
     VehicleState,
 )
 from colibri.autopilot.estimation.health import told
-from colibri.autopilot.estimation.state_source import Senses
+from colibri.autopilot.estimation.state_source import StateSource
 from colibri.autopilot.ground.forecast import Forecaster
 from colibri.autopilot.ground.stations import Stations
 from colibri.common.compiled_rotations import quaternion_from_euler
@@ -41,7 +41,7 @@ _AUTO = (
 _NEAR_GROUND_M = 1.0
 
 
-class Photographer:
+class SnapshotBuilder:
     """Takes the snapshots of one vehicle."""
 
     def __init__(self, vehicle: Vehicle, interval_s: float, columns: PlanColumns | None) -> None:
@@ -68,7 +68,7 @@ class Photographer:
         controls: FourRotors,
         battery: BatteryState | None,
         stations: Stations,
-        senses: Senses,
+        state_source: StateSource,
     ) -> Snapshot:
         """Return the vehicle as it is now.
 
@@ -82,9 +82,9 @@ class Photographer:
             controls: Rotor commands, parts of the largest speed.
             battery: Its battery; None without one.
             stations: What ground stations say.
-            senses: How the state is known.
+            state_source: How the state is known.
         """
-        sticks = pilot.scene().steered.sticks
+        sticks = pilot.context().steered.sticks
         mode, armed = pilot.state
         before, self._velocity = self._velocity or state.velocity_enu_m_s, state.velocity_enu_m_s
         ax, ay, az = ((new - old) / self._interval_s for new, old in zip(state.velocity_enu_m_s, before, strict=True))
@@ -108,7 +108,7 @@ class Photographer:
             attitude=state.attitude,
             rate_flu_rad_s=state.rate_flu_rad_s,
             origin=pilot.home.origin,
-            gps_ok=senses.has_gps(now_us),
+            gps_ok=state_source.has_gps(now_us),
             fence_enabled=stations.fence.exists,
             fence_breached=stations.fence.breach(state.position_enu_m, now_us) is not None,
             home=Home(pilot.home.position_enu_m, pilot.home.yaw_rad),
@@ -124,10 +124,10 @@ class Photographer:
             flights=pilot.times.flights,
             ground_m=pilot.home.position_enu_m[2],
             load=min(duration_s / self._interval_s, 1.0),
-            sensed=senses.sensed,
-            fix=senses.fix,
-            latest=dict(senses.latest),
-            estimator=None if senses.estimate is None else told(senses.estimate),
+            sensed=state_source.sensed,
+            fix=state_source.fix,
+            latest=dict(state_source.latest),
+            estimator=None if state_source.estimate is None else told(state_source.estimate),
         )
 
     def _solver_state(

@@ -215,7 +215,7 @@ class Stations:
         self._heartbeat.update(snapshot)
         self._streams.update(snapshot)
         origin = snapshot.origin
-        self.offboard.update(snapshot.position_enu_m, self._pilot.scene().state.euler[2], origin, snapshot.home)
+        self.offboard.update(snapshot.position_enu_m, self._pilot.context().state.euler[2], origin, snapshot.home)
         self.follow.update(origin)
         if snapshot.armed is not self._logs_stream:
             self._logs_stream = snapshot.armed
@@ -345,9 +345,9 @@ class Stations:
 
     def _status(self) -> str:
         mode, armed = self._pilot.state
-        x, y, z = self._pilot.scene().state.position_enu_m
+        x, y, z = self._pilot.context().state.position_enu_m
         reasons = "; ".join(self._pilot.refusals()) or "ready to arm"
-        yaw_deg = (90.0 - self._pilot.scene().state.euler[2] * 180.0 / pi) % 360.0
+        yaw_deg = (90.0 - self._pilot.context().state.euler[2] * 180.0 / pi) % 360.0
         return (
             f"{self.banner()}\nmode {mode}, {'armed' if armed else 'disarmed'}, {reasons}\n"
             f"east {x:.2f} north {y:.2f} up {z:.2f} m, heading {yaw_deg:.0f} degrees\n"

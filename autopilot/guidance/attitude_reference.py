@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Preview, VehicleState
-from colibri.autopilot.guidance.attitude_slew import LEAN, POSE, SPIN, Slew, limit_tilt, slew_on
+from colibri.autopilot.guidance.attitude_slew import ATTITUDE, RATE, TILT, Slew, limit_tilt, slew_on
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.elementary import square
@@ -64,8 +64,8 @@ def attitude_limits(behaviour: Behaviour) -> AttitudeLimits:
     )
 
 
-class Wish(NamedTuple):
-    """What is asked for: made by `lean`, `pose` and `spin`.
+class AttitudeCommand(NamedTuple):
+    """What is asked for: made by `tilt_command`, `attitude_command` and `rate_command`.
 
     Attributes:
         kind: LEAN, POSE or SPIN.
@@ -112,7 +112,7 @@ class AttitudeReference:
         self._samples = preview.samples
         self.limits = limits
         level = VehicleState(_NOWHERE, _NOWHERE, (1.0, 0.0, 0.0, 0.0), _NOWHERE, _NOWHERE)
-        self.step(self.initial(level), level, lean(0.0, 0.0, 0.0, self.weight_n))
+        self.step(self.initial(level), level, tilt_command(0.0, 0.0, 0.0, self.weight_n))
 
     def obey(self, behaviour: Behaviour) -> None:
         """Keep to other limits from now on."""
@@ -129,18 +129,20 @@ class AttitudeReference:
         limit_tilt(angles, rates, self.limits.slew.max_tilt_rad)
         return ReferenceMemory(angles, rates, self.weight_n if thrust_n is None else thrust_n)
 
-    def step(self, memory: ReferenceMemory, state: VehicleState, wish: Wish) -> tuple[ReferenceMemory, AttitudeDemand]:
-        """Return the memory for the next control sample, and the demand from now on if `wish` stays."""
+    def step(
+        self, memory: ReferenceMemory, state: VehicleState, command: AttitudeCommand
+    ) -> tuple[ReferenceMemory, AttitudeDemand]:
+        """Return the memory for the next control sample, and the demand from now on if `command` stays."""
         angles, rates = np.empty((self._samples + 1, 3)), np.empty((self._samples + 1, 3))
         thrusts = np.empty(self._samples + 1)
         angles[0], rates[0], thrusts[0] = memory.angles, memory.rates, memory.thrust_n
         angles[0, 2] = self._near(memory.angles[2].item(), state.euler[2])
         slew_on(
-            wish.kind,
-            np.array(wish.vector),
-            wish.yaw_rad,
-            wish.yaw_rate_rad_s,
-            wish.thrust_n,
+            command.kind,
+            np.array(command.vector),
+            command.yaw_rad,
+            command.yaw_rate_rad_s,
+            command.thrust_n,
             self.weight_n,
             self.limits.slew,
             self._interval_s,
@@ -151,13 +153,13 @@ class AttitudeReference:
         after = ReferenceMemory(angles[1].copy(), rates[1].copy(), thrusts[1].item())
         return after, AttitudeDemand(angles[:-1], rates[:-1], thrusts[:-1])
 
-    def from_sticks(self, sticks: Sticks) -> Wish:
+    def from_sticks(self, sticks: Sticks) -> AttitudeCommand:
         """Return what stabilized flight makes of sticks."""
         tilt = self.limits.stick_tilt_rad
         yaw_rate = -self.limits.stick_yaw_rate_rad_s * sticks.yaw
-        return lean(tilt * sticks.roll, tilt * sticks.pitch, yaw_rate, self.thrust_for_stick(sticks.thrust))
+        return tilt_command(tilt * sticks.roll, tilt * sticks.pitch, yaw_rate, self.thrust_for_stick(sticks.thrust))
 
-    def from_setpoint(self, setpoint: AttitudeSetpoint) -> Wish:
+    def from_setpoint(self, setpoint: AttitudeSetpoint) -> AttitudeCommand:
         """Return what a client's setpoint asks for, its thrust as a stick's: half of it hovers.
 
         An attitude goes before body rates, of which yaw's alone is then fed forward. A rate that is not given beside
@@ -166,8 +168,8 @@ class AttitudeReference:
         thrust_n = nan if isnan(setpoint.thrust) else self.thrust_for_stick(setpoint.thrust)
         p, q, r = (0.0 if isnan(rate) else rate for rate in setpoint.rate_flu_rad_s)
         if setpoint.attitude is None:
-            return spin((p, q, r), thrust_n)
-        return pose(setpoint.attitude, thrust_n, r)
+            return rate_command((p, q, r), thrust_n)
+        return attitude_command(setpoint.attitude, thrust_n, r)
 
     def thrust_for_stick(self, stick: float) -> float:
         """Return the thrust, N, of a stick at 0..1: none at the bottom, hover in the middle, all there is at the top.
@@ -185,17 +187,17 @@ class AttitudeReference:
         return min(max(nearest_turn(psi, yaw_rad), yaw_rad - max_ahead), yaw_rad + max_ahead)
 
 
-def lean(phi: float, theta: float, yaw_rate_rad_s: float, thrust_n: float) -> Wish:
+def tilt_command(phi: float, theta: float, yaw_rate_rad_s: float, thrust_n: float) -> AttitudeCommand:
     """Roll and pitch, rad, about the heading that there is, turning at a rate counter-clockwise."""
-    return Wish(LEAN, (phi, theta, 0.0), 0.0, yaw_rate_rad_s, thrust_n)
+    return AttitudeCommand(TILT, (phi, theta, 0.0), 0.0, yaw_rate_rad_s, thrust_n)
 
 
-def pose(attitude: Quaternion, thrust_n: float, yaw_rate_rad_s: float = 0.0) -> Wish:
+def attitude_command(attitude: Quaternion, thrust_n: float, yaw_rate_rad_s: float = 0.0) -> AttitudeCommand:
     """An attitude, FLU to ENU; its yaw is reached more slowly than its thrust's direction."""
     (_, _, x), (_, _, y), (_, _, z) = rotation_matrix(attitude)
-    return Wish(POSE, (x, y, z), euler_from_quaternion(attitude)[2], yaw_rate_rad_s, thrust_n)
+    return AttitudeCommand(ATTITUDE, (x, y, z), euler_from_quaternion(attitude)[2], yaw_rate_rad_s, thrust_n)
 
 
-def spin(rate_flu_rad_s: Vector, thrust_n: float) -> Wish:
+def rate_command(rate_flu_rad_s: Vector, thrust_n: float) -> AttitudeCommand:
     """Body rates."""
-    return Wish(SPIN, rate_flu_rad_s, 0.0, 0.0, thrust_n)
+    return AttitudeCommand(RATE, rate_flu_rad_s, 0.0, 0.0, thrust_n)

@@ -14,7 +14,7 @@ from colibri.common.jit import compiled
 from colibri.common.kernels import atan2, cos, sin
 from colibri.common.types import Array
 
-LEAN, POSE, SPIN = 0, 1, 2
+TILT, ATTITUDE, RATE = 0, 1, 2
 _NO_DIRECTION = 1e-9
 
 
@@ -76,11 +76,11 @@ def slew_on(
         here, there = angles[n], angles[n + 1]
         there[:] = here
         rates[n + 1] = rates[n]
-        if kind == SPIN:
+        if kind == RATE:
             _euler_rates(here, vector, wanted_rate)
         else:
             wanted_rate[2] = yaw_rate_rad_s
-        towards = here[2] if kind != POSE else yaw_rad - 2.0 * pi * floor((yaw_rad - here[2]) / (2.0 * pi) + 0.5)
+        towards = here[2] if kind != ATTITUDE else yaw_rad - 2.0 * pi * floor((yaw_rad - here[2]) / (2.0 * pi) + 0.5)
         w, max_rate, max_acceleration = slew.yaw_frequency_rad_s, slew.yaw_rate_rad_s, slew.yaw_acceleration_rad_s2
         _move(
             2,
@@ -93,16 +93,16 @@ def slew_on(
             there,
             rates[n + 1],
         )
-        if kind == LEAN:
+        if kind == TILT:
             wanted[:2] = vector[:2]
-        elif kind == POSE:
+        elif kind == ATTITUDE:
             _point(vector, there[2], slew.max_tilt_rad, wanted)
             after = wanted[:2].copy()
             _point(vector, here[2], slew.max_tilt_rad, wanted)
             wanted_rate[:2] = (after - wanted[:2]) / interval_s
         w, max_rate, max_acceleration = slew.tilt_frequency_rad_s, slew.tilt_rate_rad_s, slew.tilt_acceleration_rad_s2
         for i in range(2):
-            pull = 0.0 if kind == SPIN else w * w * (wanted[i] - here[i])
+            pull = 0.0 if kind == RATE else w * w * (wanted[i] - here[i])
             _move(i, pull, wanted_rate[i], w, max_rate, max_acceleration, interval_s, there, rates[n + 1])
         limit_tilt(there, rates[n + 1], slew.max_tilt_rad)
         thrust = weight_n / (cos(there[0]) * cos(there[1])) if isnan(thrust_n) else thrust_n

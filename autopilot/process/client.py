@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.process.logs import AutopilotLog
-from colibri.common.process.lifecycle import Stop
+from colibri.common.process.lifecycle import HoldTask
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.px4_autopilot import FlierEnd
-from colibri.mavlink.links.link import OneByOne
+from colibri.mavlink.links.link import BlockingReceiver
 from colibri.mavlink.links.udp import UdpLink
 from colibri.mavlink.wire.dialect import RESULT_UNSUPPORTED
 
@@ -37,10 +37,10 @@ class Client:
 
     def __init__(
         self,
-        link: UdpLink | OneByOne,
+        link: UdpLink | BlockingReceiver,
         end: AutopilotEnd | FlierEnd,
         status: Status,
-        stop: Stop,
+        stop: HoldTask,
         log: AutopilotLog | None,
         ground: "Ground | None" = None,
     ) -> None:

@@ -7,16 +7,16 @@ from time import perf_counter, thread_time, time
 from typing import TYPE_CHECKING, Any
 
 from colibri.autopilot.control.profile import Profile
-from colibri.autopilot.core.checkpoint import Past
+from colibri.autopilot.core.checkpoint import History
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.estimation.state_source import Estimator
 from colibri.autopilot.ground.stations import REBOOT, SHUT_DOWN, StationSettings
 from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.autopilot.parameters.definitions import ImpossibleError
-from colibri.autopilot.process.conducted_links import ConductedLinks, Conductor
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
 from colibri.autopilot.process.state_folder import GroundError, StateFolder
+from colibri.autopilot.process.stepped_links import ConductedLinks, Conductor
 from colibri.common.process.status import Status
 from colibri.common.serialization import to_bytes
 from colibri.mavlink.links.link import LinkError
@@ -69,7 +69,7 @@ class Ground:
         )
         self._first = track(args.track) if args.track else None
         self._log: AutopilotLog | None = None
-        self.copter = self._vehicle_anew(self._state.past())
+        self.copter = self._vehicle_anew(self._state.history())
         self._kept_samples = self._kept_plans = 0
         self._kept_armed = False
         try:
@@ -155,10 +155,10 @@ class Ground:
             self._revision = self.copter.parameters.revision
             self._status.say("said", "restarted by a ground station")
 
-    def _vehicle_anew(self, past: Past | None) -> Copter:
+    def _vehicle_anew(self, history: History | None) -> Copter:
         args = self._args
         self._values = self._state.parameters()
-        self._past_bytes = b"" if past is None else to_bytes(past)
+        self._past_bytes = b"" if history is None else to_bytes(history)
         settings = StationSettings(
             system_id=args.system_id,
             identity=args.identity,
@@ -179,7 +179,7 @@ class Ground:
                 values=self._values,
                 first=self._first,
                 estimator=self._estimator,
-                past=past,
+                history=history,
             )
         except ImpossibleError as error:
             raise GroundError(f"{self._state.parameter_path()}: {error}") from error
@@ -190,7 +190,7 @@ class Ground:
         facts = self._links.facts(self.copter.stations, now_s - self._told_s)
         if self._status.as_json:
             self._status.say("status", "", **self._facts(now_s), links=facts)
-        self._told_s, self._told_us = now_s, pilot.scene().now_us
+        self._told_s, self._told_us = now_s, pilot.context().now_us
         for link in facts:
             for who in link["heard"]:
                 if f"{link['url']} {who}" not in self._heard:
@@ -202,7 +202,7 @@ class Ground:
 
     def _facts(self, now_s: float) -> dict[str, Any]:
         pilot = self.copter.pilot
-        now_us, state = pilot.scene().now_us, pilot.scene().state
+        now_us, state = pilot.context().now_us, pilot.context().state
         return {
             "mode": pilot.state.mode,
             "armed": pilot.state.armed,

@@ -10,7 +10,7 @@ from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Ac
 from colibri.autopilot.core.step import Step
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.measurements.table import kinds_of
-from colibri.autopilot.process.recorded_inputs import Heard, Setup, line
+from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup, line
 from colibri.common.process.log_files import CsvLog, LineLog
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
@@ -69,7 +69,7 @@ class AutopilotLog:
             self._inputs.write(line(msgspec.structs.replace(self._setup, first_us=self._time_us)))
         if self._checks is not None and step.estimate is not None and step.estimate.check is not None:
             check = step.estimate.check
-            self._checks.write((check.time_us / 1e6, *check.state, *check.covariance, *check.nis, *check.believed))
+            self._checks.write((check.time_us / 1e6, *check.state, *check.covariance, *check.nis, *check.accepted))
         if step.decision is None:
             return
         if self._estimates is not None and step.estimate is not None:
@@ -82,16 +82,18 @@ class AutopilotLog:
             (time_s, *step.decision.attitude_reference, *codes, *times_us, how.cost, how.slack, *how.active)
         )
 
-    def begin_again(self, values: Mapping[str, Value], past: bytes) -> None:
+    def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
         """Note that the next frame is answered by a vehicle that begins with these parameters, and with this past."""
-        self._setup = msgspec.structs.replace(self._setup, values=dict(values), past=past)
+        self._setup = msgspec.structs.replace(self._setup, values=dict(values), history=history)
         self._begins = True
 
     def hear(self, datagrams: Iterable["Received"]) -> Iterator["Received"]:
         """Pass on what ground stations sent, and note it."""
         for received in datagrams:
             datagram, link, address, loopback = received
-            heard = Heard(time_us=self._time_us, link=link, address=address, loopback=loopback, datagram=datagram)
+            heard = ReceivedDatagram(
+                time_us=self._time_us, link=link, address=address, loopback=loopback, datagram=datagram
+            )
             self._inputs.write(line(heard))
             yield received
 

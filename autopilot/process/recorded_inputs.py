@@ -34,7 +34,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         identity: Towards ground stations.
         ground: Whether it served ground stations.
         values: Of parameters that were changed before.
-        past: What had been kept of the same flight, where it was killed in it; else empty.
+        history: What had been kept of the same flight, where it was killed in it; else empty.
         first_us: The first frame that it answered.
     """
 
@@ -49,11 +49,13 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     identity: str
     ground: bool
     values: dict[str, Value] = {}
-    past: bytes = b""
+    history: bytes = b""
     first_us: int = 0
 
 
-class Heard(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="heard", tag_field="what"):
+class ReceivedDatagram(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="heard", tag_field="what"
+):
     """A datagram of a ground station.
 
     Attributes:
@@ -71,7 +73,7 @@ class Heard(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     datagram: bytes
 
 
-Input: TypeAlias = Setup | Heard
+Input: TypeAlias = Setup | ReceivedDatagram
 _DECODER = msgspec.json.Decoder(Input)
 
 

@@ -12,11 +12,11 @@ from colibri.autopilot.process.client import Client
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, undisturbed
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, HoldTask, fail, gc_frozen
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.px4_autopilot import FlierEnd
-from colibri.mavlink.links.link import OneByOne
+from colibri.mavlink.links.link import BlockingReceiver
 from colibri.mavlink.links.open import open_link
 from colibri.mavlink.links.udp import UdpLink
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
@@ -41,11 +41,11 @@ def loaded(args: argparse.Namespace) -> tuple[Profile, Vehicle, Estimator | None
     return profile, vehicle, estimator_for(args.feedback, vehicle, args.home.origin)
 
 
-def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop: Stop) -> int:
+def run(args: argparse.Namespace, link: UdpLink | BlockingReceiver, status: Status, stop: HoldTask) -> int:
     """Fly the plant at the other end of `link` as the command line says; return the exit code."""
     try:
         profile, vehicle, estimator = loaded(args)
-        served = args.gcs or args.conducted
+        served = args.gcs or args.stepped
         ground = _ground(args, profile, vehicle, estimator, status, stop) if served else None
         autopilot = ground.copter if ground else _alone(args, profile, vehicle, estimator)
         end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
@@ -54,10 +54,10 @@ def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop
     log = AutopilotLog(args.out, _setup(args, profile)) if args.out else None
     if ground and log:
         ground.record(log)
-    if args.conducted and isinstance(link, UdpLink):  # several flights share the cores: who waits gives way at once
+    if args.stepped and isinstance(link, UdpLink):  # several flights share the cores: who waits gives way at once
         link.spin_s = 0.0
     try:
-        with undisturbed():
+        with gc_frozen():
             Client(link, end, status, stop, log, ground).fly(autopilot)
     except Error as error:
         fail(str(error), EXIT_FAILED)
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace, link: UdpLink | OneByOne, status: Status, stop
 
 
 def _setup(args: argparse.Namespace, profile: Profile) -> Setup:
-    served = bool(args.gcs or args.conducted)
+    served = bool(args.gcs or args.stepped)
     return Setup(
         profile=args.profile,
         controller=profile.controller,
@@ -116,15 +116,15 @@ def _ground(
     vehicle: Vehicle,
     estimator: Estimator | None,
     status: Status,
-    stop: Stop,
+    stop: HoldTask,
 ) -> "Ground":
     """Load what serves ground stations only where there are any: it is as much as all the rest."""
-    from colibri.autopilot.process.conducted_links import UdpConductor
     from colibri.autopilot.process.ground import open_ground
+    from colibri.autopilot.process.stepped_links import UdpConductor
 
     conductor = None
-    if args.conducted:
-        link = open_link(args.conducted)
+    if args.stepped:
+        link = open_link(args.stepped)
         link.spin_s = 0.0
         conductor = UdpConductor(link, lambda: stop)
     return open_ground(args, profile, vehicle, estimator, status, conductor)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from colibri.autopilot.control.profile import Profile
-from colibri.autopilot.core.checkpoint import Kept, Past
+from colibri.autopilot.core.checkpoint import Checkpoint, History
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.parameters.definitions import definitions
 from colibri.common.process.slot_file import Slots
@@ -71,13 +71,13 @@ class StateFolder:
         """Whether a flight is kept, to go on after a restart."""
         return self._flight is not None
 
-    def past(self) -> Past | None:
+    def history(self) -> History | None:
         """Return what was kept of the last flight: it goes on if this is the same one."""
         content = self._flight.newest() if self._flight else None
-        kept = of_bytes(Kept, content) if content else None
-        return None if kept is None else Past(kept, self._read_plans())
+        kept = of_bytes(Checkpoint, content) if content else None
+        return None if kept is None else History(kept, self._read_plans())
 
-    def keep(self, record: Kept) -> bool:
+    def keep(self, record: Checkpoint) -> bool:
         """Keep what the flight needs to go on; return whether there was room."""
         return self._flight is None or self._flight.write(to_bytes(record))
 

@@ -15,7 +15,7 @@ from colibri.autopilot.ground.stations import StationSettings
 from colibri.bench.stages import Figures, summary
 from colibri.bench.variants import TRACK, plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
-from colibri.common.process.lifecycle import EXIT_FAILED, fail, undisturbed
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, gc_frozen
 from colibri.flights.plan import FlightPlan, GroundAccess
 from colibri.flights.processes import FlightError, fly_processes
 from colibri.mavlink.streaming.rates import GCS, SDK
@@ -62,7 +62,7 @@ def served(plan: FlightPlan, channels: int) -> Figures:
         plan.feedback, copter.frame_interval_us
     )
     times_us = []
-    with undisturbed():
+    with gc_frozen():
         while plant.world.time_us < plan.duration_s * 1e6:
             plant.answer(copter.step(*plant.tell()).command)
             began_s = perf_counter()

@@ -62,10 +62,10 @@ STAGES = (
     CONTROL_STEP,
 )
 FRAME_SENT = Stage("encode frame", PlantEnd, "offer")
-FRAME_HEARD = Stage("decode frame", AutopilotEnd, "receive")
+FRAME_RECEIVED = Stage("decode frame", AutopilotEnd, "receive")
 COMMAND_SENT = Stage("encode command", AutopilotEnd, "answer")
-COMMAND_HEARD = Stage("decode command", PlantEnd, "receive")
-LINK_STAGES = (FRAME_SENT, FRAME_HEARD, COMMAND_SENT, COMMAND_HEARD)
+COMMAND_RECEIVED = Stage("decode command", PlantEnd, "receive")
+LINK_STAGES = (FRAME_SENT, FRAME_RECEIVED, COMMAND_SENT, COMMAND_RECEIVED)
 EXCHANGE = "exchange"
 
 
@@ -103,8 +103,8 @@ def measured_flight(profile: Profile, folder: Path, duration_s: float) -> Flight
 
     keepers: dict[str, Callable[..., object]] = {
         "QP": keep_qp,
-        FRAME_HEARD.name: lambda _result, datagram, *_: flight.frames.append(datagram),
-        COMMAND_HEARD.name: lambda _result, datagram, *_: flight.commands.append(datagram),
+        FRAME_RECEIVED.name: lambda _result, datagram, *_: flight.frames.append(datagram),
+        COMMAND_RECEIVED.name: lambda _result, datagram, *_: flight.commands.append(datagram),
     }
     with ExitStack() as stack:
         for stage in (*STAGES, *LINK_STAGES):

@@ -12,7 +12,7 @@ from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
-from colibri.common.process.lifecycle import undisturbed
+from colibri.common.process.lifecycle import gc_frozen
 from colibri.common.types import Address
 from colibri.flights.plan import FlightPlan, Summary
 from colibri.mavlink.hil.feedback import Feedback
@@ -55,7 +55,7 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
         exchange = InMemory(autopilot, interval_us, plan.feedback, plant_logs)
     try:
         plant_logs.write_world(plant.world)
-        with undisturbed():
+        with gc_frozen():
             began_s = perf_counter()
             while plant.world.time_us + interval_us <= plan.duration_s * 1e6:
                 if isfinite(plan.speed):

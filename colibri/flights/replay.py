@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import DecisionError
-from colibri.autopilot.core.checkpoint import Past
+from colibri.autopilot.core.checkpoint import History
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.step import Received, Step
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.tracks import track
-from colibri.autopilot.process.recorded_inputs import Heard, Input, InputsError, Setup, read
+from colibri.autopilot.process.recorded_inputs import Input, InputsError, ReceivedDatagram, Setup, read
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.common.rotations import euler_from_quaternion
@@ -151,7 +151,7 @@ def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
     setups = {what.first_us: what for what in inputs if isinstance(what, Setup)}
     heard: dict[int, list[Received]] = {}
     for what in inputs:
-        if isinstance(what, Heard):
+        if isinstance(what, ReceivedDatagram):
             heard.setdefault(what.time_us, []).append(Received(what.datagram, what.link, what.address, what.loopback))
     pilot: Autopilot | Copter | None = None
     wire = Wire(next(iter(setups.values())).system_id)
@@ -209,8 +209,10 @@ def _begun(setup: Setup) -> Autopilot | Copter:
     settings = StationSettings(
         system_id=setup.system_id, identity=setup.identity, origin=setup.origin, feedback=setup.feedback
     )
-    past = of_bytes(Past, setup.past) if setup.past else None
-    return Copter(profile, vehicle, settings, _clock, values=setup.values, first=flown, estimator=estimator, past=past)
+    history = of_bytes(History, setup.history) if setup.history else None
+    return Copter(
+        profile, vehicle, settings, _clock, values=setup.values, first=flown, estimator=estimator, history=history
+    )
 
 
 def _end(setup: Setup, pilot: Autopilot | Copter) -> AutopilotEnd:

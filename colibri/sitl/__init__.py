@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
+    from colibri.sitl.backends.lockstep import SessionError
     from colibri.sitl.backends.setting import Setting, SettingError
-    from colibri.sitl.backends.stage import StageError
     from colibri.sitl.errors import SitlError
     from colibri.sitl.fleet import Fleet
     from colibri.sitl.flight_record import Record
@@ -18,7 +18,7 @@ else:
         __name__,
         {
             "colibri.sitl.backends.setting": "Setting SettingError",
-            "colibri.sitl.backends.stage": "StageError",
+            "colibri.sitl.backends.lockstep": "SessionError",
             "colibri.sitl.errors": "SitlError",
             "colibri.sitl.fleet": "Fleet",
             "colibri.sitl.flight_record": "Record",
@@ -34,10 +34,10 @@ __all__ = [
     "NotInTimeError",
     "Record",
     "RefusedError",
+    "SessionError",
     "Setting",
     "SettingError",
     "Sitl",
     "SitlError",
-    "StageError",
     "Station",
 ]

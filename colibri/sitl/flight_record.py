@@ -16,7 +16,7 @@ from colibri.common.rotations import euler_from_quaternion
 from colibri.mavlink.files.flight_log import SUFFIX
 from colibri.mavlink.wire.framing import Framer
 from colibri.mavlink.wire.tlog import TlogWriter
-from colibri.sitl.backends.stage import Instant
+from colibri.sitl.backends.lockstep import Instant
 
 COLUMNS = (
     *("t", "x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r"),

@@ -16,9 +16,9 @@ from colibri.mavlink.parameters.file import write
 from colibri.mavlink.parameters.store import Parameters
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
 from colibri.sitl.backends.launcher import Launcher
+from colibri.sitl.backends.lockstep import Autopilot, LockstepSession, Plant
 from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
 from colibri.sitl.backends.setting import Setting, SettingError
-from colibri.sitl.backends.stage import Autopilot, Plant, Stage
 from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant
 from colibri.sitl.vehicle import Sitl
 
@@ -47,12 +47,12 @@ class Flights:
         values = {name: getattr(self._setting, name) for name in Setting.__dataclass_fields__}
         setting = Setting(**(values | changes))
         state = self._folder / f"vehicle-{len(self.flown)}"
-        sitl = Sitl(setting, self._stage(setting, state), origin_of(setting))
+        sitl = Sitl(setting, self._lockstep(setting, state), origin_of(setting))
         self.flown.append(sitl)
         sitl.begin()
         return sitl
 
-    def _stage(self, setting: Setting, state: Path) -> Stage:
+    def _lockstep(self, setting: Setting, state: Path) -> LockstepSession:
         state.mkdir()
         _write_parameters(setting, state)
         plant, autopilot = setting.plant_options(_hover_rpm(setting)), setting.autopilot_options(state)
@@ -62,9 +62,9 @@ class Flights:
         self._ends.callback(begun.close)
         return self._met(begun, UdpAutopilot(self._launcher, autopilot, state), setting)
 
-    def _met(self, plant: Plant, autopilot: Autopilot, setting: Setting) -> Stage:
+    def _met(self, plant: Plant, autopilot: Autopilot, setting: Setting) -> LockstepSession:
         self._ends.callback(autopilot.close)
-        return Stage(plant, autopilot, setting.system, setting.seed)
+        return LockstepSession(plant, autopilot, setting.system, setting.seed)
 
     def keep(self, folder: Path, *, figures: bool = True) -> list[Path]:
         """Write all that is known of the flights below `folder`, with or without figures; return where each is."""

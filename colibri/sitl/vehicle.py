@@ -9,7 +9,7 @@ from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.types import Vector
-from colibri.mavlink.hil.conductor import Parcel, Turn
+from colibri.mavlink.hil.conductor import Parcel, StepMessage
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
 from colibri.mavlink.parameters.store import Value
@@ -17,8 +17,8 @@ from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
 from colibri.mavlink.wire.ned import ned_from_enu
 from colibri.sitl import mission_items as items
 from colibri.sitl.backends.link_faults import Trouble
+from colibri.sitl.backends.lockstep import LockstepSession
 from colibri.sitl.backends.setting import Setting
-from colibri.sitl.backends.stage import Stage
 from colibri.sitl.errors import SitlError
 from colibri.sitl.flight_record import Record
 from colibri.sitl.ground_station import RefusedError, Station
@@ -67,14 +67,14 @@ class Sitl(View):
     Refused = RefusedError
     NotInTime = NotInTimeError
 
-    def __init__(self, setting: Setting, stage: Stage, origin: Geodetic) -> None:
+    def __init__(self, setting: Setting, lockstep: LockstepSession, origin: Geodetic) -> None:
         """Begin a flight on a stage; `origin` is that of the ENU frame."""
         self.setting = setting
         self.origin = origin
-        self.link = Links(Trouble(**dict[str, Any](setting.ground)), stage.trouble)
+        self.link = Links(Trouble(**dict[str, Any](setting.ground)), lockstep.trouble)
         self.record = Record()
-        self._stage = stage
-        self._said = Turn(0, ())
+        self._lockstep = lockstep
+        self._said = StepMessage(0, ())
         self._injected = b""
         self._sticks: dict[str, float] | None = None
         self._sticks_at_us = 0
@@ -102,7 +102,7 @@ class Sitl(View):
                 parcels.append(Parcel(station.number, datagram))
                 self.record.note(now_us, datagram)
         injected, self._injected = self._injected, b""
-        instant = self._stage.advance(parcels, injected)
+        instant = self._lockstep.advance(parcels, injected)
         self.record.add(instant)
         self._said, self.rotors = instant.said, instant.command
         for number, datagram in instant.said.parcels:
@@ -370,17 +370,17 @@ class Sitl(View):
         """
         numbers = (_number("FAILURE_UNIT", unit), _number("FAILURE_TYPE", kind))
         params = (*map(float, numbers), float(instance), *values)
-        self._injected += self._stage.command_to_plant(mav.MAV_CMD_INJECT_FAILURE, *params)
-        before = len(self._stage.acks)
+        self._injected += self._lockstep.command_to_plant(mav.MAV_CMD_INJECT_FAILURE, *params)
+        before = len(self._lockstep.acks)
         self.step()
-        results = [result for number, result in self._stage.acks[before:] if number == mav.MAV_CMD_INJECT_FAILURE]
+        results = [result for number, result in self._lockstep.acks[before:] if number == mav.MAV_CMD_INJECT_FAILURE]
         if results != [mav.MAV_RESULT_ACCEPTED]:
             result = results[0] if results else mav.MAV_RESULT_FAILED
             raise RefusedError(f"failure {unit} {kind}", result, "this plant cannot fail so")
 
     def kill_autopilot(self) -> None:
         """Kill the autopilot as `kill -9` does, and start it again at once, with the files that it has written."""
-        self._stage.kill_autopilot()
+        self._lockstep.kill_autopilot()
 
     # Who else is there.
 

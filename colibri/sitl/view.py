@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from colibri.autopilot.commander.rules.modes import Mode, mode_of_custom
 from colibri.common.rotations import euler_from_quaternion, tilt_deg
 from colibri.common.types import Vector
-from colibri.mavlink.hil.conductor import Turn
+from colibri.mavlink.hil.conductor import StepMessage
 from colibri.mavlink.wire.ned import ned_from_enu
+from colibri.sitl.backends.lockstep import LockstepSession
 from colibri.sitl.backends.setting import Setting
-from colibri.sitl.backends.stage import Stage
 from colibri.sitl.flight_record import Columns, Record
 from colibri.sitl.ground_station import Station
 from colibri.sitl.inbox import Words
@@ -37,14 +37,14 @@ class View:
     setting: Setting
     gcs: Station
     record: Record
-    _stage: Stage
-    _said: Turn
+    _lockstep: LockstepSession
+    _said: StepMessage
     _words: Words
 
     @property
     def time_us(self) -> int:
         """Simulated time, µs."""
-        return self._stage.truth.time_us
+        return self._lockstep.truth.time_us
 
     @property
     def time_s(self) -> float:
@@ -59,12 +59,12 @@ class View:
     @property
     def position(self) -> Vector:
         """Where the vehicle is."""
-        return self._stage.truth.position_enu_m
+        return self._lockstep.truth.position_enu_m
 
     @property
     def velocity(self) -> Vector:
         """How fast it flies."""
-        return self._stage.truth.velocity_enu_m_s
+        return self._lockstep.truth.velocity_enu_m_s
 
     @property
     def speed_m_s(self) -> float:
@@ -74,17 +74,17 @@ class View:
     @property
     def rates(self) -> Vector:
         """Body rates p, q, r, FLU, rad/s."""
-        return self._stage.truth.rate_flu_rad_s
+        return self._lockstep.truth.rate_flu_rad_s
 
     @property
     def euler(self) -> Vector:
         """Roll, pitch, yaw, FLU to ENU, rad."""
-        return euler_from_quaternion(self._stage.truth.attitude)
+        return euler_from_quaternion(self._lockstep.truth.attitude)
 
     @property
     def tilt_deg(self) -> float:
         """How far its thrust points from straight up, degrees."""
-        return tilt_deg(self._stage.truth.attitude)
+        return tilt_deg(self._lockstep.truth.attitude)
 
     @property
     def mode(self) -> Mode | None:
@@ -135,7 +135,7 @@ class View:
     @property
     def processes(self) -> dict[str, int]:
         """Numbers of the processes "plant" and "autopilot"; empty in memory."""
-        return self._stage.processes()
+        return self._lockstep.processes()
 
     @property
     def sha256(self) -> str:

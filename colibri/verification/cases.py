@@ -100,7 +100,7 @@ class SitlCase:
 
         Raises:
             SettingError: It cannot begin.
-            StageError: A process has died, or does not answer.
+            SessionError: A process has died, or does not answer.
             RefusedError: The vehicle refuses an order.
             NotInTimeError: What was waited for has not come about.
         """

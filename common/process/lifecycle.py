@@ -29,7 +29,7 @@ def nudge_m() -> float:
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
+def gc_frozen() -> Iterator[None]:
     """Keep the garbage collector from all that exists already: to look at it again and again costs a flight time."""
     gc.collect()
     gc.freeze()
@@ -47,7 +47,7 @@ def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
     raise SystemExit(code)
 
 
-class Stop:
+class HoldTask:
     """Becomes true when the process shall end: SIGINT, SIGTERM, or (if asked for) the death of its parent."""
 
     def __init__(self, *, parent: int | None = None, starting: bool = False) -> None:

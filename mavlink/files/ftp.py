@@ -85,10 +85,10 @@ class Ftp:
     """Serves files.
 
     Attributes:
-        hears: FILE_TRANSFER_PROTOCOL.
+        handles: FILE_TRANSFER_PROTOCOL.
     """
 
-    hears = frozenset({"FILE_TRANSFER_PROTOCOL"})
+    handles = frozenset({"FILE_TRANSFER_PROTOCOL"})
 
     def __init__(self, files: Files) -> None:
         """Serve `files`."""

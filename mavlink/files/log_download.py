@@ -55,10 +55,10 @@ class Logs:
     """Serves the logs in a folder.
 
     Attributes:
-        hears: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_ERASE, LOG_REQUEST_END.
+        handles: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_ERASE, LOG_REQUEST_END.
     """
 
-    hears = frozenset({"LOG_REQUEST_LIST", "LOG_REQUEST_DATA", "LOG_ERASE", "LOG_REQUEST_END"})
+    handles = frozenset({"LOG_REQUEST_LIST", "LOG_REQUEST_DATA", "LOG_ERASE", "LOG_REQUEST_END"})
 
     def __init__(
         self, files: Files, folder: Names = (), being_written: Callable[[], str | None] = lambda: None

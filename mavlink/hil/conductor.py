@@ -33,7 +33,7 @@ class Parcel(NamedTuple):
     datagram: bytes
 
 
-class Turn(NamedTuple):
+class StepMessage(NamedTuple):
     """All that is said at an instant in one direction.
 
     Attributes:
@@ -49,21 +49,21 @@ class Turn(NamedTuple):
     armed: bool = False
 
 
-def packets(turn: Turn) -> list[bytes]:
+def packets(step_message: StepMessage) -> list[bytes]:
     """Return a turn as packets, each of which fits a datagram.
 
     Raises:
         ValueError: It is more than 255 packets.
     """
-    parts = [_HEAD.pack(turn.time_us, turn.custom_mode, turn.armed, len(turn.parcels))]
-    for station, whole in turn.parcels:
+    parts = [_HEAD.pack(step_message.time_us, step_message.custom_mode, step_message.armed, len(step_message.parcels))]
+    for station, whole in step_message.parcels:
         datagram = whole[:MAX_PARCEL_BYTES]
         parts += (_PARCEL.pack(station, len(datagram)), datagram)
     content = b"".join(parts)
     pieces = [content[at : at + _PIECE_BYTES] for at in range(0, len(content), _PIECE_BYTES)]
     if len(pieces) > 255:
         raise ValueError(f"{len(content)} bytes are too many to say at one instant")
-    return [_PIECE.pack(turn.time_us, number, len(pieces)) + piece for number, piece in enumerate(pieces)]
+    return [_PIECE.pack(step_message.time_us, number, len(pieces)) + piece for number, piece in enumerate(pieces)]
 
 
 class Gathering:
@@ -74,7 +74,7 @@ class Gathering:
         self._time_us = -1
         self._pieces: dict[int, bytes] = {}
 
-    def take(self, packet: bytes) -> Turn | None:
+    def take(self, packet: bytes) -> StepMessage | None:
         """Take in a packet from the other process; return the turn if that makes it whole."""
         time_us, number, count = _PIECE.unpack_from(packet)
         if time_us != self._time_us:
@@ -87,7 +87,7 @@ class Gathering:
         return _turn(content)
 
 
-def _turn(content: bytes) -> Turn:
+def _turn(content: bytes) -> StepMessage:
     time_us, custom_mode, armed, count = _HEAD.unpack_from(content)
     at = _HEAD.size
     parcels = []
@@ -96,4 +96,4 @@ def _turn(content: bytes) -> Turn:
         at += _PARCEL.size
         parcels.append(Parcel(station, content[at : at + length]))
         at += length
-    return Turn(time_us, parcels, custom_mode, bool(armed))
+    return StepMessage(time_us, parcels, custom_mode, bool(armed))

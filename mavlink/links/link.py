@@ -64,7 +64,7 @@ class GroundLink(Protocol):
         ...
 
 
-class OneByOne:
+class BlockingReceiver:
     """A link of any kind, used as `UdpLink` is: what has come is handed out one by one.
 
     Attributes:

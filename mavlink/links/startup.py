@@ -5,21 +5,23 @@ import gc
 from collections.abc import Callable
 from typing import TypeVar
 
-from colibri.common.process.lifecycle import Stop, fail, use_one_thread
+from colibri.common.process.lifecycle import HoldTask, fail, use_one_thread
 from colibri.common.process.status import Status
 from colibri.mavlink.links.link import LinkError
 
 Link = TypeVar("Link")
 
 
-def begin(name: str, url: str, args: argparse.Namespace, opened: Callable[[str], Link]) -> tuple[Link, Status, Stop]:
+def begin(
+    name: str, url: str, args: argparse.Namespace, opened: Callable[[str], Link]
+) -> tuple[Link, Status, HoldTask]:
     """Open the link at `url` by `opened` and take over signals, or end with one line.
 
     To be called before numpy is loaded.
     """
     use_one_thread()
-    gc.disable()  # until all is loaded, see `undisturbed`: what is loaded stays
-    stop = Stop(parent=args.parent, starting=True)
+    gc.disable()  # until all is loaded, see `gc_frozen`: what is loaded stays
+    stop = HoldTask(parent=args.parent, starting=True)
     try:
         link = opened(url)
     except LinkError as error:

@@ -102,7 +102,7 @@ class MissionService:
             "MISSION_WRITE_PARTIAL_LIST": self._partial,
             "MISSION_REQUEST_PARTIAL_LIST": self._partial,
         }
-        self.hears = frozenset((*self._receivers, "MISSION_ITEM_INT", "MISSION_ITEM"))
+        self.handles = frozenset((*self._receivers, "MISSION_ITEM_INT", "MISSION_ITEM"))
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         """Take in one message; return what to send at once."""

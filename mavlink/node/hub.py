@@ -67,8 +67,8 @@ class Hub:
         """Be component `component_id` of system `system_id`; without `signing` nobody can switch that on."""
         self._own = (system_id, component_id)
         self._services = tuple(services)
-        names = frozenset[str]().union(*(service.hears for service in services))
-        self._hearing = {name: [service for service in services if name in service.hears] for name in names}
+        names = frozenset[str]().union(*(service.handles for service in services))
+        self._hearing = {name: [service for service in services if name in service.handles] for name in names}
         self._signing = signing
         self._observers = tuple(observers)
         self._router = Router(self._own)

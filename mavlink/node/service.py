@@ -46,10 +46,10 @@ class Service(Protocol):
     """A microservice.
 
     Attributes:
-        hears: Names of the messages that `receive` is to be given.
+        handles: Names of the messages that `receive` is to be given.
     """
 
-    hears: frozenset[str]
+    handles: frozenset[str]
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         """Take in one message; return what to send at once."""

@@ -32,7 +32,7 @@ class _Listing:
 class ParameterService:
     """Answers for `parameters`."""
 
-    hears = frozenset({"PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"})
+    handles = frozenset({"PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"})
 
     def __init__(self, parameters: Parameters) -> None:
         """Serve `parameters`."""

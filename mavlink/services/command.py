@@ -149,7 +149,7 @@ class CommandService:
         closed: Why every command is denied for the time being; empty if they are obeyed.
     """
 
-    hears = frozenset({"COMMAND_LONG", "COMMAND_INT", "COMMAND_CANCEL"})
+    handles = frozenset({"COMMAND_LONG", "COMMAND_INT", "COMMAND_CANCEL"})
 
     def __init__(self, handlers: Mapping[int, Handler | Entry], text: StatusText) -> None:
         """Obey the commands of `handlers`, by MAV_CMD; say with `text` why one is refused.

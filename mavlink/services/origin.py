@@ -34,10 +34,10 @@ class OriginService:
     """Hears the messages.
 
     Attributes:
-        hears: Their names.
+        handles: Their names.
     """
 
-    hears = frozenset({"SET_GPS_GLOBAL_ORIGIN", "SET_HOME_POSITION", "SET_MODE"})
+    handles = frozenset({"SET_GPS_GLOBAL_ORIGIN", "SET_HOME_POSITION", "SET_MODE"})
 
     def __init__(self, setters: Setters, text: StatusText) -> None:
         """Hand what is asked for to `setters`; say why it is refused."""

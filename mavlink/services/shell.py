@@ -28,10 +28,10 @@ class Shell:
     """Answers lines.
 
     Attributes:
-        hears: SERIAL_CONTROL.
+        handles: SERIAL_CONTROL.
     """
 
-    hears = frozenset({"SERIAL_CONTROL"})
+    handles = frozenset({"SERIAL_CONTROL"})
 
     def __init__(self, commands: Mapping[str, Command]) -> None:
         """Know `commands`, by name, and "help"."""

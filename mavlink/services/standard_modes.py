@@ -41,7 +41,7 @@ SetMode: TypeAlias = Callable[[int, Command], Outcome]
 class StandardModes:
     """Lists the modes, and sets the standard ones."""
 
-    hears: frozenset[str] = frozenset()
+    handles: frozenset[str] = frozenset()
 
     def __init__(self, modes: Sequence[ModeInfo], set_mode: SetMode) -> None:
         """Offer `modes`; `set_mode` sets one."""

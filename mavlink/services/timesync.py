@@ -15,7 +15,7 @@ INT64_MAX = 2**63 - 1
 class TimeService:
     """Answers who asks what time it is, and who asks whether anybody is there. Nobody sets this clock."""
 
-    hears = frozenset({"TIMESYNC", "PING", "SYSTEM_TIME"})
+    handles = frozenset({"TIMESYNC", "PING", "SYSTEM_TIME"})
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         """Answer requests; what answers a request of somebody else is ignored, as is SYSTEM_TIME."""

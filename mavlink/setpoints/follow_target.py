@@ -33,11 +33,11 @@ class Follow:
     """Keeps the latest state of the target of the tracker that is obeyed; see `streams` for which that is.
 
     Attributes:
-        hears: FOLLOW_TARGET.
+        handles: FOLLOW_TARGET.
         dropped: Messages that were not taken, by reason.
     """
 
-    hears = frozenset({"FOLLOW_TARGET"})
+    handles = frozenset({"FOLLOW_TARGET"})
 
     def __init__(self) -> None:
         """No target yet."""

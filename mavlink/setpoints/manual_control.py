@@ -41,11 +41,11 @@ class Manual:
     """Keeps the latest sticks of the client that is obeyed; see `streams` for which that is.
 
     Attributes:
-        hears: MANUAL_CONTROL and RC_CHANNELS_OVERRIDE.
+        handles: MANUAL_CONTROL and RC_CHANNELS_OVERRIDE.
         dropped: Messages that were not taken, by reason.
     """
 
-    hears = frozenset({"MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"})
+    handles = frozenset({"MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"})
 
     def __init__(self, system_id: int) -> None:
         """Be the vehicle `system_id`."""

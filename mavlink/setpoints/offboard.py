@@ -29,12 +29,12 @@ class Offboard:
     """Keeps the latest setpoint of the client that is obeyed; see `streams` for which that is.
 
     Attributes:
-        hears: The messages of setpoints.
+        handles: The messages of setpoints.
         dropped: Setpoints that were not taken, by reason.
         ignored: How many SET_ACTUATOR_CONTROL_TARGET came.
     """
 
-    hears = frozenset({*_DECODERS, "SET_ACTUATOR_CONTROL_TARGET"})
+    handles = frozenset({*_DECODERS, "SET_ACTUATOR_CONTROL_TARGET"})
 
     def __init__(self) -> None:
         """Nobody streams yet; the vehicle is at the origin and has no home."""

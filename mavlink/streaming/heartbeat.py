@@ -38,7 +38,7 @@ class HeartbeatService:
         expected_us: When a ground station began to be waited for that was heard before a restart; None for none.
     """
 
-    hears = frozenset({"HEARTBEAT"})
+    handles = frozenset({"HEARTBEAT"})
 
     def __init__(self, identity: Identity) -> None:
         """Speak as `identity`."""

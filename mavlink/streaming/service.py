@@ -44,7 +44,7 @@ class StreamService:
     The lead tells it of each frame's snapshot by `update` before `poll`.
     """
 
-    hears = frozenset({"REQUEST_DATA_STREAM"})
+    handles = frozenset({"REQUEST_DATA_STREAM"})
 
     def __init__(self, telemetry: Mapping[str, Encoder], providers: Mapping[str, Provider] | None = None) -> None:
         """Stream the messages of `telemetry`; have `providers` answer for messages of other services, by name."""

@@ -2,7 +2,7 @@
 
 from time import perf_counter
 
-from colibri.common.process.lifecycle import Stop
+from colibri.common.process.lifecycle import HoldTask
 from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
@@ -19,7 +19,14 @@ class FreeServer(Server):
     """Sends each frame when it is due; the rotors follow the newest command from the moment at which it came."""
 
     def __init__(
-        self, link: UdpLink, end: PlantEnd, status: Status, stop: Stop, logs: PlantLogs | None, *, cut_after_s: float
+        self,
+        link: UdpLink,
+        end: PlantEnd,
+        status: Status,
+        stop: HoldTask,
+        logs: PlantLogs | None,
+        *,
+        cut_after_s: float,
     ) -> None:
         """Serve `end` on `link` until `stop`; stop the rotors where no command comes for `cut_after_s`, simulated."""
         super().__init__(link, end, status, stop, logs)

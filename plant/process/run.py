@@ -3,7 +3,7 @@
 import argparse
 
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, undisturbed
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, HoldTask, fail, gc_frozen
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.links.udp import UdpLink
@@ -29,7 +29,7 @@ def builder_of(args: argparse.Namespace) -> PlantBuilder:
     return PlantBuilder(setting, vehicle, starts, integrator=args.integrator, origin=args.home.origin)
 
 
-def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
+def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: HoldTask) -> int:
     """Serve one flight on `link` as the command line says; return the exit code."""
     try:
         builder = builder_of(args)
@@ -42,13 +42,13 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     end = PlantEnd(
         system_id=args.system_id, frame_interval_us=interval_us, serves=tuple(builder.starts), waits=not args.realtime
     )
-    server = Server(link, end, status, stop, logs, tells_truth=args.truth)
+    server = Server(link, end, status, stop, logs, streams_truth=args.truth)
     if args.realtime:
         from colibri.plant.process.free_running import FreeServer
 
         server = FreeServer(link, end, status, stop, logs, cut_after_s=args.cut_after)
     try:
-        with undisturbed():
+        with gc_frozen():
             if server.wait():
                 plant = builder.build(end.feedback, end.frame_interval_us)
                 server.fly(plant, duration_s=args.duration, speed=args.speed)

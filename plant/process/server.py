@@ -2,7 +2,7 @@
 
 from time import perf_counter, sleep
 
-from colibri.common.process.lifecycle import Stop
+from colibri.common.process.lifecycle import HoldTask
 from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
@@ -43,18 +43,18 @@ class Server:
         link: UdpLink,
         end: PlantEnd,
         status: Status,
-        stop: Stop,
+        stop: HoldTask,
         logs: PlantLogs | None,
         *,
-        tells_truth: bool = False,
+        streams_truth: bool = False,
     ) -> None:
-        """Serve `end` on `link` until `stop`; where it `tells_truth`, each frame has the true state behind it."""
+        """Serve `end` on `link` until `stop`; where it `streams_truth`, each frame has the true state behind it."""
         self._link = link
         self._end = end
         self._status = status
         self._stop = stop
         self._logs = logs
-        self._tells_truth = tells_truth
+        self._streams_truth = streams_truth
         self._time_us = 0
         self._logged: World | None = None
 
@@ -96,7 +96,7 @@ class Server:
         self._time_us = world.time_us
         offered_s = perf_counter()
         frame, plant_status = plant.tell()
-        self._end.offer(frame, offered_s, plant_status, state_frame(world) if self._tells_truth else None)
+        self._end.offer(frame, offered_s, plant_status, state_frame(world) if self._streams_truth else None)
         self._send()
         self._log(world)  # while the autopilot computes
         silence_said = False

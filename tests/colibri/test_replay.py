@@ -149,7 +149,7 @@ def test_what_ground_stations_ordered_is_replayed(tmp_path: Path) -> None:
             plant.process.send_signal(signal.SIGINT)
             plant.wait()
     setups = [what for what in read((out / "inputs.jsonl").read_bytes()) if isinstance(what, Setup)]
-    assert [bool(setup.past) for setup in setups] == [False, True]
+    assert [bool(setup.history) for setup in setups] == [False, True]
     commands, last_us, difference = replay_flight(out / "flight.tlog")
     assert difference is None
     assert commands > 500

@@ -32,17 +32,17 @@ def test_decoding_never_raises_and_keeps_nothing(seed: int) -> None:
 
 
 @pytest.fixture(scope="module")
-def undisturbed() -> list[tuple[float, ...]]:
+def gc_frozen() -> list[tuple[float, ...]]:
     return Flight().fly(FRAMES)
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_flight_under_fire_is_the_same_flight(seed: int, undisturbed: list[tuple[float, ...]]) -> None:
+def test_a_flight_under_fire_is_the_same_flight(seed: int, gc_frozen: list[tuple[float, ...]]) -> None:
     """Hostile datagrams from the peer's own address, before and after each good one, change no bit of any state."""
     chance = random.Random(seed)
     flight = Flight()
     states = flight.fly(FRAMES, 20, (Fuzzer(chance, AUTOPILOT, PLANT), Fuzzer(chance, PLANT, AUTOPILOT)))
-    assert states == undisturbed
+    assert states == gc_frozen
     assert flight.plant_end.frame_interval_us == FRAME_US
     plant, autopilot = flight.plant_end.dropped, flight.autopilot_end.dropped
     assert min(plant[reason] for reason in ("foreign", "invalid", "repeated", "unexpected", "unknown")) > 10

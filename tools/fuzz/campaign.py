@@ -65,7 +65,7 @@ def campaign(
             failures += _end(processes) if not failures else []
     if not failures:
         failures += _miscounted(processes, relay)
-        failures += ["the trajectory differs"] * (_hash(folder / "flight") != _undisturbed(folder, duration_s))
+        failures += ["the trajectory differs"] * (_hash(folder / "flight") != _gc_frozen(folder, duration_s))
     failures += ["not all was sent"] * (set(relay.sent.values()) != {quota})
     failures += [f"{name} said: {process.errors()}" for name, process in processes.items() if process.errors()]
     memory = {name: (before[name], after[name]) for name in processes}
@@ -137,7 +137,7 @@ def _kernel_drops(processes: dict[str, Process]) -> int:
     return sum(int(row[-1]) for row in rows if int(row[1].split(":")[1], 16) in ports)
 
 
-def _undisturbed(folder: Path, duration_s: float) -> str:
+def _gc_frozen(folder: Path, duration_s: float) -> str:
     fly_thesis(folder / "undisturbed", "spiral", "--link", "memory", "--duration", str(duration_s))
     return _hash(folder / "undisturbed")
 

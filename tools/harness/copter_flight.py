@@ -13,7 +13,7 @@ from msgspec import structs
 
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode, mode_of_custom
 from colibri.autopilot.control.profile import Profile, load_profile
-from colibri.autopilot.core.checkpoint import Kept, Past
+from colibri.autopilot.core.checkpoint import Checkpoint, History
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.state_source import estimator_for
@@ -93,15 +93,15 @@ class CopterFlight:
         On sensors it stands until there is an estimate.
         """
         self._profile = profile or FLIGHT
-        self._believed = load_vehicle(self._profile.simulation.vehicle)
+        self._assumed = load_vehicle(self._profile.simulation.vehicle)
         self._settings = StationSettings(
             system_id=SYSTEM, identity="px4", origin=origin, files=files, feedback=feedback
         )
         self._weather = blowing(wind_enu_m_s)
-        self._estimator = estimator_for(feedback, self._believed, origin)
+        self._estimator = estimator_for(feedback, self._assumed, origin)
         self.copter = self._copter(values, first)
         world = WorldSetting(wind=self._weather.wind, seed=seed, latency=latency_us * 1e-3)
-        builder = PlantBuilder(world, vehicle or self._believed, {feedback: nudged(start)}, origin=origin)
+        builder = PlantBuilder(world, vehicle or self._assumed, {feedback: nudged(start)}, origin=origin)
         self.plant = builder.build(feedback, self.copter.frame_interval_us)
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
         self.estimate: Estimate | None = None
@@ -113,23 +113,23 @@ class CopterFlight:
             self.until(lambda: self.estimate is not None, 10.0, "the first estimate")
         self.step()
 
-    def past(self) -> Past:
+    def history(self) -> History:
         """Return what is kept of the flight, as it comes from a disk."""
-        kept = of_bytes(Kept, to_bytes(self.copter.record()))
+        kept = of_bytes(Checkpoint, to_bytes(self.copter.record()))
         assert kept is not None
         plans = self.copter.stations.plans.plans
-        return Past(kept, {plan_type: plan.items for plan_type, plan in plans.items()})
+        return History(kept, {plan_type: plan.items for plan_type, plan in plans.items()})
 
-    def _copter(self, values: dict[str, Value] | None, first: Track | None, past: Past | None = None) -> Copter:
+    def _copter(self, values: dict[str, Value] | None, first: Track | None, history: History | None = None) -> Copter:
         return Copter(
             self._profile,
-            self._believed,
+            self._assumed,
             self._settings,
             lambda: NO_CLOCK_S,
             values=values,
             first=first,
             estimator=self._estimator,
-            past=past,
+            history=history,
         )
 
     def add(self, client: Client) -> Client:
@@ -140,15 +140,15 @@ class CopterFlight:
 
     def put(self, start: Start) -> None:
         """Put the vehicle elsewhere, at this very time."""
-        self.world = replace(starting_world(start, self._believed, self._weather), time_us=self.world.time_us)
+        self.world = replace(starting_world(start, self._assumed, self._weather), time_us=self.world.time_us)
 
-    def restart(self, past: Past | None = None) -> None:
+    def restart(self, history: History | None = None) -> None:
         """Start the autopilot anew, wherever the vehicle is; with what was kept of a flight it flies on at once."""
-        values = None if past is None else dict(self.copter.parameters.values)
-        self.copter = self._copter(values, None, past)
+        values = None if history is None else dict(self.copter.parameters.values)
+        self.copter = self._copter(values, None, history)
         for client in self._clients:
             self.copter.stations.hub.open(client.link, client.address)
-        if past is not None:
+        if history is not None:
             self.step()
 
     def step(self) -> None:
@@ -267,8 +267,8 @@ class CopterFlight:
 
     def drain(self, part: float) -> None:
         """Have so much of the full battery's charge gone at once, and the autopilot know."""
-        assert self._believed.battery is not None
-        gone_ah = part * self._believed.battery.capacity_ah
+        assert self._assumed.battery is not None
+        gone_ah = part * self._assumed.battery.capacity_ah
         self.world = replace(self.world, charge_used_ah=self.world.charge_used_ah + gone_ah)
         self.step()
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.autopilot.guidance.trajectories.tracks import position
-from colibri.common.process.lifecycle import undisturbed
+from colibri.common.process.lifecycle import gc_frozen
 from colibri.common.types import Array
 from colibri.flights.in_process import Direct, put_together
 from colibri.flights.plan import FlightPlan
@@ -63,7 +63,7 @@ def fly_family(track: str, count: int, duration_s: float, **start: float) -> lis
 def _fly(plan: FlightPlan, start: Start, duration_s: float) -> Flown:
     autopilot, plant = put_together(replace(plan, start=start), lambda: 0.0)
     exchange, states, fallback = Direct(autopilot), [], []
-    with undisturbed():
+    with gc_frozen():
         while plant.world.time_us < duration_s * 1e6:
             step, command = exchange(plant)
             plant.answer(command)

@@ -139,7 +139,7 @@ class Station:
         self._outbox.append(self._codec.encode(name, *fields))
 
 
-class Companion(Station):
+class OffboardTask(Station):
     """A companion computer that takes off and flies the vehicle in a circle, by setpoints.
 
     Attributes:

@@ -15,7 +15,7 @@ import psutil
 from colibri import plant
 from tools.harness.ports import OnPort
 from tools.harness.sitl_process import vehicle
-from tools.harness.stations import Companion, Station
+from tools.harness.stations import OffboardTask, Station
 
 MAX_GAP_S = 1.5
 MAX_GROWTH_BYTES = 2_000_000
@@ -42,9 +42,9 @@ class Look(NamedTuple):
     cpu_s: dict[str, float]
 
 
-def crew() -> tuple[Station, Station, Companion]:
+def crew() -> tuple[Station, Station, OffboardTask]:
     """Return two ground stations and a companion."""
-    return Station(255), Station(254), Companion(245)
+    return Station(255), Station(254), OffboardTask(245)
 
 
 def faults(crew: Iterable[Station]) -> list[str]:
@@ -58,7 +58,7 @@ def faults(crew: Iterable[Station]) -> list[str]:
         acknowledged = sum(client.acks.values())
         if not sum(client.sent.values()) - 2 <= acknowledged <= sum(client.sent.values()):
             found.append(f"{name}: {acknowledged} of {sum(client.sent.values())} commands acknowledged")
-        if isinstance(client, Companion) and not 0.0 < client.off_m < MAX_ERROR_M:
+        if isinstance(client, OffboardTask) and not 0.0 < client.off_m < MAX_ERROR_M:
             found.append(f"{name}: {client.off_m:.2f} m off its circle")
     return found
 
@@ -114,7 +114,7 @@ def _figures(clients: Sequence[Station], looks: Sequence[Look], warm: Look) -> d
             }
             for client in clients
         },
-        "off_m": max(client.off_m for client in clients if isinstance(client, Companion)),
+        "off_m": max(client.off_m for client in clients if isinstance(client, OffboardTask)),
         "looks": looks,
     }
 

@@ -16,7 +16,7 @@ VOLTAGE_OF = (0.5, 1.2)
 MAX_THRUST_STICK = 0.6
 
 
-class Facts(NamedTuple):
+class ArmingInputs(NamedTuple):
     """What the checks look at.
 
     Attributes:
@@ -38,46 +38,46 @@ class Facts(NamedTuple):
     battery: str = ""
 
 
-def _tilt(facts: Facts) -> str:
-    assert facts.state is not None
-    tilted_deg = tilt_deg(facts.state.attitude)
+def _tilt(inputs: ArmingInputs) -> str:
+    assert inputs.state is not None
+    tilted_deg = tilt_deg(inputs.state.attitude)
     if tilted_deg <= MAX_TILT_DEG:
         return ""
     return f"tilted by {tilted_deg:.0f} degrees, more than {MAX_TILT_DEG:.0f}"
 
 
-def _speed(facts: Facts) -> str:
-    assert facts.state is not None
-    fast = max(map(abs, facts.state.velocity_enu_m_s))
+def _speed(inputs: ArmingInputs) -> str:
+    assert inputs.state is not None
+    fast = max(map(abs, inputs.state.velocity_enu_m_s))
     return f"moving at {fast:.1f} m/s" if fast > MAX_SPEED_M_S else ""
 
 
-def _standing(facts: Facts) -> str:
-    return "" if facts.standing else "not standing on the ground"
+def _standing(inputs: ArmingInputs) -> str:
+    return "" if inputs.standing else "not standing on the ground"
 
 
-def _charge(facts: Facts) -> str:
-    return f"battery at {facts.charge:.0%}" if facts.charge < MIN_CHARGE else ""
+def _charge(inputs: ArmingInputs) -> str:
+    return f"battery at {inputs.charge:.0%}" if inputs.charge < MIN_CHARGE else ""
 
 
-def _battery(facts: Facts) -> str:
-    return facts.battery
+def _battery(inputs: ArmingInputs) -> str:
+    return inputs.battery
 
 
-def _thrust_stick(facts: Facts) -> str:
-    high = facts.thrust_stick is not None and facts.thrust_stick > MAX_THRUST_STICK
+def _thrust_stick(inputs: ArmingInputs) -> str:
+    high = inputs.thrust_stick is not None and inputs.thrust_stick > MAX_THRUST_STICK
     return "thrust stick is up" if high else ""
 
 
-def _fence(facts: Facts) -> str:
-    return facts.outside_fence.reason if facts.outside_fence else ""
+def _fence(inputs: ArmingInputs) -> str:
+    return inputs.outside_fence.reason if inputs.outside_fence else ""
 
 
-def _knows(facts: Facts) -> str:
-    return facts.not_known
+def _knows(inputs: ArmingInputs) -> str:
+    return inputs.not_known
 
 
-CHECKS: tuple[Callable[[Facts], str], ...] = (
+CHECKS: tuple[Callable[[ArmingInputs], str], ...] = (
     _tilt,
     _speed,
     _standing,
@@ -95,8 +95,8 @@ def battery_fault(voltage_v: float, empty_v: float, full_v: float) -> str:
     return "" if minimum <= voltage_v <= maximum else f"battery not healthy: {voltage_v:.1f} V"
 
 
-def refusals(facts: Facts) -> list[str]:
+def refusals(inputs: ArmingInputs) -> list[str]:
     """Return why the rotors may not be armed; empty if they may."""
-    if facts.state is None:
+    if inputs.state is None:
         return ["no telemetry from the plant"]
-    return [reason for check in CHECKS if (reason := check(facts))]
+    return [reason for check in CHECKS if (reason := check(inputs))]

@@ -27,7 +27,7 @@ _PLANLESS = (Fallback.SHIFTED_PLAN, Fallback.LQR, Fallback.DESCENT)
 """What decides where no QP is solved; recovery is no failure, but how a vehicle turns upright."""
 
 
-class Seen(NamedTuple):
+class FailsafeInputs(NamedTuple):
     """What the conditions are judged by.
 
     Attributes:
@@ -76,31 +76,31 @@ class Conditions:
         self._told: tuple[Vector, object] | None = None
         self._told_us = 0
 
-    def look(self, seen: Seen, limits: Limits, held: Container[Condition]) -> Mapping[Condition, int]:
+    def look(self, inputs: FailsafeInputs, limits: Limits, held: Container[Condition]) -> Mapping[Condition, int]:
         """Return since when each condition holds; those that do not are not in it. `held` are lost already."""
         before, self._since_us = self._since_us, {}
         for condition, is_so in _LOOKS:
-            if is_so(seen, limits):
-                self._since_us[condition] = before.get(condition, seen.now_us)
+            if is_so(inputs, limits):
+                self._since_us[condition] = before.get(condition, inputs.now_us)
         found = dict(self._since_us)
-        frozen_us = self._frozen_since(seen)
+        frozen_us = self._frozen_since(inputs)
         if frozen_us is not None:
             found[Condition.ATTITUDE_LOST] = frozen_us
         for condition, since in _AGES:
-            since_us = since(seen, condition in held)
+            since_us = since(inputs, condition in held)
             if since_us is not None:
                 found[condition] = since_us
         return found
 
-    def _frozen_since(self, seen: Seen) -> int | None:
+    def _frozen_since(self, inputs: FailsafeInputs) -> int | None:
         """Return since when what is told stays the same though it says that it moves; None if it does not."""
-        told = (seen.state.position_enu_m, seen.state.attitude)
-        if told != self._told or seen.standing:
-            self._told, self._told_us = told, seen.now_us
+        told = (inputs.state.position_enu_m, inputs.state.attitude)
+        if told != self._told or inputs.standing:
+            self._told, self._told_us = told, inputs.now_us
             return None
-        for_s = (seen.now_us - self._told_us) * 1e-6
-        moved = hypot(*seen.state.velocity_enu_m_s) * for_s > _FROZEN_M
-        turned = hypot(*seen.state.rate_flu_rad_s) * for_s > _FROZEN_RAD
+        for_s = (inputs.now_us - self._told_us) * 1e-6
+        moved = hypot(*inputs.state.velocity_enu_m_s) * for_s > _FROZEN_M
+        turned = hypot(*inputs.state.rate_flu_rad_s) * for_s > _FROZEN_RAD
         return self._told_us if moved or turned else None
 
 
@@ -141,62 +141,62 @@ def stopping_m(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> 
     return speed_m_s * sqrt(speed_m_s / jerk_m_s3)
 
 
-def _attitude_lost(seen: Seen, limits: Limits) -> bool:
+def _attitude_lost(inputs: FailsafeInputs, limits: Limits) -> bool:
     del limits
-    return seen.estimate is not None and not seen.estimate.health.attitude
+    return inputs.estimate is not None and not inputs.estimate.health.attitude
 
 
-def _tilted(seen: Seen, limits: Limits) -> bool:
-    roll, pitch, _ = map(abs, seen.state.euler)
+def _tilted(inputs: FailsafeInputs, limits: Limits) -> bool:
+    roll, pitch, _ = map(abs, inputs.state.euler)
     return roll > radians(limits["FD_FAIL_R"]) or pitch > radians(limits["FD_FAIL_P"])
 
 
-def _rotor_failed(seen: Seen, limits: Limits) -> bool:
+def _rotor_failed(inputs: FailsafeInputs, limits: Limits) -> bool:
     del limits
-    return seen.rotor_lost is not None
+    return inputs.rotor_lost is not None
 
 
-def _position_lost(seen: Seen, limits: Limits) -> bool:
-    return needs_position(seen.mode, seen.setpoint) and not knows_position(seen.estimate, limits)
+def _position_lost(inputs: FailsafeInputs, limits: Limits) -> bool:
+    return needs_position(inputs.mode, inputs.setpoint) and not knows_position(inputs.estimate, limits)
 
 
-def _estimate_doubted(seen: Seen, limits: Limits) -> bool:
+def _estimate_invalid(inputs: FailsafeInputs, limits: Limits) -> bool:
     del limits
-    if seen.estimate is None:
+    if inputs.estimate is None:
         return False
-    health = seen.estimate.health
+    health = inputs.estimate.health
     return not (health.heading and health.height and health.vertical_velocity)
 
 
-def _battery(charge: str, voltage: str) -> Callable[[Seen, Limits], bool]:
-    return lambda seen, limits: battery_below(seen.battery, limits[charge], limits[voltage])
+def _battery(charge: str, voltage: str) -> Callable[[FailsafeInputs, Limits], bool]:
+    return lambda inputs, limits: battery_below(inputs.battery, limits[charge], limits[voltage])
 
 
-def _fence_breached(seen: Seen, limits: Limits) -> bool:
-    if seen.fence is None or seen.standing:
+def _fence_breached(inputs: FailsafeInputs, limits: Limits) -> bool:
+    if inputs.fence is None or inputs.standing:
         return False
     margin_m = limits["GF_MARGIN"]
-    if seen.fence(seen.state.position_enu_m) < margin_m:
+    if inputs.fence(inputs.state.position_enu_m) < margin_m:
         return True
-    return limits["GF_PREDICT"] != 0 and seen.fence(resting_place(seen.state, seen.pace)) < margin_m
+    return limits["GF_PREDICT"] != 0 and inputs.fence(resting_place(inputs.state, inputs.pace)) < margin_m
 
 
-def _plan_failed(seen: Seen, limits: Limits) -> bool:
+def _plan_failed(inputs: FailsafeInputs, limits: Limits) -> bool:
     del limits
-    return seen.decided is not None and seen.decided.fallback in _PLANLESS
+    return inputs.decided is not None and inputs.decided.fallback in _PLANLESS
 
 
-def _late(seen: Seen, limits: Limits) -> bool:
+def _late(inputs: FailsafeInputs, limits: Limits) -> bool:
     del limits
-    return seen.late
+    return inputs.late
 
 
-_LOOKS: tuple[tuple[Condition, Callable[[Seen, Limits], bool]], ...] = (
+_LOOKS: tuple[tuple[Condition, Callable[[FailsafeInputs, Limits], bool]], ...] = (
     (Condition.ATTITUDE_LOST, _attitude_lost),
     (Condition.TILTED, _tilted),
     (Condition.ROTOR_FAILED, _rotor_failed),
     (Condition.POSITION_LOST, _position_lost),
-    (Condition.ESTIMATE_DOUBTED, _estimate_doubted),
+    (Condition.ESTIMATE_INVALID, _estimate_invalid),
     (Condition.BATTERY_EMERGENCY, _battery("BAT_EMERGEN_THR", "BAT_EMERGEN_VOLT")),
     (Condition.BATTERY_CRITICAL, _battery("BAT_CRIT_THR", "BAT_CRIT_VOLT")),
     (Condition.BATTERY_LOW, _battery("BAT_LOW_THR", "BAT_LOW_VOLT")),
@@ -207,34 +207,34 @@ _LOOKS: tuple[tuple[Condition, Callable[[Seen, Limits], bool]], ...] = (
 """What holds since the first sample that says so."""
 
 
-def _missed_since(seen: Seen, held: bool) -> int | None:
+def _missed_since(inputs: FailsafeInputs, held: bool) -> int | None:
     del held
-    return seen.missed_us
+    return inputs.missed_us
 
 
-def _gps_lost_since(seen: Seen, held: bool) -> int | None:
+def _gps_lost_since(inputs: FailsafeInputs, held: bool) -> int | None:
     del held
-    return None if seen.estimate is None else seen.estimate.health.gps_lost_since_us
+    return None if inputs.estimate is None else inputs.estimate.health.gps_lost_since_us
 
 
-def _station_silent_since(seen: Seen, held: bool) -> int | None:
+def _station_silent_since(inputs: FailsafeInputs, held: bool) -> int | None:
     del held
-    return seen.station_us
+    return inputs.station_us
 
 
-def _sticks_silent_since(seen: Seen, held: bool) -> int | None:
-    if seen.mode not in MANUAL and not held:
+def _sticks_silent_since(inputs: FailsafeInputs, held: bool) -> int | None:
+    if inputs.mode not in MANUAL and not held:
         return None
-    return seen.listening_us if seen.sticks_us is None else seen.sticks_us
+    return inputs.listening_us if inputs.sticks_us is None else inputs.sticks_us
 
 
-def _setpoints_silent_since(seen: Seen, held: bool) -> int | None:
-    if seen.mode is not Mode.OFFBOARD and not held:
+def _setpoints_silent_since(inputs: FailsafeInputs, held: bool) -> int | None:
+    if inputs.mode is not Mode.OFFBOARD and not held:
         return None
-    return seen.listening_us if seen.setpoint is None else seen.setpoint.time_us
+    return inputs.listening_us if inputs.setpoint is None else inputs.setpoint.time_us
 
 
-_AGES: tuple[tuple[Condition, Callable[[Seen, bool], int | None]], ...] = (
+_AGES: tuple[tuple[Condition, Callable[[FailsafeInputs, bool], int | None]], ...] = (
     (Condition.TELEMETRY_MISSED, _missed_since),
     (Condition.GPS_LOST, _gps_lost_since),
     (Condition.STATION_LOST, _station_silent_since),

@@ -47,7 +47,7 @@ class Condition(StrEnum):
     TILTED = "tilted too far"
     ROTOR_FAILED = "rotor failed"
     POSITION_LOST = "position lost"
-    ESTIMATE_DOUBTED = "estimate not healthy"
+    ESTIMATE_INVALID = "estimate not healthy"
     BATTERY_EMERGENCY = "battery nearly empty"
     BATTERY_CRITICAL = "battery critical"
     PLAN_FAILED = "control law finds no plan"
@@ -146,7 +146,7 @@ TABLE: tuple[Row, ...] = (
         "both are known again",
     ),
     Row(
-        Condition.ESTIMATE_DOUBTED,
+        Condition.ESTIMATE_INVALID,
         "on sensors: heading, height or climb is not known",
         (),
         "COM_EST_LOSS_T",

@@ -243,7 +243,7 @@ class State(NamedTuple):
 FIRST = State(Mode.HOLD, armed=False)
 
 
-def following(state: State, event: Event, selected: Mode | None, missing: Collection[Need]) -> State | Refusal:
+def next_state(state: State, event: Event, selected: Mode | None, missing: Collection[Need]) -> State | Refusal:
     """Return the state after an event, or why there is none.
 
     Args:

@@ -45,7 +45,7 @@ class AttitudeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
     slack_weight: Positive
 
 
-class Situation(NamedTuple):
+class AttitudeSituation(NamedTuple):
     """What a plan begins with.
 
     Attributes:
@@ -144,7 +144,7 @@ class AttitudeMpc:
         self._lower = np.concatenate([-max_increment, np.zeros(condensing.SLACKS)])
         self._upper = np.concatenate([max_increment, np.full(condensing.SLACKS, _MAX_SLACK)])
 
-    def plan(self, now: Situation, target: Target, ahead: Array | None) -> tuple[Plan | None, Diagnostics]:
+    def plan(self, now: AttitudeSituation, target: Target, ahead: Array | None) -> tuple[Plan | None, Diagnostics]:
         """Plan from `now` towards `target`; no plan where the QP is not solved.
 
         The thrust leaves the rotors only a part of the moments that they could make. Where no plan with these keeps the
@@ -164,12 +164,12 @@ class AttitudeMpc:
         how = how._replace(solve_time_s=diagnostics.solve_time_s + how.solve_time_s)
         return (second, how) if second is not None else (plan, diagnostics)
 
-    def _middle_thrust_n(self, now: Situation) -> float:
+    def _middle_thrust_n(self, now: AttitudeSituation) -> float:
         """Return the thrust, N, that leaves the rotors most for moments of either sign."""
         middle = 0.5 * (square(self._lag.min_speed) + square(now.max_speed))
         return middle / float(self._from_thrust.max())
 
-    def _solve(self, now: Situation, target: Target) -> tuple[Plan | None, Diagnostics]:
+    def _solve(self, now: AttitudeSituation, target: Target) -> tuple[Plan | None, Diagnostics]:
         """Plan from the responses predicted last."""
         qp = self.condense(now, target)
         started_s = self._clock()
@@ -179,7 +179,7 @@ class AttitudeMpc:
             return None, Diagnostics(status, solve_time_s=solve_time_s)
         return self.read(now, target, qp, z, solve_time_s)
 
-    def predict(self, now: Situation, ahead: Array | None) -> None:
+    def predict(self, now: AttitudeSituation, ahead: Array | None) -> None:
         """Predict the responses, scheduled along the last plan if there is one."""
         if ahead is not None and len(ahead) and self._along_plan:
             prediction.schedule_along(now.x, ahead, self._schedule)
@@ -197,7 +197,7 @@ class AttitudeMpc:
             self._responses,
         )
 
-    def condense(self, now: Situation, target: Target) -> Qp:
+    def condense(self, now: AttitudeSituation, target: Target) -> Qp:
         """Condense what was predicted to a QP; it lies in arrays that the next one overwrites.
 
         The first move may always take back the moments last commanded, however large a fallback left them: without
@@ -226,7 +226,9 @@ class AttitudeMpc:
         )
         return Qp(self._H, self._f, self._G, self._h, self._lower, self._upper)
 
-    def read(self, now: Situation, target: Target, qp: Qp, z: Array, solve_time_s: float) -> tuple[Plan, Diagnostics]:
+    def read(
+        self, now: AttitudeSituation, target: Target, qp: Qp, z: Array, solve_time_s: float
+    ) -> tuple[Plan, Diagnostics]:
         """Return the plan that the QP's solution `z` (n,) stands for, and what there is to say of it."""
         states, moments = np.empty((self.horizon + 1, STATES)), np.empty((self.horizon, INPUTS))
         squared = np.empty((self.horizon, condensing.ROTORS))
@@ -254,7 +256,7 @@ class AttitudeMpc:
         )
         return Plan(moments, states, float(z[-condensing.SLACKS + condensing.ANGLE_SLACK])), diagnostics
 
-    def lqr(self, now: Situation, target: Target) -> Array:
+    def lqr(self, now: AttitudeSituation, target: Target) -> Array:
         """Return the moments, N m, (3,), of the unconstrained law at hover that the terminal weight belongs to."""
         state = np.concatenate([now.x, now.u])
         wanted = target.end.copy()

@@ -18,7 +18,13 @@ from colibri.autopilot.control.interface import (
     VehicleState,
 )
 from colibri.autopilot.control.lpv_mpc import position_loop, prediction, recovery
-from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc, Plan, Situation, Target, squared_speeds_from
+from colibri.autopilot.control.lpv_mpc.attitude_mpc import (
+    AttitudeMpc,
+    AttitudeSituation,
+    Plan,
+    Target,
+    squared_speeds_from,
+)
 from colibri.autopilot.control.lpv_mpc.position_loop import Limits
 from colibri.autopilot.control.lpv_mpc.settings import GuidanceSettings, LpvMpcSettings, ObserverSettings
 from colibri.autopilot.control.qp import QpSolver
@@ -66,7 +72,7 @@ class Memory(NamedTuple):
     age: int
 
 
-class Course(NamedTuple):
+class FlightTask(NamedTuple):
     """What the outer loop asks for.
 
     Attributes:
@@ -80,7 +86,7 @@ class Course(NamedTuple):
     target: Target
 
 
-class Seen(NamedTuple):
+class LawInputs(NamedTuple):
     """What a decision begins with.
 
     Attributes:
@@ -94,7 +100,7 @@ class Seen(NamedTuple):
     rotation: Array
     measured: Array
     estimate: Array
-    now: Situation
+    now: AttitudeSituation
     thrust_n: float
 
 
@@ -195,41 +201,41 @@ class LpvMpc:
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample."""
         del time_us
-        seen = self._see(memory, state)
-        course = self.position(memory, seen.now, seen.thrust_n, state, seen.measured, references, seen.estimate)
-        return self._decide(memory, seen, course)
+        inputs = self._see(memory, state)
+        task = self.position(memory, inputs.now, inputs.thrust_n, state, inputs.measured, references, inputs.estimate)
+        return self._decide(memory, inputs, task)
 
     def step_attitude(
         self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
     ) -> tuple[Memory, Decision]:
         """Decide the same for an attitude and a thrust, which is kept within what the rotors leave to the moments."""
         del time_us
-        seen = self._see(memory, state)
-        return self._decide(memory, seen, self.attitude(memory, seen, demand))
+        inputs = self._see(memory, state)
+        return self._decide(memory, inputs, self.attitude(memory, inputs, demand))
 
-    def _see(self, memory: Memory, state: VehicleState) -> Seen:
+    def _see(self, memory: Memory, state: VehicleState) -> LawInputs:
         rotation = np.array(rotation_matrix(state.attitude))
         measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2].tolist()])
         estimate = self.estimate(memory, measured)
         now, thrust_n = self._situation(memory, state, estimate)
-        return Seen(rotation, measured, estimate, now, thrust_n)
+        return LawInputs(rotation, measured, estimate, now, thrust_n)
 
-    def _decide(self, memory: Memory, seen: Seen, course: Course) -> tuple[Memory, Decision]:
-        choice = self._choose(memory, seen.now, course, seen.rotation)
-        commands, speeds, wrench, mean_wrench = self.mix(memory, choice.squared, seen.now.max_speed)
+    def _decide(self, memory: Memory, inputs: LawInputs, task: FlightTask) -> tuple[Memory, Decision]:
+        choice = self._choose(memory, inputs.now, task, inputs.rotation)
+        commands, speeds, wrench, mean_wrench = self.mix(memory, choice.squared, inputs.now.max_speed)
         charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
         after = Memory(
             speeds,
             choice.moments,
             wrench,
             mean_wrench,
-            seen.measured,
-            seen.estimate,
+            inputs.measured,
+            inputs.estimate,
             charge_ah,
             choice.plan,
             choice.age,
         )
-        phi, theta, psi = course.target.angles[0].tolist()
+        phi, theta, psi = task.target.angles[0].tolist()
         return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), choice.diagnostics)
 
     def estimate(self, memory: Memory, measured: Array) -> Array:
@@ -256,13 +262,13 @@ class LpvMpc:
     def position(
         self,
         memory: Memory,
-        now: Situation,
+        now: AttitudeSituation,
         thrust_n: float,
         state: VehicleState,
         measured: Array,
         references: Horizon,
         estimate: Array,
-    ) -> Course:
+    ) -> FlightTask:
         """Return where the thrust must point now, and what the attitude is to reach for it and for what follows."""
         forces, angles = np.empty((self._samples, 3)), np.empty((self._samples, 3))
         thrusts, end = np.empty(self._attitude.horizon), np.empty(prediction.STATES + prediction.INPUTS)
@@ -293,18 +299,18 @@ class LpvMpc:
             thrusts,
             end,
         )
-        return Course(forces[0], aligned, Target(angles[1:-1], end, thrusts))
+        return FlightTask(forces[0], aligned, Target(angles[1:-1], end, thrusts))
 
-    def attitude(self, memory: Memory, seen: Seen, demand: AttitudeDemand) -> Course:
+    def attitude(self, memory: Memory, inputs: LawInputs, demand: AttitudeDemand) -> FlightTask:
         """Return the course that a demanded attitude is, its thrust within the limits of the position loop's."""
         angles, force = np.empty((self._samples, 3)), np.empty(3)
         thrusts, end = np.empty(self._attitude.horizon), np.empty(prediction.STATES + prediction.INPUTS)
         aligned = position_loop.hold_attitude(
-            seen.measured[6:],
-            float(seen.now.x[prediction.PSI]),
-            seen.thrust_n,
+            inputs.measured[6:],
+            float(inputs.now.x[prediction.PSI]),
+            inputs.thrust_n,
             (demand.angles, demand.thrust_n),
-            seen.estimate[9:],
+            inputs.estimate[9:],
             self._inertia,
             self._limits(self._battery.max_common_speed(memory.charge_ah)),
             self._lag.planned,
@@ -314,7 +320,7 @@ class LpvMpc:
             thrusts,
             end,
         )
-        return Course(force, aligned, Target(angles[1:-1], end, thrusts))
+        return FlightTask(force, aligned, Target(angles[1:-1], end, thrusts))
 
     def mix(self, memory: Memory, squared: Array, max_speed: float) -> tuple[Array, Array, Array, Array]:
         """Return the rotors' commands, their speeds and wrench a sample later, the mean wrench until then, (4,) each.
@@ -326,12 +332,12 @@ class LpvMpc:
         """
         return rotor_lag.actuate(memory.speeds, squared, self._lag, max_speed, self._allocation)
 
-    def _choose(self, memory: Memory, now: Situation, course: Course, rotation: Array) -> Choice:
+    def _choose(self, memory: Memory, now: AttitudeSituation, task: FlightTask, rotation: Array) -> Choice:
         """Plan; where that cannot be had, fall back."""
-        target = course.target
+        target = task.target
         steep = square(float(rotation[2, 0])) > 1.0 - square(_RECOVER_BEYOND)
-        if steep or course.aligned < _RECOVER_BEYOND:
-            return self._recover(now, course.force, rotation)
+        if steep or task.aligned < _RECOVER_BEYOND:
+            return self._recover(now, task.force, rotation)
         ahead = memory.plan.states[memory.age + 1 :] if memory.plan else None
         plan, diagnostics = self._attitude.plan(now, target, ahead)
         if plan is not None:
@@ -348,7 +354,7 @@ class LpvMpc:
             return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, None, age, how)
         return self._descend(now, age, diagnostics)
 
-    def _situation(self, memory: Memory, state: VehicleState, estimate: Array) -> tuple[Situation, float]:
+    def _situation(self, memory: Memory, state: VehicleState, estimate: Array) -> tuple[AttitudeSituation, float]:
         """Return what a plan begins with, and the thrust now, N."""
         phi, theta, psi = state.euler
         p, q, r = state.rate_flu_rad_s
@@ -356,7 +362,7 @@ class LpvMpc:
         x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
         momentum = dot(self._momentum, memory.speeds)
         max_speed = self._battery.max_speed_now(memory.charge_ah, memory.speeds)
-        return Situation(x, memory.moments, estimate[9:], momentum, max_speed), thrust_n
+        return AttitudeSituation(x, memory.moments, estimate[9:], momentum, max_speed), thrust_n
 
     def _limits(self, max_speed: float) -> Limits:
         """Return what the outer loop may ask for while all rotors can turn at `max_speed`, parts of the largest."""
@@ -365,14 +371,14 @@ class LpvMpc:
         margin_n = self._thrust_margin * (max_n - min_n)
         return Limits(self._tilt_tangent, min_n + margin_n, max_n - margin_n, self._position_error_m)
 
-    def _recover(self, now: Situation, force: Array, rotation: Array) -> Choice:
+    def _recover(self, now: AttitudeSituation, force: Array, rotation: Array) -> Choice:
         """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
         direction = matvec(rotation.T, force / position_loop.length(force))
         moments = recovery.turning_moment(direction, now.x[list(prediction.RATES)], self._inertia, self._turn)
         squared = self._mixed(max(dot(force, rotation[:, 2]), 0.0), moments, now)
         return Choice(squared, matvec(self._allocation[1:], squared), None, 1, Diagnostics(fallback=Fallback.RECOVERY))
 
-    def _descend(self, now: Situation, age: int, diagnostics: Diagnostics) -> Choice:
+    def _descend(self, now: AttitudeSituation, age: int, diagnostics: Diagnostics) -> Choice:
         """Level and sink, the last resort."""
         end = np.zeros(prediction.STATES + prediction.INPUTS)
         end[prediction.PSI] = now.x[prediction.PSI]
@@ -384,6 +390,6 @@ class LpvMpc:
         squared = self._mixed(weight_n * self._fallback.descent_thrust, moments, now)
         return Choice(squared, moments, None, age, how)
 
-    def _mixed(self, thrust_n: float, moments: Array, now: Situation) -> Array:
+    def _mixed(self, thrust_n: float, moments: Array, now: AttitudeSituation) -> Array:
         minimum, maximum = square(self._lag.min_speed), square(now.max_speed)
-        return recovery.prioritised(thrust_n, moments, self._from_thrust, self._from_moments, minimum, maximum)
+        return recovery.mix_with_priority(thrust_n, moments, self._from_thrust, self._from_moments, minimum, maximum)

@@ -52,7 +52,7 @@ def turning_moment(direction: Array, rate: Array, inertia: Array, gains: TurnGai
 
 
 @compiled
-def prioritised(
+def mix_with_priority(
     thrust_n: float,
     moment_n_m: Array,
     rotors_from_thrust: Array,

@@ -18,17 +18,17 @@ _APART = 0.02
 """Model and battery may differ by this part of the charge; the model is the smoother of both."""
 
 
-def believed(model_ah: float, told_ah: float, vehicle: Vehicle) -> float:
+def estimated(model_ah: float, reported_ah: float, vehicle: Vehicle) -> float:
     """Return the charge taken, Ah, that is believed where a model and the battery itself say different things.
 
     Args:
         model_ah: What the model has counted.
-        told_ah: What the battery says.
+        reported_ah: What the battery says.
         vehicle: Whose battery it is.
     """
     if vehicle.battery is None:
         return model_ah
-    return told_ah if abs(told_ah - model_ah) > _APART * vehicle.battery.capacity_ah else model_ah
+    return reported_ah if abs(reported_ah - model_ah) > _APART * vehicle.battery.capacity_ah else model_ah
 
 
 class BatteryModel:

@@ -17,7 +17,7 @@ _MIN_PA, _MAX_PA = 20e3, 115e3
 _FROZEN_US = 500_000
 _MIN_NOISE_M = 1e-6
 _PATIENCE_US = 7_000_000
-_DOUBTED_M = 100.0
+_INFLATED_M = 100.0
 _TYPICAL_PA = 95e3
 
 
@@ -39,7 +39,7 @@ class Barometer:
     def __init__(self, sensors: Sensors, _field_enu_gauss: Vector) -> None:
         """Expect any weather."""
         self._noise_pa = sensors.barometer.noise_pa
-        self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (BARO_OFFSET, 1, _DOUBTED_M))
+        self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (BARO_OFFSET, 1, _INFLATED_M))
         self._watch = Watch(_MIN_PA, _MAX_PA, _FROZEN_US)
         self.height_m = 0.0
 
@@ -64,8 +64,8 @@ class Barometer:
         (pressure_pa,) = value
         height = self.height_m = altitude_m(pressure_pa)
         variance = square(max(-self._noise_pa * altitude_slope_m_pa(pressure_pa), _MIN_NOISE_M))
-        believed = self.kind.fuse(x, P, time_us, update.fuse_pressure_height, height, variance)
-        return None if believed else Reason.INNOVATION
+        accepted = self.kind.fuse(x, P, time_us, update.fuse_pressure_height, height, variance)
+        return None if accepted else Reason.INNOVATION
 
     def typical(self) -> Value:
         """Return the pressure of a place that is not high."""

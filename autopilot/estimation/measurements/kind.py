@@ -32,10 +32,10 @@ class Kind:
         rejected_us: Since when it is not; None while it is.
         resets: How often it had to be believed.
         nis: Sum of the normalised innovations squared that were believed at once.
-        believed: How many they are.
+        accepted: How many they are.
     """
 
-    def __init__(self, name: str, numbers: int, patience_us: int, doubted: tuple[int, int, float]) -> None:
+    def __init__(self, name: str, numbers: int, patience_us: int, inflated: tuple[int, int, float]) -> None:
         """Measure `numbers` at once; after `patience_us` of rejections, doubt (first state, count, σ) and believe."""
         self.name = name
         self.gate = FIVE_SIGMA[numbers - 1]
@@ -43,18 +43,18 @@ class Kind:
         self.accepted_us = 0
         self.rejected_us: int | None = None
         self._patience_us = patience_us
-        self._doubted = doubted
+        self._inflated = inflated
         self._y = np.zeros(numbers)
         self.resets = 0
         self.nis = 0.0
-        self.believed = 0
+        self.accepted = 0
 
     def fuse(self, x: Array, P: Array, time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
         """Fuse a measurement into state and covariance; return whether it was believed."""
         nis = kernel(x, P, *arguments, self.gate, self._y)
         if self.note(time_us, tuple(self._y.tolist()), nis):
             return True
-        return self.insist(x, P, time_us, kernel, *arguments)
+        return self.force_accept(x, P, time_us, kernel, *arguments)
 
     def note(self, time_us: int, innovation: tuple[float, ...], nis: float) -> bool:
         """Note a test; return whether the measurement was believed."""
@@ -62,16 +62,16 @@ class Kind:
         if nis <= self.gate:
             self.accepted_us, self.rejected_us = time_us, None
             self.nis += nis
-            self.believed += 1
+            self.accepted += 1
             return True
         return False
 
-    def insist(self, x: Array, P: Array, time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
+    def force_accept(self, x: Array, P: Array, time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
         """Reject a measurement, but believe it if this has lasted too long; return whether it was believed."""
         if not self.reject(time_us):
             return False
-        first, count, sigma = self._doubted
-        update.doubt(P, first, count, sigma * sigma)
+        first, count, sigma = self._inflated
+        update.inflate_covariance(P, first, count, sigma * sigma)
         kernel(x, P, *arguments, inf, self._y)
         self.resets += 1
         self.accept(time_us)

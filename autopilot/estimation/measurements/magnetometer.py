@@ -22,7 +22,7 @@ _MIN_NOISE_GAUSS = 1e-6
 _STRENGTH_PART, _DIP_RAD = 0.2, radians(15.0)
 """By how much the field may differ from the earth's in strength and inclination."""
 _PATIENCE_US = 10_000_000
-_DOUBTED_GAUSS = 0.3
+_INFLATED_GAUSS = 0.3
 
 
 class Magnetometer:
@@ -44,7 +44,7 @@ class Magnetometer:
         """Expect the field of the earth."""
         self._field = np.array(field_enu_gauss)
         self.variance = square(max(sensors.magnetometer.noise_gauss, _MIN_NOISE_GAUSS))
-        self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (HARD_IRON, 3, _DOUBTED_GAUSS))
+        self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (HARD_IRON, 3, _INFLATED_GAUSS))
         self._watch = Watch(-_MAX_GAUSS, _MAX_GAUSS, _FROZEN_US)
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
@@ -63,8 +63,8 @@ class Magnetometer:
         is_of_earth = update.is_of_earth(x, measured, self._field, _STRENGTH_PART, _DIP_RAD)
         if not is_of_earth and not self.kind.reject(time_us):
             return Reason.FIELD
-        believed = self.kind.fuse(x, P, time_us, update.fuse_field, measured, self._field, self.variance)
-        return None if believed else Reason.INNOVATION
+        accepted = self.kind.fuse(x, P, time_us, update.fuse_field, measured, self._field, self.variance)
+        return None if accepted else Reason.INNOVATION
 
     def typical(self) -> Value:
         """Return the earth's field of a level vehicle that looks east."""

@@ -4,7 +4,7 @@ MAX_GAP_US = 1_000_000
 _SETTLED = 25
 
 
-class Strays:
+class ClockResets:
     """Counts frames that follow one another, and not the clock that is kept."""
 
     def __init__(self) -> None:

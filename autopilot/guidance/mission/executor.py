@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.guidance.mission.items import place_of
-from colibri.autopilot.guidance.mission.legs import Context, Defaults, Phase, Situation, phases_of
+from colibri.autopilot.guidance.mission.legs import Defaults, ItemContext, MissionContext, Phase, phases_of
 from colibri.autopilot.guidance.tasks.orders import Hold, Order, OrderRecord, order_of, record_of
 from colibri.common.types import Vector
 from colibri.mavlink.mission.items import MissionItem
@@ -78,7 +78,7 @@ class MissionRecord(NamedTuple):
         order: What it asks for now.
         speed_m_s: That the mission asked for; None for the cruise speed.
         jumps: How often each jump is still to be made.
-        situation: When the current item began; None where it has not.
+        mission_context: When the current item began; None where it has not.
         defaults: Of then.
         order_before: Of then.
         phases: How many of the item's are left.
@@ -93,7 +93,7 @@ class MissionRecord(NamedTuple):
     order: OrderRecord
     speed_m_s: float | None
     jumps: dict[int, int]
-    situation: Situation | None
+    mission_context: MissionContext | None
     defaults: Defaults
     order_before: OrderRecord
     phases: int
@@ -120,7 +120,7 @@ class MissionExecutor:
         self._speed_m_s: float | None = None
         self._jumps: dict[int, int] = {}
         self._phases: list[Phase] | None = None
-        self._context: Context | None = None
+        self._context: ItemContext | None = None
         self._since_us = 0
         self._fresh = True
         self._jumped = False
@@ -188,11 +188,11 @@ class MissionExecutor:
         self._show(seq, PAUSED if self.progress.state == COMPLETE else self.progress.state)
         return None
 
-    def step(self, situation: Situation, now_us: int) -> Step:
+    def step(self, mission_context: MissionContext, now_us: int) -> Step:
         """Return what to fly now."""
         events: list[MissionEvent] = []
         for _ in range(MAX_ITEMS_A_STEP):
-            if not self.active or now_us < self._rest_until_us or not self._fly(situation, now_us, events):
+            if not self.active or now_us < self._rest_until_us or not self._fly(mission_context, now_us, events):
                 break
         if not self.active and self.progress.state != COMPLETE:
             self._order = _HOLD
@@ -207,7 +207,7 @@ class MissionExecutor:
             record_of(self._order),
             self._speed_m_s,
             self._jumps,
-            context.situation if context else None,
+            context.mission_context if context else None,
             context.defaults if context else self.defaults,
             record_of(context.order if context else self._order),
             len(self._phases or ()),
@@ -225,28 +225,28 @@ class MissionExecutor:
         self._leave()
         self._show(record.seq, record.state)
         self._jumped, self._rest_until_us = record.jumped, record.rest_until_us
-        if record.situation is None:
+        if record.mission_context is None:
             return
         order = order_of(record.order_before)
-        self._context = Context(record.situation, record.defaults, order, record.speed_m_s)
+        self._context = ItemContext(record.mission_context, record.defaults, order, record.speed_m_s)
         phases = list(phases_of(self._items[record.seq], self._context))
         self._phases = phases[max(len(phases) - record.phases, 0) :]
         self._since_us, self._fresh = record.since_us, record.fresh
 
-    def _fly(self, situation: Situation, now_us: int, events: list[MissionEvent]) -> bool:
+    def _fly(self, mission_context: MissionContext, now_us: int, events: list[MissionEvent]) -> bool:
         """Fly the current item; return whether it is done and another is current."""
         seq = self.progress.seq
         item = self._items[seq]
         if self._phases is None:
-            self._context = Context(situation, self.defaults, self._order, self._speed_m_s)
+            self._context = ItemContext(mission_context, self.defaults, self._order, self._speed_m_s)
             self._phases = list(phases_of(item, self._context))
             if not self._phases:
-                self._do(item, situation, now_us, events)
+                self._do(item, mission_context, now_us, events)
                 return True
             self._begin(now_us)
         while self._phases:
             phase = self._phases[0]
-            seen = situation._replace(arrived=False, turns=0.0) if self._fresh else situation
+            seen = mission_context._replace(arrived=False, turns=0.0) if self._fresh else mission_context
             if not phase.ends(seen, (now_us - self._since_us) * 1e-6):
                 self._fresh = self._jumped = False
                 return False
@@ -264,7 +264,7 @@ class MissionExecutor:
             self._order = self._phases[0].order
         self._fresh = True
 
-    def _do(self, item: MissionItem, situation: Situation, now_us: int, events: list[MissionEvent]) -> None:
+    def _do(self, item: MissionItem, mission_context: MissionContext, now_us: int, events: list[MissionEvent]) -> None:
         """Do what takes no time."""
         events.append(Reached(self.progress.seq))
         if item.command == mav.MAV_CMD_DO_CHANGE_SPEED and item.p1 not in (2.0, 3.0):
@@ -274,7 +274,7 @@ class MissionExecutor:
                 self._speed_m_s = None
         elif item.command == mav.MAV_CMD_DO_SET_HOME:
             here = item.p1 == 1.0
-            events.append(SetHome(None if here else place_of(item, situation.home_enu_m, situation.origin)))
+            events.append(SetHome(None if here else place_of(item, mission_context.home_enu_m, mission_context.origin)))
         elif item.command == mav.MAV_CMD_DO_JUMP and self._jump(item, now_us):
             return
         self._advance()

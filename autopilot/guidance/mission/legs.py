@@ -17,7 +17,7 @@ _TURN_WITHIN_S = 30.0
 """A turn that takes longer is not waited for."""
 
 
-class Situation(NamedTuple):
+class MissionContext(NamedTuple):
     """What the mission sees of the flight.
 
     Attributes:
@@ -55,17 +55,17 @@ class Defaults(NamedTuple):
     orbit_radius_m: float = 10.0
 
 
-class Context(NamedTuple):
+class ItemContext(NamedTuple):
     """What an item begins with.
 
     Attributes:
-        situation: Now.
+        mission_context: Now.
         defaults: Where it does not say.
         order: The last one.
         speed_m_s: That the mission asked for; None for the cruise speed.
     """
 
-    situation: Situation
+    mission_context: MissionContext
     defaults: Defaults
     order: Order
     speed_m_s: float | None
@@ -81,50 +81,50 @@ class Phase(NamedTuple):
     """
 
     order: Order | None
-    ends: Callable[[Situation, float], bool]
+    ends: Callable[[MissionContext, float], bool]
     reaches: bool = False
 
 
-Leg: TypeAlias = Callable[[MissionItem, Context], tuple[Phase, ...]]
+Leg: TypeAlias = Callable[[MissionItem, ItemContext], tuple[Phase, ...]]
 
 
-def phases_of(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+def phases_of(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     """Return how an item is flown; nothing where that takes no time."""
     leg = _LEGS.get(item.command)
     return () if leg is None else leg(item, context)
 
 
-def _waypoint(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+def _waypoint(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     radius = item.p2 if item.p2 > 0.0 else context.defaults.acceptance_m
     return _there(item, context, radius, _or_zero(item.p1))
 
 
-def _loiter_forever(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+def _loiter_forever(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     return _there(item, context, context.defaults.acceptance_m, inf)
 
 
-def _loiter_time(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+def _loiter_time(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     return _there(item, context, context.defaults.acceptance_m, _or_zero(item.p1))
 
 
-def _loiter_to_height(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+def _loiter_to_height(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     """A multicopter climbs on the way: it is at the height when it is there."""
     return _there(item._replace(p4=nan), context, context.defaults.acceptance_m, 0.0)
 
 
-def _there(item: MissionItem, context: Context, radius_m: float, stay_s: float) -> tuple[Phase, ...]:
+def _there(item: MissionItem, context: ItemContext, radius_m: float, stay_s: float) -> tuple[Phase, ...]:
     """Fly to a place, heading as p4 says, and stay; stay_s 0 flies through."""
-    situation = context.situation
-    place = place_of(item, situation.home_enu_m, situation.origin)
+    mission_context = context.mission_context
+    place = place_of(item, mission_context.home_enu_m, mission_context.origin)
     go = GoTo(place, _yaw(item.p4), context.speed_m_s)
     climb = _off_the_ground(place[2], context)
     stay = (Phase(None, _after(stay_s)),) if stay_s > 0.0 else ()
     return (*climb, Phase(go, _within(place, radius_m), reaches=True), *stay)
 
 
-def _circle(item: MissionItem, context: Context) -> tuple[Phase, ...]:
-    situation = context.situation
-    center = place_of(item, situation.home_enu_m, situation.origin)
+def _circle(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
+    mission_context = context.mission_context
+    center = place_of(item, mission_context.home_enu_m, mission_context.origin)
     radius = item.p3 if abs(item.p3) > 0.0 else context.defaults.orbit_radius_m
     radius = max(radius, MIN_RADIUS_M) if radius > 0.0 else min(radius, -MIN_RADIUS_M)
     turns = 1.0 if isnan(item.p1) else item.p1
@@ -133,48 +133,48 @@ def _circle(item: MissionItem, context: Context) -> tuple[Phase, ...]:
     return (*_off_the_ground(center[2], context), around)
 
 
-def _take_off(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+def _take_off(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     """Straight up, then to the place if it names one."""
-    situation, defaults = context.situation, context.defaults
-    height = height_of(item, situation.home_enu_m, situation.origin)
+    mission_context, defaults = context.mission_context, context.defaults
+    height = height_of(item, mission_context.home_enu_m, mission_context.origin)
     yaw = _yaw(item.p4)
-    high = situation.position_enu_m[2] >= height - defaults.acceptance_m and not situation.landed
+    high = mission_context.position_enu_m[2] >= height - defaults.acceptance_m and not mission_context.landed
     up = () if high else (Phase(TakeOff(height, yaw), _above(height - defaults.acceptance_m)),)
     if is_here(item):
         return (*up[:-1], *(phase._replace(reaches=True) for phase in up[-1:]))
-    place = place_of(item, situation.home_enu_m, situation.origin)
+    place = place_of(item, mission_context.home_enu_m, mission_context.origin)
     go = GoTo(place, yaw, context.speed_m_s)
     return (*up, Phase(go, _within(place, defaults.acceptance_m), reaches=True))
 
 
-def _land(item: MissionItem, context: Context) -> tuple[Phase, ...]:
-    situation = context.situation
-    place = None if is_here(item) else place_of(item, situation.home_enu_m, situation.origin)
+def _land(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
+    mission_context = context.mission_context
+    place = None if is_here(item) else place_of(item, mission_context.home_enu_m, mission_context.origin)
     return (Phase(Land(place, _yaw(item.p4)), _landed, reaches=True),)
 
 
-def _return(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+def _return(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     del item, context
     return (Phase(Return(), _landed, reaches=True),)
 
 
-def _delay(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+def _delay(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     del context
     return (Phase(None, _after(_or_zero(item.p1)), reaches=True),)
 
 
-def _turn(item: MissionItem, context: Context) -> tuple[Phase, ...]:
+def _turn(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     """Turn on the spot; p1 counts clockwise from north, or from the heading now where p4 is 1."""
-    situation = context.situation
-    if situation.landed:
+    mission_context = context.mission_context
+    if mission_context.landed:
         return ()
     angle = radians(item.p1)
     yaw = remainder(0.5 * pi - angle, tau)
     if item.p4 == 1.0:
-        yaw = remainder(situation.yaw_rad - (-angle if item.p3 < 0.0 else angle), tau)
-    place = context.order.position_enu_m if isinstance(context.order, GoTo) else situation.position_enu_m
+        yaw = remainder(mission_context.yaw_rad - (-angle if item.p3 < 0.0 else angle), tau)
+    place = context.order.position_enu_m if isinstance(context.order, GoTo) else mission_context.position_enu_m
 
-    def turned(now: Situation, since_s: float) -> bool:
+    def turned(now: MissionContext, since_s: float) -> bool:
         return abs(remainder(now.yaw_rad - yaw, tau)) <= _TURNED_RAD or now.arrived or since_s >= _TURN_WITHIN_S
 
     return (Phase(GoTo(place, yaw, context.speed_m_s), turned, reaches=True),)
@@ -195,12 +195,12 @@ _LEGS: Mapping[int, Leg] = {
 }
 
 
-def _off_the_ground(height_m: float, context: Context) -> tuple[Phase, ...]:
+def _off_the_ground(height_m: float, context: ItemContext) -> tuple[Phase, ...]:
     """Take off first where the vehicle stands: a mission may begin with a waypoint, as MAVSDK's do."""
-    situation, defaults = context.situation, context.defaults
-    if not situation.landed:
+    mission_context, defaults = context.mission_context, context.defaults
+    if not mission_context.landed:
         return ()
-    up = max(height_m, situation.position_enu_m[2] + defaults.takeoff_height_m)
+    up = max(height_m, mission_context.position_enu_m[2] + defaults.takeoff_height_m)
     return (Phase(TakeOff(up), _above(up - defaults.acceptance_m)),)
 
 
@@ -214,18 +214,18 @@ def _or_zero(value: float) -> float:
     return 0.0 if isnan(value) else value
 
 
-def _within(place: Vector, radius_m: float) -> Callable[[Situation, float], bool]:
+def _within(place: Vector, radius_m: float) -> Callable[[MissionContext, float], bool]:
     return lambda now, _: now.arrived or dist(now.position_enu_m, place) <= radius_m
 
 
-def _above(height_m: float) -> Callable[[Situation, float], bool]:
+def _above(height_m: float) -> Callable[[MissionContext, float], bool]:
     return lambda now, _: now.arrived or now.position_enu_m[2] >= height_m
 
 
-def _after(wait_s: float) -> Callable[[Situation, float], bool]:
+def _after(wait_s: float) -> Callable[[MissionContext, float], bool]:
     return lambda _, since_s: since_s >= wait_s
 
 
-def _landed(now: Situation, since_s: float) -> bool:
+def _landed(now: MissionContext, since_s: float) -> bool:
     del since_s
     return now.landed

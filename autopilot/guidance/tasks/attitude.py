@@ -1,13 +1,18 @@
-"""Courses by attitude and thrust: what sticks or a companion ask for, made smooth, and height held under sticks."""
+"""Flight tasks by attitude and thrust: what sticks or setpoints ask for, made smooth; height held under sticks."""
 
 import numpy as np
 
-from colibri.autopilot.guidance.attitude_reference import AttitudeReference, ReferenceMemory, Wish, lean
+from colibri.autopilot.guidance.attitude_reference import (
+    AttitudeCommand,
+    AttitudeReference,
+    ReferenceMemory,
+    tilt_command,
+)
 from colibri.autopilot.guidance.landing_detector import CARRIED, is_below
 from colibri.autopilot.guidance.reference import Kind, Reference, Target, lead, moving_with, still_target
-from colibri.autopilot.guidance.tasks.position import Stop, sinking_m_s
+from colibri.autopilot.guidance.tasks.position import HoldTask, sinking_m_s
 from colibri.autopilot.guidance.tasks.sticks import stick_climb, without_play
-from colibri.autopilot.guidance.tasks.task import Endless, Lean, Motion, Scene, lifts
+from colibri.autopilot.guidance.tasks.task import AttitudeMotion, EndlessTask, Motion, TaskContext, lifts
 from colibri.common.kernels import cos
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, Sticks
 
@@ -20,7 +25,7 @@ _MIN_UPRIGHT = 0.5
 _RESTS_M_S = 0.025
 
 
-class Leaning:
+class TiltLoop:
     """Attitude and thrust, smoothly, as a generator of demands makes them."""
 
     def __init__(self, generator: AttitudeReference) -> None:
@@ -32,85 +37,85 @@ class Leaning:
         """Begin anew at the next demand."""
         self._memory = None
 
-    def by_setpoint(self, setpoint: AttitudeSetpoint, scene: Scene) -> Lean:
+    def by_setpoint(self, setpoint: AttitudeSetpoint, context: TaskContext) -> AttitudeMotion:
         """Return what a companion's setpoint asks for."""
-        return self.by_wish(self._generator.from_setpoint(setpoint), scene)
+        return self.by_command(self._generator.from_setpoint(setpoint), context)
 
-    def by_wish(self, wish: Wish, scene: Scene) -> Lean:
+    def by_command(self, command: AttitudeCommand, context: TaskContext) -> AttitudeMotion:
         """Return what is asked for, as smoothly as the vehicle can follow."""
         if self._memory is None:
-            self._memory = self._generator.initial(scene.state)
-        self._memory, demand = self._generator.step(self._memory, scene.state, wish)
+            self._memory = self._generator.initial(context.state)
+        self._memory, demand = self._generator.step(self._memory, context.state, command)
         # nan asks for no thrust of its own: a vehicle that stands stays, one that flies does not sink
-        share = wish.thrust_n / self._generator.weight_n
-        return Lean(demand, moving_with(scene.state), lifts=share > _LIFTING, sinks=share < _SINKING)
+        share = command.thrust_n / self._generator.weight_n
+        return AttitudeMotion(demand, moving_with(context.state), lifts=share > _LIFTING, sinks=share < _SINKING)
 
 
-class Stabilized(Endless):
+class StabilizedTask(EndlessTask):
     """Sticks to tilt, yaw rate and thrust."""
 
     def __init__(self, generator: AttitudeReference) -> None:
         """Begin with the attitude that the vehicle has."""
-        self._leaning = Leaning(generator)
+        self._leaning = TiltLoop(generator)
         self._generator = generator
-        self._stop = Stop()
+        self._stop = HoldTask()
 
-    def ask(self, scene: Scene) -> Motion | Lean:
+    def update(self, context: TaskContext) -> Motion | AttitudeMotion:
         """Return what the sticks ask for; without sticks, stop."""
-        sticks = scene.steered.sticks
+        sticks = context.steered.sticks
         if sticks is None:
-            return self._stop.ask(scene)
-        return self._leaning.by_wish(self._generator.from_sticks(without_play(sticks)), scene)
+            return self._stop.update(context)
+        return self._leaning.by_command(self._generator.from_sticks(without_play(sticks)), context)
 
 
-class AltitudeSticks(Endless):
+class AltitudeTask(EndlessTask):
     """Sticks to tilt, yaw rate and climb; height is held while its stick is in the middle."""
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
         """Begin with the attitude and height that the vehicle has."""
-        self._leaning = Leaning(generator)
+        self._leaning = TiltLoop(generator)
         self._generator = generator
-        self._stop = Stop()
+        self._stop = HoldTask()
         self._loop = HeightLoop(generator.weight_n, gravity_m_s2)
         self._height_m: float | None = None
 
-    def ask(self, scene: Scene) -> Motion | Lean:
+    def update(self, context: TaskContext) -> Motion | AttitudeMotion:
         """Return what the sticks ask for; without sticks, stop."""
-        sticks = scene.steered.sticks
+        sticks = context.steered.sticks
         if sticks is None:
-            return self._stop.ask(scene)
-        reference, lifting = self._climb(sticks, scene)
-        wish = self._generator.from_sticks(without_play(sticks))._replace(
-            thrust_n=self._loop.thrust_n(reference, scene)
+            return self._stop.update(context)
+        reference, lifting = self._climb(sticks, context)
+        command = self._generator.from_sticks(without_play(sticks))._replace(
+            thrust_n=self._loop.thrust_n(reference, context)
         )
-        leaning = self._leaning.by_wish(wish, scene)
-        return leaning._replace(reference=reference, lifts=lifting, sinks=is_below(reference, scene.state))
+        leaning = self._leaning.by_command(command, context)
+        return leaning._replace(reference=reference, lifts=lifting, sinks=is_below(reference, context.state))
 
-    def _climb(self, sticks: Sticks, scene: Scene) -> tuple[Reference, bool]:
+    def _climb(self, sticks: Sticks, context: TaskContext) -> tuple[Reference, bool]:
         """Return the height's reference, where the vehicle is otherwise, and whether it is to leave the ground."""
-        climb_m_s = stick_climb(sticks, scene)
+        climb_m_s = stick_climb(sticks, context)
         if climb_m_s != 0.0:
             self._height_m = None
-        elif self._height_m is None and abs(scene.velocity[2]) < _RESTS_M_S:
-            self._height_m = scene.place[2]
-        reference, target = vertically(scene, climb_m_s, self._height_m)
-        return reference, lifts(target, scene.state)
+        elif self._height_m is None and abs(context.velocity[2]) < _RESTS_M_S:
+            self._height_m = context.place[2]
+        reference, target = vertically(context, climb_m_s, self._height_m)
+        return reference, lifts(target, context.state)
 
 
-class Descent(Endless):
+class DescentTask(EndlessTask):
     """Level, and down at the speed of landings: for a vehicle that does not know where it is, or which way it looks."""
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
         """Begin with the attitude and climb that the vehicle has."""
-        self._leaning = Leaning(generator)
+        self._leaning = TiltLoop(generator)
         self._weight_n = generator.weight_n
         self._loop = HeightLoop(self._weight_n, gravity_m_s2)
 
-    def ask(self, scene: Scene) -> Lean:
+    def update(self, context: TaskContext) -> AttitudeMotion:
         """Return a level attitude, and the thrust that sinks."""
-        reference, _ = vertically(scene, -sinking_m_s(scene), None)
-        thrust_n = self._loop.thrust_n(reference, scene)
-        leaning = self._leaning.by_wish(lean(0.0, 0.0, 0.0, thrust_n), scene)
+        reference, _ = vertically(context, -sinking_m_s(context), None)
+        thrust_n = self._loop.thrust_n(reference, context)
+        leaning = self._leaning.by_command(tilt_command(0.0, 0.0, 0.0, thrust_n), context)
         sinks = thrust_n < CARRIED * self._weight_n
         return leaning._replace(reference=reference, lifts=False, sinks=sinks, drifts=True)
 
@@ -123,12 +128,12 @@ class HeightLoop:
         self._weight_n, self._gravity_m_s2 = weight_n, gravity_m_s2
         self._offset_m_s2 = 0.0
 
-    def thrust_n(self, reference: Reference, scene: Scene) -> float:
+    def thrust_n(self, reference: Reference, context: TaskContext) -> float:
         """Return the thrust, N, that brings the vehicle to the height of `reference`."""
         height_m, climb_m_s, lift_m_s2 = (float(order) for order in reference.motion[:3, 2])
-        state = scene.state
+        state = context.state
         height_error, climb_error = height_m - state.position_enu_m[2], climb_m_s - state.velocity_enu_m_s[2]
-        self._offset_m_s2 += _INTEGRAL_1_S3 * height_error * scene.interval_s
+        self._offset_m_s2 += _INTEGRAL_1_S3 * height_error * context.interval_s
         self._offset_m_s2 = min(max(self._offset_m_s2, -_MAX_OFFSET_M_S2), _MAX_OFFSET_M_S2)
         wanted = lift_m_s2 + _HEIGHT_1_S2 * height_error + _CLIMB_1_S * climb_error + self._offset_m_s2
         lift = min(max(wanted, -_MAX_LIFT_M_S2), _MAX_LIFT_M_S2)
@@ -136,16 +141,16 @@ class HeightLoop:
         return self._weight_n * (1.0 + lift / self._gravity_m_s2) / upright
 
 
-def vertically(scene: Scene, climb_m_s: float, height_m: float | None) -> tuple[Reference, Target]:
+def vertically(context: TaskContext, climb_m_s: float, height_m: float | None) -> tuple[Reference, Target]:
     """Return a reference that climbs, or goes to a height where one is given, and where it leads.
 
     Horizontally it is where the vehicle is.
     """
     kind = Kind.VELOCITY if height_m is None else Kind.POSITION
-    place = (*scene.place[:2], scene.place[2] if height_m is None else height_m)
-    target = still_target(place, scene.yaw_rad, scene.samples, (Kind.VELOCITY, Kind.VELOCITY, kind))
+    place = (*context.place[:2], context.place[2] if height_m is None else height_m)
+    target = still_target(place, context.yaw_rad, context.samples, (Kind.VELOCITY, Kind.VELOCITY, kind))
     target.motion[:, 1, 2] = climb_m_s
-    _, after = lead(scene.reference, target, scene.behaviour.limits, scene.interval_s)
-    moved = moving_with(scene.state).motion
+    _, after = lead(context.reference, target, context.behaviour.limits, context.interval_s)
+    moved = moving_with(context.state).motion
     moved[:, 2] = after.motion[:, 2]
-    return Reference(moved, np.array([scene.state.euler[2], 0.0])), target
+    return Reference(moved, np.array([context.state.euler[2], 0.0])), target

@@ -1,4 +1,4 @@
-"""The course behind a leader: where FOLLOW_TARGET says that it is, at a distance, seen from a chosen side."""
+"""The flight task behind a target: where FOLLOW_TARGET says that it is, at a distance, seen from a chosen side."""
 
 from math import hypot, pi, radians
 
@@ -6,46 +6,46 @@ import numpy as np
 
 from colibri.autopilot.guidance.reference import still_target
 from colibri.autopilot.guidance.tasks.offboard import allowed_velocity
-from colibri.autopilot.guidance.tasks.position import Stop
-from colibri.autopilot.guidance.tasks.task import Endless, Motion, Scene
+from colibri.autopilot.guidance.tasks.position import HoldTask
+from colibri.autopilot.guidance.tasks.task import EndlessTask, Motion, TaskContext
 from colibri.common.kernels import atan2, cos, sin
 
 _STANDS_M_S = 0.3
 MIN_HEIGHT_M = 1.0
-"""Above home, however low the leader is thought to be: as PX4's MINIMUM_SAFETY_ALTITUDE has it."""
+"""Above home, however low the target is thought to be: as PX4's MINIMUM_SAFETY_ALTITUDE has it."""
 ABOVE_TARGET = 2
 """Of `Behaviour.follow_altitude_mode`; the ground that the others count from is flat."""
 
 
-class Following(Endless):
-    """A place relative to the leader; without a leader, stop."""
+class FollowTargetTask(EndlessTask):
+    """A place relative to the target; without one, stop."""
 
     def __init__(self) -> None:
         """Follow nobody yet."""
-        self._stop = Stop()
+        self._stop = HoldTask()
         self._ahead_rad: float | None = None
 
-    def ask(self, scene: Scene) -> Motion:
-        """Return the place that moves with the leader, looking at it."""
-        leader = scene.steered.leader
-        if leader is None:
-            return self._stop.ask(scene)
-        self._stop = Stop()
-        vx, vy, vz = allowed_velocity(leader.velocity_enu_m_s, scene)
-        x, y, z = leader.position_enu_m
+    def update(self, context: TaskContext) -> Motion:
+        """Return the place that moves with the target, looking at it."""
+        followed = context.steered.followed
+        if followed is None:
+            return self._stop.update(context)
+        self._stop = HoldTask()
+        vx, vy, vz = allowed_velocity(followed.velocity_enu_m_s, context)
+        x, y, z = followed.position_enu_m
         if hypot(vx, vy) > _STANDS_M_S:
             self._ahead_rad = atan2(vy, vx)
         elif self._ahead_rad is None:
-            self._ahead_rad = atan2(y - scene.place[1], x - scene.place[0])
-        behaviour = scene.behaviour
+            self._ahead_rad = atan2(y - context.place[1], x - context.place[0])
+        behaviour = context.behaviour
         side = self._ahead_rad - radians(behaviour.follow_angle_deg)
         x, y = x + behaviour.follow_distance_m * cos(side), y + behaviour.follow_distance_m * sin(side)
         if behaviour.follow_altitude_mode != ABOVE_TARGET:
-            z, vz = scene.home_enu_m[2], 0.0
-        height_m, min_height_m = z + behaviour.follow_height_m, scene.home_enu_m[2] + MIN_HEIGHT_M
+            z, vz = context.home_enu_m[2], 0.0
+        height_m, min_height_m = z + behaviour.follow_height_m, context.home_enu_m[2] + MIN_HEIGHT_M
         if height_m < min_height_m:
             height_m, vz = min_height_m, max(vz, 0.0)
-        target = still_target((x, y, height_m), side + pi, scene.samples)
+        target = still_target((x, y, height_m), side + pi, context.samples)
         target.motion[:, 1] = vx, vy, vz
-        target.motion[:, 0] += np.outer(scene.interval_s * np.arange(scene.samples), (vx, vy, vz))
+        target.motion[:, 0] += np.outer(context.interval_s * np.arange(context.samples), (vx, vy, vz))
         return Motion(target, behaviour.limits)

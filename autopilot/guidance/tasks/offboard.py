@@ -1,4 +1,4 @@
-"""The course of an offboard companion: its setpoints, from moment to moment, no faster than anything else flies."""
+"""The flight task of offboard mode: setpoints from moment to moment, no faster than anything else flies."""
 
 from math import hypot, isnan
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference
 from colibri.autopilot.guidance.reference import Kind, Target, still_target
-from colibri.autopilot.guidance.tasks.attitude import Leaning
-from colibri.autopilot.guidance.tasks.position import Stop
-from colibri.autopilot.guidance.tasks.task import Endless, Lean, Motion, Scene
+from colibri.autopilot.guidance.tasks.attitude import TiltLoop
+from colibri.autopilot.guidance.tasks.position import HoldTask
+from colibri.autopilot.guidance.tasks.task import AttitudeMotion, EndlessTask, Motion, TaskContext
 from colibri.common.types import Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, PositionSetpoint
 
@@ -17,33 +17,33 @@ _BRAKE_1_S = 2.0
 """How fast an acceleration fades where the speed comes near what is allowed."""
 
 
-class Companion(Endless):
+class OffboardTask(EndlessTask):
     """The setpoints of an offboard companion; where they end, stop."""
 
     def __init__(self, attitude: AttitudeReference | None) -> None:
         """Follow setpoints; of attitude if there is a generator of demands for it."""
-        self._leaning = Leaning(attitude) if attitude else None
-        self._hold = Stop()
+        self._leaning = TiltLoop(attitude) if attitude else None
+        self._hold = HoldTask()
 
-    def ask(self, scene: Scene) -> Motion | Lean:
+    def update(self, context: TaskContext) -> Motion | AttitudeMotion:
         """Return what the latest setpoint asks for."""
-        setpoint = scene.steered.setpoint
+        setpoint = context.steered.setpoint
         if isinstance(setpoint, PositionSetpoint):
             if self._leaning:
                 self._leaning.forget()
-            self._hold = Stop()
-            return Motion(position_target(setpoint.in_enu(scene.state.euler[2]), scene), scene.behaviour.limits)
+            self._hold = HoldTask()
+            return Motion(position_target(setpoint.in_enu(context.state.euler[2]), context), context.behaviour.limits)
         if isinstance(setpoint, AttitudeSetpoint) and self._leaning:
-            self._hold = Stop()
-            return self._leaning.by_setpoint(setpoint, scene)
-        return self._hold.ask(scene)
+            self._hold = HoldTask()
+            return self._leaning.by_setpoint(setpoint, context)
+        return self._hold.update(context)
 
 
-def position_target(setpoint: PositionSetpoint, scene: Scene) -> Target:
+def position_target(setpoint: PositionSetpoint, context: TaskContext) -> Target:
     """Return a setpoint as a target: each axis bound by the lowest derivative that is given."""
-    target = still_target(scene.place, scene.yaw_rad, scene.samples)
-    velocity = allowed_velocity(setpoint.velocity_m_s, scene)
-    ahead_s = (scene.now_us - setpoint.time_us) * 1e-6 + scene.interval_s * np.arange(scene.samples)
+    target = still_target(context.place, context.yaw_rad, context.samples)
+    velocity = allowed_velocity(setpoint.velocity_m_s, context)
+    ahead_s = (context.now_us - setpoint.time_us) * 1e-6 + context.interval_s * np.arange(context.samples)
     kinds = []
     for axis in range(3):
         p, v, a = setpoint.position_enu_m[axis], velocity[axis], setpoint.acceleration_m_s2[axis]
@@ -57,7 +57,7 @@ def position_target(setpoint: PositionSetpoint, scene: Scene) -> Target:
             kinds.append(Kind.ACCELERATION)
         target.motion[:, 1, axis] = v_or_0
         if not isnan(a):
-            target.motion[:, 2, axis] = allowed_acceleration(a, axis, scene)
+            target.motion[:, 2, axis] = allowed_acceleration(a, axis, context)
     x, y, z = kinds
     target.heading[:, 1] = 0.0 if isnan(setpoint.yaw_rate_rad_s) else setpoint.yaw_rate_rad_s
     if not isnan(setpoint.yaw_rad):
@@ -65,19 +65,19 @@ def position_target(setpoint: PositionSetpoint, scene: Scene) -> Target:
     return target._replace(kinds=(x, y, z), turns=not isnan(setpoint.yaw_rad))
 
 
-def allowed_velocity(velocity: Vector, scene: Scene) -> Vector:
+def allowed_velocity(velocity: Vector, context: TaskContext) -> Vector:
     """Return a velocity, or the part of it that may be flown; nan stays nan."""
     x, y, z = velocity
     fast = hypot(*(0.0 if isnan(v) else v for v in (x, y)))
-    share = min(1.0, scene.behaviour.max_speed_m_s / fast) if fast > 0.0 else 1.0
-    limits = scene.behaviour.limits
+    share = min(1.0, context.behaviour.max_speed_m_s / fast) if fast > 0.0 else 1.0
+    limits = context.behaviour.limits
     return (share * x, share * y, z if isnan(z) else min(max(z, -limits.sink_m_s), limits.climb_m_s))
 
 
-def allowed_acceleration(acceleration: float, axis: int, scene: Scene) -> float:
+def allowed_acceleration(acceleration: float, axis: int, context: TaskContext) -> float:
     """Return an acceleration, or the part of it that leads to no forbidden speed and that may be flown."""
-    limits, speed = scene.behaviour.limits, scene.velocity[axis]
-    up, down, maximum = scene.behaviour.max_speed_m_s, scene.behaviour.max_speed_m_s, limits.acceleration_m_s2
+    limits, speed = context.behaviour.limits, context.velocity[axis]
+    up, down, maximum = context.behaviour.max_speed_m_s, context.behaviour.max_speed_m_s, limits.acceleration_m_s2
     if axis == UP:
         up, down, maximum = limits.climb_m_s, limits.sink_m_s, limits.lift_m_s2
     minimum = max(-maximum, _BRAKE_1_S * (-down - speed))

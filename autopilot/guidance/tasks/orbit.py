@@ -1,4 +1,4 @@
-"""The course around a centre: to the circle, then along it."""
+"""The flight task around a centre: to the circle, then along it."""
 
 from math import copysign, hypot, pi, sqrt
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from colibri.autopilot.guidance.reference import ALL_BOUND, Target
 from colibri.autopilot.guidance.tasks.orders import Circle, GoTo
-from colibri.autopilot.guidance.tasks.position import Way
-from colibri.autopilot.guidance.tasks.task import Endless, Motion, Scene
+from colibri.autopilot.guidance.tasks.position import GoToTask
+from colibri.autopilot.guidance.tasks.task import EndlessTask, Motion, TaskContext
 from colibri.common import elementwise
 from colibri.common.kernels import atan2, cos, sin
 from colibri.common.types import Array, Vector
@@ -19,7 +19,7 @@ _ON_IT_M, _ON_IT_M_S = 0.3, 0.5
 """So close to the circle's line, and crossing it no faster, the reference goes on along it."""
 
 
-class Round(Endless):
+class OrbitTask(EndlessTask):
     """Around a centre: to the nearest point of the circle, then along it. On the circle already, it goes on at once.
 
     Attributes:
@@ -27,59 +27,59 @@ class Round(Endless):
         turns: How often it went around.
     """
 
-    def __init__(self, order: Circle, scene: Scene) -> None:
+    def __init__(self, order: Circle, context: TaskContext) -> None:
         """Begin where the reference is."""
         self.order = order
         self._radius_m = abs(order.radius_m)
         self._turn = -copysign(1.0, order.radius_m)
-        self._first_yaw_rad = scene.yaw_rad
-        self._angle = self._angle_of(scene.place)
+        self._first_yaw_rad = context.yaw_rad
+        self._angle = self._angle_of(context.place)
         x, y, z = order.center_enu_m
         entry = (x + self._radius_m * cos(self._angle), y + self._radius_m * sin(self._angle), z)
         yaw_rad = float(self._heading(np.array([self._angle]), 0.0)[0, 0])
-        self._way = Way(GoTo(entry, yaw_rad, order.speed_m_s), scene)
+        self._way = GoToTask(GoTo(entry, yaw_rad, order.speed_m_s), context)
         self._circles, self._rate = False, 0.0
         self.turns = 0.0
 
-    def ask(self, scene: Scene) -> Motion:
+    def update(self, context: TaskContext) -> Motion:
         """Return the way to the circle, then the motion along it."""
         if not self._circles:
-            if not self._joins(scene):
-                return self._way.ask(scene)
-            self._circles, self._angle = True, self._angle_of(scene.place)
-            self._rate = self._rate_of(scene)
-        rate = self._rate = self._towards(self._turn * self._speed_m_s(scene) / self._radius_m, scene)
-        angles: Array = self._angle + rate * scene.interval_s * np.arange(scene.samples, dtype=np.float64)
+            if not self._joins(context):
+                return self._way.update(context)
+            self._circles, self._angle = True, self._angle_of(context.place)
+            self._rate = self._rate_of(context)
+        rate = self._rate = self._towards(self._turn * self._speed_m_s(context) / self._radius_m, context)
+        angles: Array = self._angle + rate * context.interval_s * np.arange(context.samples, dtype=np.float64)
         self._angle = float(angles[1])
-        self.turns += abs(rate) * scene.interval_s / (2.0 * pi)
+        self.turns += abs(rate) * context.interval_s / (2.0 * pi)
         target = Target(self._motion(angles, rate), ALL_BOUND, self._heading(angles, rate))
-        return Motion(target, scene.behaviour.limits)
+        return Motion(target, context.behaviour.limits)
 
     def _angle_of(self, place: Vector) -> float:
         """Return where a place is seen from the centre, counter-clockwise from east; its own place counts as east."""
         return atan2(place[1] - self.order.center_enu_m[1], place[0] - self.order.center_enu_m[0])
 
-    def _rate_of(self, scene: Scene) -> float:
+    def _rate_of(self, context: TaskContext) -> float:
         """Return how fast the reference goes around, rad/s, counter-clockwise."""
-        (vx, vy, _), angle = scene.velocity, self._angle
+        (vx, vy, _), angle = context.velocity, self._angle
         return (vy * cos(angle) - vx * sin(angle)) / self._radius_m
 
-    def _towards(self, wanted: float, scene: Scene) -> float:
+    def _towards(self, wanted: float, context: TaskContext) -> float:
         """Return the rate of now, rad/s: no sooner the one that is wanted than the vehicle can gain that speed."""
-        maximum = _SHARE * scene.behaviour.limits.acceleration_m_s2 * scene.interval_s / self._radius_m
+        maximum = _SHARE * context.behaviour.limits.acceleration_m_s2 * context.interval_s / self._radius_m
         return min(max(wanted, self._rate - maximum), self._rate + maximum)
 
-    def _joins(self, scene: Scene) -> bool:
+    def _joins(self, context: TaskContext) -> bool:
         """Whether the reference is on the circle, and not about to leave it but along it."""
-        east, north, above = (p - c for p, c in zip(scene.place, self.order.center_enu_m, strict=True))
+        east, north, above = (p - c for p, c in zip(context.place, self.order.center_enu_m, strict=True))
         away = hypot(east, north)
         if abs(away - self._radius_m) > _ON_IT_M or abs(above) > _ON_IT_M:
             return False
-        vx, vy, vz = scene.velocity
+        vx, vy, vz = context.velocity
         return abs(vx * east + vy * north) < _ON_IT_M_S * away and abs(vz) < _ON_IT_M_S
 
-    def _speed_m_s(self, scene: Scene) -> float:
-        behaviour, asked = scene.behaviour, self.order.speed_m_s
+    def _speed_m_s(self, context: TaskContext) -> float:
+        behaviour, asked = context.behaviour, self.order.speed_m_s
         wanted = behaviour.limits.speed_m_s if asked is None else asked
         return min(wanted, behaviour.max_speed_m_s, sqrt(_SHARE * behaviour.limits.acceleration_m_s2 * self._radius_m))
 

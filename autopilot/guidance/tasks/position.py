@@ -1,4 +1,4 @@
-"""Courses by place: how each order is flown, as a target for the reference to follow, sample after sample."""
+"""Flight tasks by place: how each order is flown, as a target for the reference to follow, sample after sample."""
 
 from collections.abc import Callable
 from math import dist, hypot
@@ -6,13 +6,20 @@ from typing import TypeAlias
 
 from colibri.autopilot.guidance.reference import Kind, Reference, still_target
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Order, TakeOff
-from colibri.autopilot.guidance.tasks.task import Asked, Course, Endless, Motion, Planned, Scene
+from colibri.autopilot.guidance.tasks.task import (
+    EndlessTask,
+    FlightTask,
+    Motion,
+    PlannedMotion,
+    TaskContext,
+    TaskOutput,
+)
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.common.kernels import atan2
 from colibri.common.types import Vector
 
-Leg: TypeAlias = Callable[[Scene], Course]
-"""Begins a course where the scene is."""
+Leg: TypeAlias = Callable[[TaskContext], FlightTask]
+"""Begins a task where the context says."""
 
 _ALONG_BEYOND_M = 1.0
 """A way shorter than this does not turn the vehicle."""
@@ -24,15 +31,15 @@ _FLARE_1_S, _FLARE_ABOVE_M = 0.5, 1.0
 """A descent slows down in proportion to the height, to the speed of landings at this height."""
 
 
-class Way:
+class GoToTask:
     """Straight to a place, and stay."""
 
-    def __init__(self, order: GoTo, scene: Scene) -> None:
+    def __init__(self, order: GoTo, context: TaskContext) -> None:
         """Begin where the reference is."""
         self._place = order.position_enu_m
         self._speed_m_s = order.speed_m_s
-        east, north = (order.position_enu_m[axis] - scene.place[axis] for axis in (0, 1))
-        along = atan2(north, east) if hypot(east, north) > _ALONG_BEYOND_M else scene.yaw_rad
+        east, north = (order.position_enu_m[axis] - context.place[axis] for axis in (0, 1))
+        along = atan2(north, east) if hypot(east, north) > _ALONG_BEYOND_M else context.yaw_rad
         self._yaw_rad = along if order.yaw_rad is None else order.yaw_rad
 
     @property
@@ -40,19 +47,19 @@ class Way:
         """What it flies: by this it can begin again."""
         return GoTo(self._place, self._yaw_rad, self._speed_m_s)
 
-    def ask(self, scene: Scene) -> Motion:
+    def update(self, context: TaskContext) -> Motion:
         """Return the place."""
-        limits = scene.behaviour.limits
+        limits = context.behaviour.limits
         if self._speed_m_s is not None:
-            limits = limits._replace(speed_m_s=min(self._speed_m_s, scene.behaviour.max_speed_m_s))
-        return Motion(still_target(self._place, self._yaw_rad, scene.samples), limits)
+            limits = limits._replace(speed_m_s=min(self._speed_m_s, context.behaviour.max_speed_m_s))
+        return Motion(still_target(self._place, self._yaw_rad, context.samples), limits)
 
-    def arrived(self, scene: Scene) -> bool:
+    def arrived(self, context: TaskContext) -> bool:
         """Whether the vehicle is there, and slow."""
-        return dist(scene.state.position_enu_m, self._place) < _THERE_M and hypot(*scene.velocity) < _THERE_M_S
+        return dist(context.state.position_enu_m, self._place) < _THERE_M and hypot(*context.velocity) < _THERE_M_S
 
 
-class Stop:
+class HoldTask:
     """Stop, and stay where that is."""
 
     def __init__(self) -> None:
@@ -65,58 +72,58 @@ class Stop:
         """What it flies: by this it can begin again."""
         return Hold() if self._place is None else GoTo(self._place, self._yaw_rad)
 
-    def ask(self, scene: Scene) -> Motion:
+    def update(self, context: TaskContext) -> Motion:
         """Return rest: of the velocity first, then of the place that it led to."""
-        turning = abs(float(scene.reference.heading[1])) > _REST_RAD_S
-        if self._place is None and not turning and hypot(*scene.velocity) < _REST_M_S:
-            self._place, self._yaw_rad = scene.place, scene.yaw_rad
+        turning = abs(float(context.reference.heading[1])) > _REST_RAD_S
+        if self._place is None and not turning and hypot(*context.velocity) < _REST_M_S:
+            self._place, self._yaw_rad = context.place, context.yaw_rad
         if self._place is not None:
-            return Motion(still_target(self._place, self._yaw_rad, scene.samples), scene.behaviour.limits)
-        braking = still_target(scene.place, scene.yaw_rad, scene.samples, (Kind.VELOCITY,) * 3)
-        return Motion(braking._replace(turns=False), scene.behaviour.limits)
+            return Motion(still_target(self._place, self._yaw_rad, context.samples), context.behaviour.limits)
+        braking = still_target(context.place, context.yaw_rad, context.samples, (Kind.VELOCITY,) * 3)
+        return Motion(braking._replace(turns=False), context.behaviour.limits)
 
-    def arrived(self, scene: Scene) -> bool:
+    def arrived(self, context: TaskContext) -> bool:
         """Whether it stands."""
-        del scene
+        del context
         return self._place is not None
 
 
-class Climb:
+class TakeoffTask:
     """Straight up to a height, above where the reference comes to rest; one that is higher already stays there."""
 
     def __init__(
-        self, height_enu_m: float, yaw_rad: float | None, scene: Scene, speed_m_s: float | None = None
+        self, height_enu_m: float, yaw_rad: float | None, context: TaskContext, speed_m_s: float | None = None
     ) -> None:
         """Begin where the reference is; climb at `speed_m_s`, or as fast as the parameters say."""
-        self._height_m = max(height_enu_m, scene.place[2])
-        self._yaw_rad = scene.yaw_rad if yaw_rad is None else yaw_rad
+        self._height_m = max(height_enu_m, context.place[2])
+        self._yaw_rad = context.yaw_rad if yaw_rad is None else yaw_rad
         self._speed_m_s = speed_m_s
-        self._way: Way | None = None
+        self._way: GoToTask | None = None
 
     @property
     def order(self) -> TakeOff:
         """What it flies: by this it can begin again."""
         return TakeOff(self._height_m, self._yaw_rad)
 
-    def ask(self, scene: Scene) -> Motion:
+    def update(self, context: TaskContext) -> Motion:
         """Return the height, and rest in the plane until that is reached."""
-        x, y, _ = scene.place
-        if self._way is None and hypot(*scene.velocity[:2]) < _REST_M_S:
-            self._way = Way(GoTo((x, y, self._height_m), self._yaw_rad), scene)
+        x, y, _ = context.place
+        if self._way is None and hypot(*context.velocity[:2]) < _REST_M_S:
+            self._way = GoToTask(GoTo((x, y, self._height_m), self._yaw_rad), context)
         if self._way is None:
             kinds = (Kind.VELOCITY, Kind.VELOCITY, Kind.POSITION)
-            target = still_target((x, y, self._height_m), self._yaw_rad, scene.samples, kinds)
-            limits = scene.behaviour.limits
+            target = still_target((x, y, self._height_m), self._yaw_rad, context.samples, kinds)
+            limits = context.behaviour.limits
         else:
-            target, limits = self._way.ask(scene)
+            target, limits = self._way.update(context)
         return Motion(target, limits if self._speed_m_s is None else limits._replace(climb_m_s=self._speed_m_s))
 
-    def arrived(self, scene: Scene) -> bool:
+    def arrived(self, context: TaskContext) -> bool:
         """Whether the vehicle is there, and slow."""
-        return self._way is not None and self._way.arrived(scene)
+        return self._way is not None and self._way.arrived(context)
 
 
-class Sink(Endless):
+class LandTask(EndlessTask):
     """Straight down, slower towards the ground, until that ends it."""
 
     def __init__(self, xy: tuple[float, float], yaw_rad: float | None) -> None:
@@ -124,63 +131,63 @@ class Sink(Endless):
         self._xy = xy
         self._yaw_rad = yaw_rad
 
-    def ask(self, scene: Scene) -> Motion:
+    def update(self, context: TaskContext) -> Motion:
         """Return a descent."""
-        behaviour = scene.behaviour
-        yaw = scene.yaw_rad if self._yaw_rad is None else self._yaw_rad
+        behaviour = context.behaviour
+        yaw = context.yaw_rad if self._yaw_rad is None else self._yaw_rad
         kinds = (Kind.POSITION, Kind.POSITION, Kind.VELOCITY)
-        target = still_target((*self._xy, scene.place[2]), yaw, scene.samples, kinds)
-        target.motion[:, 1, 2] = -sinking_m_s(scene)
+        target = still_target((*self._xy, context.place[2]), yaw, context.samples, kinds)
+        target.motion[:, 1, 2] = -sinking_m_s(context)
         return Motion(target._replace(turns=self._yaw_rad is not None), behaviour.limits)
 
 
-def sinking_m_s(scene: Scene) -> float:
+def sinking_m_s(context: TaskContext) -> float:
     """Return how fast to sink at this height, m/s."""
-    flare = _FLARE_1_S * (scene.place[2] - scene.home_enu_m[2] - _FLARE_ABOVE_M)
-    return min(max(flare, scene.behaviour.land_speed_m_s), scene.behaviour.limits.sink_m_s)
+    flare = _FLARE_1_S * (context.place[2] - context.home_enu_m[2] - _FLARE_ABOVE_M)
+    return min(max(flare, context.behaviour.land_speed_m_s), context.behaviour.limits.sink_m_s)
 
 
-class Legs:
+class TaskSequence:
     """Courses one after another, each from where the one before has led.
 
     Attributes:
-        course: The one that is flown; None before the first sample.
+        task: The one that is flown; None before the first sample.
     """
 
     def __init__(self, first: Leg, *others: Leg) -> None:
         """Begin with the first at the first sample."""
         self._ahead = [first, *others]
         self._inner: tuple[int, ...] = ()
-        self.course: Course | None = None
+        self.task: FlightTask | None = None
 
     @property
     def left(self) -> tuple[int, ...]:
         """How many legs are left from the one that is flown on; then the same of that, where it has legs itself."""
-        inner = self.course.left if isinstance(self.course, Legs) else ()
-        return (len(self._ahead) + (self.course is not None), *inner)
+        inner = self.task.left if isinstance(self.task, TaskSequence) else ()
+        return (len(self._ahead) + (self.task is not None), *inner)
 
-    def skip(self, left: tuple[int, ...]) -> "Legs":
+    def skip(self, left: tuple[int, ...]) -> "TaskSequence":
         """Begin with the leg after which so many are left, itself among them; return this."""
         if left:
             self._ahead = self._ahead[max(len(self._ahead) - left[0], 0) :]
             self._inner = left[1:]
         return self
 
-    def ask(self, scene: Scene) -> Asked:
+    def update(self, context: TaskContext) -> TaskOutput:
         """Return what the leg that is flown now asks for."""
-        if self.course is None or (self._ahead and self.course.arrived(scene)):
-            self.course = self._ahead.pop(0)(scene)
-            if isinstance(self.course, Legs):
-                self.course.skip(self._inner)
+        if self.task is None or (self._ahead and self.task.arrived(context)):
+            self.task = self._ahead.pop(0)(context)
+            if isinstance(self.task, TaskSequence):
+                self.task.skip(self._inner)
             self._inner = ()
-        return self.course.ask(scene)
+        return self.task.update(context)
 
-    def arrived(self, scene: Scene) -> bool:
+    def arrived(self, context: TaskContext) -> bool:
         """Whether the last leg is flown to its end."""
-        return not self._ahead and self.course is not None and self.course.arrived(scene)
+        return not self._ahead and self.task is not None and self.task.arrived(context)
 
 
-class Along:
+class TrackTask:
     """A track, from a moment on; past its end, its last point.
 
     Attributes:
@@ -206,49 +213,49 @@ class Along:
         self._duration_s = duration_s
         self.began_us = began_us
 
-    def ask(self, scene: Scene) -> Planned:
+    def update(self, context: TaskContext) -> PlannedMotion:
         """Return the track."""
-        since_us = scene.now_us - self.began_us
+        since_us = context.now_us - self.began_us
         for_law = self._planner_for_law.horizon(since_us) if self._planner_for_law else None
-        return Planned(self._planner.horizon(since_us), scene.behaviour.limits, for_law)
+        return PlannedMotion(self._planner.horizon(since_us), context.behaviour.limits, for_law)
 
-    def arrived(self, scene: Scene) -> bool:
+    def arrived(self, context: TaskContext) -> bool:
         """Whether the track has ended."""
-        return scene.now_us - self.began_us > self._duration_s * 1e6
+        return context.now_us - self.began_us > self._duration_s * 1e6
 
 
-def landing(order: Land) -> Legs:
+def landing(order: Land) -> TaskSequence:
     """Return how to land: above the place first, or at rest, then down."""
     place, yaw_rad = order
     if place is None:
-        return Legs(lambda _: Stop(), lambda scene: Sink(scene.place[:2], yaw_rad))
+        return TaskSequence(lambda _: HoldTask(), lambda context: LandTask(context.place[:2], yaw_rad))
     x, y, _ = place
-    return Legs(
-        lambda scene: Way(GoTo((x, y, scene.place[2]), yaw_rad), scene),
-        lambda _: Sink((x, y), yaw_rad),
+    return TaskSequence(
+        lambda context: GoToTask(GoTo((x, y, context.place[2]), yaw_rad), context),
+        lambda _: LandTask((x, y), yaw_rad),
     )
 
 
-def homeward(scene: Scene) -> Legs:
+def homeward(context: TaskContext) -> TaskSequence:
     """Return how to return: up where home is far, there, and down.
 
     Nothing holds a return back, neither the geofence nor how far it is: there is no better place to go.
     """
-    x, y, z = scene.home_enu_m
+    x, y, z = context.home_enu_m
     down = landing(Land((x, y, z)))
-    if hypot(x - scene.place[0], y - scene.place[1]) <= scene.behaviour.return_radius_m:
+    if hypot(x - context.place[0], y - context.place[1]) <= context.behaviour.return_radius_m:
         return down
-    high_m = z + scene.behaviour.return_height_m
-    return Legs(lambda begin: Climb(high_m, None, begin), lambda _: down)
+    high_m = z + context.behaviour.return_height_m
+    return TaskSequence(lambda begin: TakeoffTask(high_m, None, begin), lambda _: down)
 
 
-def to_track(planner: Planner, duration_s: float) -> Legs:
+def to_track(planner: Planner, duration_s: float) -> TaskSequence:
     """Return how to fly a track from wherever the vehicle is: up to its first point's height, there, and along it."""
     first = planner.horizon(0)
     x, y, z = first.position_enu_m[0].tolist()
     yaw_rad = float(first.yaw_rad[0])
-    return Legs(
-        lambda scene: Climb(z, None, scene),
-        lambda scene: Way(GoTo((x, y, z), yaw_rad), scene),
-        lambda scene: Along(planner, duration_s, scene.now_us),
+    return TaskSequence(
+        lambda context: TakeoffTask(z, None, context),
+        lambda context: GoToTask(GoTo((x, y, z), yaw_rad), context),
+        lambda context: TrackTask(planner, duration_s, context.now_us),
     )

@@ -3,7 +3,7 @@
 from math import hypot
 
 from colibri.autopilot.guidance.reference import Kind, Target, still_target
-from colibri.autopilot.guidance.tasks.task import Endless, Motion, Scene
+from colibri.autopilot.guidance.tasks.task import EndlessTask, Motion, TaskContext
 from colibri.mavlink.setpoints.setpoints import Sticks, turned
 
 _DEADZONE = 0.05
@@ -11,7 +11,7 @@ _SLOW_M_S, _SLOW_RAD_S = 0.1, 0.05
 _MIDDLE = Sticks(0.0, 0.0, 0.5, 0.0)
 
 
-class PositionSticks(Endless):
+class PositionTask(EndlessTask):
     """Sticks to velocity; what is not asked to move is held where it came to rest."""
 
     def __init__(self) -> None:
@@ -20,66 +20,66 @@ class PositionSticks(Endless):
         self._z: float | None = None
         self._yaw_rad: float | None = None
 
-    def ask(self, scene: Scene) -> Motion:
+    def update(self, context: TaskContext) -> Motion:
         """Return velocities along the heading, or places."""
-        sticks = scene.steered.sticks or _MIDDLE
-        target = still_target(scene.place, scene.yaw_rad, scene.samples)
-        horizontally = self._move(target, stick_velocity(sticks, scene), scene)
-        vertically = self._climb(target, stick_climb(sticks, scene), scene)
-        self._turn(target, stick_yaw_rate(sticks, scene), scene)
+        sticks = context.steered.sticks or _MIDDLE
+        target = still_target(context.place, context.yaw_rad, context.samples)
+        horizontally = self._move(target, stick_velocity(sticks, context), context)
+        vertically = self._climb(target, stick_climb(sticks, context), context)
+        self._turn(target, stick_yaw_rate(sticks, context), context)
         kinds = (horizontally, horizontally, vertically)
-        return Motion(target._replace(kinds=kinds, turns=self._yaw_rad is not None), scene.behaviour.limits)
+        return Motion(target._replace(kinds=kinds, turns=self._yaw_rad is not None), context.behaviour.limits)
 
-    def _move(self, target: Target, velocity: tuple[float, float], scene: Scene) -> Kind:
+    def _move(self, target: Target, velocity: tuple[float, float], context: TaskContext) -> Kind:
         if velocity != (0.0, 0.0):
             self._xy = None
-        elif self._xy is None and hypot(*scene.velocity[:2]) < _SLOW_M_S:
-            self._xy = scene.place[:2]
+        elif self._xy is None and hypot(*context.velocity[:2]) < _SLOW_M_S:
+            self._xy = context.place[:2]
         target.motion[:, 1, :2] = velocity
         if self._xy is None:
             return Kind.VELOCITY
         target.motion[:, 0, :2] = self._xy
         return Kind.POSITION
 
-    def _climb(self, target: Target, climb_m_s: float, scene: Scene) -> Kind:
+    def _climb(self, target: Target, climb_m_s: float, context: TaskContext) -> Kind:
         if climb_m_s != 0.0:
             self._z = None
-        elif self._z is None and abs(scene.velocity[2]) < _SLOW_M_S:
-            self._z = scene.place[2]
+        elif self._z is None and abs(context.velocity[2]) < _SLOW_M_S:
+            self._z = context.place[2]
         target.motion[:, 1, 2] = climb_m_s
         if self._z is None:
             return Kind.VELOCITY
         target.motion[:, 0, 2] = self._z
         return Kind.POSITION
 
-    def _turn(self, target: Target, yaw_rate: float, scene: Scene) -> None:
+    def _turn(self, target: Target, yaw_rate: float, context: TaskContext) -> None:
         if yaw_rate != 0.0:
             self._yaw_rad = None
-        elif self._yaw_rad is None and abs(float(scene.reference.heading[1])) < _SLOW_RAD_S:
-            self._yaw_rad = scene.yaw_rad
+        elif self._yaw_rad is None and abs(float(context.reference.heading[1])) < _SLOW_RAD_S:
+            self._yaw_rad = context.yaw_rad
         target.heading[:, 1] = yaw_rate
         if self._yaw_rad is not None:
             target.heading[:, 0] = self._yaw_rad
 
 
-def stick_velocity(sticks: Sticks, scene: Scene) -> tuple[float, float]:
+def stick_velocity(sticks: Sticks, context: TaskContext) -> tuple[float, float]:
     """Return the velocity east and north, m/s, that sticks ask for: of full sticks, in any direction, the largest."""
     ahead, left = dead(sticks.pitch), -dead(sticks.roll)
-    behaviour = scene.behaviour
+    behaviour = context.behaviour
     speed = min(behaviour.stick_speed_m_s, behaviour.max_speed_m_s) / max(1.0, hypot(ahead, left))
-    east, north, _ = turned((speed * ahead, speed * left, 0.0), scene.state.euler[2])
+    east, north, _ = turned((speed * ahead, speed * left, 0.0), context.state.euler[2])
     return east, north
 
 
-def stick_climb(sticks: Sticks, scene: Scene) -> float:
+def stick_climb(sticks: Sticks, context: TaskContext) -> float:
     """Return the speed upwards, m/s, that sticks ask for."""
     up = dead(2.0 * sticks.thrust - 1.0)
-    return up * (scene.behaviour.limits.climb_m_s if up > 0.0 else scene.behaviour.limits.sink_m_s)
+    return up * (context.behaviour.limits.climb_m_s if up > 0.0 else context.behaviour.limits.sink_m_s)
 
 
-def stick_yaw_rate(sticks: Sticks, scene: Scene) -> float:
+def stick_yaw_rate(sticks: Sticks, context: TaskContext) -> float:
     """Return the yaw rate, rad/s, that sticks ask for."""
-    return -dead(sticks.yaw) * scene.behaviour.stick_yaw_rate_rad_s
+    return -dead(sticks.yaw) * context.behaviour.stick_yaw_rate_rad_s
 
 
 def without_play(sticks: Sticks) -> Sticks:

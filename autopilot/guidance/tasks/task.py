@@ -1,4 +1,4 @@
-"""What a course is: it sees the scene, sample after sample, and asks for a motion, or for an attitude and a thrust."""
+"""What a flight task is: given the context once a control sample, it returns a motion, or an attitude and a thrust."""
 
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -18,19 +18,19 @@ class Steered(NamedTuple):
     Attributes:
         sticks: Of a pilot.
         setpoint: Of an offboard companion, in ENU.
-        leader: What is to be followed.
+        followed: What is to be followed.
     """
 
     sticks: Sticks | None = None
     setpoint: OffboardSetpoint | None = None
-    leader: TargetState | None = None
+    followed: TargetState | None = None
 
 
 NOT_STEERED = Steered()
 
 
-class Scene(NamedTuple):
-    """What a course sees.
+class TaskContext(NamedTuple):
+    """What a task sees.
 
     Attributes:
         now_us: Simulated time.
@@ -77,7 +77,7 @@ class Scene(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """A course by position and yaw.
+    """Motion by position and yaw.
 
     Attributes:
         target: What the reference is to become.
@@ -88,8 +88,8 @@ class Motion(NamedTuple):
     limits: Limits
 
 
-class Planned(NamedTuple):
-    """A course along a plan.
+class PlannedMotion(NamedTuple):
+    """Motion along a plan.
 
     Attributes:
         horizon: What the reference is to become.
@@ -107,8 +107,8 @@ class Planned(NamedTuple):
         return target_of(self.horizon)
 
 
-class Lean(NamedTuple):
-    """A course by attitude and thrust.
+class AttitudeMotion(NamedTuple):
+    """Motion by attitude and thrust.
 
     Attributes:
         demand: What the control law is to hold.
@@ -125,27 +125,27 @@ class Lean(NamedTuple):
     drifts: bool = False
 
 
-Asked: TypeAlias = Motion | Planned | Lean
+TaskOutput: TypeAlias = Motion | PlannedMotion | AttitudeMotion
 
 
-class Course(Protocol):
+class FlightTask(Protocol):
     """A way to fly."""
 
-    def ask(self, scene: Scene) -> Asked:
+    def update(self, context: TaskContext) -> TaskOutput:
         """Return what is to be flown from now on. Called once a control sample."""
         ...
 
-    def arrived(self, scene: Scene) -> bool:
+    def arrived(self, context: TaskContext) -> bool:
         """Whether it is flown to its end."""
         ...
 
 
-class Endless:
-    """A course that something else ends: the ground, a command, silence."""
+class EndlessTask:
+    """A task that something else ends: the ground, a command, silence."""
 
-    def arrived(self, scene: Scene) -> bool:
+    def arrived(self, context: TaskContext) -> bool:
         """Never by itself."""
-        del scene
+        del context
         return False
 
 

@@ -13,7 +13,7 @@ from math import factorial, perm
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.autopilot.guidance.trajectories.taylor import Jet
+from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries
 from colibri.common.matrices import inverse, matmul, solve
 from colibri.common.types import Array
 
@@ -33,7 +33,7 @@ class PiecewisePolynomial:
     times_s: Array
     coefficients: Array
 
-    def __call__(self, t: Jet) -> tuple[Jet, ...]:
+    def __call__(self, t: TaylorSeries) -> tuple[TaylorSeries, ...]:
         """Return each axis at time `t`, s; the first and the last polynomial go on beyond the ends."""
         piece = self._piece(t.coefficients[0])
         tau = (t - self.times_s[piece]) * (1.0 / np.diff(self.times_s)[piece])
@@ -125,8 +125,8 @@ def _free_derivatives(elements: Array, points: Array) -> Array:
     return free
 
 
-def _horner(coefficients: Array, x: Jet) -> Jet:
-    """Return a polynomial of a jet, coefficients (n, powers) of its own at each time."""
+def _horner(coefficients: Array, x: TaylorSeries) -> TaylorSeries:
+    """Return a polynomial of a series, coefficients (n, powers) of its own at each time."""
     value = x * 0.0 + coefficients[:, -1]
     for coefficient in coefficients[:, -2::-1].T:
         value = value * x + coefficient

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from colibri.autopilot.control.interface import Horizon, Preview
 from colibri.autopilot.control.profile import References
-from colibri.autopilot.guidance.trajectories.taylor import Jet, atan2
+from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2
 from colibri.autopilot.guidance.trajectories.tracks import Track, position
 from colibri.common import elementary, elementwise
 from colibri.common.types import Array
@@ -88,11 +88,11 @@ def _by_formula(track: Track, t: Array, interval_s: float) -> Horizon:
     return Horizon(*columns)
 
 
-def _along(x: Jet, y: Jet) -> list[Array]:
+def _along(x: TaylorSeries, y: TaylorSeries) -> list[Array]:
     """Return yaw along the horizontal velocity, its rate and acceleration; held, both zero, where it is still."""
     vx, vy = (axis.rate().coefficients[: _YAW_ACCELERATION + 1] for axis in (x, y))
     moving = np.sqrt(vx[0] * vx[0] + vy[0] * vy[0]) >= _STILL
-    direction = atan2(Jet(np.where(moving, vy, 0.0)), Jet(np.where(moving, vx, 0.0)))
+    direction = atan2(TaylorSeries(np.where(moving, vy, 0.0)), TaylorSeries(np.where(moving, vx, 0.0)))
     yaw, known = direction.derivative(0), moving.copy()
     departure = _departure(x, y)
     if departure is not None:
@@ -100,7 +100,7 @@ def _along(x: Jet, y: Jet) -> list[Array]:
     return [_unwrapped(yaw, known), direction.derivative(1), direction.derivative(2)]
 
 
-def _departure(x: Jet, y: Jet) -> float | None:
+def _departure(x: TaylorSeries, y: TaylorSeries) -> float | None:
     """Return which way the first sample leaves, rad: along its first derivative that is not still; None if all are."""
     for order in range(1, len(x.coefficients)):
         ahead, left = float(x.derivative(order)[0]), float(y.derivative(order)[0])

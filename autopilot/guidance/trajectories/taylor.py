@@ -1,7 +1,7 @@
 """Derivatives of a track without deriving: arithmetic on truncated Taylor series.
 
-A jet holds x(t + h) = c0 + c1 h + c2 h² + … at many times t at once. Sums, products, sines, cosines and directions of
-jets are exact to the last coefficient kept, so a track that is written as a formula of its time has every derivative.
+A series holds x(t + h) = c0 + c1 h + c2 h² + … at many times t at once. Sums, products, sines, cosines, directions of
+series are exact to the last coefficient kept, so a track that is written as a formula of its time has every derivative.
 Source: Griewank and Walther, "Evaluating Derivatives" (2008), chapter 13.
 """
 
@@ -14,7 +14,7 @@ from colibri.common import elementwise
 from colibri.common.types import Array
 
 
-class Jet:
+class TaylorSeries:
     """A quantity and its derivatives with respect to time.
 
     Attributes:
@@ -40,49 +40,49 @@ class Jet:
         derivative: Array = factorial(order) * self.coefficients[order]
         return derivative
 
-    def rate(self) -> "Jet":
-        """Return the jet of the derivative with respect to time, of one order less."""
+    def rate(self) -> "TaylorSeries":
+        """Return the series of the derivative with respect to time, of one order less."""
         orders = np.arange(1.0, len(self.coefficients))
-        return Jet(orders[:, None] * self.coefficients[1:])
+        return TaylorSeries(orders[:, None] * self.coefficients[1:])
 
-    def padded_rate(self) -> "Jet":
-        """Return the jet of the derivative with respect to time, its highest coefficient unknown and left at 0."""
-        return Jet(np.concatenate([self.rate().coefficients, np.zeros_like(self.coefficients[:1])]))
+    def padded_rate(self) -> "TaylorSeries":
+        """Return the series of the derivative with respect to time, its highest coefficient unknown and left at 0."""
+        return TaylorSeries(np.concatenate([self.rate().coefficients, np.zeros_like(self.coefficients[:1])]))
 
-    def __add__(self, other: "Jet | Array | float") -> "Jet":
-        """Add a jet or a constant, one for all times or one for each."""
-        if isinstance(other, Jet):
-            return Jet(self.coefficients + other.coefficients)
+    def __add__(self, other: "TaylorSeries | Array | float") -> "TaylorSeries":
+        """Add a series or a constant, one for all times or one for each."""
+        if isinstance(other, TaylorSeries):
+            return TaylorSeries(self.coefficients + other.coefficients)
         shifted = self.coefficients.copy()
         shifted[0] += other
-        return Jet(shifted)
+        return TaylorSeries(shifted)
 
-    def __mul__(self, other: "Jet | Array | float") -> "Jet":
-        """Multiply by a jet (Cauchy product) or a constant, one for all times or one for each."""
-        if not isinstance(other, Jet):
-            return Jet(self.coefficients * other)
+    def __mul__(self, other: "TaylorSeries | Array | float") -> "TaylorSeries":
+        """Multiply by a series (Cauchy product) or a constant, one for all times or one for each."""
+        if not isinstance(other, TaylorSeries):
+            return TaylorSeries(self.coefficients * other)
         a, b = self.coefficients, other.coefficients
-        return Jet(np.array([(a[: k + 1] * b[k::-1]).sum(axis=0) for k in range(len(a))]))
+        return TaylorSeries(np.array([(a[: k + 1] * b[k::-1]).sum(axis=0) for k in range(len(a))]))
 
-    def __sub__(self, other: "Jet | Array | float") -> "Jet":
-        """Subtract a jet or a constant, one for all times or one for each."""
+    def __sub__(self, other: "TaylorSeries | Array | float") -> "TaylorSeries":
+        """Subtract a series or a constant, one for all times or one for each."""
         return self + -1.0 * other
 
     __radd__ = __add__
     __rmul__ = __mul__
 
 
-def sin(x: Jet) -> Jet:
-    """Return the sine of a jet in rad."""
+def sin(x: TaylorSeries) -> TaylorSeries:
+    """Return the sine of a series in rad."""
     return _sin_cos(x)[0]
 
 
-def cos(x: Jet) -> Jet:
-    """Return the cosine of a jet in rad."""
+def cos(x: TaylorSeries) -> TaylorSeries:
+    """Return the cosine of a series in rad."""
     return _sin_cos(x)[1]
 
 
-def atan2(y: Jet, x: Jet) -> Jet:
+def atan2(y: TaylorSeries, x: TaylorSeries) -> TaylorSeries:
     """Return the direction of (x, y), rad, in (-π, π]; where x = y = 0 it has none, and every coefficient is 0.
 
     From (x² + y²) θ' = x y' - y x', solved for one coefficient of θ after another.
@@ -95,10 +95,10 @@ def atan2(y: Jet, x: Jet) -> Jet:
         slope = np.arange(1, k)[:, None] * theta[1:k]
         rest = turning[k - 1] - (slope * squared[k - 1 : 0 : -1]).sum(axis=0)
         np.divide(rest, k * squared[0], out=theta[k], where=squared[0] > 0.0)
-    return Jet(theta)
+    return TaylorSeries(theta)
 
 
-def _sin_cos(x: Jet) -> tuple[Jet, Jet]:
+def _sin_cos(x: TaylorSeries) -> tuple[TaylorSeries, TaylorSeries]:
     """Both together, from s' = c x' and c' = -s x'."""
     a = x.coefficients
     s, c = np.empty_like(a), np.empty_like(a)
@@ -107,4 +107,4 @@ def _sin_cos(x: Jet) -> tuple[Jet, Jet]:
         slope = np.arange(1, k + 1)[:, None] * a[1 : k + 1]
         s[k] = (slope * c[k - 1 :: -1][:k]).sum(axis=0) / k
         c[k] = -(slope * s[k - 1 :: -1][:k]).sum(axis=0) / k
-    return Jet(s), Jet(c)
+    return TaylorSeries(s), TaylorSeries(c)

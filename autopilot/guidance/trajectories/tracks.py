@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.autopilot.errors import AutopilotError
-from colibri.autopilot.guidance.trajectories.taylor import Jet, atan2, cos, sin
+from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, sin
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, WaypointsError, read_waypoints
 from colibri.common.config import Table
 from colibri.common.types import Array
 
-Place: TypeAlias = tuple[Jet, Jet, Jet]
+Place: TypeAlias = tuple[TaylorSeries, TaylorSeries, TaylorSeries]
 """x, y, z in m, ENU."""
 Length: TypeAlias = Annotated[float, msgspec.Meta(ge=0.01, le=1000.0)]
 Coordinate: TypeAlias = Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)]
@@ -53,8 +53,8 @@ class Track:
         duration_s: Afterwards it rests at its last point; infinite for a track without end.
     """
 
-    position: Callable[[Jet], Place]
-    yaw: Callable[[Jet], Jet] | None = None
+    position: Callable[[TaylorSeries], Place]
+    yaw: Callable[[TaylorSeries], TaylorSeries] | None = None
     duration_s: float = DURATION_S
 
     def __post_init__(self) -> None:
@@ -62,10 +62,10 @@ class Track:
         if self.yaw is None and self.duration_s == inf:
             raise ValueError("a track without end needs a formula for its yaw")
 
-    def clock(self, t: Array, order: int) -> Jet:
+    def clock(self, t: Array, order: int) -> TaylorSeries:
         """Return the time that the formulas are given at `t` (n,), s: it stands still once the track has ended."""
         ended = self.ended(t)
-        time = Jet.time(np.where(ended, self.duration_s, t), order)
+        time = TaylorSeries.time(np.where(ended, self.duration_s, t), order)
         time.coefficients[1:2, ended] = 0.0
         return time
 
@@ -75,29 +75,29 @@ class Track:
         return ended
 
 
-def spiral(t: Jet) -> Place:
+def spiral(t: TaylorSeries) -> Place:
     """Climb on a circle."""
     alpha = _alpha(t)
     return _RADIUS_M * cos(alpha), _RADIUS_M * sin(alpha), _climb(t)
 
 
-def expanding_spiral(t: Jet) -> Place:
+def expanding_spiral(t: TaylorSeries) -> Place:
     """Climb on a circle that widens by 0.2 m/s."""
     alpha, radius = _alpha(t), _RADIUS_M * 0.1 * t + _RADIUS_M
     return radius * cos(alpha), radius * sin(alpha), _climb(t)
 
 
-def line(t: Jet) -> Place:
+def line(t: TaylorSeries) -> Place:
     """Climb along a straight line."""
     return 0.1 * t + 1.0, 0.1 * t - 2.0, _climb(t)
 
 
-def wave(t: Jet) -> Place:
+def wave(t: TaylorSeries) -> Place:
     """Swing in x while flying along y at 2 m/s."""
     return _RADIUS_M * cos(_alpha(t)), 2.0 * t, _climb(t)
 
 
-def crown(t: Jet) -> Place:
+def crown(t: TaylorSeries) -> Place:
     """Circle while the height swings by 1.5 m."""
     alpha = _alpha(t)
     return _RADIUS_M * cos(alpha), _RADIUS_M * sin(alpha), 1.5 * sin(t) + _START_HEIGHT_M
@@ -142,7 +142,7 @@ class Hover(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
         """Return the track."""
         return Track(lambda t: (_held(t, self.x), _held(t, self.y), _held(t, self.height)), self._yaw, inf)
 
-    def _yaw(self, t: Jet) -> Jet:
+    def _yaw(self, t: TaylorSeries) -> TaylorSeries:
         return _held(t, radians(self.yaw))
 
 
@@ -158,17 +158,17 @@ class Lemniscate(Options, frozen=True, forbid_unknown_fields=True, kw_only=True)
         """Return the track."""
         return Track(self._position, _east if self.yaw == "fixed" else self._along, inf)
 
-    def _position(self, t: Jet) -> Place:
+    def _position(self, t: TaylorSeries) -> Place:
         alpha = self._alpha(t)
         x = self.size * sin(alpha)
         return x, x * cos(alpha), _held(t, self.height)
 
-    def _along(self, t: Jet) -> Jet:
+    def _along(self, t: TaylorSeries) -> TaylorSeries:
         """Yaw along (cos α, cos 2α): seen from -90°, it never turns as far as 180° to either side, so never wraps."""
         alpha = self._alpha(t)
         return atan2(cos(alpha), -1.0 * cos(2.0 * alpha)) - 0.5 * pi
 
-    def _alpha(self, t: Jet) -> Jet:
+    def _alpha(self, t: TaylorSeries) -> TaylorSeries:
         return 2.0 * pi / self.lap * t
 
 
@@ -184,14 +184,14 @@ class Circle(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
         """Return the track."""
         return Track(self._position, _east if self.yaw == "fixed" else self._along, inf)
 
-    def _position(self, t: Jet) -> Place:
+    def _position(self, t: TaylorSeries) -> Place:
         alpha = self._alpha(t)
         return self.radius * cos(alpha), self.radius * sin(alpha), _held(t, self.height)
 
-    def _along(self, t: Jet) -> Jet:
+    def _along(self, t: TaylorSeries) -> TaylorSeries:
         return self._alpha(t) + 0.5 * pi
 
-    def _alpha(self, t: Jet) -> Jet:
+    def _alpha(self, t: TaylorSeries) -> TaylorSeries:
         return self.speed / self.radius * t
 
 
@@ -227,7 +227,7 @@ def through(waypoints: Waypoints) -> Track:
     times_s = waypoints.times_s
     places = minimise(SNAP, times_s, waypoints.points_enu_m)
 
-    def position(t: Jet) -> Place:
+    def position(t: TaylorSeries) -> Place:
         x, y, z = places(t)
         return x, y, z
 
@@ -313,17 +313,17 @@ def _explained(reason: str, fields: dict[str, msgspec.structs.FieldInfo], given:
     return f"{key}={given[key]}: {'choose ' + ', '.join(choices) if choices else what}"
 
 
-def _alpha(t: Jet) -> Jet:
+def _alpha(t: TaylorSeries) -> TaylorSeries:
     return 2.0 * np.pi * _TURNS_PER_S * t
 
 
-def _climb(t: Jet) -> Jet:
+def _climb(t: TaylorSeries) -> TaylorSeries:
     return _CLIMB_M_S * t + _START_HEIGHT_M
 
 
-def _held(t: Jet, value: float) -> Jet:
+def _held(t: TaylorSeries, value: float) -> TaylorSeries:
     return 0.0 * t + value
 
 
-def _east(t: Jet) -> Jet:
+def _east(t: TaylorSeries) -> TaylorSeries:
     return _held(t, 0.0)

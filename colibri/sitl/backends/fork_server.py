@@ -44,21 +44,21 @@ def main() -> None:
 
 def _load() -> None:
     """Load, and run once, all that is compiled."""
+    from colibri.sitl.backends.lockstep import LockstepSession
     from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
     from colibri.sitl.backends.setting import setting_of
-    from colibri.sitl.backends.stage import Stage
 
     with TemporaryDirectory(prefix="sitl-") as folder:
         for flight in _FLIGHTS:
             setting = setting_of([flight])
             autopilot = MemoryAutopilot(setting.autopilot_options(Path(folder)))
-            stage = Stage(MemoryPlant(setting.plant_options(0.0)), autopilot, setting.system)
-            stage.advance(())
+            lockstep = LockstepSession(MemoryPlant(setting.plant_options(0.0)), autopilot, setting.system)
+            lockstep.advance(())
             autopilot.close()
 
 
 def _fork(package: str, said: str, *options: str) -> int:
-    nursery = os.getpid()
+    fork_server = os.getpid()
     pid = os.fork()
     if pid:
         return pid
@@ -67,7 +67,7 @@ def _fork(package: str, said: str, *options: str) -> int:
         nothing = os.open(os.devnull, os.O_RDONLY)
         for to, of in ((0, nothing), (1, out), (2, out)):
             os.dup2(of, to)
-        sys.argv = [package, "--parent", str(nursery), *options]
+        sys.argv = [package, "--parent", str(fork_server), *options]
         _be(package)
     finally:
         os._exit(1)

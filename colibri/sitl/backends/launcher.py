@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 from colibri.flights.children import Child, how_it_ended
-from colibri.sitl.backends.stage import StageError
+from colibri.sitl.backends.lockstep import SessionError
 
 _LAST_WORDS_BYTES = 2000
 
@@ -64,13 +64,13 @@ class LoggedChild:
         """See that it lives.
 
         Raises:
-            StageError: It has died.
+            SessionError: It has died.
         """
         code = self._running.code()
         if code is None:
             return
         words = self.last_words()
-        raise StageError(f"the {self.name} {how_it_ended(code)}" + (f": {words}" if words else ""))
+        raise SessionError(f"the {self.name} {how_it_ended(code)}" + (f": {words}" if words else ""))
 
     def last_words(self) -> str:
         """Return the last line that is not a status."""
@@ -101,7 +101,7 @@ class Forked:
     def __init__(self) -> None:
         """Start the nursery; it loads while this process goes on."""
         command = [sys.executable, "-m", "colibri.sitl.backends.fork_server"]
-        self._nursery = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
+        self._fork_server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
 
     def start(self, package: str, options: Sequence[str], said: Path) -> Running:
         """Start what `python -m colibri.PACKAGE` with `options` is; what it says goes into file `said`."""
@@ -112,14 +112,14 @@ class Forked:
 
     def close(self) -> None:
         """End the nursery, and with it whatever it has started."""
-        assert self._nursery.stdin is not None, "it is piped"
-        self._nursery.stdin.close()
-        self._nursery.wait()
-        if self._nursery.stdout:
-            self._nursery.stdout.close()
+        assert self._fork_server.stdin is not None, "it is piped"
+        self._fork_server.stdin.close()
+        self._fork_server.wait()
+        if self._fork_server.stdout:
+            self._fork_server.stdout.close()
 
     def _ask(self, *words: str) -> int | None:
-        stdin, stdout = self._nursery.stdin, self._nursery.stdout
+        stdin, stdout = self._fork_server.stdin, self._fork_server.stdout
         assert stdin is not None, "it is piped"
         assert stdout is not None, "it is piped"
         try:
@@ -127,7 +127,7 @@ class Forked:
             stdin.flush()
             answer: int | None = json.loads(stdout.readline())
         except (OSError, ValueError) as error:
-            raise StageError("the process that starts others has died; try --sitl-from-scratch") from error
+            raise SessionError("the process that starts others has died; try --sitl-from-scratch") from error
         return answer
 
 

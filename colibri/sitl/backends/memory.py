@@ -16,7 +16,7 @@ from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.status import Status
 from colibri.common.types import Address
-from colibri.mavlink.hil.conductor import Turn
+from colibri.mavlink.hil.conductor import StepMessage
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.plant.__main__ import command_line as plant_command_line
@@ -25,8 +25,8 @@ from colibri.plant.physics.world import state_frame
 from colibri.plant.process.run import builder_of
 from colibri.plant.simulation.plant import Plant
 from colibri.plant.vehicle.description import VehicleError
+from colibri.sitl.backends.lockstep import SessionError
 from colibri.sitl.backends.setting import SettingError
-from colibri.sitl.backends.stage import StageError
 
 NEVER_LATE_S = 0.0
 _ADDRESS: Address = ("memory", 0)
@@ -58,7 +58,7 @@ class MemoryPlant:
         """Take in what an autopilot says, its call for one.
 
         Raises:
-            StageError: The state cannot be integrated any further.
+            SessionError: The state cannot be integrated any further.
         """
         command = self._end.receive(datagram, _ADDRESS, self._now_s)
         self._end.received.clear()
@@ -68,7 +68,7 @@ class MemoryPlant:
         try:
             self._plant.answer(command, self._end.take_faults())
         except IntegrationError as error:
-            raise StageError(str(error)) from error
+            raise SessionError(str(error)) from error
         self._answered = True
 
     def frame(self) -> list[bytes]:
@@ -80,7 +80,7 @@ class MemoryPlant:
         """Take in the answer to that frame, and go on.
 
         Raises:
-            StageError: The state cannot be integrated any further.
+            SessionError: The state cannot be integrated any further.
         """
         self.hear(answer)
 
@@ -128,8 +128,8 @@ class MemoryAutopilot:
         """
         args = self._args
         try:
-            self._desk = _Desk()
-            self._ground = open_ground(args, *loaded(args), _Silence(), self._desk)
+            self._registry = _StationRegistry()
+            self._ground = open_ground(args, *loaded(args), _Silence(), self._registry)
         except Error as error:
             raise SettingError(str(error)) from error
         self._copter = self._ground.copter
@@ -146,21 +146,21 @@ class MemoryAutopilot:
         (call,) = self._end.take_outbox()
         return call
 
-    def tell(self, frame: bytes, turn: Turn) -> None:
+    def tell(self, frame: bytes, step_message: StepMessage) -> None:
         """Tell it a frame of the plant, and what ground stations say then."""
-        self.expect(turn)
+        self.expect(step_message)
         self.hear(frame)
 
-    def expect(self, turn: Turn) -> None:
+    def expect(self, step_message: StepMessage) -> None:
         """Tell it what ground stations say at the frame that comes next."""
-        self._desk.heard = turn
+        self._registry.heard = step_message
 
     def hear(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
         try:
             answer(self._end, self._copter, datagram, NEVER_LATE_S)
         except DecisionError as error:
-            raise StageError(f"the autopilot ended: {error}") from error
+            raise SessionError(f"the autopilot ended: {error}") from error
 
     def listen(self) -> list[bytes]:
         """Return what it has said to the plant."""
@@ -170,18 +170,18 @@ class MemoryAutopilot:
         """Return its answer to the frame.
 
         Raises:
-            StageError: It was shut down.
+            SessionError: It was shut down.
         """
         if self._ground.shut_down:
-            raise StageError("the autopilot ended with exit code 0")
+            raise SessionError("the autopilot ended with exit code 0")
         (answer,) = self._end.take_outbox()
         return answer
 
-    def said(self) -> Turn:
+    def said(self) -> StepMessage:
         """Return what it says to ground stations at that frame."""
         self._copter = self._ground.serve(perf_counter())
-        assert self._desk.said is not None, "it has served them"
-        return self._desk.said
+        assert self._registry.said is not None, "it has served them"
+        return self._registry.said
 
     def kill(self) -> None:
         """End it as a power cut does: nothing is written that was not."""
@@ -191,20 +191,20 @@ class MemoryAutopilot:
         self._ground.close()
 
 
-class _Desk:
+class _StationRegistry:
     """The autopilot's conductor, who is in this process."""
 
     def __init__(self) -> None:
-        self.heard: Turn | None = None
-        self.said: Turn | None = None
+        self.heard: StepMessage | None = None
+        self.said: StepMessage | None = None
 
-    def hear(self) -> Turn | None:
+    def hear(self) -> StepMessage | None:
         """Return what ground stations say at this instant."""
         return self.heard
 
-    def tell(self, turn: Turn) -> None:
+    def tell(self, step_message: StepMessage) -> None:
         """Take in what the vehicle says."""
-        self.said = turn
+        self.said = step_message
 
     def close(self) -> None:
         """Let go."""

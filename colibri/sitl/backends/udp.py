@@ -6,11 +6,11 @@ from pathlib import Path
 from time import perf_counter, sleep
 
 from colibri.common.types import Address
-from colibri.mavlink.hil.conductor import Gathering, Turn, packets
+from colibri.mavlink.hil.conductor import Gathering, StepMessage, packets
 from colibri.mavlink.links.open import open_link
 from colibri.mavlink.links.udp import UdpLink
 from colibri.sitl.backends.launcher import Launcher, LoggedChild
-from colibri.sitl.backends.stage import StageError, answers, parted
+from colibri.sitl.backends.lockstep import SessionError, answers, parted
 
 SILENCE_S = 60.0
 """Of the wall clock: whoever says nothing for so long will say nothing more. No flight depends on it."""
@@ -89,7 +89,7 @@ class UdpPlant:
                     return url
             self._child.check()
             sleep(0.005)
-        raise StageError(f"the plant said nothing for {SILENCE_S:.0f} s")
+        raise SessionError(f"the plant said nothing for {SILENCE_S:.0f} s")
 
 
 class UdpAutopilot:
@@ -99,9 +99,9 @@ class UdpAutopilot:
         """Start it; `folder` takes what it says."""
         self._launcher = launcher
         self._folder = folder
-        self._link, self._desk = opened(_HERE), opened(_HERE)
-        plant, desk = (link.url.replace("udpin", "udpout") for link in (self._link, self._desk))
-        self._options = ["--plant", plant, "--conducted", desk, *options]
+        self._link, self._registry = opened(_HERE), opened(_HERE)
+        plant, registry = (link.url.replace("udpin", "udpout") for link in (self._link, self._registry))
+        self._options = ["--plant", plant, "--stepped", registry, *options]
         self._starts = 0
         self.start()
 
@@ -118,24 +118,24 @@ class UdpAutopilot:
         self._gathering = Gathering()
         self._time_us = 0
         self._address: Address | None = None
-        self._desk_address: Address | None = None
+        self._registry_address: Address | None = None
 
     def call(self) -> bytes:
         """Return how it calls a plant."""
-        _, self._desk_address = received(self._desk, (self._child,), "autopilot")
+        _, self._registry_address = received(self._registry, (self._child,), "autopilot")
         call, self._address = received(self._link, (self._child,), "autopilot")
         return call
 
-    def tell(self, frame: bytes, turn: Turn) -> None:
+    def tell(self, frame: bytes, step_message: StepMessage) -> None:
         """Tell it a frame of the plant, and what ground stations say then."""
-        self.expect(turn)
+        self.expect(step_message)
         self.hear(frame)
 
-    def expect(self, turn: Turn) -> None:
+    def expect(self, step_message: StepMessage) -> None:
         """Tell it what ground stations say at the frame that comes next."""
-        self._time_us = turn.time_us
-        for packet in packets(turn):
-            self._desk.send(packet, self._desk_address)
+        self._time_us = step_message.time_us
+        for packet in packets(step_message):
+            self._registry.send(packet, self._registry_address)
 
     def hear(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
@@ -155,18 +155,18 @@ class UdpAutopilot:
             if answers(datagram, self._time_us):
                 return datagram
 
-    def said(self) -> Turn:
+    def said(self) -> StepMessage:
         """Return what it says to ground stations at that frame."""
         while True:
-            packet, _ = received(self._desk, (self._child,), "autopilot")
-            turn = self._gathering.take(packet)
-            if turn is not None:
-                return turn
+            packet, _ = received(self._registry, (self._child,), "autopilot")
+            step_message = self._gathering.take(packet)
+            if step_message is not None:
+                return step_message
 
     def kill(self) -> None:
         """End it as a power cut does, and forget what is still on its way."""
         self._child.kill()
-        for link in (self._link, self._desk):
+        for link in (self._link, self._registry):
             while link.receive_now():
                 pass
 
@@ -174,7 +174,7 @@ class UdpAutopilot:
         """End it."""
         self._child.kill()
         self._link.close()
-        self._desk.close()
+        self._registry.close()
 
 
 def opened(url: str) -> UdpLink:
@@ -190,12 +190,12 @@ def received(
     """Return what comes next.
 
     Raises:
-        StageError: Whoever should speak has died, or says nothing.
+        SessionError: Whoever should speak has died, or says nothing.
     """
     began_s = perf_counter()
     while (datagram := link.receive(_LOOK_EVERY_S)) is None:
         for child in children:
             child.check()
         if perf_counter() > began_s + silence_s:
-            raise StageError(f"the {name} has said nothing for {silence_s:.0f} s, and lives")
+            raise SessionError(f"the {name} has said nothing for {silence_s:.0f} s, and lives")
     return datagram

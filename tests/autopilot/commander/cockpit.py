@@ -11,7 +11,7 @@ from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.pilot import RESTS, Guidance, Pilot
-from colibri.autopilot.commander.rules.arming import Facts
+from colibri.autopilot.commander.rules.arming import ArmingInputs
 from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import Preview, VehicleState
@@ -145,4 +145,4 @@ class Cockpit:
 
     def stock(self, **changes: Any) -> None:
         """Let the pilot know what arming is judged by: all is well but for `changes`."""
-        self.pilot.take_stock(Facts(self.state, self.pilot.standing, 1.0, None)._replace(**changes))
+        self.pilot.take_stock(ArmingInputs(self.state, self.pilot.standing, 1.0, None)._replace(**changes))

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Mode, Need, State, custom_mode
 from colibri.autopilot.guidance.behaviour import Behaviour
-from colibri.autopilot.guidance.tasks.orbit import Round
-from colibri.autopilot.guidance.tasks.position import Climb, Stop, Way
+from colibri.autopilot.guidance.tasks.orbit import OrbitTask
+from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.mission.items import FENCE, MISSION
 from colibri.mavlink.services.command import (
@@ -112,12 +112,12 @@ def test_what_a_mode_needs_is_asked_for_at_each_command(flying: Cockpit, need: N
     ],
 )
 def test_bad_numbers_change_nothing(flying: Cockpit, command: str, params: tuple[float, ...], result: int) -> None:
-    state, course, home = flying.pilot.state, flying.pilot.course, flying.home.position_enu_m
+    state, task, home = flying.pilot.state, flying.pilot.task, flying.home.position_enu_m
     outcome = flying.do(command, *params)
     assert outcome.result == result
     assert outcome.reason
     assert (flying.pilot.state, flying.home.position_enu_m, flying.pilot.speed_m_s) == (state, home, None)
-    assert flying.pilot.course is course
+    assert flying.pilot.task is task
 
 
 @pytest.mark.parametrize("command", ["DO_REPOSITION", "DO_ORBIT"])
@@ -173,16 +173,16 @@ def test_a_takeoff_climbs_to_the_height_that_is_meant(
     standing: Cockpit, params: tuple[float, ...], frame: int | None, z: float, height_m: float | None
 ) -> None:
     assert standing.do("NAV_TAKEOFF", *params, frame=frame, z=z).result == ACCEPTED
-    course = standing.pilot.course
-    assert isinstance(course, Climb)
+    task = standing.pilot.task
+    assert isinstance(task, TakeoffTask)
     above_sea_m = z - standing.home.origin.altitude_m
-    assert course.order.height_enu_m == pytest.approx(above_sea_m if height_m is None else height_m)
+    assert task.order.height_enu_m == pytest.approx(above_sea_m if height_m is None else height_m)
 
 
 @pytest.mark.parametrize("z", [0.0, -3.0, 0.1, inf, 2e4])
 def test_a_takeoff_to_no_height_is_denied(standing: Cockpit, z: float) -> None:
     assert standing.do("NAV_TAKEOFF", z=z).result == DENIED
-    assert isinstance(standing.pilot.course, Stop)
+    assert isinstance(standing.pilot.task, HoldTask)
 
 
 def test_places_heights_and_headings_of_a_reposition(flying: Cockpit) -> None:
@@ -190,22 +190,22 @@ def test_places_heights_and_headings_of_a_reposition(flying: Cockpit) -> None:
     frame = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
     params = (3.0, 1.0, 0.0, radians(90.0))
     assert flying.do("DO_REPOSITION", *params, frame=frame, x=there.latitude_deg, y=there.longitude_deg, z=12.0)
-    course = flying.pilot.course
-    assert isinstance(course, Way)
-    assert course.order.position_enu_m == pytest.approx((30.0, 40.0, 12.0), abs=0.01)
-    assert course.order.yaw_rad == pytest.approx(0.0)
-    assert course.order.speed_m_s == 3.0
+    task = flying.pilot.task
+    assert isinstance(task, GoToTask)
+    assert task.order.position_enu_m == pytest.approx((30.0, 40.0, 12.0), abs=0.01)
+    assert task.order.yaw_rad == pytest.approx(0.0)
+    assert task.order.speed_m_s == 3.0
     assert flying.do("DO_REPOSITION", z=15.0 + flying.home.origin.altitude_m).result == ACCEPTED
-    assert isinstance(flying.pilot.course, Way)
-    assert flying.pilot.course.order.position_enu_m == pytest.approx((0.0, 0.0, 15.0), abs=0.01)
+    assert isinstance(flying.pilot.task, GoToTask)
+    assert flying.pilot.task.order.position_enu_m == pytest.approx((0.0, 0.0, 15.0), abs=0.01)
 
 
 def test_a_circle_is_as_wide_and_as_fast_as_it_was_asked_for(flying: Cockpit) -> None:
     assert flying.do("DO_ORBIT", -7.0, 2.0).result == ACCEPTED
-    course = flying.pilot.course
-    assert isinstance(course, Round)
-    assert course.order.radius_m == -7.0
-    assert course.order.speed_m_s == 2.0
+    task = flying.pilot.task
+    assert isinstance(task, OrbitTask)
+    assert task.order.radius_m == -7.0
+    assert task.order.speed_m_s == 2.0
 
 
 def test_the_speed_that_is_asked_for(flying: Cockpit) -> None:

@@ -2,63 +2,65 @@
 
 import pytest
 
-from colibri.autopilot.commander.missions import MissionCourse
+from colibri.autopilot.commander.missions import MissionTask
 from colibri.autopilot.commander.needs import Latest, ModeNeeds
 from colibri.autopilot.commander.rules.modes import Mode, Need
-from colibri.autopilot.guidance.tasks.attitude import AltitudeSticks, Descent, Stabilized
-from colibri.autopilot.guidance.tasks.follow import Following
-from colibri.autopilot.guidance.tasks.offboard import Companion
-from colibri.autopilot.guidance.tasks.position import Along, Climb, Legs, Stop
-from colibri.autopilot.guidance.tasks.sticks import PositionSticks
+from colibri.autopilot.guidance.tasks.attitude import AltitudeTask, DescentTask, StabilizedTask
+from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
+from colibri.autopilot.guidance.tasks.offboard import OffboardTask
+from colibri.autopilot.guidance.tasks.position import HoldTask, TakeoffTask, TaskSequence, TrackTask
+from colibri.autopilot.guidance.tasks.sticks import PositionTask
 from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.mavlink.mission.items import FENCE, MISSION
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
 from tests.autopilot.commander.cockpit import FLYING, Cockpit, item
 
 BEGINS = {
-    Mode.STABILIZED: Stabilized,
-    Mode.ALTITUDE: AltitudeSticks,
-    Mode.POSITION: PositionSticks,
-    Mode.HOLD: Stop,
-    Mode.TAKEOFF: Climb,
-    Mode.LAND: Legs,
-    Mode.RETURN: Legs,
-    Mode.MISSION: MissionCourse,
-    Mode.OFFBOARD: Companion,
-    Mode.ORBIT: Stop,
-    Mode.FOLLOW: Following,
-    Mode.TRACK: Legs,
+    Mode.STABILIZED: StabilizedTask,
+    Mode.ALTITUDE: AltitudeTask,
+    Mode.POSITION: PositionTask,
+    Mode.HOLD: HoldTask,
+    Mode.TAKEOFF: TakeoffTask,
+    Mode.LAND: TaskSequence,
+    Mode.RETURN: TaskSequence,
+    Mode.MISSION: MissionTask,
+    Mode.OFFBOARD: OffboardTask,
+    Mode.ORBIT: HoldTask,
+    Mode.FOLLOW: FollowTargetTask,
+    Mode.TRACK: TaskSequence,
 }
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_every_mode_begins_with_its_course(mode: Mode) -> None:
     cockpit = Cockpit(FLYING)
-    assert type(cockpit.tasks.begin(mode, cockpit.pilot.scene())) is BEGINS[mode]
+    assert type(cockpit.tasks.begin(mode, cockpit.pilot.context())) is BEGINS[mode]
 
 
 @pytest.mark.parametrize("mode", [Mode.STABILIZED, Mode.ALTITUDE])
 def test_a_law_that_takes_no_attitude_stops_instead(mode: Mode) -> None:
     cockpit = Cockpit(FLYING, takes_attitude=False)
-    assert isinstance(cockpit.tasks.begin(mode, cockpit.pilot.scene()), Stop)
+    assert isinstance(cockpit.tasks.begin(mode, cockpit.pilot.context()), HoldTask)
 
 
 @pytest.mark.parametrize("takes_attitude", [False, True])
 def test_who_does_not_know_the_place_sinks_level_where_the_law_can(takes_attitude: bool) -> None:
     cockpit = Cockpit(FLYING, takes_attitude=takes_attitude)
     cockpit.step(knows_position=False)
-    assert cockpit.pilot.scene().blind
-    assert isinstance(cockpit.tasks.begin(Mode.LAND, cockpit.pilot.scene()), Descent if takes_attitude else Legs)
+    assert cockpit.pilot.context().blind
+    assert isinstance(
+        cockpit.tasks.begin(Mode.LAND, cockpit.pilot.context()), DescentTask if takes_attitude else TaskSequence
+    )
 
 
 def test_a_track_from_time_0_begins_at_its_start_and_is_flown_once() -> None:
     cockpit = Cockpit((0.0, 0.0, 0.0), first=track("spiral"), mode=Mode.TRACK)
-    course = cockpit.pilot.course
-    assert isinstance(course, Along)
-    assert course.start is not None
-    assert cockpit.pilot.reference is course.start
+    task = cockpit.pilot.task
+    assert isinstance(task, TrackTask)
+    assert task.start is not None
+    assert cockpit.pilot.reference is task.start
     assert not cockpit.tasks.is_first
-    assert isinstance(cockpit.tasks.begin(Mode.TRACK, cockpit.pilot.scene()), Legs)
+    assert isinstance(cockpit.tasks.begin(Mode.TRACK, cockpit.pilot.context()), TaskSequence)
 
 
 def test_a_first_track_can_be_forgotten() -> None:

@@ -7,12 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colibri.autopilot.commander.pilot import RESTS
-from colibri.autopilot.commander.rules.arming import Facts
+from colibri.autopilot.commander.rules.arming import ArmingInputs
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Event, Mode, Need, State
-from colibri.autopilot.commander.task_record import course_record
+from colibri.autopilot.commander.task_record import task_record
 from colibri.autopilot.guidance.behaviour import Behaviour
-from colibri.autopilot.guidance.tasks.position import Stop
+from colibri.autopilot.guidance.tasks.position import HoldTask
 from colibri.autopilot.guidance.tasks.task import Steered
 from colibri.mavlink.mission.items import MISSION
 from colibri.mavlink.setpoints.setpoints import Sticks
@@ -56,12 +56,12 @@ def test_a_mode_whose_need_nothing_meets_is_refused_and_what_is_flown_goes_on(
     flying: Cockpit, mode: Mode, need: Need
 ) -> None:
     flying.pilot.select(Mode.LAND, ())
-    course = flying.pilot.course
+    task = flying.pilot.task
     refusal = flying.pilot.select(mode, (need,))
     assert refusal is not None
     assert refusal.reason == f"{mode} refused: {need.value}"
     assert flying.pilot.state == State(Mode.LAND, armed=True)
-    assert flying.pilot.course is course
+    assert flying.pilot.task is task
 
 
 @pytest.mark.parametrize("mode", Mode)
@@ -76,7 +76,7 @@ def test_a_failsafe_leads_where_its_action_says_whatever_is_flown(action: Action
         return
     assert cockpit.pilot.state == State(LEADS[action], armed=True)
     assert cockpit.pilot.saving is action
-    assert cockpit.pilot.scene().blind is (action is Action.DESCEND)
+    assert cockpit.pilot.context().blind is (action is Action.DESCEND)
     assert cockpit.pilot.select(Mode.HOLD, ()) is None
     assert cockpit.pilot.saving is Action.NONE
 
@@ -112,7 +112,7 @@ def test_a_missing_need_holds_back_arming_but_for_the_position_which_is_checked_
 
 def test_a_check_that_fails_holds_back_arming_unless_by_force() -> None:
     cockpit = Cockpit()
-    cockpit.pilot.take_stock(Facts(cockpit.state, standing=True, charge=0.05, thrust_stick=None))
+    cockpit.pilot.take_stock(ArmingInputs(cockpit.state, standing=True, charge=0.05, thrust_stick=None))
     refusal = cockpit.pilot.arm(())
     assert refusal is not None
     assert refusal.reason == "not armed: battery at 5%"
@@ -142,7 +142,7 @@ def test_a_takeoff_climbs_and_holds() -> None:
     cockpit.fly_for(6.0)
     assert cockpit.pilot.state == State(Mode.HOLD, armed=True)
     assert cockpit.state.position_enu_m[2] == pytest.approx(2.5, abs=0.1)
-    assert isinstance(cockpit.pilot.course, Stop) is False, "the climb holds its end"
+    assert isinstance(cockpit.pilot.task, HoldTask) is False, "the climb holds its end"
     assert cockpit.said("height reached: hold")
 
 
@@ -191,7 +191,7 @@ def test_home_is_where_the_rotors_were_armed_unless_somebody_chose_it() -> None:
 def test_with_a_rotor_lost_no_mode_is_chosen_and_nothing_is_armed(mode: Mode) -> None:
     cockpit = in_the_air()
     cockpit.pilot.lose_rotor(2)
-    refusal = cockpit.pilot.select(mode, ()) if mode is not Mode.HOLD else cockpit.pilot.fly(mode, Stop(), ())
+    refusal = cockpit.pilot.select(mode, ()) if mode is not Mode.HOLD else cockpit.pilot.fly(mode, HoldTask(), ())
     assert refusal is not None
     assert refusal.reason == f"{mode} refused: rotor 3 failed"
     cockpit.pilot.disarm(force=True)
@@ -203,31 +203,31 @@ def test_with_a_rotor_lost_no_mode_is_chosen_and_nothing_is_armed(mode: Mode) ->
 def test_who_asks_for_another_speed_gets_it_for_this_flight_and_no_more_than_is_allowed() -> None:
     cockpit = in_the_air()
     cockpit.pilot.fly_at(3.0)
-    assert cockpit.pilot.scene().behaviour.limits.speed_m_s == 3.0
+    assert cockpit.pilot.context().behaviour.limits.speed_m_s == 3.0
     cockpit.pilot.fly_at(99.0)
-    assert cockpit.pilot.scene().behaviour.limits.speed_m_s == cockpit.pilot.behaviour.max_speed_m_s
+    assert cockpit.pilot.context().behaviour.limits.speed_m_s == cockpit.pilot.behaviour.max_speed_m_s
     cockpit.pilot.disarm(force=True)
     assert cockpit.pilot.speed_m_s is None
 
 
-@pytest.mark.parametrize("closely", [False, True])
+@pytest.mark.parametrize("seamless", [False, True])
 @pytest.mark.parametrize("mode", Mode)
-def test_after_a_restart_every_mode_goes_on(mode: Mode, closely: bool) -> None:
+def test_after_a_restart_every_mode_goes_on(mode: Mode, seamless: bool) -> None:
     before = in_the_air()
     before.pilot.select(mode, ())
     before.step()
-    record, course = before.pilot.record(), course_record(before.pilot.course)
+    record, task = before.pilot.record(), task_record(before.pilot.task)
     after = in_the_air()
     after.pilot.resume(
         before.now_us + 4_000,
         before.state,
         record,
-        lambda again, scene: after.tasks.again(course, again, scene),
-        closely=closely,
+        lambda again, context: after.tasks.again(task, again, context),
+        seamless=seamless,
     )
     assert after.pilot.state == before.pilot.state
     if before.pilot.state.mode is not Mode.HOLD:  # there a stop goes on as the place where it came to rest
-        assert type(after.pilot.course) is type(before.pilot.course)
+        assert type(after.pilot.task) is type(before.pilot.task)
     assert after.home.position_enu_m == before.home.position_enu_m
     after.steered = STICKS
     assert after.step() is not RESTS
@@ -236,7 +236,7 @@ def test_after_a_restart_every_mode_goes_on(mode: Mode, closely: bool) -> None:
 def test_after_a_restart_a_vehicle_that_has_come_down_stays_down() -> None:
     before = in_the_air()
     after = Cockpit()
-    after.pilot.resume(10_000_000, at((0.0, 0.0, 0.0)), before.pilot.record(), after.tasks.begin, closely=False)
+    after.pilot.resume(10_000_000, at((0.0, 0.0, 0.0)), before.pilot.record(), after.tasks.begin, seamless=False)
     assert after.pilot.state == FIRST
     assert after.pilot.standing
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, Seen
+from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, FailsafeInputs
 from colibri.autopilot.commander.rules.failsafe_parameters import settings
 from colibri.autopilot.commander.rules.failsafe_rule import Flight, Memory
 from colibri.autopilot.commander.rules.failsafe_table import NAMES, TABLE, Action, Condition, Row
@@ -20,7 +20,7 @@ from colibri.plant.vehicle.description import load_vehicle
 from tests.autopilot.commander.cockpit import FLYING, at
 
 FULL = BatteryState(3, 12.0, 5.0, 0.1, 0.9, 600.0, 1.0)
-WELL = Seen(
+WELL = FailsafeInputs(
     now_us=10_000_000,
     missed_us=None,
     state=at(FLYING),
@@ -39,7 +39,7 @@ WELL = Seen(
     pace=Limits(),
 )
 HOLDING = Flight(armed=True, standing=False, mode=Mode.HOLD, saving=Action.NONE)
-LOST: dict[Condition, Seen] = {
+LOST: dict[Condition, FailsafeInputs] = {
     Condition.TILTED: WELL._replace(state=WELL.state._replace(euler=(1.5, 0.0, 0.0))),
     Condition.ROTOR_FAILED: WELL._replace(rotor_lost=0),
     Condition.BATTERY_EMERGENCY: WELL._replace(battery=FULL._replace(remaining=0.01)),
@@ -64,10 +64,10 @@ def supervisor(**values: int) -> tuple[Supervisor, StatusQueue]:
     return Supervisor(parameters, lines), lines
 
 
-def look(of: Supervisor, seen: Seen, flight: Flight = HOLDING, for_s: float = 100.0) -> list[Action]:
+def look(of: Supervisor, inputs: FailsafeInputs, flight: Flight = HOLDING, for_s: float = 100.0) -> list[Action]:
     """Show it the same for a while; return what begins."""
-    times = range(seen.now_us, seen.now_us + round(for_s * 1e6), 500_000)
-    begun = [of.step(seen._replace(now_us=now_us), flight) for now_us in times]
+    times = range(inputs.now_us, inputs.now_us + round(for_s * 1e6), 500_000)
+    begun = [of.step(inputs._replace(now_us=now_us), flight) for now_us in times]
     return [action for action in begun if action is not Action.NONE]
 
 
@@ -148,10 +148,10 @@ def test_parameters_are_gone_by_once_they_are_adopted() -> None:
     watches = Supervisor(parameters, lines)
     assert watches.memory == Memory()
     parameters.set("BAT_LOW_THR", 0.2)
-    seen = WELL._replace(battery=FULL._replace(remaining=0.19))
-    look(watches, seen)
+    inputs = WELL._replace(battery=FULL._replace(remaining=0.19))
+    look(watches, inputs)
     assert not watches.holds(Condition.BATTERY_LOW)
     watches.adopt(parameters)
-    look(watches, seen)
+    look(watches, inputs)
     assert watches.holds(Condition.BATTERY_LOW)
     assert settings(parameters)

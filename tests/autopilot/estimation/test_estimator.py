@@ -191,7 +191,7 @@ def test_what_gps_says_for_long_is_believed_without_a_jump() -> None:
     assert last is not None
     assert last.resets == 1
     assert last.frame.position_enu_m[0] == pytest.approx(5.0, abs=1.0)
-    assert hypot(*last.blending_m) < 0.05
+    assert hypot(*last.smoothing_m) < 0.05
     assert max_jump_m(of) < 0.06
 
 
@@ -234,10 +234,10 @@ def test_a_magnet_nearby_does_not_turn_it() -> None:
     during, last = of[3000], of[-1]
     assert during is not None
     assert last is not None
-    assert Source.MAGNETOMETER in during.health.not_believed
+    assert Source.MAGNETOMETER in during.health.not_accepted
     assert during.health.heading
     assert set(during.rejected) == {(Source.MAGNETOMETER, Reason.FIELD)}
-    assert Source.MAGNETOMETER not in last.health.not_believed
+    assert Source.MAGNETOMETER not in last.health.not_accepted
     assert last.resets == 1
     ahead = earth_from_body(last.frame.attitude, (1.0, 0.0, 0.0))
     assert np.dot(ahead, flight.motion.attitude[-1][:, 0]) > np.cos(np.radians(1.0))
@@ -252,9 +252,9 @@ def test_a_barometer_that_jumps_does_not_lift_it() -> None:
     during, last = of[3500], of[-1]
     assert during is not None
     assert last is not None
-    assert Source.BAROMETER in during.health.not_believed
+    assert Source.BAROMETER in during.health.not_accepted
     assert during.health.height
-    assert Source.BAROMETER not in last.health.not_believed
+    assert Source.BAROMETER not in last.health.not_accepted
     assert last.resets == 1
     assert max(error_m(flight, of, t) for t in np.arange(9.0, 25.0, 0.5)) < 1.0
 
@@ -268,7 +268,7 @@ def test_a_stuck_barometer_is_seen() -> None:
     last = of[-1]
     assert last is not None
     assert last.rejected[Source.BAROMETER, Reason.FROZEN] > 300
-    assert Source.BAROMETER in last.health.not_believed
+    assert Source.BAROMETER in last.health.not_accepted
     assert error_m(flight, of, 13.9) < 1.0
 
 

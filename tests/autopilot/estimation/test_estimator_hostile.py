@@ -121,7 +121,7 @@ class HostileSensors(RuleBasedStateMachine):
             *self.last.attitude_std_rad,
             *self.last.gyro_bias_rad_s,
             *self.last.accel_bias_m_s2,
-            *self.last.blending_m,
+            *self.last.smoothing_m,
         )
         assert all(map(isfinite, numbers)), self.last
         assert abs(np.linalg.norm(frame.attitude) - 1.0) < 1e-9

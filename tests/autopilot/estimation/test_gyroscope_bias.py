@@ -82,7 +82,7 @@ def test_a_receiver_that_lies_is_not_taken_for_it(path: source.Path, lie: GpsLie
 )
 def test_nor_is_a_field_beside_the_magnetometer(path: source.Path, change: Change) -> None:
     of = known(estimates(recorded(path, 5, 25.0).frames, change))
-    assert any(Source.MAGNETOMETER in one.health.not_believed for one in of)
+    assert any(Source.MAGNETOMETER in one.health.not_accepted for one in of)
     assert all(one.health.gyro_bias for one in of)
 
 

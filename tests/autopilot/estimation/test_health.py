@@ -14,10 +14,10 @@ def test_nothing_is_said_while_all_is_well() -> None:
 
 def test_each_change_is_said_once() -> None:
     watch = HealthWatch()
-    lost = WELL._replace(not_believed=(Source.MAGNETOMETER,))
+    lost = WELL._replace(not_accepted=(Source.MAGNETOMETER,))
     assert watch.lines(lost) == [(WARNING, "magnetometer not believed")]
     assert watch.lines(lost) == []
-    assert watch.lines(lost._replace(not_believed=(Source.MAGNETOMETER, Source.BAROMETER))) == [
+    assert watch.lines(lost._replace(not_accepted=(Source.MAGNETOMETER, Source.BAROMETER))) == [
         (WARNING, "barometer not believed")
     ]
     assert watch.lines(WELL) == [(INFO, "magnetometer believed again"), (INFO, "barometer believed again")]

@@ -6,7 +6,7 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.estimate import Estimate, Health
-from colibri.autopilot.estimation.state_source import Senses, estimator_for
+from colibri.autopilot.estimation.state_source import StateSource, estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
@@ -71,9 +71,9 @@ def copter() -> Copter:
 
 def test_a_state_is_what_is_known() -> None:
     told = StateFrame(0, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0), ZERO)
-    senses = Senses(None, FRAME_US)
-    assert senses.state(told) is told
-    assert senses.estimate is None
+    state_source = StateSource(None, FRAME_US)
+    assert state_source.state(told) is told
+    assert state_source.estimate is None
 
 
 def test_before_the_first_estimate_the_rotors_stand() -> None:

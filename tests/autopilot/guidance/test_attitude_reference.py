@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from colibri.autopilot.control.interface import AttitudeDemand, Preview, VehicleState
 from colibri.autopilot.guidance.attitude_reference import (
+    AttitudeCommand,
     AttitudeLimits,
     AttitudeReference,
     ReferenceMemory,
-    Wish,
-    lean,
-    pose,
-    spin,
+    attitude_command,
+    rate_command,
+    tilt_command,
 )
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Quaternion
@@ -41,19 +41,21 @@ def turned(phi: float, theta: float, psi: float) -> VehicleState:
 LEVEL = turned(0.0, 0.0, 0.0)
 
 
-def go(wish: Wish, seconds: float, memory: ReferenceMemory | None = None) -> tuple[ReferenceMemory, np.ndarray]:
+def go(
+    command: AttitudeCommand, seconds: float, memory: ReferenceMemory | None = None
+) -> tuple[ReferenceMemory, np.ndarray]:
     """Let the vehicle be where it is demanded; return the angles demanded at each sample too, degrees."""
     memory = memory or REFERENCE.initial(LEVEL)
     flown = []
     for _ in range(round(seconds / INTERVAL_S)):
         state = turned(*memory.angles.tolist())
-        memory, demand = REFERENCE.step(memory, state, wish)
+        memory, demand = REFERENCE.step(memory, state, command)
         flown.append(np.degrees(demand.angles[0]))
     return memory, np.array(flown)
 
 
 def test_a_lean_is_reached_soon_without_overshoot() -> None:
-    memory, flown = go(lean(radians(20.0), radians(-15.0), 0.0, WEIGHT_N), 0.5)
+    memory, flown = go(tilt_command(radians(20.0), radians(-15.0), 0.0, WEIGHT_N), 0.5)
     assert np.degrees(memory.angles) == pytest.approx([20.0, -15.0, 0.0], abs=0.5)
     assert flown[:, 0].max() <= 20.0
     assert flown[:, 1].min() >= -15.0
@@ -61,17 +63,17 @@ def test_a_lean_is_reached_soon_without_overshoot() -> None:
 
 
 def test_a_large_lean_does_not_overshoot_either() -> None:
-    memory, _ = go(lean(radians(-55.0), 0.0, 0.0, WEIGHT_N), 2.0)
-    _, flown = go(lean(radians(55.0), 0.0, 0.0, WEIGHT_N), 2.0, memory)
+    memory, _ = go(tilt_command(radians(-55.0), 0.0, 0.0, WEIGHT_N), 2.0)
+    _, flown = go(tilt_command(radians(55.0), 0.0, 0.0, WEIGHT_N), 2.0, memory)
     assert flown[:, 0].max() <= 55.0 + 1e-6
     assert flown[-1, 0] == pytest.approx(55.0, abs=1e-3)
 
 
 def test_rates_and_accelerations_are_bounded_and_are_the_angles_derivatives() -> None:
-    memory, _ = go(lean(radians(-50.0), radians(25.0), -2.0, WEIGHT_N), 1.0)
+    memory, _ = go(tilt_command(radians(-50.0), radians(25.0), -2.0, WEIGHT_N), 1.0)
     for _ in range(100):
         memory, demand = REFERENCE.step(
-            memory, turned(*memory.angles.tolist()), lean(radians(50.0), -0.4, 2.0, WEIGHT_N)
+            memory, turned(*memory.angles.tolist()), tilt_command(radians(50.0), -0.4, 2.0, WEIGHT_N)
         )
         rates = demand.angle_rates_rad_s
         assert np.abs(rates[:, :2]).max() <= SLEW.tilt_rate_rad_s + 1e-9
@@ -84,17 +86,17 @@ def test_rates_and_accelerations_are_bounded_and_are_the_angles_derivatives() ->
 
 def test_the_preview_is_what_follows() -> None:
     """Each sample's demand begins where the one before said that it would be."""
-    memory, wish = REFERENCE.initial(LEVEL), pose(quaternion_from_euler(0.4, 0.2, 0.4), 9.0)
-    memory, first = REFERENCE.step(memory, LEVEL, wish)
+    memory, command = REFERENCE.initial(LEVEL), attitude_command(quaternion_from_euler(0.4, 0.2, 0.4), 9.0)
+    memory, first = REFERENCE.step(memory, LEVEL, command)
     for sample in range(1, 10):
-        memory, demand = REFERENCE.step(memory, LEVEL, wish)
+        memory, demand = REFERENCE.step(memory, LEVEL, command)
         for ahead, now in zip(first, demand, strict=True):
             assert now[0] == pytest.approx(ahead[sample], abs=1e-12)
 
 
 def test_yaw_is_integrated_from_its_rate() -> None:
-    memory, _ = go(lean(0.0, 0.0, radians(60.0), WEIGHT_N), 3.0)
-    memory, _ = go(lean(0.0, 0.0, 0.0, WEIGHT_N), 3.0, memory)
+    memory, _ = go(tilt_command(0.0, 0.0, radians(60.0), WEIGHT_N), 3.0)
+    memory, _ = go(tilt_command(0.0, 0.0, 0.0, WEIGHT_N), 3.0, memory)
     assert degrees(memory.angles[2]) == pytest.approx(180.0, abs=0.1)
     assert memory.rates[2] == pytest.approx(0.0, abs=1e-3)
 
@@ -103,8 +105,8 @@ def test_yaw_is_integrated_from_its_rate() -> None:
 def test_body_rates_turn_by_their_integral(axis: int) -> None:
     rate = [0.0, 0.0, 0.0]
     rate[axis] = radians(30.0)
-    memory, _ = go(spin((rate[0], rate[1], rate[2]), WEIGHT_N), 1.0)
-    memory, _ = go(spin((0.0, 0.0, 0.0), WEIGHT_N), 1.5, memory)
+    memory, _ = go(rate_command((rate[0], rate[1], rate[2]), WEIGHT_N), 1.0)
+    memory, _ = go(rate_command((0.0, 0.0, 0.0), WEIGHT_N), 1.5, memory)
     assert degrees(memory.angles[axis]) == pytest.approx(30.0, abs=0.1)
     assert np.abs(np.delete(memory.angles, axis)).max() < 1e-9
 
@@ -112,7 +114,7 @@ def test_body_rates_turn_by_their_integral(axis: int) -> None:
 def test_body_rates_are_those_of_the_body() -> None:
     """Leaning 40 degrees to the side, turning about body z moves pitch and yaw as [2.7] has it."""
     memory = ReferenceMemory(np.array([radians(40.0), 0.0, 0.0]), np.zeros(3), WEIGHT_N)
-    memory, _ = go(spin((0.0, 0.0, 0.3), WEIGHT_N), 0.6, memory)
+    memory, _ = go(rate_command((0.0, 0.0, 0.3), WEIGHT_N), 0.6, memory)
     phi, theta, _ = memory.angles
     expected = [cos(phi) * np.tan(theta) * 0.3, -sin(phi) * 0.3, cos(phi) / cos(theta) * 0.3]
     assert memory.rates == pytest.approx(expected, abs=0.02)
@@ -124,26 +126,26 @@ def tilt_deg(angles: Any) -> float:
 
 @pytest.mark.parametrize("rate", [(3.0, 0.0, 0.0), (2.0, -2.0, 0.0), (-1.0, 3.0, 0.0)])
 def test_tilt_ends_at_its_limit_and_comes_back_at_once(rate: tuple[float, float, float]) -> None:
-    memory, flown = go(spin(rate, WEIGHT_N), 2.0)
+    memory, flown = go(rate_command(rate, WEIGHT_N), 2.0)
     assert tilt_deg(memory.angles) == pytest.approx(60.0, abs=1e-6)
     assert max(tilt_deg(np.radians(angles)) for angles in flown) <= 60.0 + 1e-6
     p, q, _ = rate
-    memory, _ = go(spin((-p, -q, 0.0), WEIGHT_N), 0.3, memory)
+    memory, _ = go(rate_command((-p, -q, 0.0), WEIGHT_N), 0.3, memory)
     assert tilt_deg(memory.angles) < 50.0
 
 
 def test_a_pose_is_reached_from_any_side_the_shorter_way() -> None:
     for psi in (radians(170.0), radians(-170.0), radians(90.0)):
-        memory, _ = go(pose(quaternion_from_euler(0.3, -0.2, psi), WEIGHT_N), 4.0)
+        memory, _ = go(attitude_command(quaternion_from_euler(0.3, -0.2, psi), WEIGHT_N), 4.0)
         assert memory.angles == pytest.approx([0.3, -0.2, psi], abs=1e-3)
     around = ReferenceMemory(np.array([0.0, 0.0, radians(360.0 + 170.0)]), np.zeros(3), WEIGHT_N)
-    memory, _ = go(pose(quaternion_from_euler(0.0, 0.0, radians(-170.0)), WEIGHT_N), 4.0, around)
+    memory, _ = go(attitude_command(quaternion_from_euler(0.0, 0.0, radians(-170.0)), WEIGHT_N), 4.0, around)
     assert degrees(memory.angles[2]) == pytest.approx(550.0, abs=0.1)
 
 
 def test_a_poses_thrust_points_right_long_before_its_yaw_does() -> None:
     attitude = quaternion_from_euler(radians(25.0), radians(-10.0), radians(150.0))
-    memory, _ = go(pose(attitude, WEIGHT_N), 0.7)
+    memory, _ = go(attitude_command(attitude, WEIGHT_N), 0.7)
     wanted, reached = (
         np.array(rotation_matrix(q))[:, 2] for q in (attitude, quaternion_from_euler(*memory.angles.tolist()))
     )
@@ -152,9 +154,9 @@ def test_a_poses_thrust_points_right_long_before_its_yaw_does() -> None:
 
 
 def test_a_pose_upside_down_is_flown_as_far_as_it_goes() -> None:
-    memory, _ = go(pose(quaternion_from_euler(radians(120.0), 0.0, 0.0), WEIGHT_N), 2.0)
+    memory, _ = go(attitude_command(quaternion_from_euler(radians(120.0), 0.0, 0.0), WEIGHT_N), 2.0)
     assert np.degrees(memory.angles) == pytest.approx([60.0, 0.0, 0.0], abs=0.01)
-    memory, _ = go(pose((0.0, 1.0, 0.0, 0.0), WEIGHT_N), 2.0)
+    memory, _ = go(attitude_command((0.0, 1.0, 0.0, 0.0), WEIGHT_N), 2.0)
     assert tilt_deg(memory.angles) == pytest.approx(0.0, abs=0.01)
 
 
@@ -162,30 +164,30 @@ def test_a_poses_yaw_rate_leads_it() -> None:
     """A client that streams the present yaw and a rate turns the vehicle at that rate."""
     memory = REFERENCE.initial(LEVEL)
     for _ in range(250):
-        wish = pose(quaternion_from_euler(0.0, 0.0, memory.angles[2]), WEIGHT_N, 0.5)
-        memory, _ = REFERENCE.step(memory, turned(*memory.angles.tolist()), wish)
+        command = attitude_command(quaternion_from_euler(0.0, 0.0, memory.angles[2]), WEIGHT_N, 0.5)
+        memory, _ = REFERENCE.step(memory, turned(*memory.angles.tolist()), command)
     assert memory.rates[2] == pytest.approx(0.5, abs=0.01)
 
 
 def test_yaw_does_not_run_away_from_a_vehicle_that_cannot_turn() -> None:
     memory, stuck = REFERENCE.initial(LEVEL), turned(0.0, 0.0, 0.1)
     for _ in range(500):
-        memory, demand = REFERENCE.step(memory, stuck, lean(0.0, 0.0, 1.5, WEIGHT_N))
+        memory, demand = REFERENCE.step(memory, stuck, tilt_command(0.0, 0.0, 1.5, WEIGHT_N))
         assert abs(demand.angles[0, 2] - 0.1) <= LIMITS.yaw_ahead_rad + 1e-12
 
 
 def test_a_demand_lies_in_the_vehicles_own_full_turn() -> None:
     memory = REFERENCE.initial(turned(0.0, 0.0, 0.2))
-    _, demand = REFERENCE.step(memory, turned(0.0, 0.0, 0.2 + 6.0 * pi), lean(0.0, 0.0, 0.0, WEIGHT_N))
+    _, demand = REFERENCE.step(memory, turned(0.0, 0.0, 0.2 + 6.0 * pi), tilt_command(0.0, 0.0, 0.0, WEIGHT_N))
     assert demand.angles[:, 2] == pytest.approx(0.2 + 6.0 * pi)
 
 
 def test_thrust_is_slewed_and_may_carry_the_weight() -> None:
     memory = REFERENCE.initial(LEVEL, 3.0)
-    _, demand = REFERENCE.step(memory, LEVEL, lean(0.0, 0.0, 0.0, 19.0))
+    _, demand = REFERENCE.step(memory, LEVEL, tilt_command(0.0, 0.0, 0.0, 19.0))
     assert demand.thrust_n[:2] == pytest.approx([3.0, 3.0 + SLEW.thrust_rate_n_s * INTERVAL_S])
     assert demand.thrust_n.max() == 19.0
-    memory, _ = go(lean(radians(40.0), 0.0, 0.0, nan), 1.0)
+    memory, _ = go(tilt_command(radians(40.0), 0.0, 0.0, nan), 1.0)
     assert memory.thrust_n * cos(memory.angles[0]) == pytest.approx(WEIGHT_N, rel=1e-6)
 
 
@@ -201,15 +203,15 @@ def test_the_sticks_middle_hovers() -> None:
 
 def test_sticks_say_what_pilots_mean() -> None:
     """Forward is nose down, right is right side down, yaw right is clockwise."""
-    wish = REFERENCE.from_sticks(Sticks(pitch=1.0, roll=0.5, thrust=0.5, yaw=0.1))
-    memory, _ = go(wish, 2.0)
+    command = REFERENCE.from_sticks(Sticks(pitch=1.0, roll=0.5, thrust=0.5, yaw=0.1))
+    memory, _ = go(command, 2.0)
     phi, theta, _ = memory.angles.tolist()
     up = np.array(rotation_matrix(quaternion_from_euler(phi, theta, 0.0)))[:, 2]
     assert up[0] > 0.5, "thrust forward"
     assert up[1] < -0.2, "thrust to the right"
     assert memory.angles[2] < 0.0
     assert np.degrees(memory.angles[:2]) == pytest.approx([17.5, 35.0], abs=0.01)
-    assert wish.thrust_n == pytest.approx(WEIGHT_N)
+    assert command.thrust_n == pytest.approx(WEIGHT_N)
 
 
 def test_setpoints_of_a_client() -> None:
@@ -218,7 +220,7 @@ def test_setpoints_of_a_client() -> None:
     assert memory.angles == pytest.approx([0.3, 0.1, 0.5], abs=1e-3)
     assert memory.thrust_n == pytest.approx(WEIGHT_N)
     rates = REFERENCE.from_setpoint(AttitudeSetpoint(None, (nan, 0.2, nan), 0.75))
-    assert rates == spin((0.0, 0.2, 0.0), REFERENCE.thrust_for_stick(0.75))
+    assert rates == rate_command((0.0, 0.2, 0.0), REFERENCE.thrust_for_stick(0.75))
     fed = REFERENCE.from_setpoint(AttitudeSetpoint(attitude, (9.0, 9.0, 0.4), nan))
     assert fed.yaw_rate_rad_s == 0.4
     assert np.isnan(fed.thrust_n)
@@ -247,9 +249,9 @@ def test_whatever_is_asked_for_the_demand_keeps_its_limits(
     state = VehicleState((0.0, 0.0, 0.0), rate, attitude, euler_from_quaternion(attitude), rate)
     memory = REFERENCE.initial(state)
     for wished in asked:
-        wish = REFERENCE.from_sticks(wished) if isinstance(wished, Sticks) else REFERENCE.from_setpoint(wished)
+        command = REFERENCE.from_sticks(wished) if isinstance(wished, Sticks) else REFERENCE.from_setpoint(wished)
         for _ in range(samples):
-            memory, demand = REFERENCE.step(memory, state, wish)
+            memory, demand = REFERENCE.step(memory, state, command)
         check(demand)
 
 

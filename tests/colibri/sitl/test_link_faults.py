@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.mavlink.hil.conductor import Gathering, Parcel, Turn, packets
+from colibri.mavlink.hil.conductor import Gathering, Parcel, StepMessage, packets
 from colibri.sitl.backends.launcher import Forked, FromScratch, Launcher
 from colibri.sitl.backends.link_faults import Pipe, Trouble
+from colibri.sitl.backends.lockstep import SessionError
 from colibri.sitl.backends.setting import Setting
-from colibri.sitl.backends.stage import StageError
 from colibri.sitl.fleet import Fleet
 from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
@@ -128,7 +128,7 @@ def test_a_process_that_dies_is_named(forked: Launcher, package: str) -> None:
         sitl = flights.begin()
         sitl.run(0.1)
         os.kill(process_of(sitl, package), signal.SIGKILL)
-        with pytest.raises(StageError, match=f"the {package} was killed by SIGKILL"):
+        with pytest.raises(SessionError, match=f"the {package} was killed by SIGKILL"):
             sitl.run(1.0)
 
 
@@ -152,7 +152,7 @@ def test_a_fleet_flies_as_each_flies_alone() -> None:
 def test_a_process_that_cannot_begin_is_quoted(forked: Launcher) -> None:
     with (
         Flights(Setting(wind="three"), forked) as flights,
-        pytest.raises(StageError, match=r"the plant ended with exit code 2: .*must be SPEED@FROM"),
+        pytest.raises(SessionError, match=r"the plant ended with exit code 2: .*must be SPEED@FROM"),
     ):
         flights.begin()
 
@@ -165,7 +165,7 @@ def process_of(sitl: Sitl, package: str) -> int:
 def test_turns_come_whole_in_whatever_order() -> None:
     chance = Random(1)
     parcels = [Parcel(number, chance.randbytes(chance.randrange(1400))) for number in range(20)]
-    turn = Turn(12_345_678, parcels, custom_mode=4 << 16, armed=True)
+    turn = StepMessage(12_345_678, parcels, custom_mode=4 << 16, armed=True)
     pieces = packets(turn)
     assert len(pieces) > 2
     gathering = Gathering()

@@ -278,7 +278,7 @@ def test_a_failsafe_outlives_the_autopilot() -> None:
     flight.drain(0.95)
     flight.run(0.5)
     assert flies(flight, Mode.LAND)
-    flight.restart(flight.past())
+    flight.restart(flight.history())
     flight.run(1.5)
     assert flies(flight, Mode.LAND)
     assert state_told(flight) == mav.MAV_STATE_EMERGENCY

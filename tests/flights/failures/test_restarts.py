@@ -42,7 +42,7 @@ def test_a_mission_goes_on_as_if_nothing_had_happened() -> None:
             paths[-1] += path_of(flight, EVERY_S)
             if killed and flight.armed:
                 paths[-1].append(flight.position)
-                flight.restart(flight.past())
+                flight.restart(flight.history())
                 restarts.append(flight.now_s)
             elif flight.armed:
                 paths[-1].append(flight.position)
@@ -70,7 +70,7 @@ def test_every_mode_goes_on(mode: Mode) -> None:
     elif mode is not Mode.HOLD:
         assert flight.select(mode) == ACCEPTED
     flight.run(6.0 if mode is Mode.ORBIT else 3.0)
-    past, there = flight.past(), flight.world
+    past, there = flight.history(), flight.world
     wanted, state = path_of(flight, 4.0), flight.copter.pilot.state
     flight.world = there
     flight.restart(past)
@@ -93,7 +93,7 @@ def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int)
     flight = CopterFlight(feedback=feedback)
     flight.take_off(4.0)
     height_m = flight.position[2]
-    past = flight.past()
+    past = flight.history()
     flight.skip(missed)
     flight.restart(past)
     assert max_tilt_deg(flight, 2.0) < (3.0 if missed == 1 else 20.0)
@@ -101,7 +101,7 @@ def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int)
     load(flight, waypoint(15.0, 0.0, 4.0), waypoint(0.0, 6.0, 4.0, stay_s=1.0))
     assert flight.select(Mode.MISSION) == ACCEPTED
     flight.until(lambda: reached(flight) == [0], 10.0)
-    past = flight.past()
+    past = flight.history()
     flight.skip(missed)
     flight.restart(past)
     assert max_tilt_deg(flight, 4.0) < 45.0
@@ -133,8 +133,8 @@ def test_what_was_asked_for_goes_on_when_a_vehicle_is_caught() -> None:
     load(flight, waypoint(5.0, 0.0, 12.0, stay_s=2.0), waypoint(0.0, 5.0, 12.0))
     assert flight.select(Mode.MISSION) == ACCEPTED
     flight.until(lambda: reached(flight) == [0], 10.0)
-    past = flight.past()
-    flight.restart(past._replace(kept=past.kept._replace(senses=b"")))
+    past = flight.history()
+    flight.restart(past._replace(checkpoint=past.checkpoint._replace(state_source=b"")))
     flight.until(lambda: flight.copter.pilot.state == HOLDING, 20.0, "the end of the mission")
     assert flight.client.said("restarted in flight: mission goes on at item 0")
     assert flight.client.said("found falling")
@@ -145,7 +145,7 @@ def test_a_landing_on_three_rotors_goes_on() -> None:
     flight = in_the_air(8.0)
     assert flight.inject(MOTOR, WRONG, 2, 0.001) == ACCEPTED
     flight.run(1.5)
-    flight.restart(flight.past())
+    flight.restart(flight.history())
     assert flight.copter.rotor_loss.lost == 1
     tilts: list[float] = []
 
@@ -165,7 +165,7 @@ def test_between_two_control_samples_the_rotors_keep_their_speed() -> None:
     flight.run(1.0)
     for _ in range(2):
         flight.step()
-        past, before = flight.past(), flight.rotors
+        past, before = flight.history(), flight.rotors
         flight.restart(past)
         assert flight.rotors.controls == pytest.approx(before.controls, abs=1e-3)
 
@@ -178,13 +178,13 @@ def test_offboard_waits_for_setpoints_as_after_a_loss() -> None:
     assert flight.select(Mode.OFFBOARD) == ACCEPTED
     flight.setpoint(velocity=(1.0, 0.0, 0.0))
     flight.run(0.1)
-    flight.restart(flight.past())
+    flight.restart(flight.history())
     flight.run(0.9)
     assert flight.mode is Mode.OFFBOARD
     flight.setpoint(velocity=(1.0, 0.0, 0.0))
     flight.run(0.9)
     assert flight.mode is Mode.OFFBOARD
-    flight.restart(flight.past())
+    flight.restart(flight.history())
     flight.run(1.1)
     assert flight.client.said("setpoints lost: hold")
 
@@ -194,7 +194,7 @@ def test_sticks_that_are_not_heard_again_are_lost() -> None:
     flight.stick()
     flight.run(0.1)
     assert flight.select(Mode.POSITION) == ACCEPTED
-    flight.restart(flight.past())
+    flight.restart(flight.history())
     flight.run(0.4)
     assert flight.mode is Mode.POSITION
     flight.run(0.2)
@@ -206,7 +206,7 @@ def test_a_ground_station_that_is_not_heard_again_is_lost() -> None:
     flight.take_off(3.0)
     flight.send("HEARTBEAT", mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE, 3)
     flight.run(0.5)
-    flight.restart(flight.past())
+    flight.restart(flight.history())
     flight.run(0.8)
     assert flight.mode is Mode.HOLD
     flight.run(0.4)
@@ -220,7 +220,7 @@ def test_a_failsafe_that_the_pilot_has_overridden_does_not_begin_again() -> None
     flight.until(lambda: flight.mode in (Mode.RETURN, Mode.LAND), 3.0, "the failsafe")
     assert flight.select(Mode.HOLD) == ACCEPTED
     flight.run(0.5)
-    flight.restart(flight.past())
+    flight.restart(flight.history())
     flight.run(2.0)
     assert flight.copter.pilot.state == HOLDING
 
@@ -234,7 +234,7 @@ def test_plans_and_home_are_kept_on_the_ground_too() -> None:
     service.load(FENCE, [circle])
     flight.copter.pilot.home.move((1.0, 2.0, 0.0), 0.5)
     plans = dict(service.plans)
-    flight.restart(flight.past())
+    flight.restart(flight.history())
     stations, pilot = flight.copter.stations, flight.copter.pilot
     assert stations.plans.plans == plans
     refusal = stations.fence.refusal((60.0, 0.0, 1.0))
@@ -243,7 +243,7 @@ def test_plans_and_home_are_kept_on_the_ground_too() -> None:
     assert (pilot.home.position_enu_m, pilot.standing, flight.armed) == ((1.0, 2.0, 0.0), True, False)
     assert not flight.client.said("restarted in flight")
     assert flight.arm() == ACCEPTED
-    flight.restart(flight.past())
+    flight.restart(flight.history())
     assert (flight.armed, flight.copter.pilot.standing) == (True, True)
 
 
@@ -255,7 +255,7 @@ def test_a_mission_that_has_landed_does_not_begin_again() -> None:
     flight.until(lambda: flight.copter.pilot.standing, 10.0)
     flight.run(0.5)
     assert flight.copter.pilot.state == State(Mode.MISSION, armed=True)
-    flight.restart(flight.past())
+    flight.restart(flight.history())
     path = flight.path_until(lambda: not flight.armed, 3.0)
     assert max(z for _, _, z in path) < 0.01
     assert flight.mode is Mode.HOLD
@@ -267,9 +267,9 @@ def test_another_flight_begins_anew(late_us: int) -> None:
     load(flight, waypoint(5.0, 0.0))
     assert flight.select(Mode.MISSION) == ACCEPTED
     flight.run(1.0)
-    kept, plans = flight.past()
+    kept, plans = flight.history()
     moved = kept._replace(time_us=flight.world.time_us - late_us)
-    flight.restart(flight.past()._replace(kept=moved))
+    flight.restart(flight.history()._replace(checkpoint=moved))
     assert flight.copter.pilot.state == HOLDING
     assert not flight.copter.stations.missions.has_mission
     assert plans
@@ -278,7 +278,7 @@ def test_another_flight_begins_anew(late_us: int) -> None:
 def test_a_vehicle_that_came_down_meanwhile_stays_there() -> None:
     flight = CopterFlight()
     flight.take_off(1.0)
-    past = flight.past()
+    past = flight.history()
     flight.land()
     flight.restart(past)
     assert flight.copter.pilot.state == State(Mode.HOLD, armed=False)
@@ -291,8 +291,8 @@ def test_another_law_takes_over_what_was_asked_for_and_not_what_a_law_remembers(
     flight = in_the_air(3.0)
     assert flight.go(5.0, 0.0, 3.0) == ACCEPTED
     flight.run(1.0)
-    past = flight.past()
-    flight.restart(past._replace(kept=past.kept._replace(maker=0)))
+    past = flight.history()
+    flight.restart(past._replace(checkpoint=past.checkpoint._replace(fingerprint=0)))
     flight.run(5.0)
     assert hypot(flight.position[0] - 5.0, flight.position[1]) < 0.05
 
@@ -300,9 +300,9 @@ def test_another_law_takes_over_what_was_asked_for_and_not_what_a_law_remembers(
 def fly_on_with(keep: Callable[[bytes], bytes]) -> None:
     """See the flight go on with what `keep` leaves of the law's memory."""
     flight = in_the_air(3.0)
-    past = flight.past()
-    loop = past.kept.loop
-    flight.restart(past._replace(kept=past.kept._replace(loop=loop._replace(memory=keep(loop.memory)))))
+    past = flight.history()
+    loop = past.checkpoint.loop
+    flight.restart(past._replace(checkpoint=past.checkpoint._replace(loop=loop._replace(memory=keep(loop.memory)))))
     flight.run(1.0)
     assert flight.position[2] == pytest.approx(3.0, abs=0.2)
 

@@ -13,7 +13,13 @@ import pytest
 from colibri.autopilot.control.interface import AttitudeController, VehicleState
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
-from colibri.autopilot.guidance.attitude_reference import AttitudeReference, Wish, lean, pose, spin
+from colibri.autopilot.guidance.attitude_reference import (
+    AttitudeCommand,
+    AttitudeReference,
+    attitude_command,
+    rate_command,
+    tilt_command,
+)
 from colibri.common.rotations import euler_from_quaternion, nearest_turn, quaternion_from_euler
 from colibri.common.types import Array
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_state, encode_state
@@ -38,7 +44,9 @@ def told(world: World, codec: Codec) -> StateFrame:
     return frame
 
 
-def fly(wish_at: Callable[[float], Wish], duration_s: float, start: Start = HOVER, law: str = "lpv-mpc") -> Array:
+def fly(
+    wish_at: Callable[[float], AttitudeCommand], duration_s: float, start: Start = HOVER, law: str = "lpv-mpc"
+) -> Array:
     """Fly what is asked for at each time, s; return time, phi, theta, psi (degrees), height, fallback a sample."""
     controller: Any = load_controller(law)(PROFILE.table(law), VEHICLE, lambda: 0.0)
     assert isinstance(controller, AttitudeController)
@@ -71,7 +79,7 @@ def after(flown: Array, time_s: float) -> Array:
 @pytest.mark.parametrize("law", ["lpv-mpc", "geometric-se3"])
 def test_a_roll_step_is_followed(law: str) -> None:
     """20 degrees: within one from 0.6 s on, no more than half a degree too far, the other angles still."""
-    flown = fly(lambda t: lean(radians(20.0) if t >= 0.5 else 0.0, 0.0, 0.0, WEIGHT_N), 2.5, law=law)
+    flown = fly(lambda t: tilt_command(radians(20.0) if t >= 0.5 else 0.0, 0.0, 0.0, WEIGHT_N), 2.5, law=law)
     assert np.abs(flown[flown[:, T] < 0.5][:, PHI]).max() < 0.1
     assert np.abs(after(flown, 1.1)[:, PHI] - 20.0).max() < 1.0
     assert np.abs(after(flown, 2.0)[:, PHI] - 20.0).max() < 0.1
@@ -86,7 +94,7 @@ def test_a_body_rate_turns_by_its_integral(axis: int) -> None:
     rate = [0.0, 0.0, 0.0]
     rate[axis - PHI] = radians(30.0)
     p, q, r = rate
-    flown = fly(lambda t: spin((p, q, r) if t < 1.0 else (0.0, 0.0, 0.0), WEIGHT_N), 3.0)
+    flown = fly(lambda t: rate_command((p, q, r) if t < 1.0 else (0.0, 0.0, 0.0), WEIGHT_N), 3.0)
     assert np.abs(after(flown, 1.6)[:, axis] - 30.0).max() < 2.0
     assert np.abs(after(flown, 2.5)[:, axis] - 30.0).max() < 0.2
     others = [other for other in (PHI, THETA, PSI) if other != axis]
@@ -96,7 +104,7 @@ def test_a_body_rate_turns_by_its_integral(axis: int) -> None:
 
 def test_a_pose_is_flown_to_across_the_compass() -> None:
     attitude = quaternion_from_euler(radians(15.0), radians(-10.0), radians(-160.0))
-    flown = fly(lambda t: pose(attitude, nan) if t >= 0.2 else lean(0.0, 0.0, 0.0, nan), 5.0)
+    flown = fly(lambda t: attitude_command(attitude, nan) if t >= 0.2 else tilt_command(0.0, 0.0, 0.0, nan), 5.0)
     assert after(flown, 4.5)[:, PHI : PSI + 1] == pytest.approx(
         np.broadcast_to([15.0, -10.0, -160.0], after(flown, 4.5)[:, PHI : PSI + 1].shape), abs=0.5
     )
@@ -104,8 +112,8 @@ def test_a_pose_is_flown_to_across_the_compass() -> None:
 
 
 def test_full_sticks_back_and_forth_are_followed() -> None:
-    def sticks(t: float) -> Wish:
-        return lean(
+    def sticks(t: float) -> AttitudeCommand:
+        return tilt_command(
             radians(35.0 * (-1) ** int(t)), radians(35.0 * (-1) ** int(1.3 * t)), 1.7 * (-1) ** int(0.5 * t), nan
         )
 
@@ -116,14 +124,14 @@ def test_full_sticks_back_and_forth_are_followed() -> None:
 
 
 def test_the_weight_is_carried_whatever_the_tilt() -> None:
-    flown = fly(lambda t: lean(radians(30.0) if t >= 0.5 else 0.0, 0.0, 0.0, nan), 2.0)
+    flown = fly(lambda t: tilt_command(radians(30.0) if t >= 0.5 else 0.0, 0.0, 0.0, nan), 2.0)
     assert np.abs(flown[:, Z] - 100.0).max() < 0.5
 
 
 @pytest.mark.parametrize("start", [{"phi": 170.0}, {"theta": 85.0}, {"phi": 120.0, "p": 6.0, "q": -6.0, "r": 5.0}])
 def test_it_recovers_under_an_attitude_demand_too(start: dict[str, float]) -> None:
     """From 120 degrees the demand begins within reach, so that the MPC flies from the first sample on."""
-    flown = fly(lambda _: lean(0.0, 0.0, 0.0, nan), 3.0, HOVER._replace(**start))
+    flown = fly(lambda _: tilt_command(0.0, 0.0, 0.0, nan), 3.0, HOVER._replace(**start))
     assert flown[0, FALLBACK] == (len(start) == 1)
     assert not after(flown, 1.0)[:, FALLBACK].any()
     assert np.abs(after(flown, 2.0)[:, (PHI, THETA)]).max() < 1.0

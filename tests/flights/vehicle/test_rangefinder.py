@@ -55,11 +55,11 @@ def test_a_fault_is_said_and_the_height_kept(kind: str, value: float) -> None:
     assert flight.command(mav.MAV_CMD_INJECT_FAILURE, *fault) == ACCEPTED
     flight.run(2.5)
     assert flight.estimate is not None
-    assert flight.estimate.health.not_believed == ("rangefinder",)
+    assert flight.estimate.health.not_accepted == ("rangefinder",)
     assert flight.position[2] == pytest.approx(HEIGHT_M, abs=0.2)
     assert flight.command(mav.MAV_CMD_INJECT_FAILURE, fault[0], float(mav.FAILURE_TYPE_OK)) == ACCEPTED
     flight.run(1.0)
-    assert not flight.estimate.health.not_believed
+    assert not flight.estimate.health.not_accepted
 
 
 def test_it_lands() -> None:

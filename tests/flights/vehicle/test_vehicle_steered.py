@@ -53,7 +53,7 @@ def test_offboard_velocity_and_yaw_rate_and_what_silence_does() -> None:
     flight = offboard(velocity=(2.0, -1.0, 0.5), yaw_rate_rad_s=0.5)
     stream(flight, 3.0, velocity=(2.0, -1.0, 0.5), yaw_rate_rad_s=0.5)
     assert flight.velocity == pytest.approx((2.0, -1.0, 0.5), abs=0.05)
-    assert flight.copter.pilot.scene().state.rate_flu_rad_s[2] == pytest.approx(0.5, abs=0.05)
+    assert flight.copter.pilot.context().state.rate_flu_rad_s[2] == pytest.approx(0.5, abs=0.05)
     flight.run(0.8)
     assert flight.told_mode is Mode.OFFBOARD  # COM_OF_LOSS_T is 1 s
     flight.run(0.3)
@@ -68,11 +68,11 @@ def test_no_velocity_or_acceleration_leads_beyond_what_is_allowed() -> None:
     stream(flight, EVERY_S, velocity=(30.0, 30.0, 20.0))
     assert flight.select(Mode.OFFBOARD) == ACCEPTED
     stream(flight, 3.0, velocity=(30.0, 30.0, 20.0))
-    reference = flight.copter.pilot.scene().velocity
+    reference = flight.copter.pilot.context().velocity
     assert 3.9 < hypot(*reference[:2]) <= 4.01  # MPC_XY_VEL_MAX
     assert 2.9 < reference[2] <= 3.01
     stream(flight, 4.0, acceleration=(-40.0, 0.0, -9.0))
-    reference = flight.copter.pilot.scene().velocity
+    reference = flight.copter.pilot.context().velocity
     assert -4.01 <= reference[0] < -3.5
     assert -1.51 <= reference[2] < -1.2
 
@@ -120,7 +120,7 @@ def test_offboard_attitude_then_rates_then_silence() -> None:
     assert degrees(flight.euler[0]) == pytest.approx(10.0, abs=0.5)
     assert degrees(flight.euler[1]) == pytest.approx(0.0, abs=0.5)
     attitude(flight, 0.5, 0x80, tilted, (0.0, 0.0, -1.0), 0.5)  # FRD: to the left
-    assert flight.copter.pilot.scene().state.rate_flu_rad_s[2] == pytest.approx(1.0, abs=0.1)
+    assert flight.copter.pilot.context().state.rate_flu_rad_s[2] == pytest.approx(1.0, abs=0.1)
     attitude(flight, 0.5, 0x80 | 0x40, tilted, (0.0, 0.0, 0.0), nan)  # no thrust is asked for: the weight's
     assert flight.copter.pilot.standing is False
     flight.run(1.1)
@@ -163,7 +163,7 @@ def test_position_by_hand() -> None:
     sticks(flight, 0.5)
     assert dist(flight.position, held) < 0.05
     sticks(flight, 1.5, yaw=1.0)
-    assert flight.copter.pilot.scene().state.rate_flu_rad_s[2] == pytest.approx(-radians(120.0), abs=0.1)
+    assert flight.copter.pilot.context().state.rate_flu_rad_s[2] == pytest.approx(-radians(120.0), abs=0.1)
     sticks(flight, 1.0, thrust=1.0)
     assert flight.velocity[2] > 2.0
     flight.run(0.6)
@@ -207,7 +207,7 @@ def test_stabilized_by_hand() -> None:
     flight = by_hand(Mode.STABILIZED, 20.0, MPC_MAN_TILT_MAX=15.0, MPC_MAN_Y_MAX=60.0)
     sticks(flight, 0.8, pitch=1.0, yaw=-1.0)
     assert degrees(hypot(*flight.euler[:2])) == pytest.approx(15.0, abs=1.5)
-    assert flight.copter.pilot.scene().state.rate_flu_rad_s[2] == pytest.approx(radians(60.0), abs=0.1)
+    assert flight.copter.pilot.context().state.rate_flu_rad_s[2] == pytest.approx(radians(60.0), abs=0.1)
     sticks(flight, 0.8)
     assert abs(flight.velocity[2]) < 0.5
     sticks(flight, 0.5, thrust=0.0)
@@ -271,7 +271,7 @@ def test_a_target_as_fast_as_a_train_is_not_raced() -> None:
     flight.run(0.05)
     assert flight.select(Mode.FOLLOW) == ACCEPTED
     flight.run(4.0)
-    assert hypot(*flight.copter.pilot.scene().velocity) < 18.0
+    assert hypot(*flight.copter.pilot.context().velocity) < 18.0
 
 
 def test_without_a_target_follow_stops() -> None:

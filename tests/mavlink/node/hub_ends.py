@@ -15,7 +15,7 @@ GCS, SDK = ("127.0.0.1", 14550), ("127.0.0.1", 14540)
 class Recorder:
     """A service that hears everything and answers PINGs."""
 
-    hears = frozenset(definition.msgname for definition in dialect.mav.mavlink_map.values())
+    handles = frozenset(definition.msgname for definition in dialect.mav.mavlink_map.values())
 
     def __init__(self) -> None:
         self.heard: list[tuple[str, Peer, int]] = []

@@ -4,13 +4,13 @@ from math import cos, radians, sin
 
 import pytest
 
-from colibri.autopilot.commander.rules.arming import CHECKS, Facts, refusals
+from colibri.autopilot.commander.rules.arming import CHECKS, ArmingInputs, refusals
 from colibri.autopilot.control.interface import VehicleState
 from colibri.common.types import Vector
 from colibri.mavlink.wire.refusal import Refusal
 
 READY = VehicleState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-FACTS = Facts(READY, standing=True, charge=1.0, thrust_stick=None)
+INPUTS = ArmingInputs(READY, standing=True, charge=1.0, thrust_stick=None)
 
 
 def tilted(angle_deg: float) -> VehicleState:
@@ -23,44 +23,44 @@ def moving(velocity: Vector) -> VehicleState:
 
 
 def test_a_vehicle_that_stands_may_be_armed() -> None:
-    assert refusals(FACTS) == []
-    assert refusals(FACTS._replace(thrust_stick=0.5)) == []
+    assert refusals(INPUTS) == []
+    assert refusals(INPUTS._replace(thrust_stick=0.5)) == []
 
 
 FAILING = [
-    (FACTS._replace(state=None), "no telemetry"),
-    (FACTS._replace(state=tilted(46.0)), "tilted by 46 degrees, more than 45"),
-    (FACTS._replace(state=tilted(180.0)), "tilted by 180 degrees"),
-    (FACTS._replace(state=moving((0.0, -0.6, 0.0))), "moving at 0.6 m/s"),
-    (FACTS._replace(standing=False), "not standing on the ground"),
-    (FACTS._replace(charge=0.09), "battery at 9%"),
-    (FACTS._replace(thrust_stick=0.7), "thrust stick is up"),
-    (FACTS._replace(battery="battery not healthy: 0.0 V"), "battery not healthy: 0.0 V"),
-    (FACTS._replace(outside_fence=Refusal("outside the geofence")), "outside the geofence"),
+    (INPUTS._replace(state=None), "no telemetry"),
+    (INPUTS._replace(state=tilted(46.0)), "tilted by 46 degrees, more than 45"),
+    (INPUTS._replace(state=tilted(180.0)), "tilted by 180 degrees"),
+    (INPUTS._replace(state=moving((0.0, -0.6, 0.0))), "moving at 0.6 m/s"),
+    (INPUTS._replace(standing=False), "not standing on the ground"),
+    (INPUTS._replace(charge=0.09), "battery at 9%"),
+    (INPUTS._replace(thrust_stick=0.7), "thrust stick is up"),
+    (INPUTS._replace(battery="battery not healthy: 0.0 V"), "battery not healthy: 0.0 V"),
+    (INPUTS._replace(outside_fence=Refusal("outside the geofence")), "outside the geofence"),
 ]
 
 
-@pytest.mark.parametrize(("facts", "reason"), FAILING, ids=[reason for _, reason in FAILING])
-def test_a_check_that_fails_says_why(facts: Facts, reason: str) -> None:
-    (said,) = refusals(facts)
+@pytest.mark.parametrize(("inputs", "reason"), FAILING, ids=[reason for _, reason in FAILING])
+def test_a_check_that_fails_says_why(inputs: ArmingInputs, reason: str) -> None:
+    (said,) = refusals(inputs)
     assert reason in said
 
 
 @pytest.mark.parametrize(
-    "facts",
+    "inputs",
     [
-        FACTS._replace(state=tilted(44.0)),
-        FACTS._replace(state=moving((0.4, 0.4, -0.4))),
-        FACTS._replace(charge=0.11),
-        FACTS._replace(thrust_stick=0.59),
+        INPUTS._replace(state=tilted(44.0)),
+        INPUTS._replace(state=moving((0.4, 0.4, -0.4))),
+        INPUTS._replace(charge=0.11),
+        INPUTS._replace(thrust_stick=0.59),
     ],
 )
-def test_less_than_that_is_no_reason(facts: Facts) -> None:
-    assert refusals(facts) == []
+def test_less_than_that_is_no_reason(inputs: ArmingInputs) -> None:
+    assert refusals(inputs) == []
 
 
 def test_every_reason_is_told_at_once() -> None:
-    facts = Facts(
+    inputs = ArmingInputs(
         tilted(90.0)._replace(velocity_enu_m_s=(2.0, 0.0, 0.0)),
         False,
         0.0,
@@ -69,4 +69,4 @@ def test_every_reason_is_told_at_once() -> None:
         "height not known",
         "battery critical",
     )
-    assert len(refusals(facts)) == len(CHECKS)
+    assert len(refusals(inputs)) == len(CHECKS)

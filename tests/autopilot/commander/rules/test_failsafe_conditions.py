@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from colibri.autopilot.commander.rules.failsafe_conditions import (
     NEVER_US,
     Conditions,
-    Seen,
+    FailsafeInputs,
     battery_below,
     needs_position,
     resting_place,
@@ -30,7 +30,7 @@ LIMITS = {number.name: float(number.default) for number in NUMBERS}
 NOW_US = 10_000_000
 LEVEL = VehicleState((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 FULL = BatteryState(3, 12.0, 5.0, 0.1, 0.9, 600.0, 1.0)
-WELL = Seen(
+WELL = FailsafeInputs(
     now_us=NOW_US,
     missed_us=None,
     state=LEVEL,
@@ -75,13 +75,13 @@ LOST = [
 ]
 
 
-@pytest.mark.parametrize(("condition", "seen"), LOST, ids=[condition for condition, _ in LOST])
-def test_what_begins_to_hold_holds_since_then(condition: Condition, seen: Seen) -> None:
+@pytest.mark.parametrize(("condition", "inputs"), LOST, ids=[condition for condition, _ in LOST])
+def test_what_begins_to_hold_holds_since_then(condition: Condition, inputs: FailsafeInputs) -> None:
     conditions = Conditions()
-    assert conditions.look(seen, LIMITS, ())[condition] == NOW_US
-    assert conditions.look(seen._replace(now_us=NOW_US + 8000), LIMITS, ())[condition] == NOW_US
+    assert conditions.look(inputs, LIMITS, ())[condition] == NOW_US
+    assert conditions.look(inputs._replace(now_us=NOW_US + 8000), LIMITS, ())[condition] == NOW_US
     assert condition not in conditions.look(WELL._replace(now_us=NOW_US + 16000), LIMITS, ())
-    assert conditions.look(seen._replace(now_us=NOW_US + 24000), LIMITS, ())[condition] == NOW_US + 24000
+    assert conditions.look(inputs._replace(now_us=NOW_US + 24000), LIMITS, ())[condition] == NOW_US + 24000
 
 
 HEARD_US = 9_000_000
@@ -93,16 +93,16 @@ SILENT = [
 ]
 
 
-@pytest.mark.parametrize(("condition", "seen"), SILENT, ids=[condition for condition, _ in SILENT])
-def test_what_is_silent_is_so_since_it_was_heard_last(condition: Condition, seen: Seen) -> None:
-    assert Conditions().look(seen, LIMITS, ()) == {condition: HEARD_US}
+@pytest.mark.parametrize(("condition", "inputs"), SILENT, ids=[condition for condition, _ in SILENT])
+def test_what_is_silent_is_so_since_it_was_heard_last(condition: Condition, inputs: FailsafeInputs) -> None:
+    assert Conditions().look(inputs, LIMITS, ()) == {condition: HEARD_US}
 
 
 @pytest.mark.parametrize("condition", [Condition.STICKS_LOST, Condition.SETPOINTS_LOST])
 def test_a_stream_that_no_mode_asks_for_is_missed_only_if_it_was_lost_before(condition: Condition) -> None:
-    seen = WELL._replace(sticks_us=HEARD_US, setpoint=PositionSetpoint(time_us=HEARD_US))
-    assert condition not in Conditions().look(seen, LIMITS, ())
-    assert Conditions().look(seen, LIMITS, (condition,))[condition] == HEARD_US
+    inputs = WELL._replace(sticks_us=HEARD_US, setpoint=PositionSetpoint(time_us=HEARD_US))
+    assert condition not in Conditions().look(inputs, LIMITS, ())
+    assert Conditions().look(inputs, LIMITS, (condition,))[condition] == HEARD_US
 
 
 def test_one_that_was_ended_has_been_silent_for_ever() -> None:
@@ -110,13 +110,13 @@ def test_one_that_was_ended_has_been_silent_for_ever() -> None:
 
 
 def test_after_a_restart_there_is_time_to_be_heard() -> None:
-    seen = WELL._replace(mode=Mode.OFFBOARD, listening_us=NOW_US - 8000)
-    assert Conditions().look(seen, LIMITS, ())[Condition.SETPOINTS_LOST] == NOW_US - 8000
+    inputs = WELL._replace(mode=Mode.OFFBOARD, listening_us=NOW_US - 8000)
+    assert Conditions().look(inputs, LIMITS, ())[Condition.SETPOINTS_LOST] == NOW_US - 8000
 
 
 def test_recovery_is_no_failure_of_the_plan() -> None:
-    seen = WELL._replace(decided=Diagnostics(fallback=Fallback.RECOVERY))
-    assert Conditions().look(seen, LIMITS, ()) == {}
+    inputs = WELL._replace(decided=Diagnostics(fallback=Fallback.RECOVERY))
+    assert Conditions().look(inputs, LIMITS, ()) == {}
 
 
 def test_the_same_state_lies_only_where_it_says_that_it_moves() -> None:
@@ -175,9 +175,9 @@ def test_the_reference_comes_to_rest_close_to_where_that_is_said(east: float, no
 
 
 def test_a_fence_may_be_foreseen() -> None:
-    seen = WELL._replace(fence=inside_of_10_m, state=at_speed((4.0, 0.0, 0.0), (7.0, 0.0, 5.0)))
-    assert Conditions().look(seen, LIMITS, ()) == {}
-    assert Condition.FENCE_BREACHED in Conditions().look(seen, {**LIMITS, "GF_PREDICT": 1}, ())
-    assert Condition.FENCE_BREACHED in Conditions().look(seen, {**LIMITS, "GF_MARGIN": 4.0}, ())
-    standing = seen._replace(standing=True)
+    inputs = WELL._replace(fence=inside_of_10_m, state=at_speed((4.0, 0.0, 0.0), (7.0, 0.0, 5.0)))
+    assert Conditions().look(inputs, LIMITS, ()) == {}
+    assert Condition.FENCE_BREACHED in Conditions().look(inputs, {**LIMITS, "GF_PREDICT": 1}, ())
+    assert Condition.FENCE_BREACHED in Conditions().look(inputs, {**LIMITS, "GF_MARGIN": 4.0}, ())
+    standing = inputs._replace(standing=True)
     assert Conditions().look(standing, {**LIMITS, "GF_MARGIN": inf}, ()) == {}

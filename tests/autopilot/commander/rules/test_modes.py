@@ -18,10 +18,10 @@ from colibri.autopilot.commander.rules.modes import (
     State,
     Transition,
     custom_mode,
-    following,
     mode_of,
     mode_of_custom,
     mode_of_standard,
+    next_state,
 )
 from colibri.mavlink.wire.refusal import Refusal
 from tools.pages.modes import page
@@ -65,7 +65,7 @@ def test_every_transition_leads_where_its_row_says(row: Transition) -> None:
         if row.event is Event.ARM and not ROWS[mode].to_arm:
             continue
         selected = Mode.HOLD if row.event is Event.SELECT else None
-        after = following(State(mode, armed=row.event is not Event.ARM), row.event, selected, ())
+        after = next_state(State(mode, armed=row.event is not Event.ARM), row.event, selected, ())
         assert isinstance(after, State)
         expected = row.target or selected or mode
         assert after == State(expected, armed=not row.disarms)
@@ -76,7 +76,7 @@ def test_every_transition_leads_where_its_row_says(row: Transition) -> None:
 def test_what_no_row_names_is_refused_and_what_one_names_keeps_to_the_table(event: Event, armed: bool) -> None:
     for mode in Mode:
         rows = [row for row in TRANSITIONS if row.event is event and (not row.sources or mode in row.sources)]
-        after = following(State(mode, armed), event, None, ())
+        after = next_state(State(mode, armed), event, None, ())
         if not any(armed or not row.armed for row in rows):
             assert isinstance(after, Refusal)
         elif isinstance(after, State):
@@ -86,28 +86,28 @@ def test_what_no_row_names_is_refused_and_what_one_names_keeps_to_the_table(even
 
 def test_nothing_but_arming_arms() -> None:
     for mode, event, selected in product(Mode, Event, (None, *Mode)):
-        after = following(State(mode, armed=False), event, selected, ())
+        after = next_state(State(mode, armed=False), event, selected, ())
         assert event is Event.ARM or isinstance(after, Refusal) or not after.armed
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_every_mode_is_reached_and_its_first_missing_need_refuses_it(mode: Mode) -> None:
     flying = State(Mode.LAND, armed=True)
-    assert following(flying, Event.SELECT, mode, ()) == State(mode, armed=True)
+    assert next_state(flying, Event.SELECT, mode, ()) == State(mode, armed=True)
     for need in ROWS[mode].needs:
-        refusal = following(flying, Event.SELECT, mode, (need,))
+        refusal = next_state(flying, Event.SELECT, mode, (need,))
         assert isinstance(refusal, Refusal)
         assert need.value in refusal.reason
     others = [need for need in Need if need not in ROWS[mode].needs]
-    assert following(flying, Event.SELECT, mode, others) == State(mode, armed=True)
+    assert next_state(flying, Event.SELECT, mode, others) == State(mode, armed=True)
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_on_the_ground_needs_hold_back_arming_and_not_the_choice(mode: Mode) -> None:
     needs = ROWS[mode].needs
-    chosen = following(FIRST, Event.SELECT, mode, needs)
+    chosen = next_state(FIRST, Event.SELECT, mode, needs)
     assert isinstance(chosen, State) is ROWS[mode].selectable
-    armed = following(State(mode, armed=False), Event.ARM, None, needs)
+    armed = next_state(State(mode, armed=False), Event.ARM, None, needs)
     assert isinstance(armed, State) is (ROWS[mode].to_arm and not needs)
 
 

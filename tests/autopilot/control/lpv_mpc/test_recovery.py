@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colibri.autopilot.control.lpv_mpc.attitude_mpc import squared_speeds_from
-from colibri.autopilot.control.lpv_mpc.recovery import TurnGains, prioritised, turning_moment
+from colibri.autopilot.control.lpv_mpc.recovery import TurnGains, mix_with_priority, turning_moment
 from colibri.common.rotations import normalized, rotation_matrix
 from colibri.common.types import Quaternion, Vector
 from colibri.plant.vehicle.description import load_vehicle
@@ -21,7 +21,7 @@ GAINS = TurnGains(6.0, 20.0, 8.0)
 
 
 def mixed(thrust_n: float, moment: np.ndarray) -> np.ndarray:
-    return prioritised(thrust_n, moment, FROM_THRUST, FROM_MOMENTS, MIN_SQUARED, MAX_SQUARED)
+    return mix_with_priority(thrust_n, moment, FROM_THRUST, FROM_MOMENTS, MIN_SQUARED, MAX_SQUARED)
 
 
 @given(st.floats(-10.0, 40.0), reals(5.0), reals(5.0), reals(2.0))

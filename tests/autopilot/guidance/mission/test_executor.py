@@ -17,7 +17,7 @@ from colibri.autopilot.guidance.mission.executor import (
     SetHome,
 )
 from colibri.autopilot.guidance.mission.items import MISSION_RULES
-from colibri.autopilot.guidance.mission.legs import Defaults, Situation
+from colibri.autopilot.guidance.mission.legs import Defaults, MissionContext
 from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Hold, Land, Order, Return, TakeOff
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.common.types import Vector
@@ -70,10 +70,10 @@ class Flight:
 
     def step(self) -> None:
         self.now_us += STEP_US
-        situation = Situation(
+        mission_context = MissionContext(
             self.position, (0.0, 0.0, 0.0), self.yaw, self.landed, self.arrived, self.turns, HOME, DEFAULT_ORIGIN
         )
-        step = self.mission.step(situation, self.now_us)
+        step = self.mission.step(mission_context, self.now_us)
         assert step.flying == (self.mission.progress.state == ACTIVE)
         self.reached += [event.seq for event in step.events if isinstance(event, Reached)]
         self.homes += [event.position_enu_m for event in step.events if isinstance(event, SetHome)]
@@ -443,8 +443,8 @@ def test_whatever_is_uploaded_and_happens_can_be_flown(
             mission.pause(item_flown=arrived)
         elif what == 2:
             mission.set_current(seq, reset=landed)
-        situation = Situation(HOME, (0.0, 0.0, 0.0), 0.0, landed, arrived, turns, HOME, DEFAULT_ORIGIN)
-        step = mission.step(situation, now_us)
+        mission_context = MissionContext(HOME, (0.0, 0.0, 0.0), 0.0, landed, arrived, turns, HOME, DEFAULT_ORIGIN)
+        step = mission.step(mission_context, now_us)
         assert 0 <= mission.progress.seq < max(1, len(items))
         assert step.flying == mission.active
         if isinstance(step.order, GoTo):

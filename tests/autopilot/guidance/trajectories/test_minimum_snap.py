@@ -10,7 +10,7 @@ from scipy.integrate import quad_vec
 from scipy.linalg import solve
 
 from colibri.autopilot.guidance.trajectories.minimum_snap import ACCELERATION, SNAP, PiecewisePolynomial, minimise
-from colibri.autopilot.guidance.trajectories.taylor import Jet
+from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries
 from colibri.common.types import Array
 from tests.strategies import reals
 
@@ -20,7 +20,7 @@ POINTS = np.array([[0.0, 1.0], [3.0, 1.0], [3.0, 4.0], [-2.0, 0.0], [0.0, 0.0]])
 
 def derivatives(curve: PiecewisePolynomial, t: Array, order: int) -> Array:
     """Return (n, axes)."""
-    return np.stack([axis.derivative(order) for axis in curve(Jet.time(t, order))], axis=1)
+    return np.stack([axis.derivative(order) for axis in curve(TaylorSeries.time(t, order))], axis=1)
 
 
 def cost(curve: PiecewisePolynomial, order: int) -> float:

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from colibri.autopilot.guidance.trajectories.taylor import Jet, atan2, cos, sin
+from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, sin
 from colibri.common.types import Array
 from tests.strategies import reals
 
 ORDER = 5
 
 
-def at(t: float) -> Jet:
-    return Jet.time(np.array([t]), ORDER)
+def at(t: float) -> TaylorSeries:
+    return TaylorSeries.time(np.array([t]), ORDER)
 
 
-def derivatives(x: Jet) -> Array:
+def derivatives(x: TaylorSeries) -> Array:
     return np.array([x.derivative(order)[0] for order in range(len(x.coefficients))])
 
 
@@ -47,6 +47,6 @@ def test_rate_is_the_derivative(t: float) -> None:
 
 
 def test_constants_of_their_own_at_each_time() -> None:
-    x = Jet.time(np.array([1.0, 2.0]), 1) * np.array([3.0, 4.0]) - np.array([1.0, 2.0])
+    x = TaylorSeries.time(np.array([1.0, 2.0]), 1) * np.array([3.0, 4.0]) - np.array([1.0, 2.0])
     assert x.derivative(0) == pytest.approx([2.0, 6.0])
     assert x.derivative(1) == pytest.approx([3.0, 4.0])

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from colibri.autopilot.commander.rules.modes import State, custom_mode
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import Stations
-from colibri.mavlink.hil.conductor import Gathering, Parcel, Turn, packets
+from colibri.mavlink.hil.conductor import Gathering, Parcel, StepMessage, packets
 from colibri.mavlink.links.udp import UdpLink
 from colibri.mavlink.node.hub import Outgoing
 
@@ -19,11 +19,11 @@ _MAX_WAIT_S = 0.1
 class Conductor(Protocol):
     """Whoever speaks for the ground stations."""
 
-    def hear(self) -> Turn | None:
+    def hear(self) -> StepMessage | None:
         """Return what they say at this instant; None where there will be nothing more."""
         ...
 
-    def tell(self, turn: Turn) -> None:
+    def tell(self, step_message: StepMessage) -> None:
         """Tell them what the vehicle says."""
         ...
 
@@ -42,18 +42,18 @@ class UdpConductor:
         self._gathering = Gathering()
         link.send(b"")
 
-    def hear(self) -> Turn | None:
+    def hear(self) -> StepMessage | None:
         """Wait for its turn."""
         while not self._ended():
             received = self._link.receive(_MAX_WAIT_S)
-            turn = None if received is None else self._gathering.take(received[0])
-            if turn is not None:
-                return turn
+            step_message = None if received is None else self._gathering.take(received[0])
+            if step_message is not None:
+                return step_message
         return None
 
-    def tell(self, turn: Turn) -> None:
+    def tell(self, step_message: StepMessage) -> None:
         """Send a turn."""
-        for packet in packets(turn):
+        for packet in packets(step_message):
             self._link.send(packet)
 
     def close(self) -> None:
@@ -77,17 +77,17 @@ class ConductedLinks:
     def receive(self, stations: Stations) -> Iterator[Received]:
         """Wait for what is said at this instant, then yield it; what is not taken is yielded the next time."""
         del stations
-        turn = self._conductor.hear()
-        if turn is not None:
-            self._time_us = turn.time_us
-            self._waiting.extend(turn.parcels)
+        step_message = self._conductor.hear()
+        if step_message is not None:
+            self._time_us = step_message.time_us
+            self._waiting.extend(step_message.parcels)
         return self._taken()
 
     def send(self, outbox: Iterable[Outgoing]) -> None:
         """Tell the conductor what the vehicle says."""
         parcels = [Parcel(address[1], datagram) for _, address, datagram in outbox if address is not None]
         mode, armed = self._state()
-        self._conductor.tell(Turn(self._time_us, parcels, custom_mode(mode), armed))
+        self._conductor.tell(StepMessage(self._time_us, parcels, custom_mode(mode), armed))
 
     def facts(self, stations: Stations, interval_s: float) -> list[dict[str, Any]]:
         """Return nothing: nobody watches a terminal."""

@@ -6,7 +6,7 @@ The two may be in this process or in others: see `memory` and `udp`. Either way 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, Protocol
 
-from colibri.mavlink.hil.conductor import Parcel, Turn
+from colibri.mavlink.hil.conductor import Parcel, StepMessage
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_actuators, decode_state
 from colibri.mavlink.wire.dialect import (
     AUTOPILOT_COMPONENT,
@@ -29,7 +29,7 @@ _GIVE_UP_S = 20.0
 """Of the clock that a link is late by. No flight depends on it."""
 
 
-class StageError(SitlError):
+class SessionError(SitlError):
     """A flight that cannot go on: a process has died, or does not answer; the message says which and why."""
 
 
@@ -74,11 +74,11 @@ class Autopilot(Protocol):
         """Return how it calls a plant."""
         ...
 
-    def tell(self, frame: bytes, turn: Turn) -> None:
+    def tell(self, frame: bytes, step_message: StepMessage) -> None:
         """Tell it a frame of the plant, and what ground stations say then."""
         ...
 
-    def expect(self, turn: Turn) -> None:
+    def expect(self, step_message: StepMessage) -> None:
         """Tell it what ground stations say at the frame that comes next."""
         ...
 
@@ -94,7 +94,7 @@ class Autopilot(Protocol):
         """Return its answer to the frame."""
         ...
 
-    def said(self) -> Turn:
+    def said(self) -> StepMessage:
         """Return what it says to ground stations at that frame."""
         ...
 
@@ -124,12 +124,12 @@ class Instant(NamedTuple):
 
     began: StateFrame
     command: ActuatorCommand
-    said: Turn
+    said: StepMessage
     frame: bytes
     answer: bytes
 
 
-class Stage:
+class LockstepSession:
     """Conducts a flight.
 
     Attributes:
@@ -157,14 +157,14 @@ class Stage:
             injected: Frames that go to the plant with the autopilot's answer.
 
         Raises:
-            StageError: The flight cannot go on.
+            SessionError: The flight cannot go on.
         """
         frame, began = self._frame, self.truth
-        turn = Turn(began.time_us, parcels)
+        step_message = StepMessage(began.time_us, parcels)
         if self.trouble.any:
-            answer, said, heard = self._struggle(frame, turn, injected)
+            answer, said, heard = self._struggle(frame, step_message, injected)
         else:
-            self._autopilot.tell(frame, turn)
+            self._autopilot.tell(frame, step_message)
             answer = self._autopilot.answer()
             self._plant.take(answer + injected)
             said = self._autopilot.said()
@@ -174,14 +174,16 @@ class Stage:
             self._hear(self._frame)
         return Instant(began, self._command(answer), said, frame, answer)
 
-    def _struggle(self, frame: bytes, turn: Turn, injected: bytes) -> tuple[bytes, Turn, list[bytes]]:
+    def _struggle(
+        self, frame: bytes, step_message: StepMessage, injected: bytes
+    ) -> tuple[bytes, StepMessage, list[bytes]]:
         """Carry a frame and its answer over a bad link, until the plant has gone on.
 
         Returns the answer, what is said to ground stations, and what the plant said up to its next frame.
         """
         plant, autopilot, up, down = self._plant, self._autopilot, self._up, self._down
         began_s = plant.clock_s()
-        autopilot.expect(turn)
+        autopilot.expect(step_message)
         up.put(frame, _us(began_s))
         answer, said, heard = b"", None, list[bytes]()
         while True:
@@ -189,7 +191,7 @@ class Stage:
             for datagram in up.due(now_us):
                 autopilot.hear(datagram)
             for datagram in autopilot.listen():
-                if not answer and answers(datagram, turn.time_us):
+                if not answer and answers(datagram, step_message.time_us):
                     answer, said = datagram, autopilot.said()
                 down.put(datagram + injected, now_us)
             for datagram in down.due(now_us):
@@ -203,7 +205,7 @@ class Stage:
                 if is_frame and said is not None:
                     return answer, said, heard
             if plant.clock_s() > began_s + _GIVE_UP_S:
-                raise StageError(f"nothing has passed between plant and autopilot for {_GIVE_UP_S:.0f} s")
+                raise SessionError(f"nothing has passed between plant and autopilot for {_GIVE_UP_S:.0f} s")
 
     def command_to_plant(self, number: int, *params: float) -> bytes:
         """Return a COMMAND_LONG as the autopilot would send it to the plant."""
@@ -229,7 +231,7 @@ class Stage:
         messages = {message.name: message for message in self._codec.decode(told)}
         truth = decode_state(messages["ATTITUDE_QUATERNION"], messages["LOCAL_POSITION_NED"])
         if truth is None:
-            raise StageError("the vehicle has left what can be told: its state is not finite")
+            raise SessionError("the vehicle has left what can be told: its state is not finite")
         return frame, truth
 
     def _hear(self, datagram: bytes) -> None:
@@ -238,7 +240,7 @@ class Stage:
                 continue
             number, result = message.fields.command, message.fields.result
             if number == CMD_SET_MESSAGE_INTERVAL and result != RESULT_ACCEPTED:
-                raise StageError("the plant cannot give the feedback that is asked for: fly a vehicle with sensors")
+                raise SessionError("the plant cannot give the feedback that is asked for: fly a vehicle with sensors")
             self.acks.append((number, result))
 
     def _command(self, answer: bytes) -> ActuatorCommand:
@@ -246,7 +248,7 @@ class Stage:
             command = decode_actuators(message) if message.name == "HIL_ACTUATOR_CONTROLS" else None
             if command is not None:
                 return command
-        raise StageError("the autopilot answered with what no rotor can follow")
+        raise SessionError("the autopilot answered with what no rotor can follow")
 
 
 def frames_of(datagram: bytes) -> Iterator[bytes]:
