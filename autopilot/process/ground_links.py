@@ -10,7 +10,7 @@ from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import Stations
 from colibri.common.types import Address
 from colibri.mavlink.links.link import GroundLink, LinkError
-from colibri.mavlink.links.open import beyond_loopback, open_ground_link, unsigned_refusal
+from colibri.mavlink.links.open import beyond_loopback, check_reach, open_ground_link
 from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.streaming.rates import GCS, SDK
 
@@ -27,9 +27,7 @@ def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[Gro
     Raises:
         LinkError: One cannot be opened, or would let anybody on the network fly the vehicle.
     """
-    for url in urls:
-        if beyond_loopback(url) and not (signed or insecure):
-            raise LinkError(unsigned_refusal(url))
+    check_reach(urls, signed=signed, insecure=insecure)
     links: list[GroundLink] = []
     try:
         for url in urls:

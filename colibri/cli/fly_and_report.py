@@ -4,12 +4,10 @@ import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from colibri.analysis.outcome import keep_flight, keep_what_there_is
-from colibri.analysis.report import print_report
 from colibri.common.errors import Error, InFlightError
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
 from colibri.flights.fly import fly_plan, prepare
-from colibri.flights.plan import FlightPlan
+from colibri.flights.plan import FlightPlan, Summary
 from colibri.flights.processes import FlightError
 
 _UPDATES = 500
@@ -26,26 +24,43 @@ def fly(args: argparse.Namespace) -> int:
         with _progress(plan, quiet=args.quiet) as (progress, say):
             summary = fly_plan(plan, progress, say)
     except FlightError as error:
-        keep_what_there_is(plan)
+        _keep_what_there_is(plan)
         if error.said:
             return error.code
         fail(f"{error}; what was logged is in {plan.out}", error.code)
     except InFlightError as error:
-        keep_what_there_is(plan)
+        _keep_what_there_is(plan)
         fail(f"{error}; what was logged is in {plan.out}", EXIT_FAILED)
     except Error as error:
         fail(str(error))
     except KeyboardInterrupt:
-        keep_what_there_is(plan)
+        _keep_what_there_is(plan)
         fail(f"interrupted; what was logged is in {plan.out}", EXIT_INTERRUPTED)
-    recording, figures = keep_flight(plan, summary)
-    if not args.no_figures:
+    _report(plan, summary, figures=not args.no_figures, quiet=args.quiet)
+    return 0
+
+
+def _keep_what_there_is(plan: FlightPlan) -> None:
+    """Write what there is of a flight that did not end well; that of one that never began is nothing."""
+    if not (plan.out / "autopilot.csv").exists():
+        return
+    from colibri.analysis.outcome import keep_what_there_is
+
+    keep_what_there_is(plan)
+
+
+def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -> None:
+    """Keep what was flown and say how well it went; what does that is loaded only now, when something has flown."""
+    from colibri.analysis.outcome import keep_flight
+    from colibri.analysis.report import print_report
+
+    recording, found = keep_flight(plan, summary)
+    if figures:
         from colibri.analysis.figures import draw_flight
 
         draw_flight(recording, plan)
-    if not args.quiet:
-        print_report(figures, plan.out)
-    return 0
+    if not quiet:
+        print_report(found, plan.out)
 
 
 @contextmanager

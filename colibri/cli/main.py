@@ -11,7 +11,7 @@ from typing import Protocol, cast
 from colibri.cli.processes import PROCESSES, run_process
 from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail, use_one_thread
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, end_quickly, fail, use_one_thread
 
 SUBCOMMANDS = {
     "fly": "fly a track and report how well it went",
@@ -44,6 +44,7 @@ def main(argv: list[str] | None = None) -> int:
     if given and given[0] in PROCESSES:
         return run_process(given[0], given[1:])
     use_one_thread()
+    end_quickly()
     args = _parser(given).parse_args(given)
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that what was started is ended, too

@@ -15,7 +15,7 @@ from colibri.flights.command_lines import options_of, plant_options
 from colibri.flights.fleet_status import StatusLines
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import LinkError
-from colibri.mavlink.links.open import beyond_loopback, open_link, unsigned_refusal
+from colibri.mavlink.links.open import check_reach, open_link
 from colibri.plant.physics.start import Start
 from colibri.plant.simulation.setting import WorldSetting, world_values
 from colibri.plant.vehicle.description import load_vehicle
@@ -80,12 +80,9 @@ def _check(args: argparse.Namespace) -> None:
         name = args.plant_vehicle or args.vehicle or profile.simulation.vehicle
         vehicle = load_vehicle(name).without(args.without)
         believed = load_vehicle(args.vehicle or profile.simulation.vehicle)
-        urls = ground_links(args, args.instance)
-        exposed = [url for url in urls if beyond_loopback(url)]
+        check_reach(ground_links(args, args.instance), signed=args.signing_key is not None, insecure=args.insecure)
     except Error as error:
         fail(str(error))
-    if exposed and not (args.signing_key or args.insecure):
-        fail(unsigned_refusal(exposed[0]))
     if args.feedback is Feedback.SENSORS and (vehicle.sensors is None or believed.sensors is None):
         fail(f"--feedback sensors: vehicle {(believed if vehicle.sensors else vehicle).name} has no table sensors")
     if vehicle.ground is None and "z" not in args.start:

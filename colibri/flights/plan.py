@@ -11,6 +11,7 @@ from colibri.autopilot.guidance.trajectories.planner import start_yaw
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, track
 from colibri.common.errors import Error
 from colibri.mavlink.hil.feedback import Feedback
+from colibri.mavlink.links.open import check_reach
 from colibri.plant.environment.weather import Weather, weather_of
 from colibri.plant.physics.start import Start, check_start
 from colibri.plant.simulation.setting import WorldSetting, world_values
@@ -93,6 +94,7 @@ class FlightPlan(WorldSetting):
         Raises:
             PlanError: Ground stations are invited to a flight that has no links to them; or sensors are to be flown by
                 that the vehicle has not, or without ground to stand on.
+            LinkError: What invites a ground station names no link, or would let anybody on the network fly the vehicle.
             ProfileError: The profile cannot be read.
             VehicleError: A vehicle cannot be read, or cannot start as the profile says.
             TrackError: There is no such track, or its file cannot be flown.
@@ -100,6 +102,7 @@ class FlightPlan(WorldSetting):
         ground = GroundAccess(tuple(args.gcs), args.signing_key, args.insecure)
         if ground.links and args.link != "udp":
             raise PlanError(f"--gcs needs --link udp: over {args.link} there is no autopilot to connect to")
+        check_reach(ground.links, signed=ground.signing_key is not None, insecure=ground.insecure)
         to_fly = track(args.track)
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle_name = args.vehicle or profile.simulation.vehicle

@@ -1,5 +1,6 @@
-"""A process's life: one-line errors and exit codes, a clean end on a signal, one thread, no pauses."""
+"""A process's life: one-line errors and exit codes, a clean and quick end, one thread, no pauses."""
 
+import atexit
 import gc
 import os
 import signal
@@ -38,6 +39,12 @@ def gc_frozen() -> Iterator[None]:
         yield
     finally:
         gc.unfreeze()
+
+
+def end_quickly() -> None:
+    """Spare this process at its end the search for garbage through all that it has loaded: a third of a second."""
+    atexit.unregister(gc.freeze)
+    atexit.register(gc.freeze)
 
 
 def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:

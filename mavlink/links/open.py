@@ -6,6 +6,7 @@ clients, `tcp:HOST:PORT` calls a server. The link between plant and autopilot is
 
 import os
 import socket
+from collections.abc import Iterable
 from ipaddress import ip_address
 
 from colibri.common.types import Address
@@ -53,6 +54,17 @@ def beyond_loopback(url: str) -> bool:
     """
     _, host, _ = _parse(url, (*_UDP, *_TCP))
     return not ip_address(_resolved(url, host)).is_loopback
+
+
+def check_reach(urls: Iterable[str], *, signed: bool, insecure: bool) -> None:
+    """Check that nobody on the network could fly the vehicle over `urls`, unless that is asked for.
+
+    Raises:
+        LinkError: Somebody could; or a URL is malformed, or its host unknown.
+    """
+    for url in urls:
+        if beyond_loopback(url) and not (signed or insecure):
+            raise LinkError(unsigned_refusal(url))
 
 
 def unsigned_refusal(url: str) -> str:

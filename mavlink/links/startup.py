@@ -5,7 +5,7 @@ import gc
 from collections.abc import Callable
 from typing import TypeVar
 
-from colibri.common.process.lifecycle import HoldTask, fail, use_one_thread
+from colibri.common.process.lifecycle import Stop, end_quickly, fail, use_one_thread
 from colibri.common.process.status import Status
 from colibri.mavlink.links.link import LinkError
 
@@ -20,8 +20,9 @@ def begin(
     To be called before numpy is loaded.
     """
     use_one_thread()
+    end_quickly()
     gc.disable()  # until all is loaded, see `gc_frozen`: what is loaded stays
-    stop = HoldTask(parent=args.parent, starting=True)
+    stop = Stop(parent=args.parent, starting=True)
     try:
         link = opened(url)
     except LinkError as error:

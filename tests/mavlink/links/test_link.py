@@ -6,7 +6,13 @@ from contextlib import closing
 import pytest
 
 from colibri.mavlink.links.link import LinkError
-from colibri.mavlink.links.open import beyond_loopback, open_ground_link, open_link, unsigned_refusal
+from colibri.mavlink.links.open import (
+    beyond_loopback,
+    check_reach,
+    open_ground_link,
+    open_link,
+    unsigned_refusal,
+)
 from colibri.mavlink.links.udp import UdpLink
 
 TIMEOUT_S = 2.0
@@ -132,3 +138,12 @@ def test_a_malformed_url_of_a_ground_station_is_refused(url: str) -> None:
     for function in (open_ground_link, beyond_loopback):
         with pytest.raises(LinkError, match=r"port 0|expected udpin:HOST:PORT or .* or tcp:HOST:PORT|unknown host"):
             function(url)
+
+
+def test_what_reaches_beyond_loopback_is_refused_unless_signed_or_asked_for() -> None:
+    urls = ("udpin:127.0.0.1:0", "udpin:0.0.0.0:0")
+    check_reach(urls, signed=True, insecure=False)
+    check_reach(urls, signed=False, insecure=True)
+    check_reach(urls[:1], signed=False, insecure=False)
+    with pytest.raises(LinkError, match=r"udpin:0\.0\.0\.0:0 reaches beyond this computer"):
+        check_reach(urls, signed=False, insecure=False)
