@@ -78,6 +78,7 @@ def test_services(tmp_path: Path) -> None:
         assert not any(sight.armed or sight.flying for sight in seen.sights)
 
 
+@pytest.mark.long
 def test_failure(tmp_path: Path) -> None:
     """On sensors, as only they can fail."""
     with vehicle(tmp_path, "--feedback", "sensors", speed=SPEED) as flown:

@@ -171,6 +171,7 @@ def test_it_flies_a_plan_and_returns(tmp_path: Path) -> None:
         assert flown.seen.modes() == [Mode.MISSION, Mode.RETURN]
 
 
+@pytest.mark.long
 def test_its_virtual_joystick(tmp_path: Path) -> None:
     with connected(tmp_path) as (station, flown):
         seen = flown.seen

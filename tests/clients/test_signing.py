@@ -48,6 +48,7 @@ def key_file(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_with_a_key_file_both_sign(tmp_path: Path, key_file: Path) -> None:
     with GroundStation() as station:
         sign(station)

@@ -139,6 +139,9 @@ BAD_INPUT = {
     "command": ((), "the following arguments are required: TRACK"),
 }
 
+SEEN_BY_THE_AUTOPILOT = ("extra", "profile key", "solver")
+"""Over UDP its process has to be started for it; `controller` shows the same of such a one in seconds."""
+
 
 def exit_code(command: list[str]) -> int | str | None:
     """Run a command; return what the shell would see."""
@@ -148,8 +151,14 @@ def exit_code(command: list[str]) -> int | str | None:
         return ended.code
 
 
-@pytest.mark.parametrize("link", ["udp", "direct"])
-@pytest.mark.parametrize(("arguments", "line"), BAD_INPUT.values(), ids=BAD_INPUT)
+@pytest.mark.parametrize(
+    ("arguments", "line", "link"),
+    [
+        pytest.param(*BAD_INPUT[what], link, id=f"{what}-{link}", marks=marks)
+        for what in BAD_INPUT
+        for link, marks in (("udp", pytest.mark.long if what in SEEN_BY_THE_AUTOPILOT else ()), ("direct", ()))
+    ],
+)
 def test_bad_input_gets_one_line_and_exit_code_2(
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -240,7 +249,7 @@ def has_flown(out: Path) -> bool:
     return log.exists() and log.stat().st_size > 10_000
 
 
-@pytest.mark.parametrize("whom", ["group", "parent"])
+@pytest.mark.parametrize("whom", ["group", pytest.param("parent", marks=pytest.mark.long)])
 def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path, whom: str) -> None:
     """A terminal interrupts the whole group; `kill` ends only the command itself."""
     flight = fly_slowly(tmp_path)
@@ -261,7 +270,7 @@ def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path, whom: str) ->
     assert flown[0].startswith("t,u,v,w,p,q,r,x,y,z,phi,theta,psi,U1")
 
 
-@pytest.mark.parametrize("name", ["plant", "autopilot"])
+@pytest.mark.parametrize("name", ["autopilot", pytest.param("plant", marks=pytest.mark.long)])
 def test_a_process_that_dies_ends_the_flight_in_words(tmp_path: Path, name: str) -> None:
     flight = fly_slowly(tmp_path)
     wait_for(lambda: has_flown(tmp_path), "the flight to begin")

@@ -24,6 +24,7 @@ def test_every_figure_of_the_thesis_has_its_place() -> None:
     assert (kinds["4.10"], kinds["4.11"], kinds["A.24"]) == ("first-seconds", "inputs", "inputs")
 
 
+@pytest.mark.long
 def test_tracks_with_options_are_compared_too(tmp_path: Path) -> None:
     tracks = ["hover:x=1,y=2", "hover:x=1"]
     options = [option for name in tracks for option in ("--track", name)]

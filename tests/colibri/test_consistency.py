@@ -65,7 +65,7 @@ def test_nees_is_within_its_bounds(path: source.Path, part: int, numbers: int) -
     assert share_within(means, bounds(numbers, FLIGHTS)) >= 0.85
 
 
-@pytest.mark.parametrize("path", [source.circle, source.hover])
+@pytest.mark.parametrize("path", [source.circle, pytest.param(source.hover, marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     ("kind", "numbers", "rate_hz"),
     [("velocity", 3, 10.0), ("position", 2, 10.0), ("height", 1, 10.0), ("pressure", 1, 50.0), ("field", 3, 50.0)],

@@ -105,7 +105,7 @@ def assert_gone(processes: list[psutil.Process]) -> None:
     assert not [process for process in processes if process.is_running()]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_it_ends_when_told_to(tmp_path: Path, number: signal.Signals) -> None:
     with standing(tmp_path) as (flown, children):
         flown.process.send_signal(number)
@@ -135,7 +135,7 @@ def test_ctrl_c_in_a_terminal_while_it_starts(tmp_path: Path) -> None:
     assert errors.read_text(encoding="utf-8") == ""
 
 
-@pytest.mark.parametrize("name", ["plant", "autopilot"])
+@pytest.mark.parametrize("name", ["plant", pytest.param("autopilot", marks=pytest.mark.long)])
 def test_a_process_that_dies_ends_it_in_words(tmp_path: Path, name: str) -> None:
     with standing(tmp_path) as (flown, children):
         (victim,) = (child for child in children if name in child.cmdline()[2])
@@ -146,6 +146,7 @@ def test_a_process_that_dies_ends_it_in_words(tmp_path: Path, name: str) -> None
         assert flown.said.count("error") == 1
 
 
+@pytest.mark.long
 def test_nothing_outlives_it(tmp_path: Path) -> None:
     with standing(tmp_path) as (flown, children):
         flown.process.kill()

@@ -18,7 +18,7 @@ FEW = ("at-its-limits-in-gusts", "lemniscate-on-sensors", "wave-by-global-lpv-mp
 """Those that showed a difference of kernels first, and others of other parts."""
 FEWER = ("at-its-limits-in-gusts", "wave-by-global-lpv-mpc")
 ALL = {variation.name: variation for variation in variations()}
-FEW_VARIATIONS = ("openblas-nehalem", "openblas-haswell", "numpy-without-simd", "glibc-without-avx2-and-fma")
+FEW_VARIATIONS = ("openblas-nehalem", "glibc-without-avx2-and-fma")
 
 
 def check(variation: Variation, flown: Flown) -> None:

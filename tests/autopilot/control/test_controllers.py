@@ -194,7 +194,7 @@ def fly_theirs(folder: Path, environment: dict[str, str], *options: str) -> "sub
     return subprocess.run([*command, *options], env=environment, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("link", ["udp", "direct"])
+@pytest.mark.parametrize("link", ["direct", pytest.param("udp", marks=pytest.mark.long)])
 def test_the_example_of_the_docs_flies(tmp_path: Path, link: str) -> None:
     assert len(example().splitlines()) <= 36
     environment = foreign_package(tmp_path, example())
@@ -213,14 +213,14 @@ def test_a_foreign_law_that_cannot_be_loaded_is_one_line(tmp_path: Path, link: s
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize("link", ["udp", "direct"])
+@pytest.mark.parametrize("link", ["direct", pytest.param("udp", marks=pytest.mark.long)])
 def test_a_foreign_law_that_cannot_be_built_says_why_in_one_line(tmp_path: Path, link: str) -> None:
     law = "import colibri\n\n\ndef TheirLaw(*_):\n    raise colibri.Error('mind the gap')\n"
     done = fly_theirs(tmp_path, foreign_package(tmp_path, law), "--controller", "their-name", "--link", link)
     assert (done.returncode, done.stderr) == (2, "colibri: error: mind the gap\n")
 
 
-@pytest.mark.parametrize("link", ["udp", "direct"])
+@pytest.mark.parametrize("link", ["direct", pytest.param("udp", marks=pytest.mark.long)])
 def test_a_foreign_law_that_goes_wild_ends_in_words(tmp_path: Path, link: str) -> None:
     wild = example().replace("rotor_speeds=", "rotor_speeds=float('nan') * ")
     done = fly_theirs(tmp_path, foreign_package(tmp_path, wild), "--controller", "their-name", "--link", link)

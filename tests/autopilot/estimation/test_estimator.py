@@ -142,7 +142,7 @@ def test_a_stationary_covariance_is_not_too_small() -> None:
 # --- GPS
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 5))])
 def test_without_gps_a_hover_drifts_little_says_so_and_comes_back_smoothly(seed: int) -> None:
     flight = recorded(source.hover, seed, 70.0, Faults(gps_lost_s=(30.0, 50.0)))
     of = estimates(flight.frames)

@@ -59,6 +59,7 @@ def test_the_same_flight_over_udp(forked: Launcher, feedback: str) -> None:
     assert any("take-off" in text for text in in_memory[1])
 
 
+@pytest.mark.long
 def test_the_same_flight_of_processes_from_scratch() -> None:
     def hover(sitl: Sitl) -> None:
         sitl.run(0.2)
@@ -66,7 +67,7 @@ def test_the_same_flight_of_processes_from_scratch() -> None:
     assert flown(FromScratch(), hover, airborne=2.0) == flown(None, hover, airborne=2.0)
 
 
-@pytest.mark.parametrize("processes", [False, True])
+@pytest.mark.parametrize("processes", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_a_bad_link_between_plant_and_autopilot_changes_no_flight(forked: Launcher, processes: bool) -> None:
     def fly(sitl: Sitl) -> None:
         sitl.goto(0.3, 0.0, 3.0, wait=False)

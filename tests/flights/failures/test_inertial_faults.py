@@ -24,7 +24,9 @@ def stays(flight: CopterFlight, seconds: float, max_m: Vector) -> None:
     assert max(dist(place[:2], (x, y)) for place in path) < away_m
 
 
-@pytest.mark.parametrize(("bias", "seed"), [((0.0, 0.0, 2.0), 1), ((1.0, 0.0, 0.0), 3)])
+@pytest.mark.parametrize(
+    ("bias", "seed"), [((0.0, 0.0, 2.0), 1), pytest.param((1.0, 0.0, 0.0), 3, marks=pytest.mark.long)]
+)
 def test_a_sudden_bias_is_learned_and_its_end_too(bias: Vector, seed: int) -> None:
     flight = CopterFlight(feedback=Feedback.SENSORS, seed=seed)
     flight.take_off(10.0)

@@ -60,7 +60,13 @@ def test_a_mission_goes_on_as_if_nothing_had_happened() -> None:
     assert flight.copter.power.charge_ah == pytest.approx(wanted.copter.power.charge_ah, rel=0.01)
 
 
-@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.TAKEOFF, Mode.LAND, Mode.RETURN, Mode.TRACK, Mode.ORBIT])
+@pytest.mark.parametrize(
+    "mode",
+    [
+        *(Mode.HOLD, Mode.TRACK, Mode.RETURN),
+        *(pytest.param(mode, marks=pytest.mark.long) for mode in (Mode.TAKEOFF, Mode.LAND, Mode.ORBIT)),
+    ],
+)
 def test_every_mode_goes_on(mode: Mode) -> None:
     flight = in_the_air(3.0)
     assert flight.go(8.0, 3.0, 3.0) == ACCEPTED
@@ -86,7 +92,7 @@ def max_tilt_deg(flight: CopterFlight, seconds: float) -> float:
     return max(tilts)
 
 
-@pytest.mark.parametrize("missed", [1, 30])
+@pytest.mark.parametrize("missed", [30, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("feedback", list(Feedback))
 def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int) -> None:
     """Frames are missed while an autopilot starts only where the plant does not wait for it."""
@@ -109,7 +115,7 @@ def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int)
     assert dist(flight.position, (0.0, 6.0, 4.0)) < (0.3 if feedback is Feedback.STATE else 3.0)
 
 
-@pytest.mark.parametrize("flying_s", [0.0, 0.6, 4.0])
+@pytest.mark.parametrize("flying_s", [4.0, *(pytest.param(each, marks=pytest.mark.long) for each in (0.0, 0.6))])
 def test_a_vehicle_on_sensors_is_caught_by_an_autopilot_that_knows_nothing(flying_s: float) -> None:
     """Out of a hover, while it gains speed with 20 degrees of tilt, and at speed."""
     flight = CopterFlight(feedback=Feedback.SENSORS)

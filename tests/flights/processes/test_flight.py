@@ -33,12 +33,12 @@ def vehicle_file(folder: Path, **changes: str) -> str:
     ("track", "duration_s", "reach_m"),
     [
         ("spiral", 25, 0.001),
-        ("expanding-spiral", 40, 0.005),
-        ("line", 25, 0.001),
-        ("wave", 25, 0.002),
         ("crown", 25, 0.003),
         ("lemniscate", 32, 0.005),
-        ("lemniscate:yaw=fixed", 26, 0.002),
+        pytest.param("expanding-spiral", 40, 0.005, marks=pytest.mark.long),
+        pytest.param("line", 25, 0.001, marks=pytest.mark.long),
+        pytest.param("wave", 25, 0.002, marks=pytest.mark.long),
+        pytest.param("lemniscate:yaw=fixed", 26, 0.002, marks=pytest.mark.long),
     ],
 )
 def test_every_track_is_tracked(tmp_path: Path, track: str, duration_s: int, reach_m: float) -> None:
@@ -82,7 +82,16 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("what", WRONG)
+@pytest.mark.parametrize(
+    "what",
+    [
+        *("20 % heavier", "one rotor 15 % weak"),
+        *(
+            pytest.param(what, marks=pytest.mark.long)
+            for what in ("20 % lighter", *(it for it in WRONG if "inertia" in it))
+        ),
+    ],
+)
 def test_a_wrong_model_costs_little(tmp_path: Path, what: str) -> None:
     other = ("--plant-vehicle", vehicle_file(tmp_path, **WRONG[what]))
     figures = fly(tmp_path / "out", "spiral", "--link", "memory", "--duration", "25", *other)
@@ -119,7 +128,13 @@ def test_with_tight_limits_constraints_bind_and_it_still_flies(tmp_path: Path) -
 
 @pytest.mark.parametrize(
     "start",
-    ["phi=170", "phi=180", "theta=89", "p=10", "q=10", "r=10", "phi=170,p=6,q=-6,r=5", "phi=120,theta=40,q=10"],
+    [
+        *("phi=170", "theta=89", "phi=170,p=6,q=-6,r=5"),
+        *(
+            pytest.param(it, marks=pytest.mark.long)
+            for it in ("phi=180", "p=10", "q=10", "r=10", "phi=120,theta=40,q=10")
+        ),
+    ],
 )
 def test_any_start_is_recovered_from(tmp_path: Path, start: str) -> None:
     """20 m up: upright within a second, no lower than 3 m below, and back at its place."""
@@ -144,8 +159,8 @@ RECOVERED: dict[str, dict[str, float]] = {
 
 
 def test_whichever_way_it_turns_it_recovers() -> None:
-    """20 starts a millimetre apart: which way is the shortest is decided by nothing when it is upside down."""
-    check_recovered(fly_family("hover:height=20", 20, 2.5, x=0.0, y=0.0, z=20.0, **RECOVERED["upside down"]))
+    """8 starts a millimetre apart: which way is the shortest is decided by nothing when it is upside down."""
+    check_recovered(fly_family("hover:height=20", 8, 2.5, x=0.0, y=0.0, z=20.0, **RECOVERED["upside down"]))
 
 
 @pytest.mark.long
@@ -163,8 +178,8 @@ def check_recovered(flown: list[Flown]) -> None:
 
 
 def test_what_no_vehicle_can_follow_is_followed_upright_and_never_lost() -> None:
-    """36 m/s and 400 m/s²: from 20 starts a millimetre apart, for these are chaotic flights."""
-    check_upright_and_near(fly_family("lemniscate:lap=1.0", 20, 6.0))
+    """36 m/s and 400 m/s²: from 8 starts a millimetre apart, for these are chaotic flights."""
+    check_upright_and_near(fly_family("lemniscate:lap=1.0", 8, 6.0))
 
 
 @pytest.mark.long

@@ -81,6 +81,7 @@ def test_an_autopilot_that_was_killed_is_started_again_and_holds(logs: Path) -> 
             flies_on(seen, 1.0)
 
 
+@pytest.mark.long
 def test_an_autopilot_says_that_its_plant_is_gone(logs: Path) -> None:
     with hovering(logs) as (plant, autopilot, _, _):
         plant.process.send_signal(signal.SIGKILL)

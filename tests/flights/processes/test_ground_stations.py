@@ -50,7 +50,7 @@ def test_nothing_is_compiled_or_loaded_in_flight() -> None:
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == ""
 
 
-@pytest.mark.parametrize("profile", ["se3", "thesis"])
+@pytest.mark.parametrize("profile", ["thesis", pytest.param("se3", marks=pytest.mark.long)])
 def test_every_control_law_flies_where_it_is_sent(profile: str) -> None:
     """One previews a single reference, the other two that are four control samples apart."""
     flight = CopterFlight(profile=load_profile(profile), start=Start(z=5.0, rotors=4740.0))

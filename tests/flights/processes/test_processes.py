@@ -124,7 +124,7 @@ def test_an_autopilot_that_wants_sensors_of_a_vehicle_without_is_told(tmp_path: 
         assert "has no sensors" in autopilot.wait_for("refused")["text"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_a_signal_ends_both_and_keeps_what_was_logged(tmp_path: Path, logs: Path, number: signal.Signals) -> None:
     out = tmp_path / "flight"
     plant, url = start_plant(logs, out)

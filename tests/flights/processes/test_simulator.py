@@ -29,6 +29,7 @@ def test_it_hovers_on_sensors_in_a_simulator_of_px4(tmp_path: Path, vehicle: str
         assert np.ptp(flown[axis][settled]) < 0.5
 
 
+@pytest.mark.long
 def test_it_outlives_the_seconds_in_which_it_knows_nothing(tmp_path: Path) -> None:
     """Ground stations are told of a vehicle each second; at real time the first estimate takes longer."""
     plant = Process(tmp_path, "plant", "--serve", "px4", "--link", "tcpin:127.0.0.1:0", "--speed", "1")

@@ -17,7 +17,7 @@ SETTLED_RMS_M = {"spiral": 0.1254, "line": 0.0578}
 
 
 @begins_as_recorded
-@pytest.mark.parametrize("integrator", ["adaptive", "rk4"])
+@pytest.mark.parametrize("integrator", ["adaptive", pytest.param("rk4", marks=pytest.mark.long)])
 @pytest.mark.parametrize("track", TRACKS)
 def test_direct_equals_the_reference(tmp_path: Path, track: str, integrator: str) -> None:
     figures = fly_thesis(tmp_path, track, "--link", "direct", "--integrator", integrator)

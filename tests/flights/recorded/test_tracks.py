@@ -40,9 +40,8 @@ def flown_directly(name: str, profile: str = "thesis") -> tuple[dict[str, Any], 
         return figures, rows(Path(folder) / "flight.csv")
 
 
-@pytest.mark.parametrize(
-    "name", ["expanding-spiral", *(pytest.param(name, marks=pytest.mark.long) for name in ("wave", "crown"))]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["expanding-spiral", "wave", "crown"])
 def test_a_track_over_udp_is_the_one_flown_directly(tmp_path: Path, name: str) -> None:
     """But for float32 on the wire, which costs 2e-5 where a track stays near the origin, more at 200 m from it."""
     over_udp, (direct, wanted) = fly_thesis(tmp_path, name, "--link", "udp", "--duration", "40"), flown_directly(name)
@@ -112,10 +111,10 @@ def test_forward_euler_flies_a_little_worse() -> None:
 @pytest.mark.parametrize(
     ("name", "duration_s", "rms_m"),
     [
-        ("hover", 25.0, 1e-6),
         ("circle:radius=3,speed=4", 25.0, 1e-3),
-        ("lemniscate", 30.0, 0.01),
         ("waypoints", 25.0, 1e-6),
+        pytest.param("hover", 25.0, 1e-6, marks=pytest.mark.long),
+        pytest.param("lemniscate", 30.0, 0.01, marks=pytest.mark.long),
     ],
 )
 def test_the_others_by_formula(tmp_path: Path, name: str, duration_s: float, rms_m: float) -> None:

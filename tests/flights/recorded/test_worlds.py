@@ -16,6 +16,7 @@ REALISTIC = ("spiral", "--profile", "thesis", "--vehicle", "hummingbird", "--int
 TUMBLING = "x=1,y=2,z=20,phi=170,theta=-10,psi=123.4,vx=3,vy=-2,vz=1,p=10,q=-1,r=0.5,rotors=4000"
 
 
+@pytest.mark.long
 def test_udp_and_memory_are_in_the_same_world(tmp_path: Path) -> None:
     options = (*REALISTIC, "4", "--wind", "3.3@123.4", "--without", "drag", "--without", "battery", "--start", TUMBLING)
     udp, memory = (fly(tmp_path / link, *options, "--link", link) for link in ("udp", "memory"))

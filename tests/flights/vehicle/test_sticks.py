@@ -33,7 +33,9 @@ def test_without_sticks_there_is_no_such_mode_in_flight(mode: Mode) -> None:
     assert flight.client.said("no MANUAL_CONTROL is heard")
 
 
-@pytest.mark.parametrize("mode", [Mode.POSITION, Mode.ALTITUDE, Mode.STABILIZED])
+@pytest.mark.parametrize(
+    "mode", [Mode.STABILIZED, *(pytest.param(mode, marks=pytest.mark.long) for mode in (Mode.POSITION, Mode.ALTITUDE))]
+)
 def test_silent_sticks_lead_to_hold(mode: Mode) -> None:
     flight = flying(mode)
     hold_sticks(flight, 0.5)

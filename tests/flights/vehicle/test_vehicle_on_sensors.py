@@ -20,7 +20,7 @@ def off_m(flight: CopterFlight) -> float:
     return dist(flight.estimate.frame.position_enu_m, flight.position)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_it_takes_off_goes_somewhere_and_lands(seed: int) -> None:
     flight = on_sensors(seed)
     flight.take_off(5.0)

@@ -51,7 +51,7 @@ def test_too_much_tilting_moment_keeps_its_direction() -> None:
     assert wrench[1] > 0.3
 
 
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(quaternions(), vectors(10.0))
 def test_the_thrust_axis_gets_where_it_must_point(q: Quaternion, rate: Vector) -> None:
     """From any attitude and rotation, with moments as asked: upright, and turning no more, in three seconds."""
