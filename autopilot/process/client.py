@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.process.logs import AutopilotLog
-from colibri.common.process.lifecycle import HoldTask
+from colibri.common.process.lifecycle import Stop
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.px4_autopilot import FlierEnd
@@ -40,7 +40,7 @@ class Client:
         link: UdpLink | BlockingReceiver,
         end: AutopilotEnd | FlierEnd,
         status: Status,
-        stop: HoldTask,
+        stop: Stop,
         log: AutopilotLog | None,
         ground: "Ground | None" = None,
     ) -> None:

@@ -12,7 +12,7 @@ from colibri.autopilot.process.client import Client
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, HoldTask, fail, gc_frozen
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, gc_frozen
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.px4_autopilot import FlierEnd
@@ -41,7 +41,7 @@ def loaded(args: argparse.Namespace) -> tuple[Profile, Vehicle, Estimator | None
     return profile, vehicle, estimator_for(args.feedback, vehicle, args.home.origin)
 
 
-def run(args: argparse.Namespace, link: UdpLink | BlockingReceiver, status: Status, stop: HoldTask) -> int:
+def run(args: argparse.Namespace, link: UdpLink | BlockingReceiver, status: Status, stop: Stop) -> int:
     """Fly the plant at the other end of `link` as the command line says; return the exit code."""
     try:
         profile, vehicle, estimator = loaded(args)
@@ -116,7 +116,7 @@ def _ground(
     vehicle: Vehicle,
     estimator: Estimator | None,
     status: Status,
-    stop: HoldTask,
+    stop: Stop,
 ) -> "Ground":
     """Load what serves ground stations only where there are any: it is as much as all the rest."""
     from colibri.autopilot.process.ground import open_ground

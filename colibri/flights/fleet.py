@@ -9,7 +9,7 @@ from time import perf_counter
 from colibri.autopilot.control.profile import load_profile
 from colibri.common.earth.home import HomePlace
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, HoldTask, fail
+from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
 from colibri.flights.children import Child, end_children, events_of, how_it_ended
 from colibri.flights.command_lines import options_of, plant_options
 from colibri.flights.fleet_status import StatusLines
@@ -62,7 +62,7 @@ def sitl(args: argparse.Namespace) -> int:
         for instance in range(args.instance, args.instance + args.count):
             prepare(args.out / str(instance))
     fleet = [Member(i, ground_links(args, i)) for i in range(args.instance, args.instance + args.count)]
-    stop = HoldTask()
+    stop = Stop()
     lines = StatusLines(quiet=args.quiet)
     try:
         for member in fleet:
@@ -148,7 +148,7 @@ def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -
     member.children.append(Child("autopilot", options))
 
 
-def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: HoldTask, lines: StatusLines) -> int:
+def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines: StatusLines) -> int:
     """Hear what the processes say until the last vehicle ends or the user has had enough."""
     flying = list(fleet)
     while flying and not stop:

@@ -54,7 +54,7 @@ def fail(message: str, code: int = EXIT_BAD_INPUT) -> NoReturn:
     raise SystemExit(code)
 
 
-class HoldTask:
+class Stop:
     """Becomes true when the process shall end: SIGINT, SIGTERM, or (if asked for) the death of its parent."""
 
     def __init__(self, *, parent: int | None = None, starting: bool = False) -> None:

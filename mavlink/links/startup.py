@@ -12,9 +12,7 @@ from colibri.mavlink.links.link import LinkError
 Link = TypeVar("Link")
 
 
-def begin(
-    name: str, url: str, args: argparse.Namespace, opened: Callable[[str], Link]
-) -> tuple[Link, Status, HoldTask]:
+def begin(name: str, url: str, args: argparse.Namespace, opened: Callable[[str], Link]) -> tuple[Link, Status, Stop]:
     """Open the link at `url` by `opened` and take over signals, or end with one line.
 
     To be called before numpy is loaded.

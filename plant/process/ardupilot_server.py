@@ -4,7 +4,7 @@ import argparse
 from time import perf_counter
 
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, HoldTask, fail, gc_frozen
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, gc_frozen
 from colibri.common.process.log_files import CsvLog
 from colibri.common.process.status import Progress, Status
 from colibri.common.types import Address
@@ -21,7 +21,7 @@ _SILENCE_SAID_AFTER_S = 2.0
 _MAX_WAIT_S = 0.1
 
 
-def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: HoldTask) -> int:
+def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
     """Serve ArduPilot on `link` as the command line says; return the exit code."""
     try:
         weather = weather_of(args)
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: HoldTask)
 
 
 def _serve(
-    end: ArduPilotEnd, link: UdpLink, status: Status, stop: HoldTask, log: CsvLog | None, *, duration_s: float
+    end: ArduPilotEnd, link: UdpLink, status: Status, stop: Stop, log: CsvLog | None, *, duration_s: float
 ) -> None:
     """Answer until the simulated time is over or the process is told to stop."""
     began_s = heard_s = perf_counter()

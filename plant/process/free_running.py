@@ -2,7 +2,7 @@
 
 from time import perf_counter
 
-from colibri.common.process.lifecycle import HoldTask
+from colibri.common.process.lifecycle import Stop
 from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
@@ -23,7 +23,7 @@ class FreeServer(Server):
         link: UdpLink,
         end: PlantEnd,
         status: Status,
-        stop: HoldTask,
+        stop: Stop,
         logs: PlantLogs | None,
         *,
         cut_after_s: float,

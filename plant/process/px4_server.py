@@ -7,7 +7,7 @@ from time import perf_counter, sleep
 
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, HoldTask, fail, gc_frozen
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, gc_frozen
 from colibri.common.process.status import Progress, Status
 from colibri.common.rotations import earth_from_body
 from colibri.mavlink.hil.px4_simulator import SimulatorEnd, Truth
@@ -26,7 +26,7 @@ _SILENCE_SAID_AFTER_S = 2.0
 _MAX_WAIT_S = 0.1
 
 
-def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: HoldTask) -> int:
+def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> int:
     """Serve PX4 on `link` as the command line says; return the exit code."""
     try:
         simulator = Simulator(args, link, status, stop)
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: HoldTa
 class Simulator:
     """Serves one PX4 after the other, each from the start."""
 
-    def __init__(self, args: argparse.Namespace, link: GroundLink, status: Status, stop: HoldTask) -> None:
+    def __init__(self, args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> None:
         """Fly as the command line says.
 
         Raises:

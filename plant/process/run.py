@@ -3,7 +3,7 @@
 import argparse
 
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, HoldTask, fail, gc_frozen
+from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, gc_frozen
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.links.udp import UdpLink
@@ -29,7 +29,7 @@ def builder_of(args: argparse.Namespace) -> PlantBuilder:
     return PlantBuilder(setting, vehicle, starts, integrator=args.integrator, origin=args.home.origin)
 
 
-def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: HoldTask) -> int:
+def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
     """Serve one flight on `link` as the command line says; return the exit code."""
     try:
         builder = builder_of(args)

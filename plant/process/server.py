@@ -2,7 +2,7 @@
 
 from time import perf_counter, sleep
 
-from colibri.common.process.lifecycle import HoldTask
+from colibri.common.process.lifecycle import Stop
 from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
@@ -43,7 +43,7 @@ class Server:
         link: UdpLink,
         end: PlantEnd,
         status: Status,
-        stop: HoldTask,
+        stop: Stop,
         logs: PlantLogs | None,
         *,
         streams_truth: bool = False,

@@ -8,7 +8,7 @@ import pytest
 
 from colibri.autopilot.__main__ import command_line
 from colibri.autopilot.process.run import run
-from colibri.common.process.lifecycle import HoldTask
+from colibri.common.process.lifecycle import Stop
 from colibri.common.process.status import Status
 from colibri.mavlink.links.open import open_link
 
@@ -17,7 +17,7 @@ Prepare = Callable[[Path], str]
 PARAMETERS = "lpv-mpc-asctec-hummingbird.params"
 
 
-class AtOnce(HoldTask):
+class AtOnce(Stop):
     """Ends the process before its first frame, and leaves signals alone."""
 
     def __init__(self) -> None:
