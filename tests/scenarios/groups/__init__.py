@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from tests.scenarios.groups import (
     arming,
     failsafes,
+    faults,
     fleet,
     holding,
     links,
@@ -24,6 +25,7 @@ GROUPS: Mapping[str, Sequence[Scenario | FleetScenario]] = {
     "mission": missions.SCENARIOS,
     "offboard": offboard.SCENARIOS,
     "failsafes": failsafes.SCENARIOS,
+    "faults": faults.SCENARIOS,
     "link-process": links.SCENARIOS,
     "malformed": malformed.SCENARIOS,
     "fleet": fleet.SCENARIOS,

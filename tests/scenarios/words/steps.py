@@ -1,7 +1,7 @@
 """What is done in a scenario, and what must hold: the words that scenarios are written in."""
 
 from collections.abc import Callable, Iterable, Sequence
-from math import nan, radians
+from math import dist, nan, radians
 from typing import Any
 
 import numpy as np
@@ -120,6 +120,17 @@ def hold(condition: Condition, *, for_: float, meanwhile: Step | None = None) ->
             return condition.holds(sitl)
 
         sitl.hold(still, for_=for_, what=condition.words)
+
+    return step
+
+
+def moves_less(max_m: float, seconds: float, tilt: float = 90.0) -> Step:
+    """See that it stays about where it is."""
+
+    def step(sitl: Sitl) -> None:
+        began = sitl.position
+        near_and_level = lambda: dist(sitl.position, began) <= max_m and sitl.tilt_deg <= tilt  # noqa: E731
+        sitl.hold(near_and_level, for_=seconds, what=f"at most {max_m:g} m away")
 
     return step
 
