@@ -1,24 +1,22 @@
 """Sees what a vehicle really does, on a link of its own: clients are judged by this, not by what they say."""
 
-import socket
 from collections import Counter
 from collections.abc import Callable
-from select import select
-from threading import Condition, Event, Thread
+from threading import Condition
 from time import monotonic
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 from colibri.autopilot.commander.rules.modes import Mode, mode_of_custom
 from colibri.common.rotations import euler_from_quaternion
 from colibri.common.types import Vector
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Codec, Message, mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
+from tools.harness.ports import OnPort
 
 ON_GROUND: int = mav.MAV_LANDED_STATE_ON_GROUND
 GIVE_UP_AFTER_S = 60.0
 
 _SYSTEM_ID = 240
-_LOOK_EVERY_S = 0.05
 _INTERVALS_US = {
     "LOCAL_POSITION_NED": 50_000,
     "ATTITUDE_QUATERNION": 50_000,
@@ -61,42 +59,21 @@ class Sight(NamedTuple):
         return self.landed not in (ON_GROUND, mav.MAV_LANDED_STATE_UNDEFINED)
 
 
-class Observer:
-    """Records what a vehicle sends to a port of this computer.
+class Observer(OnPort):
+    """Records what a vehicle sends to a port of this computer."""
 
-    Attributes:
-        url: The link that the vehicle is to serve.
-    """
-
-    def __init__(self, port: int = 0) -> None:
-        """Listen on `port`; 0: any that is free."""
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4_000_000)
-        self._socket.bind(("127.0.0.1", port))
-        self.url = f"udpout:127.0.0.1:{self._socket.getsockname()[1]}"
+    def __init__(self) -> None:
+        """Listen on any free port."""
+        super().__init__(self)
         self._codec = Codec(_SYSTEM_ID, mav.MAV_COMP_ID_MISSIONPLANNER)
-        self._vehicle: tuple[str, int] | None = None
         self._system_id = 0
-        self._has_asked = False
+        self._requested = False
         self._latest: dict[str, Any] = {}
         self._sights: list[Sight] = []
         self._texts: list[str] = []
         self._modes: list[Mode] = []
         self._counts: Counter[str] = Counter()
         self._news = Condition()
-        self._ended = Event()
-        self._thread = Thread(target=self._run, daemon=True)
-
-    def __enter__(self) -> Self:
-        """Begin."""
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """End."""
-        self._ended.set()
-        self._thread.join()
-        self._socket.close()
 
     @property
     def sights(self) -> list[Sight]:
@@ -180,10 +157,9 @@ class Observer:
             within_s: Wall-clock bound for what hangs.
         """
         with self._news:
-            assert self._vehicle is not None, "nobody to ask"
             before = self._counts[answer]
             target = (self._system_id, AUTOPILOT_COMPONENT)
-            self._socket.sendto(self._codec.encode(name, *target, *fields), self._vehicle)
+            self.send(self._codec.encode(name, *target, *fields))
             assert self._news.wait_for(lambda: self._counts[answer] > before, within_s), f"no {answer}"
             return self._latest[answer]
 
@@ -202,15 +178,15 @@ class Observer:
         told = self.ask("PARAM_VALUE", "PARAM_SET", name, value, mav.MAV_PARAM_TYPE_REAL32)
         assert (told.param_id, told.param_value) == (name, value)
 
-    def _run(self) -> None:
-        while not self._ended.is_set():
-            if not select([self._socket], [], [], _LOOK_EVERY_S)[0]:
-                continue
-            datagram, self._vehicle = self._socket.recvfrom(4096)
-            with self._news:
-                for message in self._codec.decode(datagram):
-                    self._take(message)
-                self._news.notify_all()
+    def receive(self, datagram: bytes, now_s: float) -> list[bytes]:  # noqa: ARG002
+        """Take in a datagram of the vehicle; return the requests for message rates after the first heartbeat."""
+        with self._news:
+            for message in self._codec.decode(datagram):
+                self._take(message)
+            self._news.notify_all()
+            requests = [] if self._requested or not self._system_id else self._rate_requests()
+            self._requested |= bool(requests)
+        return requests
 
     def _take(self, message: Message) -> None:
         name, fields = message.name, message.fields
@@ -230,20 +206,14 @@ class Observer:
         mode = mode_of_custom(heartbeat.custom_mode)
         if heartbeat.base_mode & MODE_ARMED and mode and self._modes[-1:] != [mode]:
             self._modes.append(mode)
-        if not self._has_asked:
-            self._ask()
 
-    def _ask(self) -> None:
-        """Ask for the rates at which to see, once: loopback loses nothing."""
-        assert self._vehicle is not None, "it has just been heard"
-        self._has_asked = True
-        for name, interval_us in _INTERVALS_US.items():
-            number = getattr(mav, f"MAVLINK_MSG_ID_{name}")
-            fields = (
-                *(self._system_id, AUTOPILOT_COMPONENT, mav.MAV_CMD_SET_MESSAGE_INTERVAL, 0),
-                *(number, interval_us, 0, 0, 0, 0, 0),
-            )
-            self._socket.sendto(self._codec.encode("COMMAND_LONG", *fields), self._vehicle)
+    def _rate_requests(self) -> list[bytes]:
+        """Return the requests for the rates at which to see, sent once: loopback loses nothing."""
+        head = (self._system_id, AUTOPILOT_COMPONENT, mav.MAV_CMD_SET_MESSAGE_INTERVAL, 0)
+        return [
+            self._codec.encode("COMMAND_LONG", *head, getattr(mav, f"MAVLINK_MSG_ID_{name}"), interval_us, *(0,) * 5)
+            for name, interval_us in _INTERVALS_US.items()
+        ]
 
     def _sight(self) -> Sight:
         where, heartbeat = self._latest["LOCAL_POSITION_NED"], self._latest["HEARTBEAT"]

@@ -23,10 +23,12 @@ class OnPort:
 
     Attributes:
         url: The link that the vehicle is to serve.
+        sender: The address that the last datagram came from; None before the first.
     """
 
     def __init__(self, talker: Talker) -> None:
         """Listen on any free port."""
+        self.sender: tuple[str, int] | None = None
         self._talker = talker
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
@@ -46,9 +48,14 @@ class OnPort:
         self._thread.join()
         self._socket.close()
 
+    def send(self, datagram: bytes) -> None:
+        """Send a datagram to whoever sent last."""
+        assert self.sender is not None, "nothing has been received"
+        self._socket.sendto(datagram, self.sender)
+
     def _run(self) -> None:
         while not self._ended.is_set():
             if select([self._socket], [], [], _LOOK_EVERY_S)[0]:
-                datagram, sender = self._socket.recvfrom(4096)
+                datagram, self.sender = self._socket.recvfrom(4096)
                 for answer in self._talker.receive(datagram, monotonic()):
-                    self._socket.sendto(answer, sender)
+                    self.send(answer)

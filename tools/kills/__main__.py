@@ -2,12 +2,12 @@
 
 import argparse
 import sys
-import tempfile
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
+from typing import TypeVar
 
 from colibri.common.process.arguments import natural
 from colibri.mavlink.hil.feedback import Feedback, feedback
@@ -18,6 +18,8 @@ MAX_TILT_DEG = 35.0 + 45.0
 """45° more than the largest tilt that a pilot may ask for."""
 MAX_LOST_M = 2.0
 _PLANTS_A_FLIGHT = 10
+
+K = TypeVar("K")
 
 
 def main() -> int:
@@ -55,20 +57,12 @@ def failures_of(number: int, flight: autopilots.Flight) -> list[str]:
 
 def _autopilots(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[str]]:
     """Kill autopilots; return what to print, and what failed."""
-    done: list[autopilots.Kill] = []
-    failures: list[str] = []
-    flights = 0
-    while len(done) < kills:
-        flights += 1
-        try:
-            with _folder() as folder:
-                flight = autopilots.fly(folder, feedback, 1000 * seed + flights, kills - len(done))
-        except HangsError as error:
-            failures.append(f"mission {flights}: {error}")
-            break
-        done += flight.kills
-        failures += failures_of(flights, flight)
-        _say(f"mission {flights}: {len(flight.kills)} kills in {flight.duration_s:.0f} s, {len(done)} in all")
+
+    def fly(folder: Path, number: int, maximum: int) -> tuple[list[autopilots.Kill], list[str]]:
+        flight = autopilots.fly(folder, feedback, 1000 * seed + number, maximum)
+        return flight.kills, failures_of(number, flight)
+
+    done, failures, flights = _killed("mission", kills, fly)
     hovers, others = [kill for kill in done if kill.still], [kill for kill in done if not kill.hovered]
     phases = Counter(kill.phase for kill in done)
     lines = [
@@ -86,26 +80,19 @@ def _autopilots(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], l
 
 def _plants(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[str]]:
     """Kill plants; return what to print, and what failed."""
-    done: list[plants.Kill] = []
-    failures: list[str] = []
-    flights = 0
-    while len(done) < kills:
-        flights += 1
-        try:
-            with _folder() as folder:
-                maximum = min(_PLANTS_A_FLIGHT, kills - len(done))
-                killed, words = plants.fly(folder, feedback, 1000 * seed + flights, maximum)
-        except HangsError as error:
-            failures.append(f"autopilot {flights}: {error}")
-            break
-        done += killed
-        failures += [f"autopilot {flights}: {words}"] if words else []
+
+    def fly(folder: Path, number: int, maximum: int) -> tuple[list[plants.Kill], list[str]]:
+        killed, words = plants.fly(folder, feedback, 1000 * seed + number, min(_PLANTS_A_FLIGHT, maximum))
+        found = [f"autopilot {number}: {words}"] if words else []
         for kill in killed:
+            where = f"autopilot {number}, t = {kill.time_s:.3f} s"
             if not kill.stood:
-                failures.append(f"autopilot {flights}, t = {kill.time_s:.3f} s: the next flight did not begin anew")
+                found.append(f"{where}: the next flight did not begin anew")
             if kill.said and "waiting for a plant" not in kill.said:
-                failures.append(f"autopilot {flights}, t = {kill.time_s:.3f} s: said {kill.said}")
-        _say(f"autopilot {flights}: {len(killed)} plants, {len(done)} in all")
+                found.append(f"{where}: said {kill.said}")
+        return killed, found
+
+    done, failures, _ = _killed("autopilot", kills, fly)
     phases = Counter(kill.phase for kill in done)
     waited = sum(bool(kill.said) for kill in done)
     lines = [
@@ -115,20 +102,29 @@ def _plants(kills: int, seed: int, feedback: Feedback) -> tuple[list[str], list[
     return lines, failures
 
 
-@contextmanager
-def _folder() -> Iterator[Path]:
-    """Give a folder that is to be made for a flight, and is gone after it."""
-    with tempfile.TemporaryDirectory() as folder:
-        yield Path(folder) / "flight"
+def _killed(
+    what: str, kills: int, fly: Callable[[Path, int, int], tuple[list[K], list[str]]]
+) -> tuple[list[K], list[str], int]:
+    """Fly until there are so many kills; return them, what failed, and the number of flights."""
+    done: list[K] = []
+    failures: list[str] = []
+    flights = 0
+    while len(done) < kills:
+        flights += 1
+        try:
+            with TemporaryDirectory() as folder:
+                killed, found = fly(Path(folder) / "flight", flights, kills - len(done))
+        except HangsError as error:
+            failures.append(f"{what} {flights}: {error}")
+            break
+        done += killed
+        failures += found
+        print(f"{what} {flights}: {len(killed)} kills, {len(done)} in all", file=sys.stderr, flush=True)  # noqa: T201
+    return done, failures, flights
 
 
 def _most(values: Iterator[float]) -> float:
     return max(values, default=0.0)
-
-
-def _say(line: str) -> None:
-    sys.stderr.write(line + "\n")
-    sys.stderr.flush()
 
 
 if __name__ == "__main__":
