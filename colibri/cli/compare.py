@@ -1,9 +1,8 @@
 """`colibri compare`: its options, and its call."""
 
 from argparse import ArgumentTypeError, Namespace
-from pathlib import Path
 
-from colibri.cli.shared_options import add_feedback
+from colibri.cli.shared_options import add_feedback, add_out
 from colibri.common.process.arguments import ArgumentParser, positive
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import NO_WIND
@@ -54,14 +53,7 @@ def add_options(parser: ArgumentParser) -> None:
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--duration", type=positive, default=COMPARED_S, metavar="S", help="simulated time (default %(default)s)")
     add_weather_arguments(parser)
-    add(
-        "--out",
-        type=Path,
-        default=Path("out/compare"),
-        metavar="DIR",
-        help="folder for the tables (default %(default)s)",
-    )
-    add("--quiet", action="store_true", help="say nothing but errors")
+    add_out(add, "out/compare", "the tables")
 
 
 def run(args: Namespace) -> int:

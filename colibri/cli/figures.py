@@ -1,23 +1,16 @@
 """`colibri figures`: its options, and its call."""
 
 from argparse import Namespace
-from pathlib import Path
 
+from colibri.cli.shared_options import add_out
 from colibri.common.process.arguments import ArgumentParser
 
 
 def add_options(parser: ArgumentParser) -> None:
     """Add the options of `colibri figures`."""
     add = parser.add_argument
-    add(
-        "--out",
-        type=Path,
-        default=Path("out/thesis"),
-        metavar="DIR",
-        help="folder for PNG and SVG (default %(default)s)",
-    )
+    add_out(add, "out/thesis", "PNG and SVG")
     add("--only", action="append", metavar="NUMBER", help="only this figure, 4.9 say; may be repeated")
-    add("--quiet", action="store_true", help="say nothing but errors")
 
 
 def run(args: Namespace) -> int:

@@ -1,9 +1,8 @@
 """`colibri fly`: its options, and its call."""
 
 from argparse import Namespace
-from pathlib import Path
 
-from colibri.cli.shared_options import add_feedback, add_signing
+from colibri.cli.shared_options import add_feedback, add_out, add_signing
 from colibri.common.process.arguments import ArgumentParser, natural, positive, speed
 from colibri.plant.process.options import add_world_arguments
 
@@ -50,10 +49,7 @@ def add_options(parser: ArgumentParser) -> None:
         parser, start="the profile's, and the track's first yaw", of_whom=" of the plant; the autopilot keeps its own"
     )
     add("--duration", type=positive, default=100.0, metavar="S", help="simulated time (default %(default)s)")
-    add(
-        "--out", type=Path, default=Path("out"), metavar="DIR", help="folder for logs and figures (default %(default)s)"
-    )
-    add("--quiet", action="store_true", help="say nothing but errors")
+    add_out(add, "out", "logs and figures")
     add("--no-figures", action="store_true", help="draw no PNG figures")
 
 

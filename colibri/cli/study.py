@@ -1,8 +1,8 @@
 """`colibri study`: its options, and its call."""
 
 from argparse import Namespace
-from pathlib import Path
 
+from colibri.cli.shared_options import add_out
 from colibri.common.process.arguments import ArgumentParser
 
 
@@ -15,14 +15,7 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="NAME",
         help="tracks, speed, recovery, robustness, limits or scheduling (default: all of them)",
     )
-    add(
-        "--out",
-        type=Path,
-        default=Path("out/study"),
-        metavar="DIR",
-        help="folder for figures and tables (default %(default)s)",
-    )
-    add("--quiet", action="store_true", help="say nothing but errors")
+    add_out(add, "out/study", "figures and tables")
 
 
 def run(args: Namespace) -> int:

@@ -3,6 +3,7 @@
 from argparse import Namespace
 from pathlib import Path
 
+from colibri.cli.shared_options import add_out
 from colibri.common.process.arguments import ArgumentParser, positive
 
 GOLDEN_HASHES = Path("tests/golden/hashes.json")
@@ -24,8 +25,7 @@ def add_options(parser: ArgumentParser) -> None:
     )
     add("--renew", action="store_true", help="with --golden: write the hashes to FILE, and show which have changed")
     add("--only", action="append", default=[], metavar="NAME", help="with --golden: only this flight; may be repeated")
-    add("--out", type=Path, default=Path("out/verify"), metavar="DIR", help="folder for the logs (default %(default)s)")
-    add("--quiet", action="store_true", help="say nothing but errors")
+    add_out(add, "out/verify", "the logs")
 
 
 def run(args: Namespace) -> int:
