@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtri  # scipy.stats has it too, and takes a second to load
 
-from colibri.common.types import Array, Vector
+from colibri.common.types import Array
 
 NAVIGATION = 9
 """Position, velocity, attitude."""
@@ -32,29 +32,6 @@ class Errors(NamedTuple):
         return float(self.error[part] @ np.linalg.solve(self.covariance[part, part], self.error[part]))
 
 
-def errors_of(x: Array, P: Array, position: Vector | Array, velocity: Vector | Array, rotation: Array) -> Errors:
-    """Compare a filter's state with the truth at its time.
-
-    Args:
-        x: Nominal state, (23,).
-        P: Covariance, (22, 22).
-        position: True, m, ENU.
-        velocity: True, m/s, ENU.
-        rotation: True, earth from body, (3, 3).
-    """
-    w, a, b, c = x[6:10]
-    estimated = np.array(
-        [
-            [1.0 - 2.0 * (b * b + c * c), 2.0 * (a * b - w * c), 2.0 * (a * c + w * b)],
-            [2.0 * (a * b + w * c), 1.0 - 2.0 * (a * a + c * c), 2.0 * (b * c - w * a)],
-            [2.0 * (a * c - w * b), 2.0 * (b * c + w * a), 1.0 - 2.0 * (a * a + b * b)],
-        ]
-    )
-    turn = estimated.T @ rotation
-    small = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    return Errors(np.concatenate([position - x[:3], velocity - x[3:6], small]), P[:NAVIGATION, :NAVIGATION].copy())
-
-
 class Bounds(NamedTuple):
     """Between which the mean over independent flights lies."""
 
@@ -70,8 +47,3 @@ def bounds(numbers: int, flights: int, level: float = 0.95) -> Bounds:
     """Return where the mean of χ² of `numbers` degrees of freedom over `flights` lies, with probability `level`."""
     lower, upper = (float(chdtri(numbers * flights, above)) for above in (0.5 + 0.5 * level, 0.5 - 0.5 * level))
     return Bounds(lower / flights, upper / flights)
-
-
-def share_within(means: Array, within: Bounds) -> float:
-    """Return which part of the means over flights, one at each instant, lies within the bounds."""
-    return float(np.mean((means >= within.lower) & (means <= within.upper)))

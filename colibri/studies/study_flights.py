@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from colibri.analysis.recording import Recording, read_recording
 from colibri.analysis.report import SETTLED_AFTER_S
-from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fallback
+from colibri.autopilot.control.interface import FALLBACK_CODES, Fallback
 from colibri.autopilot.control.profile import Profile
-from colibri.autopilot.control.qp import QpStatus
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S
 from colibri.common.errors import InFlightError
 from colibri.common.types import Array
@@ -173,11 +172,6 @@ class Flown:
     def height_lost_m(self) -> float:
         """How far it sank below where it began, m."""
         return float(self.recording["z"][0] - self.recording["z"].min())
-
-    @property
-    def unsolved(self) -> int:
-        """Control samples with a QP that was not solved."""
-        return int(np.count_nonzero(self.recording.qp_status > STATUS_CODES[QpStatus.SOLVED]))
 
     def decided_by(self, fallback: Fallback) -> NDArray[np.bool_]:
         """Return at which control samples `fallback` decided, (m,)."""

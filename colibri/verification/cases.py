@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from colibri.analysis.outcome import keep_flight
-from colibri.autopilot.control.profile import load_profile
 from colibri.common.process.lifecycle import fail
 from colibri.flights.fly import prepare
 from colibri.flights.plan import FlightPlan
@@ -39,11 +38,6 @@ class Case(NamedTuple):
         if self.waypoints:
             options["track"] = f"waypoints:{out / _WAYPOINTS_FILE}"
         return FlightPlan.of_options(out, **(options | more))
-
-    def controller(self) -> str:
-        """Return the name of the control law that flies."""
-        profile = load_profile(self.options["profile"])
-        return profile.with_choices(self.options.get("controller"), None).controller
 
     def fly(self, out: Path, link: str, **more: Any) -> str:
         """Fly; return the hash of the trajectory.
@@ -85,11 +79,6 @@ class SitlCase:
     name: str
     orders: "Callable[[Sitl], object]"
     setting: Mapping[str, Any] = field(default_factory=dict)
-
-    def controller(self) -> str:
-        """Return the name of the control law that flies."""
-        setting = setting_of([self.setting])
-        return load_profile(setting.profile).with_choices(setting.controller, None).controller
 
     def fly(self, out: Path, link: str) -> str:
         """Fly; return the hash of every frame's truth and command.

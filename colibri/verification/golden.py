@@ -99,12 +99,6 @@ def read_hashes(path: Path) -> dict[str, str]:
         fail(f"{path} holds no golden hashes, names and SHA-256 as one JSON object: {error}")
 
 
-def without_flight(controllers: Iterable[str]) -> list[str]:
-    """Return which control laws fly no golden flight."""
-    flown = {flight.controller() for flight in FLIGHTS}
-    return sorted(set(controllers) - flown)
-
-
 def _check_names(path: Path, known: Mapping[str, str]) -> None:
     """See that a file names the flights of the set and no others, or end with one line."""
     names = {flight.name for flight in FLIGHTS}

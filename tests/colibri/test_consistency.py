@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from colibri.analysis.consistency import Bounds, bounds, errors_of, share_within
+from colibri.analysis.consistency import NAVIGATION, Bounds, Errors, bounds
 from colibri.autopilot.estimation.estimator import Estimator
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
+from colibri.common.rotations import rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
 from tests import sensor_source as source
@@ -25,6 +26,19 @@ class Run(NamedTuple):
 
     nees: Array
     nis: dict[str, float]
+
+
+def errors_of(x: Array, P: Array, position: Array, velocity: Array, rotation: Array) -> Errors:
+    """Return the true position, velocity and rotation (earth from body) less those of the state `x`."""
+    w, a, b, c = x[6:10].tolist()
+    turn = np.array(rotation_matrix((w, a, b, c))).T @ rotation
+    small = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    return Errors(np.concatenate([position - x[:3], velocity - x[3:6], small]), P[:NAVIGATION, :NAVIGATION].copy())
+
+
+def share_within(means: Array, within: Bounds) -> float:
+    """Return which part of the means over flights, one at each instant, lies within the bounds."""
+    return float(np.mean((means >= within.lower) & (means <= within.upper)))
 
 
 @lru_cache(maxsize=2)

@@ -19,7 +19,6 @@ _USUAL = (0.0, 1.0, -1.0, 2.0, 0.5, 5.0, 21196.0, nan)
 _BITS = {"uint8_t": 8, "int8_t": 8, "uint16_t": 16, "int16_t": 16, "uint32_t": 32, "int32_t": 32}
 _BITS |= {"uint64_t": 64, "int64_t": 64}
 _SETPOINT_MASKS = (0x9F8, 0x9C7, 0x9C0, 0x800, 0xC3F, 0x5C7, 0x0, 0xFFF)
-_FILES = (b"/", b"logs", b"/logs/a.tlog", b"@PARAM/param.pck", b"../../etc/passwd", b"a" * 239, b"")
 _OFTEN = (
     *("COMMAND_LONG", "COMMAND_INT", "COMMAND_LONG", "COMMAND_INT", "COMMAND_CANCEL", "SET_MODE"),
     *("PARAM_SET", "PARAM_REQUEST_READ", "PARAM_REQUEST_LIST", "MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"),
