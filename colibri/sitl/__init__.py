@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from colibri.sitl.flight_record import Record
     from colibri.sitl.ground_station import RefusedError, Station
     from colibri.sitl.session import Flights
-    from colibri.sitl.vehicle import NotInTimeError, Sitl
+    from colibri.sitl.stepping import NotInTimeError
+    from colibri.sitl.vehicle import Sitl
 else:
     __getattr__, __dir__ = public(
         __name__,
@@ -24,7 +25,8 @@ else:
             "colibri.sitl.flight_record": "Record",
             "colibri.sitl.ground_station": "RefusedError Station",
             "colibri.sitl.session": "Flights",
-            "colibri.sitl.vehicle": "NotInTimeError Sitl",
+            "colibri.sitl.stepping": "NotInTimeError",
+            "colibri.sitl.vehicle": "Sitl",
         },
     )
 

@@ -1,18 +1,14 @@
 """What a flight leaves: every frame with its command, every message; in memory, and in files only where it is asked."""
 
-from collections.abc import Callable
 from hashlib import sha256
-from math import degrees
 from pathlib import Path
 from struct import Struct
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from colibri.autopilot.commander.rules.modes import mode_of_custom
 from colibri.common.process.log_files import CsvLog
-from colibri.common.rotations import euler_from_quaternion
 from colibri.mavlink.files.flight_log import SUFFIX
 from colibri.mavlink.wire.framing import Framer
 from colibri.mavlink.wire.tlog import TlogWriter
@@ -111,12 +107,3 @@ def tilt_deg(flown: Columns) -> NDArray[np.float64]:
     """Return how far the thrust points from straight up, degrees, at each frame."""
     upright = 1.0 - 2.0 * (flown["qx"] ** 2 + flown["qy"] ** 2)
     return np.asarray(np.degrees(np.arccos(np.clip(upright, -1.0, 1.0))))
-
-
-Predicate = Callable[[], Any]
-
-
-def euler_deg(attitude: tuple[float, float, float, float]) -> tuple[float, float, float]:
-    """Return roll, pitch, yaw in degrees."""
-    roll, pitch, yaw = euler_from_quaternion(attitude)
-    return degrees(roll), degrees(pitch), degrees(yaw)

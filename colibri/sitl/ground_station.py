@@ -10,6 +10,7 @@ from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Bits, Codec, Messa
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.errors import SitlError
 from colibri.sitl.inbox import Hearing
+from colibri.sitl.stepping import Stepped
 
 HEARTBEAT_EVERY_US = 1_000_000
 AGAIN_AFTER_S = 0.5
@@ -33,21 +34,12 @@ class RefusedError(SitlError):
         self.text = text
 
 
-class Flying(Protocol):
-    """A flight that can go on."""
-
-    @property
-    def time_us(self) -> int:
-        """Simulated time, µs."""
-        ...
+class SteppedVehicle(Stepped, Protocol):
+    """A vehicle in a flight that can go on."""
 
     @property
     def system(self) -> int:
         """The vehicle's system id."""
-        ...
-
-    def wait_until(self, predicate: Callable[[], object], *, within: float, what: str) -> float:
-        """Fly until `predicate()`; return how long that took, s."""
         ...
 
 
@@ -65,7 +57,15 @@ class Station(Hearing):
     """
 
     def __init__(
-        self, flight: Flying, number: int, *, system: int, component: int, trouble: Trouble, seed: int, beats: bool
+        self,
+        flight: SteppedVehicle,
+        number: int,
+        *,
+        system: int,
+        component: int,
+        trouble: Trouble,
+        seed: int,
+        beats: bool,
     ) -> None:
         """Be component `component` of `system` on link `number`; one that `beats` sends a HEARTBEAT a second."""
         super().__init__()

@@ -1,6 +1,6 @@
 """A vehicle in flight as a test sees it: orders that wait for their answer, and time that passes only when told to."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from math import dist, nan, pi
 from typing import Any, NamedTuple
@@ -8,22 +8,20 @@ from typing import Any, NamedTuple
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
-from colibri.common.types import Vector
 from colibri.mavlink.hil.conductor import Parcel, StepMessage
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
 from colibri.mavlink.parameters.store import Value
-from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
-from colibri.mavlink.wire.ned import ned_from_enu
+from colibri.mavlink.wire.dialect import mav
 from colibri.sitl import mission_items as items
 from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.backends.lockstep import LockstepSession
 from colibri.sitl.backends.setting import Setting
-from colibri.sitl.errors import SitlError
 from colibri.sitl.flight_record import Record
 from colibri.sitl.ground_station import RefusedError, Station
 from colibri.sitl.inbox import Words
 from colibri.sitl.mission_items import Item, on_wire
+from colibri.sitl.stepping import NotInTimeError, Steered, Stepped
 from colibri.sitl.view import View
 
 FORCE = 21196.0
@@ -31,10 +29,6 @@ FORCE = 21196.0
 READY_WITHIN_S = 40.0
 STICKS_EVERY_US = 40_000
 """25 times a second, as QGroundControl sends those of a joystick."""
-
-
-class NotInTimeError(SitlError, AssertionError):
-    """What was waited for has not come about."""
 
 
 class Links(NamedTuple):
@@ -50,7 +44,7 @@ class Links(NamedTuple):
     plant: Trouble
 
 
-class Sitl(View):
+class Sitl(View, Stepped, Steered):
     """A vehicle, its plant, its ground stations, and the links between them.
 
     What it looks like is in `View`.
@@ -112,44 +106,6 @@ class Sitl(View):
             self._stations[number - 1].arriving(datagram, now_us)
         for station in self._stations:
             station.listen(self.time_us)
-
-    def run(self, seconds: float, each_frame: Callable[[], object] | None = None) -> None:
-        """Let simulated time pass; call `each_frame` before each frame."""
-        end_us = self.time_us + round(seconds * 1e6)
-        while self.time_us < end_us:
-            if each_frame is not None:
-                each_frame()
-            self.step()
-
-    def wait_until(self, predicate: Callable[[], object], *, within: float, what: str = "") -> float:
-        """Fly until `predicate()`; return how long that took, s.
-
-        Raises:
-            NotInTimeError: It is not so `within` that many seconds of simulated time.
-        """
-        began_us = self.time_us
-        end_us = began_us + round(within * 1e6)
-        while not predicate():
-            if self.time_us >= end_us:
-                raise NotInTimeError(f"{what or 'what was waited for'} took longer than {within:g} s: {self}")
-            self.step()
-        return (self.time_us - began_us) * 1e-6
-
-    def hold(self, predicate: Callable[[], object], *, for_: float, what: str = "") -> None:
-        """Fly for so many seconds, at each frame of which `predicate()` must hold.
-
-        Raises:
-            NotInTimeError: It does not.
-        """
-        began_us = self.time_us
-        end_us = began_us + round(for_ * 1e6)
-        while True:
-            if not predicate():
-                after_s = (self.time_us - began_us) * 1e-6
-                raise NotInTimeError(f"{what or 'what was to hold'} did so for {after_s:.3f} of {for_:g} s: {self}")
-            if self.time_us >= end_us:
-                return
-            self.step()
 
     # Orders.
 
@@ -331,28 +287,6 @@ class Sitl(View):
     def send(self, name: str, *fields: Any) -> None:
         """Send a message from the first ground station."""
         self.gcs.send(name, *fields)
-
-    def stick(self, pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: float = 0.0) -> None:
-        """Send sticks once: forward, right, up (0..1, the middle is 0.5), clockwise, each -1..1."""
-        axes = (pitch, roll, thrust, yaw)
-        self.send("MANUAL_CONTROL", self.system, *(round(1000.0 * axis) for axis in axes), 0)
-
-    def setpoint(
-        self,
-        position: Vector | None = None,
-        velocity: Vector | None = None,
-        acceleration: Vector | None = None,
-        yaw: float | None = None,
-        yaw_rate: float | None = None,
-    ) -> None:
-        """Send an offboard setpoint once, ENU, SI; what is None is masked."""
-        groups = (position, velocity, acceleration)
-        mask = sum(0b111 << 3 * place for place, group in enumerate(groups) if group is None)
-        mask |= (yaw is None) << 10 | (yaw_rate is None) << 11
-        ned = [value for group in groups for value in ned_from_enu(group or (0.0, 0.0, 0.0))]
-        heading = 0.0 if yaw is None else 0.5 * pi - yaw
-        target = (self.system, AUTOPILOT_COMPONENT, mav.MAV_FRAME_LOCAL_NED)
-        self.send("SET_POSITION_TARGET_LOCAL_NED", 0, *target, mask, *ned, heading, -(yaw_rate or 0.0))
 
     # What goes wrong.
 

@@ -47,11 +47,6 @@ class View:
         return self._lockstep.truth.time_us
 
     @property
-    def time_s(self) -> float:
-        """Simulated time, s."""
-        return self.time_us * 1e-6
-
-    @property
     def system(self) -> int:
         """The vehicle's system id."""
         return self.setting.system
@@ -145,7 +140,7 @@ class View:
     def __str__(self) -> str:
         """Return how it is, for who reads a failed test."""
         east, north, up = self.position
-        words = f"t = {self.time_s:.3f} s, {self.mode or 'no mode'}, {'armed' if self.armed else 'disarmed'}"
+        words = f"t = {self.time_us * 1e-6:.3f} s, {self.mode or 'no mode'}, {'armed' if self.armed else 'disarmed'}"
         where = f"at ({east:.2f}, {north:.2f}, {up:.2f}) m, {self.speed_m_s:.2f} m/s, tilt {self.tilt_deg:.1f} degrees"
         last = f"; last said: {'; '.join(self.texts[-3:])}" if self.texts else ""
         return f"{words}, {where}{last}"

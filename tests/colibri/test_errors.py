@@ -19,7 +19,7 @@ from colibri.mavlink.links.link import LinkError
 from colibri.plant.errors import PlantError
 from colibri.plant.physics.start import IntegrationError
 from colibri.sitl.errors import SitlError
-from colibri.sitl.vehicle import NotInTimeError
+from colibri.sitl.stepping import NotInTimeError
 
 SHIPPED = Path(colibri.__file__).parent
 PACKAGES = {

@@ -69,7 +69,7 @@ def ground_campaign(
     failures += ["it grew"] * (quota >= FEWEST_FOR_MEMORY and after - (before or after) > MAX_GROWTH_MIB)
     memory = (before or after, after)
     kinds, accepted = len(target.accepted), target.accepted.total()
-    return GroundOutcome(dict(target.sent), accepted, kinds, target.flight.now_s, memory, failures)
+    return GroundOutcome(dict(target.sent), accepted, kinds, target.flight.time_s, memory, failures)
 
 
 def _fire(target: Target, situation: State, chance: random.Random, quota: int) -> int:

@@ -14,10 +14,11 @@ from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
 from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import MARKER, mav
 from colibri.plant.physics.start import Start
+from colibri.sitl.vehicle import FORCE
 from tools.fuzz.messages import Messages, Sent
 from tools.fuzz.sensible import COMMANDS, SENSIBLE, asked
 from tools.harness.client import COMPONENT, SYSTEM, Client
-from tools.harness.copter_flight import ACCEPTED, FORCE, STANDING, CopterFlight
+from tools.harness.copter_flight import ACCEPTED, STANDING, CopterFlight
 
 HIGH = Start(z=15.0, vz=-1.0, rotors=4740.0)
 """Falling: what lies still has landed."""
@@ -118,13 +119,13 @@ class Target:
         for plan in (FENCE, RALLY, MISSION):
             copter.stations.plans.load(plan, ())
         self._order(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE)
-        flight.put(STANDING)
+        flight.reset_world(STANDING)
         flight.run(0.8)
         flight.send("SET_GPS_GLOBAL_ORIGIN", SYSTEM, *_integers(DEFAULT_ORIGIN))
         self._order(mav.MAV_CMD_DO_SET_HOME, 1.0)
         self._select(Mode.HOLD)
         if state.armed:
-            flight.put(HIGH)
+            flight.reset_world(HIGH)
             copter.pilot.standing = False
             self._order(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE)
         copter.stations.plans.load(MISSION, PLAN)

@@ -5,7 +5,7 @@ Nothing is simulated of the links but the bytes.
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import nan, pi
+from math import nan
 from typing import Any
 
 import pytest
@@ -30,7 +30,6 @@ from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.parameters.store import Value
 from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import mav
-from colibri.mavlink.wire.ned import ned_from_enu
 from colibri.plant.environment.air import CALM
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import World, starting_world, state_frame
@@ -38,6 +37,8 @@ from colibri.plant.process.options import nudged
 from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.simulation.setting import WorldSetting
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
+from colibri.sitl.stepping import Steered, Stepped
+from colibri.sitl.vehicle import FORCE
 from tools.harness.client import COMPONENT, SYSTEM, Client
 from tools.harness.plant_flights import blowing
 
@@ -46,7 +47,6 @@ STANDING = Start()
 NO_CLOCK_S = 0.0
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 DENIED: int = mav.MAV_RESULT_DENIED
-FORCE = 21196.0
 _AS_IT_IS = load_profile("flight")
 FLIGHT = structs.replace(_AS_IT_IS, simulation=structs.replace(_AS_IT_IS.simulation, frame_interval_s=None))
 """The flight profile with a frame for each control sample and none between: a third less to compute."""
@@ -60,17 +60,19 @@ def in_the_air(height_m: float = 5.0, **settings: Any) -> "CopterFlight":
     return flight
 
 
-class CopterFlight:
-    """A vehicle and its surroundings.
+class CopterFlight(Stepped, Steered):
+    """A vehicle and its surroundings, with the words of fixture `sitl`; what commands it returns the MAV_RESULT.
 
     Attributes:
+        system: The vehicle's system id.
         copter: The autopilot.
         plant: The plant.
         client: The first ground station.
         rotors: The last command to the plant.
-        estimate: What the autopilot makes of its sensors; None where the state is told.
-        path: Positions, ENU, one a control sample, once `record` is set.
+        estimate: The last state estimate; None where the plant sends the true state.
     """
+
+    system = SYSTEM
 
     def __init__(
         self,
@@ -110,7 +112,7 @@ class CopterFlight:
         self.add(self.client)
         self.step()
         if feedback is Feedback.SENSORS:
-            self.until(lambda: self.estimate is not None, 10.0, "the first estimate")
+            self.wait_until(lambda: self.estimate is not None, within=10.0, what="the first estimate")
         self.step()
 
     def history(self) -> History:
@@ -138,8 +140,8 @@ class CopterFlight:
         self.copter.stations.hub.open(client.link, client.address)
         return client
 
-    def put(self, start: Start) -> None:
-        """Put the vehicle elsewhere, at this very time."""
+    def reset_world(self, start: Start) -> None:
+        """Reset the plant to `start` at this time."""
         self.world = replace(starting_world(start, self._assumed, self._weather), time_us=self.world.time_us)
 
     def restart(self, history: History | None = None) -> None:
@@ -167,22 +169,6 @@ class CopterFlight:
         for _ in range(frames):
             self.plant.go_on()
 
-    def run(self, seconds: float, each_frame: Callable[[], None] | None = None) -> None:
-        """Fly for so long; call `each_frame` before each frame."""
-        end_us = self.world.time_us + round(seconds * 1e6)
-        while self.world.time_us < end_us:
-            if each_frame:
-                each_frame()
-            self.step()
-
-    def until(self, condition: Callable[[], object], max_s: float, what: str = "") -> float:
-        """Fly until `condition()`; return how long that took, s of simulated time."""
-        began_us = self.world.time_us
-        while not condition():
-            assert self.world.time_us < began_us + max_s * 1e6, f"{what or 'it'} took longer than {max_s} s"
-            self.step()
-        return (self.world.time_us - began_us) * 1e-6
-
     def path(self, seconds: float) -> list[Vector]:
         """Fly for so long; return where it was at each frame."""
         end_us = self.world.time_us + round(seconds * 1e6)
@@ -196,7 +182,7 @@ class CopterFlight:
             path.append(self.position)
             return condition()
 
-        self.until(note_and_ask, max_s)
+        self.wait_until(note_and_ask, within=max_s)
         return path
 
     def send(self, name: str, *fields: Any) -> None:
@@ -220,7 +206,7 @@ class CopterFlight:
 
     def _result(self, number: int, who: Client) -> int:
         before = len(who.acks)
-        self.until(lambda: len(who.acks) > before, 0.1, f"COMMAND_ACK of {number}")
+        self.wait_until(lambda: len(who.acks) > before, within=0.1, what=f"COMMAND_ACK of {number}")
         self.step()
         (ack,) = who.acks[before:]
         assert ack.command == number
@@ -231,39 +217,13 @@ class CopterFlight:
         number = custom_mode(mode)
         return self.command(mav.MAV_CMD_DO_SET_MODE, 1.0, number >> 16 & 0xFF, number >> 24 & 0xFF)
 
-    def arm(self) -> int:
-        """Arm; return the MAV_RESULT."""
-        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+    def arm(self, *, force: bool = False) -> int:
+        """Arm, by force whatever the checks say; return the MAV_RESULT."""
+        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE if force else 0.0)
 
-    def arm_by_force(self) -> int:
-        """Arm whatever the checks say; return the MAV_RESULT."""
-        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE)
-
-    def disarm(self, magic: float = 0.0) -> int:
-        """Disarm, or try to; return the MAV_RESULT."""
-        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, magic)
-
-    def stick(self, pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: float = 0.0) -> None:
-        """Send sticks once: forward, right, up (0..1, the middle is 0.5), clockwise."""
-        axes = (pitch, roll, thrust, yaw)
-        self.send("MANUAL_CONTROL", SYSTEM, *(round(1000.0 * axis) for axis in axes), 0)
-
-    def setpoint(
-        self,
-        position: Vector | None = None,
-        velocity: Vector | None = None,
-        acceleration: Vector | None = None,
-        yaw_rad: float | None = None,
-        yaw_rate_rad_s: float | None = None,
-    ) -> None:
-        """Send an offboard setpoint once, ENU; what is None is masked."""
-        groups = (position, velocity, acceleration)
-        mask = sum(0b111 << 3 * place for place, group in enumerate(groups) if group is None)
-        mask |= (yaw_rad is None) << 10 | (yaw_rate_rad_s is None) << 11
-        ned = [value for group in groups for value in ned_from_enu(group or (0.0, 0.0, 0.0))]
-        yaw = 0.0 if yaw_rad is None else 0.5 * pi - yaw_rad
-        fields = (mav.MAV_FRAME_LOCAL_NED, mask, *ned, yaw, -(yaw_rate_rad_s or 0.0))
-        self.send("SET_POSITION_TARGET_LOCAL_NED", 0, SYSTEM, COMPONENT, *fields)
+    def disarm(self, *, force: bool = False) -> int:
+        """Disarm, in the air only by force; return the MAV_RESULT."""
+        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE if force else 0.0)
 
     def drain(self, part: float) -> None:
         """Have so much of the full battery's charge gone at once, and the autopilot know."""
@@ -278,31 +238,37 @@ class CopterFlight:
         self.world, told = self.plant.faults.inject(Fault(unit, kind, instance, (a, b, c, d)), self.world)
         return told.result
 
-    def set(self, name: str, value: Value) -> None:
+    def set_param(self, name: str, value: Value) -> None:
         """Set a parameter as a ground station does, and see that it was taken."""
         self.copter.parameters.set(name, value)
         self.step()
         assert self.copter.parameters[name] == pytest.approx(value, rel=1e-6)  # they are of 32 bits
 
-    def take_off(self, height_m: float = 2.5) -> None:
+    def takeoff(self, height_m: float = 2.5) -> None:
         """Arm, climb above home and stay."""
         assert self.command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, height_m) == ACCEPTED
         assert self.arm() == ACCEPTED
-        self.until(lambda: self.mode is Mode.HOLD, 5.0 + 2.0 * height_m, "take-off")
+        self.wait_until(lambda: self.mode is Mode.HOLD, within=5.0 + 2.0 * height_m, what="take-off")
         self.run(1.0)
 
     def land(self) -> None:
         """Land where it is, and wait until the rotors have stopped."""
         assert self.select(Mode.LAND) == ACCEPTED
-        self.until(lambda: not self.armed, 5.0 + 2.0 * self.position[2], "landing")
+        self.wait_until(lambda: not self.armed, within=5.0 + 2.0 * self.position[2], what="landing")
 
-    def go(self, east_m: float, north_m: float, up_m: float, yaw_rad: float = nan, speed_m_s: float = -1.0) -> int:
-        """Reposition to a place, ENU from the origin; return the MAV_RESULT."""
-        there = geodetic_of((east_m, north_m, up_m), self._settings.origin)
+    def goto(self, east: float, north: float, up: float, *, speed: float = -1.0) -> int:
+        """Reposition to a place, ENU from the origin, m and m/s; return the MAV_RESULT."""
+        there = geodetic_of((east, north, up), self._settings.origin)
         x, y = round(there.latitude_deg * 1e7), round(there.longitude_deg * 1e7)
-        params = (speed_m_s, 1.0, 0.0, yaw_rad)
         frame = mav.MAV_FRAME_GLOBAL
-        return self.command_int(mav.MAV_CMD_DO_REPOSITION, *params, frame=frame, x=x, y=y, z=there.altitude_m)
+        return self.command_int(
+            mav.MAV_CMD_DO_REPOSITION, speed, 1.0, 0.0, nan, frame=frame, x=x, y=y, z=there.altitude_m
+        )
+
+    @property
+    def time_us(self) -> int:
+        """Simulated time, µs."""
+        return self.world.time_us
 
     @property
     def world(self) -> World:
@@ -312,11 +278,6 @@ class CopterFlight:
     @world.setter
     def world(self, world: World) -> None:
         self.plant.world = world
-
-    @property
-    def now_s(self) -> float:
-        """Simulated time, s."""
-        return self.world.time_us * 1e-6
 
     @property
     def mode(self) -> Mode:
@@ -329,7 +290,7 @@ class CopterFlight:
         return self.copter.pilot.state.armed
 
     @property
-    def told_mode(self) -> Mode | None:
+    def reported_mode(self) -> Mode | None:
         """The flight mode of the last HEARTBEAT."""
         return mode_of_custom(self.client.latest("HEARTBEAT").custom_mode)
 

@@ -49,11 +49,11 @@ def fence_of(flight: CopterFlight, radius_m: float) -> None:
 def test_a_lost_ground_station_leads_home_after_the_time_that_is_set_and_clears() -> None:
     flight = in_the_air(10.0, values={"NAV_DLL_ACT": RETURN, "COM_DL_LOSS_T": 2.0})
     heard_every_second(flight, 2.0)
-    flight.set("COM_DL_LOSS_T", 4.0)
+    flight.set_param("COM_DL_LOSS_T", 4.0)
     flight.run(2.0)  # the last was 1 s ago: half as long again as the old time
     assert flies(flight, Mode.HOLD)
     assert not flight.client.said("lost")
-    silent_s = 3.0 + flight.until(lambda: flight.mode is Mode.RETURN, 2.0, "the return")
+    silent_s = 3.0 + flight.wait_until(lambda: flight.mode is Mode.RETURN, within=2.0, what="the return")
     assert silent_s == pytest.approx(4.0, abs=0.03)
     flight.run(0.1)
     assert flight.client.said("ground station lost: return")
@@ -87,7 +87,7 @@ def test_sticks_lost_before_the_take_off_stop_the_rotors_within_a_second() -> No
     flight.stick(thrust=0.0)
     flight.step()
     assert flight.arm() == ACCEPTED
-    assert flight.until(lambda: not flight.armed, 1.0, "disarming") == pytest.approx(0.5, abs=0.05)
+    assert flight.wait_until(lambda: not flight.armed, within=1.0, what="disarming") == pytest.approx(0.5, abs=0.05)
     flight.step()
     assert flight.client.said("sticks lost: rotors stop")
     assert state_told(flight) != mav.MAV_STATE_FLIGHT_TERMINATION
@@ -101,9 +101,9 @@ def test_a_companion_that_falls_silent_is_left_at_the_time_that_is_set(choice: i
     assert flight.select(Mode.OFFBOARD) == ACCEPTED
     flight.setpoint(velocity=(1.0, 0.0, 0.0))
     flight.step()
-    heard_s = flight.now_s
-    flight.until(lambda: flight.mode is mode, 1.0, "the action")
-    assert flight.now_s - heard_s == pytest.approx(0.8, abs=2 * SAMPLE_S)
+    heard_s = flight.time_s
+    flight.wait_until(lambda: flight.mode is mode, within=1.0, what="the action")
+    assert flight.time_s - heard_s == pytest.approx(0.8, abs=2 * SAMPLE_S)
     for _ in range(30):
         flight.setpoint(velocity=(1.0, 0.0, 0.0))
         flight.run(0.05)
@@ -134,13 +134,15 @@ def test_a_low_battery_leads_home_and_a_critical_one_down_and_nothing_later_up_a
     heartbeat(flight.client)
     assert charge_state(flight) == mav.MAV_BATTERY_CHARGE_STATE_OK
     flight.drain(0.87)
-    assert flight.until(lambda: flight.mode is Mode.RETURN, 2.0) == pytest.approx(1.0, abs=0.05)  # BAT_LOW_T
+    assert flight.wait_until(lambda: flight.mode is Mode.RETURN, within=2.0) == pytest.approx(
+        1.0, abs=0.05
+    )  # BAT_LOW_T
     assert charge_state(flight) == mav.MAV_BATTERY_CHARGE_STATE_LOW
     flight.drain(0.07)
-    flight.until(lambda: flight.mode is Mode.LAND, 2.0)
+    flight.wait_until(lambda: flight.mode is Mode.LAND, within=2.0)
     assert charge_state(flight) == mav.MAV_BATTERY_CHARGE_STATE_CRITICAL
-    flight.until(lambda: flight.client.said("ground station lost: land goes on"), 2.0)
-    flight.until(lambda: not flight.armed, 15.0, "the landing")
+    flight.wait_until(lambda: flight.client.said("ground station lost: land goes on"), within=2.0)
+    flight.wait_until(lambda: not flight.armed, within=15.0, what="the landing")
     assert flight.arm() == DENIED
     assert flight.client.said("battery critical")
 
@@ -149,11 +151,11 @@ def test_a_voltage_below_its_limit_counts_as_the_charge_does() -> None:
     flight = in_the_air(5.0, values={"COM_LOW_BAT_ACT": 1, "BAT_LOW_T": 0.5})
     battery = flight.copter.power.state()
     assert battery is not None
-    flight.set("BAT_LOW_VOLT", battery.voltage_v + 0.5)
+    flight.set_param("BAT_LOW_VOLT", battery.voltage_v + 0.5)
     flight.run(0.6)
     assert flies(flight, Mode.RETURN)
     assert charge_state(flight) == mav.MAV_BATTERY_CHARGE_STATE_LOW
-    flight.set("BAT_CRIT_VOLT", battery.voltage_v + 0.5)
+    flight.set_param("BAT_CRIT_VOLT", battery.voltage_v + 0.5)
     flight.run(0.6)
     assert flies(flight, Mode.LAND)
     assert charge_state(flight) == mav.MAV_BATTERY_CHARGE_STATE_CRITICAL
@@ -191,8 +193,8 @@ def test_held_inside_of_the_fence_by_sticks_that_push_against_it() -> None:
     held = push(3.0)
     assert 11.0 < min(held) < max(held) < 13.0
     assert flight.client.said("geofence breached: hold")
-    assert flight.go(14.0, 9.0, 5.0) == DENIED
-    assert flight.go(0.0, 0.0, 5.0) == ACCEPTED
+    assert flight.goto(14.0, 9.0, 5.0) == DENIED
+    assert flight.goto(0.0, 0.0, 5.0) == ACCEPTED
     flight.run(4.0)
     assert away_m() < 8.0
     assert flight.client.said("geofence breached: cleared")
@@ -215,8 +217,8 @@ def test_a_breach_of_the_fence_around_home_leads_home(
         if flight.mode is Mode.RETURN:
             break
     assert flies(flight, Mode.RETURN)
-    assert flight.go(5.0, 0.0, 7.0) == DENIED
-    flight.until(lambda: hypot(*flight.position[:2]) < 0.5 and flight.position[2] < 5.0, 30.0, "home")
+    assert flight.goto(5.0, 0.0, 7.0) == DENIED
+    flight.wait_until(lambda: hypot(*flight.position[:2]) < 0.5 and flight.position[2] < 5.0, within=30.0, what="home")
     flight.run(1.2)
     assert flight.client.said("geofence breached: cleared")
 
@@ -268,7 +270,7 @@ def test_a_control_law_that_finds_no_plan_stops() -> None:
     profile = structs.replace(FLIGHT, controllers={**FLIGHT.controllers, "lpv-mpc": hopeless})
     flight = in_the_air(20.0, profile=profile)
     assert flight.select(Mode.TRACK) == ACCEPTED
-    assert flight.until(lambda: flight.mode is Mode.HOLD, 1.0) == pytest.approx(0.5, abs=0.05)
+    assert flight.wait_until(lambda: flight.mode is Mode.HOLD, within=1.0) == pytest.approx(0.5, abs=0.05)
     flight.step()
     assert flight.client.said("control law finds no plan: hold")
 

@@ -20,7 +20,7 @@ GPS, OFF, OK = (float(number) for number in (mav.FAILURE_UNIT_SENSOR_GPS, mav.FA
 
 def flying(height_m: float, **values: float) -> CopterFlight:
     flight = CopterFlight(feedback=Feedback.SENSORS, seed=3, values={"SYS_FAILURE_EN": 1, **values})
-    flight.take_off(height_m)
+    flight.takeoff(height_m)
     return flight
 
 
@@ -32,17 +32,17 @@ def test_a_lost_position_is_left_by_sinking_level_and_disarmed() -> None:
     flight = flying(4.0, COM_POS_FS_EPH=0.6)
     place = flight.position
     inject(flight, GPS, OFF)
-    flight.until(lambda: flight.client.said("position lost: descend"), 30.0)
+    flight.wait_until(lambda: flight.client.said("position lost: descend"), within=30.0)
     assert flight.mode is Mode.LAND
     assert flight.select(Mode.HOLD) == DENIED
     assert flight.client.said("the position is not known")
-    lost_s = flight.now_s
+    lost_s = flight.time_s
     max_rate = 0.0
     while flight.armed:
         flight.run(0.1)
         max_rate = max(max_rate, -flight.velocity[2])
         assert max(map(abs, flight.euler[:2])) < 0.05
-    assert flight.now_s - lost_s < 30.0
+    assert flight.time_s - lost_s < 30.0
     assert max_rate < 1.7
     assert dist(flight.position[:2], place[:2]) < 3.0
     assert flight.copter.pilot.standing
@@ -67,7 +67,7 @@ def between(monkeypatch: pytest.MonkeyPatch, flight: CopterFlight, change: Calla
 
 def test_gps_that_says_zero_moves_nobody_to_zero(monkeypatch: pytest.MonkeyPatch) -> None:
     flight = flying(5.0)
-    assert flight.go(8.0, 0.0, 5.0) == ACCEPTED
+    assert flight.goto(8.0, 0.0, 5.0) == ACCEPTED
     flight.run(6.0)
 
     def nowhere(frame: Frame) -> Frame:
@@ -90,7 +90,7 @@ def test_no_gyroscope_is_no_attitude_and_the_rotors_stop(monkeypatch: pytest.Mon
         return replace(frame, updated=frame.updated & ~Updated.GYROSCOPE)
 
     between(monkeypatch, flight, blind)
-    assert flight.until(lambda: not flight.armed, 2.0) == pytest.approx(0.52, abs=0.05)
+    assert flight.wait_until(lambda: not flight.armed, within=2.0) == pytest.approx(0.52, abs=0.05)
     flight.step()
     assert flight.client.said("attitude lost: rotors stop")
     assert flight.client.latest("HEARTBEAT").system_status == mav.MAV_STATE_FLIGHT_TERMINATION
@@ -98,7 +98,7 @@ def test_no_gyroscope_is_no_attitude_and_the_rotors_stop(monkeypatch: pytest.Mon
 
 def test_a_state_that_stays_the_same_though_it_moves_is_not_flown_on(monkeypatch: pytest.MonkeyPatch) -> None:
     flight = in_the_air(10.0)
-    assert flight.go(20.0, 0.0, 10.0) == ACCEPTED
+    assert flight.goto(20.0, 0.0, 10.0) == ACCEPTED
     flight.run(2.0)
     kept: list[StateFrame] = []
 
@@ -108,7 +108,7 @@ def test_a_state_that_stays_the_same_though_it_moves_is_not_flown_on(monkeypatch
         return replace(kept[0], time_us=frame.time_us)
 
     between(monkeypatch, flight, stuck)
-    assert flight.until(lambda: not flight.armed, 2.0) == pytest.approx(0.5, abs=0.05)
+    assert flight.wait_until(lambda: not flight.armed, within=2.0) == pytest.approx(0.5, abs=0.05)
     flight.step()
     assert flight.client.said("attitude lost: rotors stop")
 

@@ -17,7 +17,7 @@ def test_a_ground_station_weakens_a_rotor_and_the_vehicle_stays() -> None:
     flight = in_the_air()
     assert flight.command(INJECT, MOTOR, WRONG, 1.0, 0.65) == DENIED
     assert flight.client.said("SYS_FAILURE_EN is 0")
-    flight.set("SYS_FAILURE_EN", 1)
+    flight.set_param("SYS_FAILURE_EN", 1)
     assert flight.command(INJECT, GPS, OFF) == mav.MAV_RESULT_UNSUPPORTED
     assert flight.client.said("flown by the state")
     assert flight.command(INJECT, MOTOR, WRONG, 1.0, 65.0) == DENIED
@@ -55,7 +55,7 @@ def test_a_battery_that_sags_is_known_to_the_autopilot() -> None:
 
 def test_a_gps_that_jumps_and_a_gyroscope_that_errs_are_survived() -> None:
     flight = CopterFlight(feedback=Feedback.SENSORS, seed=3)
-    flight.take_off(5.0)
+    flight.takeoff(5.0)
     before = flight.position
     assert flight.inject(GPS, WRONG, 0, 200.0, 0.0, 0.0) == ACCEPTED
     flight.run(5.0)
@@ -74,7 +74,7 @@ def flown(solve_ms: float) -> tuple[list[tuple[float, ...]], CopterFlight]:
     """Hold, go 2 m east, hold."""
     flight = in_the_air(values={"SIM_SOLVE_MS": solve_ms})
     flight.run(0.5)
-    assert flight.go(2.0, 0.0, 5.0) == ACCEPTED
+    assert flight.goto(2.0, 0.0, 5.0) == ACCEPTED
     return [tuple(place) for place in flight.path(6.0)], flight
 
 

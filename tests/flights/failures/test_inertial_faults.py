@@ -29,7 +29,7 @@ def stays(flight: CopterFlight, seconds: float, max_m: Vector) -> None:
 )
 def test_a_sudden_bias_is_learned_and_its_end_too(bias: Vector, seed: int) -> None:
     flight = CopterFlight(feedback=Feedback.SENSORS, seed=seed)
-    flight.take_off(10.0)
+    flight.takeoff(10.0)
     flight.run(2.0)
     assert not flight.client.said(OFF)
     assert flight.inject(ACCELEROMETER, WRONG, 0, *bias) == ACCEPTED
@@ -52,7 +52,7 @@ def test_a_sudden_bias_is_learned_and_its_end_too(bias: Vector, seed: int) -> No
 )
 def test_a_gyroscope_that_is_suddenly_off_is_learned_and_its_end_too(bias: Vector) -> None:
     flight = CopterFlight(feedback=Feedback.SENSORS, seed=3)
-    flight.take_off(10.0)
+    flight.takeoff(10.0)
     flight.run(2.0)
     assert not flight.client.said(TURNS)
     assert flight.estimate is not None
@@ -70,7 +70,7 @@ def test_a_gyroscope_that_is_suddenly_off_is_learned_and_its_end_too(bias: Vecto
 
 def test_a_gyroscope_that_drifts_is_followed() -> None:
     flight = CopterFlight(feedback=Feedback.SENSORS, seed=3)
-    flight.take_off(10.0)
+    flight.takeoff(10.0)
     assert flight.inject(GYROSCOPE, SLOW, 0, 0.01) == ACCEPTED
     stays(flight, 20.0, (1.0, 1.0, 1.0))
     assert flight.client.said(TURNS)

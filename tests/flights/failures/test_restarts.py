@@ -43,7 +43,7 @@ def test_a_mission_goes_on_as_if_nothing_had_happened() -> None:
             if killed and flight.armed:
                 paths[-1].append(flight.position)
                 flight.restart(flight.history())
-                restarts.append(flight.now_s)
+                restarts.append(flight.time_s)
             elif flight.armed:
                 paths[-1].append(flight.position)
                 flight.step()
@@ -69,7 +69,7 @@ def test_a_mission_goes_on_as_if_nothing_had_happened() -> None:
 )
 def test_every_mode_goes_on(mode: Mode) -> None:
     flight = in_the_air(3.0)
-    assert flight.go(8.0, 3.0, 3.0) == ACCEPTED
+    assert flight.goto(8.0, 3.0, 3.0) == ACCEPTED
     flight.run(2.0)
     if mode is Mode.ORBIT:
         assert flight.command(mav.MAV_CMD_DO_ORBIT, 4.0, 3.0, 0.0, 0.0, *[nan] * 3) == ACCEPTED
@@ -97,7 +97,7 @@ def max_tilt_deg(flight: CopterFlight, seconds: float) -> float:
 def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int) -> None:
     """Frames are missed while an autopilot starts only where the plant does not wait for it."""
     flight = CopterFlight(feedback=feedback)
-    flight.take_off(4.0)
+    flight.takeoff(4.0)
     height_m = flight.position[2]
     past = flight.history()
     flight.skip(missed)
@@ -106,12 +106,12 @@ def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int)
     assert flight.position[2] == pytest.approx(height_m, abs=0.15)
     load(flight, waypoint(15.0, 0.0, 4.0), waypoint(0.0, 6.0, 4.0, stay_s=1.0))
     assert flight.select(Mode.MISSION) == ACCEPTED
-    flight.until(lambda: reached(flight) == [0], 10.0)
+    flight.wait_until(lambda: reached(flight) == [0], within=10.0)
     past = flight.history()
     flight.skip(missed)
     flight.restart(past)
     assert max_tilt_deg(flight, 4.0) < 45.0
-    flight.until(lambda: flight.copter.pilot.state == HOLDING, 15.0, "the end of the mission")
+    flight.wait_until(lambda: flight.copter.pilot.state == HOLDING, within=15.0, what="the end of the mission")
     assert dist(flight.position, (0.0, 6.0, 4.0)) < (0.3 if feedback is Feedback.STATE else 3.0)
 
 
@@ -119,13 +119,13 @@ def test_nothing_is_felt_in_hover_and_in_a_turn(feedback: Feedback, missed: int)
 def test_a_vehicle_on_sensors_is_caught_by_an_autopilot_that_knows_nothing(flying_s: float) -> None:
     """Out of a hover, while it gains speed with 20 degrees of tilt, and at speed."""
     flight = CopterFlight(feedback=Feedback.SENSORS)
-    flight.take_off(8.0)
+    flight.takeoff(8.0)
     if flying_s:
-        assert flight.go(60.0, 20.0, 8.0) == ACCEPTED
+        assert flight.goto(60.0, 20.0, 8.0) == ACCEPTED
         flight.run(flying_s)
     height_m = flight.position[2]
     flight.restart()
-    flight.until(lambda: flight.armed, 0.5)
+    flight.wait_until(lambda: flight.armed, within=0.5)
     assert max_tilt_deg(flight, 4.0) < 45.0
     assert min(z for _, _, z in path_of(flight, 2.0)) > height_m - 3.0
     assert hypot(*flight.velocity) < 0.2
@@ -135,13 +135,13 @@ def test_a_vehicle_on_sensors_is_caught_by_an_autopilot_that_knows_nothing(flyin
 
 def test_what_was_asked_for_goes_on_when_a_vehicle_is_caught() -> None:
     flight = CopterFlight(feedback=Feedback.SENSORS)
-    flight.take_off(12.0)
+    flight.takeoff(12.0)
     load(flight, waypoint(5.0, 0.0, 12.0, stay_s=2.0), waypoint(0.0, 5.0, 12.0))
     assert flight.select(Mode.MISSION) == ACCEPTED
-    flight.until(lambda: reached(flight) == [0], 10.0)
+    flight.wait_until(lambda: reached(flight) == [0], within=10.0)
     past = flight.history()
     flight.restart(past._replace(checkpoint=past.checkpoint._replace(state_source=b"")))
-    flight.until(lambda: flight.copter.pilot.state == HOLDING, 20.0, "the end of the mission")
+    flight.wait_until(lambda: flight.copter.pilot.state == HOLDING, within=20.0, what="the end of the mission")
     assert flight.client.said("restarted in flight: mission goes on at item 0")
     assert flight.client.said("found falling")
     assert dist(flight.position, (0.0, 5.0, 12.0)) < 3.0
@@ -159,7 +159,7 @@ def test_a_landing_on_three_rotors_goes_on() -> None:
         tilts.append(tilt_deg(state_frame(flight.world).attitude))
         return not flight.armed
 
-    flight.until(landed, 20.0)
+    flight.wait_until(landed, within=20.0)
     assert max(tilts) < 20.0
     assert hypot(*flight.position[:2]) < 3.0
     assert flight.client.said("rotor 2 failed: landing on three rotors")
@@ -209,7 +209,7 @@ def test_sticks_that_are_not_heard_again_are_lost() -> None:
 
 def test_a_ground_station_that_is_not_heard_again_is_lost() -> None:
     flight = CopterFlight(values={"NAV_DLL_ACT": 3, "COM_DL_LOSS_T": 1.0})
-    flight.take_off(3.0)
+    flight.takeoff(3.0)
     flight.send("HEARTBEAT", mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE, 3)
     flight.run(0.5)
     flight.restart(flight.history())
@@ -221,9 +221,9 @@ def test_a_ground_station_that_is_not_heard_again_is_lost() -> None:
 
 def test_a_failsafe_that_the_pilot_has_overridden_does_not_begin_again() -> None:
     flight = CopterFlight(values={"COM_LOW_BAT_ACT": 1})
-    flight.take_off(3.0)
+    flight.takeoff(3.0)
     flight.drain(0.9)
-    flight.until(lambda: flight.mode in (Mode.RETURN, Mode.LAND), 3.0, "the failsafe")
+    flight.wait_until(lambda: flight.mode in (Mode.RETURN, Mode.LAND), within=3.0, what="the failsafe")
     assert flight.select(Mode.HOLD) == ACCEPTED
     flight.run(0.5)
     flight.restart(flight.history())
@@ -258,7 +258,7 @@ def test_a_mission_that_has_landed_does_not_begin_again() -> None:
     flight = in_the_air(1.0)
     load(flight, waypoint(1.0, 0.0, 1.0), do(mav.MAV_CMD_NAV_LAND, 0.0, 0.0, 0.0, nan))
     assert flight.select(Mode.MISSION) == ACCEPTED
-    flight.until(lambda: flight.copter.pilot.standing, 10.0)
+    flight.wait_until(lambda: flight.copter.pilot.standing, within=10.0)
     flight.run(0.5)
     assert flight.copter.pilot.state == State(Mode.MISSION, armed=True)
     flight.restart(flight.history())
@@ -283,7 +283,7 @@ def test_another_flight_begins_anew(late_us: int) -> None:
 
 def test_a_vehicle_that_came_down_meanwhile_stays_there() -> None:
     flight = CopterFlight()
-    flight.take_off(1.0)
+    flight.takeoff(1.0)
     past = flight.history()
     flight.land()
     flight.restart(past)
@@ -295,7 +295,7 @@ def test_a_vehicle_that_came_down_meanwhile_stays_there() -> None:
 
 def test_another_law_takes_over_what_was_asked_for_and_not_what_a_law_remembers() -> None:
     flight = in_the_air(3.0)
-    assert flight.go(5.0, 0.0, 3.0) == ACCEPTED
+    assert flight.goto(5.0, 0.0, 3.0) == ACCEPTED
     flight.run(1.0)
     past = flight.history()
     flight.restart(past._replace(checkpoint=past.checkpoint._replace(fingerprint=0)))

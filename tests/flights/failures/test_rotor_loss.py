@@ -47,14 +47,14 @@ def tilt_deg(flight: CopterFlight) -> float:
 
 def fall(flight: CopterFlight, rotor: int) -> Fall:
     """Take a rotor away, and fly until the others have stopped and the vehicle rests."""
-    place, began_s = flight.position, flight.now_s
+    place, began_s = flight.position, flight.time_s
     assert flight.inject(MOTOR, WRONG, rotor + 1, NEXT_TO_NONE) == ACCEPTED
     tilts: list[tuple[float, float]] = []
     sank_m_s = spin_rad_s = noticed_s = 0.0
     while flight.armed:
-        assert flight.now_s < began_s + 30.0, "it must come down"
+        assert flight.time_s < began_s + 30.0, "it must come down"
         flight.step()
-        since_s = flight.now_s - began_s
+        since_s = flight.time_s - began_s
         tilts.append((since_s, tilt_deg(flight)))
         spin_rad_s = max(spin_rad_s, abs(flight.world.state[5]))
         if flight.position[2] < 0.5:
@@ -89,7 +89,7 @@ def test_it_lands_upright_on_three_rotors(rotor: int) -> None:
 
 def test_it_lands_on_sensors() -> None:
     flight = CopterFlight(feedback=Feedback.SENSORS, seed=3)
-    flight.take_off(HEIGHT_M)
+    flight.takeoff(HEIGHT_M)
     check(fall(flight, 3))
 
 
@@ -109,18 +109,18 @@ def test_nothing_but_landing_is_possible_any_more() -> None:
     assert flight.client.latest("HEARTBEAT").system_status == mav.MAV_STATE_EMERGENCY
     assert flight.select(Mode.HOLD) == DENIED
     assert flight.client.said("hold refused: rotor 2 failed")
-    flight.until(lambda: not flight.armed, 20.0, "the landing")
+    flight.wait_until(lambda: not flight.armed, within=20.0, what="the landing")
     assert flight.arm() == DENIED
     assert flight.client.said("not armed: rotor 2 failed")
-    assert flight.arm_by_force() == DENIED
-    flight.set("CA_FAILURE_MODE", 0)
-    flight.set("CA_FAILURE_MODE", 1)
+    assert flight.arm(force=True) == DENIED
+    flight.set_param("CA_FAILURE_MODE", 0)
+    flight.set_param("CA_FAILURE_MODE", 1)
     assert flight.arm() == ACCEPTED
 
 
 def test_it_is_lost_at_speed_and_stops() -> None:
     flight = in_the_air(HEIGHT_M)
-    assert flight.go(100.0, 0.0, HEIGHT_M, speed_m_s=5.0) == ACCEPTED
+    assert flight.goto(100.0, 0.0, HEIGHT_M, speed=5.0) == ACCEPTED
     flight.run(4.0)
     assert hypot(*flight.velocity) > 4.5
     fallen = fall(flight, 0)
@@ -152,7 +152,7 @@ def test_a_weak_rotor_is_flown_on_and_a_parameter_turns_all_off() -> None:
     assert flight.mode is Mode.HOLD
     assert flight.position[2] == pytest.approx(HEIGHT_M, abs=0.5)
     assert flight.copter.rotor_loss.watch.max_evidence == 0.0
-    flight.set("CA_FAILURE_MODE", 0)
+    flight.set_param("CA_FAILURE_MODE", 0)
     assert flight.inject(MOTOR, OFF, 1) == ACCEPTED
     flight.run(0.5)
     assert flight.mode is Mode.HOLD

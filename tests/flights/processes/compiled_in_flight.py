@@ -26,8 +26,8 @@ def versions() -> dict[str, int]:
 
 def fly(flight: CopterFlight) -> None:
     """Fly by every kind of reference that there is: up, across, by a velocity, an attitude, on a track, home."""
-    flight.take_off()
-    assert flight.go(5.0, 0.0, 3.0) == ACCEPTED
+    flight.takeoff()
+    assert flight.goto(5.0, 0.0, 3.0) == ACCEPTED
     flight.run(1.0)
     attitude = (0, 1, 1, 0b0000_0111, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.5)
     velocity = (0, 1, 1, mav.MAV_FRAME_LOCAL_NED, 0b1101_1100_0111, 0, 0, 0, 1.0, 0, 0, 0, 0, 0, 0, 0)

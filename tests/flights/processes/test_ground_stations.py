@@ -54,7 +54,7 @@ def test_nothing_is_compiled_or_loaded_in_flight() -> None:
 def test_every_control_law_flies_where_it_is_sent(profile: str) -> None:
     """One previews a single reference, the other two that are four control samples apart."""
     flight = CopterFlight(profile=load_profile(profile), start=Start(z=5.0, rotors=4740.0))
-    assert flight.go(3.0, 1.0, 6.0) == ACCEPTED
+    assert flight.goto(3.0, 1.0, 6.0) == ACCEPTED
     flight.run(8.0)
     assert flight.position == pytest.approx((3.0, 1.0, 6.0), abs=0.05)
     assert flight.select(Mode.TRACK) == ACCEPTED

@@ -29,8 +29,8 @@ def fly() -> None:
     flight = CopterFlight()
     flight.step()
     before = loaded()
-    flight.take_off()
-    flight.go(2.0, 0.0, 3.0)
+    flight.takeoff()
+    flight.goto(2.0, 0.0, 3.0)
     flight.run(1.0)
     for mode in (Mode.POSITION, Mode.ALTITUDE, Mode.STABILIZED):
         flight.stick()

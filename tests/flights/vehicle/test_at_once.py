@@ -22,7 +22,7 @@ def _ask_for(flown: CopterFlight, mode: Mode) -> None:
 @pytest.mark.parametrize("mode", [Mode.OFFBOARD, Mode.POSITION])
 def test_the_mode_is_taken_with_the_first_message_that_it_needs(mode: Mode) -> None:
     flown = CopterFlight()
-    flown.take_off()
+    flown.takeoff()
     if mode is Mode.OFFBOARD:
         place = (0.0, 0.0, -2.5)
         still = (0.0,) * 8
@@ -37,6 +37,6 @@ def test_the_mode_is_taken_with_the_first_message_that_it_needs(mode: Mode) -> N
 
 def test_without_it_the_mode_is_refused() -> None:
     flown = CopterFlight()
-    flown.take_off()
+    flown.takeoff()
     assert flown.select(Mode.OFFBOARD) == mav.MAV_RESULT_DENIED
     assert flown.select(Mode.POSITION) == mav.MAV_RESULT_DENIED

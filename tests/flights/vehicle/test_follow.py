@@ -29,8 +29,8 @@ def _follow(flown: CopterFlight, east_m: float, north_m: float, up_m: float, sec
 def test_the_target_is_followed_at_its_distance(above: int, target_up_m: float, height_m: float) -> None:
     flown = CopterFlight()
     for name, value in (("FLW_TGT_DST", DISTANCE_M), ("FLW_TGT_HT", HEIGHT_M), ("FLW_TGT_ALT_M", above)):
-        flown.set(name, value)
-    flown.take_off()
+        flown.set_param(name, value)
+    flown.takeoff()
     assert flown.select(Mode.FOLLOW) == mav.MAV_RESULT_ACCEPTED
     _follow(flown, 10.0, 0.0, target_up_m, seconds=10)
     assert flown.mode is Mode.FOLLOW

@@ -13,7 +13,7 @@ RADIUS_M, SPEED_M_S, HEIGHT_M = 4.0, 2.0, 3.0
 def test_an_orbit_keeps_its_radius_speed_and_height() -> None:
     """The frame says above home, and the height is above sea level: so MAVSDK sends it, and PX4 reads it."""
     flown = CopterFlight()
-    flown.take_off(HEIGHT_M)
+    flown.takeoff(HEIGHT_M)
     orbit = (RADIUS_M, SPEED_M_S, mav.ORBIT_YAW_BEHAVIOUR_HOLD_FRONT_TO_CIRCLE_CENTER, nan)
     frame = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
     altitude_m = DEFAULT_ORIGIN.altitude_m + HEIGHT_M
@@ -30,6 +30,6 @@ def test_an_orbit_keeps_its_radius_speed_and_height() -> None:
 
 def test_nobody_selects_an_orbit_without_a_circle() -> None:
     flown = CopterFlight()
-    flown.take_off()
+    flown.takeoff()
     assert flown.select(Mode.ORBIT) == mav.MAV_RESULT_DENIED
     assert flown.mode is Mode.HOLD

@@ -20,8 +20,8 @@ def vehicle(name: str) -> CopterFlight:
     flight = CopterFlight(
         profile=msgspec.structs.replace(profile, simulation=simulation), feedback=Feedback.SENSORS, seed=1
     )
-    flight.take_off(HEIGHT_M)
-    assert flight.go(0.0, 0.0, HEIGHT_M) == ACCEPTED
+    flight.takeoff(HEIGHT_M)
+    assert flight.goto(0.0, 0.0, HEIGHT_M) == ACCEPTED
     flight.run(6.0)
     return flight
 
@@ -50,7 +50,7 @@ def test_ground_stations_are_told_what_it_measures() -> None:
 @pytest.mark.parametrize(("kind", "value"), [("OFF", 0.0), ("STUCK", 0.0), ("WRONG", 1.0)])
 def test_a_fault_is_said_and_the_height_kept(kind: str, value: float) -> None:
     flight = hovering()
-    flight.set("SYS_FAILURE_EN", 1)
+    flight.set_param("SYS_FAILURE_EN", 1)
     fault = (float(mav.FAILURE_UNIT_SENSOR_DISTANCE_SENSOR), float(getattr(mav, f"FAILURE_TYPE_{kind}")), 0.0, value)
     assert flight.command(mav.MAV_CMD_INJECT_FAILURE, *fault) == ACCEPTED
     flight.run(2.5)
@@ -65,5 +65,5 @@ def test_a_fault_is_said_and_the_height_kept(kind: str, value: float) -> None:
 def test_it_lands() -> None:
     flight = hovering()
     assert flight.select(Mode.LAND) == ACCEPTED
-    flight.until(lambda: not flight.armed, 30.0, "the landing")
+    flight.wait_until(lambda: not flight.armed, within=30.0, what="the landing")
     assert abs(flight.position[2]) < 0.01

@@ -11,7 +11,7 @@ from tools.harness.copter_flight import ACCEPTED, DENIED, CopterFlight
 def flying(mode: Mode, height_m: float = 5.0) -> CopterFlight:
     """Take off and go over to the sticks, which are in the middle."""
     flight = CopterFlight()
-    flight.take_off(height_m)
+    flight.takeoff(height_m)
     flight.stick()
     flight.step()
     assert flight.select(mode) == ACCEPTED
@@ -28,7 +28,7 @@ def hold_sticks(flight: CopterFlight, seconds: float, **deflection: float) -> No
 @pytest.mark.parametrize("mode", [Mode.POSITION, Mode.ALTITUDE, Mode.STABILIZED])
 def test_without_sticks_there_is_no_such_mode_in_flight(mode: Mode) -> None:
     flight = CopterFlight()
-    flight.take_off()
+    flight.takeoff()
     assert flight.select(mode) == DENIED
     assert flight.client.said("no MANUAL_CONTROL is heard")
 
@@ -40,7 +40,7 @@ def test_silent_sticks_lead_to_hold(mode: Mode) -> None:
     flight = flying(mode)
     hold_sticks(flight, 0.5)
     assert flight.mode is mode
-    silent_s = 0.05 + flight.until(lambda: flight.mode is Mode.HOLD, 1.0, "hold")
+    silent_s = 0.05 + flight.wait_until(lambda: flight.mode is Mode.HOLD, within=1.0, what="hold")
     assert silent_s == pytest.approx(0.5, abs=0.01)
     assert flight.client.said("sticks lost")
     flight.run(4.0)
@@ -74,7 +74,7 @@ def test_position_sticks_climb_and_turn() -> None:
 def test_altitude_sticks_lean_and_keep_the_height() -> None:
     flight = flying(Mode.ALTITUDE, 10.0)
     height = flight.position[2]
-    flight.set("MPC_MAN_TILT_MAX", 20.0)
+    flight.set_param("MPC_MAN_TILT_MAX", 20.0)
     hold_sticks(flight, 3.0, roll=1.0)
     assert degrees(flight.euler[0]) == pytest.approx(20.0, abs=1.5)
     assert flight.position[2] == pytest.approx(height, abs=0.3)
@@ -86,11 +86,11 @@ def test_stabilized_sticks_are_tilt_yaw_rate_and_thrust() -> None:
     flight = flying(Mode.STABILIZED, 10.0)
     hold_sticks(flight, 1.0, pitch=0.5)
     assert degrees(flight.euler[1]) == pytest.approx(17.5, abs=1.0)  # of 35 degrees
-    flight.set("MPC_MAN_TILT_MAX", 20.0)
+    flight.set_param("MPC_MAN_TILT_MAX", 20.0)
     hold_sticks(flight, 1.0, pitch=0.5)
     assert degrees(flight.euler[1]) == pytest.approx(10.0, abs=1.0)
     yaw = flight.yaw_rad
-    flight.set("MPC_MAN_Y_MAX", 60.0)
+    flight.set_param("MPC_MAN_Y_MAX", 60.0)
     hold_sticks(flight, 2.0, yaw=-1.0)
     assert flight.yaw_rad - yaw == pytest.approx(radians(60.0) * 2.0, abs=0.4)
     climb = flight.velocity[2]

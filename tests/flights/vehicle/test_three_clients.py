@@ -35,7 +35,7 @@ def test_three_clients_at_once_are_served_each_for_itself() -> None:
 
     def tick() -> None:
         for client in talking:
-            client.now_s = flight.now_s
+            client.now_s = flight.time_s
 
     flight.run(WARM_S, tick)
     gc.collect()

@@ -8,7 +8,8 @@ from colibri.autopilot.commander.rules.modes import FIRST, Mode, State
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.physics.start import Start
-from tools.harness.copter_flight import ACCEPTED, DENIED, FORCE, CopterFlight
+from colibri.sitl.vehicle import FORCE
+from tools.harness.copter_flight import ACCEPTED, DENIED, CopterFlight
 
 ARM = mav.MAV_CMD_COMPONENT_ARM_DISARM
 
@@ -16,7 +17,7 @@ ARM = mav.MAV_CMD_COMPONENT_ARM_DISARM
 def test_arming_and_disarming_on_the_ground() -> None:
     flight = CopterFlight()
     assert not flight.armed
-    assert flight.told_mode is Mode.HOLD
+    assert flight.reported_mode is Mode.HOLD
     assert flight.arm() == ACCEPTED
     flight.run(1.1)
     assert flight.client.latest("HEARTBEAT").base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED
@@ -42,14 +43,14 @@ def test_arming_and_disarming_on_the_ground() -> None:
 )
 def test_a_check_that_fails_refuses_arming_and_says_why(start: Start, reason: str) -> None:
     flight = CopterFlight()
-    flight.put(start)
+    flight.reset_world(start)
     flight.copter.pilot.standing = False
     flight.run(0.03)
     assert flight.arm() == DENIED
     assert flight.client.said("not armed: ")
     assert flight.client.said(reason)
     assert flight.command(mav.MAV_CMD_RUN_PREARM_CHECKS) == mav.MAV_RESULT_FAILED
-    assert flight.arm_by_force() == ACCEPTED
+    assert flight.arm(force=True) == ACCEPTED
 
 
 def test_an_empty_battery_refuses_arming() -> None:
@@ -89,23 +90,23 @@ def test_take_off_hover_and_land() -> None:
     assert flight.arm() == ACCEPTED
     assert flight.command(mav.MAV_CMD_NAV_TAKEOFF, *(nan,) * 7) == ACCEPTED
     assert flight.mode is Mode.TAKEOFF
-    flight.until(lambda: flight.position[2] > 0.5, 3.0)
+    flight.wait_until(lambda: flight.position[2] > 0.5, within=3.0)
     flight.run(0.6)
     assert flight.client.latest("EXTENDED_SYS_STATE").landed_state == mav.MAV_LANDED_STATE_TAKEOFF
     assert max(z for _, _, z in flight.path(4.0)) < 2.51
-    assert flight.told_mode is Mode.HOLD
+    assert flight.reported_mode is Mode.HOLD
     assert flight.position == pytest.approx((0.0, 0.0, 2.5), abs=0.01)
     assert flight.client.latest("EXTENDED_SYS_STATE").landed_state == mav.MAV_LANDED_STATE_IN_AIR
     assert flight.disarm() == DENIED
     assert flight.client.said("not disarmed: the vehicle is flying")
     assert flight.armed
     assert flight.command(mav.MAV_CMD_NAV_LAND, 0.0, 0.0, 0.0, nan) == ACCEPTED
-    flight.until(lambda: flight.position[2] < 0.05, 5.0)
+    flight.wait_until(lambda: flight.position[2] < 0.05, within=5.0)
     assert flight.velocity[2] == pytest.approx(-0.7, abs=0.05)  # MPC_LAND_SPEED
-    flight.until(lambda: flight.client.said("landing detected"), 2.0)
-    landed_s = flight.now_s
-    flight.until(lambda: not flight.armed, 5.0)
-    assert flight.now_s - landed_s == pytest.approx(2.0, abs=0.02)  # COM_DISARM_LAND
+    flight.wait_until(lambda: flight.client.said("landing detected"), within=2.0)
+    landed_s = flight.time_s
+    flight.wait_until(lambda: not flight.armed, within=5.0)
+    assert flight.time_s - landed_s == pytest.approx(2.0, abs=0.02)  # COM_DISARM_LAND
     assert flight.copter.pilot.state == FIRST
     assert flight.client.said("landed, rotors stopped")
     assert flight.position == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
@@ -114,7 +115,7 @@ def test_take_off_hover_and_land() -> None:
 def test_who_does_not_take_off_is_disarmed() -> None:
     flight = CopterFlight(values={"COM_DISARM_PRFLT": 3.0})
     assert flight.arm() == ACCEPTED
-    assert flight.until(lambda: not flight.armed, 5.0) == pytest.approx(3.0, abs=0.05)
+    assert flight.wait_until(lambda: not flight.armed, within=5.0) == pytest.approx(3.0, abs=0.05)
     assert flight.client.said("no take-off, rotors stopped")
 
 
@@ -124,7 +125,7 @@ def test_the_height_commanded_before_arming_is_flown() -> None:
     above_sea = DEFAULT_ORIGIN.altitude_m + 1.5
     assert flight.command(mav.MAV_CMD_NAV_TAKEOFF, -1.0, 0.0, 0.0, nan, nan, nan, above_sea) == ACCEPTED
     assert flight.arm() == ACCEPTED
-    flight.until(lambda: flight.mode is Mode.HOLD, 6.0)
+    flight.wait_until(lambda: flight.mode is Mode.HOLD, within=6.0)
     flight.run(2.0)
     assert flight.position[2] == pytest.approx(1.5, abs=0.03)
     flight.land()
@@ -135,7 +136,7 @@ def test_the_height_commanded_before_arming_is_flown() -> None:
 
 def test_a_take_off_in_the_air_climbs_or_stays_but_never_sinks() -> None:
     flight = CopterFlight()
-    flight.take_off(1.5)
+    flight.takeoff(1.5)
     before = flight.position[2]
     assert flight.command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, 1.0) == ACCEPTED
     assert min(z for _, _, z in flight.path(1.0)) > before - 0.01
@@ -155,12 +156,12 @@ def test_a_take_off_to_nowhere_is_denied(height: float) -> None:
 @pytest.mark.parametrize("command", [(ARM, 0.0, FORCE), (mav.MAV_CMD_DO_FLIGHTTERMINATION, 1.0)])
 def test_force_stops_the_rotors_in_the_air_and_it_can_be_armed_again(command: tuple[float, ...]) -> None:
     flight = CopterFlight()
-    flight.take_off(2.0)
+    flight.takeoff(2.0)
     assert flight.command(int(command[0]), *command[1:]) == ACCEPTED
     assert not flight.armed
     assert flight.client.said("rotors stopped in the air")
     assert flight.arm() == DENIED
-    assert flight.until(lambda: flight.copter.pilot.standing, 5.0) > 0.6
+    assert flight.wait_until(lambda: flight.copter.pilot.standing, within=5.0) > 0.6
     assert not any(flight.rotors.controls)
     assert flight.arm() == ACCEPTED
     flight.run(0.5)
@@ -169,12 +170,12 @@ def test_force_stops_the_rotors_in_the_air_and_it_can_be_armed_again(command: tu
 
 def test_armed_by_force_in_the_fall_it_catches_itself() -> None:
     flight = CopterFlight()
-    flight.take_off(1.0)
-    assert flight.disarm(FORCE) == ACCEPTED
-    flight.put(Start(z=20.0, vx=2.0, vz=-5.0, p=1.0))
+    flight.takeoff(1.0)
+    assert flight.disarm(force=True) == ACCEPTED
+    flight.reset_world(Start(z=20.0, vx=2.0, vz=-5.0, p=1.0))
     flight.run(0.2)
     assert flight.velocity[2] < -6.0
-    assert flight.arm_by_force() == ACCEPTED
+    assert flight.arm(force=True) == ACCEPTED
     flight.run(3.0)
     assert flight.position[2] > 10.0
     assert hypot(*flight.velocity) < 0.1
@@ -182,9 +183,9 @@ def test_armed_by_force_in_the_fall_it_catches_itself() -> None:
 
 def test_disarmed_by_hand_after_a_landing_it_can_be_armed_at_once() -> None:
     flight = CopterFlight()
-    flight.take_off(1.0)
+    flight.takeoff(1.0)
     assert flight.select(Mode.LAND) == ACCEPTED
-    flight.until(lambda: flight.copter.pilot.standing, 8.0)
+    flight.wait_until(lambda: flight.copter.pilot.standing, within=8.0)
     assert flight.disarm() == ACCEPTED
     assert flight.mode is Mode.HOLD
     assert flight.arm() == ACCEPTED
@@ -192,9 +193,9 @@ def test_disarmed_by_hand_after_a_landing_it_can_be_armed_at_once() -> None:
 
 def test_return_climbs_flies_home_lands_and_disarms() -> None:
     flight = CopterFlight(values={"RTL_RETURN_ALT": 4.0, "RTL_MIN_DIST": 2.0, "COM_DISARM_LAND": 0.2})
-    flight.take_off(2.0)
-    assert flight.go(4.0, -3.0, 2.0) == ACCEPTED
-    flight.until(lambda: flight.position[0] > 3.9 and hypot(*flight.velocity) < 0.2, 10.0)
+    flight.takeoff(2.0)
+    assert flight.goto(4.0, -3.0, 2.0) == ACCEPTED
+    flight.wait_until(lambda: flight.position[0] > 3.9 and hypot(*flight.velocity) < 0.2, within=10.0)
     assert flight.command(mav.MAV_CMD_NAV_RETURN_TO_LAUNCH) == ACCEPTED
     assert flight.mode is Mode.RETURN
     path = flight.path_until(lambda: not flight.armed, 40.0)
@@ -207,8 +208,8 @@ def test_return_climbs_flies_home_lands_and_disarms() -> None:
 
 def test_close_to_home_it_returns_without_a_climb() -> None:
     flight = CopterFlight(values={"COM_DISARM_LAND": 0.2})
-    flight.take_off(1.0)
-    assert flight.go(2.0, 0.0, 1.0) == ACCEPTED
+    flight.takeoff(1.0)
+    assert flight.goto(2.0, 0.0, 1.0) == ACCEPTED
     flight.run(2.0)
     assert flight.select(Mode.RETURN) == ACCEPTED
     path = flight.path_until(lambda: not flight.armed, 20.0)
@@ -218,7 +219,7 @@ def test_close_to_home_it_returns_without_a_climb() -> None:
 
 def test_in_wind_it_lands_where_it_was_told_to() -> None:
     flight = CopterFlight(wind_enu_m_s=(-5.0, 3.0, 0.0), values={"COM_DISARM_LAND": 0.2})
-    flight.take_off(1.5)
+    flight.takeoff(1.5)
     assert hypot(*flight.position[:2]) < 0.3
     assert flight.select(Mode.LAND) == ACCEPTED
     path = flight.path_until(lambda: not flight.armed, 20.0)
@@ -228,9 +229,9 @@ def test_in_wind_it_lands_where_it_was_told_to() -> None:
 
 def test_the_autopilot_restarted_in_mid_air_picks_the_flight_up_in_hold() -> None:
     flight = CopterFlight()
-    flight.take_off(1.0)
-    assert flight.go(20.0, 0.0, 1.0) == ACCEPTED
-    flight.until(lambda: flight.velocity[0] > 3.0, 5.0)
+    flight.takeoff(1.0)
+    assert flight.goto(20.0, 0.0, 1.0) == ACCEPTED
+    flight.wait_until(lambda: flight.velocity[0] > 3.0, within=5.0)
     flight.restart()
     flight.run(3.0)
     assert flight.copter.pilot.state == State(Mode.HOLD, armed=True)
@@ -243,7 +244,7 @@ def test_the_autopilot_restarted_in_mid_air_picks_the_flight_up_in_hold() -> Non
 def test_the_battery_is_counted_across_flights() -> None:
     flight = CopterFlight(values={"COM_DISARM_LAND": 0.2})
     for _ in range(2):
-        flight.take_off(0.5)
+        flight.takeoff(0.5)
         flight.land()
     flight.run(0.6)
     consumed_mah = flight.client.latest("BATTERY_STATUS").current_consumed

@@ -19,16 +19,16 @@ from tools.harness.copter_flight import ACCEPTED, DENIED, CopterFlight, in_the_a
 
 def test_a_speed_and_a_behaviour_act_at_once() -> None:
     flight = in_the_air()
-    flight.go(50.0, 0.0, 5.0)
+    flight.goto(50.0, 0.0, 5.0)
     flight.run(2.5)
-    flight.set("MPC_XY_CRUISE", 2.0)
+    flight.set_param("MPC_XY_CRUISE", 2.0)
     flight.run(2.0)
     assert hypot(*flight.velocity) == pytest.approx(2.0, abs=0.05)
-    flight.set("MPC_XY_VEL_MAX", 1.0)  # less than the cruise speed: that holds
+    flight.set_param("MPC_XY_VEL_MAX", 1.0)  # less than the cruise speed: that holds
     flight.run(1.0)
     assert hypot(*flight.velocity) == pytest.approx(1.0, abs=0.05)
-    flight.set("MPC_LAND_SPEED", 0.3)
-    flight.set("MPC_Z_VEL_MAX_DN", 0.3)
+    flight.set_param("MPC_LAND_SPEED", 0.3)
+    flight.set_param("MPC_Z_VEL_MAX_DN", 0.3)
     flight.select(Mode.LAND)
     flight.run(3.0)
     assert flight.velocity[2] == pytest.approx(-0.3, abs=0.03)
@@ -40,10 +40,10 @@ def test_a_speed_and_a_behaviour_act_at_once() -> None:
 )
 def test_a_number_that_changes_in_flight_jolts_nothing(name: str, value: Value) -> None:
     flight = in_the_air(wind_enu_m_s=(3.0, 0.0, 0.0))
-    flight.go(30.0, 0.0, 5.0)
+    flight.goto(30.0, 0.0, 5.0)
     flight.run(1.5)
     tilts = [flight.euler]
-    flight.set(name, value)
+    flight.set_param(name, value)
     flight.run(0.3, lambda: tilts.append(flight.euler))
     jolts = [degrees(dist(before, after)) for before, after in pairwise(tilts)]
     assert max(jolts) < 1.2  # in 8 ms
@@ -65,7 +65,7 @@ def test_a_heavier_vehicle_than_is_believed_flies_and_lands() -> None:
     body = structs.replace(nominal.body, mass_kg=1.15 * nominal.body.mass_kg)
     heavy = structs.replace(nominal, body=body)
     flight = CopterFlight(vehicle=heavy, values={"COM_DISARM_LAND": 0.1})
-    flight.take_off(1.5)
+    flight.takeoff(1.5)
     flight.run(1.5)
     assert flight.position[2] == pytest.approx(1.5, abs=0.1)
     flight.land()
@@ -96,7 +96,7 @@ def test_failures_are_injected_only_where_a_parameter_says_so() -> None:
     flight = CopterFlight(feedback=Feedback.SENSORS, seed=1)
     inject, gps, off, ok = mav.MAV_CMD_INJECT_FAILURE, 4.0, 1.0, 0.0
     assert flight.command(inject, gps, off) == DENIED
-    flight.set("SYS_FAILURE_EN", 1)
+    flight.set_param("SYS_FAILURE_EN", 1)
     assert flight.command(inject, gps, off) == ACCEPTED
     flight.run(1.2)
     assert flight.client.latest("GPS_RAW_INT").fix_type == mav.GPS_FIX_TYPE_NO_GPS

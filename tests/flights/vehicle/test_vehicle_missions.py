@@ -84,21 +84,21 @@ def test_a_mission_is_left_and_gone_on_with_where_it_was() -> None:
     load(flight, waypoint(4.0, 0.0), waypoint(4.0, 4.0), waypoint(0.0, 4.0, stay_s=0.2))
     pause = mav.MAV_CMD_DO_PAUSE_CONTINUE
     assert flight.command(pause, 1.0) == ACCEPTED
-    flight.until(lambda: reached(flight) == [0], 6.0)
+    flight.wait_until(lambda: reached(flight) == [0], within=6.0)
     assert flight.command(pause, 0.0) == ACCEPTED
-    assert flight.told_mode is not None
+    assert flight.reported_mode is not None
     assert state(flight) == PAUSED
     flight.run(2.0)
-    assert flight.go(1.0, 1.0, 4.0) == ACCEPTED  # elsewhere, in between
+    assert flight.goto(1.0, 1.0, 4.0) == ACCEPTED  # elsewhere, in between
     flight.run(3.0)
     assert flight.command(pause, 1.0) == ACCEPTED
     assert state(flight) == ACTIVE
     assert flight.client.latest("MISSION_CURRENT").seq == 1
-    assert flight.go(5.0, 1.0, 3.0) == ACCEPTED  # out of the flown mission
+    assert flight.goto(5.0, 1.0, 3.0) == ACCEPTED  # out of the flown mission
     assert flight.mode is Mode.HOLD
     assert state(flight) == PAUSED
     assert flight.select(Mode.MISSION) == ACCEPTED
-    flight.until(lambda: flight.copter.pilot.state.mode is not Mode.MISSION, 12.0)
+    flight.wait_until(lambda: flight.copter.pilot.state.mode is not Mode.MISSION, within=12.0)
     assert flight.client.said("finished: hold")
     assert reached(flight) == [0, 1, 2]
     assert state(flight) == COMPLETE
@@ -112,7 +112,7 @@ def test_another_item_is_made_current_in_flight() -> None:
     assert flight.select(Mode.MISSION) == ACCEPTED
     flight.run(0.5)
     flight.send("MISSION_SET_CURRENT", SYSTEM, 1, 1)
-    flight.until(lambda: reached(flight) == [1], 5.0)
+    flight.wait_until(lambda: reached(flight) == [1], within=5.0)
     assert flight.position == pytest.approx((0.0, 3.0, 3.0), abs=0.5)
     assert flight.command(mav.MAV_CMD_DO_SET_MISSION_CURRENT, 0.0) == ACCEPTED
     flight.run(2.0)
@@ -125,7 +125,7 @@ def test_a_mission_that_ends_on_a_circle_ends_at_rest() -> None:
     flight = in_the_air(3.0)
     load(flight, item(mav.MAV_CMD_NAV_LOITER_TURNS, 0.5, 0.0, 1.5, nan, east=1.5, up=3.0))
     assert flight.select(Mode.MISSION) == ACCEPTED
-    flight.until(lambda: flight.mode is Mode.HOLD, 10.0)
+    flight.wait_until(lambda: flight.mode is Mode.HOLD, within=10.0)
     flight.run(2.5)
     assert hypot(*flight.velocity) < 0.1
 
@@ -144,7 +144,7 @@ def test_without_a_mission_there_is_none_to_fly() -> None:
 
 def test_a_track_is_flown_from_the_ground() -> None:
     flight = CopterFlight()
-    flight.set("TRACK", 2)
+    flight.set_param("TRACK", 2)
     assert flight.select(Mode.TRACK) == ACCEPTED
     assert flight.arm() == ACCEPTED
     wanted = position(track("line"), np.zeros(1))[0]
@@ -162,7 +162,7 @@ def test_a_track_from_time_0_on_ends_in_hold() -> None:
     start = Start(x=2.0, z=2.0, vy=1.0, psi=90.0, rotors=FLIGHT.simulation.rotor_speed_rpm)
     flight = CopterFlight(start=start, first=short)
     away = []
-    flight.run(1.9, lambda: away.append(dist(flight.position, position(short, np.array([flight.now_s]))[0])))
+    flight.run(1.9, lambda: away.append(dist(flight.position, position(short, np.array([flight.time_s]))[0])))
     assert flight.mode is Mode.TRACK
     assert max(away) < 0.1
     flight.run(0.5)

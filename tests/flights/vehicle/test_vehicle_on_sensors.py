@@ -23,19 +23,19 @@ def off_m(flight: CopterFlight) -> float:
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_it_takes_off_goes_somewhere_and_lands(seed: int) -> None:
     flight = on_sensors(seed)
-    flight.take_off(5.0)
-    assert flight.go(10.0, 5.0, 8.0) == ACCEPTED
+    flight.takeoff(5.0)
+    assert flight.goto(10.0, 5.0, 8.0) == ACCEPTED
     flight.run(12.0)
     assert flight.position == pytest.approx((10.0, 5.0, 8.0), abs=1.0)
     assert flight.select(Mode.LAND) == ACCEPTED
-    flight.until(lambda: not flight.armed, 30.0, "the landing")
+    flight.wait_until(lambda: not flight.armed, within=30.0, what="the landing")
     assert abs(flight.position[2]) < 0.01
     assert flight.copter.pilot.standing
 
 
 def test_telemetry_tells_what_the_sensors_measure() -> None:
     flight = on_sensors()
-    flight.take_off(3.0)
+    flight.takeoff(3.0)
     flight.client.forget()
     for name in ("HIGHRES_IMU", "GPS_RAW_INT", "ESTIMATOR_STATUS"):
         number = getattr(mav, f"MAVLINK_MSG_ID_{name}")
@@ -56,8 +56,8 @@ def test_telemetry_tells_what_the_sensors_measure() -> None:
 def test_lost_gps_is_said_and_survived() -> None:
     """20 s without: it drifts a little, says so, and goes back without a jump."""
     flight = on_sensors()
-    flight.set("SYS_FAILURE_EN", 1)
-    flight.take_off(10.0)
+    flight.set_param("SYS_FAILURE_EN", 1)
+    flight.takeoff(10.0)
     flight.run(20.0)
     before = flight.position
     off, ok = float(mav.FAILURE_TYPE_OFF), float(mav.FAILURE_TYPE_OK)
@@ -80,7 +80,7 @@ def test_lost_gps_is_said_and_survived() -> None:
 
 def test_it_does_not_arm_without_knowing_where_it_is() -> None:
     flight = on_sensors()
-    flight.set("SYS_FAILURE_EN", 1)
+    flight.set_param("SYS_FAILURE_EN", 1)
     flight.command(mav.MAV_CMD_INJECT_FAILURE, float(mav.FAILURE_UNIT_SENSOR_GPS), float(mav.FAILURE_TYPE_OFF))
     flight.run(5.0)
     assert flight.arm() != ACCEPTED

@@ -12,7 +12,7 @@ from colibri.mavlink.mission.items import FENCE, MissionItem
 from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import mav
 from tools.harness.client import SYSTEM
-from tools.harness.copter_flight import ACCEPTED, DENIED, FORCE, STANDING, CopterFlight, in_the_air
+from tools.harness.copter_flight import ACCEPTED, DENIED, STANDING, CopterFlight, in_the_air
 
 GLOBAL, RELATIVE = mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 REPOSITION = mav.MAV_CMD_DO_REPOSITION
@@ -31,7 +31,7 @@ def turned_by(flight: CopterFlight, yaw_rad: float) -> float:
 
 def test_it_goes_to_a_place_without_overshoot_and_holds_it() -> None:
     flight = in_the_air()
-    assert flight.go(6.0, -2.5, 6.0) == ACCEPTED
+    assert flight.goto(6.0, -2.5, 6.0) == ACCEPTED
     path = flight.path(5.0)
     assert max(x for x, _, _ in path) < 6.03
     assert min(y for _, y, _ in path) > -2.53
@@ -43,8 +43,8 @@ def test_it_goes_to_a_place_without_overshoot_and_holds_it() -> None:
 
 def test_hold_stops_it_and_it_stays_there() -> None:
     flight = in_the_air()
-    assert flight.go(50.0, 0.0, 5.0) == ACCEPTED
-    flight.until(lambda: flight.velocity[0] > 4.5, 6.0)
+    assert flight.goto(50.0, 0.0, 5.0) == ACCEPTED
+    flight.wait_until(lambda: flight.velocity[0] > 4.5, within=6.0)
     began = flight.position[0]
     assert flight.select(Mode.HOLD) == ACCEPTED
     flight.run(3.5)
@@ -79,7 +79,7 @@ def test_what_a_reposition_leaves_out_stays(params: tuple[float, ...], place: Ve
 def test_a_reposition_to_nowhere_pauses() -> None:
     """As QGroundControl's pause button does, in a mission too."""
     flight = in_the_air()
-    assert flight.go(50.0, 0.0, 5.0) == ACCEPTED
+    assert flight.goto(50.0, 0.0, 5.0) == ACCEPTED
     flight.run(2.0)
     assert flight.command(REPOSITION, -1.0, 1.0, 0.0, nan, nan, nan, nan) == ACCEPTED
     flight.run(3.0)
@@ -103,7 +103,7 @@ def test_a_reposition_that_cannot_be_flown_is_denied() -> None:
 
 def test_on_the_ground_nothing_is_flown_to() -> None:
     flight = CopterFlight()
-    assert flight.go(1.0, 1.0, 5.0) == DENIED
+    assert flight.goto(1.0, 1.0, 5.0) == DENIED
     assert flight.command_int(ORBIT, 5.0, 2.0, 0.0, nan, frame=RELATIVE) == DENIED
     assert flight.command(mav.MAV_CMD_CONDITION_YAW, 90.0) == mav.MAV_RESULT_TEMPORARILY_REJECTED
     assert flight.select(Mode.ORBIT) == DENIED
@@ -171,7 +171,7 @@ def test_an_orbit_that_cannot_be_flown_is_denied() -> None:
 
 def test_speed_can_be_changed_in_flight_and_is_forgotten_after_it() -> None:
     flight = in_the_air()
-    assert flight.go(60.0, 0.0, 5.0) == ACCEPTED
+    assert flight.goto(60.0, 0.0, 5.0) == ACCEPTED
     speed = mav.MAV_CMD_DO_CHANGE_SPEED
     assert flight.command(speed, 1.0, 2.0, -1.0) == ACCEPTED
     flight.run(3.0)
@@ -186,7 +186,7 @@ def test_speed_can_be_changed_in_flight_and_is_forgotten_after_it() -> None:
     flight.run(2.5)
     assert hypot(*flight.velocity) == pytest.approx(5.0, abs=0.05)
     assert flight.command(speed, 1.0, 3.0) == ACCEPTED
-    assert flight.disarm(FORCE) == ACCEPTED
+    assert flight.disarm(force=True) == ACCEPTED
     assert flight.copter.pilot.speed_m_s is None
 
 
@@ -206,7 +206,7 @@ def test_turns() -> None:
 
 def test_home_and_origin() -> None:
     flight = in_the_air()
-    flight.go(3.0, 4.0, 5.0)
+    flight.goto(3.0, 4.0, 5.0)
     flight.run(4.0)
     home = mav.MAV_CMD_DO_SET_HOME
     x, y = degrees_e7(1.0, -2.0)
@@ -252,7 +252,7 @@ def test_modes_by_message_and_by_standard_number() -> None:
     flight.send("SET_MODE", SYSTEM, mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, 99 << 16)
     flight.run(0.05)
     assert flight.client.said("this vehicle has no such mode")
-    assert flight.told_mode is not Mode.HOLD
+    assert flight.reported_mode is not Mode.HOLD
     standard = mav.MAV_CMD_DO_SET_STANDARD_MODE
     assert flight.command(standard, float(mav.MAV_STANDARD_MODE_SAFE_RECOVERY)) == ACCEPTED
     for number in (0.0, 99.0, 1.5, nan, -1.0):
@@ -272,7 +272,7 @@ def fence(*places: tuple[float, float]) -> tuple[MissionItem, ...]:
 def test_nothing_is_flown_to_outside_the_geofence() -> None:
     flight = in_the_air()
     flight.copter.stations.plans.load(FENCE, fence((-8.0, -8.0), (8.0, -8.0), (8.0, 8.0), (-8.0, 8.0)))
-    assert flight.go(9.0, 0.0, 5.0) == DENIED
+    assert flight.goto(9.0, 0.0, 5.0) == DENIED
     assert flight.client.said("reposition refused: outside the geofence")
     assert flight.command_int(ORBIT, 9.0, 2.0, nan, nan, frame=RELATIVE) == DENIED  # its centre alone is inside
     assert flight.client.said("orbit refused: outside the geofence")
@@ -280,11 +280,11 @@ def test_nothing_is_flown_to_outside_the_geofence() -> None:
     x, y = degrees_e7(20.0, 0.0)
     home = mav.MAV_CMD_DO_SET_HOME
     assert flight.command_int(home, 0.0, 0.0, 0.0, 0.0, frame=RELATIVE, x=x, y=y, z=488.0) == DENIED
-    flight.disarm(FORCE)
-    flight.put(STANDING)
+    flight.disarm(force=True)
+    flight.reset_world(STANDING)
     flight.copter.stations.plans.load(FENCE, fence((20.0, 20.0), (30.0, 20.0), (30.0, 30.0)))
     assert flight.command(mav.MAV_CMD_NAV_TAKEOFF, *(nan,) * 7) == DENIED
-    flight.until(lambda: flight.copter.pilot.standing, 4.0)
+    flight.wait_until(lambda: flight.copter.pilot.standing, within=4.0)
     flight.run(0.2)
     assert flight.arm() == DENIED
     assert flight.client.said("not armed: outside the geofence")
@@ -292,11 +292,11 @@ def test_nothing_is_flown_to_outside_the_geofence() -> None:
 
 def test_home_beyond_the_geofence_is_returned_to_all_the_same() -> None:
     flight = in_the_air(2.0, values={"RTL_RETURN_ALT": 2.0, "RTL_MIN_DIST": 1.0, "COM_DISARM_LAND": 0.1})
-    flight.go(5.0, 0.0, 2.0)
+    flight.goto(5.0, 0.0, 2.0)
     flight.run(2.5)
     flight.copter.stations.plans.load(FENCE, fence((4.0, -8.0), (9.0, -8.0), (9.0, 8.0), (4.0, 8.0)))
     assert flight.select(Mode.RETURN) == ACCEPTED
-    flight.until(lambda: not flight.armed, 25.0)
+    flight.wait_until(lambda: not flight.armed, within=25.0)
     assert hypot(*flight.position[:2]) < 0.1
 
 

@@ -41,7 +41,7 @@ def test_offboard_positions_and_that_a_jump_of_them_is_flown_smoothly() -> None:
     stream(flight, 0.5, position=(0.0, 0.0, 5.0), yaw_rad=0.5 * pi)  # it is there, to the last bit
     speeds = []
     for _ in range(45):
-        flight.setpoint(position=(4.0, 2.0, 6.0), yaw_rad=0.0)
+        flight.setpoint(position=(4.0, 2.0, 6.0), yaw=0.0)
         flight.run(EVERY_S, lambda: speeds.append(hypot(*flight.velocity)))
     assert max(speeds) < 5.2
     assert max(abs(after - before) for before, after in pairwise(speeds)) < 0.05
@@ -55,7 +55,7 @@ def test_offboard_velocity_and_yaw_rate_and_what_silence_does() -> None:
     assert flight.velocity == pytest.approx((2.0, -1.0, 0.5), abs=0.05)
     assert flight.copter.pilot.context().state.rate_flu_rad_s[2] == pytest.approx(0.5, abs=0.05)
     flight.run(0.8)
-    assert flight.told_mode is Mode.OFFBOARD  # COM_OF_LOSS_T is 1 s
+    assert flight.reported_mode is Mode.OFFBOARD  # COM_OF_LOSS_T is 1 s
     flight.run(0.3)
     assert flight.mode is Mode.HOLD
     assert flight.client.said("setpoints lost: hold")
@@ -276,7 +276,7 @@ def test_a_target_as_fast_as_a_train_is_not_raced() -> None:
 
 def test_without_a_target_follow_stops() -> None:
     flight = in_the_air()
-    flight.go(30.0, 0.0, 5.0)
+    flight.goto(30.0, 0.0, 5.0)
     flight.run(2.0)
     assert flight.select(Mode.FOLLOW) == ACCEPTED
     flight.run(3.0)

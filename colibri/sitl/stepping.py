@@ -1,0 +1,107 @@
+"""What tests can do with any flight in simulated time: step it, wait for a condition, send sticks and setpoints."""
+
+from collections.abc import Callable
+from math import pi
+from typing import Any, Protocol
+
+from colibri.common.types import Vector
+from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
+from colibri.mavlink.wire.ned import ned_from_enu
+from colibri.sitl.errors import SitlError
+
+
+class NotInTimeError(SitlError, AssertionError):
+    """A condition was not met in time."""
+
+
+class Stepped(Protocol):
+    """A flight whose simulated time passes frame by frame, when `step` is called and never otherwise."""
+
+    __slots__ = ()
+
+    @property
+    def time_us(self) -> int:
+        """Simulated time, µs."""
+        ...
+
+    def step(self) -> None:
+        """Fly one frame."""
+        ...
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time, s."""
+        return self.time_us * 1e-6
+
+    def run(self, seconds: float, each_frame: Callable[[], object] | None = None) -> None:
+        """Fly for so many seconds of simulated time; call `each_frame` before each frame."""
+        end_us = self.time_us + round(seconds * 1e6)
+        while self.time_us < end_us:
+            if each_frame is not None:
+                each_frame()
+            self.step()
+
+    def wait_until(self, predicate: Callable[[], object], *, within: float, what: str = "") -> float:
+        """Fly until `predicate()`; return how long that took, s.
+
+        Raises:
+            NotInTimeError: It is not so `within` that many seconds of simulated time.
+        """
+        began_us = self.time_us
+        end_us = began_us + round(within * 1e6)
+        while not predicate():
+            if self.time_us >= end_us:
+                raise NotInTimeError(f"{what or 'what was waited for'} took longer than {within:g} s: {self}")
+            self.step()
+        return (self.time_us - began_us) * 1e-6
+
+    def hold(self, predicate: Callable[[], object], *, for_: float, what: str = "") -> None:
+        """Fly for so many seconds, at each frame of which `predicate()` must hold.
+
+        Raises:
+            NotInTimeError: It does not.
+        """
+        began_us = self.time_us
+        end_us = began_us + round(for_ * 1e6)
+        while True:
+            if not predicate():
+                after_s = (self.time_us - began_us) * 1e-6
+                raise NotInTimeError(f"{what or 'what was to hold'} did so for {after_s:.3f} of {for_:g} s: {self}")
+            if self.time_us >= end_us:
+                return
+            self.step()
+
+
+class Steered(Protocol):
+    """A vehicle that is sent sticks and setpoints, which no message answers."""
+
+    @property
+    def system(self) -> int:
+        """The vehicle's system id."""
+        ...
+
+    def send(self, name: str, *fields: Any) -> None:
+        """Send a message from the first ground station, with its fields as MAVLink defines them."""
+        ...
+
+    def stick(self, pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: float = 0.0) -> None:
+        """Send sticks once: forward, right, up (0..1, the middle is 0.5), clockwise, each -1..1."""
+        axes = (pitch, roll, thrust, yaw)
+        self.send("MANUAL_CONTROL", self.system, *(round(1000.0 * axis) for axis in axes), 0)
+
+    def setpoint(
+        self,
+        position: Vector | None = None,
+        velocity: Vector | None = None,
+        acceleration: Vector | None = None,
+        yaw: float | None = None,
+        yaw_rate: float | None = None,
+    ) -> None:
+        """Send an offboard setpoint once, ENU, SI; what is None is masked."""
+        groups = (position, velocity, acceleration)
+        mask = sum(0b111 << 3 * place for place, group in enumerate(groups) if group is None)
+        mask |= (yaw is None) << 10 | (yaw_rate is None) << 11
+        ned = [value for group in groups for value in ned_from_enu(group or (0.0, 0.0, 0.0))]
+        heading = 0.0 if yaw is None else 0.5 * pi - yaw
+        target = (self.system, AUTOPILOT_COMPONENT, mav.MAV_FRAME_LOCAL_NED)
+        self.send("SET_POSITION_TARGET_LOCAL_NED", 0, *target, mask, *ned, heading, -(yaw_rate or 0.0))
