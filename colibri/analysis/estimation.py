@@ -31,7 +31,7 @@ class Estimation(NamedTuple):
         checked_s: Times of the filter, (m,).
         nees: Its normalised estimation error squared at them: position, velocity and attitude together, (m,).
         nis: Sums of the normalised innovations squared up to them, a column for each of `kinds`, (m, k).
-        believed: How many innovations these are, (m, k).
+        accepted: How many innovations these are, (m, k).
         kinds: What of `MEASURED` the vehicle has, k names.
     """
 
@@ -43,7 +43,7 @@ class Estimation(NamedTuple):
     checked_s: Array
     nees: Array
     nis: Array
-    believed: Array
+    accepted: Array
     kinds: tuple[str, ...]
 
     def after(self, start_s: float) -> "Estimation":
@@ -58,7 +58,7 @@ class Estimation(NamedTuple):
             checked_s=self.checked_s[checked],
             nees=self.nees[checked],
             nis=self.nis[checked],
-            believed=self.believed[checked],
+            accepted=self.accepted[checked],
             kinds=self.kinds,
         )
 
@@ -81,7 +81,7 @@ class Estimation(NamedTuple):
         return dict(zip(FIGURES, values, strict=True))
 
     def _mean_nis(self) -> dict[str, dict[str, float | None]]:
-        sums, counts = self.nis[-1] - self.nis[0], self.believed[-1] - self.believed[0]
+        sums, counts = self.nis[-1] - self.nis[0], self.accepted[-1] - self.accepted[0]
         return {
             kind: {"mean": total / count / MEASURED[kind] if count > 0 else None, "innovations": max(int(count), 0)}
             for kind, total, count in zip(self.kinds, sums.tolist(), counts.tolist(), strict=True)
@@ -118,7 +118,7 @@ def read_estimation(plan: FlightPlan) -> Estimation:
             [_errors(check, real).nees() for check, real in zip(checks, _at(truth, checks[:, 0]), strict=True)]
         ),
         nis=checks[:, [columns.index(f"nis_{kind}") for kind in kinds]],
-        believed=checks[:, [columns.index(f"believed_{kind}") for kind in kinds]],
+        accepted=checks[:, [columns.index(f"believed_{kind}") for kind in kinds]],
         kinds=kinds,
     )
 

@@ -294,7 +294,7 @@ def put_title(figure: Figure, title: str) -> None:
 
 
 def _scale(axes: Any) -> bool:
-    """Make the axes as long as their ranges, but none shorter than a part of the longest; tell whether none was."""
+    """Make the axes as long as their ranges, but none shorter than a part of the longest; return whether none was."""
     ranges = np.ptp([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()], axis=1)
     ranges /= ranges.max()
     lengths = np.maximum(ranges, _FLATTEST)

@@ -70,7 +70,7 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
 
 
 def _estimation_figures(plan: FlightPlan, settled: Array) -> Report:
-    """Return how far estimate and reference, estimate and truth are apart; a state that is told is the truth."""
+    """Return how far estimate and reference, estimate and truth are apart; without an estimator the former alone."""
     if plan.feedback is Feedback.SENSORS:
         return read_estimation(plan).after(SETTLED_AFTER_S).figures()
     return dict.fromkeys(FIGURES) | {FIGURES[0]: _rms(settled) if len(settled) else None}

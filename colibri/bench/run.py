@@ -18,7 +18,7 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
 from colibri.bench.sensing import FLIGHTS_A_RUN, sensing_figures
 from colibri.bench.serving import ALONE, CHANNELS, WATCHED, serving_figures
-from colibri.bench.speed import CONTROL_S, LINKS, THESIS_LINKS, Peer, Tell, rate_figures, thesis_figures
+from colibri.bench.speed import CONTROL_S, LINKS, THESIS_LINKS, Peer, Report, rate_figures, thesis_figures
 from colibri.bench.stages import MOVES, STAGES, stage_figures
 from colibri.common.process.lifecycle import fail
 
@@ -35,18 +35,18 @@ def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
     if args.out:
         _check_writable(args.out)
     figures: dict[str, Any] = {"settings": _settings(args)}
-    with _progress(parts(wanted, args.runs, beside=peer is not None)) as tell, TemporaryDirectory() as folder:
+    with _progress(parts(wanted, args.runs, beside=peer is not None)) as report, TemporaryDirectory() as folder:
         profile = load_profile(PROFILE)
         if "stages" in wanted:
-            figures["stages"] = stage_figures(profile, Path(folder), args.duration, tell)
+            figures["stages"] = stage_figures(profile, Path(folder), args.duration, report)
         if "flights" in wanted:
-            figures["flights"] = rate_figures(profile, Path(folder), args.duration, args.runs, tell, peer)
+            figures["flights"] = rate_figures(profile, Path(folder), args.duration, args.runs, report, peer)
         if "sensors" in wanted:
-            figures["sensors"] = sensing_figures(profile, Path(folder), args.duration, args.runs, tell)
+            figures["sensors"] = sensing_figures(profile, Path(folder), args.duration, args.runs, report)
         if "ground" in wanted:
-            figures["ground"] = serving_figures(profile, Path(folder), args.duration, args.runs, tell)
+            figures["ground"] = serving_figures(profile, Path(folder), args.duration, args.runs, report)
         if "thesis" in wanted:
-            figures["thesis"] = thesis_figures(args.runs, tell)
+            figures["thesis"] = thesis_figures(args.runs, report)
     if args.out:
         _write(figures, args.out)
     _print(figures)
@@ -59,7 +59,7 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def parts(wanted: list[str], runs: int, *, beside: bool) -> int:
-    """Return how often `tell` will be called."""
+    """Return how often `report` will be called."""
     stages = 1 + len(MOVES) * (1 + len(installed_solvers()))
     flights = 1 + runs * len(CONTROL_S) * (len(LINKS) + beside)
     ground = len(CHANNELS) + 2 * runs
@@ -70,17 +70,17 @@ def parts(wanted: list[str], runs: int, *, beside: bool) -> int:
 
 
 @contextmanager
-def _progress(parts: int) -> Iterator[Tell]:
+def _progress(parts: int) -> Iterator[Report]:
     """Show on standard error what is being measured."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=parts)
 
-        def tell(what: str) -> None:
+        def report(what: str) -> None:
             bar.update(task, description=what, advance=1)
 
-        yield tell
+        yield report
 
 
 def _print(figures: Mapping[str, Any]) -> None:

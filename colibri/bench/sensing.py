@@ -10,7 +10,7 @@ import numpy as np
 
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.estimation.estimator import Estimator
-from colibri.bench.speed import Samples, Tell, summarised
+from colibri.bench.speed import Report, Samples, summarised
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.flights.in_process import SYSTEM_ID, fly_locally
@@ -34,10 +34,10 @@ _SETTLED = 500
 FLIGHTS_A_RUN = len(LINKS) * len(Feedback)
 
 
-def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int, tell: Tell) -> dict[str, Any]:
+def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int, report: Report) -> dict[str, Any]:
     """Time the estimator on the frames of a flight; fly on sensors and on the state, in turn, in every run."""
     duration_s = max(duration_s, _MIN_S)
-    tell("estimator")
+    report("estimator")
     fly_locally(_plan(profile, folder, duration_s, "memory", Feedback.SENSORS), _unseen)
     frames = list(sensor_frames((folder / "flight.tlog").read_bytes()))
     steps = {
@@ -49,7 +49,7 @@ def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int
         for link in LINKS:
             for feedback in Feedback:
                 name = f"{link}, {feedback}"
-                tell(f"{name}, {run + 1} of {runs}")
+                report(f"{name}, {run + 1} of {runs}")
                 factor = _real_time_factor(_plan(profile, folder, duration_s, link, feedback))
                 samples.setdefault(name, []).append(factor)
     return {

@@ -1,17 +1,17 @@
 """What ground stations cost: the time to serve them after a frame, and what is left of it in the control step."""
 
 import socket
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any, TypeAlias
+from typing import Any
 
 from colibri.analysis.recording import read_recording
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.ground.stations import StationSettings
+from colibri.bench.speed import Report
 from colibri.bench.stages import Figures, summary
 from colibri.bench.variants import TRACK, plan_of
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
@@ -21,8 +21,6 @@ from colibri.flights.processes import FlightError, fly_processes
 from colibri.mavlink.streaming.rates import GCS, SDK
 from colibri.plant.process.options import nudged
 from colibri.plant.simulation.plant import PlantBuilder
-
-Tell: TypeAlias = Callable[[str], None]
 
 CHANNELS = (0, 1, 2, 4, 8)
 """Every other one is a ground station's, the others are an SDK's, with the streams that each gets unasked."""
@@ -34,17 +32,17 @@ _MIN_FRAMES = 4
 """Before these all is loaded."""
 
 
-def serving_figures(profile: Profile, folder: Path, duration_s: float, runs: int, tell: Tell) -> dict[str, Any]:
-    """Measure both: serving in memory, control steps of two processes at real time; `tell` is told what comes next."""
+def serving_figures(profile: Profile, folder: Path, duration_s: float, runs: int, report: Report) -> dict[str, Any]:
+    """Measure both: serving in memory, control steps of two processes at real time; `report` gets what comes next."""
     plan = plan_of(profile, folder, duration_s, "udp")
     serve: dict[str, Figures] = {}
     for channels in CHANNELS:
-        tell(f"serving {channels} ground stations")
+        report(f"serving {channels} ground stations")
         serve[str(channels)] = served(plan, channels)
     steps: dict[str, list[Figures]] = {ALONE: [], WATCHED: []}
     for run in range(runs):
         for name, flown in steps.items():
-            tell(f"control steps, {name}, {run + 1} of {runs}")
+            report(f"control steps, {name}, {run + 1} of {runs}")
             flown.append(control_steps_us(plan, STATIONS if name == WATCHED else 0))
     return {"track": TRACK, "serve": serve, "control_step_us": {name: _median(flown) for name, flown in steps.items()}}
 

@@ -17,7 +17,7 @@ from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import Summary
 from colibri.flights.processes import FlightError, fly_processes
 
-Tell: TypeAlias = Callable[[str], None]
+Report: TypeAlias = Callable[[str], None]
 Samples: TypeAlias = dict[str, list[float]]
 
 CONTROL_S: Mapping[int, float] = {100: 0.01, 250: 0.008, 500: 0.008}
@@ -43,13 +43,13 @@ class Peer(NamedTuple):
 
 
 def rate_figures(
-    profile: Profile, folder: Path, duration_s: float, runs: int, tell: Tell, peer: Peer | None = None
+    profile: Profile, folder: Path, duration_s: float, runs: int, report: Report, peer: Peer | None = None
 ) -> dict[str, Any]:
     """Fly at every rate over every link, and the peer if there is one, one after the other in every run.
 
     Ratios are taken within a run, so that what else the machine does weighs on both sides.
     """
-    tell("warm up")
+    report("warm up")
     plan = plan_of(profile, folder, _WARM_UP_S, "memory")
     fly_locally(plan, _unseen)
     samples: dict[int, Samples] = {frames_hz: {} for frames_hz in CONTROL_S}
@@ -58,22 +58,22 @@ def rate_figures(
             chosen = with_intervals(profile, frame_s=1.0 / frames_hz, control_s=control_s)
             flown = samples[frames_hz]
             for link in LINKS:
-                tell(f"{frames_hz} Hz, {link}, {run + 1} of {runs}")
+                report(f"{frames_hz} Hz, {link}, {run + 1} of {runs}")
                 flown.setdefault(link, []).append(_real_time_factor(chosen, folder, duration_s, link))
             if peer is not None:
-                tell(f"{frames_hz} Hz, {peer.name}, {run + 1} of {runs}")
+                report(f"{frames_hz} Hz, {peer.name}, {run + 1} of {runs}")
                 factor = peer.real_time_factor(frames_hz, min(duration_s, _PEER_MAX_S))
                 flown.setdefault(peer.name, []).append(factor)
     rates = {str(frames_hz): _with_ratios(flown, peer) for frames_hz, flown in samples.items()}
     return {"track": TRACK, "control_interval_s": {str(hz): s for hz, s in CONTROL_S.items()}, "rates_hz": rates}
 
 
-def thesis_figures(runs: int, tell: Tell) -> dict[str, Any]:
+def thesis_figures(runs: int, report: Report) -> dict[str, Any]:
     """Fly the thesis's spiral through the whole command, as a user would."""
     samples: Samples = {}
     for run in range(runs):
         for link in THESIS_LINKS:
-            tell(f"spiral, {link}, {run + 1} of {runs}")
+            report(f"spiral, {link}, {run + 1} of {runs}")
             for name, value in _command(link).items():
                 samples.setdefault(name, []).append(value)
     return {name: summarised(values) for name, values in samples.items()}

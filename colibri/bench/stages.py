@@ -120,24 +120,24 @@ def summary(times_us: Sequence[float]) -> Figures:
     return {"p50": float(p50), "p99": float(p99), "samples": len(times_us)}
 
 
-def stage_figures(profile: Profile, folder: Path, duration_s: float, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Measure all: stages over horizons, solvers over horizons, and the link; `tell` is told what comes next."""
+def stage_figures(profile: Profile, folder: Path, duration_s: float, report: Callable[[str], None]) -> dict[str, Any]:
+    """Measure all: stages over horizons, solvers over horizons, and the link; `report` gets what comes next."""
     horizons: dict[str, Any] = {}
     solvers: dict[str, dict[str, Figures]] = {}
     link: dict[str, Figures] = {}
     for horizon, moves in MOVES.items():
         chosen = with_moves(profile, moves)
-        tell(f"stages, N = {horizon}")
+        report(f"stages, N = {horizon}")
         measured_flight(chosen, folder, min(duration_s, 0.5))
         flight = measured_flight(chosen, folder, duration_s)
         us = {stage.name: summary(flight.times_us[stage.name]) for stage in STAGES}
         horizons[str(horizon)] = {"moves": list(moves), "us": us}
         solvers[str(horizon)] = {}
         for solver in installed_solvers():
-            tell(f"QP by {solver}, N = {horizon}")
+            report(f"QP by {solver}, N = {horizon}")
             solvers[str(horizon)][solver] = solver_figures(chosen, solver, flight.qps)
         if horizon == PROFILE_HORIZON:
-            tell("datagrams")
+            report("datagrams")
             link = {stage.name: summary(flight.times_us[stage.name]) for stage in LINK_STAGES}
             link[EXCHANGE] = summary(exchange_times_us(flight.frames, flight.commands))
     return {"track": TRACK, "horizons": horizons, "solvers": solvers, "link": link}

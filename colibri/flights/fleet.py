@@ -1,4 +1,4 @@
-"""`colibri sitl`: vehicles that ground stations connect to, each a plant and an autopilot, until told to stop."""
+"""`colibri sitl`: vehicles that ground stations connect to, each a plant and an autopilot, until interrupted."""
 
 import argparse
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ def ground_links(args: argparse.Namespace, instance: int) -> list[str]:
 
 
 def sitl(args: argparse.Namespace) -> int:
-    """Fly as the command line says, until told to stop; return the exit code."""
+    """Fly as the command line says, until interrupted; return the exit code."""
     _check(args)
     if args.out:
         from colibri.flights.fly import prepare
@@ -79,12 +79,12 @@ def _check(args: argparse.Namespace) -> None:
         profile = load_profile(args.profile).with_choices(args.controller, None)
         name = args.plant_vehicle or args.vehicle or profile.simulation.vehicle
         vehicle = load_vehicle(name).without(args.without)
-        believed = load_vehicle(args.vehicle or profile.simulation.vehicle)
+        assumed = load_vehicle(args.vehicle or profile.simulation.vehicle)
         check_reach(ground_links(args, args.instance), signed=args.signing_key is not None, insecure=args.insecure)
     except Error as error:
         fail(str(error))
-    if args.feedback is Feedback.SENSORS and (vehicle.sensors is None or believed.sensors is None):
-        fail(f"--feedback sensors: vehicle {(believed if vehicle.sensors else vehicle).name} has no table sensors")
+    if args.feedback is Feedback.SENSORS and (vehicle.sensors is None or assumed.sensors is None):
+        fail(f"--feedback sensors: vehicle {(assumed if vehicle.sensors else vehicle).name} has no table sensors")
     if vehicle.ground is None and "z" not in args.start:
         fail(f"vehicle {name} has no ground to stand on: fly a vehicle with a table ground, or give --start z=...")
     if not 1 <= args.count <= MAX_FLEET - args.instance:
@@ -169,7 +169,7 @@ def _hear(fleet: Sequence[Member], args: argparse.Namespace, lines: StatusLines)
         member = members[child]
         if child.name == "plant" and event["event"] == "listening":
             _start_autopilot(member, args, event["url"])
-        lines.hear(member.instance, child.name, event)
+        lines.add(member.instance, child.name, event)
 
 
 def _has_ended(member: Member) -> bool:

@@ -8,7 +8,7 @@ from rich.live import Live
 from rich.table import Table
 
 _REDRAW_EVERY_S = 0.5
-_TOLD = ("ground", "said", "heard", "silence", "answered", "refused", "flying")
+_SHOWN = ("ground", "said", "heard", "silence", "answered", "refused", "flying")
 """Events that get a line of their own."""
 _COLUMNS: tuple[tuple[str, int, Literal["left", "right"]], ...] = (
     ("id", 3, "right"),
@@ -27,7 +27,7 @@ _LINK_SIDES: tuple[Literal["left", "right"], ...] = ("right", "left", "left", "r
 
 
 class StatusLines:
-    """Collects what the processes say, and draws it."""
+    """Collects the events of the processes, and draws them."""
 
     def __init__(self, *, quiet: bool) -> None:
         """Draw on standard error; `quiet`: only what happens, no live line."""
@@ -37,11 +37,11 @@ class StatusLines:
         self._drawn_s = 0.0
         self._live: Live | None = None
 
-    def hear(self, instance: int, name: str, event: dict[str, Any]) -> None:
-        """Take in one event of a process of vehicle `instance`."""
+    def add(self, instance: int, name: str, event: dict[str, Any]) -> None:
+        """Add one event of a process of vehicle `instance`."""
         if event["event"] == "status":
             self._facts[instance] = event
-        elif event["event"] in _TOLD and not self._quiet:
+        elif event["event"] in _SHOWN and not self._quiet:
             self._console.print(f"{instance + 1:3d} {name}: {event['text']}", markup=False)
 
     def show(self, now_s: float) -> None:

@@ -31,14 +31,14 @@ _NEVER_LATE_S = 0.0
 
 
 class Exchange(Protocol):
-    """How what the plant tells gets to the autopilot, and its command back."""
+    """How a frame of the plant gets to the autopilot, and its command back."""
 
     def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and the command that reached the plant."""
 
 
 def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
-    """Fly `plan` in this process; `progress` is told the simulated time in s.
+    """Fly `plan` in this process; `progress` is called with the simulated time, s.
 
     Raises:
         ControllerError: The control law cannot be used.

@@ -58,7 +58,7 @@ class FlightPlan(WorldSetting):
         integrator: `rk4` or `adaptive`.
         link: `udp`, `memory` or `direct`.
         speed: Times real time; infinite for flat out.
-        feedback: What the plant tells the autopilot.
+        feedback: What the plant sends to the autopilot.
         duration_s: Simulated time to fly.
         out: Folder for all that the flight leaves.
         solver: QP solver asked for; None for the profile's.
@@ -176,7 +176,7 @@ class FlightPlan(WorldSetting):
 
     @property
     def start_yaw_rad(self) -> float:
-        """The first yaw reference, with which the vehicle starts unless told otherwise."""
+        """The first yaw reference, with which the vehicle starts unless the options have another."""
         return start_yaw(self.track, self.profile.references)
 
 

@@ -8,7 +8,7 @@ from colibri.flights.children import Child, end_children, events_of, how_it_ende
 from colibri.flights.command_lines import options_of, plant_options
 from colibri.flights.plan import FlightPlan, Summary
 
-_TOLD = ("ground", "heard", "said")
+_SHOWN = ("ground", "heard", "said")
 """Events of the autopilot that a user who has invited ground stations wants to read."""
 
 
@@ -17,7 +17,7 @@ class FlightError(InFlightError):
 
     Attributes:
         code: What the exit code shall be.
-        said: Whether the process already told the user why.
+        said: Whether the process has already printed why.
     """
 
     def __init__(self, message: str, code: int, *, said: bool) -> None:
@@ -34,8 +34,8 @@ def fly_processes(
 
     Args:
         plan: What to fly.
-        progress: Is told the simulated time in s.
-        say: Is told in words where ground stations may connect, and which have.
+        progress: Called with the simulated time, s.
+        say: Called with a line for each ground link and each ground station that connects.
 
     Raises:
         FlightError: One of them ended before the flight did.
@@ -48,7 +48,7 @@ def fly_processes(
             over = any(child.code() is not None for child in children.values())
             for child, event in events_of(children.values()):
                 if child.name == "autopilot":
-                    if event["event"] in _TOLD:
+                    if event["event"] in _SHOWN:
                         say(event["text"])
                 elif event["event"] == "listening":
                     said = subprocess.PIPE if plan.ground.links else subprocess.DEVNULL

@@ -38,7 +38,7 @@ class Recorded(NamedTuple):
 
     Attributes:
         time_us: Simulated time.
-        datagram: What the autopilot was told.
+        datagram: What the autopilot received.
         command: What it answered; None where nothing of it was recorded.
     """
 
@@ -54,7 +54,7 @@ class Difference(NamedTuple):
         recorded: What it was.
         replayed: What it is.
         mode: Of the autopilot, at that moment.
-        known: What it knew of its vehicle; None before the first estimate.
+        known: Its state estimate; None before the first estimate.
     """
 
     recorded: ActuatorCommand
@@ -63,12 +63,12 @@ class Difference(NamedTuple):
     known: StateFrame | None
 
     def __str__(self) -> str:
-        """Say it to a person."""
+        """Return it as lines for a user."""
         return "\n".join(
             (
                 f"first difference at t = {self.recorded.time_us * 1e-6:.3f} s, in mode {self.mode}",
-                f"  recorded: {_told(self.recorded)}",
-                f"  replayed: {_told(self.replayed)}",
+                f"  recorded: {_rotors(self.recorded)}",
+                f"  replayed: {_rotors(self.replayed)}",
                 f"  vehicle:  {_state(self.known)}",
             )
         )
@@ -132,27 +132,27 @@ def recorded_frames(log: Iterable[Logged], setup: Setup) -> Iterator[Recorded]:
     """Yield each frame of the plant once, in order, with the command that answered it."""
     codec = Codec(setup.system_id, dialect.AUTOPILOT_COMPONENT)
     plant = (setup.system_id, dialect.PLANT_COMPONENT)
-    told: dict[int, dict[bytes, None]] = {}
+    sent: dict[int, dict[bytes, None]] = {}
     commands: dict[int, ActuatorCommand] = {}
     for time_us, frame in log:
         for message in codec.decode(frame):
             if message.source == plant:
-                told.setdefault(time_us, {})[frame] = None  # once, however often it was sent
+                sent.setdefault(time_us, {})[frame] = None  # once, however often it was sent
             elif message.source == codec.source and message.name == "HIL_ACTUATOR_CONTROLS":
                 command = decode_actuators(message)
                 if command is not None:
                     commands.setdefault(command.time_us, command)
-    for time_us in sorted(told):
-        yield Recorded(time_us, b"".join(told[time_us]), commands.get(time_us))
+    for time_us in sorted(sent):
+        yield Recorded(time_us, b"".join(sent[time_us]), commands.get(time_us))
 
 
 def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
     """Answer each frame as the autopilot did that was started last before it, until an answer differs."""
     setups = {what.first_us: what for what in inputs if isinstance(what, Setup)}
-    heard: dict[int, list[Received]] = {}
+    inbox: dict[int, list[Received]] = {}
     for what in inputs:
         if isinstance(what, ReceivedDatagram):
-            heard.setdefault(what.time_us, []).append(Received(what.datagram, what.link, what.address, what.loopback))
+            inbox.setdefault(what.time_us, []).append(Received(what.datagram, what.link, what.address, what.loopback))
     pilot: Autopilot | Copter | None = None
     wire = Wire(next(iter(setups.values())).system_id)
     known: StateFrame | None = None
@@ -163,12 +163,12 @@ def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
             end = _end(setups[time_us], pilot)
         if pilot is None:
             continue
-        told = end.receive(datagram, _NO_CLOCK_S)
-        if told is None:
+        received = end.receive(datagram, _NO_CLOCK_S)
+        if received is None:
             continue
-        frame = told.frame
+        frame = received.frame
         try:
-            step = pilot.step(*told)
+            step = pilot.step(*received)
         except DecisionError as error:
             raise ReplayError(f"at t = {frame.time_us * 1e-6:.3f} s: {error}") from error
         known = _known(frame, step, known)
@@ -178,7 +178,7 @@ def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
                 return Replayed(commands, last_us, Difference(command, replayed, _mode(pilot), known))
             commands, last_us = commands + 1, frame.time_us
         if isinstance(pilot, Copter):
-            pilot.serve(heard.get(frame.time_us, ()))
+            pilot.serve(inbox.get(frame.time_us, ()))
     return Replayed(commands, last_us, None)
 
 
@@ -258,7 +258,7 @@ def _mode(pilot: Autopilot | Copter) -> str:
     return "track" if isinstance(pilot, Autopilot) else str(pilot.pilot.state.mode)
 
 
-def _told(command: ActuatorCommand) -> str:
+def _rotors(command: ActuatorCommand) -> str:
     speeds = " ".join(f"{control!r}" for control in command.controls)
     return f"rotors {speeds} of the largest speed, {'armed' if command.armed else 'disarmed'}"
 

@@ -44,11 +44,11 @@ class Record:
 
     def add(self, instant: Instant) -> None:
         """Take in a frame."""
-        began, command, said = instant.began, instant.command, instant.said
+        began, command, custom_mode = instant.began, instant.command, instant.to_stations.custom_mode
         place, moves = began.position_enu_m, began.velocity_enu_m_s
         state = (*place, *moves, *began.attitude, *began.rate_flu_rad_s)
         self._hash.update(_FLOWN.pack(began.time_us, *state, *command.controls, command.armed))
-        self._rows += _ROW.pack(began.time_us * 1e-6, *state, *command.controls, command.armed, said.custom_mode)
+        self._rows += _ROW.pack(began.time_us * 1e-6, *state, *command.controls, command.armed, custom_mode)
         self._plant.append((began.time_us, instant.frame + instant.answer))
         self.frames += 1
 

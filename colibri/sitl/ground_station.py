@@ -1,4 +1,4 @@
-"""A ground station, or whatever else speaks MAVLink to the vehicle: what it says and what it has heard."""
+"""A ground station, or whatever else speaks MAVLink to the vehicle: what it sends and what it has received."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
@@ -9,26 +9,26 @@ from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, Bits, Codec, Message, mav, param_bits
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.errors import SitlError
-from colibri.sitl.inbox import Hearing
+from colibri.sitl.inbox import Inbox
 from colibri.sitl.stepping import Stepped
 
 HEARTBEAT_EVERY_US = 1_000_000
 AGAIN_AFTER_S = 0.5
-"""What stays unanswered is asked again, as ground stations do."""
+"""What stays unanswered is requested again, as ground stations do."""
 ANSWER_WITHIN_S = 15.0
 _IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
 
 
 class RefusedError(SitlError):
-    """The vehicle has refused what it was asked for.
+    """The vehicle has refused a request.
 
     Attributes:
         result: MAV_RESULT, MAV_MISSION_RESULT or MAV_PARAM_ERROR.
-        text: What the vehicle said about it.
+        text: Its STATUSTEXT lines about it.
     """
 
     def __init__(self, what: str, result: int, text: str) -> None:
-        """Say what was refused, with which number and words."""
+        """Name what was refused, with which number and text."""
         super().__init__(f"{what} was refused: {text or 'without a word'} (result {result})")
         self.result = result
         self.text = text
@@ -43,16 +43,16 @@ class SteppedVehicle(Stepped, Protocol):
         ...
 
 
-class Station(Hearing):
-    """A component on a link of its own; what it has heard is in `Hearing`.
+class Station(Inbox):
+    """A component on a link of its own; what it has received is in `Inbox`.
 
-    What it says goes out with the next frame; what waits for an answer lets simulated time go on, and says it again
-    every half second until the answer comes.
+    What it sends goes out with the next frame; what waits for an answer lets simulated time go on, and repeats the
+    request every half second until the answer comes.
 
     Attributes:
         system, component: Its ids.
         number: Of its link.
-        silent: Whether it says no HEARTBEAT and nothing else, while it still hears.
+        silent: Whether it sends nothing, no HEARTBEAT either, while it still receives.
         dropped: What came and was no message, by reason.
     """
 
@@ -103,15 +103,15 @@ class Station(Hearing):
         self._down.put(datagram, now_us)
 
     def listen(self, now_us: int) -> None:
-        """Hear what has arrived."""
+        """Receive what has arrived."""
         for datagram in self._down.due(now_us):
             for message in self._codec.decode(datagram):
                 if message.source == (self._flight.system, AUTOPILOT_COMPONENT):
-                    self.hear(message)
+                    self.add(message)
 
-    def hear(self, message: Message) -> None:
-        """Take in a message of the vehicle's, and what it answers."""
-        super().hear(message)
+    def add(self, message: Message) -> None:
+        """Add a message of the vehicle, and note which request it answers."""
+        super().add(message)
         name, fields = message.name, message.fields
         if name == "PARAM_VALUE":
             kind = Kind(fields.param_type)
@@ -121,9 +121,9 @@ class Station(Hearing):
             self._param_errors[fields.param_id] = fields.error
         elif name in ("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK"):
             for upload in self._uploads:
-                upload.hear(name, fields)
+                upload.receive(name, fields)
 
-    # What it says.
+    # What it sends.
 
     def send(self, name: str, *fields: Any) -> None:
         """Send a message, with its fields as MAVLink defines them."""
@@ -161,7 +161,7 @@ class Station(Hearing):
         self.check(result, said, what or f"command {number}")
 
     def check(self, result: int, said: int, what: str) -> None:
-        """See that a result is ACCEPTED; `said` is how many texts had been heard before.
+        """See that a result is ACCEPTED; `said` is how many texts had been received before.
 
         Raises:
             RefusedError: It is not.
@@ -169,8 +169,8 @@ class Station(Hearing):
         if result != mav.MAV_RESULT_ACCEPTED:
             raise RefusedError(what, result, "; ".join(self.texts[said:]))
 
-    def ask(self, send: Callable[[int], None], answered: Callable[[], object], what: str) -> None:
-        """Say something, and again every half second until it is answered; `send` is told how often it was said before.
+    def request(self, send: Callable[[int], None], answered: Callable[[], object], what: str) -> None:
+        """Send a request, and repeat it every half second until it is answered; `send` gets the count of those before.
 
         Raises:
             NotInTimeError: It is not answered within `ANSWER_WITHIN_S`.
@@ -194,7 +194,7 @@ class Station(Hearing):
     # Parameters.
 
     def get_param(self, name: str) -> Value:
-        """Ask for a parameter.
+        """Request a parameter.
 
         Raises:
             RefusedError: There is no such.
@@ -248,13 +248,13 @@ class Station(Hearing):
             mine = (ack for ack in self.acks[before:] if ack.command == number and ack.target_system in to_us)
             return [int(ack.result) for ack in mine if ack.result != _IN_PROGRESS]
 
-        self.ask(send, results, f"the COMMAND_ACK of {number}")
+        self.request(send, results, f"the COMMAND_ACK of {number}")
         return results()[0]
 
-    def _parameter(self, name: str, ask: Callable[[], None]) -> Value:
+    def _parameter(self, name: str, send: Callable[[], None]) -> Value:
         self._param_errors.pop(name, None)
-        self.ask(
-            lambda _: ask(), lambda: name in self._values or name in self._param_errors, f"the PARAM_VALUE of {name}"
+        self.request(
+            lambda _: send(), lambda: name in self._values or name in self._param_errors, f"the PARAM_VALUE of {name}"
         )
         if name in self._param_errors:
             raise RefusedError(f"parameter {name}", self._param_errors[name], "PARAM_ERROR")
@@ -262,7 +262,7 @@ class Station(Hearing):
 
 
 class Upload:
-    """An upload on its way, https://mavlink.io/en/services/mission.html: the vehicle asks for item after item.
+    """An upload on its way, https://mavlink.io/en/services/mission.html: the vehicle requests item after item.
 
     Attributes:
         result: MAV_MISSION_RESULT; None before the end.
@@ -279,14 +279,14 @@ class Upload:
         self._last: tuple[str, tuple[Any, ...]] = ("MISSION_COUNT", (*vehicle, len(self._items), plan))
 
     def poll(self, now_us: int) -> None:
-        """Say the last thing again while nothing comes back."""
+        """Repeat the last message while nothing comes back."""
         if now_us >= self._again_at_us:
             self._again_at_us = now_us + round(AGAIN_AFTER_S * 1e6)
             name, fields = self._last
             self._station.send(name, *fields)
 
-    def hear(self, name: str, fields: Any) -> None:
-        """Take in what the vehicle asks for."""
+    def receive(self, name: str, fields: Any) -> None:
+        """Take in a request or the acknowledgement of the vehicle."""
         if fields.target_system not in (0, self._station.system) or fields.mission_type != self._plan:
             return
         if name == "MISSION_ACK":

@@ -1,4 +1,4 @@
-"""What somebody who listens to a vehicle has heard of it."""
+"""What a ground station has received of a vehicle."""
 
 from collections import Counter, defaultdict
 from typing import Any
@@ -8,18 +8,18 @@ from colibri.mavlink.wire.dialect import Codec, Message, mav
 _STATUSTEXT = int(mav.MAVLINK_MSG_ID_STATUSTEXT).to_bytes(3, "little")
 
 
-class Hearing:
-    """What was heard.
+class Inbox:
+    """The messages of a vehicle that were received.
 
     Attributes:
         heard: Messages, as their fields, by name, the latest last.
-        counts: How many were heard, by name.
+        counts: How many were received, by name.
         acks: Every COMMAND_ACK, in order, whoever it is for.
         texts: Every STATUSTEXT, in order.
     """
 
     def __init__(self, remembers: int = 20_000) -> None:
-        """Have heard nothing yet; of one name so many messages are remembered, at least the last half of them."""
+        """Begin empty; keep at most `remembers` messages of a name, and at least the last half of them."""
         self._remembers = remembers
         self.heard: defaultdict[str, list[Any]] = defaultdict(list)
         self.counts: Counter[str] = Counter()
@@ -28,22 +28,22 @@ class Hearing:
 
     def latest(self, name: str) -> Any:
         """Return the last message of a name, as its fields."""
-        assert self.heard[name], f"no {name} was heard"
+        assert self.heard[name], f"no {name} was received"
         return self.heard[name][-1]
 
     def said(self, part: str) -> bool:
-        """Whether a STATUSTEXT of the vehicle's has said so."""
+        """Whether a STATUSTEXT of the vehicle's has `part` in it."""
         return any(part in text for text in self.texts)
 
     def forget(self) -> None:
-        """Forget all that was heard up to now."""
+        """Forget all that was received up to now."""
         self.heard.clear()
         self.counts.clear()
         self.acks.clear()
         self.texts.clear()
 
-    def hear(self, message: Message) -> None:
-        """Take in a message of the vehicle's."""
+    def add(self, message: Message) -> None:
+        """Add a message of the vehicle."""
         name, fields = message.name, message.fields
         self.counts[name] += 1
         kept = self.heard[name]
@@ -53,28 +53,28 @@ class Hearing:
         if name == "COMMAND_ACK":
             self.acks.append(fields)
         elif name == "STATUSTEXT":
-            self._hear_text(fields)
+            self._add_text(fields)
 
-    def _hear_text(self, fields: Any) -> None:
-        """Take in a line; a long one comes in chunks of 50 characters."""
+    def _add_text(self, fields: Any) -> None:
+        """Add a line; a long one comes in chunks of 50 characters."""
         if fields.chunk_seq and self.texts:
             self.texts[-1] += fields.text
         else:
             self.texts.append(fields.text)
 
 
-class Words(Hearing):
-    """Every STATUSTEXT that a vehicle sends to one listener, heard where it is sent: no link loses it."""
+class StatusTexts(Inbox):
+    """Every STATUSTEXT that a vehicle sends to one ground station, read where it is sent: no link loses it."""
 
     def __init__(self) -> None:
-        """Have heard nothing yet."""
+        """Begin empty."""
         super().__init__()
         self._codec = Codec(0, 0)
 
-    def overhear(self, datagram: bytes) -> None:
-        """Take in a datagram that is sent."""
+    def add_datagram(self, datagram: bytes) -> None:
+        """Add a datagram that is sent."""
         if _STATUSTEXT not in datagram:  # most have none: what costs time is to decode them
             return
         for message in self._codec.decode(datagram):
             if message.name == "STATUSTEXT":
-                self.hear(message)
+                self.add(message)

@@ -1,4 +1,4 @@
-"""The flights of one test: begun as its marks say, on the link that the command line chose, and ended with it."""
+"""The flights of one test: begun by its marks, on the link that the command line chose, and ended with it."""
 
 import json
 from argparse import ArgumentTypeError
@@ -78,7 +78,7 @@ class Flights:
         return places
 
     def summary(self) -> dict[str, Any]:
-        """Return what the end of the run is told of them."""
+        """Return their number, simulated time, s, and hashes, for the summary of the run."""
         return {
             "flights": len(self.flown),
             "simulated_s": sum(sitl.time_s for sitl in self.flown),

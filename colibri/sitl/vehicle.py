@@ -1,4 +1,4 @@
-"""A vehicle in flight as a test sees it: orders that wait for their answer, and time that passes only when told to."""
+"""Fixture `sitl`: a vehicle in flight, with commands that wait for their acknowledgement."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -19,7 +19,7 @@ from colibri.sitl.backends.lockstep import LockstepSession
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.flight_record import Record
 from colibri.sitl.ground_station import RefusedError, Station
-from colibri.sitl.inbox import Words
+from colibri.sitl.inbox import StatusTexts
 from colibri.sitl.mission_items import Item, on_wire
 from colibri.sitl.stepping import NotInTimeError, Steered, Stepped
 from colibri.sitl.view import View
@@ -36,8 +36,8 @@ class Links(NamedTuple):
 
     Attributes:
         ground: Between the vehicle and every ground station, by simulated time.
-        plant: Between plant and autopilot, while simulated time stands still: in lockstep the plant says its frame
-            again until it has heard the answer, and nothing of it changes a flight.
+        plant: Between plant and autopilot, while simulated time stands still: in lockstep the plant repeats its frame
+            until it has received the answer, and nothing of it changes a flight.
     """
 
     ground: Trouble
@@ -62,23 +62,23 @@ class Sitl(View, Stepped, Steered):
     NotInTime = NotInTimeError
 
     def __init__(self, setting: Setting, lockstep: LockstepSession, origin: Geodetic) -> None:
-        """Begin a flight on a stage; `origin` is that of the ENU frame."""
+        """Begin a flight in a lockstep session; `origin` is that of the ENU frame."""
         self.setting = setting
         self.origin = origin
         self.link = Links(Trouble(**dict[str, Any](setting.ground)), lockstep.trouble)
         self.record = Record()
         self._lockstep = lockstep
-        self._said = StepMessage(0, ())
+        self._to_stations = StepMessage(0, ())
         self._injected = b""
         self._sticks: dict[str, float] | None = None
         self._sticks_at_us = 0
         self._stations: list[Station] = []
         self.gcs = self.client(255, 190)
-        self._words = Words()
+        self._texts = StatusTexts()
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
 
     def begin(self) -> None:
-        """Fly until the vehicle says that it is there, if that is asked for."""
+        """Fly until the first HEARTBEAT of the vehicle, if the setting asks for it."""
         if self.setting.ready:
             self.wait_until(lambda: self.gcs.heard["HEARTBEAT"], within=READY_WITHIN_S, what="the vehicle's HEARTBEAT")
 
@@ -98,22 +98,22 @@ class Sitl(View, Stepped, Steered):
         injected, self._injected = self._injected, b""
         instant = self._lockstep.advance(parcels, injected)
         self.record.add(instant)
-        self._said, self.rotors = instant.said, instant.command
-        for number, datagram in instant.said.parcels:
+        self._to_stations, self.rotors = instant.to_stations, instant.command
+        for number, datagram in instant.to_stations.parcels:
             self.record.note(now_us, datagram)
             if number == self.gcs.number:
-                self._words.overhear(datagram)
+                self._texts.add_datagram(datagram)
             self._stations[number - 1].arriving(datagram, now_us)
         for station in self._stations:
             station.listen(self.time_us)
 
-    # Orders.
+    # Commands.
 
     def arm(self, *, force: bool = False) -> None:
         """Let the rotors turn.
 
         Raises:
-            RefusedError: The vehicle says why not.
+            RefusedError: The vehicle refuses.
         """
         self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE if force else 0.0, what="arming")
 
@@ -121,7 +121,7 @@ class Sitl(View, Stepped, Steered):
         """Stop the rotors; in the air only by force.
 
         Raises:
-            RefusedError: The vehicle says why not.
+            RefusedError: The vehicle refuses.
         """
         self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE if force else 0.0, what="disarming")
 
@@ -129,8 +129,8 @@ class Sitl(View, Stepped, Steered):
         """Arm, climb so high above home, and stay.
 
         Raises:
-            RefusedError: The vehicle says why not.
-            NotInTimeError: It is not up there `within` s; where nothing is said, 5 s and 2 s a metre.
+            RefusedError: The vehicle refuses.
+            NotInTimeError: It is not up there `within` s; if None, 5 s and 2 s a metre.
         """
         params = (0.0, 0.0, 0.0, nan, nan, nan, height_m)
         high_m = self.position[2] + 0.9 * height_m
@@ -146,8 +146,8 @@ class Sitl(View, Stepped, Steered):
         """Land here, and wait until the rotors have stopped.
 
         Raises:
-            RefusedError: The vehicle says why not.
-            NotInTimeError: They do not stop `within` s; where nothing is said, 8 s and 2 s a metre.
+            RefusedError: The vehicle refuses.
+            NotInTimeError: They do not stop `within` s; if None, 8 s and 2 s a metre.
         """
         max_s = 8.0 + 2.0 * self.position[2] if within is None else within
         self.select(Mode.LAND)
@@ -174,10 +174,10 @@ class Sitl(View, Stepped, Steered):
             yaw: Counter-clockwise from east, rad; nan for as it is.
             speed: m/s; -1 for the parameters'.
             wait: Whether to fly until it is there.
-            within: Simulated seconds; where nothing is said, 10 s and 1 s a metre.
+            within: Simulated seconds; if None, 10 s and 1 s a metre.
 
         Raises:
-            RefusedError: The vehicle says why not.
+            RefusedError: The vehicle refuses.
             NotInTimeError: It is not there in time.
         """
         there = geodetic_of((east, north, up), self.origin)
@@ -202,7 +202,7 @@ class Sitl(View, Stepped, Steered):
         """Fly a track of parameter TRACK: arm if need be, and go there first.
 
         Raises:
-            RefusedError: The vehicle says why not.
+            RefusedError: The vehicle refuses.
         """
         self.set_param("TRACK", TRACKS.index(name))
         self.select(Mode.TRACK)
@@ -213,7 +213,7 @@ class Sitl(View, Stepped, Steered):
         """Choose a mode.
 
         Raises:
-            RefusedError: The vehicle says why not.
+            RefusedError: The vehicle refuses.
         """
         number = custom_mode(Mode(mode))
         params = (1.0, number >> 16 & 0xFF, number >> 24 & 0xFF)
@@ -227,7 +227,7 @@ class Sitl(View, Stepped, Steered):
         """Begin the mission, or go on with it; arm if need be.
 
         Raises:
-            RefusedError: The vehicle says why not.
+            RefusedError: The vehicle refuses.
         """
         self.select(Mode.MISSION)
         if not self.armed:
@@ -258,7 +258,7 @@ class Sitl(View, Stepped, Steered):
         self.gcs.upload(on_wire(plan, self.origin), RALLY, what="rally points")
 
     def get_param(self, name: str) -> Value:
-        """Ask for a parameter.
+        """Request a parameter.
 
         Raises:
             RefusedError: There is no such.
@@ -282,7 +282,7 @@ class Sitl(View, Stepped, Steered):
         finally:
             self._sticks = before
 
-    # What is said once, and not answered.
+    # Messages that are not answered.
 
     def send(self, name: str, *fields: Any) -> None:
         """Send a message from the first ground station."""
@@ -291,7 +291,7 @@ class Sitl(View, Stepped, Steered):
     # What goes wrong.
 
     def inject(self, unit: str | int, kind: str | int, instance: int = 0, *values: float) -> None:
-        """Have the plant fail from the next frame on, as MAV_CMD_INJECT_FAILURE says it, whatever the autopilot thinks.
+        """Have the plant fail from the next frame on, as by MAV_CMD_INJECT_FAILURE, without the autopilot.
 
         Args:
             unit: FAILURE_UNIT by number, or by name: "motor", "gps", "battery".

@@ -1,4 +1,4 @@
-"""What a test sees of a vehicle: the truth, and what the autopilot says of itself."""
+"""What a test sees of a vehicle: its true state, and what the autopilot reports."""
 
 from collections.abc import Sequence
 from math import dist, hypot
@@ -16,7 +16,7 @@ from colibri.sitl.backends.lockstep import LockstepSession
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.flight_record import Columns, Record
 from colibri.sitl.ground_station import Station
-from colibri.sitl.inbox import Words
+from colibri.sitl.inbox import StatusTexts
 
 _NEAR_M = {"state": 0.3, "sensors": 2.0}
 """Closer than this it is there: an estimate is as far from the truth as GPS is."""
@@ -38,8 +38,8 @@ class View:
     gcs: Station
     record: Record
     _lockstep: LockstepSession
-    _said: StepMessage
-    _words: Words
+    _to_stations: StepMessage
+    _texts: StatusTexts
 
     @property
     def time_us(self) -> int:
@@ -84,32 +84,32 @@ class View:
     @property
     def mode(self) -> Mode | None:
         """The flight mode, as the autopilot has it at this frame, whatever the links do."""
-        return mode_of_custom(self._said.custom_mode)
+        return mode_of_custom(self._to_stations.custom_mode)
 
     @property
     def armed(self) -> bool:
         """Whether its rotors may turn, as the autopilot has it at this frame."""
-        return self._said.armed
+        return self._to_stations.armed
 
     @property
     def home(self) -> Vector | None:
-        """Where home is, as HOME_POSITION said last; None before."""
+        """Where home is by the last HOME_POSITION, ENU, m; None before the first."""
         if not self.gcs.heard["HOME_POSITION"]:
             return None
-        told = self.gcs.latest("HOME_POSITION")
-        return ned_from_enu((told.x, told.y, told.z))
+        home = self.gcs.latest("HOME_POSITION")
+        return ned_from_enu((home.x, home.y, home.z))
 
     @property
     def texts(self) -> list[str]:
         """Every STATUSTEXT that the vehicle has sent to the first ground station, whatever the links do."""
-        return self._words.texts
+        return self._texts.texts
 
     def said(self, part: str) -> bool:
-        """Whether a STATUSTEXT has said so, whatever the links do; what was heard of it is in `gcs.texts`."""
-        return self._words.said(part)
+        """Whether a STATUSTEXT with `part` in it was sent, whatever the links do; those received are in `gcs.texts`."""
+        return self._texts.said(part)
 
     def heard(self, name: str) -> list[Any]:
-        """Return all messages of a name that the first ground station has heard, as their fields."""
+        """Return all messages of a name that the first ground station has received, as their fields."""
         return self.gcs.heard[name]
 
     def is_at(self, place: Sequence[float], near_m: float | None = None, slow_m_s: float = _SLOW_M_S) -> bool:

@@ -30,7 +30,7 @@ SPIRAL, LEMNISCATE = "spiral", "lemniscate"
 _LEVEL_DEG = 10.0
 _THERE_M = 0.1
 _SIZE_M = 4.0
-"""Of the lemniscate unless told otherwise."""
+"""Of the lemniscate where nothing else is given."""
 
 
 class Measure(NamedTuple):

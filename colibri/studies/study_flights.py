@@ -32,7 +32,7 @@ _SAMPLE_TIME_S = 1e-6
 
 
 class Perturbation(NamedTuple):
-    """What the plant's vehicle is that the autopilot is not told: factors.
+    """Factors by which the plant's vehicle differs from the autopilot's model.
 
     Attributes:
         mass: On the mass.

@@ -143,7 +143,7 @@ def test_what_ground_stations_ordered_is_replayed(tmp_path: Path) -> None:
         second = Process(logs, "autopilot", *options)
         with running(second):
             seen.wait(lambda sight: sight.time_s > killed_s + 0.5, "the vehicle again")
-            ack = seen.ask("COMMAND_ACK", "COMMAND_LONG", mav.MAV_CMD_NAV_LAND, 0, *[0.0] * 7)
+            ack = seen.request("COMMAND_ACK", "COMMAND_LONG", mav.MAV_CMD_NAV_LAND, 0, *[0.0] * 7)
             assert (ack.command, ack.result) == (mav.MAV_CMD_NAV_LAND, mav.MAV_RESULT_ACCEPTED)
             seen.wait(lambda sight: not sight.armed, "the landing")
             plant.process.send_signal(signal.SIGINT)

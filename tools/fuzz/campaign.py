@@ -47,7 +47,7 @@ def campaign(
         quota: Datagrams of each kind, to each process.
         burst: Datagrams with each good one, half of each kind.
         seed: Of all chance.
-        progress: Is told which part of the flight is flown.
+        progress: Called with which part of the flight is flown.
     """
     duration_s = (10 + ceil(_MARGIN * 2 * quota / burst)) * FRAME_US / 1e6
     logs = folder / "logs"
@@ -93,7 +93,7 @@ def _fly_to(
 
 
 def _end(processes: dict[str, Process]) -> list[str]:
-    """Let the plant end by itself and the autopilot when it is told to; return what was wrong with that."""
+    """Let the plant end by itself and the autopilot by SIGINT; return what was wrong with that."""
     codes = {"plant": processes["plant"].wait()}
     processes["autopilot"].process.send_signal(signal.SIGINT)
     codes["autopilot"] = processes["autopilot"].wait()

@@ -48,7 +48,7 @@ def ground_campaign(
         quota: Of messages.
         seed: Of all chance.
         files: What the vehicle writes to; None: its memory.
-        progress: Is told which part of the messages is sent.
+        progress: Called with which part of the messages is sent.
     """
     chance = random.Random(seed)
     target = Target(chance, files)

@@ -70,9 +70,9 @@ class Flight:
     def _to_plant(self, bad: list[bytes]) -> ActuatorCommand | None:
         good = self.autopilot_end.take_outbox()
         half = len(bad) // 2
-        heard = [self.plant_end.receive(it, _ADDRESS, NOW_S) for it in (*bad[:half], *good, *bad[half:])]
+        received = [self.plant_end.receive(it, _ADDRESS, NOW_S) for it in (*bad[:half], *good, *bad[half:])]
         self.plant_end.received.clear()
-        commands = [command for command in heard if command]
+        commands = [command for command in received if command]
         assert len(commands) <= 1, "a frame is answered once"
         return commands[0] if commands else None
 

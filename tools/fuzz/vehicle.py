@@ -112,7 +112,7 @@ class Target:
                 _must(sensible is None or sensible(asked(one.fields)), f"accepted {one}")
 
     def prepare(self, state: State) -> None:
-        """Begin a situation anew: everything as it is after the start but for the mode, and where it flies."""
+        """Reset a situation: everything as it is after the start but for the mode, and where it flies."""
         flight, copter = self.flight, self.flight.copter
         copter.parameters.reset()
         copter.parameters.set("MIS_TAKEOFF_ALT", 40.0)
@@ -175,8 +175,8 @@ def check(flight: CopterFlight) -> None:
     _must(all(0.0 <= control <= 1.0 for control in controls), f"rotors commanded to {controls}")
     _must(flight.rotors.armed or not any(controls), "a rotor turns while disarmed")
     _must(pilot.state.mode in Mode, "no mode of the table")
-    told = mode_of_custom(flight.client.latest("HEARTBEAT").custom_mode)
-    _must(told is not None, "no mode of the table is told")
+    mode = mode_of_custom(flight.client.latest("HEARTBEAT").custom_mode)
+    _must(mode is not None, "no mode of the table is reported")
     reference = pilot.reference
     _must(reference is not None, "there is always a reference")
     assert reference is not None

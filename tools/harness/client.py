@@ -1,18 +1,18 @@
-"""A ground station of a vehicle in this process: it encodes what it says, and decodes what it is sent."""
+"""A ground station of a vehicle in this process: it encodes what it sends, and decodes what it receives."""
 
 from typing import Any
 
 from colibri.autopilot.core.step import Received
 from colibri.mavlink.wire.dialect import Codec
-from colibri.sitl.inbox import Hearing
+from colibri.sitl.inbox import Inbox
 
 SYSTEM, COMPONENT = 1, 1
 """Of the vehicle."""
 GCS_PORT, SDK_PORT = 14550, 14540
 
 
-class Client(Hearing):
-    """A ground station, or whatever else speaks MAVLink to the vehicle; what it has heard is in `Hearing`.
+class Client(Inbox):
+    """A ground station, or whatever else speaks MAVLink to the vehicle; what it has received is in `Inbox`.
 
     Attributes:
         component: Its component id.
@@ -46,7 +46,7 @@ class Client(Hearing):
         """Decode what the vehicle sent."""
         for message in self._codec.decode(datagram):
             if message.source == (SYSTEM, COMPONENT):
-                self.hear(message)
+                self.add(message)
 
     def forget(self) -> None:
         """Forget all but the latest of each message."""

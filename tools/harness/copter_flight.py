@@ -145,7 +145,7 @@ class CopterFlight(Stepped, Steered):
         self.world = replace(starting_world(start, self._assumed, self._weather), time_us=self.world.time_us)
 
     def restart(self, history: History | None = None) -> None:
-        """Start the autopilot anew, wherever the vehicle is; with what was kept of a flight it flies on at once."""
+        """Start the autopilot again, wherever the vehicle is; with the history of a flight it flies on at once."""
         values = None if history is None else dict(self.copter.parameters.values)
         self.copter = self._copter(values, None, history)
         for client in self._clients:
@@ -226,17 +226,17 @@ class CopterFlight(Stepped, Steered):
         return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE if force else 0.0)
 
     def drain(self, part: float) -> None:
-        """Have so much of the full battery's charge gone at once, and the autopilot know."""
+        """Have so much of the full battery's charge gone at once, and fly one frame."""
         assert self._assumed.battery is not None
         gone_ah = part * self._assumed.battery.capacity_ah
         self.world = replace(self.world, charge_used_ah=self.world.charge_used_ah + gone_ah)
         self.step()
 
     def inject(self, unit: int, kind: int, instance: int = 0, *values: float) -> int:
-        """Have a fault happen in the plant, which nobody has asked for; return the MAV_RESULT."""
+        """Have a fault happen in the plant, without a command; return the MAV_RESULT."""
         a, b, c, d = (*values, 0.0, 0.0, 0.0, 0.0)[:4]
-        self.world, told = self.plant.faults.inject(Fault(unit, kind, instance, (a, b, c, d)), self.world)
-        return told.result
+        self.world, ack = self.plant.faults.inject(Fault(unit, kind, instance, (a, b, c, d)), self.world)
+        return ack.result
 
     def set_param(self, name: str, value: Value) -> None:
         """Set a parameter as a ground station does, and see that it was taken."""

@@ -141,13 +141,13 @@ class Observer(OnPort):
     def wait_until_disarmed(self) -> Sight:
         """Return the first sight from now on in which a flight that was seen is over.
 
-        On a busy machine what is seen lags behind what a client has been told already.
+        On a busy machine what is seen lags behind what a client has received already.
         """
         return self.wait(
             lambda sight: not sight.armed and any(it.armed for it in self._sights), "the end of the flight"
         )
 
-    def ask(self, answer: str, name: str, *fields: Any, within_s: float = 5.0) -> Any:
+    def request(self, answer: str, name: str, *fields: Any, within_s: float = 5.0) -> Any:
         """Send message `name` to the vehicle; return the fields of the first message `answer` after it.
 
         Args:
@@ -165,18 +165,18 @@ class Observer(OnPort):
 
     def plan_length(self, mission_type: int = mav.MAV_MISSION_TYPE_MISSION) -> int:
         """Return how many items of a plan the vehicle has."""
-        return int(self.ask("MISSION_COUNT", "MISSION_REQUEST_LIST", mission_type).count)
+        return int(self.request("MISSION_COUNT", "MISSION_REQUEST_LIST", mission_type).count)
 
     def parameter(self, name: str) -> float:
         """Return a REAL32 parameter of the vehicle."""
-        value = self.ask("PARAM_VALUE", "PARAM_REQUEST_READ", name, -1)
+        value = self.request("PARAM_VALUE", "PARAM_REQUEST_READ", name, -1)
         assert value.param_id == name
         return float(value.param_value)
 
     def set_parameter(self, name: str, value: float) -> None:
         """Set a REAL32 parameter of the vehicle."""
-        told = self.ask("PARAM_VALUE", "PARAM_SET", name, value, mav.MAV_PARAM_TYPE_REAL32)
-        assert (told.param_id, told.param_value) == (name, value)
+        reply = self.request("PARAM_VALUE", "PARAM_SET", name, value, mav.MAV_PARAM_TYPE_REAL32)
+        assert (reply.param_id, reply.param_value) == (name, value)
 
     def receive(self, datagram: bytes, now_s: float) -> list[bytes]:  # noqa: ARG002
         """Take in a datagram of the vehicle; return the requests for message rates after the first heartbeat."""

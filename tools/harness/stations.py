@@ -1,4 +1,4 @@
-"""Ground stations that ask for a lot and keep account of what they are told; no input or output in them.
+"""Ground stations that ask for a lot and keep account of what they receive; no input or output in them.
 
 What they send follows from what comes, so that it does not matter how fast the vehicle flies.
 """
@@ -49,7 +49,7 @@ class Station:
         sent: How often each MAV_CMD was sent.
         counts: How many messages of each name came from the vehicle.
         acks: How often each acknowledgement came.
-        max_gap_s: The longest time between two heartbeats of the vehicle, by the clock that it is told.
+        max_gap_s: The longest time between two heartbeats of the vehicle, by the `now_s` that it is given.
         time_s: Simulated time of the vehicle.
         position_ned_m: Where the vehicle is.
     """

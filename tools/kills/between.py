@@ -1,4 +1,4 @@
-"""Stands between plant and autopilot, and tells at which simulated instant something is to be done."""
+"""Stands between plant and autopilot, and finds at which simulated instant something is to be done."""
 
 import random
 import socket
@@ -71,7 +71,7 @@ class Between:
     def fly_until(
         self, station: Station, condition: Callable[[], bool], what: str, give_up_after_s: float = GIVE_UP_AFTER_S
     ) -> None:
-        """Pass on, and have the ground station hear, until `condition()`.
+        """Pass on, and have the ground station receive, until `condition()`.
 
         Raises:
             HangsError: It does not come about.
@@ -83,7 +83,7 @@ class Between:
                 if sock in ready and sock.fileno() >= 0:
                     self._pass_on(sock)
             if station.socket in ready:
-                station.hear()
+                station.receive()
             if monotonic() > give_up_s:
                 said = f"{station.mode}, item {station.seq}, {station.texts[-3:]}"
                 raise HangsError(f"waited in vain for {what} at t = {self.time_us * 1e-6:.3f} s: {said}")

@@ -10,7 +10,7 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.mavlink.mission.items import MISSION, MissionItem, item_fields
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, MODE_ARMED, Codec, Message, mav
-from colibri.sitl.inbox import Hearing
+from colibri.sitl.inbox import Inbox
 
 _VEHICLE = Peer(0, 1, AUTOPILOT_COMPONENT)
 _MAX_DATAGRAM_BYTES = 65536
@@ -53,7 +53,7 @@ class Station:
         self.socket.setblocking(False)
         self.url = f"udpout:127.0.0.1:{self.socket.getsockname()[1]}"
         self._items = items
-        self._words = Hearing()
+        self._words = Inbox()
         self._codec = Codec(255, mav.MAV_COMP_ID_MISSIONPLANNER)
         self.begin_anew()
 
@@ -71,7 +71,7 @@ class Station:
         """What it said, line by line."""
         return self._words.texts
 
-    def hear(self) -> None:
+    def receive(self) -> None:
         """Take in what has come, and answer it."""
         while True:
             try:
@@ -83,7 +83,7 @@ class Station:
                     self._take(message)
 
     def drain(self) -> None:
-        """Forget what has come and was not heard."""
+        """Forget what has come and was not read."""
         while True:
             try:
                 self.socket.recv(_MAX_DATAGRAM_BYTES)
@@ -100,7 +100,7 @@ class Station:
             case "HEARTBEAT":
                 self._see(mode_of_custom(fields.custom_mode), bool(fields.base_mode & MODE_ARMED))
             case "STATUSTEXT":
-                self._words.hear(message)
+                self._words.add(message)
             case "MISSION_CURRENT":
                 self.seq = fields.seq
             case "MISSION_REQUEST_INT" | "MISSION_REQUEST":
@@ -129,7 +129,7 @@ class Station:
         self._send("COMMAND_LONG", *_VEHICLE[1:], number, 0, p1, *[0.0] * 6)
 
     def _send(self, name: str, *fields: Any) -> None:
-        assert self._vehicle is not None, "who is answered was heard"
+        assert self._vehicle is not None, "who is answered has sent"
         self.socket.sendto(self._codec.encode(name, *fields), self._vehicle)
 
 

@@ -1,6 +1,6 @@
-"""A program of its own: loads what plant and autopilot need, then forks one or the other as asked.
+"""A program of its own: loads what plant and autopilot need, then forks one or the other on request.
 
-A request is a line on standard input, a JSON list: "start", the package, a file for what it says, and its options;
+A request is a line on standard input, a JSON list: "start", the package, a file for its output, and its options;
 "code" or "kill" and a process. The answer is a line on standard output: the process, or its exit code, or null.
 """
 
@@ -57,13 +57,13 @@ def _load() -> None:
             autopilot.close()
 
 
-def _fork(package: str, said: str, *options: str) -> int:
+def _fork(package: str, log: str, *options: str) -> int:
     fork_server = os.getpid()
     pid = os.fork()
     if pid:
         return pid
     try:
-        out = os.open(said, os.O_WRONLY | os.O_APPEND)
+        out = os.open(log, os.O_WRONLY | os.O_APPEND)
         nothing = os.open(os.devnull, os.O_RDONLY)
         for to, of in ((0, nothing), (1, out), (2, out)):
             os.dup2(of, to)

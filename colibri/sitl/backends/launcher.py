@@ -35,8 +35,8 @@ class Running(Protocol):
 class Launcher(Protocol):
     """Starts processes."""
 
-    def start(self, package: str, options: Sequence[str], said: Path) -> Running:
-        """Start `python -m colibri.PACKAGE` with `options`; what it says goes into file `said`."""
+    def start(self, package: str, options: Sequence[str], log: Path) -> Running:
+        """Start `python -m colibri.PACKAGE` with `options`; its output goes into file `log`."""
         ...
 
     def close(self) -> None:
@@ -45,19 +45,19 @@ class Launcher(Protocol):
 
 
 class LoggedChild:
-    """A flying process, with what it has said.
+    """A flying process, with its output.
 
     Attributes:
         name: What it is.
         number: Of the process.
-        said: The file of what it says.
+        log: The file of its output.
     """
 
-    def __init__(self, launcher: Launcher, package: str, options: Sequence[str], said: Path) -> None:
+    def __init__(self, launcher: Launcher, package: str, options: Sequence[str], log: Path) -> None:
         """Start it."""
         self.name = package
-        self.said = said
-        self._running = launcher.start(package, options, said)
+        self.log = log
+        self._running = launcher.start(package, options, log)
         self.number = self._running.number
 
     def check(self) -> None:
@@ -74,7 +74,7 @@ class LoggedChild:
 
     def last_words(self) -> str:
         """Return the last line that is not a status."""
-        text = self.said.read_bytes()[-_LAST_WORDS_BYTES:].decode(errors="replace")
+        text = self.log.read_bytes()[-_LAST_WORDS_BYTES:].decode(errors="replace")
         lines = [line for line in text.splitlines() if line and not line.startswith("{")]
         return lines[-1] if lines else ""
 
@@ -86,9 +86,9 @@ class LoggedChild:
 class FromScratch:
     """Starts each process from scratch, as a user does."""
 
-    def start(self, package: str, options: Sequence[str], said: Path) -> Running:
-        """Start `python -m colibri.PACKAGE` with `options`; what it says goes into file `said`."""
-        with said.open("wb") as out:
+    def start(self, package: str, options: Sequence[str], log: Path) -> Running:
+        """Start `python -m colibri.PACKAGE` with `options`; its output goes into file `log`."""
+        with log.open("wb") as out:
             return Child(package, options, stdout=out, stderr=out)
 
     def close(self) -> None:
@@ -96,29 +96,29 @@ class FromScratch:
 
 
 class Forked:
-    """Has a nursery fork each process: it has loaded what both need, which takes longer than most flights."""
+    """Has a fork server start each process: it has loaded what both need, which takes longer than most flights."""
 
     def __init__(self) -> None:
-        """Start the nursery; it loads while this process goes on."""
+        """Start the fork server; it loads while this process goes on."""
         command = [sys.executable, "-m", "colibri.sitl.backends.fork_server"]
         self._fork_server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
 
-    def start(self, package: str, options: Sequence[str], said: Path) -> Running:
-        """Start what `python -m colibri.PACKAGE` with `options` is; what it says goes into file `said`."""
-        said.touch()
-        pid = self._ask("start", package, str(said), *options)
+    def start(self, package: str, options: Sequence[str], log: Path) -> Running:
+        """Start what `python -m colibri.PACKAGE` with `options` is; its output goes into file `log`."""
+        log.touch()
+        pid = self._request("start", package, str(log), *options)
         assert pid is not None, "whatever is forked has a number"
-        return _Nursling(pid, self._ask)
+        return _ForkedChild(pid, self._request)
 
     def close(self) -> None:
-        """End the nursery, and with it whatever it has started."""
+        """End the fork server, and with it whatever it has started."""
         assert self._fork_server.stdin is not None, "it is piped"
         self._fork_server.stdin.close()
         self._fork_server.wait()
         if self._fork_server.stdout:
             self._fork_server.stdout.close()
 
-    def _ask(self, *words: str) -> int | None:
+    def _request(self, *words: str) -> int | None:
         stdin, stdout = self._fork_server.stdin, self._fork_server.stdout
         assert stdin is not None, "it is piped"
         assert stdout is not None, "it is piped"
@@ -131,20 +131,20 @@ class Forked:
         return answer
 
 
-class _Nursling:
-    def __init__(self, pid: int, ask: Callable[..., int | None]) -> None:
+class _ForkedChild:
+    def __init__(self, pid: int, request: Callable[..., int | None]) -> None:
         self.number = pid
-        self._ask = ask
+        self._request = request
         self._code: int | None = None
 
     def code(self) -> int | None:
         if self._code is None:
-            self._code = self._ask("code", str(self.number))
+            self._code = self._request("code", str(self.number))
         return self._code
 
     def kill(self) -> None:
         if self._code is None:
-            self._code = self._ask("kill", str(self.number))
+            self._code = self._request("kill", str(self.number))
 
 
 def launcher(*, from_scratch: bool) -> Launcher:

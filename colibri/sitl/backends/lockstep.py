@@ -1,4 +1,4 @@
-"""A flight one frame at a time: who conducts it stands between plant and autopilot, and holds simulated time still.
+"""A flight in lockstep, one frame at a time: the session stands between plant and autopilot, and steps simulated time.
 
 The two may be in this process or in others: see `memory` and `udp`. Either way the same bytes pass.
 """
@@ -21,8 +21,6 @@ from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.errors import SitlError
 
 _HEADER_BYTES, _CRC_BYTES, _COMPONENT_AT = 10, 2, 6
-
-
 _ANSWER: int = mav.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
 _GLANCE_S = 0.002
 _GIVE_UP_S = 20.0
@@ -41,12 +39,12 @@ class Plant(Protocol):
         """The number of its process; None where it has none of its own."""
         ...
 
-    def hear(self, datagram: bytes) -> None:
+    def receive(self, datagram: bytes) -> None:
         """Take in a datagram of an autopilot's, sound or not."""
         ...
 
     def frame(self) -> list[bytes]:
-        """Return what the plant says up to its next frame, which comes last."""
+        """Return what the plant sends up to its next frame, which comes last."""
         ...
 
     def take(self, answer: bytes) -> None:
@@ -54,7 +52,7 @@ class Plant(Protocol):
         ...
 
     def listen(self, timeout_s: float) -> list[bytes]:
-        """Return what it says up to `timeout_s` from now, the frame it waits with said again and again."""
+        """Return what it sends up to `timeout_s` from now, repeating the frame that waits for an answer."""
         ...
 
     def clock_s(self) -> float:
@@ -74,28 +72,28 @@ class Autopilot(Protocol):
         """Return how it calls a plant."""
         ...
 
-    def tell(self, frame: bytes, step_message: StepMessage) -> None:
-        """Tell it a frame of the plant, and what ground stations say then."""
+    def receive_frame(self, frame: bytes, step_message: StepMessage) -> None:
+        """Take in a frame of the plant, and what ground stations send at its time."""
         ...
 
     def expect(self, step_message: StepMessage) -> None:
-        """Tell it what ground stations say at the frame that comes next."""
+        """Take in what ground stations send at the time of the next frame."""
         ...
 
-    def hear(self, datagram: bytes) -> None:
+    def receive(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
         ...
 
     def listen(self) -> list[bytes]:
-        """Return what it has said to the plant."""
+        """Return what it has sent to the plant."""
         ...
 
     def answer(self) -> bytes:
         """Return its answer to the frame."""
         ...
 
-    def said(self) -> StepMessage:
-        """Return what it says to ground stations at that frame."""
+    def to_stations(self) -> StepMessage:
+        """Return what it sends to ground stations at that frame."""
         ...
 
     def kill(self) -> None:
@@ -103,7 +101,7 @@ class Autopilot(Protocol):
         ...
 
     def start(self) -> None:
-        """Start it anew."""
+        """Start it again."""
         ...
 
     def close(self) -> None:
@@ -117,20 +115,20 @@ class Instant(NamedTuple):
     Attributes:
         began: How the vehicle was, in truth.
         command: What the autopilot answered.
-        said: What it said to ground stations.
-        frame: What the plant told the autopilot, as bytes.
+        to_stations: What it sent to ground stations.
+        frame: What the plant sent to the autopilot, as bytes.
         answer: The answer, as bytes.
     """
 
     began: StateFrame
     command: ActuatorCommand
-    said: StepMessage
+    to_stations: StepMessage
     frame: bytes
     answer: bytes
 
 
 class LockstepSession:
-    """Conducts a flight.
+    """A flight that is stepped.
 
     Attributes:
         truth: How the vehicle is now.
@@ -146,14 +144,14 @@ class LockstepSession:
         self.acks: list[tuple[int, int]] = []
         self.trouble = Trouble()
         self._up, self._down = (Pipe(self.trouble, f"{seed} plant {way}") for way in ("up", "down"))
-        plant.hear(autopilot.call())
+        plant.receive(autopilot.call())
         self._frame, self.truth = self._taken_in(plant.frame())
 
     def advance(self, parcels: Sequence[Parcel], injected: bytes = b"") -> Instant:
         """Fly one frame.
 
         Args:
-            parcels: What ground stations say now.
+            parcels: What ground stations send now.
             injected: Frames that go to the plant with the autopilot's answer.
 
         Raises:
@@ -162,48 +160,48 @@ class LockstepSession:
         frame, began = self._frame, self.truth
         step_message = StepMessage(began.time_us, parcels)
         if self.trouble.any:
-            answer, said, heard = self._struggle(frame, step_message, injected)
+            answer, to_stations, received = self._struggle(frame, step_message, injected)
         else:
-            self._autopilot.tell(frame, step_message)
+            self._autopilot.receive_frame(frame, step_message)
             answer = self._autopilot.answer()
             self._plant.take(answer + injected)
-            said = self._autopilot.said()
-            heard = self._plant.frame()
-        self._frame, self.truth = self._taken_in(heard)
+            to_stations = self._autopilot.to_stations()
+            received = self._plant.frame()
+        self._frame, self.truth = self._taken_in(received)
         if injected:
-            self._hear(self._frame)
-        return Instant(began, self._command(answer), said, frame, answer)
+            self._read_acks(self._frame)
+        return Instant(began, self._command(answer), to_stations, frame, answer)
 
     def _struggle(
         self, frame: bytes, step_message: StepMessage, injected: bytes
     ) -> tuple[bytes, StepMessage, list[bytes]]:
         """Carry a frame and its answer over a bad link, until the plant has gone on.
 
-        Returns the answer, what is said to ground stations, and what the plant said up to its next frame.
+        Returns the answer, what goes to ground stations, and what the plant sent up to its next frame.
         """
         plant, autopilot, up, down = self._plant, self._autopilot, self._up, self._down
         began_s = plant.clock_s()
         autopilot.expect(step_message)
         up.put(frame, _us(began_s))
-        answer, said, heard = b"", None, list[bytes]()
+        answer, to_stations, received = b"", None, list[bytes]()
         while True:
             now_us = _us(plant.clock_s())
             for datagram in up.due(now_us):
-                autopilot.hear(datagram)
+                autopilot.receive(datagram)
             for datagram in autopilot.listen():
                 if not answer and answers(datagram, step_message.time_us):
-                    answer, said = datagram, autopilot.said()
+                    answer, to_stations = datagram, autopilot.to_stations()
                 down.put(datagram + injected, now_us)
             for datagram in down.due(now_us):
-                plant.hear(datagram)
+                plant.receive(datagram)
             for datagram in plant.listen(_GLANCE_S):
                 is_frame = bool(parted(datagram)[1])
                 if is_frame and parted(datagram)[0] == frame:
                     up.put(frame, now_us)
                     continue
-                heard.append(datagram)
-                if is_frame and said is not None:
-                    return answer, said, heard
+                received.append(datagram)
+                if is_frame and to_stations is not None:
+                    return answer, to_stations, received
             if plant.clock_s() > began_s + _GIVE_UP_S:
                 raise SessionError(f"nothing has passed between plant and autopilot for {_GIVE_UP_S:.0f} s")
 
@@ -218,23 +216,23 @@ class LockstepSession:
         return {name: number for name, number in sides.items() if number is not None}
 
     def kill_autopilot(self) -> None:
-        """End the autopilot as a power cut does, and start it anew: the plant has waited."""
+        """End the autopilot as a power cut does, and start it again: the plant waits meanwhile."""
         self._autopilot.kill()
         self._autopilot.start()
         self._autopilot.call()
 
-    def _taken_in(self, said: list[bytes]) -> tuple[bytes, StateFrame]:
-        *others, datagram = said
+    def _taken_in(self, datagrams: list[bytes]) -> tuple[bytes, StateFrame]:
+        *others, datagram = datagrams
         for other in others:
-            self._hear(other)
-        frame, told = parted(datagram)
-        messages = {message.name: message for message in self._codec.decode(told)}
+            self._read_acks(other)
+        frame, true_state = parted(datagram)
+        messages = {message.name: message for message in self._codec.decode(true_state)}
         truth = decode_state(messages["ATTITUDE_QUATERNION"], messages["LOCAL_POSITION_NED"])
         if truth is None:
-            raise SessionError("the vehicle has left what can be told: its state is not finite")
+            raise SessionError("the vehicle has no finite state any more")
         return frame, truth
 
-    def _hear(self, datagram: bytes) -> None:
+    def _read_acks(self, datagram: bytes) -> None:
         for message in self._codec.decode(datagram):
             if message.name != "COMMAND_ACK":
                 continue
@@ -271,11 +269,11 @@ def answers(datagram: bytes, time_us: int) -> bool:
 
 def parted(datagram: bytes) -> tuple[bytes, bytes]:
     """Return what of a plant's datagram is for the autopilot, and the truth behind it."""
-    told: list[bytes] = []
+    feedback: list[bytes] = []
     truth: list[bytes] = []
     for frame in frames_of(datagram):
-        (truth if frame[_COMPONENT_AT] == TRUTH_COMPONENT else told).append(frame)
-    return b"".join(told), b"".join(truth)
+        (truth if frame[_COMPONENT_AT] == TRUTH_COMPONENT else feedback).append(frame)
+    return b"".join(feedback), b"".join(truth)
 
 
 def _us(time_s: float) -> int:

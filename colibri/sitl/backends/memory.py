@@ -54,8 +54,8 @@ class MemoryPlant:
         self._plant: Plant | None = None
         self._now_s = 0.0
 
-    def hear(self, datagram: bytes) -> None:
-        """Take in what an autopilot says, its call for one.
+    def receive(self, datagram: bytes) -> None:
+        """Take in a datagram of an autopilot: its call, or an answer.
 
         Raises:
             SessionError: The state cannot be integrated any further.
@@ -64,7 +64,7 @@ class MemoryPlant:
         self._end.received.clear()
         if command is None:
             return
-        assert self._plant is not None, "it has told a frame"
+        assert self._plant is not None, "it has sent a frame"
         try:
             self._plant.answer(command, self._end.take_faults())
         except IntegrationError as error:
@@ -72,7 +72,7 @@ class MemoryPlant:
         self._answered = True
 
     def frame(self) -> list[bytes]:
-        """Return what the plant says up to its next frame, which comes last."""
+        """Return what the plant sends up to its next frame, which comes last."""
         self._offer()
         return [outgoing.datagram for outgoing in self._end.take_outbox()]
 
@@ -82,10 +82,10 @@ class MemoryPlant:
         Raises:
             SessionError: The state cannot be integrated any further.
         """
-        self.hear(answer)
+        self.receive(answer)
 
     def listen(self, timeout_s: float) -> list[bytes]:
-        """Return what it says up to `timeout_s` from now, the frame it waits with said again and again."""
+        """Return what it sends up to `timeout_s` from now, repeating the frame that waits for an answer."""
         if self._answered:
             self._offer()
         else:
@@ -121,7 +121,7 @@ class MemoryAutopilot:
         self.start()
 
     def start(self) -> None:
-        """Start it anew.
+        """Start it again.
 
         Raises:
             SettingError: It cannot start.
@@ -146,16 +146,16 @@ class MemoryAutopilot:
         (call,) = self._end.take_outbox()
         return call
 
-    def tell(self, frame: bytes, step_message: StepMessage) -> None:
-        """Tell it a frame of the plant, and what ground stations say then."""
+    def receive_frame(self, frame: bytes, step_message: StepMessage) -> None:
+        """Take in a frame of the plant, and what ground stations send at its time."""
         self.expect(step_message)
-        self.hear(frame)
+        self.receive(frame)
 
     def expect(self, step_message: StepMessage) -> None:
-        """Tell it what ground stations say at the frame that comes next."""
-        self._registry.heard = step_message
+        """Take in what ground stations send at the time of the next frame."""
+        self._registry.from_stations = step_message
 
-    def hear(self, datagram: bytes) -> None:
+    def receive(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
         try:
             answer(self._end, self._copter, datagram, NEVER_LATE_S)
@@ -163,7 +163,7 @@ class MemoryAutopilot:
             raise SessionError(f"the autopilot ended: {error}") from error
 
     def listen(self) -> list[bytes]:
-        """Return what it has said to the plant."""
+        """Return what it has sent to the plant."""
         return self._end.take_outbox()
 
     def answer(self) -> bytes:
@@ -177,11 +177,11 @@ class MemoryAutopilot:
         (answer,) = self._end.take_outbox()
         return answer
 
-    def said(self) -> StepMessage:
-        """Return what it says to ground stations at that frame."""
+    def to_stations(self) -> StepMessage:
+        """Return what it sends to ground stations at that frame."""
         self._copter = self._ground.serve(perf_counter())
-        assert self._registry.said is not None, "it has served them"
-        return self._registry.said
+        assert self._registry.to_stations is not None, "it has served them"
+        return self._registry.to_stations
 
     def kill(self) -> None:
         """End it as a power cut does: nothing is written that was not."""
@@ -192,19 +192,19 @@ class MemoryAutopilot:
 
 
 class _StationRegistry:
-    """The autopilot's conductor, who is in this process."""
+    """The stepped ground stations of an autopilot in this process."""
 
     def __init__(self) -> None:
-        self.heard: StepMessage | None = None
-        self.said: StepMessage | None = None
+        self.from_stations: StepMessage | None = None
+        self.to_stations: StepMessage | None = None
 
     def hear(self) -> StepMessage | None:
-        """Return what ground stations say at this instant."""
-        return self.heard
+        """Return what ground stations send at this time."""
+        return self.from_stations
 
     def tell(self, step_message: StepMessage) -> None:
-        """Take in what the vehicle says."""
-        self.said = step_message
+        """Take in what the vehicle sends."""
+        self.to_stations = step_message
 
     def close(self) -> None:
         """Let go."""
@@ -224,11 +224,11 @@ def parsed(command_line: Callable[[], ArgumentParser], options: Sequence[str]) -
     """Read a command line.
 
     Raises:
-        SettingError: It says something impossible.
+        SettingError: It cannot be read.
     """
-    said = io.StringIO()
+    errors = io.StringIO()
     try:
-        with redirect_stderr(said):
+        with redirect_stderr(errors):
             return command_line().parse_args(options)
     except SystemExit as error:
-        raise SettingError(said.getvalue().strip().removeprefix("colibri: error: ")) from error
+        raise SettingError(errors.getvalue().strip().removeprefix("colibri: error: ")) from error

@@ -33,7 +33,7 @@ class Setting(WorldSetting):
         believed: That the autopilot controls; None for the same.
         profile: Control profile, name or .toml.
         controller: Control law; None for the profile's.
-        feedback: What the autopilot is told: "state" or "sensors".
+        feedback: What the plant sends to the autopilot: "state" or "sensors".
         airborne: Picked up in hold so many metres above the origin, its rotors at hover speed: no take-off needed.
             With feedback "state" only: an estimator begins at rest.
         params: Parameters that were changed before.
@@ -86,7 +86,7 @@ KEYS = frozenset(each.name for each in fields(Setting))
 DOES = frozenset(each.name for each in fields(Trouble)) - {"down"}
 
 
-def setting_of(said: Iterable[Mapping[str, Any]]) -> Setting:
+def setting_of(marks: Iterable[Mapping[str, Any]]) -> Setting:
     """Return the setting that several marks describe together, of which a later one has the last word; params add up.
 
     Raises:
@@ -94,7 +94,7 @@ def setting_of(said: Iterable[Mapping[str, Any]]) -> Setting:
     """
     values: dict[str, Any] = {}
     params: dict[str, float] = {}
-    for mark in said:
+    for mark in marks:
         unknown = sorted(set(mark) - KEYS)
         if unknown:
             raise SettingError(f"a flight has no {unknown[0]}: choose {', '.join(sorted(KEYS))}")

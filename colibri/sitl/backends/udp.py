@@ -13,7 +13,7 @@ from colibri.sitl.backends.launcher import Launcher, LoggedChild
 from colibri.sitl.backends.lockstep import SessionError, answers, parted
 
 SILENCE_S = 60.0
-"""Of the wall clock: whoever says nothing for so long will say nothing more. No flight depends on it."""
+"""Wall-clock time after which a silent process is taken for dead. No flight depends on it."""
 _LOOK_EVERY_S = 0.1
 _HERE = "udpin:127.0.0.1:0"
 
@@ -22,7 +22,7 @@ class UdpPlant:
     """A plant in another process."""
 
     def __init__(self, launcher: Launcher, options: Sequence[str], folder: Path) -> None:
-        """Start it; `folder` takes what it says."""
+        """Start it; `folder` takes its output."""
         self._child = LoggedChild(launcher, "plant", ["--json", "--link", _HERE, *options], folder / "plant.said")
         self._link: UdpLink | None = None
         self._last = self._answer = b""
@@ -32,26 +32,26 @@ class UdpPlant:
         """The number of its process."""
         return self._child.number
 
-    def hear(self, datagram: bytes) -> None:
-        """Take in what an autopilot says that answers no frame: its call."""
+    def receive(self, datagram: bytes) -> None:
+        """Send a datagram of an autopilot that answers no frame: its call."""
         if self._link is None:
             self._link = opened(self._url().replace("udpin", "udpout"))
         self._link.send(datagram)
 
     def frame(self) -> list[bytes]:
-        """Return what the plant says up to its next frame, which comes last."""
+        """Return what the plant sends up to its next frame, which comes last."""
         assert self._link is not None, "it was called"
-        said = []
+        datagrams = []
         while True:
             datagram, _ = received(self._link, (self._child,), "plant")
-            if datagram == self._last:  # it has not heard the answer
+            if datagram == self._last:  # the answer was lost
                 if self._answer:
                     self._link.send(self._answer)
                 continue
-            said.append(datagram)
+            datagrams.append(datagram)
             if parted(datagram)[1]:
                 self._last, self._answer = datagram, b""
-                return said
+                return datagrams
 
     def take(self, answer: bytes) -> None:
         """Send the answer to that frame."""
@@ -60,14 +60,14 @@ class UdpPlant:
         self._link.send(answer)
 
     def listen(self, timeout_s: float) -> list[bytes]:
-        """Return what it says up to `timeout_s` from now, the frame it waits with said again and again."""
+        """Return what it sends up to `timeout_s` from now, repeating the frame that waits for an answer."""
         assert self._link is not None, "it was called"
         self._link.wait(timeout_s)
-        said = [datagram for datagram, _ in self._link.receive_now()]
-        if not said:
+        datagrams = [datagram for datagram, _ in self._link.receive_now()]
+        if not datagrams:
             self._child.check()
-        self._last = next((datagram for datagram in reversed(said) if parted(datagram)[1]), self._last)
-        return said
+        self._last = next((datagram for datagram in reversed(datagrams) if parted(datagram)[1]), self._last)
+        return datagrams
 
     def clock_s(self) -> float:
         """Return the time that links are late by."""
@@ -83,7 +83,7 @@ class UdpPlant:
         """Return where it listens."""
         began_s = perf_counter()
         while perf_counter() < began_s + SILENCE_S:
-            for line in self._child.said.read_text(encoding="utf-8").split("\n")[:-1]:
+            for line in self._child.log.read_text(encoding="utf-8").split("\n")[:-1]:
                 if line.startswith('{"event": "listening"'):
                     url: str = json.loads(line)["url"]
                     return url
@@ -96,7 +96,7 @@ class UdpAutopilot:
     """An autopilot in another process."""
 
     def __init__(self, launcher: Launcher, options: Sequence[str], folder: Path) -> None:
-        """Start it; `folder` takes what it says."""
+        """Start it; `folder` takes its output."""
         self._launcher = launcher
         self._folder = folder
         self._link, self._registry = opened(_HERE), opened(_HERE)
@@ -111,10 +111,10 @@ class UdpAutopilot:
         return self._child.number
 
     def start(self) -> None:
-        """Start it anew."""
+        """Start it again."""
         self._starts += 1
-        said = self._folder / f"autopilot-{self._starts}.said"
-        self._child = LoggedChild(self._launcher, "autopilot", self._options, said)
+        log = self._folder / f"autopilot-{self._starts}.said"
+        self._child = LoggedChild(self._launcher, "autopilot", self._options, log)
         self._gathering = Gathering()
         self._time_us = 0
         self._address: Address | None = None
@@ -126,37 +126,37 @@ class UdpAutopilot:
         call, self._address = received(self._link, (self._child,), "autopilot")
         return call
 
-    def tell(self, frame: bytes, step_message: StepMessage) -> None:
-        """Tell it a frame of the plant, and what ground stations say then."""
+    def receive_frame(self, frame: bytes, step_message: StepMessage) -> None:
+        """Take in a frame of the plant, and what ground stations send at its time."""
         self.expect(step_message)
-        self.hear(frame)
+        self.receive(frame)
 
     def expect(self, step_message: StepMessage) -> None:
-        """Tell it what ground stations say at the frame that comes next."""
+        """Take in what ground stations send at the time of the next frame."""
         self._time_us = step_message.time_us
         for packet in packets(step_message):
             self._registry.send(packet, self._registry_address)
 
-    def hear(self, datagram: bytes) -> None:
+    def receive(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
         self._link.send(datagram, self._address)
 
     def listen(self) -> list[bytes]:
-        """Return what it has said to the plant."""
-        said = [datagram for datagram, _ in self._link.receive_now()]
-        if not said:
+        """Return what it has sent to the plant."""
+        datagrams = [datagram for datagram, _ in self._link.receive_now()]
+        if not datagrams:
             self._child.check()
-        return said
+        return datagrams
 
     def answer(self) -> bytes:
-        """Return its answer to the frame; what else it says is for a plant that it misses."""
+        """Return its answer to the frame; everything else is a call for a plant."""
         while True:
             datagram, _ = received(self._link, (self._child,), "autopilot")
             if answers(datagram, self._time_us):
                 return datagram
 
-    def said(self) -> StepMessage:
-        """Return what it says to ground stations at that frame."""
+    def to_stations(self) -> StepMessage:
+        """Return what it sends to ground stations at that frame."""
         while True:
             packet, _ = received(self._registry, (self._child,), "autopilot")
             step_message = self._gathering.take(packet)
@@ -178,7 +178,7 @@ class UdpAutopilot:
 
 
 def opened(url: str) -> UdpLink:
-    """Open a link on which nobody looks without a pause: flights share the cores."""
+    """Open a link that is polled with pauses: flights share the cores."""
     link = open_link(url)
     link.spin_s = 0.0
     return link
@@ -190,7 +190,7 @@ def received(
     """Return what comes next.
 
     Raises:
-        SessionError: Whoever should speak has died, or says nothing.
+        SessionError: The process has died, or is silent.
     """
     began_s = perf_counter()
     while (datagram := link.receive(_LOOK_EVERY_S)) is None:

@@ -59,7 +59,7 @@ def calibration(evidence: Evidence) -> None:
 
 def all_params(evidence: Evidence) -> None:
     """Every parameter is printed."""
-    count = evidence.seen.ask("PARAM_VALUE", "PARAM_REQUEST_READ", "", 0).param_count
+    count = evidence.seen.request("PARAM_VALUE", "PARAM_REQUEST_READ", "", 0).param_count
     assert len(re.findall(r"(?m)^[A-Z][A-Z0-9_]*: [-\d.e]+$", evidence.client.printed)) == count
 
 

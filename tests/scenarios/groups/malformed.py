@@ -74,7 +74,7 @@ def many_items_refused(sitl: Sitl) -> None:
     """Announce more items than there is room for."""
     sitl.gcs.forget()
     announce = lambda _: sitl.send("MISSION_COUNT", sitl.system, 1, TOO_MANY, 0)  # noqa: E731
-    sitl.gcs.ask(announce, lambda: sitl.heard("MISSION_ACK"), "MISSION_ACK")
+    sitl.gcs.request(announce, lambda: sitl.heard("MISSION_ACK"), "MISSION_ACK")
     assert sitl.gcs.latest("MISSION_ACK").type == mav.MAV_MISSION_NO_SPACE
 
 
