@@ -28,7 +28,7 @@ LINKS = ("memory", "udp")
 MARKS = {
     "sitl": "sitl(vehicle=..., feedback=..., wind=..., seed=..., start=..., params=...): what the flight begins with",
     "vehicle": "vehicle(name): what is flown",
-    "feedback": 'feedback(kind): what the autopilot is told, "state" or "sensors"',
+    "feedback": 'feedback(kind): what the plant sends to the autopilot, "state" or "sensors"',
     "wind": 'wind(wind, turbulence=None): "5@270" blows from the west with 5 m/s; "light", "moderate" or "severe"',
     "seed": "seed(number): of everything random",
     "seeds": "seeds(first, last): one flight for each seed",
@@ -84,7 +84,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def sitl_seed(request: pytest.FixtureRequest) -> int | None:
-    """Return the seed of the flight where mark `seeds` or `seed` says one."""
+    """Return the seed of the flight of mark `seeds` or `seed`, if there is one."""
     mark = request.node.get_closest_marker("seed")
     seed: int | None = getattr(request, "param", None if mark is None else mark.args[0])
     return seed
@@ -114,7 +114,7 @@ def sitl(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Sitl
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Keep the flights of a failed test, and tell the end of the run of all."""
+    """Keep the flights of a failed test, and attach the summary of all to the report."""
     report = yield
     flights = item.stash.get(_FLIGHTS, None)
     if flights is None:
@@ -143,7 +143,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Write the hashes, where they are asked for."""
+    """Write the hashes, if an option names a file for them."""
     path = session.config.getoption("--sitl-hashes")
     if path and not hasattr(session.config, "workerinput"):
         Path(path).write_text("".join(line + "\n" for line in session.config.stash[_SUMMARY].lines()), encoding="utf-8")
@@ -210,7 +210,7 @@ def _launcher(config: pytest.Config) -> Launcher | None:
 
 
 def _said(node: pytest.Item, seed: int | None) -> list[Mapping[str, Any]]:
-    """Return what the marks of a test say, the closest last."""
+    """Return the keywords of the marks of a test, the closest last."""
     said: list[Mapping[str, Any]] = [mark.kwargs for mark in reversed(list(node.iter_markers("sitl")))]
     for name in ("vehicle", "feedback"):
         mark = node.get_closest_marker(name)

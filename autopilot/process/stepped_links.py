@@ -43,7 +43,7 @@ class UdpConductor:
         link.send(b"")
 
     def hear(self) -> StepMessage | None:
-        """Wait for its turn."""
+        """Wait for its step message."""
         while not self._ended():
             received = self._link.receive(_MAX_WAIT_S)
             step_message = None if received is None else self._gathering.take(received[0])
@@ -52,7 +52,7 @@ class UdpConductor:
         return None
 
     def tell(self, step_message: StepMessage) -> None:
-        """Send a turn."""
+        """Send a step message."""
         for packet in packets(step_message):
             self._link.send(packet)
 
@@ -65,7 +65,7 @@ class ConductedLinks:
     """Carries datagrams between a conductor and a vehicle's hub."""
 
     def __init__(self, conductor: Conductor, state: Callable[[], State]) -> None:
-        """Serve the ground stations of `conductor`, which is told the vehicle's `state` with each turn."""
+        """Serve the ground stations of `conductor`, which receives the vehicle's `state` with each step message."""
         self._conductor = conductor
         self._state = state
         self._time_us = 0

@@ -1,4 +1,4 @@
-"""Whether an estimator's errors are as large as it says: NEES and NIS against the bounds of χ².
+"""Consistency of an estimator's errors with its covariance: NEES and NIS against the bounds of χ².
 
 Y. Bar-Shalom, X. Li, T. Kirubarajan, Estimation with Applications to Tracking and Navigation, section 5.4: over
 independent flights, the sum of normalised errors squared is χ² of as many degrees of freedom as there are numbers.

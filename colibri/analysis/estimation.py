@@ -1,4 +1,4 @@
-"""How far the estimate was off the truth, and the vehicle off its reference by its own lights."""
+"""Estimation errors of a flight against the truth, and tracking errors by the estimate."""
 
 from typing import Any, NamedTuple
 
@@ -65,7 +65,7 @@ class Estimation(NamedTuple):
     def figures(self) -> dict[str, Any]:
         """Return the root mean squares that a report has, and mean NEES and NIS; None if it ended too early for them.
 
-        NIS is given in parts of the number of numbers: 1 if the filter errs as it says.
+        NIS is given in parts of the number of numbers: 1 if the errors match the covariance.
         """
         if not len(self.t):
             return dict.fromkeys(FIGURES)

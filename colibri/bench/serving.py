@@ -50,7 +50,7 @@ def serving_figures(profile: Profile, folder: Path, duration_s: float, runs: int
 def served(plan: FlightPlan, channels: int) -> Figures:
     """Fly in memory with so many channels open; return the time to serve them after a frame, µs, and messages a second.
 
-    The log of the flight is a listener like any other, and is there even where nobody else is.
+    The log of the flight is served as a ground station is, also where there is none.
     """
     settings = StationSettings(system_id=1, identity="px4", origin=DEFAULT_ORIGIN)
     copter = Copter(plan.profile, plan.vehicle, settings, perf_counter, first=plan.track)

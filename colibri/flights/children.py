@@ -1,4 +1,4 @@
-"""Child processes: started, what they say read, watched, ended.
+"""Child processes: started, their output read, watched, ended.
 
 Each is in a process group of its own, out of reach of the terminal's Ctrl-C: that is for this process, which then ends
 them, once and in its order. It does so by SIGTERM, which a child that is still loading obeys without a traceback; who
@@ -50,7 +50,7 @@ class Child:
 
     def read(self) -> list[dict[str, Any]]:
         """Return the JSON lines that it has said since the last time; waits until there is something."""
-        assert self.process.stdout is not None, "asked for only where it is piped"
+        assert self.process.stdout is not None, "read only where it is piped"
         *lines, self._rest = (self._rest + os.read(self.process.stdout.fileno(), 65536)).split(b"\n")
         return [json.loads(line) for line in lines]
 
@@ -61,7 +61,7 @@ class Child:
 
 
 def events_of(children: Iterable[Child]) -> Iterator[tuple[Child, dict[str, Any]]]:
-    """Yield what children say now, or within a moment."""
+    """Yield the events that children have printed, waiting a moment for them."""
     streams = {child.process.stdout: child for child in children if child.process.stdout is not None}
     ready, _, _ = select(list(streams), [], [], _LOOK_EVERY_S)
     for stream in ready:

@@ -1,4 +1,4 @@
-"""The command lines of plant and autopilot, written from what they are to say; loads nothing."""
+"""The command lines of plant and autopilot, written from values by option name; loads nothing."""
 
 from collections.abc import Mapping
 from math import inf
@@ -10,7 +10,7 @@ _NAMES = {"gusts": "gust"}
 
 
 def options_of(**values: object) -> list[str]:
-    """Return the options that say `values`, by their names; of None, False and what is empty nothing is said."""
+    """Return the options for `values` by name; None, False and empty values are left out."""
     return [option for name, value in values.items() for option in _said(f"--{_NAMES.get(name, name)}", value)]
 
 

@@ -47,7 +47,7 @@ class Member:
 
 
 def ground_links(args: argparse.Namespace, instance: int) -> list[str]:
-    """Return the URLs that instance `instance` serves: those asked for, or the two that clients wait on."""
+    """Return the URLs that instance `instance` serves: those of the options, or the two that clients listen on."""
     if args.gcs:
         return list(args.gcs)
     return [f"udpout:127.0.0.1:{GROUND_PORT}", f"udpout:127.0.0.1:{SDK_PORT + instance}"]
@@ -74,7 +74,7 @@ def sitl(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> None:
-    """End with one line where what is asked for cannot fly."""
+    """End with one line where the options cannot be flown."""
     try:
         profile = load_profile(args.profile).with_choices(args.controller, None)
         name = args.plant_vehicle or args.vehicle or profile.simulation.vehicle
@@ -149,7 +149,7 @@ def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -
 
 
 def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines: StatusLines) -> int:
-    """Hear what the processes say until the last vehicle ends or the user has had enough."""
+    """Show the events of the processes until the last vehicle ends or the user interrupts."""
     flying = list(fleet)
     while flying and not stop:
         over = [member for member in flying if _has_ended(member)]
@@ -163,7 +163,7 @@ def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines:
 
 
 def _hear(fleet: Sequence[Member], args: argparse.Namespace, lines: StatusLines) -> None:
-    """Take in what the processes of `fleet` say."""
+    """Read the events of the processes of `fleet`."""
     members = {child: member for member in fleet for child in member.children}
     for child, event in events_of(members):
         member = members[child]

@@ -68,7 +68,7 @@ class StatusLines:
 def status_table(facts: dict[int, dict[str, Any]]) -> Group:
     """Return a row for each vehicle: what it does, where it is, how long its QP takes; and one for each of its links.
 
-    Of a fleet, links on which nobody is heard are left out. It fits 80 columns.
+    Of a fleet, links without a ground station are left out. It fits 80 columns.
     """
     vehicles = Table(box=None, padding=(0, 1, 0, 0), header_style="dim")
     for heading, width, side in _COLUMNS:
@@ -100,6 +100,6 @@ def _vehicle_texts(fact: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _link_texts(link: dict[str, Any]) -> tuple[str, ...]:
-    """Return the columns of a link: its URL, who is heard on it, messages a second in and out."""
+    """Return the columns of a link: its URL, the ground stations on it, messages a second in and out."""
     who = " ".join(link["heard"]) or "nobody yet"
     return (link["url"], f"hears {who}", f"{link['received_hz']:.0f}/s in", f"{link['sent_hz']:.0f}/s out")

@@ -120,7 +120,7 @@ class InMemory:
     """Carries the datagrams that the two processes would send, in the same conversation."""
 
     def __init__(self, autopilot: Autopilot, frame_interval_us: int, feedback: Feedback, logs: PlantLogs) -> None:
-        """Let `autopilot` call the plant and ask for `feedback`."""
+        """Let `autopilot` call the plant and request `feedback`."""
         self._autopilot = autopilot
         self._logs = logs
         self._plant_end = PlantEnd(system_id=SYSTEM_ID, frame_interval_us=frame_interval_us, serves=[feedback])

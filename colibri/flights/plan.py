@@ -19,7 +19,7 @@ from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 
 class Summary(NamedTuple):
-    """What only the run itself knows: wall-clock time of the flight, frames exchanged and sent again."""
+    """What only the run itself can give: wall-clock time of the flight, frames exchanged and sent again."""
 
     wall_time_s: float
     frames: int
@@ -31,7 +31,7 @@ class GroundAccess:
     """Which ground stations may watch and command a flight.
 
     Attributes:
-        links: URLs to call or to wait on; none where nobody is invited.
+        links: URLs to call or to wait on; none without ground stations.
         signing_key: File of the key that both sides sign with.
         insecure: Whether links may leave this computer without one.
     """
@@ -42,12 +42,12 @@ class GroundAccess:
 
 
 class PlanError(Error):
-    """What was asked for does not go together; the message is the one line that a user needs."""
+    """Options that cannot be combined; the message is the one line that a user needs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightPlan(WorldSetting):
-    """A flight as it was asked for, in the world of a `WorldSetting`.
+    """A flight by its options, in the world of a `WorldSetting`.
 
     Attributes:
         track_name: The track, with its options.
@@ -61,10 +61,10 @@ class FlightPlan(WorldSetting):
         feedback: What the plant sends to the autopilot.
         duration_s: Simulated time to fly.
         out: Folder for all that the flight leaves.
-        solver: QP solver asked for; None for the profile's.
+        solver: QP solver by option; None for the profile's.
         ground: Who may watch and command.
         track: The track to fly.
-        profile: The profile, with controller and solver as asked for.
+        profile: The profile, with controller and solver of the options.
         vehicle: The vehicle that the autopilot controls.
         plant_vehicle: The vehicle that the plant flies, its parts left out.
     """
@@ -166,8 +166,8 @@ class FlightPlan(WorldSetting):
             "speed": inf,
             "duration": DURATION_S,
         }
-        asked = world_values(WorldSetting()) | unset | usual | options
-        return cls.from_arguments(argparse.Namespace(**asked, out=out))
+        values = world_values(WorldSetting()) | unset | usual | options
+        return cls.from_arguments(argparse.Namespace(**values, out=out))
 
     @property
     def weather(self) -> Weather:

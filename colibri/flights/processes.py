@@ -9,7 +9,7 @@ from colibri.flights.command_lines import options_of, plant_options
 from colibri.flights.plan import FlightPlan, Summary
 
 _SHOWN = ("ground", "heard", "said")
-"""Events of the autopilot that a user who has invited ground stations wants to read."""
+"""Events of the autopilot that are shown to a user with ground stations."""
 
 
 class FlightError(InFlightError):

@@ -204,7 +204,7 @@ def _begun(setup: Setup) -> Autopilot | Copter:
     estimator = estimator_for(setup.feedback, vehicle, setup.origin)
     flown = track(setup.track) if setup.track else None
     if not setup.ground:
-        assert flown is not None, "who serves no ground station flies a track"
+        assert flown is not None, "without ground stations a track is flown"
         return Autopilot(profile, vehicle, flown, _clock, estimator=estimator)
     settings = StationSettings(
         system_id=setup.system_id, identity=setup.identity, origin=setup.origin, feedback=setup.feedback

@@ -22,5 +22,5 @@ class Fleet(tuple[Sitl, ...], Stepped):
                 sitl.step()
 
     def __str__(self) -> str:
-        """Return how each vehicle is, for who reads a failed test."""
+        """Return the state of each vehicle, for the message of a failed test."""
         return "; ".join(f"vehicle {sitl.system}: {sitl}" for sitl in self)

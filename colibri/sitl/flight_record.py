@@ -1,4 +1,4 @@
-"""What a flight leaves: every frame with its command, every message; in memory, and in files only where it is asked."""
+"""Record of a flight: every frame with its command, every message; in memory, and in files only on request."""
 
 from hashlib import sha256
 from pathlib import Path
@@ -28,7 +28,7 @@ Columns = dict[str, NDArray[np.float64]]
 
 
 class Record:
-    """A flight as it was.
+    """The frames and messages of a flight.
 
     Attributes:
         frames: How many were flown.

@@ -1,11 +1,11 @@
-"""What a run of tests has flown: how much, how fast, and one number that two runs can be compared by."""
+"""Summary of the flights of a test run: number, speed, and one hash that two runs can be compared by."""
 
 from collections.abc import Mapping
 from hashlib import sha256
 from typing import Any
 
 FLOWN = "sitl_flown"
-"""The attribute of a report that says what its test has flown."""
+"""The attribute of a report with the flights of its test."""
 
 
 class Summary:

@@ -32,7 +32,7 @@ STICKS_EVERY_US = 40_000
 
 
 class Links(NamedTuple):
-    """What the links do.
+    """Faults of the links.
 
     Attributes:
         ground: Between the vehicle and every ground station, by simulated time.
@@ -47,14 +47,15 @@ class Links(NamedTuple):
 class Sitl(View, Stepped, Steered):
     """A vehicle, its plant, its ground stations, and the links between them.
 
-    What it looks like is in `View`.
+    What can be read of it is in `View`, waiting in `Stepped`, sticks and setpoints in `Steered`. Its methods are the
+    vocabulary of tests: that is why they are many.
 
     Attributes:
         items: Items of missions and fences, `items.waypoint(3.0, 0.0, 5.0)` say.
-        Refused: What is raised where the vehicle refuses.
-        NotInTime: What is raised where something does not come about, an AssertionError.
+        Refused: Raised where the vehicle refuses.
+        NotInTime: Raised where a condition is not met in time, an AssertionError.
         gcs: The first ground station; what `Sitl` does itself it does through it.
-        link: What the links do.
+        link: Faults of the links, which may be changed at any time.
     """
 
     items = items
@@ -78,7 +79,7 @@ class Sitl(View, Stepped, Steered):
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
 
     def begin(self) -> None:
-        """Fly until the first HEARTBEAT of the vehicle, if the setting asks for it."""
+        """Fly until the first HEARTBEAT of the vehicle, if the setting has it so."""
         if self.setting.ready:
             self.wait_until(lambda: self.gcs.heard["HEARTBEAT"], within=READY_WITHIN_S, what="the vehicle's HEARTBEAT")
 

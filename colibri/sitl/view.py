@@ -24,7 +24,7 @@ _SLOW_M_S = 0.3
 
 
 class View:
-    """A vehicle in flight, which this only looks at.
+    """What can be read of a vehicle in flight.
 
     Positions and velocities are true, ENU, m and m/s; the origin is where the vehicle stood, or what `home` says.
 
@@ -53,17 +53,17 @@ class View:
 
     @property
     def position(self) -> Vector:
-        """Where the vehicle is."""
+        """Position, ENU, m."""
         return self._lockstep.truth.position_enu_m
 
     @property
     def velocity(self) -> Vector:
-        """How fast it flies."""
+        """Velocity, ENU, m/s."""
         return self._lockstep.truth.velocity_enu_m_s
 
     @property
     def speed_m_s(self) -> float:
-        """How fast, whatever the direction."""
+        """Magnitude of the velocity, m/s."""
         return hypot(*self.velocity)
 
     @property
@@ -138,7 +138,7 @@ class View:
         return self.record.sha256
 
     def __str__(self) -> str:
-        """Return how it is, for who reads a failed test."""
+        """Return its state in a line, for the message of a failed test."""
         east, north, up = self.position
         words = f"t = {self.time_us * 1e-6:.3f} s, {self.mode or 'no mode'}, {'armed' if self.armed else 'disarmed'}"
         where = f"at ({east:.2f}, {north:.2f}, {up:.2f}) m, {self.speed_m_s:.2f} m/s, tilt {self.tilt_deg:.1f} degrees"

@@ -52,8 +52,8 @@ class Job(NamedTuple):
         """Return the flight as a plan."""
         profile, _, controller = self.contender.partition(":")
         chosen = {"profile": profile, "controller": controller or None, "track": self.track, "seed": self.seed}
-        asked = {name: getattr(self.args, name) for name in (*_COMMON, *_WEATHER)}
-        return FlightPlan.of_options(out, **chosen, **asked)
+        options = {name: getattr(self.args, name) for name in (*_COMMON, *_WEATHER)}
+        return FlightPlan.of_options(out, **chosen, **options)
 
 
 _MAX_WIDTH = 400

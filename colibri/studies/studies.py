@@ -52,7 +52,7 @@ class Study(NamedTuple):
     """A study.
 
     Attributes:
-        name: What it is asked for by.
+        name: Its name on the command line.
         headings: Of the names of a row.
         measures: What each group of columns shows.
         cases: What to fly.

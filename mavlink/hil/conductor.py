@@ -1,8 +1,8 @@
-"""Turns: what ground stations and a vehicle say to one another at one instant, as packets between two processes.
+"""Step messages: what stepped ground stations and a vehicle send each other at one time, as packets between processes.
 
-Whoever conducts a flight holds simulated time still, and says with each frame of the plant all that ground stations say
-at that instant; the vehicle answers with all that it says. So every datagram is heard at a definite frame, however slow
-either process is.
+The process that steps simulated time sends, with each frame of the plant, all that ground stations send at that time;
+the vehicle answers with all that it sends. So every datagram arrives at a definite frame, however slow either process
+is.
 """
 
 from collections.abc import Sequence
@@ -34,7 +34,7 @@ class Parcel(NamedTuple):
 
 
 class StepMessage(NamedTuple):
-    """All that is said at an instant in one direction.
+    """All datagrams of one time in one direction.
 
     Attributes:
         time_us: Simulated time.
@@ -50,7 +50,7 @@ class StepMessage(NamedTuple):
 
 
 def packets(step_message: StepMessage) -> list[bytes]:
-    """Return a turn as packets, each of which fits a datagram.
+    """Return a step message as packets, each of which fits a datagram.
 
     Raises:
         ValueError: It is more than 255 packets.
@@ -62,12 +62,12 @@ def packets(step_message: StepMessage) -> list[bytes]:
     content = b"".join(parts)
     pieces = [content[at : at + _PIECE_BYTES] for at in range(0, len(content), _PIECE_BYTES)]
     if len(pieces) > 255:
-        raise ValueError(f"{len(content)} bytes are too many to say at one instant")
+        raise ValueError(f"{len(content)} bytes are too many for one step message")
     return [_PIECE.pack(step_message.time_us, number, len(pieces)) + piece for number, piece in enumerate(pieces)]
 
 
 class Gathering:
-    """Puts packets of one turn together, in whatever order they come."""
+    """Puts the packets of one step message together, in any order."""
 
     def __init__(self) -> None:
         """Begin with none."""
@@ -75,7 +75,7 @@ class Gathering:
         self._pieces: dict[int, bytes] = {}
 
     def take(self, packet: bytes) -> StepMessage | None:
-        """Take in a packet from the other process; return the turn if that makes it whole."""
+        """Take in a packet from the other process; return the step message if that completes it."""
         time_us, number, count = _PIECE.unpack_from(packet)
         if time_us != self._time_us:
             self._time_us, self._pieces = time_us, {}
@@ -84,10 +84,10 @@ class Gathering:
             return None
         content = b"".join(self._pieces[number] for number in range(count))
         self._pieces = {}
-        return _turn(content)
+        return _step_message(content)
 
 
-def _turn(content: bytes) -> StepMessage:
+def _step_message(content: bytes) -> StepMessage:
     time_us, custom_mode, armed, count = _HEAD.unpack_from(content)
     at = _HEAD.size
     parcels = []

@@ -218,7 +218,7 @@ class CopterFlight(Stepped, Steered):
         return self.command(mav.MAV_CMD_DO_SET_MODE, 1.0, number >> 16 & 0xFF, number >> 24 & 0xFF)
 
     def arm(self, *, force: bool = False) -> int:
-        """Arm, by force whatever the checks say; return the MAV_RESULT."""
+        """Arm, by `force` without the checks; return the MAV_RESULT."""
         return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE if force else 0.0)
 
     def disarm(self, *, force: bool = False) -> int:

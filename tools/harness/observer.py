@@ -1,4 +1,4 @@
-"""Sees what a vehicle really does, on a link of its own: clients are judged by this, not by what they say."""
+"""Observes a vehicle on a link of its own: clients are judged by this, not by their own output."""
 
 from collections import Counter
 from collections.abc import Callable

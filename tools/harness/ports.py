@@ -19,7 +19,7 @@ class Talker(Protocol):
 
 
 class OnPort:
-    """Lets a client talk with whoever sends to a port, while the block lasts.
+    """Connects a client to the vehicle that sends to a port, while the block lasts.
 
     Attributes:
         url: The link that the vehicle is to serve.
@@ -49,7 +49,7 @@ class OnPort:
         self._socket.close()
 
     def send(self, datagram: bytes) -> None:
-        """Send a datagram to whoever sent last."""
+        """Send a datagram to the address that the last one came from."""
         assert self.sender is not None, "nothing has been received"
         self._socket.sendto(datagram, self.sender)
 

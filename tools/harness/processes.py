@@ -70,7 +70,7 @@ class Process(Child):
     """`colibri plant` or `colibri autopilot` as a user starts it, its JSON status read from a file."""
 
     def __init__(self, folder: Path, package: str, *options: str) -> None:
-        """Start it; `folder` takes what it says."""
+        """Start it; `folder` takes its output."""
         self._said = folder / f"{package}-{len(list(folder.iterdir()))}.jsonl"
         self._errors = self._said.with_suffix(".err")
         with self._said.open("wb") as said, self._errors.open("wb") as errors:

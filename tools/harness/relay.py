@@ -1,4 +1,4 @@
-"""A UDP relay between autopilot and plant, which does to the datagrams what a test wants done."""
+"""A UDP relay between autopilot and plant, which applies the faults of a test to the datagrams."""
 
 import socket
 from abc import ABC, abstractmethod

@@ -71,7 +71,7 @@ def vehicle(folder: Path, *options: str, links: tuple[str, ...] = (WAITING,), sp
     """Run `colibri sitl` while the block lasts; it stands, ready to be armed, when the block begins.
 
     Args:
-        folder: For what it keeps and says.
+        folder: For its state and output.
         options: More of its command line.
         links: URLs that it serves beside the observer's; by default it waits on any free port.
         speed: Times real time.

@@ -1,4 +1,4 @@
-"""Ground stations that ask for a lot and keep account of what they receive; no input or output in them.
+"""Ground stations that request a lot and keep account of what they receive; no input or output in them.
 
 What they send follows from what comes, so that it does not matter how fast the vehicle flies.
 """
@@ -62,9 +62,9 @@ class Station:
         every: int = 25,
         orders: Sequence[tuple[float, ...]] = (),
     ) -> None:
-        """Ask for something with every `every` datagrams that come: first `orders`, a MAV_CMD and its parameters each.
+        """Send a request with every `every` datagrams received: first `orders`, a MAV_CMD and its parameters each.
 
-        After them it asks for all that a ground station may ask for, over and over.
+        After them it sends every request that a ground station may send, over and over.
         """
         self.identity = (system_id, component_id)
         self.sent: Counter[int] = Counter()
@@ -117,7 +117,7 @@ class Station:
             yield partial(self._command, int(command), *parameters)
 
     def _wish(self) -> Iterator[Callable[[], None]]:
-        """Yield what a ground station asks for, of every kind."""
+        """Yield the requests of a ground station, of every kind."""
         for name, interval_us in _STREAMED_US.items():
             yield partial(self._command, mav.MAV_CMD_SET_MESSAGE_INTERVAL, _number(name), interval_us)
         for name in _ASKED:

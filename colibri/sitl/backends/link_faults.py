@@ -1,4 +1,4 @@
-"""What a link does to datagrams: loses, delays, repeats, overtakes, spoils them; by seed and by simulated time."""
+"""Faults of a link: loss, delay, duplication, reordering and corruption of datagrams, by seed and simulated time."""
 
 from dataclasses import dataclass
 from heapq import heappop, heappush
@@ -40,7 +40,7 @@ class Pipe:
     """One direction of a link."""
 
     def __init__(self, trouble: Trouble, seed: str) -> None:
-        """Do to datagrams what `trouble` says; the same `seed` does it to the same datagrams."""
+        """Apply `trouble` to datagrams; the same `seed` affects the same datagrams."""
         self._trouble = trouble
         self._chance = Random(seed)
         self._waiting: list[tuple[int, int, bytes]] = []

@@ -238,7 +238,7 @@ class LockstepSession:
                 continue
             number, result = message.fields.command, message.fields.result
             if number == CMD_SET_MESSAGE_INTERVAL and result != RESULT_ACCEPTED:
-                raise SessionError("the plant cannot give the feedback that is asked for: fly a vehicle with sensors")
+                raise SessionError("the plant cannot give the requested feedback: fly a vehicle with sensors")
             self.acks.append((number, result))
 
     def _command(self, answer: bytes) -> ActuatorCommand:
@@ -250,7 +250,7 @@ class LockstepSession:
 
 
 def frames_of(datagram: bytes) -> Iterator[bytes]:
-    """Yield the frames of a datagram of whole MAVLink 2 frames that nobody has signed."""
+    """Yield the frames of a datagram of whole MAVLink 2 frames that are not signed."""
     at = 0
     while at < len(datagram):
         end = at + _HEADER_BYTES + datagram[at + 1] + _CRC_BYTES

@@ -38,7 +38,7 @@ class MemoryPlant:
     process = None
 
     def __init__(self, options: Sequence[str]) -> None:
-        """Begin as a command line says.
+        """Begin with the options of a command line.
 
         Raises:
             SettingError: It cannot begin so.
@@ -112,7 +112,7 @@ class MemoryAutopilot:
     process = None
 
     def __init__(self, options: Sequence[str]) -> None:
-        """Begin as a command line says.
+        """Begin with the options of a command line.
 
         Raises:
             SettingError: It cannot begin so.

@@ -1,6 +1,6 @@
-"""What a flight begins with, and the command lines of the two processes that say so.
+"""The setting of a flight, and the command lines of its two processes.
 
-Nothing here loads what flies: pytest imports it in every run, whoever's tests these are.
+Nothing here loads plant or autopilot: pytest imports it in every run.
 """
 
 from collections.abc import Iterable, Mapping
@@ -23,7 +23,7 @@ class SettingError(SitlError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting(WorldSetting):
-    """What a flight begins with; each is what the option of the same name of `colibri plant` or `autopilot` says.
+    """The setting of a flight; each field is the option of the same name of `colibri plant` or `autopilot`.
 
     Beside what a `WorldSetting` has, whose seed is that of the links' faults, too. What is left out of `start` is that
     of a vehicle that stands, nose to the north; x, y, z count from there.
@@ -42,7 +42,7 @@ class Setting(WorldSetting):
         ground: What links to ground stations do: loss, delay_s, jitter_s, duplicate, reorder, corrupt, as in `Trouble`.
         identity: Towards ground stations: "px4" or "generic".
         system: MAVLink system id.
-        ready: Whether the flight is handed over only when the vehicle says that it is there.
+        ready: Whether the flight is handed over only after the first HEARTBEAT.
     """
 
     vehicle: str = "hummingbird"
@@ -87,10 +87,10 @@ DOES = frozenset(each.name for each in fields(Trouble)) - {"down"}
 
 
 def setting_of(marks: Iterable[Mapping[str, Any]]) -> Setting:
-    """Return the setting that several marks describe together, of which a later one has the last word; params add up.
+    """Return the setting that several marks describe together, where a later one overrides; params add up.
 
     Raises:
-        SettingError: One says what a flight has not, or says it wrongly.
+        SettingError: One has a key that no setting has, or a wrong value.
     """
     values: dict[str, Any] = {}
     params: dict[str, float] = {}
