@@ -47,7 +47,7 @@ class Station(Inbox):
     """A component on a link of its own; what it has received is in `Inbox`.
 
     What it sends goes out with the next frame; what waits for an answer lets simulated time go on, and repeats the
-    request every half second until the answer comes.
+    request every half second until the answer comes. Its methods are the vocabulary of tests.
 
     Attributes:
         system, component: Its ids.

@@ -24,7 +24,7 @@ _SLOW_M_S = 0.3
 
 
 class View:
-    """What can be read of a vehicle in flight.
+    """What can be read of a vehicle in flight: a property each, which is why they are many.
 
     Positions and velocities are true, ENU, m and m/s; the origin is where the vehicle stood, or what `home` says.
 

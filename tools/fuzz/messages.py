@@ -63,7 +63,7 @@ class Messages:
 
     Attributes:
         chance: Where all chance comes from.
-        parameters: Names that are in use, for who asks for parameters.
+        parameters: Names that are in use, for requests of parameters.
         commands: Commands that the vehicle knows.
     """
 

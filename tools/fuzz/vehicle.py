@@ -44,7 +44,7 @@ class BrokenError(AssertionError):
 
 
 class Shooter(Client):
-    """Hears nothing but acknowledgements: all the telemetry that was asked for would take the time."""
+    """Receives nothing but acknowledgements: decoding all requested telemetry would take too long."""
 
     def receive(self, datagram: bytes) -> None:
         """Decode the COMMAND_ACKs of a datagram of whole frames."""
@@ -95,16 +95,16 @@ class Target:
         for place, shooter in enumerate(self._shooters):
             commands, self._unanswered[place] = self._unanswered[place], []
             self._check_answers(commands, shooter.acks)
-        _must(not self.flight.client.acks, "an acknowledgement went to who had asked for nothing")
+        _must(not self.flight.client.acks, "an acknowledgement went to a station without a request")
         check(self.flight)
         if self.flight.copter.stations.restart:
             self.flight.restart()
 
     def _check_answers(self, commands: list[Sent], acks: list[Any]) -> None:
         """Every command is acknowledged once, to who sent it, and only what can be meant is accepted."""
-        asked_for = [(one.fields["command"], *one.source) for one in commands]
+        requested = [(one.fields["command"], *one.source) for one in commands]
         answered = [(ack.command, ack.target_system, ack.target_component) for ack in acks]
-        _must(asked_for == answered, f"asked {asked_for}, answered {answered}")
+        _must(requested == answered, f"requested {requested}, answered {answered}")
         for one, ack in zip(commands, acks, strict=True):
             if ack.result == ACCEPTED:
                 self.accepted[ack.command] += 1

@@ -61,7 +61,7 @@ def in_the_air(height_m: float = 5.0, **settings: Any) -> "CopterFlight":
 
 
 class CopterFlight(Stepped, Steered):
-    """A vehicle and its surroundings, with the words of fixture `sitl`; what commands it returns the MAV_RESULT.
+    """A vehicle and its surroundings, with the vocabulary of fixture `sitl`; commands return the MAV_RESULT.
 
     Attributes:
         system: The vehicle's system id.

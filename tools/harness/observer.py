@@ -60,7 +60,7 @@ class Sight(NamedTuple):
 
 
 class Observer(OnPort):
-    """Records what a vehicle sends to a port of this computer."""
+    """Records what a vehicle sends to a port of this computer; its methods are the vocabulary of tests."""
 
     def __init__(self) -> None:
         """Listen on any free port."""

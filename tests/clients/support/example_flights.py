@@ -91,7 +91,7 @@ def do_orbit(evidence: Evidence) -> None:
 
 
 def mission(evidence: Evidence) -> None:
-    """Past the three places within the 3 m that MAVSDK asks for, 25 m high, at most 10 m/s fast; then home."""
+    """Past the three places within the 3 m that MAVSDK requires, 25 m high, at most 10 m/s fast; then home."""
     lands(evidence, HOME)
     for latitude, longitude in (*IRCHEL, IRCHEL_LAST):
         assert closest_m(evidence.seen.sights, place(latitude, longitude, 25.0)) < 3.0
@@ -101,7 +101,7 @@ def mission(evidence: Evidence) -> None:
 
 
 def offboard_position_ned(evidence: Evidence) -> None:
-    """At each of the setpoints, facing as asked, and on the ground at the last."""
+    """At each of the setpoints, facing as commanded, and on the ground at the last."""
     sights = evidence.seen.in_mode(Mode.OFFBOARD)
     for where, heading in (((0.0, 0.0, 5.0), 0.0), ((0.0, 5.0, 5.0), 90.0), ((10.0, 5.0, 5.0), 90.0)):
         assert any(away_m(s, where) < 0.2 and _off_deg(s, heading) < 2.0 for s in sights), where
@@ -109,9 +109,9 @@ def offboard_position_ned(evidence: Evidence) -> None:
 
 
 def offboard_velocity_ned(evidence: Evidence) -> None:
-    """Each of the velocities, facing as asked: within 3 degrees after 4 s, and 10 where the script leaves it 2."""
+    """Each of the velocities, facing as commanded: within 3 degrees after 4 s, and 10 where the script leaves it 2."""
     sights = evidence.seen.in_mode(Mode.OFFBOARD)
-    asked: tuple[tuple[Vector, float, float], ...] = (
+    demanded: tuple[tuple[Vector, float, float], ...] = (
         ((0.0, 0.0, 2.0), 0.0, 3.0),
         ((0.0, 2.0, 0.0), 90.0, 3.0),
         ((0.0, -2.0, 0.0), -90.0, 3.0),
@@ -120,7 +120,7 @@ def offboard_velocity_ned(evidence: Evidence) -> None:
         ((0.0, 0.0, 0.0), 180.0, 10.0),  # a quarter turn at no more than 60 degrees a second
         ((0.0, 0.0, -1.0), 0.0, 3.0),
     )
-    for velocity, heading, off in asked:
+    for velocity, heading, off in demanded:
         assert any(_off_m_s(s, velocity) < 0.2 and _off_deg(s, heading) < off for s in sights), (velocity, heading)
 
 
@@ -173,7 +173,7 @@ def manual_control(evidence: Evidence) -> None:
 
 
 def follow_me(evidence: Evidence) -> None:
-    """Flies to where it is told that the target is, 2 m from it; then lands."""
+    """Flies to the reported position of the target, 2 m from it; then lands."""
     lands(evidence)
     sights = evidence.seen.in_mode(Mode.FOLLOW)
     latitude, longitude = IRCHEL[0]

@@ -18,7 +18,7 @@ def place(latitude_deg: float, longitude_deg: float, height_m: float) -> Vector:
 
 def away_m(sight: Sight, where: Vector) -> float:
     """Return how far the vehicle is from a place."""
-    return hypot(*(seen - asked for seen, asked in zip(sight.position_enu_m, where, strict=True)))
+    return hypot(*(seen - wanted for seen, wanted in zip(sight.position_enu_m, where, strict=True)))
 
 
 def closest_m(sights: Sequence[Sight], where: Vector) -> float:

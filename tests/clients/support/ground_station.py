@@ -1,4 +1,4 @@
-"""A ground station of pymavlink alone, none of our code between it and the vehicle: asks, commands, listens."""
+"""A ground station of pymavlink alone, none of our code between it and the vehicle."""
 
 import socket
 from collections import deque
@@ -141,12 +141,12 @@ class GroundStation:
 
     def ask(self, number: int, name: str, p2: float = 0.0) -> Message:
         """Ask for message `number` as QGroundControl does; return it, the acknowledgement having come first."""
-        asked = mavlink2.MAV_CMD_REQUEST_MESSAGE
-        self.mav.command_long_send(1, 1, asked, 0, number, p2, 0, 0, 0, 0, 0)
+        request = mavlink2.MAV_CMD_REQUEST_MESSAGE
+        self.mav.command_long_send(1, 1, request, 0, number, p2, 0, 0, 0, 0, 0)
         before = len(self.heard)
         self.wait(name)
-        acks = [m for m in self.heard[before:] if m.get_type() == "COMMAND_ACK" and m.command == asked]
-        result = acks[0].result if acks else self._acknowledged(asked, 1)
+        acks = [m for m in self.heard[before:] if m.get_type() == "COMMAND_ACK" and m.command == request]
+        result = acks[0].result if acks else self._acknowledged(request, 1)
         assert result == mavlink2.MAV_RESULT_ACCEPTED
         return next(message for message in self.heard[before:] if message.get_type() == name)
 

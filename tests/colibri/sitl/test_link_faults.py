@@ -163,16 +163,16 @@ def process_of(sitl: Sitl, package: str) -> int:
     return sitl.processes[package]
 
 
-def test_turns_come_whole_in_whatever_order() -> None:
+def test_step_messages_come_whole_in_any_order() -> None:
     chance = Random(1)
     parcels = [Parcel(number, chance.randbytes(chance.randrange(1400))) for number in range(20)]
     step_message = StepMessage(12_345_678, parcels, custom_mode=4 << 16, armed=True)
     pieces = packets(step_message)
     assert len(pieces) > 2
     gathering = Gathering()
-    told = [gathering.take(piece) for piece in reversed(pieces)]
-    assert told[:-1] == [None] * (len(pieces) - 1)
-    assert told[-1] == step_message
+    gathered = [gathering.take(piece) for piece in reversed(pieces)]
+    assert gathered[:-1] == [None] * (len(pieces) - 1)
+    assert gathered[-1] == step_message
 
 
 def test_a_link_is_as_bad_as_it_is_said_to_be() -> None:

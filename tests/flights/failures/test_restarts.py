@@ -54,7 +54,7 @@ def test_a_mission_goes_on_as_if_nothing_had_happened() -> None:
     wanted, flight = flown(killed=False), flown(killed=True)
     assert len(restarts) > 15
     assert reached(flight) == reached(wanted)
-    assert max(map(dist, *paths)) < 0.6  # the circle is joined where it is nearest, which the restart finds anew
+    assert max(map(dist, *paths)) < 0.6  # the circle is joined where it is nearest, which the restart finds again
     assert flight.client.said("restarted in flight: mission goes on at item 3")
     assert flight.client.said("restarted in flight: return goes on")
     assert flight.copter.power.charge_ah == pytest.approx(wanted.copter.power.charge_ah, rel=0.01)

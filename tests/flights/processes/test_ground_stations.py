@@ -1,4 +1,4 @@
-"""`colibri fly` watched and asked by ground stations: the same flight, bit for bit."""
+"""`colibri fly` watched by ground stations that send requests: the same flight, bit for bit."""
 
 import subprocess
 import sys
@@ -27,12 +27,12 @@ WATCHED = ("HEARTBEAT", "ATTITUDE", "LOCAL_POSITION_NED", "ODOMETRY", "AUTOPILOT
     ],
 )
 def test_a_watched_flight_is_the_same_bit_for_bit(tmp_path: Path, track: str, profile: str) -> None:
-    asked = ("--profile", profile, *DURATION)
-    alone = fly(tmp_path / "alone", track, "--link", "memory", *asked)
+    options = ("--profile", profile, *DURATION)
+    alone = fly(tmp_path / "alone", track, "--link", "memory", *options)
     stations = Station(255, every=2), Station(245, every=2)
     with OnPort(stations[0]) as one, OnPort(stations[1]) as other:
         links = ("--gcs", one.url, "--gcs", other.url, "--speed", "3")
-        watched = fly(tmp_path / "watched", track, *links, *asked)
+        watched = fly(tmp_path / "watched", track, *links, *options)
     for station in stations:
         assert not [name for name in WATCHED if not station.counts[name]], station.counts
         assert {ack.target for ack in station.acks} == {station.identity}

@@ -1,4 +1,4 @@
-"""Flights on what sensors tell: the same over every link, another with every seed, and on the track."""
+"""Flights on sensors: the same over every link, another with every seed, and on the track."""
 
 from collections import Counter
 from pathlib import Path

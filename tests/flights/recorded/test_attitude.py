@@ -1,4 +1,4 @@
-"""Attitude and body rates demanded of profile `flight`: hover, then what a client or a pilot asks for.
+"""Attitude and body rates demanded of profile `flight`: hover, then what a client or a pilot demands.
 
 Plant and control law in one process, the state through the codec, with rotor lag, drag and battery.
 """
@@ -36,7 +36,7 @@ FRAME_US = 4_000
 T, PHI, THETA, PSI, Z, FALLBACK = range(6)
 
 
-def told(world: World, codec: Codec) -> StateFrame:
+def received(world: World, codec: Codec) -> StateFrame:
     """Return a frame as the autopilot gets it: in single precision."""
     attitude, position = codec.decode(b"".join(encode_state(codec, state_frame(world))))
     frame = decode_state(attitude, position)
@@ -47,7 +47,7 @@ def told(world: World, codec: Codec) -> StateFrame:
 def fly(
     wish_at: Callable[[float], AttitudeCommand], duration_s: float, start: Start = HOVER, law: str = "lpv-mpc"
 ) -> Array:
-    """Fly what is asked for at each time, s; return time, phi, theta, psi (degrees), height, fallback a sample."""
+    """Fly what is demanded at each time, s; return time, phi, theta, psi (degrees), height, fallback a sample."""
     controller: Any = load_controller(law)(PROFILE.table(law), VEHICLE, lambda: 0.0)
     assert isinstance(controller, AttitudeController)
     generator = AttitudeReference(VEHICLE, controller.preview)
@@ -55,7 +55,7 @@ def fly(
     world, memory, reference = starting_world(start, VEHICLE), controller.initial(VEHICLE.hover_speed), None
     yaw, rows = 0.0, []
     while world.time_us < duration_s * 1e6:
-        frame = told(world, codec)
+        frame = received(world, codec)
         phi, theta, psi = euler_from_quaternion(frame.attitude)
         yaw = nearest_turn(psi, yaw)
         state = VehicleState(

@@ -1,4 +1,4 @@
-"""What the sensors told in a flight, fed to an estimator again: the same states."""
+"""The sensor frames of a flight, fed to an estimator again: the same states."""
 
 import gzip
 from pathlib import Path
@@ -39,9 +39,9 @@ def logged(path: Path) -> Array:
 def test_a_flight_replays_bit_for_bit(tmp_path: Path) -> None:
     fly(tmp_path, "spiral", "--feedback", "sensors", "--seed", "3", "--duration", "8", "--link", "memory")
     again = replayed((tmp_path / "flight.tlog").read_bytes())
-    told = logged(tmp_path / "estimate.csv")
-    assert len(told) > 500
-    for row in told:
+    logged_rows = logged(tmp_path / "estimate.csv")
+    assert len(logged_rows) > 500
+    for row in logged_rows:
         assert again[round(row[0] * 1e6)] == tuple(row[STATE_COLUMNS])
 
 

@@ -100,8 +100,8 @@ def test_the_same_seed_is_the_same_weather_over_every_link(tmp_path: Path) -> No
     assert reports["udp"]["trajectory_sha256"] == reports["memory"]["trajectory_sha256"]
     assert reports["other"]["trajectory_sha256"] != reports["memory"]["trajectory_sha256"]
     assert (tmp_path / "udp" / "plant.csv").read_bytes() == (tmp_path / "memory" / "plant.csv").read_bytes()
-    told = [reports["udp"][key] for key in ("wind", "gusts", "turbulence")]
-    assert told == ["8.0@270.0", ["6.0@0.0:start=1.0,duration=1.0"], "moderate"]
+    reported = [reports["udp"][key] for key in ("wind", "gusts", "turbulence")]
+    assert reported == ["8.0@270.0", ["6.0@0.0:start=1.0,duration=1.0"], "moderate"]
 
 
 def test_the_log_of_the_plant_ends_with_battery_and_wind(tmp_path: Path) -> None:

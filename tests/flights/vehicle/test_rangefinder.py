@@ -41,9 +41,9 @@ def test_ground_stations_are_told_what_it_measures() -> None:
     for name in ("DISTANCE_SENSOR", "SYS_STATUS"):
         assert flight.command(mav.MAV_CMD_REQUEST_MESSAGE, float(getattr(mav, f"MAVLINK_MSG_ID_{name}"))) == ACCEPTED
     flight.run(0.1)
-    told, status = (flight.client.latest(name) for name in ("DISTANCE_SENSOR", "SYS_STATUS"))
-    assert told.current_distance == pytest.approx(100.0 * HEIGHT_M + 12.0, abs=12.0)
-    assert (told.min_distance, told.max_distance, told.signal_quality) == (5, 4000, 100)
+    reading, status = (flight.client.latest(name) for name in ("DISTANCE_SENSOR", "SYS_STATUS"))
+    assert reading.current_distance == pytest.approx(100.0 * HEIGHT_M + 12.0, abs=12.0)
+    assert (reading.min_distance, reading.max_distance, reading.signal_quality) == (5, 4000, 100)
     assert status.onboard_control_sensors_health & mav.MAV_SYS_STATUS_SENSOR_LASER_POSITION
 
 

@@ -1,4 +1,4 @@
-"""What a vehicle in the air does when it is told to: go there, go round, go faster; and what it will not do."""
+"""Commands to a vehicle in the air: reposition, orbit, speed; and which it refuses."""
 
 from math import atan2, dist, hypot, inf, isfinite, nan, pi, remainder, tau
 from typing import Any
@@ -214,8 +214,8 @@ def test_home_and_origin() -> None:
     assert flight.command_int(home, 0.0, 0.0, 0.0, 0.0, frame=RELATIVE, x=x, y=y, z=above_sea) == ACCEPTED
     assert flight.copter.pilot.home.position_enu_m == pytest.approx((1.0, -2.0, 0.5), abs=0.02)
     flight.run(1.1)
-    told = flight.client.latest("HOME_POSITION")
-    assert (told.latitude, told.longitude) == pytest.approx((x, y), abs=2)
+    reported = flight.client.latest("HOME_POSITION")
+    assert (reported.latitude, reported.longitude) == pytest.approx((x, y), abs=2)
     for bad_x, bad_y, z in ((950000000, y, 500.0), (x, y, nan), (0, 0, 500.0), (NOT_GIVEN, NOT_GIVEN, 500.0)):
         assert flight.command_int(home, 0.0, 0.0, 0.0, 0.0, frame=RELATIVE, x=bad_x, y=bad_y, z=z) == DENIED
     assert flight.command(home, 2.0) == DENIED
@@ -232,8 +232,8 @@ def test_the_origin_is_set_on_the_ground_and_told_to_the_digit() -> None:
     flight = CopterFlight()
     flight.send("SET_GPS_GLOBAL_ORIGIN", SYSTEM, 473000001, -85000003, 500004)
     flight.run(0.05)
-    told = flight.client.latest("GPS_GLOBAL_ORIGIN")
-    assert (told.latitude, told.longitude, told.altitude) == (473000001, -85000003, 500004)
+    reported = flight.client.latest("GPS_GLOBAL_ORIGIN")
+    assert (reported.latitude, reported.longitude, reported.altitude) == (473000001, -85000003, 500004)
     assert flight.copter.pilot.home.origin == pytest.approx(Geodetic(47.3000001, -8.5000003, 500.004))
     origin = mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN
     assert flight.command_int(origin, frame=GLOBAL) == DENIED

@@ -37,11 +37,7 @@ from tests.scenarios.words.steps import (
 )
 
 PLACE = (0.0, 0.0, 5.0)
-INJECT: int = mav.MAV_CMD_INJECT_FAILURE
-GPS_OFF = (float(mav.FAILURE_UNIT_SENSOR_GPS), float(mav.FAILURE_TYPE_OFF))
-MOTOR_OFF = (float(mav.FAILURE_UNIT_SYSTEM_MOTOR), float(mav.FAILURE_TYPE_OFF), 1.0)
 IN_THE_AIR = {"airborne": 5.0}
-ON_SENSORS = {"feedback": "sensors"}
 
 
 def charge_is(state: int) -> Step:

@@ -21,8 +21,8 @@ class Scenario:
 
     Attributes:
         name: What it shows, in words joined by hyphens.
-        peer: What a peer's suite asks for, and whose; or "ours".
-        holds: What is asked for here.
+        peer: What a peer's suite requires, and whose; or "ours".
+        holds: What is required here.
         steps: What is done, in order.
         setting: What the flight begins with, as mark `sitl` has it.
         seeds: One flight for each; none: seed 0.
@@ -44,8 +44,8 @@ class FleetScenario:
 
     Attributes:
         name: What it shows.
-        peer: What a peer's suite asks for, and whose; or "ours".
-        holds: What is asked for here.
+        peer: What a peer's suite requires, and whose; or "ours".
+        holds: What is required here.
         count: How many vehicles.
         fly: Flies them.
         setting: What each flight begins with.
