@@ -135,44 +135,6 @@ def reading_of(data: bytes) -> Reading:
     return Reading(len(data), lambda offset, count: data[offset : offset + count])
 
 
-class ReadOnly:
-    """Files that can be looked at."""
-
-    def __init__(self, files: Files) -> None:
-        """Show `files`."""
-        self._files = files
-
-    def list(self, names: Names) -> list[Entry] | FileRefusal:
-        """Return what a folder holds, by name."""
-        return self._files.list(names)
-
-    def open(self, names: Names) -> Reading | FileRefusal:
-        """Open a file to read it."""
-        return self._files.open(names)
-
-    def create(self, names: Names) -> FileRefusal:
-        """Refuse."""
-        del names
-        return FileRefusal.PROTECTED
-
-    def write(self, names: Names, offset: int, data: bytes) -> FileRefusal:
-        """Refuse."""
-        del names, offset, data
-        return FileRefusal.PROTECTED
-
-    def truncate(self, names: Names, size: int) -> FileRefusal:
-        """Refuse."""
-        del names, size
-        return FileRefusal.PROTECTED
-
-    def rename(self, old: Names, new: Names) -> FileRefusal:
-        """Refuse."""
-        del old, new
-        return FileRefusal.PROTECTED
-
-    remove = make_folder = remove_folder = create
-
-
 Generator: TypeAlias = Callable[[str], bytes]
 """Makes the content of a file; it is given what stands behind the name's question mark: "withdefaults=1"."""
 
@@ -230,31 +192,19 @@ class Tree:
 
     def create(self, names: Names) -> FileRefusal | None:
         """Make an empty file; one that exists is emptied."""
-        if self._is_fixed(names):
-            return FileRefusal.PROTECTED
-        files, rest = self._at(names)
-        return files.create(rest)
+        return self._change(names, lambda files, rest: files.create(rest))
 
     def write(self, names: Names, offset: int, data: bytes) -> FileRefusal | None:
         """Put `data` into a file; a gap before it is zeros."""
-        if self._is_fixed(names):
-            return FileRefusal.PROTECTED
-        files, rest = self._at(names)
-        return files.write(rest, offset, data)
+        return self._change(names, lambda files, rest: files.write(rest, offset, data))
 
     def truncate(self, names: Names, size: int) -> FileRefusal | None:
         """Keep the first `size` bytes of a file; nothing where it has fewer."""
-        if self._is_fixed(names):
-            return FileRefusal.PROTECTED
-        files, rest = self._at(names)
-        return files.truncate(rest, size)
+        return self._change(names, lambda files, rest: files.truncate(rest, size))
 
     def remove(self, names: Names) -> FileRefusal | None:
         """Remove a file."""
-        if self._is_fixed(names):
-            return FileRefusal.PROTECTED
-        files, rest = self._at(names)
-        return files.remove(rest)
+        return self._change(names, lambda files, rest: files.remove(rest))
 
     def rename(self, old: Names, new: Names) -> FileRefusal | None:
         """Give a file or folder another place, where nothing is yet, in the same mount."""
@@ -275,10 +225,11 @@ class Tree:
 
     def remove_folder(self, names: Names) -> FileRefusal | None:
         """Remove an empty folder."""
-        if self._is_fixed(names):
-            return FileRefusal.PROTECTED
-        files, rest = self._at(names)
-        return files.remove_folder(rest)
+        return self._change(names, lambda files, rest: files.remove_folder(rest))
+
+    def _change(self, names: Names, change: Callable[[Files, Names], FileRefusal | None]) -> FileRefusal | None:
+        """Change what `names` name, unless it is part of the composition."""
+        return FileRefusal.PROTECTED if self._is_fixed(names) else change(*self._at(names))
 
     def _is_fixed(self, names: Names) -> bool:
         fixed = (self._generated, self._mounts, self._folders, self._aliases)

@@ -64,6 +64,32 @@ class GroundLink(Protocol):
         ...
 
 
+class Endpoint:
+    """What every link keeps besides its socket.
+
+    Attributes:
+        url: The URL of the endpoint, with its actual port.
+        target: The address that it calls; None where it waits for others.
+    """
+
+    def __init__(self, url: str, target: Address | None) -> None:
+        """Begin without connections."""
+        self.url = url
+        self.target = target
+        self._opened: list[Address] = []
+        self._closed: list[Address] = []
+
+    def take_opened(self) -> list[Address]:
+        """Return the addresses connected since the last call: some clients send nothing before they receive."""
+        opened, self._opened = self._opened, []
+        return opened
+
+    def take_closed(self) -> list[Address]:
+        """Return the addresses whose connections have ended since the last call; none over UDP."""
+        closed, self._closed = self._closed, []
+        return closed
+
+
 class BlockingReceiver:
     """A link of any kind, used as `UdpLink` is: what has come is handed out one by one.
 

@@ -8,6 +8,7 @@ import socket
 from time import perf_counter
 
 from colibri.common.types import Address
+from colibri.mavlink.links.link import Endpoint
 from colibri.mavlink.wire.framing import Framer
 
 OUTPUT_BYTES = 1 << 18
@@ -26,7 +27,6 @@ class Connection:
     Attributes:
         address: The other end.
         alive: False once the other end is gone.
-        dropped: Datagrams not sent because the other end reads too slowly.
     """
 
     def __init__(self, sock: socket.socket, address: Address) -> None:
@@ -38,12 +38,10 @@ class Connection:
         self._pending = bytearray()
         self.address = address
         self.alive = True
-        self.dropped = 0
 
     def send(self, datagram: bytes) -> None:
         """Send whole frames; drop them if too much is waiting already."""
         if len(self._pending) + len(datagram) > OUTPUT_BYTES:
-            self.dropped += 1
             return
         self._pending += datagram
         self.flush()
@@ -85,23 +83,15 @@ class Connection:
         self._socket.close()
 
 
-class TcpServer:
-    """Waits for clients, of which it has several.
-
-    Attributes:
-        url: The URL of the endpoint, with the port that it really has.
-        target: None: a server calls nobody.
-    """
+class TcpServer(Endpoint):
+    """Waits for clients, of which it has several."""
 
     def __init__(self, sock: socket.socket, url: str) -> None:
         """Take over a listening socket."""
+        super().__init__(url, None)
         sock.setblocking(False)
         self._socket = sock
         self._connections: dict[Address, Connection] = {}
-        self._opened: list[Address] = []
-        self._closed: list[Address] = []
-        self.url = url
-        self.target: Address | None = None
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
         """Send whole frames to the client at `address`, or to all; nothing if there is none."""
@@ -125,16 +115,6 @@ class TcpServer:
         """Sleep until somebody has come, gone or sent something, but no longer than `timeout_s`."""
         sockets = [self._socket.fileno(), *(connection.fileno() for connection in self._connections.values())]
         select.select(sockets, [], [], timeout_s)
-
-    def take_opened(self) -> list[Address]:
-        """Return the clients that have come since last asked: some say nothing before they hear something."""
-        opened, self._opened = self._opened, []
-        return opened
-
-    def take_closed(self) -> list[Address]:
-        """Return the clients that have gone since last asked."""
-        closed, self._closed = self._closed, []
-        return closed
 
     def close(self) -> None:
         """Close every connection and stop waiting."""
@@ -162,23 +142,17 @@ class TcpServer:
             self._closed.append(address)
 
 
-class TcpClient:
-    """Calls a server, and again `RECONNECT_AFTER_S` later if that failed or the connection ended.
+class TcpClient(Endpoint):
+    """Calls a server, and again `RECONNECT_AFTER_S` later if that failed or the connection ended."""
 
-    Attributes:
-        url: The URL of the endpoint.
-        target: The server.
-    """
+    target: Address
 
     def __init__(self, url: str, target: Address) -> None:
         """Call `target` at once, and wait for nothing."""
+        super().__init__(url, target)
         self._socket: socket.socket | None = None
         self._connection: Connection | None = None
         self._call_again_s = 0.0
-        self._opened: list[Address] = []
-        self._closed: list[Address] = []
-        self.url = url
-        self.target: Address = target
         self._call()
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
@@ -203,16 +177,6 @@ class TcpClient:
             select.select([self._connection], [], [], timeout_s)
         else:
             select.select([], [] if self._socket is None else [self._socket], [], min(timeout_s, RECONNECT_AFTER_S))
-
-    def take_opened(self) -> list[Address]:
-        """Return the server if it has answered a call since last asked."""
-        opened, self._opened = self._opened, []
-        return opened
-
-    def take_closed(self) -> list[Address]:
-        """Return the server if a connection to it has ended since last asked."""
-        closed, self._closed = self._closed, []
-        return closed
 
     def close(self) -> None:
         """Close the connection and call no more."""

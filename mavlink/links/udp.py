@@ -5,31 +5,28 @@ from select import select
 from time import perf_counter
 
 from colibri.common.types import Address
-from colibri.mavlink.links.link import SPIN_S, LinkError, give_way
+from colibri.mavlink.links.link import SPIN_S, Endpoint, LinkError, give_way
 
 _MAX_DATAGRAM_BYTES = 4096
 _DATAGRAMS_AT_ONCE = 64
 """So that whoever sends without a pause cannot hold the process up."""
 
 
-class UdpLink:
-    """A UDP socket that never blocks for longer than it is told.
+class UdpLink(Endpoint):
+    """A UDP socket that blocks for no longer than the time given.
 
     Attributes:
-        url: The URL of the endpoint, with the port that it really has.
-        target: Whom it speaks with; None for whoever sends.
-        spin_s: How long to look for a datagram before going to sleep.
+        spin_s: How long to poll for a datagram before sleeping.
     """
 
     def __init__(self, sock: socket.socket, url: str, target: Address | None) -> None:
-        """Wrap a bound socket; with a `target`, hear nobody else."""
+        """Wrap a bound socket; with a `target`, drop datagrams from other addresses."""
+        super().__init__(url, target)
         sock.setblocking(False)
         self._socket = sock
-        self.target = target
         self.spin_s = SPIN_S
         self._waited_s = 0.0
         self._opened = [] if target is None else [target]
-        self.url = url
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
         """Send to `address`, or to the target. What the network will not take now is lost, as UDP may lose it.
@@ -81,15 +78,6 @@ class UdpLink:
     def wait(self, timeout_s: float) -> None:
         """Sleep until a datagram has come, but no longer than `timeout_s`."""
         select([self._socket], [], [], timeout_s)
-
-    def take_opened(self) -> list[Address]:
-        """Return the target, once."""
-        opened, self._opened = self._opened, []
-        return opened
-
-    def take_closed(self) -> list[Address]:
-        """Return nobody: UDP has no connections."""
-        return []
 
     def close(self) -> None:
         """Close the socket."""

@@ -1,13 +1,17 @@
-"""Who is obeyed where several clients stream the same kind of order.
+"""Services of streamed setpoints, and which client they obey where several stream the same kind.
 
-The first that streams is, until it has been silent for a time-out; then whoever streams next. A client that claims the
-vehicle, by engaging the mode that its stream is for, is from then on, if it streams. A client is a channel, a
-system and a component: two programs with the same ids on two links are two.
+The first client that streams is obeyed until it has been silent for a time-out; then the next one that streams. One
+that engages the mode which its stream is for is obeyed from then on, if it streams. A client is a channel, a system and
+a component: two programs with the same ids on two links are two.
 """
 
-from typing import Generic, NamedTuple, TypeVar
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Iterable
+from typing import Generic, TypeVar
 
-from colibri.mavlink.node.service import Peer
+from colibri.mavlink.node.service import Peer, Send
+from colibri.mavlink.wire.dialect import Message
 
 SILENT_AFTER_US = 500_000
 """A stream without a valid message for longer than this has ended; MAVLink asks clients for 2 Hz at least."""
@@ -16,58 +20,76 @@ MAX_CLIENTS = 16
 Value = TypeVar("Value")
 
 
-class Heard(NamedTuple, Generic[Value]):
-    """The latest of a stream."""
-
-    value: Value
-    time_us: int
+class Refused(Exception):  # noqa: N818 (what happened to a setpoint, not an error of this program)
+    """A setpoint that is not flown; its text is the reason it is counted under."""
 
 
-class Streams(Generic[Value]):
-    """The latest value of each client, and who of them is obeyed.
+class StreamedService(ABC, Generic[Value]):
+    """A service that keeps the latest setpoint of each client, and never answers.
 
     Attributes:
-        source: The client that is obeyed; None before the first.
+        handles: Names of the messages that carry the setpoints.
+        dropped: Number of messages that were not used, by reason.
+        source: The client that is obeyed; None before the first setpoint.
     """
 
-    def __init__(self, silent_after_us: int = SILENT_AFTER_US) -> None:
-        """Nobody streams yet; a stream has ended after `silent_after_us`."""
-        self._silent_after_us = silent_after_us
-        self.source: Peer | None = None
-        self._heard: dict[Peer, Heard[Value]] = {}
+    handles: frozenset[str]
 
-    def hear(self, peer: Peer, value: Value, now_us: int) -> bool:
-        """Take in a valid value; return whether it is from the client that is obeyed."""
-        if peer not in self._heard and len(self._heard) >= MAX_CLIENTS:
-            self._forget_silent(now_us)
-            if len(self._heard) >= MAX_CLIENTS:
+    def __init__(self, silent_after_us: int = SILENT_AFTER_US) -> None:
+        """Begin without clients; a stream ends `silent_after_us` after its last valid message."""
+        self.dropped: Counter[str] = Counter()
+        self.source: Peer | None = None
+        self._silent_after_us = silent_after_us
+        self._received: dict[Peer, tuple[int, Value]] = {}
+
+    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
+        """Keep a setpoint, or count why it is dropped."""
+        try:
+            value = self._decode(message, peer, now_us)
+        except Refused as refused:
+            self.dropped[str(refused)] += 1
+            return ()
+        if value is not None and not self._keep(peer, value, now_us):
+            self.dropped["another client"] += 1
+        return ()
+
+    def poll(self, now_us: int) -> Iterable[Send]:
+        """Nothing is ever due."""
+        del now_us
+        return ()
+
+    def engage(self, peer: Peer, now_us: int) -> None:
+        """Obey `peer`, which has requested the mode, from now on, if it streams."""
+        if self._streams(peer, now_us):
+            self.source = peer
+
+    @abstractmethod
+    def _decode(self, message: Message, peer: Peer, now_us: int) -> Value | None:
+        """Return the setpoint in a message; None where it holds none.
+
+        Raises:
+            Refused: It cannot be flown.
+        """
+
+    def _latest(self, now_us: int, timeout_us: int) -> Value | None:
+        """Return the latest setpoint of the client that is obeyed, if it is no older than `timeout_us`."""
+        return None if self.source is None else self._value(self.source, now_us, timeout_us)
+
+    def _value(self, peer: Peer, now_us: int, timeout_us: int) -> Value | None:
+        """Return the latest setpoint of one client, obeyed or not, if it is no older than `timeout_us`."""
+        time_us, value = self._received.get(peer, (now_us + 1, None))
+        return value if 0 <= now_us - time_us <= timeout_us else None
+
+    def _streams(self, peer: Peer, now_us: int) -> bool:
+        return self._value(peer, now_us, self._silent_after_us) is not None
+
+    def _keep(self, peer: Peer, value: Value, now_us: int) -> bool:
+        """Store a valid setpoint; return whether it is from the client that is obeyed."""
+        if peer not in self._received and len(self._received) >= MAX_CLIENTS:
+            self._received = {it: kept for it, kept in self._received.items() if self._streams(it, now_us)}
+            if len(self._received) >= MAX_CLIENTS:
                 return False
-        self._heard[peer] = Heard(value, now_us)
-        if self.source is None or not self._fresh(self.source, now_us):
+        self._received[peer] = (now_us, value)
+        if self.source is None or not self._streams(self.source, now_us):
             self.source = peer
         return peer == self.source
-
-    def claim(self, peer: Peer, now_us: int) -> None:
-        """Obey `peer` from now on, if it streams."""
-        if self._fresh(peer, now_us):
-            self.source = peer
-
-    def latest(self, now_us: int, timeout_us: int) -> Heard[Value] | None:
-        """Return the latest of the client that is obeyed, if it is no older than `timeout_us`."""
-        heard = None if self.source is None else self._heard.get(self.source)
-        return heard if heard is not None and 0 <= now_us - heard.time_us <= timeout_us else None
-
-    def value(self, peer: Peer, now_us: int) -> Value | None:
-        """Return the latest of one client, obeyed or not, if its stream has not ended."""
-        return self._heard[peer].value if self._fresh(peer, now_us) else None
-
-    def forget(self, peer: Peer) -> None:
-        """Take it that `peer` has ended its stream."""
-        self._heard.pop(peer, None)
-
-    def _fresh(self, peer: Peer, now_us: int) -> bool:
-        heard = self._heard.get(peer)
-        return heard is not None and 0 <= now_us - heard.time_us <= self._silent_after_us
-
-    def _forget_silent(self, now_us: int) -> None:
-        self._heard = {peer: heard for peer, heard in self._heard.items() if self._fresh(peer, now_us)}

@@ -18,6 +18,7 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, enu_of, is_on
 from colibri.common.kernels import cos, sin
 from colibri.common.rotations import nearest_turn
 from colibri.common.types import Quaternion, Vector
+from colibri.mavlink.setpoints.arbitration import Refused
 from colibri.mavlink.setpoints.setpoints import NOWHERE, AttitudeSetpoint, PositionSetpoint, turned
 from colibri.mavlink.telemetry.snapshot import Home
 from colibri.mavlink.wire.dialect import mav
@@ -87,10 +88,6 @@ RELATIVE_FRAMES = frozenset(
         mav.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
     }
 )
-
-
-class Refused(Exception):  # noqa: N818 (what happened to a setpoint, not an error of this program)
-    """A setpoint that is not flown; its text is the reason it is counted under."""
 
 
 class Whereabouts(NamedTuple):

@@ -5,12 +5,10 @@ RC_CHANNELS_OVERRIDE (70). Neither is answered. The signs of the yaw stick are t
 as PX4 and all who fly it have it, though the message's text has counter-clockwise positive. Buttons are not looked at.
 """
 
-from collections import Counter
-from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from colibri.mavlink.node.service import Peer, Send
-from colibri.mavlink.setpoints.arbitration import Streams
+from colibri.mavlink.node.service import Peer
+from colibri.mavlink.setpoints.arbitration import SILENT_AFTER_US, Refused, StreamedService
 from colibri.mavlink.setpoints.setpoints import Sticks
 from colibri.mavlink.wire.dialect import Message
 
@@ -23,11 +21,10 @@ RELEASED, UNCHANGED = 0, 0xFFFF
 MIN_US, MIDDLE_US, MAX_US = 1000, 1500, 2000
 VALID_US = (800, 2200)
 """Transmitters go beyond 1000 and 2000 µs; what lies in here counts as a full stick."""
-ROLL, PITCH, THRUST, YAW = range(4)
-"""The order of the first four channels: aileron, elevator, throttle, rudder."""
 _ALL_RELEASED = (RELEASED, RELEASED, RELEASED, RELEASED)
 
 Channels = tuple[int, int, int, int]
+"""The first four: aileron, elevator, throttle, rudder."""
 
 
 class Controls(NamedTuple):
@@ -37,80 +34,49 @@ class Controls(NamedTuple):
     channels: Channels = _ALL_RELEASED
 
 
-class Manual:
-    """Keeps the latest sticks of the client that is obeyed; see `streams` for which that is.
-
-    Attributes:
-        handles: MANUAL_CONTROL and RC_CHANNELS_OVERRIDE.
-        dropped: Messages that were not taken, by reason.
-    """
+class Manual(StreamedService[Controls]):
+    """Keeps the latest sticks of each client; see `arbitration` for which client is obeyed."""
 
     handles = frozenset({"MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"})
 
     def __init__(self, system_id: int) -> None:
         """Be the vehicle `system_id`."""
-        self.dropped: Counter[str] = Counter()
+        super().__init__()
         self._system_id = system_id
-        self._streams: Streams[Controls] = Streams()
-
-    @property
-    def source(self) -> Peer | None:
-        """The client that is obeyed; None before the first."""
-        return self._streams.source
-
-    def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        """Take in sticks; there is never an answer."""
-        if message.name == "MANUAL_CONTROL":
-            self._hear_sticks(message.fields, peer, now_us)
-        else:
-            self._hear_channels(message.fields, peer, now_us)
-        return ()
-
-    def poll(self, now_us: int) -> Iterable[Send]:
-        """Nothing is ever due."""
-        del now_us
-        return ()
-
-    def engage(self, peer: Peer, now_us: int) -> None:
-        """Obey `peer`, who has just asked for a mode that is flown by hand, rather than another that streams too."""
-        self._streams.claim(peer, now_us)
 
     def latest(self, now_us: int, timeout_us: int) -> Sticks | None:
         """Return the latest sticks of the client that is obeyed, if they are no older than `timeout_us`."""
-        heard = self._streams.latest(now_us, timeout_us)
-        return heard.value.sticks if heard else None
+        controls = self._latest(now_us, timeout_us)
+        return controls.sticks if controls else None
 
-    def _hear_sticks(self, fields: Any, peer: Peer, now_us: int) -> None:
+    def _decode(self, message: Message, peer: Peer, now_us: int) -> Controls | None:
+        if message.name == "RC_CHANNELS_OVERRIDE":
+            return self._decode_channels(message.fields, peer, now_us)
+        fields = message.fields
         if fields.target not in (self._system_id, 0):
-            self.dropped["another vehicle"] += 1
-            return
+            raise Refused("another vehicle")
         axes = (fields.x, fields.y, fields.z, fields.r)
         if not all(axis == UNUSED or -FULL <= axis <= FULL for axis in axes):
-            self.dropped["out of range"] += 1
-            return
+            raise Refused("out of range")
         pitch, roll, yaw = (0.0 if axis == UNUSED else axis / FULL for axis in (fields.x, fields.y, fields.r))
         # "negative values are negative thrust", which no rotor of ours makes
         thrust = 0.5 if fields.z == UNUSED else max(fields.z, 0) / FULL
-        self._keep(peer, Controls(Sticks(pitch, roll, thrust, yaw, now_us)), now_us)
+        return Controls(Sticks(pitch, roll, thrust, yaw, now_us))
 
-    def _hear_channels(self, fields: Any, peer: Peer, now_us: int) -> None:
+    def _decode_channels(self, fields: Any, peer: Peer, now_us: int) -> Controls | None:
         wire = (fields.chan1_raw, fields.chan2_raw, fields.chan3_raw, fields.chan4_raw)
         minimum, maximum = VALID_US
         if not all(value in (RELEASED, UNCHANGED) or minimum <= value <= maximum for value in wire):
-            self.dropped["out of range"] += 1
-            return
-        before = self._streams.value(peer, now_us)
+            raise Refused("out of range")
+        before = self._value(peer, now_us, SILENT_AFTER_US)
         held = before.channels if before else _ALL_RELEASED
         c1, c2, c3, c4 = (old if new == UNCHANGED else new for new, old in zip(wire, held, strict=True))
         channels = (c1, c2, c3, c4)
         if channels != _ALL_RELEASED:
-            self._keep(peer, Controls(sticks_of(channels, now_us), channels), now_us)
-        elif held != _ALL_RELEASED:
-            self._streams.forget(peer)
-
-    def _keep(self, peer: Peer, controls: Controls, now_us: int) -> None:
-        if not self._streams.hear(peer, controls, now_us):
-            self.dropped["another client"] += 1
+            return Controls(sticks_of(channels, now_us), channels)
+        if held != _ALL_RELEASED:
+            del self._received[peer]
+        return None
 
 
 def sticks_of(channels: Channels, now_us: int) -> Sticks:

@@ -4,7 +4,7 @@ import pytest
 
 from colibri.mavlink.files.ftp import Ftp
 from colibri.mavlink.files.memory import Memory
-from colibri.mavlink.files.tree import ReadOnly, Tree
+from colibri.mavlink.files.tree import Tree
 from tests.mavlink.files.ftp_client import Client
 
 TEXT = bytes(range(256)) * 20
@@ -20,7 +20,7 @@ def memory() -> Memory:
 
 @pytest.fixture
 def service(memory: Memory) -> Ftp:
-    return Ftp(Tree(memory, {"logs": ReadOnly(Memory())}, {"@PARAM/param.pck": lambda query: b"Q" + query.encode()}))
+    return Ftp(Tree(memory, {"logs": Memory()}, {"@PARAM/param.pck": lambda query: b"Q" + query.encode()}))
 
 
 @pytest.fixture

@@ -161,7 +161,6 @@ def test_what_is_open_to_read_is_not_written_and_the_reverse(client: Client) -> 
         (Opcode.LIST, b"logs", 0, Error.END_OF_FILE),
         (Opcode.CREATE, b"@PARAM/param.pck", 0, Error.PROTECTED),
         (Opcode.OPEN_TO_WRITE, b"@PARAM/param.pck", 0, Error.PROTECTED),
-        (Opcode.CREATE, b"logs/new", 0, Error.PROTECTED),
         (Opcode.CREATE, b"nope/new", 0, Error.NOT_FOUND),
         (Opcode.CREATE, b"tab\tname", 0, Error.FAIL_ERRNO),
         (Opcode.REMOVE, b"nope", 0, Error.NOT_FOUND),

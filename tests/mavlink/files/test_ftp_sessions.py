@@ -10,7 +10,7 @@ from colibri.mavlink.files import ftp
 from colibri.mavlink.files.ftp import Ftp
 from colibri.mavlink.files.ftp_wire import DATA_BYTES, Error, Opcode
 from colibri.mavlink.files.memory import Memory
-from colibri.mavlink.files.tree import ReadOnly, Tree
+from colibri.mavlink.files.tree import Tree
 from colibri.mavlink.node.service import Peer
 from colibri.mavlink.wire.dialect import Codec
 from tests.mavlink.files.conftest import TEXT
@@ -188,7 +188,7 @@ REQUESTS = st.one_of(
 def test_nothing_that_is_asked_raises(requests: list[tuple[bytes, Peer, int]]) -> None:
     memory = Memory()
     memory.create(("text",))
-    service = Ftp(Tree(memory, {"logs": ReadOnly(Memory())}, {"@PARAM/param.pck": lambda query: query.encode()}))
+    service = Ftp(Tree(memory, {"logs": Memory()}, {"@PARAM/param.pck": lambda query: query.encode()}))
     codec = Codec(255, 190)
     now_us = 0
     for payload, peer, later_us in requests:

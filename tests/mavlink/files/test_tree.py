@@ -17,7 +17,6 @@ from colibri.mavlink.files.tree import (
     Names,
     Quota,
     Reading,
-    ReadOnly,
     Tree,
     can_be_new,
     names_of,
@@ -286,7 +285,7 @@ class TestTree:
     @pytest.fixture
     def tree(self, root: Memory, logs: Memory) -> Tree:
         generated = {"general.json": lambda _: b"{}", "@PARAM/param.pck": lambda query: b"<" + query.encode() + b">"}
-        return Tree(root, {"logs": ReadOnly(logs), "@MAV_LOG": logs}, generated)
+        return Tree(root, {"logs": logs, "@MAV_LOG": logs}, generated)
 
     def test_it_shows_everything(self, tree: Tree) -> None:
         assert tree.list(()) == [
@@ -334,12 +333,6 @@ class TestTree:
         before = tree.list(())
         assert all(isinstance(outcome, FileRefusal) for outcome in changes(tree, names)[:8])
         assert tree.list(()) == before
-
-    def test_a_read_only_mount_is_protected(self, tree: Tree, logs: Memory) -> None:
-        names = ("logs", "1.tlog")
-        assert set(changes(tree, names)[:5]) == {FileRefusal.PROTECTED}
-        assert changes(tree, ("logs", "new"))[6:8] == [FileRefusal.PROTECTED, FileRefusal.PROTECTED]
-        assert content(logs, ("1.tlog",)) == b"log"
 
     def test_mounts_can_be_written_to(self, tree: Tree, root: Memory, logs: Memory) -> None:
         assert tree.remove(("@MAV_LOG", "1.tlog")) is None
