@@ -43,8 +43,6 @@ class FixType(IntEnum):
 
     NO_FIX = 1
     FIX_3D = 3
-    RTK_FLOAT = 5
-    RTK_FIXED = 6
 
 
 @dataclass(frozen=True, slots=True)

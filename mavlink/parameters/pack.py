@@ -7,7 +7,6 @@ from struct import Struct
 
 from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, bits_of
 
-PATH = "@PARAM/param.pck"
 BLOCK_BYTES = 239
 """Of every read that a client makes: no value lies across the border of two."""
 

@@ -55,12 +55,6 @@ class ParameterService:
             return ()
         return [send for channel in tuple(self._listings) for send in self._go_on(channel, now_us)]
 
-    def announce(self, name: str) -> Send:
-        """Tell everybody the value of a parameter that the vehicle changed by itself."""
-        index = self._parameters.index(name)
-        assert index is not None, "the vehicle knows its parameters"
-        return self._value(index)
-
     def _begin_list(self, peer: Peer, now_us: int) -> None:
         """Begin a list. Who asks while one is on its way gets the rest of it, then what went before."""
         listing = self._listings.setdefault(peer.channel, _Listing(0, 0, now_us))

@@ -93,14 +93,6 @@ class HeartbeatService:
         heard = (other.at_us for other in self._heard.values() if other.kind == mav.MAV_TYPE_GCS)
         return max(heard, default=self.expected_us)
 
-    def ground_stations(self, now_us: int, within_us: int) -> list[Heard]:
-        """Return the ground stations (MAV_TYPE_GCS) heard within the last `within_us`."""
-        return [
-            other
-            for other in self._heard.values()
-            if other.kind == mav.MAV_TYPE_GCS and now_us - other.at_us <= within_us
-        ]
-
 
 def _state(s: Snapshot) -> int:
     """MAV_STATE: a flight ended for good, one in distress, one that saves itself, motors that may turn, none of it."""

@@ -16,21 +16,6 @@ POINTS = 5
 FLOATS = 58
 """That DEBUG_FLOAT_ARRAY holds."""
 ARRAY_NAME = b"lpv_mpc"
-ARRAY_HEAD = (
-    "status",
-    "fallback",
-    "iterations",
-    "solve_us",
-    "step_us",
-    "cost",
-    "slack",
-    "active_rotors",
-    "active_increments",
-    "active_angles",
-    "active_rates",
-)
-"""The first floats of DEBUG_FLOAT_ARRAY "lpv_mpc" (id 0); the squared rotor speeds of the plan's steps follow, four a
-step, as parts of the largest. Codes are those of `SolverState`."""
 
 
 def attitude_target(s: Snapshot) -> Fields:
@@ -86,7 +71,12 @@ def trajectory_representation_waypoints(s: Snapshot) -> Fields | None:
 
 
 def debug_float_array(s: Snapshot) -> Fields:
-    """DEBUG_FLOAT_ARRAY (350) "lpv_mpc": laid out as `ARRAY_HEAD` says."""
+    """DEBUG_FLOAT_ARRAY (350) "lpv_mpc", id 0: eleven figures of the solver, then its plan.
+
+    The figures: status, fallback, iterations, solve_us, step_us, cost, slack, and how many bounds are active on rotors,
+    increments, angles, rates (codes are those of `SolverState`). The plan: squared rotor speeds as parts of the
+    largest, four a step.
+    """
     solver = s.solver
     times_us = (1e6 * solver.solve_time_s, 1e6 * solver.step_time_s)
     head = (solver.status, solver.fallback, solver.iterations, *times_us, solver.cost, solver.slack, *solver.active)

@@ -87,6 +87,3 @@ _WITH_CONSTANTS: dict[str, Callable[..., Fields | None]] = {
     "SCALED_IMU": sensors.scaled_imu,
     "RAW_IMU": sensors.raw_imu,
 }
-
-TELEMETRY = telemetry()
-"""With the usual constants."""

@@ -40,7 +40,6 @@ RESULT_UNSUPPORTED: int = mav.MAV_RESULT_UNSUPPORTED
 
 MARKER = 0xFD
 """What a frame of MAVLink 2 begins with."""
-MARKER_V1 = 0xFE
 SIGNED = 0x01
 """The incompatibility flag of a frame that a signature follows, https://mavlink.io/en/guide/serialization.html."""
 SIGNATURE_BYTES: int = mav.MAVLINK_SIGNATURE_BLOCK_LEN

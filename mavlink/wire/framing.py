@@ -10,7 +10,6 @@ _PREFIX_BYTES = 3
 """What tells how long a frame is: marker, payload length, incompatibility flags (of MAVLink 2)."""
 _OTHER_BYTES_V1 = 8
 _OTHER_BYTES = 12
-MAX_FRAME_BYTES = _OTHER_BYTES + 255 + SIGNATURE_BYTES
 
 
 class Framer:
@@ -18,22 +17,17 @@ class Framer:
 
     A frame is one whose CRC holds. Of a message that the dialect has not nobody can know; that is taken for a frame if
     another begins behind it, or nothing has come yet.
-
-    Attributes:
-        skipped: Bytes that belonged to no frame.
     """
 
     def __init__(self) -> None:
         """Begin with nothing."""
         self._rest = b""
-        self.skipped = 0
 
     def take(self, chunk: bytes) -> list[bytes]:
         """Return the frames that are whole with `chunk`; the bytes of a half one wait for the next."""
         frames: list[bytes] = []
         data, at = self._rest + chunk, 0
         while marker := _MARKERS.search(data, at):
-            self.skipped += marker.start() - at
             at = marker.start()
             length = frame_length(data, at)
             if length is None or at + length > len(data):
@@ -44,8 +38,6 @@ class Framer:
                 at += length
             else:
                 at += 1
-                self.skipped += 1
-        self.skipped += len(data) - at
         self._rest = b""
         return frames
 

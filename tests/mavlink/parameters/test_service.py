@@ -257,15 +257,6 @@ def test_a_list_with_loss_is_completed_by_index(seed: int) -> None:
     assert [got[index] for index in range(len(parameters))] == [parameter.name for parameter in parameters]
 
 
-def test_what_the_vehicle_changes_itself_is_told() -> None:
-    parameters = parameters_of()
-    service = ParameterService(parameters)
-    parameters.set("LIMITED", 2)
-    send = service.announce("LIMITED")
-    assert send.channel is None
-    assert as_int(*heard([send])) == 2
-
-
 @given(
     st.sampled_from(["PARAM_SET", "PARAM_REQUEST_READ", "PARAM_REQUEST_LIST"]),
     st.binary(max_size=16),

@@ -9,7 +9,7 @@ from colibri.mavlink.services.identity import GENERIC, PX4, Identity
 from colibri.mavlink.streaming.heartbeat import MAX_HEARD, HeartbeatService
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.wire.dialect import mav
-from tests.mavlink.services.peers import GROUND, OTHER, message, on_the_wire
+from tests.mavlink.services.peers import message, on_the_wire
 
 AT_REST = Snapshot(time_us=0, base_mode=mav.MAV_MODE_FLAG_GUIDED_ENABLED, custom_mode=(4 << 16) | (3 << 24))
 
@@ -77,16 +77,6 @@ def test_a_clock_that_begins_anew_is_no_silence(service: HeartbeatService) -> No
 
 def test_nothing_is_said_before_anything_is_known() -> None:
     assert list(HeartbeatService(PX4).poll(0)) == []
-
-
-def test_ground_stations_are_those_heard_lately(service: HeartbeatService) -> None:
-    hear(service, GROUND, 0)
-    hear(service, OTHER, 4_000_000)
-    hear(service, Peer(3, 1, 158), 5_000_000, mav.MAV_TYPE_CAMERA)
-    heard = service.ground_stations(5_000_000, within_us=2_000_000)
-    assert [(other.peer, other.at_us) for other in heard] == [(OTHER, 4_000_000)]
-    hear(service, GROUND, 6_000_000)
-    assert len(service.ground_stations(6_000_000, within_us=2_000_000)) == 2
 
 
 def test_who_was_heard_has_a_limit(service: HeartbeatService) -> None:

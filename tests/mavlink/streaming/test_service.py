@@ -13,10 +13,9 @@ from colibri.mavlink.services.command import ACCEPTED, DENIED, TEMPORARILY_REJEC
 from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SDK, SILENT
 from colibri.mavlink.streaming.service import MAX_WAITING, StreamService
 from colibri.mavlink.telemetry.snapshot import Snapshot
-from colibri.mavlink.telemetry.table import TELEMETRY
 from colibri.mavlink.wire.dialect import mav
 from tests.mavlink.services.peers import FLOATS, GROUND, NAN, OTHER, PEERS, message, on_the_wire
-from tests.mavlink.telemetry.snapshots import FLYING
+from tests.mavlink.telemetry.snapshots import FLYING, TELEMETRY
 
 FRAME_US = 4_000
 ATTITUDE, HOME, HEARTBEAT = 30, 242, 0

@@ -9,9 +9,10 @@ from colibri.common.earth.geodesy import Geodetic
 from colibri.common.rotations import quaternion_from_euler
 from colibri.mavlink.telemetry.encoder import Encoder
 from colibri.mavlink.telemetry.snapshot import BatteryState, Forecast, Home, Setpoint, Snapshot, SolverState
-from colibri.mavlink.telemetry.table import TELEMETRY
+from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import Codec
 
+TELEMETRY = telemetry()
 ORIGIN = Geodetic(47.0, 8.0, 400.0)
 YAW_NORTH = pi / 2
 
