@@ -62,7 +62,7 @@ def served(plan: FlightPlan, channels: int) -> Figures:
     times_us = []
     with gc_frozen():
         while plant.world.time_us < plan.duration_s * 1e6:
-            plant.answer(copter.step(*plant.tell()).command)
+            plant.answer(copter.step(*plant.measure()).command)
             began_s = perf_counter()
             copter.serve(())
             times_us.append((perf_counter() - began_s) * 1e6)

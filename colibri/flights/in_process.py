@@ -112,7 +112,7 @@ class Direct:
 
     def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and its command as it is."""
-        step = self._autopilot.step(*plant.tell())
+        step = self._autopilot.step(*plant.measure())
         return step, step.command
 
 
@@ -132,7 +132,7 @@ class InMemory:
 
     def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and the command as the plant decoded it."""
-        frame, plant_status = plant.tell()
+        frame, plant_status = plant.measure()
         self._plant_end.offer(frame, _NEVER_LATE_S, plant_status)
         step = self._to_autopilot(frame.time_us)
         command = self._to_plant(frame.time_us)

@@ -55,7 +55,7 @@ class ArduPilotEnd:
         self.steps = 0
         self.restarts = 0
         self.dropped: Counter[str] = Counter()
-        self._heard_s = 0.0
+        self._received_s = 0.0
         self._count: int | None = None
         self._carried = 0
         self._reply = b""
@@ -75,10 +75,10 @@ class ArduPilotEnd:
         if rate_hz < _MIN_RATE_HZ:
             self.dropped["frame rate"] += 1
             return None
-        if sender != self.peer and self.peer is not None and now_s - self._heard_s < PEER_LOST_AFTER_S:
+        if sender != self.peer and self.peer is not None and now_s - self._received_s < PEER_LOST_AFTER_S:
             self.dropped["second autopilot"] += 1
             return None
-        self.peer, self._heard_s = sender, now_s
+        self.peer, self._received_s = sender, now_s
         if count == self._count:
             self.dropped["repeated"] += 1
             return self._reply
@@ -86,7 +86,7 @@ class ArduPilotEnd:
             self._begin_again()
         self._count = count
         self._advance(rate_hz, fields[_ROTORS])
-        self._reply = _told(self.world, self._physics)
+        self._reply = _encode(self.world, self._physics)
         return self._reply
 
     def _begin_again(self) -> None:
@@ -103,10 +103,10 @@ class ArduPilotEnd:
         self.steps += 1
 
 
-def _told(world: World, physics: Physics) -> bytes:
+def _encode(world: World, physics: Physics) -> bytes:
     """Return the JSON of a world. ArduPilot's parser wants no space behind a colon."""
     frame = state_frame(world)
-    told = {
+    values = {
         "timestamp": world.time_us / _SECOND_US,
         "imu": {
             "gyro": frd_from_flu(frame.rate_flu_rad_s),
@@ -116,4 +116,4 @@ def _told(world: World, physics: Physics) -> bytes:
         "quaternion": ned_frd_from_enu_flu(frame.attitude),
         "velocity": ned_from_enu(frame.velocity_enu_m_s),
     }
-    return b"\n" + msgspec.json.encode(told) + b"\n"
+    return b"\n" + msgspec.json.encode(values) + b"\n"

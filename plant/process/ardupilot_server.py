@@ -2,9 +2,10 @@
 
 import argparse
 from time import perf_counter
+from typing import Any
 
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, gc_frozen
+from colibri.common.process.lifecycle import EXIT_INTERRUPTED, Stop, fail
 from colibri.common.process.log_files import CsvLog
 from colibri.common.process.status import Progress, Status
 from colibri.common.types import Address
@@ -15,10 +16,8 @@ from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.ardupilot import ArduPilotEnd
 from colibri.plant.process.logs import TRUTH_COLUMNS, truth_row
 from colibri.plant.process.options import nudged
+from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, closing, report_end
 from colibri.plant.vehicle.description import load_vehicle
-
-_SILENCE_SAID_AFTER_S = 2.0
-_MAX_WAIT_S = 0.1
 
 
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
@@ -36,54 +35,36 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     status.say("frame", text, frame_class=1, frame_type=frame_type, thrust_expo=expo)
     end = ArduPilotEnd(Physics(vehicle, args.integrator, weather), start, motors, vehicle.rotors)
     log = CsvLog(args.out / "plant.csv", TRUTH_COLUMNS) if args.out else None
-    try:
-        with gc_frozen():
-            _serve(end, link, status, stop, log, duration_s=args.duration)
-    except Error as error:
-        fail(str(error), EXIT_FAILED)
-    finally:
-        link.close()
-        if log:
-            log.close()
+    with closing(link, log):
+        _serve(end, link, status, stop, log, duration_s=args.duration)
     return EXIT_INTERRUPTED if stop else 0
 
 
 def _serve(
     end: ArduPilotEnd, link: UdpLink, status: Status, stop: Stop, log: CsvLog | None, *, duration_s: float
 ) -> None:
-    """Answer until the simulated time is over or the process is told to stop."""
-    began_s = heard_s = perf_counter()
-    progress, silence_said, logged = Progress(status), False, None
+    """Answer until the simulated time is over or a signal ends the process."""
+    began_s = perf_counter()
+    silence = Silence(status, SILENT_AFTER_S, "ArduPilot asks again", began_s)
+    progress, logged = Progress(status), None
     while not stop and end.world.time_us < duration_s * 1e6:
-        received = link.receive(_MAX_WAIT_S)
+        received = link.receive(MAX_WAIT_S)
         now_s = perf_counter()
         if received is None:
-            if end.peer and not silence_said and now_s - heard_s > _SILENCE_SAID_AFTER_S:
-                silence_said = True
-                text = f"no request at t = {end.world.time_us / 1e6:.3f} s, waiting for ArduPilot"
-                status.say("silence", text)
+            if end.peer:
+                silence.lasts(now_s, "no request", end.world.time_us, ", waiting for ArduPilot")
             continue
         if end.peer is None:
             began_s = now_s
         if not _answer(end, link, received, now_s):
             continue
-        heard_s = now_s
-        if silence_said:
-            silence_said = False
-            status.say("answered", "ArduPilot asks again")
+        silence.end(now_s)
         if log and end.world is not logged:
             logged = end.world
             log.write(truth_row(logged))
         progress.report(end.world.time_us / 1e6, now_s - began_s)
-    status.say(
-        "ended",
-        f"ended at t = {end.world.time_us / 1e6:.3f} s after {end.steps} steps",
-        sim_time_s=end.world.time_us / 1e6,
-        wall_time_s=perf_counter() - began_s,
-        steps=end.steps,
-        restarts=end.restarts,
-        dropped=dict(end.dropped),
-    )
+    figures: dict[str, Any] = {"steps": end.steps, "restarts": end.restarts, "dropped": dict(end.dropped)}
+    report_end(status, end.world.time_us, began_s, f"ended {{}} after {end.steps} steps", **figures)
 
 
 def _answer(end: ArduPilotEnd, link: UdpLink, received: tuple[bytes, Address], now_s: float) -> bool:

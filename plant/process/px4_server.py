@@ -4,10 +4,11 @@ import argparse
 from dataclasses import replace
 from math import hypot
 from time import perf_counter, sleep
+from typing import Any
 
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, gc_frozen
+from colibri.common.process.lifecycle import EXIT_INTERRUPTED, Stop, fail
 from colibri.common.process.status import Progress, Status
 from colibri.common.rotations import earth_from_body
 from colibri.mavlink.hil.px4_simulator import SimulatorEnd, Truth
@@ -18,12 +19,10 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.options import nudged
+from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, closing, report_end
 from colibri.plant.process.server import Pace
 from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
-
-_SILENCE_SAID_AFTER_S = 2.0
-_MAX_WAIT_S = 0.1
 
 
 def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> int:
@@ -32,14 +31,8 @@ def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) 
         simulator = Simulator(args, link, status, stop)
     except Error as error:
         fail(str(error))
-    try:
-        with gc_frozen():
-            simulator.serve()
-    except Error as error:
-        fail(str(error), EXIT_FAILED)
-    finally:
-        link.close()
-        simulator.close()
+    with closing(link, simulator):
+        simulator.serve()
     return EXIT_INTERRUPTED if stop else 0
 
 
@@ -75,7 +68,7 @@ class Simulator:
         while not self._stop and not over:
             if self._link.target is not None:
                 self._end.call(self._link.target, perf_counter())
-            self._exchange(_MAX_WAIT_S)
+            self._exchange(MAX_WAIT_S)
             if self._end.peer is not None:
                 self._status.say("connected", "PX4 has called")
                 over = self._fly()
@@ -95,22 +88,17 @@ class Simulator:
             if world.time_us > self._duration_us:
                 break
             self._wait_until(self._due_s(pace, world))
-            self._tell(world, suite)
+            self._offer(world, suite)
             if self._end.lockstep and not self._await_answer(world):
                 break
             world = self._physics.step(world, self._command(world), self._interval_us)
             frames += 1
             progress.report(world.time_us / 1e6, perf_counter() - began_s)
         gone = self._end.peer is None or self._end.calls != call
-        self._status.say(
-            "gone" if gone else "ended",
-            f"{'PX4 has gone' if gone else 'ended'} at t = {world.time_us / 1e6:.3f} s after {frames} frames",
-            sim_time_s=world.time_us / 1e6,
-            wall_time_s=perf_counter() - began_s,
-            frames=frames,
-            resent=self._end.resent,
-            dropped=dict(self._end.dropped),
-        )
+        figures: dict[str, Any] = {"frames": frames, "resent": self._end.resent, "dropped": dict(self._end.dropped)}
+        event, text = ("gone", "PX4 has gone") if gone else ("ended", "ended")
+        text = f"{text} {{}} after {frames} frames"
+        report_end(self._status, world.time_us, began_s, text, event=event, **figures)
         return not gone
 
     def _due_s(self, pace: Pace, world: World) -> float:
@@ -119,7 +107,7 @@ class Simulator:
         due_s = pace.due_s(world.time_us - self._interval_us, now_s)
         return due_s if self._end.lockstep else max(due_s, now_s + self._interval_us * 1e-6)
 
-    def _tell(self, world: World, suite: SensorSuite) -> None:
+    def _offer(self, world: World, suite: SensorSuite) -> None:
         self._time_us = world.time_us
         truth = self._truth(world) if self._end.wants_truth(world.time_us) else None
         self._end.offer(suite.measure(world), truth, perf_counter())
@@ -137,17 +125,16 @@ class Simulator:
 
     def _await_answer(self, world: World) -> bool:
         """Wait for the answer to a frame; return False if there will be none."""
-        asked_s, silence_said, call = perf_counter(), False, self._end.calls
+        call = self._end.calls
+        silence = Silence(self._status, SILENT_AFTER_S, "PX4 answers again", perf_counter())
         while not self._end.answered and not self._stop:
-            self._exchange(_MAX_WAIT_S)
+            self._exchange(MAX_WAIT_S)
             if self._end.peer is None or self._end.calls != call:
                 return False
             self._end.poll(perf_counter())
-            if not silence_said and perf_counter() - asked_s > _SILENCE_SAID_AFTER_S:
-                silence_said = True
-                self._status.say("silence", f"no answer at t = {world.time_us / 1e6:.3f} s, waiting for PX4")
-        if silence_said and self._end.answered:
-            self._status.say("answered", "PX4 answers again")
+            silence.lasts(perf_counter(), "no answer", world.time_us, ", waiting for PX4")
+        if self._end.answered:
+            silence.end(perf_counter())
         return self._end.answered
 
     def _command(self, world: World) -> ActuatorCommand:
@@ -177,6 +164,6 @@ class Simulator:
         """Wait, and hear all that comes before: an answer must not be taken for that to the next frame."""
         while not self._stop and (early_s := due_s - perf_counter()) > 0.0:
             if self._end.lockstep:
-                sleep(min(early_s, _MAX_WAIT_S))
+                sleep(min(early_s, MAX_WAIT_S))
             else:
-                self._exchange(min(early_s, _MAX_WAIT_S))
+                self._exchange(min(early_s, MAX_WAIT_S))

@@ -3,13 +3,14 @@
 import argparse
 
 from colibri.common.errors import Error
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, gc_frozen
+from colibri.common.process.lifecycle import EXIT_INTERRUPTED, Stop, fail
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.links.udp import UdpLink
 from colibri.plant.physics.start import DEFAULT_STARTS
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.options import nudged
+from colibri.plant.process.reports import closing
 from colibri.plant.process.server import Server
 from colibri.plant.sensors.suite import served_by
 from colibri.plant.simulation.plant import PlantBuilder
@@ -47,15 +48,8 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         from colibri.plant.process.free_running import FreeServer
 
         server = FreeServer(link, end, status, stop, logs, cut_after_s=args.cut_after)
-    try:
-        with gc_frozen():
-            if server.wait():
-                plant = builder.build(end.feedback, end.frame_interval_us)
-                server.fly(plant, duration_s=args.duration, speed=args.speed)
-    except Error as error:
-        fail(str(error), EXIT_FAILED)
-    finally:
-        link.close()
-        if logs:
-            logs.close()
+    with closing(link, logs):
+        if server.wait():
+            plant = builder.build(end.feedback, end.frame_interval_us)
+            server.fly(plant, duration_s=args.duration, speed=args.speed)
     return EXIT_INTERRUPTED if stop else 0

@@ -1,6 +1,7 @@
 """The plant on a link: a lockstep server, driven by the wall clock."""
 
 from time import perf_counter, sleep
+from typing import Any
 
 from colibri.common.process.lifecycle import Stop
 from colibri.common.process.status import Progress, Status
@@ -9,10 +10,9 @@ from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.links.udp import UdpLink
 from colibri.plant.physics.world import World, state_frame
 from colibri.plant.process.logs import PlantLogs
+from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, report_end
 from colibri.plant.simulation.plant import Plant
 
-_SILENCE_SAID_AFTER_S = 2.0
-_MAX_WAIT_S = 0.1
 _CATCH_UP_S = 0.1
 
 
@@ -20,16 +20,19 @@ class Pace:
     """When each frame is due by the wall clock.
 
     A flight that was held up for longer than a moment stays late: it does not hurry past those who fly it.
+
+    Attributes:
+        speed: Times real time.
     """
 
     def __init__(self, speed: float, now_s: float) -> None:
         """Begin now, at `speed` times real time; infinite for flat out."""
-        self._speed = speed
+        self.speed = speed
         self._began_s = now_s
 
     def due_s(self, time_us: int, now_s: float) -> float:
         """Return the wall-clock time at which simulated time `time_us` is due."""
-        due_s = self._began_s + time_us / 1e6 / self._speed
+        due_s = self._began_s + time_us / 1e6 / self.speed
         held_up_s = max(0.0, now_s - due_s - _CATCH_UP_S)
         self._began_s += held_up_s
         return due_s + held_up_s
@@ -59,60 +62,65 @@ class Server:
         self._logged: World | None = None
 
     def wait(self) -> bool:
-        """Wait for an autopilot; return False if told to stop first."""
+        """Wait for an autopilot; return False if a signal came first."""
         while not self._stop and self._end.peer is None:
-            self._receive(_MAX_WAIT_S)
+            self._receive(MAX_WAIT_S)
         return self._end.peer is not None
 
     def fly(self, plant: Plant, *, duration_s: float, speed: float) -> None:
-        """Fly for `duration_s` at `speed` times real time, or until told to stop."""
+        """Fly for `duration_s` at `speed` times real time, or until a signal ends the process."""
         began_s = perf_counter()
-        pace = Pace(speed, began_s)
-        progress = Progress(self._status)
+        pace, progress = Pace(speed, began_s), Progress(self._status)
         frames = 0
         while not self._stop and plant.world.time_us + plant.interval_us <= duration_s * 1e6:
-            self._wait_until(pace.due_s(plant.world.time_us, perf_counter()))
-            command = self._exchange(plant)
-            if command is None:
+            if not self._advance(plant, pace):
                 break
-            plant.answer(command, self._end.take_faults())
             frames += 1
             progress.report(plant.world.time_us / 1e6, perf_counter() - began_s)
         self._log(plant.world)
-        time_s = plant.world.time_us / 1e6
-        self._status.say(
-            "ended",
-            f"ended at t = {time_s:.3f} s after {frames} frames",
-            sim_time_s=time_s,
-            wall_time_s=perf_counter() - began_s,
-            frames=frames,
-            resent=self._end.resent,
-            dropped=dict(self._end.dropped),
+        figures: dict[str, Any] = {"frames": frames, "resent": self._end.resent, "dropped": dict(self._end.dropped)}
+        text, own = self._own_figures()
+        report_end(
+            self._status, plant.world.time_us, began_s, f"ended {{}} after {frames} frames{text}", **(figures | own)
         )
 
-    def _exchange(self, plant: Plant) -> ActuatorCommand | None:
-        """Send a frame until its answer comes; None if the process is told to stop first."""
+    def _own_figures(self) -> tuple[str, dict[str, float]]:
+        """Return what the last line says besides the frames, in words and as figures."""
+        return "", {}
+
+    def _advance(self, plant: Plant, pace: Pace) -> bool:
+        """Send a frame when it is due, and go on with its answer; return False if a signal came first."""
+        self._wait_until(pace.due_s(plant.world.time_us, perf_counter()))
+        command = self._exchange(plant)
+        if command is None:
+            return False
+        plant.answer(command, self._end.take_faults())
+        return True
+
+    def _offer(self, plant: Plant) -> float:
+        """Send the plant's frame; return the wall-clock time, s."""
         world = plant.world
         self._time_us = world.time_us
-        offered_s = perf_counter()
-        frame, plant_status = plant.tell()
-        self._end.offer(frame, offered_s, plant_status, state_frame(world) if self._streams_truth else None)
+        frame, plant_status = plant.measure()
+        now_s = perf_counter()
+        self._end.offer(frame, now_s, plant_status, state_frame(world) if self._streams_truth else None)
         self._send()
         self._log(world)  # while the autopilot computes
-        silence_said = False
-        due_s = offered_s
+        return now_s
+
+    def _exchange(self, plant: Plant) -> ActuatorCommand | None:
+        """Send a frame until its answer comes; None if a signal came first."""
+        due_s = now_s = self._offer(plant)
+        silence = Silence(self._status, SILENT_AFTER_S, "the autopilot answers again", now_s)
         while not self._stop:
-            command = self._receive(min(max(0.0, due_s - perf_counter()), _MAX_WAIT_S))
-            if command is not None:
-                if silence_said:
-                    self._status.say("answered", "the autopilot answers again")
-                return command
+            command = self._receive(min(max(0.0, due_s - perf_counter()), MAX_WAIT_S))
             now_s = perf_counter()
+            if command is not None:
+                silence.end(now_s)
+                return command
             due_s = self._end.poll(now_s)
             self._send()
-            if not silence_said and now_s - offered_s > _SILENCE_SAID_AFTER_S:
-                silence_said = True
-                self._status.say("silence", f"no answer at t = {world.time_us / 1e6:.3f} s, waiting for the autopilot")
+            silence.lasts(now_s, "no answer", plant.world.time_us, ", waiting for the autopilot")
         return None
 
     def _log(self, world: World) -> None:
@@ -138,4 +146,4 @@ class Server:
 
     def _wait_until(self, due_s: float) -> None:
         while not self._stop and (early_s := due_s - perf_counter()) > 0.0:
-            sleep(min(early_s, _MAX_WAIT_S))
+            sleep(min(early_s, MAX_WAIT_S))

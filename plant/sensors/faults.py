@@ -38,7 +38,7 @@ class Reading(Generic[T]):
         self._since_us, self._last = now_us, last
         self._later.clear()
 
-    def tell(self, now_us: int, value: T | None) -> T | None:
+    def report(self, now_us: int, value: T | None) -> T | None:
         """Return what is told of what is measured; either is None where there is nothing new."""
         fault = self._fault
         if fault is None:
@@ -64,10 +64,10 @@ class Reading(Generic[T]):
     def _late(self, now_us: int, value: T | None, late_us: int) -> T | None:
         if value is not None:
             self._later.append((now_us + late_us, value))
-        told = None
+        reported = None
         while self._later and self._later[0][0] <= now_us:
-            told = self._later.popleft()[1]
-        return None if told is None else self._at(told, now_us)
+            reported = self._later.popleft()[1]
+        return None if reported is None else self._at(reported, now_us)
 
 
 class SensorFaults:
@@ -83,7 +83,7 @@ class SensorFaults:
         rows = [] if parts is None else [row for row in ROWS if is_fitted(row, parts)]
         self._readings = {row.unit: (row, Reading[Any](row.add, row.at, chances[row.unit])) for row in rows}
         self.units = frozenset(self._readings)
-        self._told: SensorFrame | None = None
+        self._reported: SensorFrame | None = None
         self._last: dict[str, Any] = {}
         self._any = False
 
@@ -91,23 +91,23 @@ class SensorFaults:
         """Begin or end a fault; it shows from the next frame on."""
         self._any = True
         row, reading = self._readings[fault.unit]
-        held = self._told is not None and row.group
-        reading.begin(fault, now_us, getattr(self._told, row.field) if held else self._last.get(row.field))
+        held = self._reported is not None and row.group
+        reading.begin(fault, now_us, getattr(self._reported, row.field) if held else self._last.get(row.field))
 
     def through(self, frame: SensorFrame) -> SensorFrame:
         """Return what is told of a frame; each is the next one."""
-        told = self._changed(frame, self._told or frame) if self._any else frame
-        self._told = told
+        reported = self._changed(frame, self._reported or frame) if self._any else frame
+        self._reported = reported
         for row, _ in self._readings.values():
-            if not row.group and (value := getattr(told, row.field)) is not None:
+            if not row.group and (value := getattr(reported, row.field)) is not None:
                 self._last[row.field] = value
-        return told
+        return reported
 
     def _changed(self, frame: SensorFrame, before: SensorFrame) -> SensorFrame:
         now_us, updated, changes = frame.time_us, 0, dict[str, Any]()
         for row, reading in self._readings.values():
             is_new = frame.has(row.group)  # a message of its own is None where it is not
-            value = reading.tell(now_us, getattr(frame, row.field) if is_new else None)
+            value = reading.report(now_us, getattr(frame, row.field) if is_new else None)
             if value is not None:
                 updated |= row.group
             changes[row.field] = getattr(before, row.field) if value is None and row.group else value

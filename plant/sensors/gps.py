@@ -29,7 +29,7 @@ class GpsReceiver:
         sideways, upward, time_s = part.horizontal_drift_m, part.vertical_drift_m, part.drift_time_s
         self._drifts = tuple(GaussMarkov(deviation, time_s, chance) for deviation in (sideways, sideways, upward))
         self._measured_us: int | None = None
-        self._untold: deque[GpsFix] = deque()
+        self._pending: deque[GpsFix] = deque()
 
     def measure(self, time_us: int, position_enu_m: Vector, velocity_enu_m_s: Vector) -> None:
         """Measure now, at `time_us`, to tell after the receiver's delay."""
@@ -60,12 +60,12 @@ class GpsReceiver:
             vertical_accuracy_m=hypot(part.vertical_noise_m, part.vertical_drift_m),
             satellites=part.satellites,
         )
-        self._untold.append(fix)
+        self._pending.append(fix)
 
-    def tell(self, time_us: int) -> GpsFix | None:
+    def report(self, time_us: int) -> GpsFix | None:
         """Return the fix that has come up to `time_us` and was not told before."""
-        if self._untold and self._untold[0].time_us <= time_us:
-            return self._untold.popleft()
+        if self._pending and self._pending[0].time_us <= time_us:
+            return self._pending.popleft()
         return None
 
 
@@ -76,7 +76,7 @@ def _switched_on(part: Gps, setting: Setting, chance: Iterator[float]) -> Measur
         if rate.is_due(world.time_us):
             u, v, w, _, _, _, x, y, z = world.state[:9]
             receiver.measure(world.time_us, (x, y, z), earth_from_body(attitude_of(world.state), (u, v, w)))
-        return receiver.tell(world.time_us)
+        return receiver.report(world.time_us)
 
     return measure
 

@@ -41,6 +41,6 @@ ROW = Instrument(
     group=0,
     unit=RANGEFINDER,
     switched_on=_switched_on,
-    add=lambda told, error: told._replace(distance_m=max(0.0, told.distance_m + error[0])),
+    add=lambda reported, error: reported._replace(distance_m=max(0.0, reported.distance_m + error[0])),
     at=as_it_is,
 )

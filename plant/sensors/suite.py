@@ -19,11 +19,11 @@ from colibri.plant.sensors.table import ROWS, is_fitted
 from colibri.plant.vehicle.description import Vehicle
 from colibri.plant.vehicle.sensors import Sensors
 
-Tell: TypeAlias = Callable[[World], Frame]
-"""What the plant tells the autopilot of a world."""
+FrameMaker: TypeAlias = Callable[[World], Frame]
+"""World -> the frame that the plant sends of it."""
 
 
-def tells(
+def frame_maker(
     feedback: Feedback,
     vehicle: Vehicle,
     physics: Physics,
@@ -32,8 +32,8 @@ def tells(
     seed: int,
     interval_us: int,
     faults: SensorFaults | None = None,
-) -> Tell:
-    """Return what makes of each world, in order, the frame that the autopilot is told; `faults` may change it."""
+) -> FrameMaker:
+    """Return the function that makes the frame of each world, in order; `faults` may change it."""
     if feedback is Feedback.STATE:
         return state_frame
     assert vehicle.sensors is not None, "only what has sensors serves them"
@@ -76,7 +76,7 @@ class SensorSuite:
             for row, chance in zip(ROWS, chances, strict=True)
             if is_fitted(row, parts)
         ]
-        self._told: dict[str, Any] = {"magnetic_field_flu_gauss": (0.0, 0.0, 0.0), "pressure_pa": 0.0}
+        self._reported: dict[str, Any] = {"magnetic_field_flu_gauss": (0.0, 0.0, 0.0), "pressure_pa": 0.0}
         self._frame: SensorFrame | None = None
 
     def measure(self, world: World) -> SensorFrame:
@@ -87,17 +87,17 @@ class SensorSuite:
         return self._frame
 
     def _measured(self, world: World) -> SensorFrame:
-        told, updated = self._told, 0
+        reported, updated = self._reported, 0
         for field, group, measure in self._instruments:
             value = measure(world)
             if value is not None:
                 updated |= group
-                told[field] = value
+                reported[field] = value
             elif not group:
-                told[field] = None
+                reported[field] = None
         return SensorFrame(
             time_us=world.time_us,
             updated=updated,
             temperature_c=temperature_c(self._origin.altitude_m + world.state[8]),
-            **told,
+            **reported,
         )

@@ -11,7 +11,7 @@ from colibri.plant.environment.weather import weather_of
 from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world
-from colibri.plant.sensors.suite import tells
+from colibri.plant.sensors.suite import frame_maker
 from colibri.plant.simulation.command_delay import Actuation
 from colibri.plant.simulation.faults import Faults
 from colibri.plant.simulation.setting import WorldSetting
@@ -56,16 +56,16 @@ class Plant:
         self.faults = Faults(vehicle, physics, feedback, seed=seed)
         self.interval_us = interval_us
         self._physics = physics
-        self._tell = tells(
+        self._measure = frame_maker(
             feedback, vehicle, physics, origin, seed=seed, interval_us=interval_us, faults=self.faults.sensors
         )
         self._actuation = Actuation(_held(world, vehicle))
         self._round_trip_us = 2 * latency_us
         self._results: tuple[FaultResult, ...] = ()
 
-    def tell(self) -> ReceivedFrame:
+    def measure(self) -> ReceivedFrame:
         """Return the frame of the world as it is now, and what goes beside it."""
-        return ReceivedFrame(self._tell(self.world), PlantStatus(self._physics.battery(self.world), self._results))
+        return ReceivedFrame(self._measure(self.world), PlantStatus(self._physics.battery(self.world), self._results))
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
         """Go on to the next frame, with the answer to this one and with faults that happen now."""

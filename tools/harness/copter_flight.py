@@ -155,7 +155,7 @@ class CopterFlight(Stepped, Steered):
 
     def step(self) -> None:
         """Fly one frame."""
-        step = self.copter.step(*self.plant.tell())
+        step = self.copter.step(*self.plant.measure())
         self.rotors, self.estimate = step.command, step.estimate or self.estimate
         self.plant.answer(step.command, step.faults)
         inbox = [received for client in self._clients for received in client.take_sent()]

@@ -197,7 +197,7 @@ def _lose(copter: Copter, plant: Plant, seed: int, fault: Fault) -> Flown:
 
 
 def _step(copter: Copter, plant: Plant) -> tuple[float, ...]:
-    step = copter.step(*plant.tell())
+    step = copter.step(*plant.measure())
     plant.answer(step.command, step.faults)
     copter.serve(())
     return step.command.controls

@@ -102,7 +102,7 @@ class MemoryPlant:
         if self._plant is None:
             self._plant = self._builder.build(end.feedback, end.frame_interval_us)
         self._answered = False
-        frame, plant_status = self._plant.tell()
+        frame, plant_status = self._plant.measure()
         end.offer(frame, self._now_s, plant_status, state_frame(self._plant.world))
 
 

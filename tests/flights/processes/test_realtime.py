@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colibri.plant.process.free_running import Silence
+from colibri.common.process.status import Status
+from colibri.plant.process.reports import Silence
 from tools.harness.processes import Process, running, wait_for
 
 HIGH = ("--start", "z=500,psi=0,rotors=4740")
@@ -63,15 +64,17 @@ def test_rotors_stop_when_the_autopilot_dies_and_turn_for_the_next(tmp_path: Pat
     assert rotors[np.argmin(rotors) :].max() > 0.5 * rotors[0]
 
 
-def test_silence_is_said_once_each_time() -> None:
-    silence = Silence(0.5)
-    assert not silence.lasts(400_000)
-    assert silence.lasts(500_000)
-    assert not silence.lasts(600_000)
-    assert silence.ends(650_000)
-    assert not silence.ends(660_000)
-    assert not silence.lasts(1_100_000)
-    assert silence.lasts(1_200_000)
+def test_silence_is_reported_once_each_time(capsys: pytest.CaptureFixture[str]) -> None:
+    silence = Silence(Status("plant", as_json=False), 0.5, "back", 0.0)
+    assert not silence.lasts(0.4, "no command", 0, "")
+    assert silence.lasts(0.5, "no command", 500_000, ", waiting")
+    assert not silence.lasts(0.6, "no command", 0, "")
+    silence.end(0.65)
+    silence.end(0.66)
+    assert not silence.lasts(1.1, "no command", 0, "")
+    assert silence.lasts(1.2, "no command", 1_200_000, "")
+    lines = ["no command at t = 0.500 s, waiting", "back", "no command at t = 1.200 s"]
+    assert capsys.readouterr().err == "".join(f"plant: {line}\n" for line in lines)
 
 
 @pytest.mark.parametrize("options", [("--speed", "max"), ("--serve", "px4")])

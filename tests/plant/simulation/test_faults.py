@@ -66,7 +66,7 @@ def told(*faults: Fault, frames: int = 300, seed: int = 7) -> list[SensorFrame]:
     """Fly; the faults happen between two frames."""
     flown, heard = plant(seed=seed), []
     for number in range(frames):
-        frame, _ = flown.tell()
+        frame, _ = flown.measure()
         assert isinstance(frame, SensorFrame)
         heard.append(frame)
         flown.answer(COMMAND, faults if number == ASKED_AT else ())
@@ -227,22 +227,22 @@ def test_a_battery_sags_and_gets_back_what_was_taken() -> None:
 
 def test_the_next_frame_tells_what_became_of_it() -> None:
     flown = plant(Feedback.STATE)
-    assert flown.tell()[1].results == ()
+    assert flown.measure()[1].results == ()
     asked = (Fault(MOTOR, OFF, 1), Fault(GPS, OFF), Fault(MOTOR, WRONG, 0, (9.0, nan, nan, nan)))
     flown.answer(COMMAND, asked)
     results = (RESULT_ACCEPTED, RESULT_UNSUPPORTED, RESULT_DENIED)
-    assert flown.tell()[1].results == tuple(
+    assert flown.measure()[1].results == tuple(
         FaultResult(fault.unit, fault.kind, result) for fault, result in zip(asked, results, strict=True)
     )
     flown.answer(COMMAND)
-    assert flown.tell()[1].results == ()
+    assert flown.measure()[1].results == ()
 
 
 def test_it_tells_the_battery_of_its_world() -> None:
     flown = plant(Feedback.STATE)
     for _ in range(100):
         flown.answer(COMMAND)
-    battery = flown.tell()[1].battery
+    battery = flown.measure()[1].battery
     assert battery is not None
     assert VEHICLE.battery is not None
     assert battery.voltage_v == flown.world.voltage_v

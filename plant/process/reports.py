@@ -1,0 +1,72 @@
+"""What every server of the plant reports, and how it ends: silence of the autopilot, the end of a flight, errors."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from time import perf_counter
+from typing import Any, Protocol
+
+from colibri.common.errors import Error
+from colibri.common.process.lifecycle import EXIT_FAILED, fail, gc_frozen
+from colibri.common.process.status import Status
+
+MAX_WAIT_S = 0.1
+"""Longest wait between two looks at whether the process shall end."""
+SILENT_AFTER_S = 2.0
+"""Wall-clock silence that is reported."""
+
+
+class Closable(Protocol):
+    """A link or a log."""
+
+    def close(self) -> None:
+        """Close it."""
+        ...
+
+
+@contextmanager
+def closing(*opened: Closable | None) -> Iterator[None]:
+    """Fly within: garbage stays uncollected, an error ends the process with one line, and `opened` is closed after."""
+    try:
+        with gc_frozen():
+            yield
+    except Error as error:
+        fail(str(error), EXIT_FAILED)
+    finally:
+        for each in opened:
+            if each:
+                each.close()
+
+
+class Silence:
+    """Reports once that an autopilot is silent, and once that it is back; by the wall clock or in simulated time."""
+
+    def __init__(self, status: Status, allowed_s: float, back: str, began_s: float) -> None:
+        """Report through `status` a silence of `allowed_s`, counted from `began_s`; its end as `back`."""
+        self._status = status
+        self._allowed_s = allowed_s
+        self._back = back
+        self._since_s = began_s
+        self._reported = False
+
+    def end(self, now_s: float) -> None:
+        """Count from now on, and report the end of a silence that was reported."""
+        if self._reported:
+            self._status.say("answered", self._back)
+        self._since_s, self._reported = now_s, False
+
+    def lasts(self, now_s: float, missing: str, time_us: int, waiting: str) -> bool:
+        """Return whether the silence has just become too long; report then what is missing, and since when."""
+        if self._reported or now_s - self._since_s < self._allowed_s:
+            return False
+        self._reported = True
+        self._status.say("silence", f"{missing} at t = {time_us / 1e6:.3f} s{waiting}")
+        return True
+
+
+def report_end(
+    status: Status, time_us: int, began_s: float, text: str, *, event: str = "ended", **figures: Any
+) -> None:
+    """Report the end of a flight at simulated time `time_us` that began at `began_s` by the wall clock."""
+    time_s = time_us / 1e6
+    wall_time_s = perf_counter() - began_s
+    status.say(event, text.format(f"at t = {time_s:.3f} s"), sim_time_s=time_s, wall_time_s=wall_time_s, **figures)
