@@ -249,7 +249,7 @@ class Stations:
 
     def wait(self, reason: str) -> None:
         """Deny every command for a reason, and hear nothing else; without one, serve."""
-        self.hub.hear_only(_COMMANDS if reason else None)
+        self.hub.accept_only(_COMMANDS if reason else None)
         self._obeys.close(reason)
 
     def take_outbox(self) -> list[Outgoing]:

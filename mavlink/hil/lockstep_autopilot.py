@@ -50,13 +50,13 @@ class AutopilotEnd:
         self.dropped: Counter[str] = self._codec.dropped
         self._time_us: int | None = None
         self._answer: bytes | None = None
-        self._heard_s = now_s - CALL_AFTER_S
+        self._received_s = now_s - CALL_AFTER_S
         self._call_at_s = now_s
         self._outbox: list[bytes] = []
 
     def silence_s(self, now_s: float) -> float:
         """How long the plant has been silent."""
-        return now_s - self._heard_s
+        return now_s - self._received_s
 
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         """Take one datagram in; return its frame if that is the next one to compute."""
@@ -70,7 +70,7 @@ class AutopilotEnd:
             elif message.name == "COMMAND_ACK" and message.fields.command == INJECT_FAILURE:
                 results.append(decode_result(message))
             elif message.name == "COMMAND_ACK":
-                self._hear_ack(message)
+                self._receive_ack(message)
             elif message.name == "BATTERY_STATUS":
                 battery = decode_battery(message)
             elif message.name == "HEARTBEAT":
@@ -99,7 +99,7 @@ class AutopilotEnd:
     def poll(self, now_s: float) -> float:
         """Do what is due at `now_s`; return the time at which something will be due again."""
         if self.silence_s(now_s) < CALL_AFTER_S:
-            return self._heard_s + CALL_AFTER_S
+            return self._received_s + CALL_AFTER_S
         if now_s >= self._call_at_s:
             self._call_at_s = now_s + CALL_EVERY_S
             self._outbox.append(self._call())
@@ -122,7 +122,7 @@ class AutopilotEnd:
     def _next(self, frame: Frame, now_s: float) -> Frame | None:
         lost = self.silence_s(now_s) >= CALL_AFTER_S
         if frame.time_us == self._time_us:
-            self._heard_s = now_s
+            self._received_s = now_s
             self.repeated += 1
             if self._answer is not None:
                 self._outbox.append(self._answer)
@@ -130,7 +130,7 @@ class AutopilotEnd:
         if self._time_us is not None and not lost and not self._follows(frame.time_us, self._time_us):
             self.dropped["out of step"] += 1
             return None
-        self._heard_s = now_s
+        self._received_s = now_s
         self._time_us = frame.time_us
         self._answer = None
         return frame
@@ -138,7 +138,7 @@ class AutopilotEnd:
     def _follows(self, time_us: int, before_us: int) -> bool:
         return time_us > before_us if self._runs_freely else time_us == before_us + self._frame_interval_us
 
-    def _hear_ack(self, message: Message) -> None:
+    def _receive_ack(self, message: Message) -> None:
         fields = message.fields
         refused = fields.command == dialect.CMD_SET_MESSAGE_INTERVAL and fields.result != dialect.RESULT_ACCEPTED
         self.refused = fields.result if refused else None

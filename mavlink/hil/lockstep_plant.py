@@ -85,7 +85,7 @@ class PlantEnd:
         self.resent = 0
         self.dropped: Counter[str] = self._codec.dropped
         self.received: list[bytes] = []
-        self._peer_heard_s = 0.0
+        self._peer_received_s = 0.0
         self._frames: tuple[bytes, ...] = ()
         self._begun = False
         self._awaited_us: int | None = None
@@ -129,7 +129,7 @@ class PlantEnd:
                 self.dropped["foreign"] += 1
                 continue
             if message.name == "HEARTBEAT":
-                self._hear_heartbeat(sender, now_s)
+                self._receive_heartbeat(sender, now_s)
             elif message.name == "COMMAND_LONG" and message.fields.command == INJECT_FAILURE:
                 asked.append(message)
             elif message.name == "COMMAND_LONG":
@@ -140,10 +140,10 @@ class PlantEnd:
                 self.dropped["unexpected"] += 1
                 continue
             if sender == self.peer:
-                self._peer_heard_s = now_s
+                self._peer_received_s = now_s
                 self.received.append(message.frame)
         for message in asked:
-            self._hear_fault(message, answered=command is not None)
+            self._receive_fault(message, answered=command is not None)
         return command
 
     def take_faults(self) -> list[Fault]:
@@ -170,10 +170,10 @@ class PlantEnd:
         if self.peer is not None:
             self._outbox.append(Outgoing(self._frames, self.peer))
 
-    def _hear_heartbeat(self, sender: Address, now_s: float) -> None:
+    def _receive_heartbeat(self, sender: Address, now_s: float) -> None:
         if sender == self.peer:
             return
-        if self.peer is not None and now_s - self._peer_heard_s < PEER_LOST_AFTER_S:
+        if self.peer is not None and now_s - self._peer_received_s < PEER_LOST_AFTER_S:
             self.dropped["second autopilot"] += 1
             return
         self.peer = sender
@@ -190,7 +190,7 @@ class PlantEnd:
             self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False, custom_mode=mode
         )
 
-    def _hear_fault(self, message: Message, *, answered: bool) -> None:
+    def _receive_fault(self, message: Message, *, answered: bool) -> None:
         fields = message.fields
         if (fields.target_system, fields.target_component) != self._codec.source:
             self.dropped["foreign"] += 1

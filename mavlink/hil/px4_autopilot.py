@@ -55,13 +55,13 @@ class FlierEnd:
         self._fix: GpsFix | None = None
         self._answer: bytes | None = None
         self._armed = False
-        self._heard_s = now_s - ANSWER_AGAIN_AFTER_S
+        self._received_s = now_s - ANSWER_AGAIN_AFTER_S
         self._call_at_s = self._again_at_s = now_s
         self._outbox: list[bytes] = []
 
     def silence_s(self, now_s: float) -> float:
         """How long the simulator has been silent."""
-        return now_s - self._heard_s
+        return now_s - self._received_s
 
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         """Take one datagram in; return its frame if that is the next one to compute."""
@@ -103,7 +103,7 @@ class FlierEnd:
         return outbox
 
     def _next(self, frame: SensorFrame, now_s: float) -> SensorFrame | None:
-        self._heard_s, self._again_at_s = now_s, now_s + ANSWER_AGAIN_AFTER_S
+        self._received_s, self._again_at_s = now_s, now_s + ANSWER_AGAIN_AFTER_S
         if frame.time_us == self._time_us:
             self.repeated += 1
             if self._answer is not None:

@@ -100,7 +100,7 @@ class SimulatorEnd:
 
     def offer(self, frame: SensorFrame, truth: Truth | None, now_s: float) -> None:
         """Send a frame, with the truth if it is wanted, and await its answer."""
-        frames = [] if truth is None else [self._told(truth)]
+        frames = [] if truth is None else [self._encode_truth(truth)]
         frames += encode_sensors(self._codec, frame)
         if frame.time_us % HEARTBEAT_EVERY_US == 0:
             frames.append(self._heartbeat())
@@ -119,7 +119,7 @@ class SimulatorEnd:
             if message.name == "HIL_ACTUATOR_CONTROLS":
                 self._obey(message)
             elif message.name == "COMMAND_LONG":
-                self._hear_request(message)
+                self._receive_request(message)
             elif message.name != "HEARTBEAT":
                 self.dropped["unexpected"] += 1
                 continue
@@ -174,7 +174,7 @@ class SimulatorEnd:
         else:
             self.dropped["invalid"] += 1
 
-    def _hear_request(self, message: Message) -> None:
+    def _receive_request(self, message: Message) -> None:
         fields = message.fields
         wanted = (dialect.CMD_SET_MESSAGE_INTERVAL, dialect.MSG_HIL_STATE_QUATERNION)
         if (fields.command, fields.param1) != wanted or not isfinite(fields.param2):
@@ -188,7 +188,7 @@ class SimulatorEnd:
             "HEARTBEAT", dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, 0, 0, dialect.STATE_ACTIVE, 3
         )
 
-    def _told(self, truth: Truth) -> bytes:
+    def _encode_truth(self, truth: Truth) -> bytes:
         state, place = truth.state, truth.place
         assert self._truth_every_us is not None, "it is told to who wants it"
         self._truth_at_us = state.time_us + self._truth_every_us

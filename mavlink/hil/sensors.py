@@ -165,7 +165,7 @@ def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
 def decode_sensors(sensor: Message, *others: Message) -> SensorFrame:
     """Decode a HIL_SENSOR, and those of `OWN_MESSAGES` that came with it."""
     s = sensor.fields
-    told = {row.field: row.decoded(other) for other in others for row in OWN_MESSAGES if row.message == other.name}
+    measured = {row.field: row.decoded(other) for other in others for row in OWN_MESSAGES if row.message == other.name}
     return SensorFrame(
         time_us=s.time_usec,
         updated=s.fields_updated,
@@ -174,7 +174,7 @@ def decode_sensors(sensor: Message, *others: Message) -> SensorFrame:
         magnetic_field_flu_gauss=frd_from_flu((s.xmag, s.ymag, s.zmag)),
         pressure_pa=s.abs_pressure * 100.0,
         temperature_c=s.temperature,
-        **told,
+        **measured,
     )
 
 
@@ -223,13 +223,13 @@ def _accuracy_m(cm: int) -> float:
     return nan if cm == 65535 else cm / 100.0
 
 
-def _distance_fields(told: Distance, time_us: int) -> tuple[Any, ...]:
+def _distance_fields(measured: Distance, time_us: int) -> tuple[Any, ...]:
     """DISTANCE_SENSOR: cm; a laser that looks down. What sees nothing has a quality of 1, "invalid"."""
-    sees = isfinite(told.distance_m)
-    limits_cm = (_in(told.min_m, 1e2, 65534), _in(told.max_m, 1e2, 65534))
-    distance_cm = _in(told.distance_m, 1e2, 65535) if sees else limits_cm[1] + 1
+    sees = isfinite(measured.distance_m)
+    limits_cm = (_in(measured.min_m, 1e2, 65534), _in(measured.max_m, 1e2, 65534))
+    distance_cm = _in(measured.distance_m, 1e2, 65535) if sees else limits_cm[1] + 1
     sensor = (mav.MAV_DISTANCE_SENSOR_LASER, 0, mav.MAV_SENSOR_ROTATION_PITCH_270, _UNKNOWN_COVARIANCE)
-    beam = (told.field_of_view_rad, told.field_of_view_rad, (0.0,) * 4)
+    beam = (measured.field_of_view_rad, measured.field_of_view_rad, (0.0,) * 4)
     quality = _PERFECT if sees else _INVALID
     return ((time_us // 1000) % 2**32, *limits_cm, distance_cm, *sensor, *beam, quality)
 

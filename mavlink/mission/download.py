@@ -21,7 +21,7 @@ class _Reading(NamedTuple):
     """What a ground station is reading."""
 
     plan: Plan
-    heard_us: int
+    received_us: int
 
 
 class Downloads:
@@ -44,7 +44,7 @@ class Downloads:
         """
         reading = self._readings.get((peer, plan_type))
         plan = newest
-        if reading is not None and now_us - reading.heard_us < FORGOTTEN_AFTER_US:
+        if reading is not None and now_us - reading.received_us < FORGOTTEN_AFTER_US:
             plan = reading.plan
             self._remember(peer, plan_type, plan, now_us)
         if seq >= len(plan.items):

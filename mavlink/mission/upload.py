@@ -57,7 +57,7 @@ class _Upload:
         self.plan_type = plan_type
         self.count = count
         self.items: list[MissionItem] = []
-        self.heard_us = self.due_us = now_us
+        self.received_us = self.due_us = now_us
         self.quiet = False
         self.asked_in_old_form = False
         self._old_form: bool | None = None
@@ -82,7 +82,7 @@ class _Upload:
     def take(self, item: MissionItem, now_us: int) -> None:
         """Take the item that was asked for; the form that brought it is the one to go on with."""
         self.items.append(item)
-        self.heard_us = now_us
+        self.received_us = now_us
         self.quiet = False
         self._asked = 0
         if not self.asked_in_old_form:
@@ -178,7 +178,7 @@ class Uploads:
         for upload in list(self._under_way.values()):
             if now_us < upload.due_us:
                 continue
-            if now_us - upload.heard_us < PATIENCE_US:
+            if now_us - upload.received_us < PATIENCE_US:
                 sends.append(upload.ask(now_us))
                 continue
             del self._under_way[upload.plan_type]

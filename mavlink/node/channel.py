@@ -1,4 +1,4 @@
-"""A channel: one remote address on one link, with what was heard on it and what is to be sent."""
+"""A channel: one remote address on one link, with counts of what was received and frames to send."""
 
 from typing import NamedTuple
 
@@ -18,8 +18,8 @@ class ChannelState(NamedTuple):
         number: Of the channel.
         link: Number of its link.
         address: The remote address.
-        sources: System and component ids heard.
-        heard_us: Simulated time when something was heard last; None if nothing was.
+        sources: System and component ids received.
+        received_us: Simulated time of the last message, µs; None before the first.
         received: Messages.
         sent: Messages, forwarded ones too.
         dropped: Pieces of input that were not used.
@@ -30,7 +30,7 @@ class ChannelState(NamedTuple):
     link: int
     address: Address | None
     sources: tuple[Source, ...]
-    heard_us: int | None
+    received_us: int | None
     received: int
     sent: int
     dropped: int
@@ -46,7 +46,7 @@ class Channel:
         address: The remote address.
         fixed: Whether it stays open however long it is silent.
         codec: Its own, for sequence numbers are counted per channel.
-        active_us: Simulated time when it was opened, or heard last.
+        active_us: Simulated time when it was opened or a message received last, µs.
     """
 
     def __init__(
@@ -65,8 +65,8 @@ class Channel:
         self._sequences: dict[Source, int] = {}
         self._pending: list[bytes] = []
 
-    def hear(self, message: Message, now_us: int) -> None:
-        """Count a message that came, and those before it that did not."""
+    def receive(self, message: Message, now_us: int) -> None:
+        """Count a received message, and the lost ones before it."""
         self.active_us = now_us
         self._received += 1
         sequence = sequence_of(message.frame)

@@ -1,4 +1,4 @@
-"""Where all links meet: judges and routes what comes, hands the services what is theirs, sends what they say."""
+"""Where all links meet: checks and routes messages, dispatches them to the services, sends their answers."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -52,7 +52,7 @@ class Hub:
     A channel is one remote address on one link. It opens with the first valid message from there.
 
     Attributes:
-        hears_only: The messages that services hear for the time being; None for all.
+        accepts_only: The messages dispatched to services for the time being; None for all.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Hub:
         self._own = (system_id, component_id)
         self._services = tuple(services)
         names = frozenset[str]().union(*(service.handles for service in services))
-        self._hearing = {name: [service for service in services if name in service.handles] for name in names}
+        self._receivers = {name: [service for service in services if name in service.handles] for name in names}
         self._signing = signing
         self._observers = tuple(observers)
         self._router = Router(self._own)
@@ -76,7 +76,7 @@ class Hub:
         self._channels: dict[int, Channel] = {}
         self._numbers: dict[tuple[int, Address | None], int] = {}
         self._next_number = 0
-        self.hears_only: frozenset[str] | None = None
+        self.accepts_only: frozenset[str] | None = None
         self._now_us = 0
         self._tidy_at_us = 0
         self._dropped_before: Counter[str] = Counter()
@@ -107,9 +107,9 @@ class Hub:
         if number is not None:
             self._forget(number)
 
-    def hear_only(self, names: frozenset[str] | None) -> None:
-        """Hand only messages of these names to services for the time being; None: all."""
-        self.hears_only = names
+    def accept_only(self, names: frozenset[str] | None) -> None:
+        """Dispatch only messages of these names to services from now on; None: all."""
+        self.accepts_only = names
 
     def receive(
         self, datagram: bytes, link: int, address: Address | None, now_us: int, *, loopback: bool = True
@@ -173,16 +173,16 @@ class Hub:
         if message.name == UNKNOWN:  # its CRC may be wrong, so nothing is learned from it
             self._forward(message, (0, 0), channel)
             return
-        channel.hear(message, self._now_us)
-        self._router.hear(message.source, channel.number)
+        channel.receive(message, self._now_us)
+        self._router.receive(message.source, channel.number)
         target = target_of(message.fields)
         if message.name == "SETUP_SIGNING":  # "must never be automatically forwarded", message_signing.html
             self._set_up_signing(message, target, channel, loopback)
             return
         self._forward(message, target, channel)
-        if self._router.concerns_us(target) and (self.hears_only is None or message.name in self.hears_only):
+        if self._router.concerns_us(target) and (self.accepts_only is None or message.name in self.accepts_only):
             peer = Peer(channel.number, *message.source)
-            for service in self._hearing.get(message.name, ()):
+            for service in self._receivers.get(message.name, ()):
                 self.send(service.receive(message, peer, self._now_us))
 
     def _forward(self, message: Message, target: tuple[int, int], channel: Channel) -> None:

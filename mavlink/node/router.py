@@ -1,41 +1,41 @@
 """Which channels a message of somebody else's goes on to: https://mavlink.io/en/guide/routing.html.
 
-A broadcast goes to every channel, a message with a target only to where the target has been heard. Neither goes to a
-channel on which its source has been heard: that has it already. So nothing can run in circles, even where two channels
-lead to the same place.
+A broadcast goes to every channel, a message with a target only to channels on which the target was received.
+Neither goes to a channel on which its source was received: that has it already. So nothing can run in circles, even
+where two channels lead to the same place.
 """
 
 Source = tuple[int, int]
 """System and component id."""
 
 SOURCES = 64
-"""Sources remembered per channel; of more, the one heard first is forgotten."""
+"""Sources remembered per channel; of more, the first is forgotten."""
 
 
 class Router:
-    """Remembers who was heard on which channel."""
+    """Table of the sources received on each channel."""
 
     def __init__(self, own: Source) -> None:
         """Route for everybody but `own`, which nothing is forwarded to."""
         self._own = own
-        self._heard: dict[int, dict[Source, None]] = {}
+        self._sources: dict[int, dict[Source, None]] = {}
 
     def open(self, channel: int) -> None:
         """Forward to `channel` from now on."""
-        self._heard[channel] = {}
+        self._sources[channel] = {}
 
     def close(self, channel: int) -> None:
         """Forget `channel`."""
-        self._heard.pop(channel, None)
+        self._sources.pop(channel, None)
 
-    def hear(self, source: Source, channel: int) -> None:
-        """Remember that `source` can be reached on `channel`."""
-        heard = self._heard[channel]
-        if source in heard:
+    def receive(self, source: Source, channel: int) -> None:
+        """Note that `source` can be reached on `channel`."""
+        sources = self._sources[channel]
+        if source in sources:
             return
-        if len(heard) == SOURCES:
-            del heard[next(iter(heard))]
-        heard[source] = None
+        if len(sources) == SOURCES:
+            del sources[next(iter(sources))]
+        sources[source] = None
 
     def onward(self, source: Source, target: Source, channel: int) -> list[int]:
         """Return the channels to forward a message to that came on `channel`; target ids of 0 mean all."""
@@ -43,8 +43,8 @@ class Router:
             return []
         return [
             other
-            for other, heard in self._heard.items()
-            if other != channel and source not in heard and (not target[0] or _leads_to(target, heard))
+            for other, sources in self._sources.items()
+            if other != channel and source not in sources and (not target[0] or _leads_to(target, sources))
         ]
 
     def concerns_us(self, target: Source) -> bool:
@@ -53,11 +53,11 @@ class Router:
         return system in (0, self._own[0]) and component in (0, self._own[1])
 
 
-def _leads_to(target: Source, heard: dict[Source, None]) -> bool:
+def _leads_to(target: Source, sources: dict[Source, None]) -> bool:
     system, component = target
     if component:
-        return target in heard
-    return any(system == other for other, _ in heard)
+        return target in sources
+    return any(system == other for other, _ in sources)
 
 
 def target_of(fields: object) -> Source:

@@ -1,6 +1,6 @@
 """What every microservice is: messages and the simulated time in, messages to send out.
 
-A service hears only what is meant for this component, or for all, and what comes from another: the hub sees to that.
+A service receives only messages to this component or to all, from another component: the hub filters them.
 Whatever the fields hold, `receive` and `poll` raise nothing. Nobody has checked the values: NaN, infinities, unknown
 enumerations and lies about counts are the service's to refuse.
 """
@@ -61,10 +61,10 @@ class Service(Protocol):
 
 
 def to(peer: Peer, name: str, *fields: Any) -> Send:
-    """Answer `peer`."""
+    """Return a message to `peer`."""
     return Send(name, fields, peer.channel)
 
 
 def to_all(name: str, *fields: Any) -> Send:
-    """Tell everybody."""
+    """Return a message to all channels."""
     return Send(name, fields)

@@ -132,7 +132,7 @@ class Entry(NamedTuple):
 class _Running:
     command: Command
     progress: int
-    tell_at_us: int
+    report_at_us: int
 
 
 class _Answered(NamedTuple):
@@ -161,7 +161,7 @@ class CommandService:
         self._text = text
         self.closed = ""
         self._running: dict[int, _Running] = {}
-        self._tell_at_us: int | None = None
+        self._report_at_us: int | None = None
         self._answered: dict[tuple[Peer, int], _Answered] = {}
         self._said: tuple[str, int] = ("", -SAME_REASON_AFTER_US)
 
@@ -189,12 +189,12 @@ class CommandService:
 
     def poll(self, now_us: int) -> Iterable[Send]:
         """Tell once a second how far the commands in progress are."""
-        if self._tell_at_us is None or 0 < self._tell_at_us - now_us <= PROGRESS_EVERY_US:
+        if self._report_at_us is None or 0 < self._report_at_us - now_us <= PROGRESS_EVERY_US:
             return ()
         sends = []
         for number, running in self._running.items():
-            if not 0 < running.tell_at_us - now_us <= PROGRESS_EVERY_US:
-                running.tell_at_us = now_us + PROGRESS_EVERY_US
+            if not 0 < running.report_at_us - now_us <= PROGRESS_EVERY_US:
+                running.report_at_us = now_us + PROGRESS_EVERY_US
                 sends.append(_progress(number, running))
         self._schedule()
         return sends
@@ -268,7 +268,7 @@ class CommandService:
         self._schedule()
 
     def _schedule(self) -> None:
-        self._tell_at_us = min((running.tell_at_us for running in self._running.values()), default=None)
+        self._report_at_us = min((running.report_at_us for running in self._running.values()), default=None)
 
     def _remember(self, command: Command, confirmation: int, outcome: Outcome, at_us: int) -> None:
         key = (command.peer, command.id)

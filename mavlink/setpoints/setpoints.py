@@ -89,22 +89,22 @@ class TargetState(NamedTuple):
         position_enu_m: From the origin, m.
         velocity_enu_m_s: Zero where it is not known.
         acceleration_enu_m_s2: Zero where it is not known.
-        told_us: When it was told, simulated time.
+        received_us: When it was told, simulated time.
         time_us: What it is the state at.
     """
 
     position_enu_m: Vector
     velocity_enu_m_s: Vector
     acceleration_enu_m_s2: Vector
-    told_us: int = 0
+    received_us: int = 0
     time_us: int = 0
 
     def at(self, now_us: int, max_us: int) -> "TargetState":
         """Return it at `now_us`: it goes on at its velocity until `max_us` after it was told, then it stands."""
-        after_s = max(min(now_us, self.told_us + max_us) - self.time_us, 0) * 1e-6
+        after_s = max(min(now_us, self.received_us + max_us) - self.time_us, 0) * 1e-6
         (x, y, z), (vx, vy, vz) = self.position_enu_m, self.velocity_enu_m_s
         there = self._replace(position_enu_m=(x + after_s * vx, y + after_s * vy, z + after_s * vz), time_us=now_us)
-        if now_us <= self.told_us + max_us:
+        if now_us <= self.received_us + max_us:
             return there
         return there._replace(velocity_enu_m_s=STILL, acceleration_enu_m_s2=STILL)
 

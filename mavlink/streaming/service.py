@@ -51,7 +51,7 @@ class StreamService:
         self._telemetry = dict(telemetry)
         self._spread = {name: number for number, name in enumerate(telemetry)}
         self._names = {_message_id(name): name for name in telemetry}
-        self._providers: dict[int, Provider] = {mav.MAVLINK_MSG_ID_MESSAGE_INTERVAL: self._interval_asked}
+        self._providers: dict[int, Provider] = {mav.MAVLINK_MSG_ID_MESSAGE_INTERVAL: self._interval_requested}
         for name, provider in (providers or {}).items():
             self.provide(name, provider)
         self._schedule: Schedule[tuple[int, str]] = Schedule()
@@ -59,7 +59,7 @@ class StreamService:
         self._open: set[int] = set()
         self._waiting: list[Send] = []
         self._snapshot: Snapshot | None = None
-        self._told: dict[str, list[Fields]] = {}
+        self._encoded: dict[str, list[Fields]] = {}
         self._now_us = 0
 
     def provide(self, name: str, provider: Provider) -> None:
@@ -71,8 +71,8 @@ class StreamService:
     def update(self, snapshot: Snapshot) -> None:
         """Take in the vehicle as it is now."""
         self._snapshot = snapshot
-        if self._told:
-            self._told = {}
+        if self._encoded:
+            self._encoded = {}
 
     def use(self, channel: int, kind: str) -> None:
         """Stream to `channel` what its `kind` (of `rates.DEFAULTS`) gets unless it asks for other rates."""
@@ -115,7 +115,7 @@ class StreamService:
             return ()
         sends, self._waiting = self._waiting, []
         for channel, name in due:
-            sends.extend([Send(name, fields, channel) for fields in self._tell(name)])
+            sends.extend([Send(name, fields, channel) for fields in self._encode(name)])
         return sends
 
     def handlers(self) -> dict[int, Handler | Entry]:
@@ -150,7 +150,7 @@ class StreamService:
         """510: param1 message id; answered by MESSAGE_INTERVAL."""
         return self._report_interval(_whole(command.p1), command.peer)
 
-    def _interval_asked(self, command: Command) -> list[Send] | Outcome:
+    def _interval_requested(self, command: Command) -> list[Send] | Outcome:
         """REQUEST_MESSAGE of MESSAGE_INTERVAL: param2 is the message whose interval is asked for."""
         outcome = self._report_interval(_whole(command.p2), command.peer)
         return [] if outcome == Outcome() else outcome
@@ -183,7 +183,7 @@ class StreamService:
         name = self._names.get(message_id)
         if name is None:
             return Outcome(UNSUPPORTED)
-        sends = [to(command.peer, name, *fields) for fields in self._tell(name)]
+        sends = [to(command.peer, name, *fields) for fields in self._encode(name)]
         return self._post(sends) if sends else Outcome(TEMPORARILY_REJECTED)
 
     def _post(self, sends: list[Send]) -> Outcome:
@@ -193,14 +193,14 @@ class StreamService:
         self._waiting.extend(sends)
         return Outcome()
 
-    def _tell(self, name: str) -> list[Fields]:
+    def _encode(self, name: str) -> list[Fields]:
         """Return the fields of the messages `name` of this frame, worked out once however many channels want them."""
-        told = self._told.get(name)
-        if told is None:
+        encoded = self._encoded.get(name)
+        if encoded is None:
             fields = None if self._snapshot is None else self._telemetry[name](self._snapshot)
-            told = [] if fields is None else fields if isinstance(fields, list) else [fields]
-            self._told[name] = told
-        return told
+            encoded = [] if fields is None else fields if isinstance(fields, list) else [fields]
+            self._encoded[name] = encoded
+        return encoded
 
     def _restart(self, channel: int, now_us: int) -> None:
         for name in self._telemetry:

@@ -84,8 +84,14 @@ def flight_information(s: Snapshot) -> Fields:
 def estimator_status(s: Snapshot) -> Fields:
     """ESTIMATOR_STATUS (230). A state that is told is known, and nothing contradicts it."""
     if s.estimator is not None:
-        told = s.estimator
-        return (s.time_us, told.flags, *told.ratios, told.horizontal_accuracy_m, told.vertical_accuracy_m)
+        e = s.estimator
+        return (
+            s.time_us,
+            e.flags,
+            *e.ratios,
+            e.horizontal_accuracy_m,
+            e.vertical_accuracy_m,
+        )
     finite = all(map(isfinite, (*s.position_enu_m, *s.velocity_enu_m_s, *s.attitude)))
     return (s.time_us, ESTIMATED if finite else 0, *(0.0,) * 8)
 

@@ -40,7 +40,7 @@ class Simulator:
                     got.append(received.frame)
         return got
 
-    def heard(self) -> list[Message]:
+    def received(self) -> list[Message]:
         return [message for datagram in self.end.take_outbox() for message in self.codec.decode(datagram)]
 
 
@@ -52,14 +52,14 @@ def test_it_calls_until_it_is_served_and_goes_on_with_heartbeats() -> None:
     simulator = Simulator()
     due_s = simulator.end.poll(0.0)
     assert due_s == CALL_EVERY_S
-    assert [message.name for message in simulator.heard()] == ["HEARTBEAT"]
+    assert [message.name for message in simulator.received()] == ["HEARTBEAT"]
     simulator.end.poll(0.9 * CALL_EVERY_S)
-    assert simulator.heard() == []
+    assert simulator.received() == []
     simulator.send(frame(0), now_s=0.5)
     simulator.end.answer(command(0))
-    simulator.heard()
+    simulator.received()
     simulator.end.poll(CALL_EVERY_S)
-    (heartbeat,) = simulator.heard()
+    (heartbeat,) = simulator.received()
     assert heartbeat.fields.base_mode == mav.MAV_MODE_FLAG_SAFETY_ARMED
 
 
@@ -68,7 +68,7 @@ def test_time_is_counted_from_the_first_frame_and_answered_as_it_came() -> None:
     got = simulator.send(frame(0), frame(1))
     assert [sensors.time_us for sensors in got] == [0, 4000]
     simulator.end.answer(command(4000))
-    (answer,) = simulator.heard()
+    (answer,) = simulator.received()
     assert (answer.name, answer.fields.time_usec) == ("HIL_ACTUATOR_CONTROLS", FIRST_US + 4000)
     assert (answer.fields.mode & mav.MAV_MODE_FLAG_SAFETY_ARMED, answer.fields.flags) == (128, 1)
 
@@ -77,7 +77,7 @@ def test_motors_are_in_the_simulators_order_and_unit() -> None:
     simulator = Simulator()
     simulator.send(frame(0))
     simulator.end.answer(command(0))
-    (answer,) = simulator.heard()
+    (answer,) = simulator.received()
     assert answer.fields.controls[:4] == pytest.approx([0.09, 0.01, 0.16, 0.04])
 
 
@@ -99,11 +99,11 @@ def test_a_frame_that_comes_again_gets_the_remembered_answer() -> None:
     simulator = Simulator()
     simulator.send(frame(0))
     assert simulator.send(frame(0)) == []
-    assert simulator.heard() == []
+    assert simulator.received() == []
     simulator.end.answer(command(0))
-    first = simulator.heard()
+    first = simulator.received()
     assert simulator.send(frame(0)) == []
-    (again,) = simulator.heard()
+    (again,) = simulator.received()
     assert again.fields.controls == first[0].fields.controls
     assert simulator.end.repeated == 2
 
@@ -113,9 +113,9 @@ def test_an_answer_that_was_lost_is_sent_again() -> None:
     simulator.send(frame(0))
     simulator.end.answer(command(0))
     simulator.end.poll(0.0)
-    simulator.heard()
+    simulator.received()
     simulator.end.poll(1.01 * ANSWER_AGAIN_AFTER_S)
-    assert [message.name for message in simulator.heard()] == ["HEARTBEAT", "HIL_ACTUATOR_CONTROLS"]
+    assert [message.name for message in simulator.received()] == ["HEARTBEAT", "HIL_ACTUATOR_CONTROLS"]
 
 
 def test_a_simulator_that_begins_anew_is_another_flight() -> None:

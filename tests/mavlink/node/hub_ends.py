@@ -18,11 +18,11 @@ class Recorder:
     handles = frozenset(definition.msgname for definition in dialect.mav.mavlink_map.values())
 
     def __init__(self) -> None:
-        self.heard: list[tuple[str, Peer, int]] = []
+        self.received: list[tuple[str, Peer, int]] = []
         self.due: list[Send] = []
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
-        self.heard.append((message.name, peer, now_us))
+        self.received.append((message.name, peer, now_us))
         return [to(peer, "PING", 7, 8, *message.source)] if message.name == "PING" else ()
 
     def poll(self, now_us: int) -> Iterable[Send]:
@@ -32,7 +32,7 @@ class Recorder:
 
     @property
     def names(self) -> list[str]:
-        return [name for name, _, _ in self.heard]
+        return [name for name, _, _ in self.received]
 
 
 class Observer:

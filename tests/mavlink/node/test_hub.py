@@ -29,8 +29,8 @@ def ours(service: Recorder) -> Hub:
 def test_the_first_message_opens_a_channel(ours: Hub, service: Recorder) -> None:
     ours.receive(Station().says(), 2, GCS, 5)
     (channel,) = ours.channels
-    assert (channel.link, channel.address, channel.sources, channel.heard_us) == (2, GCS, ((255, 190),), 5)
-    assert service.heard == [("HEARTBEAT", Peer(channel.number, 255, 190), 5)]
+    assert (channel.link, channel.address, channel.sources, channel.received_us) == (2, GCS, ((255, 190),), 5)
+    assert service.received == [("HEARTBEAT", Peer(channel.number, 255, 190), 5)]
 
 
 def test_an_answer_takes_the_channel_that_the_question_came_on(ours: Hub) -> None:
@@ -108,7 +108,7 @@ def test_our_own_messages_are_not_heard_when_they_come_back(ours: Hub, service: 
     ours.open(0, GCS)
     ours.receive(Station(1, 1).says(), 0, GCS, 0)
     ours.receive(Station(1, 1).says(), 1, SDK, 0)
-    assert service.heard == []
+    assert service.received == []
     assert len(ours.channels) == 1
     assert ours.take_outbox() == []
     assert ours.dropped == {"echo": 2}
@@ -119,8 +119,8 @@ def test_messages_are_forwarded_byte_for_byte(ours: Hub, service: Recorder) -> N
     ours.receive(gcs.says(), 0, GCS, 0)
     ours.receive(sdk.says(), 0, SDK, 0)
     ours.take_outbox()
-    service.heard.clear()
-    for datagram, heard in (
+    service.received.clear()
+    for datagram, received in (
         (gcs.says("COMMAND_LONG", 245, 190, 400, 0, *[1.0] * 7), False),
         (gcs.says("STATUSTEXT", 6, b"\xff\xfe", 0, 0), True),
         (gcs.says("FILE_TRANSFER_PROTOCOL", 0, 245, 0, range(251)), False),
@@ -128,8 +128,8 @@ def test_messages_are_forwarded_byte_for_byte(ours: Hub, service: Recorder) -> N
         ours.receive(datagram, 0, GCS, 0)
         (out,) = ours.take_outbox()
         assert (out.address, out.datagram) == (SDK, datagram)
-        assert bool(service.heard) is heard
-        service.heard.clear()
+        assert bool(service.received) is received
+        service.received.clear()
 
 
 def test_messages_for_us_and_for_nobody_known_are_not_forwarded(ours: Hub) -> None:
@@ -177,7 +177,7 @@ def test_what_is_lost_shows_in_the_gaps(ours: Hub) -> None:
     ours.receive(frames[-1], 0, GCS, 300)
     ours.receive(frames[-5], 0, GCS, 301)
     (channel,) = ours.channels
-    assert (channel.lost, channel.received, channel.heard_us) == (60, 242, 301)
+    assert (channel.lost, channel.received, channel.received_us) == (60, 242, 301)
 
 
 def test_what_is_sent_and_dropped_is_counted_per_channel(ours: Hub) -> None:
@@ -186,7 +186,7 @@ def test_what_is_sent_and_dropped_is_counted_per_channel(ours: Hub) -> None:
     ours.receive(b"\xfd\x00", 0, GCS, 0)
     ours.send([Send("HEARTBEAT", HEARTBEAT, number)])
     gcs, sdk = ours.channels
-    assert (gcs.received, gcs.sent, gcs.dropped, gcs.heard_us) == (0, 1, 1, None)
+    assert (gcs.received, gcs.sent, gcs.dropped, gcs.received_us) == (0, 1, 1, None)
     assert (sdk.sent, sdk.dropped) == (0, 0)
     assert ours.dropped == {"truncated": 1}
 
@@ -228,7 +228,7 @@ def test_fixed_channels_leave_no_room(ours: Hub, service: Recorder) -> None:
     for i in range(CHANNELS):
         ours.open(0, ("127.0.0.1", i))
     ours.receive(Station().says(), 1, GCS, 0)
-    assert service.heard == []
+    assert service.received == []
     assert ours.dropped == {"no room": 1}
 
 
@@ -302,7 +302,7 @@ def test_a_good_message_is_heard_after_anything(datagram: bytes) -> None:
     service = Recorder()
     ours = Hub(1, 1, [service])
     ours.receive(datagram, 0, GCS, 0)
-    service.heard.clear()
+    service.received.clear()
     ours.receive(Station().says(), 0, GCS, 0)
     assert service.names == ["HEARTBEAT"]
 
@@ -314,4 +314,4 @@ def test_a_flood_of_senders_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatc
         ours.receive(Station(2 + i % 200).says(), 0, ("127.0.0.1", i), i)
         ours.take_outbox()
     assert [channel.number for channel in ours.channels] == [497, 498, 499]
-    assert len(ours._numbers) == len(ours._router._heard) == 3  # noqa: SLF001
+    assert len(ours._numbers) == len(ours._router._sources) == 3  # noqa: SLF001

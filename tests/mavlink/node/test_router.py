@@ -16,7 +16,7 @@ def router() -> Router:
     for channel in range(5):
         router.open(channel)
     for source, channel in ((GCS, 0), (SDK, 1), (CAMERA, 2), (OTHER, 3), (GIMBAL, 3)):
-        router.hear(source, channel)
+        router.receive(source, channel)
     return router
 
 
@@ -55,13 +55,13 @@ def test_what_concerns_us(router: Router, target: Source, ours: bool) -> None:
 
 
 def test_a_target_on_two_channels_is_reached_on_both(router: Router) -> None:
-    router.hear(OTHER, 4)
+    router.receive(OTHER, 4)
     assert router.onward(GCS, OTHER, 0) == [3, 4]
     assert router.onward(GCS, (2, 0), 0) == [3, 4]
 
 
 def test_nothing_runs_in_circles(router: Router) -> None:
-    router.hear(GCS, 4)
+    router.receive(GCS, 4)
     assert router.onward(GCS, (0, 0), 0) == [1, 2, 3]
     assert router.onward(GCS, (0, 0), 4) == [1, 2, 3]
 
@@ -74,7 +74,7 @@ def test_a_closed_channel_is_forgotten(router: Router) -> None:
 
 def test_the_table_is_bounded_per_channel(router: Router) -> None:
     for system in range(10, 10 + 2 * SOURCES):
-        router.hear((system, 1), 4)
+        router.receive((system, 1), 4)
     reachable = [system for system in range(1, 256) if 4 in router.onward(GCS, (system, 1), 0)]
     assert reachable == list(range(10 + SOURCES, 10 + 2 * SOURCES))
     assert router.onward(GCS, OTHER, 0) == [3]

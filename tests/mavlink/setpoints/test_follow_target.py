@@ -50,7 +50,7 @@ def test_a_target_in_enu(follow: Follow) -> None:
     assert target.position_enu_m == pytest.approx((100.0, -50.0, 10.0), abs=0.02)
     assert target.velocity_enu_m_s == (1.0, 2.0, 0.5)
     assert target.acceleration_enu_m_s2 == (0.0, 0.0, 0.0)
-    assert target.told_us == 5_000
+    assert target.received_us == 5_000
 
 
 def test_it_goes_on_at_its_velocity_up_to_a_bound(follow: Follow) -> None:
@@ -105,9 +105,9 @@ def test_what_is_no_target_is_dropped(follow: Follow, changes: dict[str, Any], r
 def test_one_tracker_at_a_time(follow: Follow) -> None:
     tell(follow)
     tell(follow, SECOND, 2_000_000, alt=500.0)
-    assert latest(follow, 2_000_000).told_us == 0
+    assert latest(follow, 2_000_000).received_us == 0
     tell(follow, SECOND, 3_100_000, alt=500.0)
-    assert latest(follow, 3_100_000).told_us == 3_100_000
+    assert latest(follow, 3_100_000).received_us == 3_100_000
 
 
 @given(messages("FOLLOW_TARGET"))

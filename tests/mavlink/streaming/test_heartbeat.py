@@ -1,4 +1,4 @@
-"""Heartbeats: ours at 1 Hz and at once with news, those of others remembered."""
+"""Heartbeats: ours at 1 Hz and at once with news, the time of ground stations."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import pytest
 
 from colibri.mavlink.node.service import Peer, Send
 from colibri.mavlink.services.identity import GENERIC, PX4, Identity
-from colibri.mavlink.streaming.heartbeat import MAX_HEARD, HeartbeatService
+from colibri.mavlink.streaming.heartbeat import HeartbeatService
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.wire.dialect import mav
 from tests.mavlink.services.peers import message, on_the_wire
@@ -25,7 +25,7 @@ def service() -> HeartbeatService:
     return service
 
 
-def hear(service: HeartbeatService, peer: Peer, now_us: int, kind: int = mav.MAV_TYPE_GCS) -> None:
+def receive(service: HeartbeatService, peer: Peer, now_us: int, kind: int = mav.MAV_TYPE_GCS) -> None:
     list(service.receive(message("HEARTBEAT", kind, 8, 0, 0, 4, 3, peer=peer), peer, now_us))
 
 
@@ -79,9 +79,10 @@ def test_nothing_is_said_before_anything_is_known() -> None:
     assert list(HeartbeatService(PX4).poll(0)) == []
 
 
-def test_who_was_heard_has_a_limit(service: HeartbeatService) -> None:
-    for system in range(200):
-        hear(service, Peer(1, system, 1), system)
-    heard = service.heard()
-    assert len(heard) == MAX_HEARD
-    assert heard[-1].peer.system == 199
+def test_when_a_ground_station_was_received_last(service: HeartbeatService) -> None:
+    assert service.station_us is None
+    service.expect(1_000_000)
+    receive(service, Peer(3, 1, 158), 2_000_000, mav.MAV_TYPE_CAMERA)
+    assert service.station_us == 1_000_000
+    receive(service, Peer(1, 255, 190), 3_000_000)
+    assert service.station_us == 3_000_000

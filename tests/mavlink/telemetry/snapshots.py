@@ -107,7 +107,7 @@ ARBITRARY = st.builds(
 )
 
 
-def told(name: str, snapshot: Snapshot, table: dict[str, Encoder] = TELEMETRY) -> list[Any]:
+def sent(name: str, snapshot: Snapshot, table: dict[str, Encoder] = TELEMETRY) -> list[Any]:
     """Return the fields that arrive when `snapshot` is told by messages `name`."""
     fields = table[name](snapshot)
     messages = [] if fields is None else fields if isinstance(fields, list) else [fields]

@@ -11,7 +11,7 @@ from colibri.mavlink.telemetry.encoder import Constants
 from colibri.mavlink.telemetry.snapshot import BatteryState, Snapshot
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import mav
-from tests.mavlink.telemetry.snapshots import ARBITRARY, FLYING, TELEMETRY, told
+from tests.mavlink.telemetry.snapshots import ARBITRARY, FLYING, TELEMETRY, sent
 
 METRES_A_DEGREE = radians(1.0) * 6371000.0
 LATITUDE_E7 = round((47.0 + 20.0 / METRES_A_DEGREE) * 1e7)
@@ -158,7 +158,7 @@ EXPECTED: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", EXPECTED)
 def test_a_message_tells_the_snapshot(name: str) -> None:
-    (fields,) = told(name, FLYING)
+    (fields,) = sent(name, FLYING)
     for field, value in EXPECTED[name].items():
         received = getattr(fields, field)
         received = list(received) if isinstance(received, tuple) else received
@@ -171,13 +171,13 @@ def test_every_message_is_checked() -> None:
 
 @pytest.mark.parametrize("name", ["GLOBAL_POSITION_INT", "GPS_RAW_INT", "HIL_STATE_QUATERNION"])
 def test_a_place_is_told_to_a_centimetre(name: str) -> None:
-    (fields,) = told(name, FLYING)
+    (fields,) = sent(name, FLYING)
     assert fields.lat == pytest.approx(LATITUDE_E7, abs=1)
     assert fields.lon == pytest.approx(LONGITUDE_E7, abs=1)
 
 
 def test_each_figure_of_the_solver_has_a_name() -> None:
-    figures = {fields.name: fields.value for fields in told("NAMED_VALUE_FLOAT", FLYING)}
+    figures = {fields.name: fields.value for fields in sent("NAMED_VALUE_FLOAT", FLYING)}
     assert len(figures) == 8
     assert figures["mpc_iter"] == 7.0
     assert figures["mpc_us"] == pytest.approx(100.0)
@@ -185,7 +185,7 @@ def test_each_figure_of_the_solver_has_a_name() -> None:
 
 
 def test_the_array_is_laid_out_as_documented() -> None:
-    (fields,) = told("DEBUG_FLOAT_ARRAY", FLYING)
+    (fields,) = sent("DEBUG_FLOAT_ARRAY", FLYING)
     assert fields.data[5] == 5.5
     assert fields.data[11] == pytest.approx(0.1)
 
@@ -197,16 +197,16 @@ def test_what_is_not_known_is_not_told(name: str) -> None:
 
 def test_unknown_values_are_those_of_the_definition() -> None:
     bare = Snapshot(time_us=0)
-    (status,) = told("SYS_STATUS", bare)
+    (status,) = sent("SYS_STATUS", bare)
     assert (status.voltage_battery, status.current_battery, status.battery_remaining) == (65535, -1, -1)
-    (radio,) = told("RC_CHANNELS", bare)
+    (radio,) = sent("RC_CHANNELS", bare)
     assert (radio.chancount, radio.chan1_raw, radio.rssi) == (0, 65535, 255)
-    (gps,) = told("GPS_RAW_INT", bare)
+    (gps,) = sent("GPS_RAW_INT", bare)
     assert gps.cog == 65535
-    (target,) = told("POSITION_TARGET_LOCAL_NED", bare)
+    (target,) = sent("POSITION_TARGET_LOCAL_NED", bare)
     assert target.type_mask == 0xDFF
     assert isnan(target.x)
-    (odometry,) = told("ODOMETRY", bare)
+    (odometry,) = sent("ODOMETRY", bare)
     assert isnan(odometry.pose_covariance[0])
 
 
@@ -219,7 +219,7 @@ def test_unknown_values_are_those_of_the_definition() -> None:
     ],
 )
 def test_arming_checks_are_a_bit(snapshot: Snapshot, present: bool, enabled: bool, healthy: bool) -> None:
-    (fields,) = told("SYS_STATUS", snapshot)
+    (fields,) = sent("SYS_STATUS", snapshot)
     bit = mav.MAV_SYS_STATUS_PREARM_CHECK
     masks = (
         fields.onboard_control_sensors_present,
@@ -231,14 +231,14 @@ def test_arming_checks_are_a_bit(snapshot: Snapshot, present: bool, enabled: boo
 
 @pytest.mark.parametrize(("enabled", "breached"), [(False, False), (True, False), (True, True)])
 def test_the_fence_is_healthy_until_it_is_breached(enabled: bool, breached: bool) -> None:
-    (fields,) = told("SYS_STATUS", Snapshot(time_us=0, fence_enabled=enabled, fence_breached=breached))
+    (fields,) = sent("SYS_STATUS", Snapshot(time_us=0, fence_enabled=enabled, fence_breached=breached))
     fence = mav.MAV_SYS_STATUS_GEOFENCE
     assert bool(fields.onboard_control_sensors_enabled & fence) == enabled
     assert bool(fields.onboard_control_sensors_health & fence) != breached
 
 
 def test_health_is_what_clients_wait_for() -> None:
-    (fields,) = told("SYS_STATUS", FLYING)
+    (fields,) = sent("SYS_STATUS", FLYING)
     wanted = 1 | 2 | 4 | 8 | 32 | mav.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS | mav.MAV_SYS_STATUS_SENSOR_BATTERY
     assert fields.onboard_control_sensors_present & wanted == wanted
     assert fields.onboard_control_sensors_health & wanted == wanted
@@ -247,39 +247,39 @@ def test_health_is_what_clients_wait_for() -> None:
 @pytest.mark.parametrize(("cells", "ext"), [(14, [3700] * 4), (12, [3700] * 2 + [0] * 2), (10, [0] * 4)])
 def test_many_cells_go_on_in_the_extension(cells: int, ext: list[int]) -> None:
     battery = BatteryState(cells, 3.7 * cells, 1.0, 0.0, 1.0, 60.0, 0.0)
-    (fields,) = told("BATTERY_STATUS", replace(FLYING, battery=battery))
+    (fields,) = sent("BATTERY_STATUS", replace(FLYING, battery=battery))
     assert list(fields.voltages) == [3700] * 10
     assert list(fields.voltages_ext) == ext
 
 
 def test_unknown_cells_are_told_as_one() -> None:
     battery = BatteryState(0, 11.1, 1.0, 0.0, 1.0, 60.0, 0.0)
-    (fields,) = told("BATTERY_STATUS", replace(FLYING, battery=battery))
+    (fields,) = sent("BATTERY_STATUS", replace(FLYING, battery=battery))
     assert list(fields.voltages) == [11_100] + [65535] * 9
 
 
 @pytest.mark.parametrize("state", [1, 2, 3, 4])
 def test_charge_states(state: int) -> None:
     assert FLYING.battery is not None
-    (fields,) = told("BATTERY_STATUS", replace(FLYING, battery=FLYING.battery._replace(charge_state=state)))
+    (fields,) = sent("BATTERY_STATUS", replace(FLYING, battery=FLYING.battery._replace(charge_state=state)))
     assert fields.charge_state == state
 
 
 def test_unix_time_goes_on_from_the_start() -> None:
     table = telemetry(Constants(boot_unix_us=1_800_000_000_000_000))
-    (fields,) = told("SYSTEM_TIME", FLYING, table)
+    (fields,) = sent("SYSTEM_TIME", FLYING, table)
     assert fields.time_unix_usec == 1_800_000_012_345_678
 
 
 def test_the_gravity_of_the_place_is_felt_at_rest() -> None:
     table = telemetry(Constants(gravity_m_s2=9.5))
-    (fields,) = told("HIGHRES_IMU", Snapshot(time_us=0), table)
+    (fields,) = sent("HIGHRES_IMU", Snapshot(time_us=0), table)
     assert (fields.xacc, fields.yacc, fields.zacc) == pytest.approx((0.0, 0.0, -9.5))
 
 
 def test_the_standard_atmosphere() -> None:
     """ISO 2533: 898.76 hPa and 8.5 °C at 1000 m."""
-    (fields,) = told("SCALED_PRESSURE", replace(FLYING, position_enu_m=(0.0, 0.0, 600.0)))
+    (fields,) = sent("SCALED_PRESSURE", replace(FLYING, position_enu_m=(0.0, 0.0, 600.0)))
     assert fields.press_abs == pytest.approx(898.76, abs=0.05)
     assert fields.temperature == 850
 
@@ -288,4 +288,4 @@ def test_the_standard_atmosphere() -> None:
 @given(ARBITRARY)
 def test_whatever_the_snapshot_holds_nothing_raises(snapshot: Snapshot) -> None:
     for name in TELEMETRY:
-        told(name, snapshot)
+        sent(name, snapshot)
