@@ -146,7 +146,7 @@ def path_in(data: bytes) -> Names | FileRefusal:
 def line_of(entry: Entry, *, with_time: bool) -> bytes:
     """Return a folder's entry as it is listed: List Directory, List Directory with Timestamps.
 
-    What cannot be told is skipped by an "S", so that the entries behind it keep their numbers.
+    What cannot be listed is skipped by an "S", so that the entries behind it keep their numbers.
     """
     name = entry.name.encode(errors="replace")
     kind = b"D" if entry.is_folder else b"F"

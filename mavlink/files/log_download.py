@@ -174,7 +174,7 @@ class Logs:
 
 
 def _blocks(transfer: _Transfer, maximum: int) -> Iterator[Send]:
-    """Send the next blocks; where the log ends with a full one, an empty one tells so."""
+    """Send the next blocks; where the log ends with a full one, an empty one ends it."""
     wanted = min(maximum * BLOCK_BYTES, transfer.end - transfer.offset)
     data = transfer.reading.read(transfer.offset, wanted)
     if isinstance(data, FileRefusal):

@@ -1,4 +1,4 @@
-"""What plant and autopilot tell each other.
+"""What plant and autopilot send each other.
 
 Frames, commands, faults, and the conversations (lockstep, PX4's interface, stepped).
 """

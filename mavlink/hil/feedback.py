@@ -1,4 +1,4 @@
-"""What a plant tells its autopilot at every frame, by the word of the command line."""
+"""What a plant sends its autopilot at every frame, by the word of the command line."""
 
 from argparse import ArgumentTypeError
 from enum import StrEnum

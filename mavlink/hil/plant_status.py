@@ -1,4 +1,4 @@
-"""What a plant tells its autopilot beside a frame: its battery, and what became of the faults that were asked for."""
+"""What a plant sends its autopilot beside a frame: its battery, and the results of the faults requested."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -43,10 +43,10 @@ class FaultResult(NamedTuple):
 
 
 class PlantStatus(NamedTuple):
-    """What a plant tells beside a frame.
+    """What a plant sends beside a frame.
 
     Attributes:
-        battery: None where there is none, or nothing is told of it.
+        battery: None where there is none, or it is not sent.
         results: Of the faults that came with the answer to the frame before, in order.
     """
 
@@ -58,7 +58,7 @@ NOTHING = PlantStatus()
 
 
 class ReceivedFrame(NamedTuple):
-    """The next frame to answer, and what the plant tells beside it."""
+    """The next frame to answer, and what the plant sent beside it."""
 
     frame: Frame
     plant_status: PlantStatus = NOTHING

@@ -1,7 +1,7 @@
 """PX4's simulator interface, the autopilot's end, as a state machine: what came and the time in, datagrams out.
 
-It calls the simulator with a HEARTBEAT, and goes on with two a second by the wall clock, as a simulator that hears none
-for three seconds begins anew. Each HIL_SENSOR is answered by a HIL_ACTUATOR_CONTROLS that names its time and asks for
+It calls the simulator with a HEARTBEAT, and goes on with two a second by the wall clock, as a simulator that receives
+none for three seconds restarts. Each HIL_SENSOR is answered by a HIL_ACTUATOR_CONTROLS that names its time and asks for
 lockstep. A simulator's clock may stand anywhere when it begins: time is counted from its first frame.
 
 jMAVSim's habits are borne: its HIL_GPS comes behind the HIL_SENSOR of the same time, and belongs to the next; older

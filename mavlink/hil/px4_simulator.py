@@ -23,7 +23,7 @@ from colibri.mavlink.wire.dialect import Codec, Message
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
 RESEND_AFTER_S = 1.0
-"""Wall-clock silence after which a frame is sent again: PX4 may have been started anew, or a datagram lost."""
+"""Wall-clock silence after which a frame is sent again: PX4 may have been restarted, or a datagram lost."""
 CALL_EVERY_S = 0.5
 HEARTBEAT_EVERY_US = 1_000_000
 
@@ -46,7 +46,7 @@ class Motors(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """What HIL_STATE_QUATERNION tells: PX4 only logs it.
+    """The true state that HIL_STATE_QUATERNION holds: PX4 only logs it.
 
     Attributes:
         state: Attitude, rates and velocity.
@@ -62,7 +62,7 @@ class Truth(NamedTuple):
 
 
 class SimulatorEnd:
-    """The simulator's end: offers frames, hears what the motors shall do.
+    """The simulator's end: offers frames, receives motor commands.
 
     Attributes:
         peer: Where PX4 is; None until it has called, and after it has gone.
@@ -95,7 +95,7 @@ class SimulatorEnd:
         self._outbox: list[tuple[tuple[bytes, ...], Address]] = []
 
     def wants_truth(self, time_us: int) -> bool:
-        """Whether PX4 has asked for the truth, and it is time to tell it."""
+        """Whether PX4 has requested the true state, and it is due."""
         return self._truth_every_us is not None and time_us >= self._truth_at_us
 
     def offer(self, frame: SensorFrame, truth: Truth | None, now_s: float) -> None:
@@ -190,7 +190,7 @@ class SimulatorEnd:
 
     def _encode_truth(self, truth: Truth) -> bytes:
         state, place = truth.state, truth.place
-        assert self._truth_every_us is not None, "it is told to who wants it"
+        assert self._truth_every_us is not None, "it is sent on request"
         self._truth_at_us = state.time_us + self._truth_every_us
         airspeed = min(round(truth.airspeed_m_s * 1e2), _UINT16_MAX)
         return self._codec.encode(

@@ -1,7 +1,7 @@
-"""What sensors tell the autopilot: dataclasses in SI, ENU/FLU, and the messages of PX4's simulator interface.
+"""What sensors send the autopilot: dataclasses in SI, ENU/FLU, and the messages of PX4's simulator interface.
 
 HIL_SENSOR has what is measured on board; its `fields_updated` says which groups are new. HIL_GPS comes at its own rate,
-and tells of the past; what else tells in a message of its own is a row of `OWN_MESSAGES`. Units and frames are those
+and is of the past; each other message of a sensor's own is a row of `OWN_MESSAGES`. Units and frames are those
 that PX4 reads: https://docs.px4.io/main/en/simulation/ and https://mavlink.io/en/messages/common.html. Nothing is
 judged here: an autopilot must cope with any number that a broken sensor sends.
 """
@@ -47,10 +47,10 @@ class FixType(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class GpsFix:
-    """What a GPS receiver tells.
+    """A fix of a GPS receiver.
 
     Attributes:
-        time_us: Simulated time from which it is told, µs; it was measured the receiver's delay before, exactly.
+        time_us: Simulated time from which it is sent, µs; it was measured the receiver's delay before, exactly.
         fix_type: How good it is (`FixType`, or any number that a simulator sends).
         place: Position.
         velocity_enu_m_s: Velocity, m/s, ENU.
@@ -69,7 +69,7 @@ class GpsFix:
 
 
 class Distance(NamedTuple):
-    """What a rangefinder that looks down tells.
+    """A sample of a rangefinder that looks down.
 
     Attributes:
         distance_m: To the ground, along the vehicle's own axis; infinite where it sees none.
@@ -86,7 +86,7 @@ class Distance(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SensorFrame:
-    """What is measured on board at one instant of simulated time, and what GPS has told since the frame before.
+    """What is measured on board at one instant of simulated time, and what GPS has sent since the frame before.
 
     A group that `updated` leaves out holds its last value, or zeros.
 
@@ -118,14 +118,14 @@ class SensorFrame:
 
 
 class OwnMessage(NamedTuple):
-    """A sensor that tells in a message of its own, beside HIL_SENSOR, whenever it has something new.
+    """A sensor with a message of its own, beside HIL_SENSOR, whenever it has something new.
 
     Attributes:
         field: Of `SensorFrame`; None there where nothing is new.
         message: Its name.
         encoded: (value, simulated time in µs) -> fields of the message.
         decoded: Message -> value.
-        passed_on: Whether ground stations are told the same message.
+        passed_on: Whether ground stations receive the same message.
     """
 
     field: str
@@ -136,7 +136,7 @@ class OwnMessage(NamedTuple):
 
 
 Frame: TypeAlias = StateFrame | SensorFrame
-"""What a plant tells its autopilot at one instant of simulated time."""
+"""What a plant sends its autopilot at one instant of simulated time."""
 
 
 def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:

@@ -1,4 +1,4 @@
-"""What plant and autopilot tell each other: dataclasses in SI, ENU/FLU, and their MAVLink messages.
+"""What plant and autopilot send each other: dataclasses in SI, ENU/FLU, and their MAVLink messages.
 
 Anything that a receiver could not fly on (not finite, out of range, halves of different frames) decodes to None.
 """

@@ -24,7 +24,7 @@ class LinkError(MavlinkError):
 class GroundLink(Protocol):
     """A link to ground stations: nothing that it does blocks.
 
-    Each time: `receive_now`, then open channels for `take_opened`, hear what was received, and close channels for
+    Each time: `receive_now`, then open channels for `take_opened`, take in what was received, and close channels for
     `take_closed`.
 
     Attributes:
@@ -52,7 +52,7 @@ class GroundLink(Protocol):
         ...
 
     def take_opened(self) -> list[Address]:
-        """Return who is to be spoken to unasked since last asked: whom the link calls, who has connected."""
+        """Return the addresses to send to first, since the last call: the one the link calls, those that connected."""
         ...
 
     def take_closed(self) -> list[Address]:

@@ -1,7 +1,7 @@
-"""Downloads of plans: whoever asks is told, as many at once as like.
+"""Downloads of plans: every request is answered, any number at once.
 
 Specification: https://mavlink.io/en/services/mission.html, "Download a Mission from the Vehicle". The vehicle only
-answers. It remembers which plan it has announced to whom, so that nobody is told the first half of one plan and the
+answers. It remembers which plan it has announced to whom, so that nobody receives the first half of one plan and the
 second half of the one that replaced it meanwhile.
 """
 
@@ -13,7 +13,7 @@ from colibri.mavlink.node.service import Peer, Send, to
 from colibri.mavlink.wire.dialect import mav
 
 FORGOTTEN_AFTER_US = 5_000_000
-"""A reader that asks for nothing so long is told the newest plan after."""
+"""A reader that requests nothing so long is sent the newest plan after."""
 MAX_READERS = 32
 
 

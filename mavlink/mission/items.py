@@ -115,7 +115,7 @@ def item_of(message_name: str, fields: Any) -> MissionItem | int:
 
 
 def item_fields(peer: Peer, seq: int, item: MissionItem, current: bool, plan_type: int) -> Fields:
-    """Return the fields of the MISSION_ITEM_INT that tells `peer` an item."""
+    """Return the fields of the MISSION_ITEM_INT that sends `peer` an item."""
     frame, command, autocontinue, p1, p2, p3, p4, x, y, z = item
     target = (peer.system, peer.component)
     return (*target, seq, frame, command, int(current), autocontinue, p1, p2, p3, p4, x, y, z, plan_type)

@@ -112,7 +112,7 @@ class MissionService:
         return sends
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Ask for what has not come; tell which item is current, once a second and when that changes."""
+        """Request what has not come; send which item is current, once a second and when that changes."""
         progress = self._progress()
         if now_us < self._due_us and progress is self._shown and not self._outbox:
             return ()
@@ -142,7 +142,7 @@ class MissionService:
         return tuple(plan.id for plan in self.plans.values())
 
     def restore(self, plans: Mapping[int, Sequence[MissionItem]]) -> None:
-        """Hold the plans that were kept over a restart; the vehicle that flies them is told by whoever kept them."""
+        """Hold the plans that were kept over a restart; the owner gives them to the vehicle that flies them."""
         self.plans.update({plan_type: plan_of(plans.get(plan_type, ())) for plan_type in PLAN_TYPES})
 
     def load(self, plan_type: int, items: Sequence[MissionItem]) -> Plan:
@@ -166,7 +166,7 @@ class MissionService:
         return outcome_of(refusal)
 
     def _announce(self) -> None:
-        """Have the next poll tell where the mission stands, changed or not."""
+        """Have the next poll send where the mission stands, changed or not."""
         self._stream_us = self._due_us = 0
 
     def _current(self) -> Send:

@@ -1,4 +1,4 @@
-"""The component metadata protocol: tells ground stations where to read what this vehicle and its parameters are.
+"""The component metadata protocol: where ground stations can read what this vehicle and its parameters are.
 
 Specification: https://mavlink.io/en/services/component_metadata.html. The files themselves go by file transfer.
 """

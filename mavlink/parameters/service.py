@@ -62,7 +62,7 @@ class ParameterService:
 
     def _go_on(self, channel: int, now_us: int) -> list[Send]:
         listing = self._listings[channel]
-        listing.last_us = min(listing.last_us, now_us)  # simulated time can begin anew
+        listing.last_us = min(listing.last_us, now_us)  # simulated time can restart
         due = (now_us - listing.last_us) // INTERVAL_US
         listing.last_us += due * INTERVAL_US
         sends = []
@@ -85,7 +85,7 @@ class ParameterService:
         return self._value(known, peer.channel)
 
     def _set(self, name: str, wire_type: int, bits: int, peer: Peer) -> Iterable[Send]:
-        """Set, and tell everybody what holds now; who was refused hears why first (write parameters)."""
+        """Set a parameter, and send its value to all; a refusal is sent to the requester first (write parameters)."""
         index = self._parameters.index(name)
         definition = None if index is None else self._parameters.at(index)
         if index is None or definition is None:

@@ -25,7 +25,7 @@ UNSUPPORTED_MAV_FRAME = 9
 """MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; pymavlink's dialects leave it out, and MAV_RESULT_CANCELLED."""
 
 LATER = -1
-"""The result of a command that is obeyed within a few frames: whoever asked hears nothing before `finish`."""
+"""The result of a command that is obeyed within a few frames: its sender receives nothing before `finish`."""
 
 PROGRESS_UNKNOWN = 0xFF
 NOT_GIVEN = 2**31 - 1
@@ -242,7 +242,7 @@ class CommandService:
         return [*sends, _ack(command.id, command.peer, outcome), *self._reason(outcome, command.now_us)]
 
     def _interrupt(self, running: _Running, command: Command, outcome: Outcome) -> list[Send]:
-        """Forget the command in progress that another has replaced or ended; tell its sender if that is another."""
+        """Forget the command in progress that another has replaced or ended; notify its sender if that is another."""
         if outcome.result not in (ACCEPTED, IN_PROGRESS, LATER, CANCELLED) or command.id not in self._running:
             return []
         self._forget(command.id)
@@ -250,14 +250,14 @@ class CommandService:
         return [] if peer == command.peer else [_ack(command.id, peer, Outcome(CANCELLED))]
 
     def _cancel(self, command_id: int, peer: Peer, now_us: int) -> list[Send]:
-        """Cancel what is in progress: its sender hears CANCELLED. "If it has already completed [it] can be ignored"."""
+        """Cancel what is in progress: its sender gets CANCELLED. "If it has already completed [it] can be ignored"."""
         running, entry = self._running.get(command_id), self._entries.get(command_id)
         if running is None or entry is None:
             return []
         owner = running.command.peer
         outcome = entry.cancel(running.command._replace(now_us=now_us)) if entry.cancel else Outcome(IN_PROGRESS)
         if outcome.result not in (ACCEPTED, CANCELLED):
-            # It goes on, and so does what is told of it.
+            # It goes on, and so do its progress reports.
             return [_ack(command_id, peer, Outcome(IN_PROGRESS, progress=running.progress))]
         self._forget(command_id)
         cancelled = outcome._replace(result=CANCELLED)
@@ -314,7 +314,7 @@ def _from_int(fields: Any, entry: Entry, peer: Peer, now_us: int) -> Command:
 
 
 def _parameters(command: Command) -> tuple[str, ...]:
-    """Return what tells a command from another of its kind; as text, in which nan equals itself."""
+    """Return what distinguishes a command from another of its kind; as text, in which nan equals itself."""
     return tuple(map(repr, command[1:9]))
 
 
@@ -324,7 +324,7 @@ def _is_sent_again(command: Command, confirmation: int, before: _Answered) -> bo
 
 
 def _ack(command_id: int, peer: Peer, outcome: Outcome) -> Send:
-    """Acknowledge to whoever asked. Progress is only told of what is in progress."""
+    """Return the COMMAND_ACK to the sender. Only a command in progress has a progress."""
     progress = outcome.progress if outcome.result == IN_PROGRESS else 0
     return to(peer, "COMMAND_ACK", command_id, outcome.result, progress, outcome.param2, peer.system, peer.component)
 

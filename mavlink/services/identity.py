@@ -37,7 +37,7 @@ class Identity:
     Attributes:
         name: As the user writes it.
         autopilot: MAV_AUTOPILOT.
-        speaks: The release whose interface it follows, told as the version of the flight software; None for its own.
+        speaks: The release whose interface it follows, sent as the version of the flight software; None for its own.
     """
 
     name: str

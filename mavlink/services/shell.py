@@ -1,4 +1,4 @@
-"""A shell over SERIAL_CONTROL: a line in, text out; a few commands that only tell, none that reaches the system.
+"""A shell over SERIAL_CONTROL: a line in, text out; a few commands that only report, none that reaches the system.
 
 Specification: SERIAL_CONTROL (126), https://mavlink.io/en/messages/common.html#SERIAL_CONTROL, device SHELL.
 """

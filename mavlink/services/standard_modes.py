@@ -63,7 +63,7 @@ class StandardModes:
         return (to_all("AVAILABLE_MODES_MONITOR", self._sequence),)
 
     def change(self, modes: Sequence[ModeInfo]) -> None:
-        """Offer other modes from now on; ground stations hear of it and ask for them."""
+        """Offer other modes from now on; ground stations are notified and request them."""
         self._modes = tuple(modes)
         self._sequence = (self._sequence + 1) % 256
         self._changed = True

@@ -26,7 +26,7 @@ class StatusText:
         self._next = 1
 
     def say(self, severity: int, text: str) -> list[Send]:
-        """Return the messages that tell everybody `text`."""
+        """Return the STATUSTEXT messages of `text`, to all channels."""
         data = text.encode()[:MAX_TEXT_BYTES]
         if len(data) <= CHUNK_BYTES:
             return [to_all("STATUSTEXT", severity, data, 0, 0)]

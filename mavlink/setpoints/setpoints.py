@@ -89,7 +89,7 @@ class TargetState(NamedTuple):
         position_enu_m: From the origin, m.
         velocity_enu_m_s: Zero where it is not known.
         acceleration_enu_m_s2: Zero where it is not known.
-        received_us: When it was told, simulated time.
+        received_us: When it was received, simulated time.
         time_us: What it is the state at.
     """
 
@@ -100,7 +100,7 @@ class TargetState(NamedTuple):
     time_us: int = 0
 
     def at(self, now_us: int, max_us: int) -> "TargetState":
-        """Return it at `now_us`: it goes on at its velocity until `max_us` after it was told, then it stands."""
+        """Return it at `now_us`: it goes on at its velocity until `max_us` after it was received, then it stands."""
         after_s = max(min(now_us, self.received_us + max_us) - self.time_us, 0) * 1e-6
         (x, y, z), (vx, vy, vz) = self.position_enu_m, self.velocity_enu_m_s
         there = self._replace(position_enu_m=(x + after_s * vx, y + after_s * vy, z + after_s * vz), time_us=now_us)

@@ -26,7 +26,7 @@ DISABLED = -1.0
 DEFAULT = 0.0
 HEARTBEAT_US = 1_000_000
 MAX_WAITING = 256
-"""Messages on request between two frames of the plant; who asks for more is told to come back."""
+"""Messages on request between two frames of the plant; further requests are rejected temporarily."""
 
 _OLD_REQUESTS = {
     "MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES": "AUTOPILOT_VERSION",
@@ -41,7 +41,7 @@ _OLD_REQUESTS = {
 class StreamService:
     """Streams telemetry to every channel at its own rates, and sends messages on request.
 
-    The lead tells it of each frame's snapshot by `update` before `poll`.
+    The owner sets each frame's snapshot by `update` before `poll`.
     """
 
     handles = frozenset({"REQUEST_DATA_STREAM"})

@@ -1,4 +1,4 @@
-"""Numbers -> what a message's fields can hold; and the quantities that several messages tell in the same wire units."""
+"""Numbers -> what a message's fields can hold; and the quantities that several messages hold in the same wire units."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
 Encoder: TypeAlias = Callable[[Snapshot], Fields | list[Fields] | None]
-"""What a message tells of a snapshot: None where there is nothing to tell, a list where it takes several messages."""
+"""Snapshot -> fields of a message: None where there is nothing to send, a list where it takes several messages."""
 
 UNKNOWN_U8 = 0xFF
 UNKNOWN_U16 = 0xFFFF
@@ -27,7 +27,7 @@ FLOAT32_MAX = 3.4028234663852886e38
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constants:
-    """What telemetry tells that does not change in flight.
+    """What telemetry sends that does not change in flight.
 
     Attributes:
         boot_unix_us: Unix time at the start, µs; 0 where nobody knows it.
@@ -41,7 +41,7 @@ class Constants:
 def fitted(name: str, encoder: Encoder) -> Encoder:
     """Return `encoder` of message `name`, its numbers rounded and clamped to what the fields hold.
 
-    Integers that are no number, and places that are nowhere on earth, leave nothing to tell: the whole message is None.
+    Integers that are no number, and places that are nowhere on earth, leave nothing to send: the whole message is None.
     """
     kinds = getattr(mav, f"MAVLink_{name.lower()}_message").fieldtypes
     converters = [_CONVERTERS.get(kind, _as_it_is) for kind in kinds]
@@ -89,7 +89,7 @@ for _bits in (8, 16, 32, 64):
 
 
 def boot_ms(s: Snapshot) -> int:
-    """Time since the start in ms, which a uint32 holds: it starts anew after 49 days."""
+    """Time since the start in ms, which a uint32 holds: it wraps after 49 days."""
     return s.time_us // 1000 % 2**32
 
 

@@ -57,7 +57,7 @@ def gps_global_origin(s: Snapshot) -> Fields:
 
 
 def gps_raw_int(s: Snapshot) -> Fields:
-    """GPS_RAW_INT (24): what the receiver told, or a good one would; or none. Course is unknown at rest."""
+    """GPS_RAW_INT (24): what the receiver measured, or a good one would; or no fix. Course is unknown at rest."""
     if not s.gps_ok:
         nothing = (UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16, UNKNOWN_U16)
         return (s.time_us, mav.GPS_FIX_TYPE_NO_GPS, 0, 0, 0, *nothing, 0)

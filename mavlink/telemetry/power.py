@@ -51,7 +51,7 @@ def esc_info(s: Snapshot) -> Fields:
 
 
 def servo_output_raw(s: Snapshot) -> Fields:
-    """SERVO_OUTPUT_RAW (36): 1000 to 2000 µs; its time is in µs and starts anew after 71 minutes."""
+    """SERVO_OUTPUT_RAW (36): 1000 to 2000 µs; its time is in µs and wraps after 71 minutes."""
     return (s.time_us % 2**32, 0, *_pulses_us(s.controls), *(0,) * 12)
 
 

@@ -1,4 +1,4 @@
-"""Messages of the sensors: what they measure; where the state is told and there are none, what they would measure."""
+"""Messages of the sensors: what they measure; with state feedback, what they would measure."""
 
 from colibri.common.earth.atmosphere import pressure_pa, temperature_c
 from colibri.common.types import Vector

@@ -28,7 +28,7 @@ class Home(NamedTuple):
 
 
 class BatteryState(NamedTuple):
-    """The battery, as the autopilot believes it to be.
+    """The battery, as the autopilot estimates it.
 
     Attributes:
         cells: In series.
@@ -101,7 +101,7 @@ class SolverState(NamedTuple):
     Attributes:
         status: Code of `colibri.autopilot.control.qp.QpStatus`, 0 is solved; -1 without a QP.
         fallback: Code of `colibri.autopilot.control.interface.Fallback`; -1 is none.
-        iterations: Of the solver; -1 where it tells none.
+        iterations: Of the solver; -1 where it reports none.
         solve_time_s: Of the QP.
         step_time_s: Of the whole control step.
         cost: At the solution.
@@ -133,7 +133,7 @@ class EstimatorState(NamedTuple):
         horizontal_accuracy_m: Standard deviation.
         vertical_accuracy_m: Standard deviation.
         sensors: MAV_SYS_STATUS_SENSOR bits of those that it reads.
-        failed_sensors: MAV_SYS_STATUS_SENSOR bits of those that are not believed.
+        failed_sensors: MAV_SYS_STATUS_SENSOR bits of those that are rejected.
     """
 
     flags: int
@@ -150,7 +150,7 @@ NOT_SOLVED = SolverState()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """Everything that telemetry tells.
+    """Everything that telemetry sends.
 
     Attributes:
         time_us: Simulated time since the autopilot began, µs.
@@ -170,7 +170,7 @@ class Snapshot:
         rate_flu_rad_s: Body rates.
         origin: Of the ENU frame.
         home: None until it is known.
-        rotor_speeds_rad_s: As the autopilot believes them to be.
+        rotor_speeds_rad_s: As the autopilot estimates them.
         controls: Commanded, parts of the largest speed.
         battery: None without one.
         setpoint: Of the control law.
@@ -188,10 +188,10 @@ class Snapshot:
         fence_enabled: Whether the geofence is watched.
         fence_breached: Whether the vehicle is where it must not be.
         load: Part of the time between two frames that the autopilot computes, 0..1.
-        sensed: What was measured on board last; None where the state is told.
+        sensed: What was measured on board last; None with state feedback.
         fix: The last of GPS; None before it.
-        latest: The last of each sensor that tells in a message of its own, by the field of `SensorFrame`.
-        estimator: How well the state is known; None where it is told.
+        latest: The last value of each sensor with a message of its own, by the field of `SensorFrame`.
+        estimator: How well the state is known; None with state feedback.
     """
 
     time_us: int

@@ -82,7 +82,7 @@ def flight_information(s: Snapshot) -> Fields:
 
 
 def estimator_status(s: Snapshot) -> Fields:
-    """ESTIMATOR_STATUS (230). A state that is told is known, and nothing contradicts it."""
+    """ESTIMATOR_STATUS (230). With state feedback every state is known, and all test ratios are 0."""
     if s.estimator is not None:
         e = s.estimator
         return (

@@ -11,7 +11,7 @@ from colibri.mavlink.telemetry.snapshot import Snapshot
 
 
 def telemetry(constants: Constants | None = None) -> dict[str, Encoder]:
-    """Return how each message is told, by name, for what does not change in flight.
+    """Return the encoder of each message, by name, for what does not change in flight.
 
     An encoder raises nothing, whatever the snapshot holds; its fields fit their types.
     """
@@ -25,7 +25,7 @@ def telemetry(constants: Constants | None = None) -> dict[str, Encoder]:
 
 
 def _passed_on(row: OwnMessage, otherwise: Encoder | None) -> Encoder:
-    """Return what tells a message as a sensor told it; as it would be `otherwise` where there is no such sensor."""
+    """Return the encoder of a message as a sensor sent it; `otherwise` where there is no such sensor."""
 
     def encoder(s: Snapshot) -> Fields | list[Fields] | None:
         value = s.latest.get(row.field)

@@ -101,7 +101,7 @@ def sequence_of(frame: bytes) -> int:
 
 
 def intact(frame: bytes) -> bool | None:
-    """Whether the CRC of a whole frame of MAVLink 1 or 2 holds; None where the dialect cannot tell, for want of it."""
+    """Whether the CRC of a whole frame of MAVLink 1 or 2 holds; None where the dialect has no such message."""
     start = _header_bytes(frame)
     layout = _layout(int.from_bytes(frame[7:start], "little") if start == _HEADER.size else frame[start - 1])
     if layout is None:

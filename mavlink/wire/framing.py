@@ -7,7 +7,7 @@ from colibri.mavlink.wire.dialect import MARKER, SIGNATURE_BYTES, SIGNED, intact
 _MARKERS = re.compile(b"[\xfd\xfe]")
 _MARKER_V1 = 0xFE
 _PREFIX_BYTES = 3
-"""What tells how long a frame is: marker, payload length, incompatibility flags (of MAVLink 2)."""
+"""What determines the length of a frame: marker, payload length, incompatibility flags (of MAVLink 2)."""
 _OTHER_BYTES_V1 = 8
 _OTHER_BYTES = 12
 
@@ -43,7 +43,7 @@ class Framer:
 
 
 def frame_length(data: bytes, at: int) -> int | None:
-    """Return the length of the frame that may begin at `at`; 0 if none can, None where too little has come to tell."""
+    """Return the length of the frame that may begin at `at`; 0 if none can, None where too little has come."""
     if at + _PREFIX_BYTES > len(data):
         return None
     marker, payload_bytes, incompatible = data[at : at + _PREFIX_BYTES]

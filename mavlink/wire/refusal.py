@@ -1,4 +1,4 @@
-"""A refusal: why something that was asked for is not done, in words and as MAVLink tells it."""
+"""A refusal: why a request is not carried out, in words and as a MAV_RESULT."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Message signing of MAVLink 2: which frames to believe, how to sign our own.
+"""Message signing of MAVLink 2: which frames to accept, how to sign our own.
 
 Specification: https://mavlink.io/en/guide/message_signing.html. All components of a network share one key. A signature
 is 13 bytes behind the frame: link id, timestamp, and the first 48 bits of a SHA-256 over key and all that went before.
@@ -97,7 +97,7 @@ class Signing:
         return head + self._digest(frame + head)
 
     def refusal(self, name: str, frame: bytes, now_us: int) -> str | None:
-        """Return why message `name` in `frame` is not to be believed; None if it is."""
+        """Return why message `name` in `frame` is not accepted; None if it is."""
         if not self.active:
             return None
         if frame[0] != MARKER or not frame[_FLAGS_AT] & SIGNED:
@@ -114,7 +114,7 @@ class Signing:
         return None
 
     def set_up(self, key: bytes, initial_timestamp: int, now_us: int) -> bool:
-        """Obey SETUP_SIGNING, which is for the caller to have believed: zeros switch signing off.
+        """Obey SETUP_SIGNING, which the caller must have accepted: zeros switch signing off.
 
         Returns:
             Whether key and timestamp were such as can be.
@@ -134,7 +134,7 @@ class Signing:
         return max(self.timestamp - NEW_STREAM_TICKS, self._forgotten + 1)
 
     def _remember(self, stream: tuple[int, int, int], timestamp: int) -> None:
-        """Keep when a stream was heard last; of too many forget the oldest, and let nothing so old begin anew."""
+        """Keep when a stream was received last; of too many forget the oldest, and accept no new one that is so old."""
         self._streams[stream] = timestamp
         if len(self._streams) > STREAMS:
             oldest = min(self._streams, key=self._streams.__getitem__)

@@ -161,7 +161,7 @@ def _vector(world: World) -> Array:
 
 
 def state_frame(world: World) -> StateFrame:
-    """Return what state feedback tells of a world."""
+    """Return the frame of state feedback of a world."""
     u, v, w, p, q, r, x, y, z = world.state[:9]
     attitude = attitude_of(world.state)
     return StateFrame(world.time_us, (x, y, z), earth_from_body(attitude, (u, v, w)), attitude, (p, q, r))

@@ -37,10 +37,10 @@ class ArduPilotEnd:
     """The plant's end: steps a world at each request.
 
     Attributes:
-        world: The world as it was last told of.
+        world: The world as it was last sent.
         peer: Where ArduPilot is, None until it has called.
         steps: How many times the world was advanced.
-        restarts: How many times an ArduPilot began anew.
+        restarts: How many times an ArduPilot restarted.
         dropped: What was received and not obeyed, by reason.
     """
 

@@ -63,7 +63,7 @@ class Simulator:
         self._time_us = 0
 
     def serve(self) -> None:
-        """Wait for a PX4 and fly with it, and then with the next, until the time is over or told to stop."""
+        """Wait for a PX4 and fly with it, and then with the next, until the time is over or a signal ends it."""
         over = False
         while not self._stop and not over:
             if self._link.target is not None:
@@ -142,7 +142,7 @@ class Simulator:
         return ActuatorCommand(world.time_us, self._rotors.speeds_of(self._order.to_vehicle(controls)), armed)
 
     def _exchange(self, timeout_s: float) -> None:
-        """Send what is to be sent, and hear what comes within a time."""
+        """Send what is to be sent, and receive what comes within a time."""
         self._send()
         for datagram, sender in receive_soon(self._link, timeout_s):
             self._end.receive(datagram, sender)
@@ -161,7 +161,7 @@ class Simulator:
         self._end.received.clear()
 
     def _wait_until(self, due_s: float) -> None:
-        """Wait, and hear all that comes before: an answer must not be taken for that to the next frame."""
+        """Wait, and receive all that comes before: an answer must not be taken for that to the next frame."""
         while not self._stop and (early_s := due_s - perf_counter()) > 0.0:
             if self._end.lockstep:
                 sleep(min(early_s, MAX_WAIT_S))

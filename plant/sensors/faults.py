@@ -1,4 +1,4 @@
-"""What faults do to what sensors tell: each frame goes through them on its way out."""
+"""What faults do to the output of sensors: each frame goes through them on its way out."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -20,7 +20,7 @@ At: TypeAlias = Callable[[T, int], T]
 
 
 class Reading(Generic[T]):
-    """What one sensor tells, while it has a fault or none."""
+    """The output of one sensor, with a fault or none."""
 
     def __init__(self, add: Add[T], at: At[T], chance: Iterator[float]) -> None:
         """Be well; `chance` are standard normal numbers, drawn only for more noise."""
@@ -33,13 +33,13 @@ class Reading(Generic[T]):
         self._later: deque[tuple[int, T]] = deque()
 
     def begin(self, fault: Fault, now_us: int, last: T | None) -> None:
-        """Have a fault from now on, in place of any other; or none, where it is OK. `last` was told last."""
+        """Have a fault from now on, in place of any other; or none, where it is OK. `last` was its last output."""
         self._fault = None if fault.kind == OK else fault
         self._since_us, self._last = now_us, last
         self._later.clear()
 
     def report(self, now_us: int, value: T | None) -> T | None:
-        """Return what is told of what is measured; either is None where there is nothing new."""
+        """Return the output for a measurement; either is None where there is nothing new."""
         fault = self._fault
         if fault is None:
             return value
@@ -95,7 +95,7 @@ class SensorFaults:
         reading.begin(fault, now_us, getattr(self._reported, row.field) if held else self._last.get(row.field))
 
     def through(self, frame: SensorFrame) -> SensorFrame:
-        """Return what is told of a frame; each is the next one."""
+        """Return the frame that is sent for a frame; each is the next one."""
         reported = self._changed(frame, self._reported or frame) if self._any else frame
         self._reported = reported
         for row, _ in self._readings.values():

@@ -1,4 +1,4 @@
-"""The plant's GPS receiver: it measures at its own rate, and tells later."""
+"""The plant's GPS receiver: it measures at its own rate, and sends later."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ class GpsReceiver:
         self._pending: deque[GpsFix] = deque()
 
     def measure(self, time_us: int, position_enu_m: Vector, velocity_enu_m_s: Vector) -> None:
-        """Measure now, at `time_us`, to tell after the receiver's delay."""
+        """Measure now, at `time_us`, to report after the receiver's delay."""
         part, chance = self._part, self._chance
         if self._measured_us is not None:
             for drift in self._drifts:
@@ -63,7 +63,7 @@ class GpsReceiver:
         self._pending.append(fix)
 
     def report(self, time_us: int) -> GpsFix | None:
-        """Return the fix that has come up to `time_us` and was not told before."""
+        """Return the fix that is due at `time_us` and was not returned before."""
         if self._pending and self._pending[0].time_us <= time_us:
             return self._pending.popleft()
         return None

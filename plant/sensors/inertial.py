@@ -1,4 +1,4 @@
-"""The plant's accelerometer and gyroscope: they tell at every frame."""
+"""The plant's accelerometer and gyroscope: they measure at every frame."""
 
 from collections.abc import Iterator
 

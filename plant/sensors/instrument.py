@@ -1,4 +1,4 @@
-"""What the plant asks of a sensor: the truth in, what it tells at that frame out; and what faults do to that."""
+"""The interface of a sensor: the true world in, its output at that frame out; and what faults do to that."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, TypeAlias, TypeVar
@@ -9,7 +9,7 @@ from colibri.plant.physics.world import Physics, World
 
 T = TypeVar("T")
 Measure: TypeAlias = Callable[[World], Any]
-"""The world at a frame, each the next one -> what a sensor tells; None where that is nothing new."""
+"""The world at a frame, each the next one -> a sensor's output; None where that is nothing new."""
 
 _ROUNDING = 1e-9
 
@@ -34,9 +34,9 @@ class Instrument(NamedTuple):
     Attributes:
         part: Its table in the vehicle file's sensors; a vehicle without it has no such sensor.
         field: Of `SensorFrame`.
-        group: Of `Updated`: its field then holds what was told last; 0 where that is None between two values.
+        group: Of `Updated`: its field then holds the last output; 0 where that is None between two values.
         unit: FAILURE_UNIT.
-        switched_on: (table, setting, standard normal numbers of its own) -> what it tells.
+        switched_on: (table, setting, standard normal numbers of its own) -> its measure.
         add: (value, error of a fault) -> value with that error.
         at: (value, simulated time in µs) -> value that claims to be of that time.
     """

@@ -80,7 +80,7 @@ class SensorSuite:
         self._frame: SensorFrame | None = None
 
     def measure(self, world: World) -> SensorFrame:
-        """Return what they tell of `world`; each frame is the next one, or the one before again."""
+        """Return what they measure of `world`; each frame is the next one, or the one before again."""
         if self._frame is None or self._frame.time_us != world.time_us:
             frame = self._measured(world)
             self._frame = frame if self._faults is None else self._faults.through(frame)

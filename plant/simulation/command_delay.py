@@ -15,7 +15,7 @@ class Actuation:
         self._coming: deque[tuple[int, ActuatorCommand]] = deque()
 
     def arrive(self, from_us: int, command: ActuatorCommand) -> None:
-        """Have a command arrive at a simulated time, not before those that were told earlier."""
+        """Have a command arrive at a simulated time, not before those that were sent earlier."""
         self._coming.append((from_us, command))
 
     def spans(self, begin_us: int, end_us: int) -> Iterator[tuple[ActuatorCommand, int]]:

@@ -30,7 +30,7 @@ class Faults:
         Args:
             vehicle: The plant's.
             physics: Of its world; rotors and battery fail in it.
-            feedback: What is told of it.
+            feedback: What the autopilot receives of it.
             seed: Of chance.
         """
         self._physics = physics

@@ -1,4 +1,4 @@
-"""The plant as a pure composition, told of frame by frame, that goes on with each answer; and what builds it."""
+"""The plant as a pure composition, measured frame by frame, that goes on with each answer; and what builds it."""
 
 from collections.abc import Mapping, Sequence
 
@@ -45,7 +45,7 @@ class Plant:
             world: Now.
             vehicle: That flies in it.
             physics: Its laws.
-            feedback: What is told of it.
+            feedback: What the autopilot receives of it.
             origin: Of the ENU frame.
             seed: Of everything random.
             interval_us: Between two frames.
@@ -74,7 +74,7 @@ class Plant:
         self.go_on()
 
     def inject(self, faults: Sequence[Fault]) -> None:
-        """Have faults happen now; the next frame is told what became of them."""
+        """Have faults happen now; their results go with the next frame."""
         self.world, self._results = self.faults.inject_all(faults, self.world)
 
     def arrive(self, sent_us: int, command: ActuatorCommand) -> None:
@@ -130,7 +130,7 @@ class PlantBuilder:
         self._origin = origin
 
     def build(self, feedback: Feedback, interval_us: int) -> Plant:
-        """Return a plant that begins now, and tells `feedback` every `interval_us`."""
+        """Return a plant that begins now, and sends `feedback` every `interval_us`."""
         return Plant(
             self._worlds[feedback],
             self.vehicle,

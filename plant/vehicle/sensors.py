@@ -1,6 +1,6 @@
 """The sensors of a vehicle: numbers of named parts with units, as tables of the vehicle file.
 
-The plant measures by them; the autopilot's estimator believes them.
+The plant measures by them; the autopilot's estimator assumes them.
 """
 
 from math import isfinite
@@ -83,7 +83,7 @@ class Gps(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     rate_hz: Positive
     delay_s: NotNegative
-    """From the instant that it measures to that at which it tells."""
+    """From the instant that it measures to that at which it sends, s."""
     fix_type: Annotated[int, msgspec.Meta(ge=3, le=6)]
     """Of GPS_FIX_TYPE: 3 on its own, 6 with carrier phase fixed (RTK)."""
     horizontal_noise_m: NotNegative
