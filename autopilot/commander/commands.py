@@ -132,10 +132,10 @@ class Commands:
     def _take_off(self, command: Command) -> Outcome:
         """Climb to z, or to the parameter's height: QGC sends it above sea level, others above home."""
         pilot = self._pilot
-        height_m = pilot.ground_m + pilot.behaviour.takeoff_height_m
+        height_m = pilot.ground.height_m + pilot.behaviour.takeoff_height_m
         if not isnan(command.z):
             height_m = self._height_of_takeoff(command)
-        if not pilot.ground_m + MIN_CLIMB_M <= height_m < MAX_HEIGHT_M:
+        if not pilot.ground.height_m + MIN_CLIMB_M <= height_m < MAX_HEIGHT_M:
             return _denied("take-off", "not a height above the ground")
         context = pilot.context()
         x, y, _ = context.place
@@ -191,7 +191,7 @@ class Commands:
 
     @property
     def _flies(self) -> bool:
-        return self._pilot.state.armed and not self._pilot.standing
+        return self._pilot.state.armed and not self._pilot.ground.standing
 
     def _may_fly_at(self, speed_m_s: float) -> bool:
         return 0.0 < speed_m_s <= self._pilot.behaviour.max_speed_m_s
@@ -294,7 +294,7 @@ class Commands:
 
     def _check(self, command: Command) -> Outcome:
         del command
-        reasons = self._pilot.refusals()
+        reasons = self._pilot.readiness.refusals()
         return Outcome(FAILED, "not ready: " + "; ".join(reasons)) if reasons else Outcome(ACCEPTED)
 
 

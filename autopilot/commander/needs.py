@@ -53,8 +53,8 @@ class ModeNeeds:
             Need.MISSION: self._missions.has_mission,
             Need.INSIDE_FENCE: not self._missions.leaves_fence,
             Need.CIRCLE: False,
-            Need.FLYING: not self._pilot.standing,
-            Need.POSITION: self._pilot.knows_position,
+            Need.FLYING: not self._pilot.ground.standing,
+            Need.POSITION: self._pilot.sensed.knows_position,
         }
         return tuple(need for need, there in met.items() if not there)
 

@@ -4,19 +4,19 @@ from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
-import numpy as np
-
+from colibri.autopilot.commander.flight.ground_contact import GroundContact, GroundRecord
+from colibri.autopilot.commander.flight.readiness import Readiness
+from colibri.autopilot.commander.flight.reference_generator import RESTS, Guidance, ReferenceGenerator
 from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import MissionTask
-from colibri.autopilot.commander.rules.arming import ArmingInputs, refusals
 from colibri.autopilot.commander.rules.failsafe_rule import Flight
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import FIRST, Event, Mode, Need, State, next_state
 from colibri.autopilot.commander.status_queue import StatusQueue
-from colibri.autopilot.control.interface import AttitudeDemand, Horizon, VehicleState
+from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
-from colibri.autopilot.guidance.landing_detector import Landing, is_below, stands_at_first, watch
-from colibri.autopilot.guidance.reference import Reference, at_rest, lead, lead_along, moving_with, still_target
+from colibri.autopilot.guidance.landing_detector import is_below, stands_at_first
+from colibri.autopilot.guidance.reference import Reference
 from colibri.autopilot.guidance.sample_grid import Instants
 from colibri.autopilot.guidance.tasks.position import HoldTask, TrackTask
 from colibri.autopilot.guidance.tasks.task import (
@@ -29,8 +29,8 @@ from colibri.autopilot.guidance.tasks.task import (
     TaskContext,
     lifts,
 )
-from colibri.common.types import Array, Vector
-from colibri.mavlink.services.statustext import EMERGENCY, INFO, NOTICE
+from colibri.common.types import Vector
+from colibri.mavlink.services.statustext import INFO
 from colibri.mavlink.wire.refusal import Refusal
 
 TaskFactory: TypeAlias = Callable[[Mode, TaskContext], FlightTask]
@@ -41,49 +41,18 @@ _SAVED_BY = {
     Action.DESCEND: Event.SAVED_BY_LANDING,
     Action.TERMINATE: Event.TERMINATED,
 }
-
-
-class Guidance(NamedTuple):
-    """What the control law is to follow now; neither while the rotors stand or idle.
-
-    Attributes:
-        horizon: References of position and yaw.
-        attitude: References of attitude and thrust.
-        begins: Whether the rotors leave idle now: the control law begins anew.
-    """
-
-    horizon: Horizon | None = None
-    attitude: AttitudeDemand | None = None
-    begins: bool = False
-
-
-RESTS = Guidance()
-
-
-class FlightTimes(NamedTuple):
-    """When what happened, simulated time; 0 before.
-
-    Attributes:
-        armed_us: When the rotors were last armed.
-        takeoff_us: When the vehicle last left the ground.
-        landing_us: When it last stood again.
-        flights: How often the rotors were armed.
-    """
-
-    armed_us: int = 0
-    takeoff_us: int = 0
-    landing_us: int = 0
-    flights: int = 0
+_ENDS = {Mode.TAKEOFF: Event.ARRIVED, Mode.MISSION: Event.FINISHED, Mode.TRACK: Event.FINISHED}
+"""What has happened once the task of a mode has arrived."""
 
 
 class Sensed(NamedTuple):
-    """What is known at a control sample.
+    """Inputs of a control sample.
 
     Attributes:
         now_us: Simulated time.
-        vehicle: The vehicle; None as long as nothing is known of it.
-        steered: What clients ask for.
-        knows_position: Whether the vehicle is known well enough to fly to places.
+        vehicle: The vehicle; None before the first state.
+        steered: Setpoints of clients.
+        knows_position: Whether the position is known well enough to fly to places.
     """
 
     now_us: int = 0
@@ -93,159 +62,129 @@ class Sensed(NamedTuple):
 
 
 class PilotRecord(NamedTuple):
-    """What a pilot needs to go on after a restart, as plain data; but for the task, what `Pilot` says of each.
+    """State of a pilot for a restart, but for the task, as plain data.
 
     Attributes:
-        idles: Whether the rotors stand or idle.
+        state: Mode, and whether the rotors may turn.
+        ground: Contact with the ground.
+        home_enu_m: Home, m.
+        home_yaw_rad: Heading there.
         home_is_chosen: Whether a take-off leaves home where it is.
-        motion: Of the reference, (4, 3).
-        heading: Of the reference, (2,).
+        speed_m_s: Cruise speed requested for this flight; None for the parameters'.
+        saving: The failsafe that is flown.
+        reference: State of the reference.
     """
 
-    mode: Mode
-    armed: bool
-    standing: bool
-    idles: bool
+    state: State
+    ground: GroundRecord
     home_enu_m: Vector
     home_yaw_rad: float
     home_is_chosen: bool
     speed_m_s: float | None
-    armed_us: int
-    takeoff_us: int
-    landing_us: int
-    flights: int
-    ground_m: float
     saving: Action
-    motion: Array
-    heading: Array
+    reference: Reference
 
 
 class Pilot:
     """Flies tasks, one mode after another.
 
-    One state machine with many doors: its attributes are its state, all of it in `record`; its methods are what may
-    happen to it, and what is asked about it.
+    It has more methods than most classes: each is an event of the one state machine of mode, task and failsafe, and
+    parts of them would need the whole state.
 
     Attributes:
         state: Mode, and whether the rotors may turn.
         behaviour: The numbers to fly by.
-        home: Where it took off, or was told to return to.
-        standing: Whether it stands on the ground.
-        idles: Whether the rotors stand or idle.
+        home: Where it took off, or a place that was chosen.
+        ground: Contact with the ground.
+        generator: Of the reference.
+        readiness: Arming checks, and a failed rotor.
+        sensed: Inputs of the last control sample.
         task: What is flown.
-        reference: Where the reference stands.
-        speed_m_s: Cruise speed that was asked for; None for the parameters'.
-        times: Of the last arming, take-off and landing.
-        ground_m: Height of where it last stood, z of ENU.
-        saving: The failsafe that is flown, until somebody chooses a mode or the rotors stop.
+        speed_m_s: Cruise speed requested for this flight; None for the parameters'.
+        saving: The failsafe that is flown, until a mode is selected or the rotors stop.
         terminated: Whether a failsafe stopped the rotors in the air.
-        rotor_failed: Which rotor has failed, in words; empty if none has. Nothing but landing is possible then.
     """
 
     def __init__(
-        self,
-        instants: Instants,
-        behaviour: Behaviour,
-        make_task: TaskFactory,
-        home: Home,
-        lines: StatusQueue,
+        self, instants: Instants, behaviour: Behaviour, make_task: TaskFactory, home: Home, lines: StatusQueue
     ) -> None:
         """Begin on the ground, or in the air: see `begin`. What is compiled is loaded here.
 
         Args:
             instants: At which references are planned, and which of them the control law previews.
             behaviour: The numbers to fly by.
-            make_task: Says how each mode begins.
+            make_task: Returns the task with which a mode begins.
             home: Moved by take-offs and by whoever chooses it.
-            lines: Take what a ground station is to know.
+            lines: Take status texts for ground stations.
         """
-        self._instants = instants
         self._make_task = make_task
+        self._lines = lines
         self.state = FIRST
         self.behaviour = behaviour
         self.home = home
-        self.standing = True
+        self.ground = GroundContact(lines)
+        self.generator = ReferenceGenerator(instants, behaviour.limits)
+        self.readiness = Readiness(lines)
+        self.sensed = Sensed()
         self.task: FlightTask = HoldTask()
-        self.reference: Reference | None = None
+        self._task_is_chosen = False
         self.speed_m_s: float | None = None
-        self.times = FlightTimes()
         self.saving = Action.NONE
         self.terminated = False
-        self.rotor_failed = ""
-        self.ground_m = 0.0
-        self._task_is_chosen = False
-        self.idles = True
-        self._landing = Landing()
-        self._sensed = Sensed()
-        self._arming_inputs = ArmingInputs(None, standing=True, charge=1.0, thrust_stick=None)
-        self._lines = lines
-        self._warm_up()
-
-    def _warm_up(self) -> None:
-        """Load what is compiled: a take-off is no time for that."""
-        interval_us, samples = self._instants.preview
-        motionless = Reference(np.zeros((4, 3)), np.zeros(2))
-        lead(motionless, still_target((1.0, 0.0, 0.0), 0.0, samples), self.behaviour.limits, interval_us * 1e-6)
 
     def begin(self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None, rests: bool = False) -> None:
-        """See the vehicle for the first time: it stands, or it is picked up in flight, in `mode` or in hold.
+        """Take in the first state of a flight: the vehicle stands, or it is picked up in flight, in `mode` or in hold.
 
-        Where it is known that it `rests` it stands, however high it seems to be: an estimate of height is not exact.
+        One that is known to rest (`rests`) stands at any height: an estimate of height is not exact.
         """
-        self._sensed = self._sensed._replace(now_us=now_us, vehicle=vehicle)
-        self.times = FlightTimes(flights=self.times.flights)
-        self.standing = self.idles = mode is None and (rests or stands_at_first(vehicle, 0.0))
-        self.reference = moving_with(vehicle)
-        if self.standing:
+        self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
+        standing = mode is None and (rests or stands_at_first(vehicle, 0.0))
+        self.generator.follow(vehicle)
+        if standing:
             self.home.propose(vehicle.position_enu_m, vehicle.euler[2])
-            self.state = FIRST
-        else:
-            self.state = State(mode or Mode.HOLD, armed=True)
-            self._begin_flight()
+        self.state = FIRST if standing else State(mode or Mode.HOLD, armed=True)
+        self.ground.begin(now_us, standing=standing)
         self._engage(self.state.mode)
 
     def record(self) -> PilotRecord:
-        """Return what is needed to go on after a restart, but for the task."""
-        assert self.reference is not None, "the pilot has seen the vehicle"
+        """Return the state for a restart, but for the task."""
+        assert self.generator.reference is not None, "the vehicle has been seen"
+        home = self.home
         return PilotRecord(
-            *self.state,
-            self.standing,
-            self.idles,
-            self.home.position_enu_m,
-            self.home.yaw_rad,
-            self.home.chosen,
+            self.state,
+            self.ground.record(),
+            home.position_enu_m,
+            home.yaw_rad,
+            home.chosen,
             self.speed_m_s,
-            *self.times,
-            self.ground_m,
             self.saving,
-            *self.reference,
+            self.generator.reference,
         )
 
     def resume(
-        self,
-        now_us: int,
-        vehicle: VehicleState,
-        record: PilotRecord,
-        again: TaskFactory,
-        *,
-        seamless: bool,
+        self, now_us: int, vehicle: VehicleState, record: PilotRecord, again: TaskFactory, *, seamless: bool
     ) -> None:
-        """See the vehicle for the first time since a restart: it goes on as it was.
+        """Restore the state at the first frame after a restart.
 
-        The reference goes on where it was if the restart took no time, that is `seamless`, and else from where the
-        vehicle is. One that has come down meanwhile stays there. `again` says how a mode goes on.
+        Args:
+            now_us: Simulated time.
+            vehicle: The vehicle; if it has come down meanwhile it stays there.
+            record: State before the restart.
+            again: Returns the task with which a mode goes on.
+            seamless: Whether the restart took no time: the reference goes on as recorded, else from the vehicle.
         """
-        self._sensed = self._sensed._replace(now_us=now_us, vehicle=vehicle)
+        self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
         self.home.resume(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
         self.speed_m_s = record.speed_m_s
-        self.times = FlightTimes(record.armed_us, record.takeoff_us, record.landing_us, record.flights)
-        self.ground_m = record.ground_m
-        came_down = not seamless and not record.standing and stands_at_first(vehicle, record.ground_m)
-        self.standing = record.standing or came_down
-        self.state = FIRST if came_down else State(record.mode, record.armed)
+        ground = record.ground
+        came_down = not seamless and not ground.standing and stands_at_first(vehicle, ground.height_m)
+        self.ground.resume(ground, came_down=came_down)
+        self.state = FIRST if came_down else record.state
         self.saving = Action.NONE if came_down else record.saving
-        self.idles = record.idles or came_down
-        self.reference = Reference(record.motion, record.heading) if seamless else moving_with(vehicle)
+        if seamless:
+            self.generator.set(record.reference)
+        else:
+            self.generator.follow(vehicle)
         self._take((self._make_task if came_down else again)(self.state.mode, self.context()))
         self._task_is_chosen = not came_down
 
@@ -253,83 +192,56 @@ class Pilot:
         """Fly by other numbers from now on; without landing on three rotors, none counts as failed."""
         self.behaviour = behaviour
         if not behaviour.land_on_three:
-            self.trust_rotors()
+            self.readiness.trust_rotors()
 
     def sense(
         self, now_us: int, vehicle: VehicleState, steered: Steered = NOT_STEERED, *, knows_position: bool = True
     ) -> None:
-        """Take in what a control sample needs.
-
-        Args:
-            now_us: Simulated time.
-            vehicle: The vehicle.
-            steered: What clients ask for.
-            knows_position: Whether `vehicle` is known well enough to fly to places.
-        """
-        self._sensed = Sensed(now_us, vehicle, steered, knows_position)
-
-    @property
-    def has_seen(self) -> bool:
-        """Whether it has ever known where the vehicle is: on sensors that takes a while."""
-        return self._sensed.vehicle is not None
-
-    @property
-    def knows_position(self) -> bool:
-        """Whether the vehicle knows where it is, as of the last control sample."""
-        return self._sensed.knows_position
-
-    def take_stock(self, inputs: ArmingInputs) -> None:
-        """Take in what arming is judged by."""
-        self._arming_inputs = inputs
+        """Take in the inputs of a control sample; the arguments are the fields of `Sensed`."""
+        self.sensed = Sensed(now_us, vehicle, steered, knows_position)
 
     def context(self) -> TaskContext:
-        """Return what a task sees now."""
-        now_us, vehicle, steered, knows_position = self._sensed
-        assert vehicle is not None, "the pilot has seen the vehicle"
-        assert self.reference is not None, "the pilot has seen the vehicle"
-        interval_us, samples = self._instants.preview
-        behaviour = self.behaviour
+        """Return the inputs of a task now."""
+        now_us, vehicle, steered, knows_position = self.sensed
+        reference, behaviour = self.generator.reference, self.behaviour
+        assert vehicle is not None, "the vehicle has been seen"
+        assert reference is not None, "the vehicle has been seen"
         speed = behaviour.limits.speed_m_s if self.speed_m_s is None else self.speed_m_s
         speed = min(speed, behaviour.max_speed_m_s)
         if speed != behaviour.limits.speed_m_s:
             behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed))
-        interval_s = interval_us * 1e-6
         return TaskContext(
             now_us,
             vehicle,
-            self.reference,
+            reference,
             self.home.position_enu_m,
             behaviour,
-            interval_s,
-            samples,
+            self.generator.interval_s,
+            self.generator.samples,
             steered,
-            self.standing,
-            self.ground_m,
+            self.ground.standing,
+            self.ground.height_m,
             blind=self.saving is Action.DESCEND or not knows_position,
         )
 
     @property
     def flight(self) -> Flight:
-        """What failsafes are weighed against."""
-        return Flight(self.state.armed, self.standing, self.state.mode, self.saving)
-
-    def refusals(self) -> list[str]:
-        """Return why the rotors may not be armed; empty if they may."""
-        return refusals(self._arming_inputs) + ([self.rotor_failed] if self.rotor_failed else [])
+        """State of the flight that failsafes are weighed against."""
+        return Flight(self.state.armed, self.ground.standing, self.state.mode, self.saving)
 
     def arm(self, missing: Collection[Need], *, force: bool = False) -> Refusal | None:
-        """Let the rotors turn; return why not. `missing` are the needs of modes that nothing meets now."""
+        """Arm the rotors, or return why not; `missing` are the needs of modes that nothing meets now."""
         if self.state.armed:
             return None
-        forced = force and self.has_seen and not self.rotor_failed
-        reasons = [] if forced else self.refusals()
+        forced = force and self.sensed.vehicle is not None and not self.readiness.rotor_failed
+        reasons = [] if forced else self.readiness.refusals()
         if reasons:
             return Refusal("not armed: " + "; ".join(reasons))
         unmet = [need for need in missing if need is not Need.POSITION]  # a check of its own, and by force
         refusal = self._follow(Event.ARM, "rotors armed", missing=unmet)
         if refusal is None:
-            now_us, vehicle, _, _ = self._sensed
-            self.times = self.times._replace(armed_us=now_us, flights=self.times.flights + 1)
+            now_us, vehicle, _, _ = self.sensed
+            self.ground.arm(now_us)
             self.terminated = False
             if vehicle is not None:
                 self.home.propose(vehicle.position_enu_m, vehicle.euler[2])
@@ -338,15 +250,16 @@ class Pilot:
         return refusal
 
     def disarm(self, *, force: bool = False) -> Refusal | None:
-        """Stop the rotors; return why not."""
+        """Stop the rotors, or return why not."""
         if not self.state.armed:
             return None
-        if not self.standing and not force:
+        standing = self.ground.standing
+        if not standing and not force:
             return Refusal("not disarmed: the vehicle is flying")
-        return self._stop_rotors(Event.DISARM, "rotors stopped" if self.standing else "rotors stopped in the air")
+        return self._stop_rotors(Event.DISARM, "rotors stopped" if standing else "rotors stopped in the air")
 
     def select(self, mode: Mode, missing: Collection[Need]) -> Refusal | None:
-        """Change the mode; return why not. `missing` are the needs of modes that nothing meets now."""
+        """Change the mode, or return why not; `missing` are the needs of modes that nothing meets now."""
         if mode is self.state.mode and mode is not Mode.HOLD:
             return None
         refusal = self._follow(Event.SELECT, "", mode, missing)
@@ -356,9 +269,9 @@ class Pilot:
         return refusal
 
     def fly(self, mode: Mode, task: FlightTask, missing: Collection[Need]) -> Refusal | None:
-        """Change to `mode` and fly `task` in it, now or once the rotors are armed; return why not.
+        """Change to `mode` and fly `task` in it, now or once the rotors are armed; or return why not.
 
-        `missing` are the needs of modes that nothing meets now; where a circle leads, the task says.
+        `missing` are the needs of modes that nothing meets now; a circle comes with the task.
         """
         refusal = self._follow(Event.SELECT, "", mode, [need for need in missing if need is not Need.CIRCLE])
         if refusal is None:
@@ -367,11 +280,11 @@ class Pilot:
         return refusal
 
     def save(self, action: Action) -> None:
-        """Do what a failsafe says, whatever is flown: it has been weighed against that, and been said."""
+        """Execute a failsafe's action, which the supervisor has weighed against the flight and reported."""
         if not self.state.armed:
             return
         if action is Action.TERMINATE:
-            self.terminated = not self.standing
+            self.terminated = not self.ground.standing
             self._stop_rotors(Event.TERMINATED, "")
             return
         self.saving = action
@@ -379,157 +292,100 @@ class Pilot:
         self._engage(self.state.mode)
 
     def fly_at(self, speed_m_s: float | None) -> None:
-        """Cruise at another speed for this flight; None for the parameters'."""
+        """Set the cruise speed of this flight; None for the parameters'."""
         self.speed_m_s = speed_m_s
 
     def happened(self, event: Event) -> None:
-        """Tell of an event that may change the mode: what is finished."""
+        """Change the mode as an event demands: what is finished."""
         before = self.state
         stays = event in (Event.ARRIVED, Event.FINISHED)  # where the task that ends has led
         if self._follow(event, f"{event}: {{mode}}") is None and self.state.mode is not before.mode and not stays:
             self._engage(self.state.mode)
 
-    def lose_rotor(self, rotor: int) -> None:
-        """Choose nothing any more: rotor 0..3 has failed, and the failsafe of that lands."""
-        self.rotor_failed = f"rotor {rotor + 1} failed"
-        self.say(EMERGENCY, f"{self.rotor_failed}: landing on three rotors")
-
-    def trust_rotors(self) -> None:
-        """Take all rotors for whole again."""
-        self.rotor_failed = ""
-
     def touch_down(self) -> None:
-        """Stand, and stop the rotors: something else than the reference tells of the ground."""
-        self._stand()
+        """Stand, and stop the rotors: a landing that is detected by something else than the reference."""
+        self.ground.land(self.sensed.now_us)
         self._stop_rotors(Event.TOUCHED_DOWN, f"{Event.TOUCHED_DOWN}, rotors stopped")
 
     def step(self) -> Guidance:
-        """Return what to follow from now on. Called once a control sample."""
+        """Return the references from now on. Called once a control sample."""
         if not self.state.armed:
-            self._rest()
-            return RESTS
+            return self._rest()
         context = self.context()
         wanted = self.task.update(context)
         if isinstance(self.task, MissionTask) and self.task.says_return:
             self.happened(Event.RETURN_ITEM)
-        if self.standing:
+        if self.ground.standing:
             if not (wanted.lifts if isinstance(wanted, AttitudeMotion) else lifts(wanted.target, context.state)):
-                self._idle()
-                return RESTS
-            self._begin_flight()
-        begins, self.idles = self.idles, False
-        guidance = (
-            self._attitude_guidance(wanted, begins)
-            if isinstance(wanted, AttitudeMotion)
-            else self._move(context, wanted, begins)
-        )
-        if self.task.arrived(context):
-            self._arrive()
+                return self._idle()
+            self.ground.take_off(context.now_us)
+        guidance = self._guidance(context, wanted, begins=self.ground.spin_up())
+        ended = _ENDS.get(self.state.mode)
+        if self.task.arrived(context) and ended is not None:
+            self.happened(ended)
         return guidance
 
-    def say(self, severity: int, text: str) -> None:
-        """Add a line for the ground station."""
-        self._lines.say(severity, text)
-
-    def _move(self, context: TaskContext, wanted: Motion | PlannedMotion, begins: bool) -> Guidance:
-        horizon = self._lead(context, wanted)
-        self._watch_ground(context.state, sinks=is_below(context.reference, context.state))
+    def _guidance(
+        self, context: TaskContext, wanted: AttitudeMotion | Motion | PlannedMotion, *, begins: bool
+    ) -> Guidance:
+        """Return the references by which the output of a task is flown, and look for the ground."""
+        now_us, vehicle = context.now_us, context.state
+        if isinstance(wanted, AttitudeMotion):
+            self.generator.set(wanted.reference)
+            self.ground.watch(now_us, vehicle, sinks=wanted.sinks, drifts=wanted.drifts)
+            return Guidance(attitude=wanted.demand, begins=begins)
+        horizon = self.generator.lead(context, wanted)
+        self.ground.watch(now_us, vehicle, sinks=is_below(context.reference, vehicle))
         return Guidance(horizon=horizon, begins=begins)
 
-    def _lead(self, context: TaskContext, wanted: Motion | PlannedMotion) -> Horizon:
-        """Move the reference on, and return what the control law previews of it."""
-        reference, limits, interval_s = context.reference, wanted.limits, context.interval_s
-        if isinstance(wanted, PlannedMotion):
-            horizon, self.reference = lead_along(reference, wanted.horizon, limits, interval_s)
-            if wanted.for_law is not None and horizon.position_enu_m is wanted.horizon.position_enu_m:
-                turned = horizon.yaw_rad[0] - wanted.horizon.yaw_rad[0]
-                return wanted.for_law._replace(yaw_rad=wanted.for_law.yaw_rad + turned)
-        else:
-            horizon, self.reference = lead(reference, wanted.target, limits, interval_s)
-        return self._instants.for_law(horizon)
-
-    def _attitude_guidance(self, wanted: AttitudeMotion, begins: bool) -> Guidance:
-        vehicle = self._sensed.vehicle
-        assert vehicle is not None, "the pilot has seen the vehicle"
-        self.reference = wanted.reference
-        self._watch_ground(vehicle, sinks=wanted.sinks, drifts=wanted.drifts)
-        return Guidance(attitude=wanted.demand, begins=begins)
-
-    def _rest(self) -> None:
+    def _rest(self) -> Guidance:
         """Lie, or fall, with the rotors standing still or idle."""
-        now_us, vehicle, _, _ = self._sensed
-        assert vehicle is not None, "the pilot has seen the vehicle"
-        self.idles = True
-        self.reference = at_rest(vehicle)
-        self._landing, lies = watch(self._landing, now_us, vehicle, sinks=True)
-        self.standing = self.standing or lies
-        if self.standing:
-            self.ground_m = vehicle.position_enu_m[2]
+        now_us, vehicle, _, _ = self.sensed
+        assert vehicle is not None, "the vehicle has been seen"
+        self.generator.rest(vehicle)
+        self.ground.rest(now_us, vehicle)
+        return RESTS
 
-    def _idle(self) -> None:
-        """Stand with idling rotors; not for ever."""
+    def _idle(self) -> Guidance:
+        """Stand with idling rotors, for as long as the parameters allow."""
         self._rest()
-        times = self.times
-        on_ground_us = self._sensed.now_us - max(times.armed_us, times.landing_us)
-        landed = times.landing_us > times.armed_us
-        behaviour = self.behaviour
-        allowed_s = behaviour.disarm_after_landing_s if landed else behaviour.disarm_on_ground_s
-        if allowed_s > 0.0 and on_ground_us >= allowed_s * 1e6:
-            event = Event.TOUCHED_DOWN if landed else Event.LEFT_STANDING
+        event = self.ground.end_of_idling(self.sensed.now_us, self.behaviour)
+        if event is not None:
             self._stop_rotors(event, f"{event}, rotors stopped")
+        return RESTS
 
     def _stop_rotors(self, event: Event, text: str) -> Refusal | None:
-        """Stop the rotors, and forget what was asked for this flight alone."""
+        """Stop the rotors, and forget what was requested for this flight alone."""
         refusal = self._follow(event, text)
         if refusal is None:
             self.speed_m_s = None
             self.saving = Action.NONE
-            self._landing = Landing()
+            self.ground.stop()
             self._engage(self.state.mode)
         return refusal
 
-    def _begin_flight(self) -> None:
-        self.standing = False
-        self._landing = Landing()
-        self.times = self.times._replace(takeoff_us=self._sensed.now_us)
-        self.say(INFO, "take-off")
-
-    def _watch_ground(self, vehicle: VehicleState, *, sinks: bool, drifts: bool = False) -> None:
-        self._landing, stands = watch(self._landing, self._sensed.now_us, vehicle, sinks, drifts=drifts)
-        if stands:
-            self._stand()
-
-    def _stand(self) -> None:
-        self.standing = True
-        self.times = self.times._replace(landing_us=self._sensed.now_us)
-        self.say(NOTICE, "landing detected")
-
-    def _arrive(self) -> None:
-        if self.state.mode is Mode.TAKEOFF:
-            self.happened(Event.ARRIVED)
-        elif self.state.mode in (Mode.MISSION, Mode.TRACK):
-            self.happened(Event.FINISHED)
-
     def _engage(self, mode: Mode) -> None:
-        if self.reference is not None:
+        if self.generator.reference is not None:
             self._take(self._make_task(mode, self.context()))
             self._task_is_chosen = False
 
     def _take(self, task: FlightTask) -> None:
-        """Fly a task from now on; one that was begun in mid-flight says where the reference is."""
+        """Fly a task from now on; a track that is picked up in mid-flight sets the reference."""
         self.task = task
         if isinstance(task, TrackTask) and task.start is not None:
-            self.reference = task.start
+            self.generator.set(task.start)
 
     def _follow(
         self, event: Event, text: str, selected: Mode | None = None, missing: Collection[Need] = ()
     ) -> Refusal | None:
-        if event is Event.SELECT and self.state.armed and self.rotor_failed:
-            return Refusal(f"{selected} refused: {self.rotor_failed}")
+        """Change the state by an event, and report `text` if that changes anything; or return why not."""
+        rotor_failed = self.readiness.rotor_failed
+        if event is Event.SELECT and self.state.armed and rotor_failed:
+            return Refusal(f"{selected} refused: {rotor_failed}")
         after = next_state(self.state, event, selected, missing)
         if isinstance(after, Refusal):
             return after
         if after != self.state and text:
-            self.say(INFO, text.format(mode=after.mode))
+            self._lines.say(INFO, text.format(mode=after.mode))
         self.state = after
         return None

@@ -1,9 +1,9 @@
-"""What a flight needs to go on after the autopilot was killed, as plain data.
+"""Checkpoint: the state of a flight as plain data, from which it goes on after the autopilot was killed.
 
-A record is made at each control sample; whoever keeps it hands it to the vehicle of the next process. The first frame
-says whether it is of the same flight: its time follows the record's. Close behind it everything goes on, with the
-references, the control law's memory and the estimator as they were. Later, what is asked for goes on, from where the
-vehicle is. What the services of ground stations remember of a conversation is not kept.
+One is recorded at each control sample, and given to the vehicle of the next process. It is of the same flight if the
+time of the first frame follows its own. Within `CLOSE_US` everything is restored: references, the control law's memory,
+the estimator. Later, mode and task are restored, and go on from where the vehicle is. Open transactions of ground
+stations are not recorded.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,17 +12,13 @@ from zlib import crc32
 
 import msgspec
 
-from colibri.autopilot.commander.pilot import Pilot, PilotRecord
+from colibri.autopilot.commander.pilot import PilotRecord
 from colibri.autopilot.commander.rules.failsafe_rule import Memory
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.commander.supervisor import Supervisor
 from colibri.autopilot.commander.task_record import TaskRecord, task_record
-from colibri.autopilot.control.loop import ControlLoop, LoopRecord
+from colibri.autopilot.control.loop import LoopRecord
 from colibri.autopilot.control.profile import Profile
-from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
-from colibri.autopilot.estimation.state_source import StateSource
-from colibri.autopilot.ground.battery_monitor import BatteryMonitor
-from colibri.autopilot.ground.stations import Stations
+from colibri.autopilot.core.parts import Parts
 from colibri.autopilot.guidance.mission.executor import MissionRecord
 from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext
 from colibri.common.earth.geodesy import Geodetic
@@ -34,7 +30,7 @@ from colibri.plant.vehicle.description import Vehicle
 CLOSE_US = 50_000
 """A control law goes on over a gap as short as this: rotors and attitude are as it left them."""
 FOLLOWS_US = 30_000_000
-"""What comes later is of another flight."""
+"""A frame that comes later is of another flight."""
 
 Plans: TypeAlias = Mapping[int, Sequence[MissionItem]]
 """Items by MAV_MISSION_TYPE."""
@@ -48,17 +44,17 @@ class Checkpoint(NamedTuple):
         time_us: Simulated time.
         origin: Of the ENU frame.
         plan_ids: Opaque ids of mission, geofence and rally points, which are kept by themselves.
-        mission: Where the mission stands.
+        mission: Progress of the mission.
         pilot: Mode, home, references.
-        task: What is flown.
+        task: The flight task.
         loop: The control law.
         charge_ah: Taken from the battery.
         energy_wh: The same as energy.
-        state_source: Of the estimator; empty where the state is told.
+        state_source: Of the estimator; empty where frames are states.
         rotor_lost: 0..3; None while all turn.
         rotor_speeds: As their lag has them, parts of the largest, (4,).
-        failsafes: What they remember.
-        had_station: Whether a ground station was ever heard: its loss counts from the restart.
+        failsafes: Memory of the supervisor.
+        had_station: Whether a ground station was ever connected: its loss counts from the restart.
     """
 
     fingerprint: int
@@ -82,12 +78,12 @@ class Checkpoint(NamedTuple):
         return 0 <= time_us - self.time_us <= FOLLOWS_US
 
     def is_close_to(self, time_us: int) -> bool:
-        """Whether all goes on at a frame as if nothing had happened."""
+        """Whether a frame follows so closely that everything goes on."""
         return 0 <= time_us - self.time_us <= CLOSE_US
 
 
 class History(NamedTuple):
-    """What was kept of a flight.
+    """A recorded flight.
 
     Attributes:
         checkpoint: Its last control sample.
@@ -104,69 +100,58 @@ def fingerprint_of(profile: Profile, vehicle: Vehicle) -> int:
 
 
 def goes_on(mode: Mode, seq: int) -> str:
-    """Say what goes on."""
+    """Return the status text of a flight that goes on."""
     what = f"mission goes on at item {seq}" if mode is Mode.MISSION else f"{mode} goes on"
     return f"restarted in flight: {what}"
 
 
 Again: TypeAlias = Callable[[TaskRecord, Mode, TaskContext], FlightTask]
-"""Says how a mode goes on."""
+"""Returns the task with which a mode goes on."""
 
 
 class Checkpointer:
-    """Keeps one vehicle's flight."""
+    """Records and restores one vehicle's flight."""
 
-    def __init__(
-        self,
-        fingerprint: int,
-        loop: ControlLoop,
-        state_source: StateSource,
-        pilot: Pilot,
-        stations: Stations,
-        power: BatteryMonitor,
-        rotor_loss: RotorLoss,
-        supervisor: Supervisor,
-    ) -> None:
-        """Keep what these parts of a vehicle know; `fingerprint` is `fingerprint_of` it."""
+    def __init__(self, fingerprint: int, parts: Parts) -> None:
+        """Record the state of these parts of a vehicle; `fingerprint` is `fingerprint_of` it."""
         self._fingerprint = fingerprint
-        self._loop, self._state_source = loop, state_source
-        self._pilot, self._stations = pilot, stations
-        self._power, self._rotor_loss, self._supervisor = power, rotor_loss, supervisor
+        self._parts = parts
 
     def record(self, time_us: int) -> Checkpoint:
         """Return the flight as it is now."""
+        parts, pilot = self._parts, self._parts.pilot
         return Checkpoint(
             self._fingerprint,
             time_us,
-            self._pilot.home.origin,
-            self._stations.plans.ids,
-            self._stations.missions.record(),
-            self._pilot.record(),
-            task_record(self._pilot.task),
-            self._loop.record(),
-            self._power.charge_ah,
-            self._power.energy_wh,
-            self._state_source.record(),
-            self._rotor_loss.lost,
-            self._rotor_loss.watch.speeds,
-            self._supervisor.memory,
-            self._stations.station_us is not None,
+            pilot.home.origin,
+            parts.stations.plans.ids,
+            parts.stations.missions.record(),
+            pilot.record(),
+            task_record(pilot.task),
+            parts.loop.record(),
+            parts.battery.charge_ah,
+            parts.battery.energy_wh,
+            parts.state_source.record(),
+            parts.rotor_loss.lost,
+            parts.rotor_loss.watch.speeds,
+            parts.supervisor.memory,
+            parts.stations.station_us is not None,
         )
 
     def resume(self, history: History, frame: StateFrame, again: Again) -> None:
-        """Have every part but the senses, who come before, go on with a flight at its next frame."""
+        """Restore every part but the state source, which comes before, at the first frame after a restart."""
         checkpoint, plans = history
-        stations, pilot = self._stations, self._pilot
+        parts, stations, pilot = self._parts, self._parts.stations, self._parts.pilot
         seamless = checkpoint.is_close_to(frame.time_us) and checkpoint.fingerprint == self._fingerprint
-        self._loop.resume(checkpoint.loop, seamless=seamless)
-        self._power.resume(checkpoint.charge_ah, checkpoint.energy_wh)
+        parts.loop.resume(checkpoint.loop, seamless=seamless)
+        parts.battery.resume(checkpoint.charge_ah, checkpoint.energy_wh)
         pilot.home.move_origin(checkpoint.origin)
         stations.plans.restore(plans)
         same = stations.plans.ids == checkpoint.plan_ids
         stations.missions.resume(stations.plans.plans, checkpoint.mission if same else None)
         if checkpoint.had_station:
             stations.expect_station(frame.time_us)
-        state = self._loop.state(frame)
+        state = parts.loop.state(frame)
         pilot.resume(
             frame.time_us,
             state,
@@ -176,10 +161,9 @@ class Checkpointer:
         )
         stations.missions.moved_origin()
         if pilot.state.armed:
-            self._supervisor.resume(checkpoint.failsafes)
-        if checkpoint.rotor_lost is not None:
-            flying = pilot.state.armed and not pilot.standing
-            self._rotor_loss.resume(
-                checkpoint.rotor_lost, checkpoint.rotor_speeds, state, pilot.ground_m, flying=flying
-            )
-            pilot.lose_rotor(checkpoint.rotor_lost)
+            parts.supervisor.resume(checkpoint.failsafes)
+        lost, ground = checkpoint.rotor_lost, pilot.ground
+        if lost is not None:
+            flying = pilot.state.armed and not ground.standing
+            parts.rotor_loss.resume(lost, checkpoint.rotor_speeds, state, ground.height_m, flying=flying)
+            pilot.readiness.lose_rotor(lost)

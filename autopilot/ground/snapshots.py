@@ -2,7 +2,8 @@
 
 from math import nan
 
-from colibri.autopilot.commander.pilot import Guidance, Pilot
+from colibri.autopilot.commander.flight.reference_generator import Guidance
+from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import ROWS, Mode, custom_mode
 from colibri.autopilot.control.interface import (
@@ -101,7 +102,7 @@ class SnapshotBuilder:
             failsafe=pilot.saving is not Action.NONE,
             emergency=pilot.saving >= Action.LAND,
             terminated=pilot.terminated,
-            armable=not pilot.refusals(),
+            armable=not pilot.readiness.refusals(),
             position_enu_m=state.position_enu_m,
             velocity_enu_m_s=state.velocity_enu_m_s,
             acceleration_enu_m_s2=(ax, ay, az),
@@ -118,10 +119,10 @@ class SnapshotBuilder:
             setpoint=setpoint(guidance, decision, controls),
             solver=self._solver_state(now_us, state, guidance.horizon, decision, duration_s),
             sticks=None if sticks is None else (sticks.pitch, sticks.roll, sticks.thrust, sticks.yaw),
-            flight_started_us=pilot.times.armed_us,
-            takeoff_us=pilot.times.takeoff_us,
-            landing_us=pilot.times.landing_us,
-            flights=pilot.times.flights,
+            flight_started_us=pilot.ground.times.armed_us,
+            takeoff_us=pilot.ground.times.takeoff_us,
+            landing_us=pilot.ground.times.landing_us,
+            flights=pilot.ground.times.flights,
             ground_m=pilot.home.position_enu_m[2],
             load=min(duration_s / self._interval_s, 1.0),
             sensed=state_source.sensed,
@@ -160,12 +161,12 @@ _BY_STICKS = (Mode.STABILIZED, Mode.ALTITUDE, Mode.POSITION)
 
 def landed_state(pilot: Pilot, state: VehicleState) -> int:
     """Return the MAV_LANDED_STATE."""
-    if pilot.standing:
+    if pilot.ground.standing:
         return int(mav.MAV_LANDED_STATE_ON_GROUND)
     mode = pilot.state.mode
     if mode is Mode.TAKEOFF:
         return int(mav.MAV_LANDED_STATE_TAKEOFF)
-    sinking = pilot.reference is not None and float(pilot.reference.motion[1, 2]) < -0.1
+    sinking = pilot.generator.reference is not None and float(pilot.generator.reference.motion[1, 2]) < -0.1
     near = state.position_enu_m[2] - pilot.home.position_enu_m[2] < _NEAR_GROUND_M
     if mode is Mode.LAND or (mode is Mode.RETURN and sinking and near):
         return int(mav.MAV_LANDED_STATE_LANDING)

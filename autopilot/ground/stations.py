@@ -346,7 +346,7 @@ class Stations:
     def _status(self) -> str:
         mode, armed = self._pilot.state
         x, y, z = self._pilot.context().state.position_enu_m
-        reasons = "; ".join(self._pilot.refusals()) or "ready to arm"
+        reasons = "; ".join(self._pilot.readiness.refusals()) or "ready to arm"
         yaw_deg = (90.0 - self._pilot.context().state.euler[2] * 180.0 / pi) % 360.0
         return (
             f"{self.banner()}\nmode {mode}, {'armed' if armed else 'disarmed'}, {reasons}\n"

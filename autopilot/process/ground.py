@@ -10,7 +10,6 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.checkpoint import History
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.step import Received
-from colibri.autopilot.estimation.state_source import Estimator
 from colibri.autopilot.ground.stations import REBOOT, SHUT_DOWN, StationSettings
 from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.autopilot.parameters.definitions import ImpossibleError
@@ -45,7 +44,6 @@ class Ground:
         args: argparse.Namespace,
         profile: Profile,
         vehicle: Vehicle,
-        estimator: Estimator | None,
         status: Status,
         conductor: Conductor | None = None,
     ) -> None:
@@ -57,7 +55,6 @@ class Ground:
         self._args = args
         self._profile = profile
         self._vehicle = vehicle
-        self._estimator = estimator
         self._status = status
         self._state = StateFolder(
             args.state,
@@ -105,7 +102,7 @@ class Ground:
         outbox = self.copter.serve(received)
         if stations.restart:
             self._restart(stations.restart)
-        if now_s >= self._told_s + _TELL_EVERY_S and self.copter.pilot.has_seen:
+        if now_s >= self._told_s + _TELL_EVERY_S and self.copter.pilot.sensed.vehicle is not None:
             self._tell(now_s)
         if self.copter.parameters.revision != self._revision:
             self._revision = self.copter.parameters.revision
@@ -178,7 +175,6 @@ class Ground:
                 perf_counter,
                 values=self._values,
                 first=self._first,
-                estimator=self._estimator,
                 history=history,
             )
         except ImpossibleError as error:
@@ -210,7 +206,7 @@ class Ground:
             "speed_m_s": hypot(*state.velocity_enu_m_s),
             "sim_time_s": now_us * 1e-6,
             "times_real_time": (now_us - self._told_us) * 1e-6 / (now_s - self._told_s),
-            "solve_time_us": self.copter.solve_time_s * 1e6,
+            "solve_time_us": self.copter.parts.actuation.solve_time_s * 1e6,
         }
 
 
@@ -218,7 +214,6 @@ def open_ground(
     args: argparse.Namespace,
     profile: Profile,
     vehicle: Vehicle,
-    estimator: Estimator | None,
     status: Status,
     conductor: Conductor | None = None,
 ) -> Ground:
@@ -227,7 +222,7 @@ def open_ground(
     Raises:
         GroundError: Something of it cannot be used.
     """
-    return Ground(args, profile, vehicle, estimator, status, conductor)
+    return Ground(args, profile, vehicle, status, conductor)
 
 
 def _invitation(url: str) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.core.track_autopilot import Autopilot
-from colibri.autopilot.estimation.state_source import Estimator, estimator_for
+from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.autopilot.process.client import Client
 from colibri.autopilot.process.logs import AutopilotLog
@@ -29,25 +29,25 @@ TRACK = "spiral"
 """What flies where nothing else is said."""
 
 
-def loaded(args: argparse.Namespace) -> tuple[Profile, Vehicle, Estimator | None]:
+def loaded(args: argparse.Namespace) -> tuple[Profile, Vehicle]:
     """Return what a command line flies with.
 
     Raises:
         ProfileError: There is no such profile, or it is wrong.
-        VehicleError: There is no such vehicle, or it cannot be flown by what is asked for.
+        VehicleError: There is no such vehicle.
     """
     profile = load_profile(args.profile).with_choices(args.controller, args.solver)
     vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
-    return profile, vehicle, estimator_for(args.feedback, vehicle, args.home.origin)
+    return profile, vehicle
 
 
 def run(args: argparse.Namespace, link: UdpLink | BlockingReceiver, status: Status, stop: Stop) -> int:
     """Fly the plant at the other end of `link` as the command line says; return the exit code."""
     try:
-        profile, vehicle, estimator = loaded(args)
+        profile, vehicle = loaded(args)
         served = args.gcs or args.stepped
-        ground = _ground(args, profile, vehicle, estimator, status, stop) if served else None
-        autopilot = ground.copter if ground else _alone(args, profile, vehicle, estimator)
+        ground = _ground(args, profile, vehicle, status, stop) if served else None
+        autopilot = ground.copter if ground else _alone(args, profile, vehicle)
         end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
     except Error as error:
         fail(str(error))
@@ -106,7 +106,8 @@ def _flier(args: argparse.Namespace, vehicle: Vehicle) -> FlierEnd:
     )
 
 
-def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, estimator: Estimator | None) -> Autopilot:
+def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle) -> Autopilot:
+    estimator = estimator_for(args.feedback, vehicle, args.home.origin)
     return Autopilot(profile, vehicle, track(args.track or TRACK), perf_counter, estimator=estimator)
 
 
@@ -114,7 +115,6 @@ def _ground(
     args: argparse.Namespace,
     profile: Profile,
     vehicle: Vehicle,
-    estimator: Estimator | None,
     status: Status,
     stop: Stop,
 ) -> "Ground":
@@ -127,4 +127,4 @@ def _ground(
         link = open_link(args.stepped)
         link.spin_s = 0.0
         conductor = UdpConductor(link, lambda: stop)
-    return open_ground(args, profile, vehicle, estimator, status, conductor)
+    return open_ground(args, profile, vehicle, status, conductor)

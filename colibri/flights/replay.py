@@ -201,18 +201,16 @@ def _begun(setup: Setup) -> Autopilot | Copter:
     """Return an autopilot that begins as it did then."""
     profile = load_profile(setup.profile).with_choices(setup.controller, setup.solver)
     vehicle = load_vehicle(setup.vehicle)
-    estimator = estimator_for(setup.feedback, vehicle, setup.origin)
     flown = track(setup.track) if setup.track else None
     if not setup.ground:
         assert flown is not None, "without ground stations a track is flown"
+        estimator = estimator_for(setup.feedback, vehicle, setup.origin)
         return Autopilot(profile, vehicle, flown, _clock, estimator=estimator)
     settings = StationSettings(
         system_id=setup.system_id, identity=setup.identity, origin=setup.origin, feedback=setup.feedback
     )
     history = of_bytes(History, setup.history) if setup.history else None
-    return Copter(
-        profile, vehicle, settings, _clock, values=setup.values, first=flown, estimator=estimator, history=history
-    )
+    return Copter(profile, vehicle, settings, _clock, values=setup.values, first=flown, history=history)
 
 
 def _end(setup: Setup, pilot: Autopilot | Copter) -> AutopilotEnd:

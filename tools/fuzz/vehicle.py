@@ -126,7 +126,7 @@ class Target:
         self._select(Mode.HOLD)
         if state.armed:
             flight.reset_world(HIGH)
-            copter.pilot.standing = False
+            copter.pilot.ground.take_off(0)
             self._order(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE)
         copter.stations.plans.load(MISSION, PLAN)
         self._meet(state.mode)
@@ -177,7 +177,7 @@ def check(flight: CopterFlight) -> None:
     _must(pilot.state.mode in Mode, "no mode of the table")
     mode = mode_of_custom(flight.client.latest("HEARTBEAT").custom_mode)
     _must(mode is not None, "no mode of the table is reported")
-    reference = pilot.reference
+    reference = pilot.generator.reference
     _must(reference is not None, "there is always a reference")
     assert reference is not None
     _must(bool(np.isfinite(reference.motion).all() and np.isfinite(reference.heading).all()), "a reference of nan")

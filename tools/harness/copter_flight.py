@@ -16,7 +16,6 @@ from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.core.checkpoint import Checkpoint, History
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.estimation.estimate import Estimate
-from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, geodetic_of
@@ -100,7 +99,6 @@ class CopterFlight(Stepped, Steered):
             system_id=SYSTEM, identity="px4", origin=origin, files=files, feedback=feedback
         )
         self._weather = blowing(wind_enu_m_s)
-        self._estimator = estimator_for(feedback, self._assumed, origin)
         self.copter = self._copter(values, first)
         world = WorldSetting(wind=self._weather.wind, seed=seed, latency=latency_us * 1e-3)
         builder = PlantBuilder(world, vehicle or self._assumed, {feedback: nudged(start)}, origin=origin)
@@ -130,7 +128,6 @@ class CopterFlight(Stepped, Steered):
             lambda: NO_CLOCK_S,
             values=values,
             first=first,
-            estimator=self._estimator,
             history=history,
         )
 

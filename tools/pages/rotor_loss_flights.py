@@ -10,7 +10,6 @@ import numpy as np
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.copter import Copter
-from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.rotations import tilt_deg
@@ -140,9 +139,8 @@ def fly(case: Case, seed: int) -> Flown:
     wind = Wind(case.wind_m_s, _FULL_TURN_DEG * seed / 50.0)
     world = WorldSetting(wind=wind, turbulence=case.turbulence, seed=seed)
     settings = StationSettings(1, "px4", DEFAULT_ORIGIN, feedback=case.feedback)
-    estimator = estimator_for(case.feedback, vehicle, DEFAULT_ORIGIN)
     values = {"MIS_TAKEOFF_ALT": HEIGHT_M}
-    copter = Copter(profile, vehicle, settings, lambda: 0.0, values=values, estimator=estimator)
+    copter = Copter(profile, vehicle, settings, lambda: 0.0, values=values)
     starts = {case.feedback: Start(psi=_FULL_TURN_DEG * seed / 50.0)}
     plant = PlantBuilder(world, vehicle, starts).build(case.feedback, copter.frame_interval_us)
     _take_off(copter, plant)
@@ -164,7 +162,7 @@ def _fault(case: Case, rotor: int) -> Fault:
 
 def _take_off(copter: Copter, plant: Plant) -> None:
     """Climb to the height, and stay for a moment."""
-    while not copter.pilot.has_seen or copter.pilot.refusals():
+    while copter.pilot.sensed.vehicle is None or copter.pilot.readiness.refusals():
         _step(copter, plant)
         assert plant.world.time_us < _MAX_DURATION_S * 1e6, "it must be ready to arm"
     copter.pilot.select(Mode.TAKEOFF, ())
@@ -186,14 +184,14 @@ def _lose(copter: Copter, plant: Plant, seed: int, fault: Fault) -> Flown:
         controls = _step(copter, plant)
         after_s = (plant.world.time_us - lost_us) * 1e-6
         rows.append((after_s, *_seen(plant), *controls))
-        if copter.rotor_loss.lost is not None and np.isnan(noticed_s):
+        if copter.parts.rotor_loss.lost is not None and np.isnan(noticed_s):
             noticed_s = after_s - plant.interval_us * 1e-6
         if not copter.pilot.state.armed:
             ends_us = min(ends_us, plant.world.time_us + round(_AFTER_S * 1e6))
     path = np.array(rows)
     at_loss = int(np.argmin(np.abs(path[:, _T])))
     path[:, _X : _Y + 1] -= path[at_loss, _X : _Y + 1]
-    return Flown(seed, noticed_s, path, copter.rotor_loss.lost == fault.instance - 1)
+    return Flown(seed, noticed_s, path, copter.parts.rotor_loss.lost == fault.instance - 1)
 
 
 def _step(copter: Copter, plant: Plant) -> tuple[float, ...]:

@@ -7,10 +7,11 @@ import numpy as np
 
 from colibri.autopilot.commander.commands import Commands
 from colibri.autopilot.commander.fence import Fence
+from colibri.autopilot.commander.flight.reference_generator import RESTS, Guidance
 from colibri.autopilot.commander.home import Home
 from colibri.autopilot.commander.missions import Missions
 from colibri.autopilot.commander.mode_tasks import ModeTasks
-from colibri.autopilot.commander.pilot import RESTS, Guidance, Pilot
+from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.arming import ArmingInputs
 from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.commander.status_queue import StatusQueue
@@ -109,8 +110,8 @@ class Cockpit:
             self.now_us += PREVIEW.interval_us
             self.pilot.sense(self.now_us, self.state, self.steered, knows_position=knows_position)
             self.guidance = self.pilot.step()
-            if self.guidance is not RESTS and self.pilot.reference is not None:
-                motion, heading = self.pilot.reference
+            if self.guidance is not RESTS and self.pilot.generator.reference is not None:
+                motion, heading = self.pilot.generator.reference
                 x, y, z = motion[0].tolist()
                 vx, vy, vz = motion[1].tolist()
                 on_ground = z < 0.0
@@ -145,4 +146,4 @@ class Cockpit:
 
     def stock(self, **changes: Any) -> None:
         """Let the pilot know what arming is judged by: all is well but for `changes`."""
-        self.pilot.take_stock(ArmingInputs(self.state, self.pilot.standing, 1.0, None)._replace(**changes))
+        self.pilot.readiness.update(ArmingInputs(self.state, self.pilot.ground.standing, 1.0, None)._replace(**changes))

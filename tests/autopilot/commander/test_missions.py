@@ -65,7 +65,7 @@ def test_a_takeoff_item_leaves_the_ground_and_a_landing_item_stands_again() -> N
     cockpit.pilot.select(Mode.MISSION, ())
     assert cockpit.pilot.arm(()) is None
     cockpit.fly_for(5.0)
-    assert not cockpit.pilot.standing
+    assert not cockpit.pilot.ground.standing
     cockpit.fly_for(25.0)
     assert cockpit.pilot.state == FIRST
 

@@ -58,7 +58,7 @@ def test_a_track_from_time_0_begins_at_its_start_and_is_flown_once() -> None:
     task = cockpit.pilot.task
     assert isinstance(task, TrackTask)
     assert task.start is not None
-    assert cockpit.pilot.reference is task.start
+    assert cockpit.pilot.generator.reference is task.start
     assert not cockpit.tasks.is_first
     assert isinstance(cockpit.tasks.begin(Mode.TRACK, cockpit.pilot.context()), TaskSequence)
 

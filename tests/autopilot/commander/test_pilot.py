@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from colibri.autopilot.commander.pilot import RESTS
+from colibri.autopilot.commander.flight.reference_generator import RESTS
 from colibri.autopilot.commander.rules.arming import ArmingInputs
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.commander.rules.modes import FIRST, ROWS, Event, Mode, Need, State
@@ -112,12 +112,12 @@ def test_a_missing_need_holds_back_arming_but_for_the_position_which_is_checked_
 
 def test_a_check_that_fails_holds_back_arming_unless_by_force() -> None:
     cockpit = Cockpit()
-    cockpit.pilot.take_stock(ArmingInputs(cockpit.state, standing=True, charge=0.05, thrust_stick=None))
+    cockpit.pilot.readiness.update(ArmingInputs(cockpit.state, standing=True, charge=0.05, thrust_stick=None))
     refusal = cockpit.pilot.arm(())
     assert refusal is not None
     assert refusal.reason == "not armed: battery at 5%"
     assert cockpit.pilot.arm((), force=True) is None
-    assert cockpit.pilot.times.flights == 1
+    assert cockpit.pilot.ground.times.flights == 1
 
 
 @pytest.mark.parametrize("mode", Mode)
@@ -138,7 +138,7 @@ def test_a_takeoff_climbs_and_holds() -> None:
     assert cockpit.pilot.arm(()) is None
     cockpit.step()
     assert cockpit.guidance.begins
-    assert not cockpit.pilot.standing
+    assert not cockpit.pilot.ground.standing
     cockpit.fly_for(6.0)
     assert cockpit.pilot.state == State(Mode.HOLD, armed=True)
     assert cockpit.state.position_enu_m[2] == pytest.approx(2.5, abs=0.1)
@@ -150,7 +150,7 @@ def test_a_landing_is_noticed_and_stops_the_rotors() -> None:
     cockpit = Cockpit((0.0, 0.0, 3.0))
     assert cockpit.pilot.select(Mode.LAND, ()) is None
     cockpit.fly_for(11.0)
-    assert cockpit.pilot.standing
+    assert cockpit.pilot.ground.standing
     assert cockpit.pilot.state == FIRST
     assert cockpit.guidance is RESTS
     assert [text for _, text in cockpit.lines.take()][-2:] == ["landing detected", "landed, rotors stopped"]
@@ -190,14 +190,14 @@ def test_home_is_where_the_rotors_were_armed_unless_somebody_chose_it() -> None:
 @pytest.mark.parametrize("mode", Mode)
 def test_with_a_rotor_lost_no_mode_is_chosen_and_nothing_is_armed(mode: Mode) -> None:
     cockpit = in_the_air()
-    cockpit.pilot.lose_rotor(2)
+    cockpit.pilot.readiness.lose_rotor(2)
     refusal = cockpit.pilot.select(mode, ()) if mode is not Mode.HOLD else cockpit.pilot.fly(mode, HoldTask(), ())
     assert refusal is not None
     assert refusal.reason == f"{mode} refused: rotor 3 failed"
     cockpit.pilot.disarm(force=True)
     assert cockpit.pilot.arm((), force=True) is not None
     cockpit.pilot.adopt(replace(cockpit.pilot.behaviour, land_on_three=False))
-    assert cockpit.pilot.rotor_failed == ""
+    assert cockpit.pilot.readiness.rotor_failed == ""
 
 
 def test_who_asks_for_another_speed_gets_it_for_this_flight_and_no_more_than_is_allowed() -> None:
@@ -238,7 +238,7 @@ def test_after_a_restart_a_vehicle_that_has_come_down_stays_down() -> None:
     after = Cockpit()
     after.pilot.resume(10_000_000, at((0.0, 0.0, 0.0)), before.pilot.record(), after.tasks.begin, seamless=False)
     assert after.pilot.state == FIRST
-    assert after.pilot.standing
+    assert after.pilot.ground.standing
 
 
 ORDERS = st.one_of(
@@ -259,7 +259,7 @@ def test_whatever_comes_the_pilot_stays_of_one_mind(orders: list[Mode | Action |
         assert pilot.state.armed <= (was_armed or order == "arm")
         assert pilot.saving is Action.NONE or pilot.state.armed
         assert (cockpit.step() is RESTS) or pilot.state.armed
-        assert pilot.idles or pilot.state.armed
+        assert pilot.ground.idles or pilot.state.armed
 
 
 def obey(cockpit: Cockpit, order: Mode | Action | str) -> None:
@@ -271,7 +271,7 @@ def obey(cockpit: Cockpit, order: Mode | Action | str) -> None:
     elif order == "arm":
         pilot.arm(cockpit.unmet)
     elif order == "lose":
-        pilot.lose_rotor(0)
+        pilot.readiness.lose_rotor(0)
     elif order == "touch" and pilot.state.armed:
         pilot.touch_down()
     elif order in ("disarm", "force"):

@@ -118,7 +118,7 @@ def test_a_vehicle_that_stations_fly_is_there_with_the_first_estimate() -> None:
         assert flown.serve([]) == []
     flown.step(sensors(ALIGNED_US))
     flown.serve([])
-    assert flown.pilot.standing
+    assert flown.pilot.ground.standing
     assert not flown.pilot.state.armed
     assert not flown.stations.restart
 

@@ -149,7 +149,7 @@ def test_a_low_battery_leads_home_and_a_critical_one_down_and_nothing_later_up_a
 
 def test_a_voltage_below_its_limit_counts_as_the_charge_does() -> None:
     flight = in_the_air(5.0, values={"COM_LOW_BAT_ACT": 1, "BAT_LOW_T": 0.5})
-    battery = flight.copter.power.state()
+    battery = flight.copter.parts.battery.state()
     assert battery is not None
     flight.set_param("BAT_LOW_VOLT", battery.voltage_v + 0.5)
     flight.run(0.6)
@@ -260,7 +260,7 @@ def test_a_rotor_that_failed_leads_down() -> None:
     flight.run(1.5)
     assert flies(flight, Mode.LAND)
     assert flight.client.said("rotor 2 failed: landing on three rotors")
-    assert flight.copter.supervisor.holds(Condition.ROTOR_FAILED)
+    assert flight.copter.parts.supervisor.holds(Condition.ROTOR_FAILED)
     assert state_told(flight) == mav.MAV_STATE_EMERGENCY
 
 

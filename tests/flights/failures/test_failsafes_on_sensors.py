@@ -45,7 +45,7 @@ def test_a_lost_position_is_left_by_sinking_level_and_disarmed() -> None:
     assert flight.time_s - lost_s < 30.0
     assert max_rate < 1.7
     assert dist(flight.position[:2], place[:2]) < 3.0
-    assert flight.copter.pilot.standing
+    assert flight.copter.pilot.ground.standing
 
 
 def test_without_gps_what_is_set_is_done() -> None:

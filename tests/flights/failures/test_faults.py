@@ -43,14 +43,14 @@ def test_a_battery_that_sags_is_known_to_the_autopilot() -> None:
     after = flight.client.latest("BATTERY_STATUS")
     assert after.battery_remaining == pytest.approx(30, abs=1)
     capacity_ah = load_vehicle("hummingbird").battery.capacity_ah  # type: ignore[union-attr]
-    assert flight.copter.power.charge_ah == pytest.approx(0.7 * capacity_ah, rel=0.03)
+    assert flight.copter.parts.battery.charge_ah == pytest.approx(0.7 * capacity_ah, rel=0.03)
     real_v = flight.world.voltage_v
     told_v = sum(cell for cell in after.voltages if cell != 65535) / 1e3
     assert told_v == pytest.approx(real_v, rel=0.03)
     assert flight.position == pytest.approx((0.0, 0.0, 5.0), abs=0.1)
     flight.restart()
     flight.run(0.2)
-    assert flight.copter.power.charge_ah == pytest.approx(0.7 * capacity_ah, rel=0.03)
+    assert flight.copter.parts.battery.charge_ah == pytest.approx(0.7 * capacity_ah, rel=0.03)
 
 
 def test_a_gps_that_jumps_and_a_gyroscope_that_errs_are_survived() -> None:
@@ -82,8 +82,8 @@ def test_a_slow_solver_acts_late_and_skips_what_falls_due() -> None:
     at_once, prompt = flown(0.0)
     within, in_time = flown(8.0)
     over, late = flown(12.0)
-    assert prompt.copter.deadlines_missed == in_time.copter.deadlines_missed == 0
-    assert late.copter.deadlines_missed == pytest.approx(6.5 / 0.016, rel=0.05)  # every second sample is skipped
+    assert prompt.copter.parts.actuation.missed == in_time.copter.parts.actuation.missed == 0
+    assert late.copter.parts.actuation.missed == pytest.approx(6.5 / 0.016, rel=0.05)  # every second sample is skipped
     assert within != at_once
     assert over != within
     for path in (at_once, within, over):

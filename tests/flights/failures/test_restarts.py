@@ -57,7 +57,7 @@ def test_a_mission_goes_on_as_if_nothing_had_happened() -> None:
     assert max(map(dist, *paths)) < 0.6  # the circle is joined where it is nearest, which the restart finds again
     assert flight.client.said("restarted in flight: mission goes on at item 3")
     assert flight.client.said("restarted in flight: return goes on")
-    assert flight.copter.power.charge_ah == pytest.approx(wanted.copter.power.charge_ah, rel=0.01)
+    assert flight.copter.parts.battery.charge_ah == pytest.approx(wanted.copter.parts.battery.charge_ah, rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_a_landing_on_three_rotors_goes_on() -> None:
     assert flight.inject(MOTOR, WRONG, 2, 0.001) == ACCEPTED
     flight.run(1.5)
     flight.restart(flight.history())
-    assert flight.copter.rotor_loss.lost == 1
+    assert flight.copter.parts.rotor_loss.lost == 1
     tilts: list[float] = []
 
     def landed() -> bool:
@@ -246,11 +246,11 @@ def test_plans_and_home_are_kept_on_the_ground_too() -> None:
     refusal = stations.fence.refusal((60.0, 0.0, 1.0))
     assert refusal is not None
     assert "fence" in refusal.reason
-    assert (pilot.home.position_enu_m, pilot.standing, flight.armed) == ((1.0, 2.0, 0.0), True, False)
+    assert (pilot.home.position_enu_m, pilot.ground.standing, flight.armed) == ((1.0, 2.0, 0.0), True, False)
     assert not flight.client.said("restarted in flight")
     assert flight.arm() == ACCEPTED
     flight.restart(flight.history())
-    assert (flight.armed, flight.copter.pilot.standing) == (True, True)
+    assert (flight.armed, flight.copter.pilot.ground.standing) == (True, True)
 
 
 def test_a_mission_that_has_landed_does_not_begin_again() -> None:
@@ -258,7 +258,7 @@ def test_a_mission_that_has_landed_does_not_begin_again() -> None:
     flight = in_the_air(1.0)
     load(flight, waypoint(1.0, 0.0, 1.0), do(mav.MAV_CMD_NAV_LAND, 0.0, 0.0, 0.0, nan))
     assert flight.select(Mode.MISSION) == ACCEPTED
-    flight.wait_until(lambda: flight.copter.pilot.standing, within=10.0)
+    flight.wait_until(lambda: flight.copter.pilot.ground.standing, within=10.0)
     flight.run(0.5)
     assert flight.copter.pilot.state == State(Mode.MISSION, armed=True)
     flight.restart(flight.history())
@@ -288,7 +288,7 @@ def test_a_vehicle_that_came_down_meanwhile_stays_there() -> None:
     flight.land()
     flight.restart(past)
     assert flight.copter.pilot.state == State(Mode.HOLD, armed=False)
-    assert flight.copter.pilot.standing
+    assert flight.copter.pilot.ground.standing
     flight.run(1.0)
     assert flight.arm() == ACCEPTED
 

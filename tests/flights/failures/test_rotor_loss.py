@@ -59,7 +59,7 @@ def fall(flight: CopterFlight, rotor: int) -> Fall:
         spin_rad_s = max(spin_rad_s, abs(flight.world.state[5]))
         if flight.position[2] < 0.5:
             sank_m_s = max(sank_m_s, -flight.velocity[2])
-        if not noticed_s and flight.copter.rotor_loss.lost is not None:
+        if not noticed_s and flight.copter.parts.rotor_loss.lost is not None:
             noticed_s = since_s
     in_air = [tilt for _, tilt in tilts]
     settled = [tilt for since_s, tilt in tilts if since_s > 1.0]
@@ -136,7 +136,7 @@ def test_an_autopilot_that_is_restarted_in_the_spin_notices_anew() -> None:
     flight.run(2.5)
     flight.restart()
     flight.run(0.1)
-    assert flight.copter.rotor_loss.lost == 3
+    assert flight.copter.parts.rotor_loss.lost == 3
     steepest_deg = 0.0
     while flight.armed:
         flight.step()
@@ -151,7 +151,7 @@ def test_a_weak_rotor_is_flown_on_and_a_parameter_turns_all_off() -> None:
     flight.run(3.0)
     assert flight.mode is Mode.HOLD
     assert flight.position[2] == pytest.approx(HEIGHT_M, abs=0.5)
-    assert flight.copter.rotor_loss.watch.max_evidence == 0.0
+    assert flight.copter.parts.rotor_loss.watch.max_evidence == 0.0
     flight.set_param("CA_FAILURE_MODE", 0)
     assert flight.inject(MOTOR, OFF, 1) == ACCEPTED
     flight.run(0.5)

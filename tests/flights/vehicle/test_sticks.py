@@ -101,6 +101,6 @@ def test_stabilized_sticks_are_tilt_yaw_rate_and_thrust() -> None:
 def test_position_sticks_land_and_take_off() -> None:
     flight = flying(Mode.POSITION, 1.5)
     hold_sticks(flight, 6.0, thrust=0.0)
-    assert flight.copter.pilot.standing
+    assert flight.copter.pilot.ground.standing
     hold_sticks(flight, 2.5, thrust=0.0)
     assert not flight.armed

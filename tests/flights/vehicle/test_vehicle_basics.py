@@ -44,7 +44,7 @@ def test_arming_and_disarming_on_the_ground() -> None:
 def test_a_check_that_fails_refuses_arming_and_says_why(start: Start, reason: str) -> None:
     flight = CopterFlight()
     flight.reset_world(start)
-    flight.copter.pilot.standing = False
+    flight.copter.pilot.ground.take_off(0)
     flight.run(0.03)
     assert flight.arm() == DENIED
     assert flight.client.said("not armed: ")
@@ -161,7 +161,7 @@ def test_force_stops_the_rotors_in_the_air_and_it_can_be_armed_again(command: tu
     assert not flight.armed
     assert flight.client.said("rotors stopped in the air")
     assert flight.arm() == DENIED
-    assert flight.wait_until(lambda: flight.copter.pilot.standing, within=5.0) > 0.6
+    assert flight.wait_until(lambda: flight.copter.pilot.ground.standing, within=5.0) > 0.6
     assert not any(flight.rotors.controls)
     assert flight.arm() == ACCEPTED
     flight.run(0.5)
@@ -185,7 +185,7 @@ def test_disarmed_by_hand_after_a_landing_it_can_be_armed_at_once() -> None:
     flight = CopterFlight()
     flight.takeoff(1.0)
     assert flight.select(Mode.LAND) == ACCEPTED
-    flight.wait_until(lambda: flight.copter.pilot.standing, within=8.0)
+    flight.wait_until(lambda: flight.copter.pilot.ground.standing, within=8.0)
     assert flight.disarm() == ACCEPTED
     assert flight.mode is Mode.HOLD
     assert flight.arm() == ACCEPTED

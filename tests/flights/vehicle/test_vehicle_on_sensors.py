@@ -30,7 +30,7 @@ def test_it_takes_off_goes_somewhere_and_lands(seed: int) -> None:
     assert flight.select(Mode.LAND) == ACCEPTED
     flight.wait_until(lambda: not flight.armed, within=30.0, what="the landing")
     assert abs(flight.position[2]) < 0.01
-    assert flight.copter.pilot.standing
+    assert flight.copter.pilot.ground.standing
 
 
 def test_telemetry_tells_what_the_sensors_measure() -> None:

@@ -284,7 +284,7 @@ def test_nothing_is_flown_to_outside_the_geofence() -> None:
     flight.reset_world(STANDING)
     flight.copter.stations.plans.load(FENCE, fence((20.0, 20.0), (30.0, 20.0), (30.0, 30.0)))
     assert flight.command(mav.MAV_CMD_NAV_TAKEOFF, *(nan,) * 7) == DENIED
-    flight.wait_until(lambda: flight.copter.pilot.standing, within=4.0)
+    flight.wait_until(lambda: flight.copter.pilot.ground.standing, within=4.0)
     flight.run(0.2)
     assert flight.arm() == DENIED
     assert flight.client.said("not armed: outside the geofence")

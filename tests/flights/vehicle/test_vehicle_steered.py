@@ -122,7 +122,7 @@ def test_offboard_attitude_then_rates_then_silence() -> None:
     attitude(flight, 0.5, 0x80, tilted, (0.0, 0.0, -1.0), 0.5)  # FRD: to the left
     assert flight.copter.pilot.context().state.rate_flu_rad_s[2] == pytest.approx(1.0, abs=0.1)
     attitude(flight, 0.5, 0x80 | 0x40, tilted, (0.0, 0.0, 0.0), nan)  # no thrust is asked for: the weight's
-    assert flight.copter.pilot.standing is False
+    assert flight.copter.pilot.ground.standing is False
     flight.run(1.1)
     assert flight.mode is Mode.HOLD
     flight.run(3.0)
@@ -136,7 +136,7 @@ def test_attitude_without_thrust_lifts_nothing_off_the_ground() -> None:
     assert flight.select(Mode.OFFBOARD) == ACCEPTED
     assert flight.arm() == ACCEPTED
     attitude(flight, 0.5, 0x40 | 7, level, (0.0, 0.0, 0.0), 0.0)
-    assert flight.copter.pilot.standing
+    assert flight.copter.pilot.ground.standing
     attitude(flight, 1.0, 7, level, (0.0, 0.0, 0.0), 0.6)
     assert flight.position[2] > 0.2
 
@@ -226,7 +226,7 @@ def test_from_the_ground_and_back_by_hand() -> None:
     sticks(flight, EVERY_S)
     assert flight.arm() == ACCEPTED
     sticks(flight, 0.5)
-    assert flight.copter.pilot.standing
+    assert flight.copter.pilot.ground.standing
     sticks(flight, 1.0, thrust=0.9)
     assert flight.position[2] > 0.5
     for _ in range(80):

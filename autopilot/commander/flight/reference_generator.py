@@ -1,0 +1,71 @@
+"""The reference generator: leads the reference to what a task asks for, and previews it for the control law."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import AttitudeDemand, Horizon, VehicleState
+from colibri.autopilot.guidance.integrator_chain import Limits
+from colibri.autopilot.guidance.reference import Reference, at_rest, lead, lead_along, moving_with, still_target
+from colibri.autopilot.guidance.sample_grid import Instants
+from colibri.autopilot.guidance.tasks.task import Motion, PlannedMotion, TaskContext
+
+
+class Guidance(NamedTuple):
+    """References for the control law; neither horizon nor attitude while the rotors stand or idle.
+
+    Attributes:
+        horizon: References of position and yaw.
+        attitude: References of attitude and thrust.
+        begins: Whether the rotors leave idle now: the control law is reset.
+    """
+
+    horizon: Horizon | None = None
+    attitude: AttitudeDemand | None = None
+    begins: bool = False
+
+
+RESTS = Guidance()
+
+
+class ReferenceGenerator:
+    """Generates the references of one vehicle.
+
+    Attributes:
+        reference: State of the reference; None before the vehicle is first seen.
+        interval_s: From one planned instant to the next, s.
+        samples: How many instants are planned.
+    """
+
+    def __init__(self, instants: Instants, limits: Limits) -> None:
+        """Plan at these instants; what is compiled is loaded here, within `limits`: a take-off is no time for that."""
+        self._instants = instants
+        self.interval_s = instants.preview.interval_us * 1e-6
+        self.samples = instants.preview.samples
+        self.reference: Reference | None = None
+        motionless = Reference(np.zeros((4, 3)), np.zeros(2))
+        lead(motionless, still_target((1.0, 0.0, 0.0), 0.0, self.samples), limits, self.interval_s)
+
+    def set(self, reference: Reference) -> None:
+        """Set the reference."""
+        self.reference = reference
+
+    def follow(self, vehicle: VehicleState) -> None:
+        """Set the reference to the vehicle's motion."""
+        self.reference = moving_with(vehicle)
+
+    def rest(self, vehicle: VehicleState) -> None:
+        """Set the reference to rest where the vehicle is."""
+        self.reference = at_rest(vehicle)
+
+    def lead(self, context: TaskContext, wanted: Motion | PlannedMotion) -> Horizon:
+        """Move the reference on by one sample, and return the control law's preview of it."""
+        reference, limits, interval_s = context.reference, wanted.limits, context.interval_s
+        if isinstance(wanted, PlannedMotion):
+            horizon, self.reference = lead_along(reference, wanted.horizon, limits, interval_s)
+            if wanted.for_law is not None and horizon.position_enu_m is wanted.horizon.position_enu_m:
+                turned = horizon.yaw_rad[0] - wanted.horizon.yaw_rad[0]
+                return wanted.for_law._replace(yaw_rad=wanted.for_law.yaw_rad + turned)
+        else:
+            horizon, self.reference = lead(reference, wanted.target, limits, interval_s)
+        return self._instants.for_law(horizon)

@@ -1,0 +1,93 @@
+"""Rotor commands of one vehicle: of the control law within its solve time, or of the landing on three rotors."""
+
+from colibri.autopilot.commander.flight.reference_generator import RESTS, Guidance
+from colibri.autopilot.control.interface import Decision, VehicleState
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
+from colibri.autopilot.core.solve_time import SolveTime
+from colibri.autopilot.core.step import STILL
+from colibri.common.types import FourRotors
+
+
+class Actuation:
+    """Commands the rotors of one vehicle.
+
+    Attributes:
+        sent: The last command, parts of the largest speed.
+        decision: The decision that is flown; None while the rotors stand or idle.
+        solve_time_s: Of the last QP.
+    """
+
+    def __init__(self, loop: ControlLoop, rotor_loss: RotorLoss) -> None:
+        """Command by the control law of `loop`, and by `rotor_loss` once a rotor is lost."""
+        self._loop, self._rotor_loss = loop, rotor_loss
+        self._solving = SolveTime(loop.control_interval_us)
+        self.sent = STILL
+        self.decision: Decision | None = None
+        self.solve_time_s = 0.0
+
+    @property
+    def missed(self) -> int:
+        """How many decisions took longer than a control interval."""
+        return self._solving.missed
+
+    def begin(self, controls: FourRotors) -> None:
+        """Begin with the rotors turning at `controls`."""
+        self.sent = controls
+        self._solving.at_once(controls)
+        self._rotor_loss.begin(controls)
+
+    def send(self, now_us: int) -> FourRotors:
+        """Return the command to send at `now_us`."""
+        self.sent = self._solving.controls(now_us)
+        return self.sent
+
+    def turning(self, now_us: int, *, armed: bool) -> FourRotors:
+        """Return how the rotors turn at `now_us`, idling at the least while armed, parts of the largest speed."""
+        rotors = self._loop.vehicle.rotors
+        minimum = rotors.idle_speed / rotors.max_speed if armed else 0.0
+        c1, c2, c3, c4 = (max(control, minimum) for control in self._solving.controls(now_us))
+        return c1, c2, c3, c4
+
+    def decide(
+        self, now_us: int, state: VehicleState, guidance: Guidance, charge_ah: float, solve_time_s: float
+    ) -> Decision | None:
+        """Decide at a control sample; return None while the rotors stand or idle, or an earlier sample is being solved.
+
+        Args:
+            now_us: Simulated time.
+            state: The vehicle.
+            guidance: References.
+            charge_ah: Charge taken from the battery.
+            solve_time_s: Declared solve time of the control law.
+
+        Raises:
+            DecisionError: The control law gave what no rotor can follow.
+        """
+        decision = self._decide(now_us, state, guidance, charge_ah, solve_time_s)
+        if decision is not None or not self._solving.busy(now_us):
+            self.decision = decision
+        return decision
+
+    def _decide(
+        self, now_us: int, state: VehicleState, guidance: Guidance, charge_ah: float, solve_time_s: float
+    ) -> Decision | None:
+        loop = self._loop
+        if self._rotor_loss.flies:
+            controls, decision = self._rotor_loss.decide(state, charge_ah)
+            self._solving.at_once(controls)
+            return decision
+        if guidance.begins:
+            loop.begin(loop.vehicle.rotors.idle_speed, state.euler[2], afresh=False)
+        elif guidance is not RESTS and self._solving.busy(now_us):
+            return None
+        if guidance.horizon is not None:
+            decision = loop.decide(now_us, state, guidance.horizon)
+        elif guidance.attitude is not None:
+            decision = loop.decide_attitude(now_us, state, guidance.attitude)
+        else:
+            self._solving.at_once(STILL)
+            return None
+        self._solving.decided(loop.controls, now_us, round(solve_time_s * 1e6))
+        self.solve_time_s = decision.diagnostics.solve_time_s
+        return decision

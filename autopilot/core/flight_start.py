@@ -1,0 +1,85 @@
+"""The start of a flight: on the ground, in mid-flight, after missed frames, or after a restart of the autopilot."""
+
+from colibri.autopilot.commander.rules.modes import Mode
+from colibri.autopilot.core.checkpoint import Checkpointer, History, goes_on
+from colibri.autopilot.core.parts import Parts
+from colibri.autopilot.core.step import STILL
+from colibri.autopilot.core.supervision import Supervision
+from colibri.mavlink.hil.state import StateFrame
+from colibri.mavlink.services.statustext import INFO, WARNING
+
+FALLS = "restarted in the air, knowing nothing: found falling"
+
+
+class FlightStart:
+    """Starts the flights of one vehicle.
+
+    Attributes:
+        resumed: What goes on of a flight in which an autopilot was killed, in words; empty where none does.
+    """
+
+    def __init__(
+        self,
+        parts: Parts,
+        supervision: Supervision,
+        checkpointer: Checkpointer,
+        history: History | None,
+        start_speed: float,
+    ) -> None:
+        """Start a vehicle of these parts, from `history` if there is one; at time 0 rotors turn at `start_speed`."""
+        self._parts, self._supervision, self._checkpointer = parts, supervision, checkpointer
+        self._history = history
+        self._wakes = history is not None
+        self._start_speed = start_speed
+        self.resumed = ""
+
+    def wake(self, time_us: int) -> None:
+        """Resume the estimator before it takes in the first frame."""
+        wakes, self._wakes = self._wakes, False
+        if wakes and self._history is not None and self._history.checkpoint.state_source:
+            self._parts.state_source.resume(self._history.checkpoint.state_source, time_us)
+
+    def begin(self, frame: StateFrame, before_us: int | None) -> None:
+        """Start at a frame that does not follow the one of `before_us`; None: at the first."""
+        self._supervision.miss(before_us)
+        history, self._history = self._history, None
+        if history is not None and history.checkpoint.is_followed_by(frame.time_us):
+            self._resume(history, frame)
+        elif before_us is not None and frame.time_us > before_us:
+            loop = self._parts.loop
+            loop.begin(loop.vehicle.hover_speed, loop.state(frame).euler[2])
+            self._parts.rotor_loss.begin(loop.controls)
+        else:
+            self._begin(frame, again=before_us is not None)
+
+    def _resume(self, history: History, frame: StateFrame) -> None:
+        """Go on with the flight in which the autopilot was killed."""
+        parts, pilot, checkpoint = self._parts, self._parts.pilot, history.checkpoint
+        if checkpoint.pilot.state.mode is not Mode.TRACK or checkpoint.task.began_us != 0:
+            parts.tasks.forget_first()
+        self._supervision.listen(frame.time_us)
+        self._checkpointer.resume(history, frame, parts.tasks.again)
+        parts.actuation.begin(parts.loop.controls if pilot.state.armed and not pilot.ground.idles else STILL)
+        parts.stations.say(INFO, parts.stations.banner())
+        if not pilot.state.armed:
+            return
+        if parts.state_source.estimate is not None and not parts.state_source.rests:
+            parts.lines.say(WARNING, FALLS)
+        self.resumed = goes_on(pilot.state.mode, parts.stations.missions.progress().seq)
+        parts.lines.say(WARNING, self.resumed)
+
+    def _begin(self, frame: StateFrame, *, again: bool) -> None:
+        """Start a new flight; `again`: after another one, of which no service may remember anything."""
+        parts, loop, rests = self._parts, self._parts.loop, self._parts.state_source.rests
+        if again:
+            parts.stations.reboot()
+        speed = self._start_speed if frame.time_us == 0 else loop.vehicle.hover_speed
+        loop.begin(loop.vehicle.rotors.idle_speed if rests else speed, parts.tasks.first_yaw_rad)
+        mode = Mode.TRACK if parts.tasks.is_first else None
+        parts.pilot.begin(frame.time_us, loop.state(frame), mode=mode, rests=rests)
+        parts.rotor_loss.forget()
+        parts.actuation.begin(STILL if parts.pilot.ground.standing else loop.controls)
+        parts.pilot.readiness.trust_rotors()
+        if parts.state_source.estimate is not None and not rests:
+            parts.lines.say(WARNING, FALLS)
+        parts.stations.say(INFO, parts.stations.banner())

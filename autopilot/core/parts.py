@@ -1,0 +1,116 @@
+"""The parts of a vehicle that ground stations fly, put together around one profile."""
+
+from dataclasses import dataclass
+
+from colibri.autopilot.commander.fence import Fence
+from colibri.autopilot.commander.home import Home
+from colibri.autopilot.commander.missions import Missions
+from colibri.autopilot.commander.mode_tasks import ModeTasks
+from colibri.autopilot.commander.pilot import Pilot
+from colibri.autopilot.commander.status_queue import StatusQueue
+from colibri.autopilot.commander.supervisor import Supervisor
+from colibri.autopilot.control.interface import Clock
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
+from colibri.autopilot.core.actuation import Actuation
+from colibri.autopilot.estimation.state_source import Estimator, StateSource
+from colibri.autopilot.ground.battery_monitor import BatteryMonitor
+from colibri.autopilot.ground.snapshots import SnapshotBuilder
+from colibri.autopilot.ground.stations import Stations, StationSettings
+from colibri.autopilot.guidance.attitude_reference import AttitudeReference, attitude_limits
+from colibri.autopilot.guidance.sample_grid import instants
+from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
+from colibri.autopilot.parameters.retuning import Tuning, builder
+from colibri.autopilot.parameters.subscription import Subscribers
+from colibri.mavlink.parameters.store import Parameters, Value
+from colibri.plant.vehicle.description import Vehicle
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Parts of one vehicle: as many attributes as it has parts.
+
+    Attributes:
+        parameters: All numbers that can be changed.
+        subscribers: Adopt changes of the parameters.
+        loop: The control law.
+        state_source: Turns frames into states.
+        actuation: Commands the rotors.
+        rotor_loss: Detects a lost rotor, and lands on the others.
+        battery: Charge and voltage.
+        tasks: The tasks of the modes.
+        pilot: Decides what is flown.
+        supervisor: Decides on failsafes.
+        stations: Serves ground stations.
+        snapshots: For telemetry.
+        lines: Status texts of the parts.
+    """
+
+    parameters: Parameters
+    subscribers: Subscribers
+    loop: ControlLoop
+    state_source: StateSource
+    actuation: Actuation
+    rotor_loss: RotorLoss
+    battery: BatteryMonitor
+    tasks: ModeTasks
+    pilot: Pilot
+    supervisor: Supervisor
+    stations: Stations
+    snapshots: SnapshotBuilder
+    lines: StatusQueue
+
+
+def parts_of(
+    profile: Profile,
+    vehicle: Vehicle,
+    settings: StationSettings,
+    clock: Clock,
+    values: dict[str, Value] | None,
+    first: Track | None,
+    estimator: Estimator | None,
+) -> Parts:
+    """Return the parts of a vehicle; arguments and errors are those of `colibri.autopilot.core.copter.Copter`."""
+    numbers = Numbers(profile, vehicle)
+    parameters = Parameters(definitions(profile, vehicle, settings.system_id))
+    parameters.load(values or {})
+    flown, assumed = numbers.applied(parameters.values)
+    flies_by = behaviour(parameters)
+    loop = ControlLoop(flown, assumed, clock)
+    attitude = AttitudeReference(assumed, loop.preview, attitude_limits(flies_by)) if loop.takes_attitude else None
+    planned_at = instants(loop.preview, loop.control_interval_us)
+    home, lines = Home(settings.origin), StatusQueue()
+    fence = Fence(home, flies_by)
+    missions = Missions(home, fence, lines, flies_by)
+    tasks = ModeTasks(missions, attitude, assumed, loop.preview, planned_at, profile.references, first)
+    pilot = Pilot(planned_at, flies_by, tasks.begin, home, lines)
+    stations = Stations(settings, pilot, missions, fence, lines, parameters, takes_attitude=attitude is not None)
+    parameters.ask(Tuning(numbers, builder(profile.controller, clock), loop, stations.warn).prepare)
+    supervisor = Supervisor(parameters, lines)
+    rotor_loss = RotorLoss(assumed, loop.control_interval_us)
+    rotor_loss.obey(flies_by)
+    snapshots = SnapshotBuilder(assumed, loop.control_interval_us * 1e-6, loop.plan_columns)
+    leads = () if attitude is None else (attitude,)
+    subscribers = Subscribers(
+        parameters=(supervisor.adopt,),
+        behaviour=(pilot.adopt, missions.adopt, rotor_loss.obey, *(part.obey for part in leads)),
+        law=(loop.adopt,),
+        vehicle=(tasks.adopt, rotor_loss.adopt, snapshots.adopt, *(part.adopt for part in leads)),
+    )
+    return Parts(
+        parameters,
+        subscribers,
+        loop,
+        StateSource(estimator, loop.frame_interval_us),
+        Actuation(loop, rotor_loss),
+        rotor_loss,
+        BatteryMonitor(assumed),
+        tasks,
+        pilot,
+        supervisor,
+        stations,
+        snapshots,
+        lines,
+    )

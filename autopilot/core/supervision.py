@@ -1,0 +1,76 @@
+"""Supervision at each control sample: lost rotors, setpoints of clients, failsafes."""
+
+from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, FailsafeInputs
+from colibri.autopilot.commander.rules.failsafe_table import Action
+from colibri.autopilot.control.interface import VehicleState
+from colibri.autopilot.core.parts import Parts
+
+_EVER_US = 10**15
+
+
+class Supervision:
+    """Supervises one vehicle."""
+
+    def __init__(self, parts: Parts) -> None:
+        """Supervise a vehicle of these parts."""
+        self._parts = parts
+        self._missed_us: int | None = None
+        self._listening_us = NEVER_US
+
+    def listen(self, now_us: int) -> None:
+        """Count the loss of clients from `now_us` on: the restart."""
+        self._listening_us = now_us
+
+    def miss(self, since_us: int | None) -> None:
+        """Note that frames were missed since `since_us`; None before the first frame."""
+        if self._missed_us is None:
+            self._missed_us = since_us
+
+    def step(self, now_us: int, state: VehicleState) -> None:
+        """Take in a control sample, before the pilot's step, and have the pilot execute the failsafe that is due."""
+        parts = self._parts
+        self._watch_rotors(state)
+        knows_position = parts.supervisor.knows_position(parts.state_source.estimate)
+        steered = parts.stations.needs.steered(now_us)
+        parts.pilot.sense(now_us, state, steered, knows_position=knows_position)
+        action = parts.supervisor.step(self._inputs(now_us, state), parts.pilot.flight)
+        if action is not Action.NONE:
+            parts.pilot.save(action)
+        self._missed_us = None
+
+    def _watch_rotors(self, state: VehicleState) -> None:
+        """Detect a lost rotor, after which there is but one way to fly."""
+        parts, pilot = self._parts, self._parts.pilot
+        estimate, rotor_loss = parts.state_source.estimate, parts.rotor_loss
+        if not pilot.state.armed:
+            rotor_loss.end()
+        feels = estimate is None or (estimate.health.gyroscope and estimate.health.accelerometer)
+        airborne = feels and pilot.state.armed and not pilot.ground.standing
+        sent, charge_ah = parts.actuation.sent, parts.battery.charge_ah
+        if rotor_loss.look(state, sent, charge_ah, airborne=airborne, ground_m=pilot.ground.height_m):
+            assert rotor_loss.lost is not None, "what is lost has a number"
+            pilot.readiness.lose_rotor(rotor_loss.lost)
+
+    def _inputs(self, now_us: int, state: VehicleState) -> FailsafeInputs:
+        """Return the inputs of the failsafes' conditions."""
+        parts, pilot, stations = self._parts, self._parts.pilot, self._parts.stations
+        sticks = stations.manual.latest(now_us, _EVER_US)
+        decision = parts.actuation.decision
+        return FailsafeInputs(
+            now_us=now_us,
+            missed_us=self._missed_us,
+            state=state,
+            mode=pilot.state.mode,
+            standing=pilot.ground.standing,
+            estimate=parts.state_source.estimate,
+            setpoint=stations.offboard.latest(now_us, _EVER_US),
+            sticks_us=None if sticks is None else sticks.time_us,
+            listening_us=self._listening_us,
+            station_us=stations.station_us,
+            battery=parts.battery.state(),
+            fence=stations.fence.margin_m if stations.fence.exists else None,
+            decided=None if decision is None else decision.diagnostics,
+            late=pilot.behaviour.solve_time_s * 1e6 > parts.loop.control_interval_us,
+            rotor_lost=parts.rotor_loss.lost,
+            pace=pilot.behaviour.limits,
+        )
