@@ -242,3 +242,15 @@ class PlanController(Controller[Memory], Protocol[Memory]):
     """
 
     plan_columns: PlanColumns
+
+
+@runtime_checkable
+class CompiledController(Controller[Memory], Protocol[Memory]):
+    """A control law with compiled parts, which the process loads before it flies; optional.
+
+    A law that is built again for other parameters finds them loaded.
+    """
+
+    def warm_up(self) -> None:
+        """Load what is compiled."""
+        ...

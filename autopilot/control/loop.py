@@ -9,6 +9,7 @@ from colibri.autopilot.control.interface import (
     AttitudeDemand,
     ChargeController,
     Clock,
+    CompiledController,
     Controller,
     Decision,
     Horizon,
@@ -64,6 +65,8 @@ class ControlLoop:
         """
         self._name = profile.controller
         self._controller = _build(profile, vehicle, clock)
+        if isinstance(self._controller, CompiledController):
+            self._controller.warm_up()
         self.vehicle = vehicle
         self.preview = self._controller.preview
         self.takes_attitude = isinstance(self._controller, AttitudeController)

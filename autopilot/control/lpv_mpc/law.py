@@ -153,9 +153,8 @@ class LpvMpc:
         self._turn = recovery.TurnGains(
             settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s
         )
-        self._warm_up()
 
-    def _warm_up(self) -> None:
+    def warm_up(self) -> None:
         """Load what is compiled: three steps from hover, the last of them upside down."""
         still = np.zeros((self._samples, 3))
         level = np.zeros(self._samples)
