@@ -11,8 +11,8 @@ class Home:
 
     Attributes:
         origin: Of the ENU frame.
-        position_enu_m: Where the vehicle took off, or was told to return to.
-        yaw_rad: Its heading there.
+        position_enu_m: Where the vehicle took off, or the place that was chosen, m.
+        yaw_rad: Heading there, rad.
         chosen: Whether somebody chose it: a take-off then leaves it where it is.
     """
 

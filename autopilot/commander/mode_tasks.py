@@ -33,7 +33,7 @@ from colibri.autopilot.guidance.trajectories.tracks import Track, track
 from colibri.plant.vehicle.description import Vehicle
 
 TaskFactory: TypeAlias = Callable[[TaskContext], FlightTask]
-"""Says how a mode begins to be flown in a context."""
+"""Returns the task with which a mode begins."""
 
 
 class ModeTasks:
@@ -54,10 +54,10 @@ class ModeTasks:
         Args:
             missions: Have the task of a mission.
             attitude: Leads attitude and thrust; None for a law that takes neither.
-            vehicle: As the control law knows it.
+            vehicle: As the control law assumes it.
             preview: The references that the law wants.
             instants: At which references are planned.
-            references: How a track is planned, as the profile says it.
+            references: How a track is planned, from the profile.
             first: A track that is flown from time 0 on, until it is begun; None for none.
         """
         self._missions = missions
@@ -96,7 +96,7 @@ class ModeTasks:
         self._first = None
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Go by other numbers of the vehicle, from the next task on."""
+        """Adopt other numbers of the vehicle, from the next task on."""
         self._gravity_m_s2 = vehicle.gravity_m_s2
 
     def begin(self, mode: Mode, context: TaskContext) -> FlightTask:
@@ -137,7 +137,7 @@ class ModeTasks:
 
 
 def climb(context: TaskContext) -> FlightTask:
-    """Return how to take off where no height is asked for."""
+    """Return the task of a take-off to the parameter's height."""
     behaviour = context.behaviour
     return TakeoffTask(context.ground_m + behaviour.takeoff_height_m, None, context, behaviour.takeoff_speed_m_s)
 

@@ -1,4 +1,4 @@
-"""Which needs of flight modes are met, and what clients ask for from moment to moment."""
+"""Which needs of flight modes are met, and the latest setpoints of clients."""
 
 from typing import Protocol, TypeVar
 
@@ -40,11 +40,11 @@ class ModeNeeds:
         self._now_us = 0
 
     def at(self, now_us: int) -> None:
-        """Take in the time at which the messages come that are obeyed next."""
+        """Set the time of the messages that come next."""
         self._now_us = now_us
 
     def missing(self) -> tuple[Need, ...]:
-        """Return the needs that nothing meets now. The message before may have changed that."""
+        """Return the needs that nothing meets now; any message may change that."""
         sticks, setpoint, _ = self.steered(self._now_us)
         met = {
             Need.ATTITUDE_CONTROL: self._takes_attitude,
@@ -59,7 +59,7 @@ class ModeNeeds:
         return tuple(need for need, there in met.items() if not there)
 
     def steered(self, now_us: int) -> Steered:
-        """Return what is obeyed of what clients send, where that is fresh."""
+        """Return the setpoints of clients that are not older than the parameters allow."""
         behaviour = self._pilot.behaviour
         return Steered(
             self._manual.latest(now_us, round(behaviour.sticks_lost_s * 1e6)),

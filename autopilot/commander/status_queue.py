@@ -1,14 +1,14 @@
-"""The lines for ground stations that the parts of the commander say, until somebody sends them."""
+"""Status texts of the commander's parts for ground stations, queued until they are sent."""
 
 from typing import NamedTuple
 
 
 class Said(NamedTuple):
-    """A line for ground stations.
+    """A status text.
 
     Attributes:
         severity: MAV_SEVERITY.
-        text: The line.
+        text: One line.
     """
 
     severity: int
@@ -16,7 +16,7 @@ class Said(NamedTuple):
 
 
 class StatusQueue:
-    """Status texts in the order in which they were said."""
+    """Status texts in order."""
 
     def __init__(self) -> None:
         """Begin empty."""
@@ -27,6 +27,6 @@ class StatusQueue:
         self._said.append(Said(severity, text))
 
     def take(self) -> list[Said]:
-        """Return the lines, and forget them."""
+        """Return the lines, and empty the queue."""
         said, self._said = self._said, []
         return said

@@ -1,4 +1,4 @@
-"""The supervisor: decides by the failsafes' table what is to be done, and tells what the ground station is to know."""
+"""The supervisor: decides on failsafes by their table, and reports them to ground stations."""
 
 from colibri.autopilot.commander.rules.failsafe_conditions import Conditions, FailsafeInputs, knows_position
 from colibri.autopilot.commander.rules.failsafe_parameters import Limits, limits, settings
@@ -20,12 +20,12 @@ class Supervisor:
     """Supervises one flight.
 
     Attributes:
-        limits: What the parameters say of limits and delays.
-        memory: What is lost already.
+        limits: Limits and delays, from the parameters.
+        memory: Conditions that hold, and the failsafes they began.
     """
 
     def __init__(self, parameters: Parameters, lines: StatusQueue) -> None:
-        """Begin with nothing lost; what a ground station is to know goes to `lines`."""
+        """Begin with no condition; failsafes are reported to `lines`."""
         self._lines = lines
         self._conditions = Conditions()
         self.memory = Memory()
@@ -37,11 +37,11 @@ class Supervisor:
         self.limits, self._settings = limits(parameters), settings(parameters)
 
     def resume(self, memory: Memory) -> None:
-        """Take for lost after a restart in flight what was lost before."""
+        """Restore the memory after a restart in flight."""
         self.memory = memory
 
     def knows_position(self, estimate: Estimate | None) -> bool:
-        """Whether an estimate tells the position well enough to fly to places; a state that is told does."""
+        """Whether the position is known well enough to fly to places; without an `estimate`, from states, it is."""
         return knows_position(estimate, self.limits)
 
     def step(self, inputs: FailsafeInputs, flight: Flight) -> Action:

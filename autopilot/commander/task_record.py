@@ -10,10 +10,10 @@ from colibri.autopilot.guidance.tasks.task import FlightTask
 
 
 class TaskRecord(NamedTuple):
-    """What is flown where the mode does not say it.
+    """State of a flight task.
 
     Attributes:
-        order: By which a task can begin again; None where that is the mode's own.
+        order: With which the task begins again; None if the mode alone determines it.
         began_us: When the track that is flown began; None where none is.
         turns: How often the mission's circle was flown around.
         legs: How many legs are left of what is flown in legs.
@@ -26,7 +26,7 @@ class TaskRecord(NamedTuple):
 
 
 def task_record(task: FlightTask) -> TaskRecord:
-    """Return what is flown."""
+    """Return the state of a task."""
     if isinstance(task, MissionTask):
         return TaskRecord(turns=task.turns, legs=task.legs)
     if isinstance(task, TaskSequence):

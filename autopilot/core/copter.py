@@ -110,7 +110,7 @@ class Copter:
         if known is None:
             self._waiting_us = now_us
             if self._time_us is not None:  # another flight, of which nothing is known yet
-                parts.stations.reboot()
+                parts.stations.system.reboot()
             return nothing_known(now_us, self._clock() - started_s)
         if not goes_on:
             self._start.begin(known, self._time_us)
@@ -139,7 +139,7 @@ class Copter:
         if self._sample is not None:
             self._reporter.report(self._sample)
             self._sample = None
-        self.stations.hear_plant(self._plant_status, now_us)
+        self.stations.receive_status(self._plant_status, now_us)
         self._plant_status = NOTHING
         for datagram, link, address, loopback in inbox:
             self.stations.hub.receive(datagram, link, address, now_us, loopback=loopback)
@@ -150,10 +150,10 @@ class Copter:
         """Deny commands while nothing is known of the vehicle yet."""
         if self._waiting_us is None:
             return []
-        self.stations.wait("not ready: attitude and position are not known yet")
+        self.stations.refuse_commands("not ready: attitude and position are not known yet")
         for datagram, link, address, loopback in inbox:
             self.stations.hub.receive(datagram, link, address, self._waiting_us, loopback=loopback)
-        self.stations.wait("")
+        self.stations.refuse_commands("")
         return self.stations.take_outbox()
 
     def record(self) -> Checkpoint | None:

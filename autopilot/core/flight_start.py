@@ -60,7 +60,7 @@ class FlightStart:
         self._supervision.listen(frame.time_us)
         self._checkpointer.resume(history, frame, parts.tasks.again)
         parts.actuation.begin(parts.loop.controls if pilot.state.armed and not pilot.ground.idles else STILL)
-        parts.stations.say(INFO, parts.stations.banner())
+        parts.stations.say(INFO, parts.stations.system.banner)
         if not pilot.state.armed:
             return
         if parts.state_source.estimate is not None and not parts.state_source.rests:
@@ -72,7 +72,7 @@ class FlightStart:
         """Start a new flight; `again`: after another one, of which no service may remember anything."""
         parts, loop, rests = self._parts, self._parts.loop, self._parts.state_source.rests
         if again:
-            parts.stations.reboot()
+            parts.stations.system.reboot()
         speed = self._start_speed if frame.time_us == 0 else loop.vehicle.hover_speed
         loop.begin(loop.vehicle.rotors.idle_speed if rests else speed, parts.tasks.first_yaw_rad)
         mode = Mode.TRACK if parts.tasks.is_first else None
@@ -82,4 +82,4 @@ class FlightStart:
         parts.pilot.readiness.trust_rotors()
         if parts.state_source.estimate is not None and not rests:
             parts.lines.say(WARNING, FALLS)
-        parts.stations.say(INFO, parts.stations.banner())
+        parts.stations.say(INFO, parts.stations.system.banner)

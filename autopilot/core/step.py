@@ -25,11 +25,11 @@ def follows(time_us: int, before_us: int | None, interval_us: int) -> bool:
 
 
 class Step(NamedTuple):
-    """The answer to a frame: the command to send, the decision behind it, and how long it took.
+    """Answer to a frame: the command to send, the decision behind it, and the computation time.
 
-    Between two control samples the last command is sent again, and there is no decision. Where the state is told, there
-    is no estimate. Faults are what the plant is asked to have happen with the command. As long as nothing is `known` of
-    the vehicle, its rotors stand.
+    Between two control samples the last command is sent again, and there is no decision. Where frames are
+    states there is no estimate. Faults are requested of the plant with the command. Unless the vehicle is `known`, its
+    rotors stand.
     """
 
     command: ActuatorCommand
@@ -49,7 +49,7 @@ class Steps(Protocol):
     """An autopilot."""
 
     def step(self, frame: Frame, plant_status: PlantStatus) -> Step:
-        """Answer a frame and what the plant tells beside it."""
+        """Answer a frame and the plant status beside it."""
         ...
 
 

@@ -46,7 +46,7 @@ class Autopilot:
         self._state_source = StateSource(estimator, self.frame_interval_us)
 
     def step(self, frame: Frame, plant_status: PlantStatus = NOTHING) -> Step:
-        """Answer a frame and what the plant tells beside it.
+        """Answer a frame and the plant status beside it.
 
         Frames follow one another at the frame interval; a plant that runs freely may lose a few. One that comes much
         later, or earlier, begins a new flight: with the profile's rotor speed at time 0, and with hover in mid-flight,

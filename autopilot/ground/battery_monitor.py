@@ -1,6 +1,6 @@
-"""The battery as the ground station is told of it: followed from the rotor speeds that are commanded.
+"""The battery monitor: charge and voltage by a model driven with the commanded rotor speeds.
 
-Where the battery itself tells, and says something else, it is believed.
+What the battery itself reports takes precedence.
 """
 
 from math import nan
@@ -21,11 +21,11 @@ _SAG = 0.03
 
 
 class BatteryMonitor:
-    """Counts what one vehicle's battery gives.
+    """Integrates the charge taken from one vehicle's battery.
 
     Attributes:
-        charge_ah: Taken so far.
-        energy_wh: The same as energy.
+        charge_ah: Charge taken, Ah.
+        energy_wh: Energy taken, Wh.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
@@ -35,29 +35,29 @@ class BatteryMonitor:
         self.energy_wh = 0.0
         self._now = self._model.terminal(0.0, np.zeros(4))
         self._vehicle = vehicle
-        self._told = False
+        self._is_reported = False
         self._sag_v = 0.0
         self.charge_ah = 0.0
 
     def receive(self, reported: PlantBattery) -> None:
-        """Take in what the battery says of itself."""
+        """Take in the charge and the voltage that the battery reports."""
         if self._battery is None:
             return
-        model_ah = self.charge_ah if self._told else reported.used_ah
-        self.charge_ah, self._told = estimated(model_ah, reported.used_ah, self._vehicle), True
+        model_ah = self.charge_ah if self._is_reported else reported.used_ah
+        self.charge_ah, self._is_reported = estimated(model_ah, reported.used_ah, self._vehicle), True
         sag_v = reported.voltage_v - self._now[0]
         self._sag_v = sag_v if abs(sag_v) > _SAG * self._battery.full_voltage_v else 0.0
 
     def resume(self, charge_ah: float, energy_wh: float) -> None:
-        """Go on with a battery that has given so much, unless it says itself how much."""
+        """Restore charge and energy after a restart, unless the battery reports its charge itself."""
         self.energy_wh = energy_wh
-        if self._told:
+        if self._is_reported:
             return
         self.charge_ah = charge_ah
         self._now = self._model.terminal(charge_ah, np.zeros(4))
 
     def run(self, controls: FourRotors, duration_s: float) -> None:
-        """Turn the rotors at `controls`, parts of the largest speed, for `duration_s`."""
+        """Integrate `duration_s` with the rotors at `controls`, parts of the largest speed."""
         voltage_v, current_a = self._now = self._model.terminal(self.charge_ah, np.array(controls))
         self.charge_ah += current_a * duration_s / _SECONDS_PER_HOUR
         self.energy_wh += voltage_v * current_a * duration_s / _SECONDS_PER_HOUR
@@ -70,7 +70,7 @@ class BatteryMonitor:
         return max(0.0, 1.0 - self.charge_ah / self._battery.capacity_ah)
 
     def state(self) -> BatteryState | None:
-        """Return what to tell of it; None without a battery."""
+        """Return the battery state for telemetry; None without a battery."""
         if self._battery is None:
             return None
         voltage_v, current_a = self._now

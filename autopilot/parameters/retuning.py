@@ -1,4 +1,4 @@
-"""The control law, built anew before a number of its own or of its vehicle changes in flight."""
+"""Retuning in flight: the control law is rebuilt, and checked, before one of its parameters changes."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol, TypeAlias
@@ -41,10 +41,10 @@ class Tuned(NamedTuple):
 
 
 class Tuning:
-    """Tries every change before it is made: what no control law can be built from, or fly by, is refused."""
+    """Checks each change before it is made: one by which no control law can be built, or fly, is refused."""
 
     def __init__(self, numbers: Numbers, build: Build, running: Rhythm, say: Callable[[str], None]) -> None:
-        """Tune `numbers` while a law flies in the rhythm of `running`; `say` tells what a law says of its refusal."""
+        """Tune `numbers` while a law flies in the rhythm of `running`; `say` reports why a law refused them."""
         self._numbers = numbers
         self._build = build
         self._say = say

@@ -1,4 +1,4 @@
-"""Who goes by the parameters: each part is subscribed once, and is handed every change."""
+"""Subscribers of the parameters: parts that adopt each change."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -12,13 +12,13 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class Subscribers(NamedTuple):
-    """What adopts a change, by what it goes by.
+    """Callbacks that adopt a change, by what they take.
 
     Attributes:
-        parameters: Go by parameters as they are.
-        behaviour: Go by the numbers of the behaviour.
-        law: Fly by the control law and its vehicle; only called where one of their numbers has changed.
-        vehicle: Go by the vehicle; likewise.
+        parameters: Take all parameters.
+        behaviour: Take the numbers of the behaviour.
+        law: Take the control law and its vehicle; called only if one of their numbers has changed.
+        vehicle: Take the vehicle; likewise.
     """
 
     parameters: tuple[Callable[[Parameters], None], ...]
@@ -27,7 +27,7 @@ class Subscribers(NamedTuple):
     vehicle: tuple[Callable[[Vehicle], None], ...]
 
     def adopt(self, parameters: Parameters) -> None:
-        """Hand out what has changed since this was last called, if anything has."""
+        """Call back with the changes since the last call, if there are any."""
         changes = parameters.take_changes()
         if changes is None:
             return

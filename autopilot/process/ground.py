@@ -10,7 +10,8 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.checkpoint import History
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.step import Received
-from colibri.autopilot.ground.stations import REBOOT, SHUT_DOWN, StationSettings
+from colibri.autopilot.ground.stations import StationSettings
+from colibri.autopilot.ground.system_commands import REBOOT, SHUT_DOWN
 from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.autopilot.parameters.definitions import ImpossibleError
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
@@ -100,8 +101,8 @@ class Ground:
         if self._log:
             received = self._log.hear(received)
         outbox = self.copter.serve(received)
-        if stations.restart:
-            self._restart(stations.restart)
+        if stations.system.restart:
+            self._restart(stations.system.restart)
         if now_s >= self._told_s + _TELL_EVERY_S and self.copter.pilot.sensed.vehicle is not None:
             self._tell(now_s)
         if self.copter.parameters.revision != self._revision:

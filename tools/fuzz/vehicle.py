@@ -97,7 +97,7 @@ class Target:
             self._check_answers(commands, shooter.acks)
         _must(not self.flight.client.acks, "an acknowledgement went to a station without a request")
         check(self.flight)
-        if self.flight.copter.stations.restart:
+        if self.flight.copter.stations.system.restart:
             self.flight.restart()
 
     def _check_answers(self, commands: list[Sent], acks: list[Any]) -> None:

@@ -236,7 +236,7 @@ def test_no_command_leads_over_the_fence() -> None:
     there = cockpit.place(20.0, 0.0)
     assert "15 m from home" in cockpit.do("DO_REPOSITION", frame=0, x=there.latitude_deg, y=there.longitude_deg).reason
     assert "15 m from home" in cockpit.do("DO_ORBIT", 16.0, 2.0).reason
-    refusal = cockpit.commands.guided_goto(there.latitude_deg, there.longitude_deg, 10.0, 3)
+    refusal = cockpit.commands.motion.guided_goto(there.latitude_deg, there.longitude_deg, 10.0, 3)
     assert refusal is not None
     assert "15 m from home" in refusal.reason
     centre = item("NAV_FENCE_CIRCLE_EXCLUSION", 3.0, place=(8.0, 0.0, 0.0))

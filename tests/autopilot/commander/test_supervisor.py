@@ -2,7 +2,7 @@
 
 import pytest
 
-from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, FailsafeInputs
+from colibri.autopilot.commander.rules.failsafe_conditions import FailsafeInputs
 from colibri.autopilot.commander.rules.failsafe_parameters import settings
 from colibri.autopilot.commander.rules.failsafe_rule import Flight, Memory
 from colibri.autopilot.commander.rules.failsafe_table import NAMES, TABLE, Action, Condition, Row
@@ -11,33 +11,12 @@ from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.commander.supervisor import Supervisor
 from colibri.autopilot.control.interface import Diagnostics, Fallback
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.parameters.definitions import definitions
 from colibri.mavlink.parameters.store import Parameters
-from colibri.mavlink.telemetry.snapshot import BatteryState
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
-from tests.autopilot.commander.cockpit import FLYING, at
+from tests.autopilot.commander.failsafe_inputs import FULL, WELL
 
-FULL = BatteryState(3, 12.0, 5.0, 0.1, 0.9, 600.0, 1.0)
-WELL = FailsafeInputs(
-    now_us=10_000_000,
-    missed_us=None,
-    state=at(FLYING),
-    mode=Mode.HOLD,
-    standing=False,
-    estimate=None,
-    setpoint=None,
-    sticks_us=None,
-    listening_us=NEVER_US,
-    station_us=None,
-    battery=FULL,
-    fence=None,
-    decided=Diagnostics(),
-    late=False,
-    rotor_lost=None,
-    pace=Limits(),
-)
 HOLDING = Flight(armed=True, standing=False, mode=Mode.HOLD, saving=Action.NONE)
 LOST: dict[Condition, FailsafeInputs] = {
     Condition.TILTED: WELL._replace(state=WELL.state._replace(euler=(1.5, 0.0, 0.0))),

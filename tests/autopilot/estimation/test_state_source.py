@@ -120,14 +120,14 @@ def test_a_vehicle_that_stations_fly_is_there_with_the_first_estimate() -> None:
     flown.serve([])
     assert flown.pilot.ground.standing
     assert not flown.pilot.state.armed
-    assert not flown.stations.restart
+    assert not flown.stations.system.restart
 
 
 def test_a_vehicle_that_stations_fly_is_restarted_by_another_flight() -> None:
     flown = copter()
     for time_us in (*range(0, ALIGNED_US + 1, FRAME_US), 0):
         flown.step(sensors(time_us))
-    assert flown.stations.restart
+    assert flown.stations.system.restart
 
 
 def test_who_is_told_the_state_estimates_nothing() -> None:

@@ -8,7 +8,7 @@ from msgspec import structs
 
 from colibri.autopilot.commander.rules.modes import FIRST, Mode
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.ground.stations import REBOOT, SHUT_DOWN
+from colibri.autopilot.ground.system_commands import REBOOT, SHUT_DOWN
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
 from colibri.mavlink.wire.dialect import mav
@@ -114,11 +114,11 @@ def test_a_restart_is_for_the_ground() -> None:
     flight.disarm()
     for param in (0.0, 3.0, nan, 1.5):
         assert flight.command(restart, param) == DENIED
-    assert flight.copter.stations.restart == 0.0
+    assert flight.copter.stations.system.restart == 0.0
     assert flight.command(restart, 1.0) == ACCEPTED
-    assert flight.copter.stations.restart == REBOOT
+    assert flight.copter.stations.system.restart == REBOOT
     assert flight.command(restart, 2.0) == ACCEPTED
-    assert flight.copter.stations.restart == SHUT_DOWN
+    assert flight.copter.stations.system.restart == SHUT_DOWN
 
 
 def test_stored_parameters_are_reset_by_command() -> None:
@@ -139,7 +139,7 @@ def test_a_plant_that_begins_anew_asks_for_a_new_vehicle() -> None:
     flight.run(0.05)
     assert flight.copter.pilot.state == FIRST
     assert not any(flight.rotors.controls)
-    assert flight.copter.stations.restart == REBOOT
+    assert flight.copter.stations.system.restart == REBOOT
 
 
 def test_frames_that_were_missed_do_not_end_a_flight() -> None:

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colibri.autopilot.commander.rules.failsafe_conditions import (
-    NEVER_US,
     Conditions,
     FailsafeInputs,
     battery_below,
@@ -24,30 +23,13 @@ from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.reference import Kind, Reference, lead, still_target
 from colibri.common.types import Vector
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, PositionSetpoint
-from colibri.mavlink.telemetry.snapshot import BatteryState
+from tests.autopilot.commander import failsafe_inputs
+from tests.autopilot.commander.failsafe_inputs import FULL
 
 LIMITS = {number.name: float(number.default) for number in NUMBERS}
 NOW_US = 10_000_000
 LEVEL = VehicleState((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-FULL = BatteryState(3, 12.0, 5.0, 0.1, 0.9, 600.0, 1.0)
-WELL = FailsafeInputs(
-    now_us=NOW_US,
-    missed_us=None,
-    state=LEVEL,
-    mode=Mode.HOLD,
-    standing=False,
-    estimate=None,
-    setpoint=None,
-    sticks_us=None,
-    listening_us=NEVER_US,
-    station_us=None,
-    battery=FULL,
-    fence=None,
-    decided=Diagnostics(),
-    late=False,
-    rotor_lost=None,
-    pace=Limits(),
-)
+WELL = failsafe_inputs.WELL._replace(state=LEVEL)
 
 
 def at_speed(velocity: Vector, position: Vector = (0.0, 0.0, 5.0)) -> VehicleState:

@@ -1,0 +1,107 @@
+"""Commands to the autopilot as a system: restart, storage, calibration, origin, version, shell."""
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version as version_of_package
+from math import pi
+
+from colibri.autopilot.commander.missions import Missions
+from colibri.autopilot.commander.motion_commands import MAX_HEIGHT_M
+from colibri.autopilot.commander.pilot import Pilot
+from colibri.autopilot.ground.calibration import Calibration
+from colibri.common.earth.geodesy import Geodetic, is_on_earth
+from colibri.mavlink.parameters.store import Parameters
+from colibri.mavlink.services.command import ACCEPTED, DENIED, Command, Entry, Handler, Outcome, outcome_of
+from colibri.mavlink.services.identity import IDENTITIES, autopilot_version, banner, version_of
+from colibri.mavlink.services.shell import Command as ShellCommand
+from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.refusal import Refusal
+
+VERSION = version_of_package("colibri-sitl")
+REBOOT, SHUT_DOWN = 1.0, 2.0
+
+
+class SystemCommands:
+    """Obeys commands to one autopilot as a system.
+
+    Attributes:
+        banner: Name and version of the autopilot.
+        version: Fields of AUTOPILOT_VERSION.
+        restart: `REBOOT` or `SHUT_DOWN` once that was requested; 0 before.
+    """
+
+    def __init__(
+        self, pilot: Pilot, missions: Missions, parameters: Parameters, *, identity: str, system_id: int
+    ) -> None:
+        """Obey for `pilot`, its `missions` and `parameters`; `identity` is a name of `identity.IDENTITIES`."""
+        self._pilot, self._missions, self._parameters = pilot, missions, parameters
+        self._calibration = Calibration()
+        self.banner = banner(IDENTITIES[identity], VERSION)
+        self.version: Sequence[object] = autopilot_version(IDENTITIES[identity], version_of(VERSION), system_id)
+        self.restart = 0.0
+
+    def handlers(self) -> Mapping[int, Handler | Entry]:
+        """Return the handlers of the commands."""
+        return {
+            mav.MAV_CMD_PREFLIGHT_CALIBRATION: Entry(self._calibrate, frames=None, interruptible=True),
+            mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._restart,
+            mav.MAV_CMD_PREFLIGHT_STORAGE: self._storage,
+            mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN: lambda command: outcome_of(
+                self.set_origin(Geodetic(command.x, command.y, command.z))
+            ),
+        }
+
+    def shell(self) -> Mapping[str, ShellCommand]:
+        """Return the commands of the shell."""
+        return {"ver": lambda _: self.banner + "\n", "status": lambda _: self._status(), "param": self._param}
+
+    def reboot(self) -> None:
+        """Request a restart, as a ground station may."""
+        self.restart = REBOOT
+
+    def poll(self, now_us: int) -> list[str]:
+        """Return the status texts that are due."""
+        return self._calibration.poll(now_us)
+
+    def set_origin(self, place: Geodetic) -> Refusal | None:
+        """Set the origin of the ENU frame; return why not."""
+        if not is_on_earth(place.latitude_deg, place.longitude_deg) or not abs(place.altitude_m) <= MAX_HEIGHT_M:
+            return Refusal("origin refused: not a latitude, longitude and altitude")
+        if self._pilot.state.armed:
+            return Refusal("origin refused: the rotors are armed")
+        self._pilot.home.move_origin(place)
+        self._missions.moved_origin()
+        return None
+
+    def _calibrate(self, command: Command) -> Outcome:
+        return self._calibration.begin(command, armed=self._pilot.state.armed)
+
+    def _restart(self, command: Command) -> Outcome:
+        if self._pilot.state.armed:
+            return Outcome(DENIED, "restart refused: the rotors are armed")
+        if command.p1 not in (REBOOT, SHUT_DOWN):
+            return Outcome(DENIED, "restart with 1, shut down with 2")
+        self.restart = command.p1
+        return Outcome()
+
+    def _storage(self, command: Command) -> Outcome:
+        """Obey PREFLIGHT_STORAGE: parameters are stored as they change, so only the reset does anything."""
+        if command.p1 == 2.0:
+            if self._pilot.state.armed:
+                return Outcome(DENIED, "parameters refused: the rotors are armed")
+            self._parameters.reset()
+        return Outcome(ACCEPTED) if command.p1 in (0.0, 1.0, 2.0) else Outcome(DENIED, "storage: 0, 1 or 2")
+
+    def _status(self) -> str:
+        mode, armed = self._pilot.state
+        x, y, z = self._pilot.context().state.position_enu_m
+        reasons = "; ".join(self._pilot.readiness.refusals()) or "ready to arm"
+        yaw_deg = (90.0 - self._pilot.context().state.euler[2] * 180.0 / pi) % 360.0
+        return (
+            f"{self.banner}\nmode {mode}, {'armed' if armed else 'disarmed'}, {reasons}\n"
+            f"east {x:.2f} north {y:.2f} up {z:.2f} m, heading {yaw_deg:.0f} degrees\n"
+        )
+
+    def _param(self, arguments: list[str]) -> str:
+        shown = arguments[1:] if arguments[:1] == ["show"] else arguments
+        names = [p.name for p in self._parameters if not shown or p.name.startswith(shown[0].upper().rstrip("*"))]
+        return "".join(f"{name} {self._parameters[name]:g}\n" for name in names) or "no such parameter\n"
