@@ -5,9 +5,13 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from types import FunctionType
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeAlias, TypeVar, cast
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Packed: TypeAlias = NDArray[np.void]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -34,6 +38,22 @@ def compiled_for(*signatures: str) -> Callable[[_Function], _Function]:
         return cast(_Function, kernel)
 
     return compiled_now
+
+
+def packed(parameters: NamedTuple) -> Packed:
+    """Return the record of `parameters`, (1,): one pointer to hand to a kernel instead of a hundred numbers."""
+    return np.array([tuple(parameters)], dtype=_fields(parameters))
+
+
+def _fields(parameters: Any) -> list[tuple[str, Any, tuple[int, ...]]]:
+    """Return the fields of a record: float64 but for arrays of another type and for what has fields itself."""
+    fields: list[tuple[str, Any, tuple[int, ...]]] = []
+    for name, value in parameters._asdict().items():
+        if hasattr(value, "_fields"):
+            fields.append((name, _fields(value), ()))
+        else:
+            fields.append((name, getattr(value, "dtype", np.float64), np.shape(value)))
+    return fields
 
 
 def files_of(function: Callable[..., Any]) -> set[str]:

@@ -49,16 +49,16 @@ class Qp(NamedTuple):
         f: (n,).
         G: (m, n).
         h: (m,).
-        lower: (n,); None for no bounds.
-        upper: (n,); None for no bounds.
+        lower: (n,); (0,) for no bounds.
+        upper: (n,); (0,) for no bounds.
     """
 
     H: Array
     f: Array
     G: Array
     h: Array
-    lower: Array | None = None
-    upper: Array | None = None
+    lower: Array = _NONE
+    upper: Array = _NONE
 
 
 class QpResult(NamedTuple):
@@ -99,13 +99,12 @@ class QpSolver:
         if not solution.found or solution.x is None:
             return QpResult(why_none(qp), None)
         x = np.array(solution.x, dtype=np.float64)  # of our own: some solvers give what cannot be written to
-        lower, upper, z, z_box = map(_some, (qp.lower, qp.upper, solution.z, solution.z_box))
-        if self._residual(qp.H, qp.f, qp.G, qp.h, lower, upper, x, z, z_box) > MAX_RESIDUAL:
+        if self._residual(*qp, x, _some(solution.z), _some(solution.z_box)) > MAX_RESIDUAL:
             return QpResult(QpStatus.NOT_ACCURATE, None)
         return QpResult(QpStatus.SOLVED, x)
 
     def _solution(self, qp: Qp, P: Any, G: Any) -> Any:
-        problem = self._qpsolvers.Problem(P, qp.f, G, qp.h, lb=qp.lower, ub=qp.upper)
+        problem = self._qpsolvers.Problem(P, qp.f, G, qp.h, lb=_or_none(qp.lower), ub=_or_none(qp.upper))
         return self._qpsolvers.solve_problem(problem, self._name, **self._options)
 
     def _quietly(self, qp: Qp, P: Any, G: Any) -> Any:
@@ -119,15 +118,19 @@ def _some(vector: Array | None) -> Array:
     return _NONE if vector is None else np.ascontiguousarray(vector, dtype=np.float64)
 
 
+def _or_none(vector: Array) -> Array | None:
+    return vector if vector.size else None
+
+
 def why_none(qp: Qp) -> QpStatus:
-    """Tell why a QP has no solution: no point satisfies its constraints (a linear program's phase one), or no time."""
+    """Return why a QP has no solution: no point satisfies its constraints (a linear program tells), or no time."""
     from scipy.optimize import linprog
 
     if not all(np.isfinite(part).all() for part in (qp.H, qp.f, qp.G, qp.h)):
         return QpStatus.NOT_ACCURATE
     n = len(qp.f)
-    lower = np.full(n, -np.inf) if qp.lower is None else qp.lower
-    upper = np.full(n, np.inf) if qp.upper is None else qp.upper
+    lower = np.full(n, -np.inf) if not qp.lower.size else qp.lower
+    upper = np.full(n, np.inf) if not qp.upper.size else qp.upper
     bounds = list(zip(lower.tolist(), upper.tolist(), strict=True))
     feasible = linprog(np.zeros(n), A_ub=qp.G, b_ub=qp.h, bounds=bounds).status == 0
     return QpStatus.TIME_OUT if feasible else QpStatus.INFEASIBLE
@@ -163,7 +166,7 @@ def box(n: int) -> Array:
 
 
 def _filled(role: str, matrix: Array) -> "csc_matrix":
-    """Return a matrix as CSC: to build one anew costs five times what Clarabel takes, so its pattern is kept."""
+    """Return a matrix as CSC: to build a new one costs five times what Clarabel takes, so its pattern is kept."""
     filled = matrix.T != 0.0
     sparse = _pattern(role, matrix.shape, filled.tobytes())
     np.asarray(sparse.data)[:] = matrix.T[filled]

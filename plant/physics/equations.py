@@ -7,16 +7,13 @@ in FLU, position m in ENU, and the unit quaternion that turns FLU into ENU.
 
 from collections.abc import Sequence
 from math import sqrt
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from colibri.common.compiled_rotations import rotation_matrix
-from colibri.common.jit import compiled
+from colibri.common.jit import Packed, compiled
 from colibri.common.types import Array, FourRotors, Matrix, Quaternion, Vector
-
-Packed: TypeAlias = NDArray[np.void]
 
 STATE = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "qw", "qx", "qy", "qz")
 ROTORS = slice(13, 17)
@@ -84,12 +81,6 @@ class Parameters(NamedTuple):
     damping_n_s_m: float
     friction: float
     slip_damping_n_s_m: float
-
-
-def packed(parameters: Parameters) -> Packed:
-    """Return the record of `parameters`, (1,): one pointer to hand to a kernel instead of a hundred numbers."""
-    fields = [(name, np.float64, np.shape(value)) for name, value in parameters._asdict().items()]
-    return np.array([tuple(parameters)], dtype=fields)
 
 
 class Wrench(NamedTuple):

@@ -6,10 +6,10 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from colibri.common.jit import compiled
+from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import power
 from colibri.common.types import Array, FourRotors
-from colibri.plant.physics.equations import Packed, close, held, write_derivative
+from colibri.plant.physics.equations import close, held, write_derivative
 from colibri.plant.physics.start import IntegrationError
 
 Solver: TypeAlias = Callable[[Array, FourRotors, Packed, float], tuple[Array, float]]

@@ -5,6 +5,7 @@ from math import isfinite, nan
 
 import numpy as np
 
+from colibri.common.jit import packed
 from colibri.common.rotations import earth_from_body, normalized
 from colibri.common.types import Array, FourRotors, Vector
 from colibri.mavlink.hil.plant_status import PlantBattery
@@ -12,7 +13,7 @@ from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.air import CALM, Air
 from colibri.plant.environment.turbulence import Eddies
 from colibri.plant.environment.weather import NO_WEATHER, Weather
-from colibri.plant.physics.equations import CHARGE, ROTORS, attitude_of, packed, specific_force
+from colibri.plant.physics.equations import CHARGE, ROTORS, attitude_of, specific_force
 from colibri.plant.physics.integrators import Integrator, solver
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import IntegrationError, Start, check_start

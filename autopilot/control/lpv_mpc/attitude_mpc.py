@@ -7,13 +7,15 @@ import numpy as np
 
 from colibri.autopilot.control.interface import Active, Clock, Diagnostics
 from colibri.autopilot.control.lpv_mpc import condensing, prediction
-from colibri.autopilot.control.lpv_mpc.prediction import INPUTS, STATES
+from colibri.autopilot.control.lpv_mpc.condensing import Problem, Target
+from colibri.autopilot.control.lpv_mpc.prediction import INPUTS, STATES, Body, InitialState
 from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus
 from colibri.autopilot.control.riccati import lqr
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag
 from colibri.common.config import Count, Degrees, Positive, Table
 from colibri.common.elementary import square
+from colibri.common.jit import packed
 from colibri.common.matrices import matmul, matvec
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
@@ -45,38 +47,6 @@ class AttitudeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
     slack_weight: Positive
 
 
-class AttitudeSituation(NamedTuple):
-    """What a plan begins with.
-
-    Attributes:
-        x: The state of `prediction`, (9,).
-        u: Moments last commanded, N m, (3,).
-        disturbance_n_m: Moment that the model does not explain, (3,).
-        momentum: h of the rotors along body z, N m s.
-        max_speed: Largest rotor speed that can be had, in parts of the vehicle's largest.
-    """
-
-    x: Array
-    u: Array
-    disturbance_n_m: Array
-    momentum: float
-    max_speed: float
-
-
-class Target(NamedTuple):
-    """What a plan is to reach.
-
-    Attributes:
-        angles: phi, theta, psi after each step, rad, (N, 3).
-        end: State and moments at the end of the horizon, (12,).
-        thrust_n: U1 commanded at each step, N, (N,).
-    """
-
-    angles: Array
-    end: Array
-    thrust_n: Array
-
-
 class Plan(NamedTuple):
     """A solved QP.
 
@@ -96,6 +66,7 @@ class AttitudeMpc:
 
     Attributes:
         horizon: N.
+        problem: What all its QPs share.
     """
 
     def __init__(
@@ -114,37 +85,39 @@ class AttitudeMpc:
         self._solver = solver
         self._clock = clock
         self._along_plan = settings.scheduling == "along-plan"
-        self._starts = np.cumsum((0, *settings.moves[:-1]))
-        self._checked = np.arange(settings.check_every, self.horizon + 1, settings.check_every)
-        self._output_weight = np.array(settings.output_weight)
-        self._increment_weight = np.array(settings.increment_weight)
+        output_weight, increment_weight = np.array(settings.output_weight), np.array(settings.increment_weight)
+        terminal_weight, self._gain = _riccati(self._body, interval_s, output_weight, increment_weight)
         angle = radians(settings.max_angle_deg)
-        self._limits = np.array([angle, angle, *settings.max_rate_rad_s])
-        self._lag = lag
-        self._vehicle = vehicle
-        self._from_thrust, self._from_moments = squared_speeds_from(vehicle)
-        terminal_weight, self._gain = self._riccati()
-        self._weights = (self._output_weight, terminal_weight, self._increment_weight)
-        self._prepare(settings)
-
-    def _prepare(self, settings: AttitudeSettings) -> None:
-        """Make the arrays that every QP fills anew, and the parts that never change."""
+        self.problem = Problem(
+            np.cumsum((0, *settings.moves[:-1])),
+            np.arange(settings.check_every, self.horizon + 1, settings.check_every),
+            output_weight,
+            increment_weight,
+            terminal_weight,
+            np.array(settings.max_increment_n_m),
+            np.array([angle, angle, *settings.max_rate_rad_s]),
+            *squared_speeds_from(vehicle),
+            square(lag.min_speed),
+        )
+        self._packed = packed(self.problem)
         moved = INPUTS * len(settings.moves)
-        n = moved + condensing.SLACKS
-        self._rotor_rows = 2 * condensing.ROTORS * len(settings.moves)
-        rows = self._rotor_rows + condensing.MOTION_ROWS * len(self._checked)
         self._schedule = np.empty((self.horizon, len(prediction.SCHEDULE)))
         self._responses = np.zeros((self.horizon + 1, STATES, 1 + moved))
-        self._H, self._f = np.zeros((n, n)), np.zeros(n)
-        self._H[moved:, moved:] = settings.slack_weight * np.eye(condensing.SLACKS)
-        self._f[moved:] = settings.slack_weight
-        self._G, self._h = np.zeros((rows, n)), np.zeros(rows)
-        self._max_increment = np.array(settings.max_increment_n_m)
-        max_increment = np.concatenate([self._max_increment] * len(settings.moves))
-        self._lower = np.concatenate([-max_increment, np.zeros(condensing.SLACKS)])
-        self._upper = np.concatenate([max_increment, np.full(condensing.SLACKS, _MAX_SLACK)])
+        self._rotor_rows = 2 * condensing.ROTORS * len(settings.moves)
+        self._qp = self._empty_qp(moved, settings.slack_weight)
 
-    def plan(self, now: AttitudeSituation, target: Target, ahead: Array | None) -> tuple[Plan | None, Diagnostics]:
+    def _empty_qp(self, moved: int, slack_weight: float) -> Qp:
+        """Return the QP in `moved` increments and the slacks, with all that stays the same in it."""
+        n, rows = moved + condensing.SLACKS, self._rotor_rows + condensing.MOTION_ROWS * len(self.problem.checked)
+        H, f = np.zeros((n, n)), np.zeros(n)
+        H[moved:, moved:] = slack_weight * np.eye(condensing.SLACKS)
+        f[moved:] = slack_weight
+        max_increment = np.tile(self.problem.max_increment, moved // INPUTS)
+        lower = np.concatenate([-max_increment, np.zeros(condensing.SLACKS)])
+        upper = np.concatenate([max_increment, np.full(condensing.SLACKS, _MAX_SLACK)])
+        return Qp(H, f, np.zeros((rows, n)), np.zeros(rows), lower, upper)
+
+    def plan(self, now: InitialState, target: Target, ahead: Array | None) -> tuple[Plan | None, Diagnostics]:
         """Plan from `now` towards `target`; no plan where the QP is not solved.
 
         The thrust leaves the rotors only a part of the moments that they could make. Where no plan with these keeps the
@@ -164,12 +137,12 @@ class AttitudeMpc:
         how = how._replace(solve_time_s=diagnostics.solve_time_s + how.solve_time_s)
         return (second, how) if second is not None else (plan, diagnostics)
 
-    def _middle_thrust_n(self, now: AttitudeSituation) -> float:
+    def _middle_thrust_n(self, now: InitialState) -> float:
         """Return the thrust, N, that leaves the rotors most for moments of either sign."""
-        middle = 0.5 * (square(self._lag.min_speed) + square(now.max_speed))
-        return middle / float(self._from_thrust.max())
+        middle = 0.5 * (self.problem.min_squared + square(now.max_speed))
+        return middle / float(self.problem.from_thrust.max())
 
-    def _solve(self, now: AttitudeSituation, target: Target) -> tuple[Plan | None, Diagnostics]:
+    def _solve(self, now: InitialState, target: Target) -> tuple[Plan | None, Diagnostics]:
         """Plan from the responses predicted last."""
         qp = self.condense(now, target)
         started_s = self._clock()
@@ -179,72 +152,30 @@ class AttitudeMpc:
             return None, Diagnostics(status, solve_time_s=solve_time_s)
         return self.read(now, target, qp, z, solve_time_s)
 
-    def predict(self, now: AttitudeSituation, ahead: Array | None) -> None:
+    def predict(self, now: InitialState, ahead: Array | None) -> None:
         """Predict the responses, scheduled along the last plan if there is one."""
         if ahead is not None and len(ahead) and self._along_plan:
             prediction.schedule_along(now.x, ahead, self._schedule)
         else:
             self._schedule[:] = now.x[list(prediction.SCHEDULE)]
-        prediction.respond(
-            now.x,
-            now.u,
-            now.disturbance_n_m,
-            self._schedule,
-            now.momentum,
-            self._body,
-            self._starts,
-            self._interval_s,
-            self._responses,
-        )
+        prediction.respond(now, self._schedule, self._body, self.problem.starts, self._interval_s, self._responses)
 
-    def condense(self, now: AttitudeSituation, target: Target) -> Qp:
+    def condense(self, now: InitialState, target: Target) -> Qp:
         """Condense what was predicted to a QP; it lies in arrays that the next one overwrites.
 
         The first move may always take back the moments last commanded, however large a fallback left them: without
         them the rotors make the thrust alone, so that the hard limits can always be kept.
         """
-        condensing.condense(
-            self._responses,
-            self._schedule,
-            target,
-            now.u,
-            self._weights,
-            self._from_moments,
-            self._from_thrust,
-            self._starts,
-            self._checked,
-            self._limits,
-            self._max_increment,
-            square(self._lag.min_speed),
-            square(now.max_speed),
-            self._H,
-            self._f,
-            self._G,
-            self._h,
-            self._lower,
-            self._upper,
-        )
-        return Qp(self._H, self._f, self._G, self._h, self._lower, self._upper)
+        max_squared = square(now.max_speed)
+        condensing.condense(self._responses, self._schedule, target, now.u, self._packed, max_squared, self._qp)
+        return self._qp
 
     def read(
-        self, now: AttitudeSituation, target: Target, qp: Qp, z: Array, solve_time_s: float
+        self, now: InitialState, target: Target, qp: Qp, z: Array, solve_time_s: float
     ) -> tuple[Plan, Diagnostics]:
         """Return the plan that the QP's solution `z` (n,) stands for, and what there is to say of it."""
-        states, moments = np.empty((self.horizon + 1, STATES)), np.empty((self.horizon, INPUTS))
-        squared = np.empty((self.horizon, condensing.ROTORS))
-        condensing.read_plan(
-            self._responses,
-            self._starts,
-            now.u,
-            z,
-            target.thrust_n,
-            self._from_thrust,
-            self._from_moments,
-            states,
-            moments,
-            squared,
-        )
-        active = condensing.count_active(qp.G, qp.h, self._lower, self._upper, z, self._rotor_rows, _BINDING)
+        states, moments, squared = condensing.read_plan(self._responses, self._packed, now.u, z, target.thrust_n)
+        active = condensing.count_active(qp.G, qp.h, qp.lower, qp.upper, z, self._rotor_rows, _BINDING)
         diagnostics = Diagnostics(
             QpStatus.SOLVED,
             solve_time_s=solve_time_s,
@@ -256,7 +187,7 @@ class AttitudeMpc:
         )
         return Plan(moments, states, float(z[-condensing.SLACKS + condensing.ANGLE_SLACK])), diagnostics
 
-    def lqr(self, now: AttitudeSituation, target: Target) -> Array:
+    def lqr(self, now: InitialState, target: Target) -> Array:
         """Return the moments, N m, (3,), of the unconstrained law at hover that the terminal weight belongs to."""
         state = np.concatenate([now.x, now.u])
         wanted = target.end.copy()
@@ -264,36 +195,37 @@ class AttitudeMpc:
         moments: Array = now.u - matvec(self._gain, state - wanted)
         return moments
 
-    def _riccati(self) -> tuple[Array, Array]:
-        """Return S (12, 12) and K (3, 12) of the LQR at hover on state and last moments, for the same Q and R."""
-        A = self._hover_transition()
-        B = A[:, STATES:]
-        C = np.zeros((INPUTS, STATES + INPUTS))
-        C[range(INPUTS), prediction.ANGLES] = 1.0
-        Q, R = matmul(C.T * self._output_weight, C), np.diag(self._increment_weight).copy()
-        S, K = lqr(A, B, Q, R)
-        return 0.5 * (S + S.T), K
 
-    def _hover_transition(self) -> Array:
-        """Return Ã = [[A, B], [0, I]] of one step at hover, (12, 12)."""
-        A = np.eye(STATES + INPUTS)
-        responses = np.zeros((2, STATES, 1 + INPUTS))
-        level, never = np.zeros((1, len(prediction.SCHEDULE))), np.zeros(1, dtype=np.int64)
-        nothing = np.zeros(INPUTS)
-        for state in range(STATES):
-            prediction.respond(
-                np.eye(STATES)[state], nothing, nothing, level, 0.0, self._body, never, self._interval_s, responses
-            )
-            A[:STATES, state] = responses[1, :, 0]
-        A[:STATES, STATES:] = responses[1, :, 1:]
-        return A
+def _riccati(body: Body, interval_s: float, output_weight: Array, increment_weight: Array) -> tuple[Array, Array]:
+    """Return S (12, 12) and K (3, 12) of the LQR at hover on state and last moments, for the same Q and R."""
+    A = _hover_transition(body, interval_s)
+    B = A[:, STATES:]
+    C = np.zeros((INPUTS, STATES + INPUTS))
+    C[range(INPUTS), prediction.ANGLES] = 1.0
+    Q, R = matmul(C.T * output_weight, C), np.diag(increment_weight).copy()
+    S, K = lqr(A, B, Q, R)
+    return 0.5 * (S + S.T), K
 
 
-def body_of(vehicle: Vehicle) -> prediction.Body:
+def _hover_transition(body: Body, interval_s: float) -> Array:
+    """Return Ã = [[A, B], [0, I]] of one step at hover, (12, 12)."""
+    A = np.eye(STATES + INPUTS)
+    responses = np.zeros((2, STATES, 1 + INPUTS))
+    level, at_once = np.zeros((1, len(prediction.SCHEDULE))), np.zeros(1, dtype=np.int64)
+    nothing = np.zeros(INPUTS)
+    for state in range(STATES):
+        hover = InitialState(np.eye(STATES)[state], nothing, nothing, 0.0, 1.0)
+        prediction.respond(hover, level, body, at_once, interval_s, responses)
+        A[:STATES, state] = responses[1, :, 0]
+    A[:STATES, STATES:] = responses[1, :, 1:]
+    return A
+
+
+def body_of(vehicle: Vehicle) -> Body:
     """Return what the model knows of `vehicle`: its moments follow like the slower of its rotors' two lags."""
     lag = vehicle.rotors.lag
     lag_1_s = 1.0 / max(lag.time_constant_up_s, lag.time_constant_down_s) if lag else 0.0
-    return prediction.Body(*vehicle.body.inertia_kg_m2, lag_1_s)
+    return Body(*vehicle.body.inertia_kg_m2, lag_1_s)
 
 
 def squared_speeds_from(vehicle: Vehicle) -> tuple[Array, Array]:

@@ -7,18 +7,16 @@ The cost is the thesis's [3.13-3.20], its terminal weight a full matrix on state
 """
 
 from math import sqrt
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, STATES, P, Q, R
-from colibri.common.jit import compiled
+from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, STATES, Integers, P, Q, R
+from colibri.autopilot.control.qp import Qp
+from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import atan2, cos, sin
 from colibri.common.matrices import matmul
 from colibri.common.types import Array
-
-Integers: TypeAlias = NDArray[np.int64]
 
 SLACKS = 2
 ANGLE_SLACK, RATE_SLACK = 0, 1
@@ -32,28 +30,57 @@ _ANGLE_ROWS = 1 + _TWO_SIDES * 2
 _NO_TILT = 1e-9
 
 
+class Problem(NamedTuple):
+    """What all QPs of a control law share: weights, limits and the steps that they belong to.
+
+    Attributes:
+        starts: Step of each move, (b,).
+        checked: Steps at which the limits of the motion are held, (c,).
+        output_weight: Diagonal of Q, (3,).
+        increment_weight: Diagonal of R, (3,).
+        terminal_weight: S on state and input, (12, 12), symmetric.
+        max_increment: Largest increments of the first move, N m, (3,).
+        limits: Of |phi|, |theta|, |p|, |q|, |r|, rad and rad/s, (5,); the first also of the tilt.
+        from_thrust: Squared rotor speeds from U1, in parts of the largest, (4,).
+        from_moments: The same from U2, U3, U4, (4, 3).
+        min_squared: Least squared speed, in the same parts.
+    """
+
+    starts: Integers
+    checked: Integers
+    output_weight: Array
+    increment_weight: Array
+    terminal_weight: Array
+    max_increment: Array
+    limits: Array
+    from_thrust: Array
+    from_moments: Array
+    min_squared: float
+
+
+class Target(NamedTuple):
+    """What a plan is to reach.
+
+    Attributes:
+        angles: phi, theta, psi after each step, rad, (N, 3).
+        end: State and moments at the end of the horizon, (12,).
+        thrust_n: U1 commanded at each step, N, (N,).
+    """
+
+    angles: Array
+    end: Array
+    thrust_n: Array
+
+
 @compiled
-def quadratic_cost(
-    responses: Array,
-    angles: Array,
-    terminal: Array,
-    u: Array,
-    output_weight: Array,
-    terminal_weight: Array,
-    increment_weight: Array,
-    H: Array,
-    f: Array,
-) -> None:
+def quadratic_cost(responses: Array, target: Target, u: Array, problem: Problem, H: Array, f: Array) -> None:
     """Fill the part of H and f that belongs to the increments.
 
     Args:
         responses: Of `respond`, (N + 1, 9, 1 + 3 b).
-        angles: phi, theta, psi wanted after each step, rad, (N, 3).
-        terminal: State and input wanted at the end, (12,).
+        target: What the plan is to reach.
         u: Moments last commanded, N m, (3,).
-        output_weight: Diagonal of Q, (3,).
-        terminal_weight: S on state and input, (12, 12), symmetric.
-        increment_weight: Diagonal of R, (3,).
+        problem: The weights.
         H: (n, n), n = 3 b + 2.
         f: (n,).
     """
@@ -64,16 +91,16 @@ def quadratic_cost(
     for step in range(1, steps + 1):
         for j in range(INPUTS):
             row = responses[step, ANGLES[j]]
-            weight = output_weight[j]
-            error = weight * (row[0] - angles[step - 1, j])
+            weight = problem.output_weight[j]
+            error = weight * (row[0] - target.angles[step - 1, j])
             for k in range(moved):
                 f[k] += error * row[1 + k]
                 weighted = weight * row[1 + k]
                 for i in range(k + 1):
                     H[k, i] += weighted * row[1 + i]
-    _add_terminal(responses[steps], terminal, u, terminal_weight, H, f)
+    _add_terminal(responses[steps], target.end, u, problem.terminal_weight, H, f)
     for k in range(moved):
-        H[k, k] += increment_weight[k % INPUTS]
+        H[k, k] += problem.increment_weight[k % INPUTS]
         for i in range(k):
             H[i, k] = H[k, i]
 
@@ -114,33 +141,21 @@ def limit_first_move(u: Array, max_increment: Array, lower: Array, upper: Array)
 
 
 @compiled
-def limit_rotors(
-    rotors_from_moments: Array,
-    rotors_from_thrust: Array,
-    thrust_n: Array,
-    u: Array,
-    starts: Integers,
-    min_squared: float,
-    max_squared: float,
-    G: Array,
-    h: Array,
-) -> int:
+def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float, G: Array, h: Array) -> int:
     """Fill the rows that keep every rotor within its limits at every step of the horizon; return how many.
 
     Linear in squared speed, and with the thrust known only the moments move it. Between two moves the moments stay, so
     one row a side holds the tightest step of them. Rows are in parts of the largest squared speed.
 
     Args:
-        rotors_from_moments: Squared speeds from U2, U3, U4, in parts of the largest, (4, 3).
-        rotors_from_thrust: The same from U1, (4,).
+        problem: Of it the moves and what belongs to the rotors.
         thrust_n: U1 commanded at each step, N, (N,).
         u: Moments last commanded, N m, (3,).
-        starts: Step of each move, (b,).
-        min_squared: Least squared speed, in parts of the largest.
-        max_squared: Largest squared speed, in the same parts.
+        max_squared: Largest squared speed that can be had, in parts of the largest.
         G: Is filled from row 0, (m, n), zeros where nothing is written.
         h: (m,).
     """
+    starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
     count = 0
     for move in range(starts.shape[0]):
         end = starts[move + 1] if move + 1 < starts.shape[0] else thrust_n.shape[0]
@@ -150,12 +165,12 @@ def limit_rotors(
         for rotor in range(ROTORS):
             turned = 0.0
             for i in range(INPUTS):
-                turned += rotors_from_moments[rotor, i] * u[i]
+                turned += from_moments[rotor, i] * u[i]
                 for j in range(move + 1):
-                    G[count, INPUTS * j + i] = rotors_from_moments[rotor, i]
-                    G[count + 1, INPUTS * j + i] = -rotors_from_moments[rotor, i]
-            h[count] = max_squared - rotors_from_thrust[rotor] * maximum - turned
-            h[count + 1] = turned + rotors_from_thrust[rotor] * minimum - min_squared
+                    G[count, INPUTS * j + i] = from_moments[rotor, i]
+                    G[count + 1, INPUTS * j + i] = -from_moments[rotor, i]
+            h[count] = max_squared - from_thrust[rotor] * maximum - turned
+            h[count + 1] = turned + from_thrust[rotor] * minimum - problem.min_squared
             count += _TWO_SIDES
     return count
 
@@ -186,9 +201,7 @@ def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> fl
 
 
 @compiled
-def limit_motion(
-    responses: Array, schedule: Array, checked: Integers, limits: Array, first: int, G: Array, h: Array
-) -> int:
+def limit_motion(responses: Array, schedule: Array, problem: Problem, first: int, G: Array, h: Array) -> int:
     """Fill the soft rows of tilt, angles and rates from row `first`; return the row after them.
 
     The tilt is limited by a tangent in the direction that it is expected to have.
@@ -196,17 +209,17 @@ def limit_motion(
     Args:
         responses: Of `respond`, (N + 1, 9, 1 + 3 b).
         schedule: phi, theta, p, q, r expected at each step, (N, 5).
-        checked: Steps at which the limits are held, (c,).
-        limits: Of |phi|, |theta|, |p|, |q|, |r|, rad and rad/s, (5,); the first also of the tilt.
+        problem: Of it the limits of the motion and the steps at which they are held.
         first: Row to begin at.
         G: (m, n).
         h: (m,).
     """
     states = (ANGLES[0], ANGLES[1], P, Q, R)
+    limits = problem.limits
     moved = responses.shape[2] - 1
     normal = np.empty(2)
     count = first
-    for step in checked:
+    for step in problem.checked:
         phi, theta = responses[step, ANGLES[0]], responses[step, ANGLES[1]]
         distance = tilt_tangent(schedule[step - 1, 0], schedule[step - 1, 1], limits[0], normal)
         for k in range(moved):
@@ -229,34 +242,25 @@ def limit_motion(
 
 
 @compiled
-def read_plan(
-    responses: Array,
-    starts: Integers,
-    u: Array,
-    z: Array,
-    thrust_n: Array,
-    rotors_from_thrust: Array,
-    rotors_from_moments: Array,
-    states: Array,
-    moments: Array,
-    squared: Array,
-) -> None:
-    """Write what increments lead to.
+def read_plan(responses: Array, packed: Packed, u: Array, z: Array, thrust_n: Array) -> tuple[Array, Array, Array]:
+    """Return what increments lead to.
+
+    That is states predicted, (N + 1, 9), and of each step the moments commanded, N m, (N, 3), and the squared rotor
+    speeds commanded, in parts of the largest, (N, 4).
 
     Args:
         responses: Of `respond`, (N + 1, 9, 1 + 3 b).
-        starts: Step of each move, (b,).
+        packed: The `Problem`.
         u: Moments last commanded, N m, (3,).
         z: The QP's solution, (n,).
         thrust_n: U1 commanded at each step, N, (N,).
-        rotors_from_thrust: Squared speeds from U1, in parts of the largest, (4,).
-        rotors_from_moments: The same from U2, U3, U4, (4, 3).
-        states: Is filled: predicted, (N + 1, 9).
-        moments: Is filled: commanded at each step, N m, (N, 3).
-        squared: Is filled: squared rotor speeds commanded at each step, in parts of the largest, (N, 4).
     """
+    problem = packed[0]
+    starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
+    steps = responses.shape[0] - 1
     moved = responses.shape[2] - 1
-    for step in range(responses.shape[0]):
+    states, moments, squared = np.empty((steps + 1, STATES)), np.empty((steps, INPUTS)), np.empty((steps, ROTORS))
+    for step in range(steps + 1):
         for state in range(STATES):
             total = responses[step, state, 0]
             for k in range(moved):
@@ -264,16 +268,17 @@ def read_plan(
             states[step, state] = total
     held = u.copy()
     move = 0
-    for step in range(moments.shape[0]):
+    for step in range(steps):
         if move < starts.shape[0] and starts[move] == step:
             held += z[INPUTS * move : INPUTS * move + INPUTS]
             move += 1
         moments[step] = held
         for rotor in range(ROTORS):
-            total = rotors_from_thrust[rotor] * thrust_n[step]
+            total = from_thrust[rotor] * thrust_n[step]
             for i in range(INPUTS):
-                total += rotors_from_moments[rotor, i] * held[i]
+                total += from_moments[rotor, i] * held[i]
             squared[step, rotor] = total
+    return states, moments, squared
 
 
 @compiled
@@ -312,53 +317,24 @@ def count_active(
 
 @compiled
 def condense(
-    responses: Array,
-    schedule: Array,
-    wanted: tuple[Array, Array, Array],
-    u: Array,
-    weights: tuple[Array, Array, Array],
-    from_moments: Array,
-    from_thrust: Array,
-    starts: Integers,
-    checked: Integers,
-    limits: Array,
-    max_increment: Array,
-    min_squared: float,
-    max_squared: float,
-    H: Array,
-    f: Array,
-    G: Array,
-    h: Array,
-    lower: Array,
-    upper: Array,
+    responses: Array, schedule: Array, target: Target, u: Array, packed: Packed, max_squared: float, qp: Qp
 ) -> None:
-    """Fill a whole QP; slacks keep their part of H and f.
+    """Fill a whole QP in place; slacks keep their part of H and f.
 
     Args:
         responses: Of `respond`, (N + 1, 9, 1 + 3 b).
-        schedule: See `limit_motion`.
-        wanted: Angles (N, 3) and end (12,) of `quadratic_cost`, and the thrust commanded at each step, N, (N,).
+        schedule: phi, theta, p, q, r expected at each step, (N, 5).
+        target: What the plan is to reach.
         u: Moments last commanded, N m, (3,).
-        weights: Q (3,), S (12, 12) and R (3,).
-        from_moments: Squared speeds from U2, U3, U4, in parts of the largest, (4, 3).
-        from_thrust: The same from U1, (4,).
-        starts: Step of each move, (b,).
-        checked: See `limit_motion`.
-        limits: See `limit_motion`.
-        max_increment: N m, (3,).
-        min_squared: Least squared speed, in parts of the largest.
-        max_squared: Largest squared speed, in the same parts.
-        H: (n, n).
-        f: (n,).
-        G: (m, n).
-        h: (m,).
-        lower: (n,).
-        upper: (n,).
+        packed: The `Problem`.
+        max_squared: Largest squared rotor speed that can be had, in parts of the largest.
+        qp: Has both bounds, and zeros in G where nothing is written.
     """
-    limit_first_move(u, max_increment, lower, upper)
-    quadratic_cost(responses, wanted[0], wanted[1], u, weights[0], weights[1], weights[2], H, f)
-    row = limit_rotors(from_moments, from_thrust, wanted[2], u, starts, min_squared, max_squared, G, h)
-    limit_motion(responses, schedule, checked, limits, row, G, h)
+    problem = packed[0]
+    limit_first_move(u, problem.max_increment, qp.lower, qp.upper)
+    quadratic_cost(responses, target, u, problem, qp.H, qp.f)
+    row = limit_rotors(problem, target.thrust_n, u, max_squared, qp.G, qp.h)
+    limit_motion(responses, schedule, problem, row, qp.G, qp.h)
 
 
 @compiled

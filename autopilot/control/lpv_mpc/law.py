@@ -18,15 +18,12 @@ from colibri.autopilot.control.interface import (
     VehicleState,
 )
 from colibri.autopilot.control.lpv_mpc import position_loop, prediction, recovery
-from colibri.autopilot.control.lpv_mpc.attitude_mpc import (
-    AttitudeMpc,
-    AttitudeSituation,
-    Plan,
-    Target,
-    squared_speeds_from,
-)
-from colibri.autopilot.control.lpv_mpc.position_loop import Limits
-from colibri.autopilot.control.lpv_mpc.settings import GuidanceSettings, LpvMpcSettings, ObserverSettings
+from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc, Plan
+from colibri.autopilot.control.lpv_mpc.condensing import Target
+from colibri.autopilot.control.lpv_mpc.outer_loop import OuterLoop, Setpoint
+from colibri.autopilot.control.lpv_mpc.position_loop import Motion
+from colibri.autopilot.control.lpv_mpc.prediction import InitialState
+from colibri.autopilot.control.lpv_mpc.settings import LpvMpcSettings, ObserverSettings
 from colibri.autopilot.control.qp import QpSolver
 from colibri.autopilot.control.settings import interval_us
 from colibri.autopilot.control.vehicle_model import disturbance_observer, rotor_lag
@@ -34,7 +31,8 @@ from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.common.config import read_settings
 from colibri.common.elementary import square
-from colibri.common.kernels import cos, tan
+from colibri.common.jit import packed
+from colibri.common.kernels import cos
 from colibri.common.matrices import dot, matvec
 from colibri.common.rotations import rotation_matrix
 from colibri.common.types import Array
@@ -72,20 +70,6 @@ class Memory(NamedTuple):
     age: int
 
 
-class FlightTask(NamedTuple):
-    """What the outer loop asks for.
-
-    Attributes:
-        force: Wanted now, N, ENU, (3,).
-        aligned: Cosine of the angle from the thrust to it.
-        target: Of the attitude.
-    """
-
-    force: Array
-    aligned: float
-    target: Target
-
-
 class LawInputs(NamedTuple):
     """What a decision begins with.
 
@@ -94,14 +78,14 @@ class LawInputs(NamedTuple):
         measured: By the observer, (9,).
         estimate: Of the observer, (12,).
         now: For the attitude's plan.
-        thrust_n: Now, N.
+        motion: For the outer loop.
     """
 
     rotation: Array
     measured: Array
     estimate: Array
-    now: AttitudeSituation
-    thrust_n: float
+    now: InitialState
+    motion: Motion
 
 
 class Choice(NamedTuple):
@@ -140,46 +124,27 @@ class LpvMpc:
         self._battery = BatteryModel(vehicle)
         solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
         self._attitude = AttitudeMpc(settings.attitude, vehicle, self._lag, solver, self._interval_s, clock)
-        self._samples = self._attitude.horizon + 2
-        self.preview = Preview(self.control_interval_us, self._samples)
+        self.preview = Preview(self.control_interval_us, self._attitude.horizon + 2)
+        self._outer_loop = OuterLoop(settings.guidance, vehicle, self._lag, self._interval_s, self._attitude.horizon)
         self._fallback = settings.fallback
-        self._from_thrust, self._from_moments = squared_speeds_from(vehicle)
         self._allocation = vehicle.allocation() * square(vehicle.rotors.max_speed)
         self._momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
-        self._inertia = np.array(vehicle.body.inertia_kg_m2)
-        self._airframe = airframe_of(vehicle)
-        self._prepare_guidance(settings.guidance)
-        self._prepare_observer(settings.observer)
+        self._observer = observer_of(settings.observer, vehicle, self._interval_s)
+        self._packed_observer = packed(self._observer)
         self._turn = recovery.TurnGains(
             settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s
         )
 
     def warm_up(self) -> None:
         """Load what is compiled: three steps from hover, the last of them upside down."""
-        still = np.zeros((self._samples, 3))
-        level = np.zeros(self._samples)
+        still = np.zeros((self.preview.samples, 3))
+        level = np.zeros(self.preview.samples)
         references = Horizon(still, still, still, still, still, level, level, level)
         memory = self.initial(self._vehicle.hover_speed)
         for attitude in ((1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)):
             state = VehicleState(_NOWHERE, _NOWHERE, attitude, _NOWHERE, _NOWHERE)
             memory, _ = self.step(memory, 0, state, references)
         self.step_attitude(memory, 0, state, AttitudeDemand(still, still, level))
-
-    def _prepare_guidance(self, settings: GuidanceSettings) -> None:
-        first, second = settings.poles
-        self._gains = (first * second, -(first + second))
-        self._errors_ahead = position_loop.error_transition(settings.poles, self._interval_s, self._samples)
-        self._span_n = float(self._allocation[0].sum())
-        self._thrust_margin = settings.thrust_margin
-        self._tilt_tangent = tan(radians(settings.max_tilt_deg))
-        self._position_error_m = settings.approach_speed_m_s * self._gains[1] / self._gains[0]
-
-    def _prepare_observer(self, settings: ObserverSettings) -> None:
-        on_velocity, on_acceleration = disturbance_observer.gains(settings.acceleration_rad_s, self._interval_s)
-        on_rate, on_turn = disturbance_observer.gains(settings.moment_rad_s, self._interval_s)
-        self._observer = disturbance_observer.Observer(
-            on_velocity, on_acceleration, on_rate, on_turn, settings.max_acceleration_m_s2, settings.max_moment_n_m
-        )
 
     def initial(self, rotor_speed: float) -> Memory:
         """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
@@ -200,28 +165,41 @@ class LpvMpc:
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample."""
         del time_us
-        inputs = self._see(memory, state)
-        task = self.position(memory, inputs.now, inputs.thrust_n, state, inputs.measured, references, inputs.estimate)
-        return self._decide(memory, inputs, task)
+        inputs = self._inputs(memory, state)
+        planned_yaw = memory.plan.states[memory.age :, prediction.PSI].copy() if memory.plan else _NO_YAW
+        max_speed = self._battery.max_common_speed(memory.charge_ah)
+        setpoint = self._outer_loop.track(inputs.motion, references, planned_yaw, inputs.estimate[6:], max_speed)
+        return self._decide(memory, inputs, setpoint)
 
     def step_attitude(
         self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
     ) -> tuple[Memory, Decision]:
         """Decide the same for an attitude and a thrust, which is kept within what the rotors leave to the moments."""
         del time_us
-        inputs = self._see(memory, state)
-        return self._decide(memory, inputs, self.attitude(memory, inputs, demand))
+        inputs = self._inputs(memory, state)
+        max_speed = self._battery.max_common_speed(memory.charge_ah)
+        setpoint = self._outer_loop.hold(inputs.motion, demand, inputs.now.disturbance_n_m, max_speed)
+        return self._decide(memory, inputs, setpoint)
 
-    def _see(self, memory: Memory, state: VehicleState) -> LawInputs:
+    def _inputs(self, memory: Memory, state: VehicleState) -> LawInputs:
         rotation = np.array(rotation_matrix(state.attitude))
         measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2].tolist()])
-        estimate = self.estimate(memory, measured)
-        now, thrust_n = self._situation(memory, state, estimate)
-        return LawInputs(rotation, measured, estimate, now, thrust_n)
+        estimate = self._estimate(memory, measured)
+        phi, theta, psi = state.euler
+        p, q, r = state.rate_flu_rad_s
+        thrust_n, *moments_n_m = memory.wrench.tolist()
+        x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
+        momentum = dot(self._momentum, memory.speeds)
+        max_speed = self._battery.max_speed_now(memory.charge_ah, memory.speeds)
+        now = InitialState(x, memory.moments, estimate[9:], momentum, max_speed)
+        motion = Motion(np.array(state.position_enu_m), measured[:3], measured[6:], float(psi), thrust_n)
+        return LawInputs(rotation, measured, estimate, now, motion)
 
-    def _decide(self, memory: Memory, inputs: LawInputs, task: FlightTask) -> tuple[Memory, Decision]:
-        choice = self._choose(memory, inputs.now, task, inputs.rotation)
-        commands, speeds, wrench, mean_wrench = self.mix(memory, choice.squared, inputs.now.max_speed)
+    def _decide(self, memory: Memory, inputs: LawInputs, setpoint: Setpoint) -> tuple[Memory, Decision]:
+        choice = self._choose(memory, inputs.now, setpoint, inputs.rotation)
+        commands, speeds, wrench, mean_wrench = rotor_lag.actuate(
+            memory.speeds, choice.squared, self._lag, inputs.now.max_speed, self._allocation
+        )
         charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
         after = Memory(
             speeds,
@@ -234,109 +212,27 @@ class LpvMpc:
             choice.plan,
             choice.age,
         )
-        phi, theta, psi = task.target.angles[0].tolist()
+        phi, theta, psi = setpoint.target.angles[0].tolist()
         return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), choice.diagnostics)
 
-    def estimate(self, memory: Memory, measured: Array) -> Array:
-        """Return the observer's estimate, (12,), now that `measured`, (9,), is."""
+    def _estimate(self, memory: Memory, measured: Array) -> Array:
+        """Return the observer's estimate, (12,), with the measurement `measured`, (9,)."""
         if memory.measured is None:
             return disturbance_observer.first_estimate(measured)
         middle = 0.5 * (memory.measured + measured)
         drag = np.empty(3)
-        position_loop.drag_force(self._airframe, middle[:3], middle[6:], float(memory.mean_wrench[0]), drag)
+        position_loop.drag_force(self._observer.airframe, middle[:3], middle[6:], float(memory.mean_wrench[0]), drag)
+        momentum = dot(self._momentum, memory.speeds)
         return disturbance_observer.observe(
-            memory.estimate,
-            memory.measured,
-            measured,
-            float(memory.mean_wrench[0]),
-            memory.mean_wrench[1:],
-            dot(self._momentum, memory.speeds),
-            drag,
-            self._airframe,
-            self._inertia,
-            self._observer,
-            self._interval_s,
+            memory.estimate, memory.measured, measured, memory.mean_wrench, momentum, drag, self._packed_observer
         )
 
-    def position(
-        self,
-        memory: Memory,
-        now: AttitudeSituation,
-        thrust_n: float,
-        state: VehicleState,
-        measured: Array,
-        references: Horizon,
-        estimate: Array,
-    ) -> FlightTask:
-        """Return where the thrust must point now, and what the attitude is to reach for it and for what follows."""
-        forces, angles = np.empty((self._samples, 3)), np.empty((self._samples, 3))
-        thrusts, end = np.empty(self._attitude.horizon), np.empty(prediction.STATES + prediction.INPUTS)
-        planned_yaw = memory.plan.states[memory.age :, prediction.PSI].copy() if memory.plan else _NO_YAW
-        aligned = position_loop.guide(
-            np.array(state.position_enu_m),
-            measured[:3],
-            measured[6:],
-            float(now.x[prediction.PSI]),
-            thrust_n,
-            (
-                references.position_enu_m,
-                references.velocity_enu_m_s,
-                references.acceleration_enu_m_s2,
-                references.yaw_rad,
-            ),
-            planned_yaw,
-            self._errors_ahead,
-            self._gains,
-            estimate[6:],
-            self._airframe,
-            self._inertia,
-            self._limits(self._battery.max_common_speed(memory.charge_ah)),
-            self._lag.planned,
-            self._interval_s,
-            forces,
-            angles,
-            thrusts,
-            end,
-        )
-        return FlightTask(forces[0], aligned, Target(angles[1:-1], end, thrusts))
-
-    def attitude(self, memory: Memory, inputs: LawInputs, demand: AttitudeDemand) -> FlightTask:
-        """Return the course that a demanded attitude is, its thrust within the limits of the position loop's."""
-        angles, force = np.empty((self._samples, 3)), np.empty(3)
-        thrusts, end = np.empty(self._attitude.horizon), np.empty(prediction.STATES + prediction.INPUTS)
-        aligned = position_loop.hold_attitude(
-            inputs.measured[6:],
-            float(inputs.now.x[prediction.PSI]),
-            inputs.thrust_n,
-            (demand.angles, demand.thrust_n),
-            inputs.estimate[9:],
-            self._inertia,
-            self._limits(self._battery.max_common_speed(memory.charge_ah)),
-            self._lag.planned,
-            self._interval_s,
-            force,
-            angles,
-            thrusts,
-            end,
-        )
-        return FlightTask(force, aligned, Target(angles[1:-1], end, thrusts))
-
-    def mix(self, memory: Memory, squared: Array, max_speed: float) -> tuple[Array, Array, Array, Array]:
-        """Return the rotors' commands, their speeds and wrench a sample later, the mean wrench until then, (4,) each.
-
-        Args:
-            memory: Of the sample before.
-            squared: Squared speeds that the plan commands, in parts of the largest, (4,).
-            max_speed: Largest speed that can be had, in parts of the largest.
-        """
-        return rotor_lag.actuate(memory.speeds, squared, self._lag, max_speed, self._allocation)
-
-    def _choose(self, memory: Memory, now: AttitudeSituation, task: FlightTask, rotation: Array) -> Choice:
+    def _choose(self, memory: Memory, now: InitialState, setpoint: Setpoint, rotation: Array) -> Choice:
         """Plan; where that cannot be had, fall back."""
-        target = task.target
+        target = setpoint.target
         steep = square(float(rotation[2, 0])) > 1.0 - square(_RECOVER_BEYOND)
-        if steep or task.aligned < _RECOVER_BEYOND:
-            return self._recover(now, task.force, rotation)
+        if steep or setpoint.aligned < _RECOVER_BEYOND:
+            return self._recover(now, setpoint.force, rotation)
         ahead = memory.plan.states[memory.age + 1 :] if memory.plan else None
         plan, diagnostics = self._attitude.plan(now, target, ahead)
         if plan is not None:
@@ -353,42 +249,44 @@ class LpvMpc:
             return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, None, age, how)
         return self._descend(now, age, diagnostics)
 
-    def _situation(self, memory: Memory, state: VehicleState, estimate: Array) -> tuple[AttitudeSituation, float]:
-        """Return what a plan begins with, and the thrust now, N."""
-        phi, theta, psi = state.euler
-        p, q, r = state.rate_flu_rad_s
-        thrust_n, *moments_n_m = memory.wrench.tolist()
-        x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
-        momentum = dot(self._momentum, memory.speeds)
-        max_speed = self._battery.max_speed_now(memory.charge_ah, memory.speeds)
-        return AttitudeSituation(x, memory.moments, estimate[9:], momentum, max_speed), thrust_n
-
-    def _limits(self, max_speed: float) -> Limits:
-        """Return what the outer loop may ask for while all rotors can turn at `max_speed`, parts of the largest."""
-        span_n = self._span_n
-        min_n, max_n = span_n * square(self._lag.min_speed), span_n * square(max_speed)
-        margin_n = self._thrust_margin * (max_n - min_n)
-        return Limits(self._tilt_tangent, min_n + margin_n, max_n - margin_n, self._position_error_m)
-
-    def _recover(self, now: AttitudeSituation, force: Array, rotation: Array) -> Choice:
+    def _recover(self, now: InitialState, force: Array, rotation: Array) -> Choice:
         """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
         direction = matvec(rotation.T, force / position_loop.length(force))
-        moments = recovery.turning_moment(direction, now.x[list(prediction.RATES)], self._inertia, self._turn)
+        moments = recovery.turning_moment(direction, now.x[list(prediction.RATES)], self._observer.inertia, self._turn)
         squared = self._mixed(max(dot(force, rotation[:, 2]), 0.0), moments, now)
         return Choice(squared, matvec(self._allocation[1:], squared), None, 1, Diagnostics(fallback=Fallback.RECOVERY))
 
-    def _descend(self, now: AttitudeSituation, age: int, diagnostics: Diagnostics) -> Choice:
+    def _descend(self, now: InitialState, age: int, diagnostics: Diagnostics) -> Choice:
         """Level and sink, the last resort."""
         end = np.zeros(prediction.STATES + prediction.INPUTS)
         end[prediction.PSI] = now.x[prediction.PSI]
         end[9:] = end[6:9] = -now.disturbance_n_m
         level = Target(end[None, [0, 2, 4]], end, np.zeros(1))
         moments = self._attitude.lqr(now, level)
-        weight_n = self._airframe.mass_kg * self._airframe.gravity_m_s2
+        weight_n = self._observer.airframe.mass_kg * self._observer.airframe.gravity_m_s2
         how = diagnostics._replace(fallback=Fallback.DESCENT)
         squared = self._mixed(weight_n * self._fallback.descent_thrust, moments, now)
         return Choice(squared, moments, None, age, how)
 
-    def _mixed(self, thrust_n: float, moments: Array, now: AttitudeSituation) -> Array:
-        minimum, maximum = square(self._lag.min_speed), square(now.max_speed)
-        return recovery.mix_with_priority(thrust_n, moments, self._from_thrust, self._from_moments, minimum, maximum)
+    def _mixed(self, thrust_n: float, moments: Array, now: InitialState) -> Array:
+        problem, maximum = self._attitude.problem, square(now.max_speed)
+        return recovery.mix_with_priority(
+            thrust_n, moments, problem.from_thrust, problem.from_moments, problem.min_squared, maximum
+        )
+
+
+def observer_of(settings: ObserverSettings, vehicle: Vehicle, interval_s: float) -> disturbance_observer.Observer:
+    """Return the disturbance observer of `vehicle` that takes a step every `interval_s`."""
+    on_velocity, on_acceleration = disturbance_observer.gains(settings.acceleration_rad_s, interval_s)
+    on_rate, on_turn = disturbance_observer.gains(settings.moment_rad_s, interval_s)
+    return disturbance_observer.Observer(
+        on_velocity,
+        on_acceleration,
+        on_rate,
+        on_turn,
+        settings.max_acceleration_m_s2,
+        settings.max_moment_n_m,
+        airframe_of(vehicle),
+        np.array(vehicle.body.inertia_kg_m2),
+        interval_s,
+    )

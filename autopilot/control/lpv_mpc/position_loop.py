@@ -12,7 +12,7 @@ import numpy as np
 
 from colibri.autopilot.control.vehicle_model.airframe import Airframe
 from colibri.common import elementwise
-from colibri.common.jit import compiled
+from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import atan2, cos, sin
 from colibri.common.types import Array
 
@@ -21,7 +21,7 @@ _DRAG_PASSES = 2
 
 
 class Limits(NamedTuple):
-    """What the outer loop may ask for.
+    """Limits of the outer loop's demands.
 
     Attributes:
         tilt_tangent: Tangent of the largest tilt.
@@ -36,6 +36,62 @@ class Limits(NamedTuple):
     min_thrust_n: float
     max_thrust_n: float
     position_error_m: float
+
+
+class Loop(NamedTuple):
+    """What stays the same in the outer loop, over a horizon of N steps.
+
+    Attributes:
+        k1_s2: Gain on the position error, 1/s².
+        k2_s: Gain on its rate, 1/s.
+        errors_ahead: Of `error_transition`, (N + 2, 2, 2).
+        airframe: The vehicle.
+        inertia: Ix, Iy, Iz, kg m², (3,).
+        follows: Part of the way to its command that thrust goes in a step.
+        interval_s: Between two samples.
+    """
+
+    k1_s2: float
+    k2_s: float
+    errors_ahead: Array
+    airframe: Airframe
+    inertia: Array
+    follows: float
+    interval_s: float
+
+
+class Motion(NamedTuple):
+    """The vehicle's motion now.
+
+    Attributes:
+        position: m, ENU, (3,).
+        velocity: m/s, ENU, (3,).
+        up: Body z axis, ENU, (3,).
+        yaw_rad: psi, unwrapped.
+        thrust_n: U1, N.
+    """
+
+    position: Array
+    velocity: Array
+    up: Array
+    yaw_rad: float
+    thrust_n: float
+
+
+class Demands(NamedTuple):
+    """What the outer loop demands over the horizon, from now on; each array is filled.
+
+    Attributes:
+        forces: N, ENU, (N + 2, 3).
+        angles: phi, theta, psi, rad, (N + 2, 3).
+        thrusts: To command at each step, N, (N,).
+        end: State and moments at the end, see `end_of_motion`, (12,).
+    """
+
+    forces: Array
+    angles: Array
+    thrusts: Array
+    end: Array
 
 
 def error_transition(poles: tuple[float, float], interval_s: float, samples: int) -> Array:
@@ -86,37 +142,32 @@ def limited_force(force: Array, limits: Limits) -> None:
 
 @compiled
 def wanted_forces(
-    position: Array,
-    velocity: Array,
-    references: tuple[Array, Array, Array],
-    errors_ahead: Array,
-    gains: tuple[float, float],
+    motion: Motion,
+    references: tuple[Array, Array, Array, Array],
     disturbance_m_s2: Array,
-    airframe: Airframe,
+    loop: Loop,
     limits: Limits,
     forces: Array,
 ) -> None:
     """Fill `forces` with what the thrust must do at each sample of the horizon, N, ENU, (n, 3).
 
     Args:
-        position: Now, m, ENU, (3,).
-        velocity: Now, m/s, ENU, (3,).
-        references: Position, velocity and acceleration at each sample, (n, 3) each.
-        errors_ahead: Of `error_transition`, (n, 2, 2).
-        gains: k1, 1/s², and k2, 1/s.
+        motion: Now.
+        references: Position, velocity, acceleration, (n, 3) each, and yaw, (n,), at each sample.
         disturbance_m_s2: Acceleration that the model does not explain, ENU, (3,).
-        airframe: The vehicle.
+        loop: What stays the same.
         limits: Of the forces.
         forces: Is filled.
     """
-    e = references[0][0] - position
+    airframe = loop.airframe
+    e = references[0][0] - motion.position
     near = min(1.0, limits.position_error_m / max(length(e), limits.position_error_m))
     e *= near
-    e_rate = near * references[1][0] - velocity
-    k1, k2 = gains
+    e_rate = near * references[1][0] - motion.velocity
+    k1, k2 = loop.k1_s2, loop.k2_s
     free, drag, moving, up = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for n in range(forces.shape[0]):
-        E = errors_ahead[n]
+        E = loop.errors_ahead[n]
         for i in range(3):
             ahead = E[0, 0] * e[i] + E[0, 1] * e_rate[i]
             ahead_rate = E[1, 0] * e[i] + E[1, 1] * e_rate[i]
@@ -224,101 +275,66 @@ def yaw_ahead(yaw_rad: float, wanted: Array, planned: Array, ahead: Array) -> fl
 
 @compiled
 def guide(
-    position: Array,
-    velocity: Array,
-    up: Array,
-    yaw_rad: float,
-    thrust_n: float,
+    motion: Motion,
     references: tuple[Array, Array, Array, Array],
     planned_yaw: Array,
-    errors_ahead: Array,
-    gains: tuple[float, float],
     disturbances: Array,
-    airframe: Airframe,
-    inertia: Array,
+    packed: Packed,
     limits: Limits,
-    follows: float,
-    interval_s: float,
-    forces: Array,
-    angles: Array,
-    thrusts: Array,
-    end: Array,
+    out: Demands,
 ) -> float:
     """Do all that the outer loop does; return the cosine of the angle from the thrust to where it must point.
 
     Args:
-        position: Now, m, ENU, (3,).
-        velocity: Now, m/s, ENU, (3,).
-        up: Body z axis now, ENU, (3,).
-        yaw_rad: Now.
-        thrust_n: Now, N.
+        motion: Now.
         references: Position, velocity, acceleration (N + 2, 3) and yaw (N + 2,) at each sample from now.
         planned_yaw: See `yaw_ahead`.
-        errors_ahead: Of `error_transition`, (N + 2, 2, 2).
-        gains: k1, 1/s², and k2, 1/s.
         disturbances: Acceleration, m/s², ENU, and moment, N m, FLU, that the model does not explain, (6,).
-        airframe: The vehicle.
-        inertia: Ix, Iy, Iz, kg m², (3,).
+        packed: The `Loop`.
         limits: Of the forces.
-        follows: Part of the way to its command that thrust goes in a step.
-        interval_s: Between two samples.
-        forces: Is filled, N, ENU, (N + 2, 3).
-        angles: Is filled, rad, (N + 2, 3).
-        thrusts: Is filled: to command at each step, N, (N,).
-        end: Is filled, see `end_of_motion`.
+        out: Is filled.
     """
-    wanted_forces(position, velocity, references[:3], errors_ahead, gains, disturbances[:3], airframe, limits, forces)
-    ahead = np.empty(forces.shape[0])
-    turns = yaw_ahead(yaw_rad, references[3], planned_yaw, ahead)
-    attitudes(forces, references[3] + turns, ahead, angles)
-    thrust_commands(thrust_n, forces, up, follows, limits, thrusts)
-    end_of_motion(angles, inertia, disturbances[3:], interval_s, end)
-    force = forces[0]
+    loop = packed[0]
+    wanted_forces(motion, references, disturbances[:3], loop, limits, out.forces)
+    ahead = np.empty(out.forces.shape[0])
+    turns = yaw_ahead(motion.yaw_rad, references[3], planned_yaw, ahead)
+    attitudes(out.forces, references[3] + turns, ahead, out.angles)
+    thrust_commands(motion.thrust_n, out.forces, motion.up, loop.follows, limits, out.thrusts)
+    end_of_motion(out.angles, loop.inertia, disturbances[3:], loop.interval_s, out.end)
+    force, up = out.forces[0], motion.up
     aligned: float = (force[0] * up[0] + force[1] * up[1] + force[2] * up[2]) / length(force)
     return aligned
 
 
 @compiled
 def hold_attitude(
-    up: Array,
-    yaw_rad: float,
-    thrust_n: float,
+    motion: Motion,
     demanded: tuple[Array, Array],
     disturbance_n_m: Array,
-    inertia: Array,
+    packed: Packed,
     limits: Limits,
-    follows: float,
-    interval_s: float,
-    force: Array,
-    angles: Array,
-    thrusts: Array,
-    end: Array,
+    out: Demands,
 ) -> float:
     """Do what `guide` does where attitude and thrust are demanded themselves; return the same cosine.
 
     Args:
-        up: Body z axis now, ENU, (3,).
-        yaw_rad: Now.
-        thrust_n: Now, N.
+        motion: Now.
         demanded: phi, theta, psi, rad, (N + 2, 3), and thrust, N, (N + 2,), at each sample from now.
         disturbance_n_m: Moment that the model does not explain, (3,).
-        inertia: Ix, Iy, Iz, kg m², (3,).
+        packed: The `Loop`.
         limits: Of the thrust.
-        follows: Part of the way to its command that thrust goes in a step.
-        interval_s: Between two samples.
-        force: Is filled: demanded now, N, ENU, (3,).
-        angles: Is filled, rad, (N + 2, 3): psi in the full turn that the vehicle is in.
-        thrusts: Is filled: to command at each step, N, (N,).
-        end: Is filled, see `end_of_motion`.
+        out: Is filled, of the forces only the first; psi in the full turn that the vehicle is in.
     """
-    turns = 2.0 * pi * floor((yaw_rad - demanded[0][0, 2]) / (2.0 * pi) + 0.5)
+    loop = packed[0]
+    angles, force, up = out.angles, out.forces[0], motion.up
+    turns = 2.0 * pi * floor((motion.yaw_rad - demanded[0][0, 2]) / (2.0 * pi) + 0.5)
     along = np.zeros((angles.shape[0], 3))
     for n in range(angles.shape[0]):
         angles[n] = demanded[0][n]
         angles[n, 2] += turns
         along[n, 2] = min(max(demanded[1][n], limits.min_thrust_n), limits.max_thrust_n)
-    thrust_commands(thrust_n, along, np.array([0.0, 0.0, 1.0]), follows, limits, thrusts)
-    end_of_motion(angles, inertia, disturbance_n_m, interval_s, end)
+    thrust_commands(motion.thrust_n, along, np.array([0.0, 0.0, 1.0]), loop.follows, limits, out.thrusts)
+    end_of_motion(angles, loop.inertia, disturbance_n_m, loop.interval_s, out.end)
     phi, theta, psi = angles[0]
     force[0] = along[0, 2] * (cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi))
     force[1] = along[0, 2] * (cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi))

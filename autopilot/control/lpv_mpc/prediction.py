@@ -32,11 +32,11 @@ SCHEDULE = (PHI, THETA, P, Q, R)
 _TAYLOR_TERMS = 4
 """What is left out is (h / lag)⁵ / 120: 3e-5 of the moment's effect at 8 ms and a lag of 25 ms."""
 _MIN_COSINE = 0.1
-"""The model knows no pitch above 84 degrees."""
+"""Of pitch: the model holds up to 84 degrees."""
 
 
 class Body(NamedTuple):
-    """What the model knows of the vehicle.
+    """The vehicle's numbers in the model.
 
     Attributes:
         ix: Ix, kg m².
@@ -49,6 +49,24 @@ class Body(NamedTuple):
     iy: float
     iz: float
     lag_1_s: float
+
+
+class InitialState(NamedTuple):
+    """Where a prediction begins.
+
+    Attributes:
+        x: State, (9,).
+        u: Moments last commanded, N m, (3,).
+        disturbance_n_m: Moment that the model does not explain, constant over the horizon, (3,).
+        momentum: h of the rotors along body z, N m s.
+        max_speed: Largest rotor speed that can be had, in parts of the vehicle's largest.
+    """
+
+    x: Array
+    u: Array
+    disturbance_n_m: Array
+    momentum: float
+    max_speed: float
 
 
 @compiled
@@ -84,26 +102,15 @@ def flow(schedule: Array, momentum: float, body: Body, X: Array, out: Array) -> 
 
 @compiled
 def respond(
-    x: Array,
-    u: Array,
-    disturbance_n_m: Array,
-    schedule: Array,
-    momentum: float,
-    body: Body,
-    starts: Integers,
-    interval_s: float,
-    responses: Array,
+    now: InitialState, schedule: Array, body: Body, starts: Integers, interval_s: float, responses: Array
 ) -> None:
     """Predict: column 0 without any increment, the others for a unit increment of one input at one move.
 
     Discretised with zero-order hold, the exponential by its Taylor series applied to all columns at once.
 
     Args:
-        x: Present state, (9,).
-        u: Moments last commanded, N m, (3,).
-        disturbance_n_m: Moment that the model does not explain, constant over the horizon, (3,).
+        now: Where the prediction begins.
         schedule: Of each step, (N, 5).
-        momentum: h of the rotors along body z, N m s.
         body: The vehicle.
         starts: Step at which each move happens, ascending from 0, (b,).
         interval_s: Of a step.
@@ -111,10 +118,10 @@ def respond(
     """
     columns = responses.shape[2]
     commanded = np.zeros((INPUTS, columns))
-    commanded[:, 0] = u
+    commanded[:, 0] = now.u
     inertia = (body.ix, body.iy, body.iz)
     responses[0] = 0.0
-    responses[0, :, 0] = x
+    responses[0, :, 0] = now.x
     term, following = np.empty((STATES, columns)), np.empty((STATES, columns))
     move = 0
     for step in range(schedule.shape[0]):
@@ -126,9 +133,9 @@ def respond(
         X = responses[step]
         if body.lag_1_s == 0.0:
             X[M1 : M3 + 1, :used] = commanded[:, :used]
-        flow(schedule[step], momentum, body, X[:, :used], term[:, :used])
+        flow(schedule[step], now.momentum, body, X[:, :used], term[:, :used])
         for i in range(INPUTS):
-            term[P + 2 * i, 0] += disturbance_n_m[i] / inertia[i]
+            term[P + 2 * i, 0] += now.disturbance_n_m[i] / inertia[i]
             for k in range(used):
                 term[M1 + i, k] += body.lag_1_s * commanded[i, k]
         after = responses[step + 1]
@@ -140,7 +147,7 @@ def respond(
                     term[row, k] *= factor
                     after[row, k] += term[row, k]
             if order < _TAYLOR_TERMS:
-                flow(schedule[step], momentum, body, term[:, :used], following[:, :used])
+                flow(schedule[step], now.momentum, body, term[:, :used], following[:, :used])
                 term, following = following, term
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from colibri.autopilot.control.vehicle_model.airframe import Airframe
 from colibri.common.elementary import square
-from colibri.common.jit import compiled
+from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import exp
 from colibri.common.types import Array
 
@@ -21,15 +21,18 @@ MEASURED = 9
 
 
 class Observer(NamedTuple):
-    """Gains on the velocity and its disturbance, on the rate and its disturbance; the most believed of each.
+    """The observer's gains on the velocity and on the rate, each with its disturbance; its limits; the vehicle.
 
     Attributes:
-        velocity: Part of a velocity missed that is corrected at once.
-        acceleration: Disturbance for each m/s missed, 1/s.
-        rate: Part of a rate missed that is corrected at once.
-        angular_acceleration: Disturbance for each rad/s missed, 1/s.
-        max_acceleration_m_s2: Largest acceleration believed.
-        max_moment_n_m: Largest moment believed.
+        velocity: Part of the velocity's innovation that is corrected at once.
+        acceleration: Disturbance for each m/s of innovation, 1/s.
+        rate: Part of the rate's innovation that is corrected at once.
+        angular_acceleration: Disturbance for each rad/s of innovation, 1/s.
+        max_acceleration_m_s2: Largest acceleration estimated.
+        max_moment_n_m: Largest moment estimated.
+        airframe: Mass and gravity are of it.
+        inertia: Ix, Iy, Iz, kg m², (3,).
+        interval_s: Between two samples.
     """
 
     velocity: float
@@ -38,6 +41,9 @@ class Observer(NamedTuple):
     angular_acceleration: float
     max_acceleration_m_s2: float
     max_moment_n_m: float
+    airframe: Airframe
+    inertia: Array
+    interval_s: float
 
 
 def gains(frequency_rad_s: float, interval_s: float) -> tuple[float, float]:
@@ -47,7 +53,7 @@ def gains(frequency_rad_s: float, interval_s: float) -> tuple[float, float]:
 
 
 def first_estimate(measured: Array) -> Array:
-    """Return the estimate (12,) of an observer that has seen no disturbance yet."""
+    """Return the estimate (12,) of an observer before its first step: no disturbance."""
     return np.concatenate([measured[:6], np.zeros(6)])
 
 
@@ -56,14 +62,10 @@ def observe(
     estimate: Array,
     before: Array,
     now: Array,
-    thrust_n: float,
-    moment_n_m: Array,
+    wrench: Array,
     momentum: float,
     drag_n: Array,
-    airframe: Airframe,
-    inertia: Array,
-    observer: Observer,
-    interval_s: float,
+    packed: Packed,
 ) -> Array:
     """Return the estimate (12,) now, from that of the sample before.
 
@@ -71,19 +73,18 @@ def observe(
         estimate: Then, (12,).
         before: Measured then, (9,).
         now: Measured now, (9,).
-        thrust_n: Its mean over the interval, N.
-        moment_n_m: Its mean over the interval, FLU, (3,).
+        wrench: Mean U1 (N), U2, U3, U4 (N m) over the interval, (4,).
         momentum: h of the rotors along body z, N m s.
         drag_n: Its mean over the interval, ENU, (3,).
-        airframe: The vehicle.
-        inertia: Ix, Iy, Iz, kg m², (3,).
-        observer: Gains and limits.
-        interval_s: Between the two.
+        packed: The `Observer`.
     """
+    observer = packed[0]
+    airframe, inertia, interval_s = observer.airframe, observer.inertia, observer.interval_s
+    thrust_n, moment_n_m = wrench[0], wrench[1:]
     middle = 0.5 * (before + now)
     rate, up = middle[3:6], middle[6:]
     turn = np.empty(3)
-    ix, iy, iz = inertia
+    ix, iy, iz = inertia[0], inertia[1], inertia[2]
     p, q, r = rate
     turn[0] = (moment_n_m[0] + (iy - iz) * q * r - momentum * q) / ix
     turn[1] = (moment_n_m[1] + (iz - ix) * p * r + momentum * p) / iy
@@ -92,13 +93,13 @@ def observe(
     for i in range(3):
         explained = (drag_n[i] + thrust_n * up[i]) / airframe.mass_kg - (airframe.gravity_m_s2 if i == 2 else 0.0)
         expected = estimate[i] + interval_s * (explained + estimate[6 + i])
-        missed = now[i] - expected
-        after[i] = expected + observer.velocity * missed
-        disturbance = estimate[6 + i] + observer.acceleration * missed
+        innovation = now[i] - expected
+        after[i] = expected + observer.velocity * innovation
+        disturbance = estimate[6 + i] + observer.acceleration * innovation
         after[6 + i] = min(max(disturbance, -observer.max_acceleration_m_s2), observer.max_acceleration_m_s2)
         expected = estimate[3 + i] + interval_s * (turn[i] + estimate[9 + i] / inertia[i])
-        missed = now[3 + i] - expected
-        after[3 + i] = expected + observer.rate * missed
-        disturbance = estimate[9 + i] + observer.angular_acceleration * missed * inertia[i]
+        innovation = now[3 + i] - expected
+        after[3 + i] = expected + observer.rate * innovation
+        disturbance = estimate[9 + i] + observer.angular_acceleration * innovation * inertia[i]
         after[9 + i] = min(max(disturbance, -observer.max_moment_n_m), observer.max_moment_n_m)
     return after

@@ -87,7 +87,7 @@ def test_the_attitude_that_a_place_needs_gives_the_same_decision() -> None:
     nowhere = np.zeros((samples, 3))
     acceleration = forces / VEHICLE.body.mass_kg - np.array([0.0, 0.0, VEHICLE.gravity_m_s2])
     k1, k2 = 30.0, 11.0
-    ahead = controller._errors_ahead  # noqa: SLF001
+    ahead = controller._outer_loop.loop.errors_ahead  # noqa: SLF001
     e_rate = -np.array(state.velocity_enu_m_s)
     follow = acceleration + k1 * (ahead[:, 0, 1, None] * e_rate) + k2 * (ahead[:, 1, 1, None] * e_rate)
     level = np.zeros(samples)

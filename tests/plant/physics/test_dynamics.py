@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from colibri.common.jit import Packed, packed
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Array, Quaternion, Vector
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.environment.air import CALM
-from colibri.plant.physics.equations import Packed, angular_acceleration, attitude_of, derivative, packed
+from colibri.plant.physics.equations import angular_acceleration, attitude_of, derivative
 from colibri.plant.physics.integrators import adaptive_step
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start

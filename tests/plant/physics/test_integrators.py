@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from colibri.common.jit import packed
 from colibri.common.types import Array
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.environment.air import CALM
-from colibri.plant.physics.equations import packed
 from colibri.plant.physics.integrators import Integrator, adaptive_step, fixed_step, runge_kutta_4, solver
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import IntegrationError, Start

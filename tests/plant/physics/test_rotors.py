@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from colibri.common.jit import packed
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.environment.air import CALM
-from colibri.plant.physics.equations import close, packed
+from colibri.plant.physics.equations import close
 from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import Start

@@ -5,6 +5,7 @@ import pytest
 
 from colibri.autopilot.control.lpv_mpc import condensing, prediction
 from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, RATES, STATES
+from colibri.common.jit import packed
 
 STEPS, STARTS = 12, np.array([0, 1, 3, 7])
 MOVED = INPUTS * len(STARTS)
@@ -13,7 +14,18 @@ FROM_THRUST = np.full(4, 0.05)
 FROM_MOMENTS = np.array([[0.0, -0.6, -1.5], [-0.6, 0.0, 1.5], [0.0, 0.6, -1.5], [0.6, 0.0, 1.5]])
 MIN_SQUARED, MAX_SQUARED = 0.01, 1.0
 LIMITS = np.array([1.0, 1.1, 6.0, 7.0, 3.0])
-CHECKED = np.array([3, 6, 12])
+PROBLEM = condensing.Problem(
+    starts=STARTS,
+    checked=np.array([3, 6, 12]),
+    output_weight=np.ones(3),
+    increment_weight=np.ones(3),
+    terminal_weight=np.eye(STATES + INPUTS),
+    max_increment=np.ones(3),
+    limits=LIMITS,
+    from_thrust=FROM_THRUST,
+    from_moments=FROM_MOMENTS,
+    min_squared=MIN_SQUARED,
+)
 
 
 @pytest.fixture(params=range(4))
@@ -26,7 +38,8 @@ def responses_of(rng: np.random.Generator, u: np.ndarray) -> np.ndarray:
     responses = np.empty((STEPS + 1, STATES, 1 + MOVED))
     body = prediction.Body(0.0034, 0.0034, 0.006, 40.0)
     schedule = np.tile(x[list(prediction.SCHEDULE)], (STEPS, 1))
-    prediction.respond(x, u, np.zeros(3), schedule, 1e-4, body, STARTS, 0.008, responses)
+    now = prediction.InitialState(x, u, np.zeros(3), 1e-4, 1.0)
+    prediction.respond(now, schedule, body, STARTS, 0.008, responses)
     return responses
 
 
@@ -44,7 +57,8 @@ def test_the_cost_is_the_sum_over_the_horizon(rng: np.random.Generator) -> None:
     S = root @ root.T
     angles, terminal = rng.normal(size=(STEPS, 3)), rng.normal(size=STATES + INPUTS)
     H, f = np.zeros((N, N)), np.zeros(N)
-    condensing.quadratic_cost(responses, angles, terminal, u, Q, S, R, H, f)
+    problem = PROBLEM._replace(output_weight=Q, increment_weight=R, terminal_weight=S)
+    condensing.quadratic_cost(responses, condensing.Target(angles, terminal, np.zeros(STEPS)), u, problem, H, f)
 
     def cost(z: np.ndarray) -> float:
         states = responses @ [1.0, *z[:MOVED]]
@@ -65,7 +79,7 @@ def test_rotor_rows_hold_just_where_every_rotor_is_within_its_limits(rng: np.ran
     thrust = rng.uniform(4.0, 12.0, STEPS)
     rows = 2 * condensing.ROTORS * len(STARTS)
     G, h = np.zeros((rows, N)), np.zeros(rows)
-    count = condensing.limit_rotors(FROM_MOMENTS, FROM_THRUST, thrust, u, STARTS, MIN_SQUARED, MAX_SQUARED, G, h)
+    count = condensing.limit_rotors(PROBLEM, thrust, u, MAX_SQUARED, G, h)
     assert count == rows
     verdicts = set()
     for size in (0.02, 0.1, 0.3, 0.6):
@@ -86,14 +100,14 @@ def test_motion_rows_hold_just_where_the_slacks_cover_what_is_exceeded(rng: np.r
     u = rng.normal(size=3) * 0.05
     responses = responses_of(rng, u)
     schedule = np.zeros((STEPS, len(prediction.SCHEDULE)))  # without a tilt: no tangent
-    rows = condensing.MOTION_ROWS * len(CHECKED)
+    rows = condensing.MOTION_ROWS * len(PROBLEM.checked)
     G, h = np.zeros((rows + 3, N)), np.zeros(rows + 3)
-    assert condensing.limit_motion(responses, schedule, CHECKED, LIMITS, 3, G, h) == rows + 3
+    assert condensing.limit_motion(responses, schedule, PROBLEM, 3, G, h) == rows + 3
     verdicts = set()
     for slacks in ([0.0, 0.0], [5.0, 0.0], [0.0, 5.0], [0.3, 0.3], [5.0, 5.0]):
         for size in np.geomspace(0.01, 0.5, 20):
             z = np.concatenate([rng.normal(size=MOVED) * size, slacks])
-            states = (responses @ [1.0, *z[:MOVED]])[CHECKED]
+            states = (responses @ [1.0, *z[:MOVED]])[PROBLEM.checked]
             exceeded = np.abs(states[:, [*ANGLES[:2], *RATES]]) / LIMITS - 1.0
             within = exceeded[:, :2].max() <= slacks[0] and exceeded[:, 2:].max() <= slacks[1]
             assert bool((G[3:] @ z <= h[3:]).all()) is bool(within)
@@ -106,10 +120,10 @@ def test_the_tilts_row_is_the_tangent_in_the_direction_expected(rng: np.random.G
     u = rng.normal(size=3) * 0.05
     responses = responses_of(rng, u)
     schedule = rng.uniform(-1.0, 1.0, (STEPS, len(prediction.SCHEDULE)))
-    G = np.zeros((condensing.MOTION_ROWS * len(CHECKED), N))
+    G = np.zeros((condensing.MOTION_ROWS * len(PROBLEM.checked), N))
     h, normal = np.zeros(len(G)), np.empty(2)
-    condensing.limit_motion(responses, schedule, CHECKED, LIMITS, 0, G, h)
-    for place, step in enumerate(CHECKED):
+    condensing.limit_motion(responses, schedule, PROBLEM, 0, G, h)
+    for place, step in enumerate(PROBLEM.checked):
         row = condensing.MOTION_ROWS * place
         phi, theta = schedule[step - 1, :2]
         distance = condensing.tilt_tangent(phi, theta, LIMITS[0], normal)
@@ -137,8 +151,7 @@ def test_no_tilt_within_the_limit_is_beyond_any_tangent_to_it(rng: np.random.Gen
 def test_the_plan_is_read_as_it_was_predicted(rng: np.random.Generator) -> None:
     u, thrust = rng.normal(size=3) * 0.05, rng.uniform(4.0, 12.0, STEPS)
     responses, z = responses_of(rng, u), rng.normal(size=N) * 0.1
-    states, moments, squared = np.empty((STEPS + 1, STATES)), np.empty((STEPS, 3)), np.empty((STEPS, 4))
-    condensing.read_plan(responses, STARTS, u, z, thrust, FROM_THRUST, FROM_MOMENTS, states, moments, squared)
+    states, moments, squared = condensing.read_plan(responses, packed(PROBLEM), u, z, thrust)
     assert states == pytest.approx(responses @ [1.0, *z[:MOVED]])
     assert moments == pytest.approx(moments_of(u, z))
     assert squared == pytest.approx(thrust[:, None] * FROM_THRUST + moments @ FROM_MOMENTS.T)

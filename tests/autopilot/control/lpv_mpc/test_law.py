@@ -191,7 +191,7 @@ def test_daqp_and_clarabel_agree_on_every_input_of_a_flight() -> None:
     solve = solver.solve
 
     def record(qp: Qp) -> QpResult:
-        recorded.append(Qp(*(part.copy() for part in qp if part is not None)))
+        recorded.append(Qp(*(part.copy() for part in qp)))
         return solve(qp)
 
     solver.solve = record  # type: ignore[method-assign]

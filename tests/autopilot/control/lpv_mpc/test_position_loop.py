@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from colibri.autopilot.control.lpv_mpc import position_loop
-from colibri.autopilot.control.lpv_mpc.position_loop import Limits
+from colibri.autopilot.control.lpv_mpc.position_loop import Limits, Loop, Motion
 from colibri.autopilot.control.vehicle_model.airframe import Airframe
 from colibri.common.rotations import quaternion_from_euler, rotation_matrix
 from tests.strategies import reals, vectors
@@ -38,8 +38,9 @@ def forces_for(
 ) -> np.ndarray:
     forces = np.empty((2, 3))
     r, v, a = (np.tile(part, (2, 1)) for part in reference)
-    ahead = np.tile(np.eye(2), (2, 1, 1))
-    position_loop.wanted_forces(position, velocity, (r, v, a), ahead, GAINS, disturbance, airframe, LIMITS, forces)
+    loop = Loop(*GAINS, np.tile(np.eye(2), (2, 1, 1)), airframe, np.ones(3), 1.0, 0.008)
+    motion = Motion(position, velocity, np.array([0.0, 0.0, 1.0]), 0.0, 0.0)
+    position_loop.wanted_forces(motion, (r, v, a, np.zeros(2)), disturbance, loop, LIMITS, forces)
     first: np.ndarray = forces[0]
     return first
 

@@ -16,6 +16,7 @@ from colibri.autopilot.control.lpv_mpc.prediction import (
     STATES,
     THETA,
     Body,
+    InitialState,
     flow,
     respond,
     schedule_along,
@@ -37,7 +38,7 @@ def random_state(seed: int) -> np.ndarray:
 
 def predicted(x: np.ndarray, u: np.ndarray, d: np.ndarray, schedule: np.ndarray, body: Body) -> np.ndarray:
     responses = np.full((len(schedule) + 1, STATES, 1 + INPUTS * len(STARTS)), np.nan)
-    respond(x, u, d, schedule, MOMENTUM, body, STARTS, INTERVAL_S, responses)
+    respond(InitialState(x, u, d, MOMENTUM, 1.0), schedule, body, STARTS, INTERVAL_S, responses)
     return responses
 
 

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from colibri.autopilot.control.thesis.position_loop import PositionController, PositionSettings
 from colibri.autopilot.control.vehicle_model.mixer import Mixer
+from colibri.common.jit import packed
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Vector
-from colibri.plant.physics.equations import packed, rotor_momentum, rotor_wrench
+from colibri.plant.physics.equations import rotor_momentum, rotor_wrench
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.vehicle.description import load_vehicle
 from tests.strategies import reals, vectors

@@ -1,0 +1,93 @@
+"""The outer loop of one vehicle: what `position_loop` computes, with the limits that the battery leaves."""
+
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import AttitudeDemand, Horizon
+from colibri.autopilot.control.lpv_mpc import position_loop, prediction
+from colibri.autopilot.control.lpv_mpc.condensing import Target
+from colibri.autopilot.control.lpv_mpc.position_loop import Demands, Limits, Loop, Motion
+from colibri.autopilot.control.lpv_mpc.settings import GuidanceSettings
+from colibri.autopilot.control.vehicle_model.airframe import airframe_of
+from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag
+from colibri.common.elementary import square
+from colibri.common.jit import packed
+from colibri.common.kernels import tan
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+
+class Setpoint(NamedTuple):
+    """What the outer loop demands.
+
+    Attributes:
+        force: Of the thrust now, N, ENU, (3,).
+        aligned: Cosine of the angle from the thrust to it.
+        target: Of the attitude.
+    """
+
+    force: Array
+    aligned: float
+    target: Target
+
+
+class OuterLoop:
+    """From references, or a demanded attitude, to the setpoint of the attitude.
+
+    Attributes:
+        loop: What stays the same in it.
+    """
+
+    def __init__(self, settings: GuidanceSettings, vehicle: Vehicle, lag: RotorLag, interval_s: float, n: int) -> None:
+        """Control `vehicle` every `interval_s` over a horizon of `n` steps."""
+        first, second = settings.poles
+        k1_s2, k2_s = first * second, -(first + second)
+        self._samples, self._steps = n + 2, n
+        errors_ahead = position_loop.error_transition(settings.poles, interval_s, self._samples)
+        inertia = np.array(vehicle.body.inertia_kg_m2)
+        self.loop = Loop(k1_s2, k2_s, errors_ahead, airframe_of(vehicle), inertia, lag.planned, interval_s)
+        self._packed = packed(self.loop)
+        self._span_n = float((vehicle.allocation() * square(vehicle.rotors.max_speed))[0].sum())
+        self._min_n = self._span_n * square(lag.min_speed)
+        self._thrust_margin = settings.thrust_margin
+        self._tilt_tangent = tan(radians(settings.max_tilt_deg))
+        self._position_error_m = settings.approach_speed_m_s * k2_s / k1_s2
+
+    def track(
+        self, motion: Motion, references: Horizon, planned_yaw: Array, disturbances: Array, max_speed: float
+    ) -> Setpoint:
+        """Return the setpoint that leads to references.
+
+        Args:
+            motion: Now.
+            references: At each sample from now to one past the horizon.
+            planned_yaw: By the last plan, from now, rad, (m,); (0,) without one.
+            disturbances: Acceleration, m/s², ENU, and moment, N m, FLU, that the model does not explain, (6,).
+            max_speed: That all rotors can turn at, in parts of the largest.
+        """
+        p, v, a, *_, yaw, _, _ = references
+        out = self._demands()
+        aligned = position_loop.guide(
+            motion, (p, v, a, yaw), planned_yaw, disturbances, self._packed, self._limits(max_speed), out
+        )
+        return Setpoint(out.forces[0], aligned, Target(out.angles[1:-1], out.end, out.thrusts))
+
+    def hold(self, motion: Motion, demand: AttitudeDemand, disturbance_n_m: Array, max_speed: float) -> Setpoint:
+        """Return the setpoint that a demanded attitude is, its thrust within the same limits as when tracking."""
+        out = self._demands()
+        aligned = position_loop.hold_attitude(
+            motion, (demand.angles, demand.thrust_n), disturbance_n_m, self._packed, self._limits(max_speed), out
+        )
+        return Setpoint(out.forces[0], aligned, Target(out.angles[1:-1], out.end, out.thrusts))
+
+    def _demands(self) -> Demands:
+        n = self._samples
+        end = np.empty(prediction.STATES + prediction.INPUTS)
+        return Demands(np.empty((n, 3)), np.empty((n, 3)), np.empty(self._steps), end)
+
+    def _limits(self, max_speed: float) -> Limits:
+        max_n = self._span_n * square(max_speed)
+        margin_n = self._thrust_margin * (max_n - self._min_n)
+        return Limits(self._tilt_tangent, self._min_n + margin_n, max_n - margin_n, self._position_error_m)
