@@ -1,7 +1,7 @@
 """From sticks, or a client's attitude or body rates, to a smooth attitude demand over the control law's preview.
 
 Each angle is slewed like a critically damped second-order system, its rate and acceleration bounded: what is demanded
-can be followed, and the MPC sees it coming. A pose is followed by where its thrust points first: roll and pitch are
+can be followed, and the MPC sees it coming. An attitude is reached first where its thrust points: roll and pitch are
 those about the yaw that has been reached. Body rates are integrated by THESIS [2.7], the tilt limited. Nothing runs
 away from the vehicle: the yaw demanded stays near its own.
 """
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Preview, VehicleState
-from colibri.autopilot.guidance.attitude_slew import ATTITUDE, RATE, TILT, Slew, limit_tilt, slew_on
+from colibri.autopilot.guidance.attitude_slew import ATTITUDE, RATE, TILT, Aim, Slew, limit_tilt, slew_on
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.elementary import square
@@ -68,10 +68,10 @@ class AttitudeCommand(NamedTuple):
     """What is asked for: made by `tilt_command`, `attitude_command` and `rate_command`.
 
     Attributes:
-        kind: LEAN, POSE or SPIN.
-        vector: LEAN: phi, theta, rad, and nothing. POSE: where the thrust is to point, ENU. SPIN: p, q, r, rad/s.
-        yaw_rad: POSE: to reach.
-        yaw_rate_rad_s: LEAN: to turn at. POSE: feed-forward.
+        kind: TILT, ATTITUDE or RATE.
+        vector: TILT: phi, theta, rad, and 0. ATTITUDE: where the thrust is to point, ENU. RATE: p, q, r, rad/s.
+        yaw_rad: ATTITUDE: to reach.
+        yaw_rate_rad_s: TILT: to turn at. ATTITUDE: feed-forward.
         thrust_n: nan for what carries the weight, whatever the tilt.
     """
 
@@ -137,19 +137,8 @@ class AttitudeReference:
         thrusts = np.empty(self._samples + 1)
         angles[0], rates[0], thrusts[0] = memory.angles, memory.rates, memory.thrust_n
         angles[0, 2] = self._near(memory.angles[2].item(), state.euler[2])
-        slew_on(
-            command.kind,
-            np.array(command.vector),
-            command.yaw_rad,
-            command.yaw_rate_rad_s,
-            command.thrust_n,
-            self.weight_n,
-            self.limits.slew,
-            self._interval_s,
-            angles,
-            rates,
-            thrusts,
-        )
+        aim = Aim(command.kind, np.array(command.vector), *command[2:], self.weight_n)
+        slew_on(aim, self.limits.slew, self._interval_s, angles, rates, thrusts)
         after = ReferenceMemory(angles[1].copy(), rates[1].copy(), thrusts[1].item())
         return after, AttitudeDemand(angles[:-1], rates[:-1], thrusts[:-1])
 

@@ -42,35 +42,39 @@ class Slew(NamedTuple):
     thrust_rate_n_s: float
 
 
+class Aim(NamedTuple):
+    """What the demand goes towards.
+
+    Attributes:
+        kind: TILT, ATTITUDE or RATE.
+        vector: TILT: phi, theta, rad. ATTITUDE: where the thrust is to point, ENU. RATE: p, q, r, rad/s. (3,).
+        yaw_rad: ATTITUDE: to reach.
+        yaw_rate_rad_s: TILT: to turn at. ATTITUDE: feed-forward.
+        thrust_n: To reach, N; nan for what carries the weight.
+        weight_n: N.
+    """
+
+    kind: int
+    vector: Array
+    yaw_rad: float
+    yaw_rate_rad_s: float
+    thrust_n: float
+    weight_n: float
+
+
 @compiled
-def slew_on(
-    kind: int,
-    vector: Array,
-    yaw_rad: float,
-    yaw_rate_rad_s: float,
-    thrust_n: float,
-    weight_n: float,
-    slew: Slew,
-    interval_s: float,
-    angles: Array,
-    rates: Array,
-    thrusts: Array,
-) -> None:
+def slew_on(aim: Aim, slew: Slew, interval_s: float, angles: Array, rates: Array, thrusts: Array) -> None:
     """Fill angles, rates and thrusts from their first rows on.
 
     Args:
-        kind: LEAN, POSE or SPIN.
-        vector: LEAN: phi, theta, rad. POSE: where the thrust is to point, ENU. SPIN: p, q, r, rad/s. (3,).
-        yaw_rad: POSE: to reach.
-        yaw_rate_rad_s: LEAN: to turn at. POSE: feed-forward.
-        thrust_n: To reach, N; nan for what carries the weight.
-        weight_n: N.
+        aim: What they go towards.
         slew: How far and how fast.
         interval_s: Between two rows.
         angles: phi, theta, psi, rad, (n, 3).
         rates: Their derivatives, rad/s, (n, 3).
         thrusts: N, (n,).
     """
+    kind, vector, yaw_rad = aim.kind, aim.vector, aim.yaw_rad
     wanted, wanted_rate = np.zeros(3), np.zeros(3)
     for n in range(angles.shape[0] - 1):
         here, there = angles[n], angles[n + 1]
@@ -79,7 +83,7 @@ def slew_on(
         if kind == RATE:
             _euler_rates(here, vector, wanted_rate)
         else:
-            wanted_rate[2] = yaw_rate_rad_s
+            wanted_rate[2] = aim.yaw_rate_rad_s
         towards = here[2] if kind != ATTITUDE else yaw_rad - 2.0 * pi * floor((yaw_rad - here[2]) / (2.0 * pi) + 0.5)
         w, max_rate, max_acceleration = slew.yaw_frequency_rad_s, slew.yaw_rate_rad_s, slew.yaw_acceleration_rad_s2
         _move(
@@ -105,7 +109,7 @@ def slew_on(
             pull = 0.0 if kind == RATE else w * w * (wanted[i] - here[i])
             _move(i, pull, wanted_rate[i], w, max_rate, max_acceleration, interval_s, there, rates[n + 1])
         limit_tilt(there, rates[n + 1], slew.max_tilt_rad)
-        thrust = weight_n / (cos(there[0]) * cos(there[1])) if isnan(thrust_n) else thrust_n
+        thrust = aim.weight_n / (cos(there[0]) * cos(there[1])) if isnan(aim.thrust_n) else aim.thrust_n
         maximum = slew.thrust_rate_n_s * interval_s
         thrusts[n + 1] = thrusts[n] + min(max(thrust - thrusts[n], -maximum), maximum)
 

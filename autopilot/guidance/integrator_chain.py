@@ -27,7 +27,7 @@ K_POSITION, K_VELOCITY, K_ACCELERATION, K_JERK = 1.5, 4.0, 12.0, 36.0
 """Each loop about three times as fast as the one around it, 1/s."""
 K_YAW, K_YAW_RATE = 2.0, 8.0
 _MAX_STEP_S = 0.02
-"""The quickest loop, of the jerk, must not answer to itself: 36 / s times this is below 1."""
+"""The quickest loop, of the jerk, must not become unstable: 36 / s times this is below 1."""
 _STOPPING = 0.6
 """Part of the acceleration that stopping may count on; the rest is for keeping to it."""
 
@@ -56,32 +56,57 @@ class Limits(NamedTuple):
     yaw_acceleration_rad_s2: float = radians(180.0)
 
 
+class Axes(NamedTuple):
+    """Axes that share their limits: from `first` to before `last`."""
+
+    first: int
+    last: int
+    speed_m_s: float
+    acceleration_m_s2: float
+    jerk_m_s3: float
+
+
+class Target(NamedTuple):
+    """What the chain follows, at every instant.
+
+    Attributes:
+        motion: Position, velocity, acceleration, jerk, snap, ENU, (n, 5, 3).
+        kinds: Which of the first three binds, for x, y and z, (3,).
+        heading: Yaw, rate, acceleration, (n, 3).
+        turns: Whether yaw itself binds; otherwise its rate.
+    """
+
+    motion: Array
+    kinds: Integers
+    heading: Array
+    turns: bool
+
+
 @compiled
-def advance(
-    motion: Array,
-    heading: Array,
-    target: Array,
-    kinds: Integers,
-    yaw_target: Array,
-    turns: bool,
-    limits: Limits,
-    dt: float,
-    out: Array,
-    out_heading: Array,
-) -> None:
-    """Fill `out` (n, 5, 3) and `out_heading` (n, 3) from now on; the snap and yaw acceleration act until the next.
+def advance(motion: Array, heading: Array, target: Target, limits: Limits, dt: float) -> tuple[Array, Array]:
+    """Return motion, (n, 5, 3), and heading, (n, 3), from now on; snap and yaw acceleration act until the next instant.
 
     Between instants that are too far apart for its loops the chain takes several steps.
+
+    Args:
+        motion: Position, velocity, acceleration, jerk now, ENU, (4, 3).
+        heading: Yaw, rad, and its rate now, (2,).
+        target: To follow, at n instants.
+        limits: Of the approach.
+        dt: Between two instants, s.
     """
+    count = target.motion.shape[0]
+    out, out_heading = np.empty((count, 5, 3)), np.empty((count, 3))
     steps = ceil(dt / _MAX_STEP_S)
     step = dt / steps
-    p, v, a, j = motion[0].copy(), motion[1].copy(), motion[2].copy(), motion[3].copy()
+    motion = motion.copy()
+    p, v, a, j = motion[0], motion[1], motion[2], motion[3]
     snap = np.empty(3)
     yaw, rate = heading[0], heading[1]
-    for k in range(target.shape[0]):
+    for k in range(count):
         for part in range(steps):
-            _drive(p, v, a, j, target[k], kinds, limits, snap)
-            acceleration = _turn(yaw, rate, yaw_target[k], turns, limits)
+            _drive(motion, target.motion[k], target.kinds, limits, snap)
+            acceleration = _turn(yaw, rate, target.heading[k], target.turns, limits)
             if part == 0:
                 out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = p, v, a, j, snap
                 out_heading[k, 0], out_heading[k, 1], out_heading[k, 2] = yaw, rate, acceleration
@@ -92,42 +117,32 @@ def advance(
                 j[i] += step * snap[i]
             yaw += step * (rate + step * acceleration / 2.0)
             rate += step * acceleration
+    return out, out_heading
 
 
 @compiled
-def _drive(p: Array, v: Array, a: Array, j: Array, target: Array, kinds: Integers, limits: Limits, snap: Array) -> None:
+def _drive(motion: Array, target: Array, kinds: Integers, limits: Limits, snap: Array) -> None:
     """Write the snap, (3,): the horizontal axes share their limits, the vertical one has its own."""
-    vertically = limits.sink_m_s if p[2] > target[0, 2] else limits.climb_m_s
+    vertically = limits.sink_m_s if motion[0, 2] > target[0, 2] else limits.climb_m_s
     jerk = limits.jerk_m_s3
-    _drive_axes(p, v, a, j, target, kinds, 0, 2, limits.speed_m_s, limits.acceleration_m_s2, jerk, snap)
-    _drive_axes(p, v, a, j, target, kinds, 2, 3, vertically, limits.lift_m_s2, jerk, snap)
+    _drive_axes(motion, target, kinds, Axes(0, 2, limits.speed_m_s, limits.acceleration_m_s2, jerk), snap)
+    _drive_axes(motion, target, kinds, Axes(2, 3, vertically, limits.lift_m_s2, jerk), snap)
 
 
 @compiled
-def _drive_axes(
-    p: Array,
-    v: Array,
-    a: Array,
-    j: Array,
-    target: Array,
-    kinds: Integers,
-    first: int,
-    last: int,
-    max_speed: float,
-    max_acceleration: float,
-    jerkiest: float,
-    snap: Array,
-) -> None:
+def _drive_axes(motion: Array, target: Array, kinds: Integers, axes: Axes, snap: Array) -> None:
     """Write the snap of the axes from `first` to before `last`."""
+    p, v, a, j = motion[0], motion[1], motion[2], motion[3]
+    first, last = axes.first, axes.last
     wanted = np.zeros(3)
     distance_squared = 0.0
     for i in range(first, last):
         if kinds[i] == 0:
             distance_squared += (p[i] - target[0, i]) ** 2
     distance = sqrt(distance_squared)
-    max_acceleration = min(max_acceleration, jerkiest / K_VELOCITY)
+    max_acceleration = min(axes.acceleration_m_s2, axes.jerk_m_s3 / K_VELOCITY)
     stopping = _STOPPING * max_acceleration
-    speed, slope = _approach(distance, stopping, max_speed, K_POSITION)
+    speed, slope = _approach(distance, stopping, axes.speed_m_s, K_POSITION)
     for i in range(first, last):
         if kinds[i] == 0:
             along = (target[0, i] - p[i]) / distance if distance > 0.0 else 0.0
@@ -138,7 +153,7 @@ def _drive_axes(
     _bound(wanted, first, last, max_acceleration)
     for i in range(first, last):
         wanted[i] = K_ACCELERATION * (target[2, i] + wanted[i] - a[i])
-    _bound(wanted, first, last, jerkiest)
+    _bound(wanted, first, last, axes.jerk_m_s3)
     for i in range(first, last):
         snap[i] = target[4, i] + K_JERK * (target[3, i] + wanted[i] - j[i])
 

@@ -1,6 +1,6 @@
 """The reference that leads the vehicle from wherever it is to whatever it shall do: smooth, within limits.
 
-The chain of integrators of `reference_chain` follows a target that may itself move; once on it, the target itself is
+The chain of integrators of `integrator_chain` follows a target that may itself move; once on it, the target itself is
 the reference, to the last bit, until it jumps. An axis may have no target position, or neither position nor velocity:
 then the chain begins where the target does.
 """
@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import Horizon, VehicleState
-from colibri.autopilot.guidance.integrator_chain import Limits, advance
+from colibri.autopilot.guidance import integrator_chain
+from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.common.rotations import nearest_turn
 from colibri.common.types import Array
 
@@ -103,21 +104,10 @@ def lead(reference: Reference, target: Target, limits: Limits, interval_s: float
     """
     if target.turns and target.kinds == ALL_BOUND and _is_at(reference, target.motion[0, :4], target.heading[0]):
         return _on_target(reference, target)
-    count = len(target.motion)
-    motion, heading = np.empty((count, 5, 3)), np.empty((count, 3))
-    kinds = np.array(target.kinds, dtype=np.int64)
-    advance(
-        reference.motion,
-        reference.heading,
-        target.motion,
-        kinds,
-        target.heading,
-        target.turns,
-        limits,
-        interval_s,
-        motion,
-        heading,
+    followed = integrator_chain.Target(
+        target.motion, np.array(target.kinds, dtype=np.int64), target.heading, target.turns
     )
+    motion, heading = integrator_chain.advance(reference.motion, reference.heading, followed, limits, interval_s)
     return _horizon(motion, heading), Reference(motion[1, :4].copy(), heading[1, :2].copy())
 
 
