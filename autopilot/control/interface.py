@@ -194,7 +194,7 @@ class Controller(Protocol[Memory]):
 
 @runtime_checkable
 class AttitudeController(Controller[Memory], Protocol[Memory]):
-    """A control law that can also be told an attitude; one that cannot simply flies no mode that needs it.
+    """A control law that can also take an attitude; one that cannot simply flies no mode that needs it.
 
     Its two ways to decide share what they remember: a flight may change between them at any sample.
     """
@@ -217,7 +217,7 @@ class AttitudeController(Controller[Memory], Protocol[Memory]):
 class ChargeController(Controller[Memory], Protocol[Memory]):
     """A control law that counts what its battery gives; optional.
 
-    A law that has this goes on with the charge that is left where it begins anew in mid-flight, and with what the
+    A law that has this goes on with the charge that is left where it restarts in mid-flight, and with what the
     battery itself tells, where it does.
     """
 

@@ -50,7 +50,7 @@ class ControlLoop:
         preview: The references that the law wants.
         control_interval_us: Its sample.
         frame_interval_us: How often it wants a frame: at every control sample, or a whole number of times as often.
-        takes_attitude: Whether the law can be told an attitude and a thrust.
+        takes_attitude: Whether the law can take an attitude and a thrust.
         plan_columns: Where the law's plan holds the attitude; None for a law that plans none.
         controls: Rotor speeds commanded now, in parts of the largest.
     """
@@ -84,7 +84,7 @@ class ControlLoop:
         """Begin with every rotor at `rotor_speed` (the vehicle's unit), yaw unwrapped near `yaw_rad`.
 
         Unless all begins `afresh`, a law that remembers its battery goes on with the charge that is left; else with
-        what the battery has told of it.
+        what the battery has reported of it.
         """
         before, self._memory = self._memory, self._controller.initial(rotor_speed)
         if self._charged is not None:

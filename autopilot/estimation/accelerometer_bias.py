@@ -2,7 +2,7 @@
 
 A bias b that is there from one instant on makes the filter's velocity run away, and GPS velocity is rejected fix after
 fix, its innovations on a ramp: y = y₀ - ∫R dt · b. Where they are, b is fitted by least squares. That is no proof yet:
-a receiver that lies or is late makes ramps, too. So another sensor must say the same:
+a receiver that lies or is late makes ramps, too. So another sensor must agree:
 
 - across the body, the accelerometer itself. A multirotor's thrust is along its z axis; what it feels sideways is drag,
   and a bias. If it is the latter, that has changed by b, however the vehicle was flown since;
@@ -48,7 +48,7 @@ _MAX_GAP_S = 0.35
 _ALONG_PART = 0.5
 """The part of the bias along body z from which on the barometer is asked."""
 _ALIKE_PART = 0.5
-"""By how much of the larger may differ what two sensors say, that yet agree."""
+"""Two sensors agree whose figures differ by no more than this part of the larger."""
 _CLEAR = 9.0
 """How much two hypotheses must differ, σ², before a test can choose between them."""
 _FOUR_SIGMA = 22.06
@@ -129,7 +129,7 @@ def find_bias(
     """Return the variance of a bias that is found, along each axis; 0 if none is.
 
     Args:
-        rows: Fixes, (n, 15); the height is nan where the barometer told nothing new.
+        rows: Fixes, (n, 15); the height is nan where the barometer measured nothing new.
         first: The first of them whose velocity was rejected, as were those behind it.
         velocity_variance: Of the noise of GPS velocity, (m/s)².
         height_variance: Of the barometer's, m².

@@ -1,8 +1,8 @@
-"""The error-state Kalman filter: its state, what it believes of the sensors, and when it stops to.
+"""The error-state Kalman filter: its state, its model of the sensors, and when it resets.
 
-A kind of measurement that is rejected for long is believed again: the part of the state that it speaks of is doubted
-first, so that it is taken anew. For a magnetic field that is the field of the vehicle itself, and yaw stays; for
-pressure it is the offset of the barometer, and height stays; for GPS it is position or velocity.
+A kind of measurement that is rejected for long is accepted by force: the covariance of the part of the state that it
+measures is inflated first, which resets that part. For a magnetic field that is the field of the vehicle itself, and
+yaw stays; for pressure it is the offset of the barometer, and height stays; for GPS it is position or velocity.
 """
 
 from math import hypot, inf, isfinite, nan
@@ -61,7 +61,7 @@ _INFLATED_M, _INFLATED_M_S = 100.0, 10.0
 
 
 class FilterRecord(NamedTuple):
-    """A filter as plain data: state, covariance, the kinds of what is measured, and when biases were taken anew."""
+    """A filter as plain data: state, covariance, the kinds of what is measured, and when biases were reset."""
 
     x: Array
     P: Array
@@ -73,6 +73,8 @@ class FilterRecord(NamedTuple):
 class Filter:
     """State and covariance, at a time some way behind the vehicle's.
 
+    It has more attributes than most classes: the numbers of every sensor, and buffers that each fix uses again.
+
     Attributes:
         x: Nominal state, (23,).
         P: Covariance of its error, (22, 22).
@@ -81,12 +83,12 @@ class Filter:
         instruments: All that is fused as it comes, with these two.
         kinds: Of all measurements, in the order of `table.KINDS`.
         field_gauss: Strength of the earth's field.
-        accel_bias_us: When the accelerometer's bias was last taken anew; None if never.
+        accel_bias_us: When the accelerometer's bias was last reset; None if never.
         gyro_bias_us: When the gyroscope's was.
     """
 
     def __init__(self, sensors: Sensors, gravity_m_s2: float, field_enu_gauss: Vector) -> None:
-        """Believe what `sensors` say of themselves."""
+        """Take the noise and the biases of `sensors` for what they have."""
         self._sensors, self._gravity = sensors, gravity_m_s2
         self._field = np.array(field_enu_gauss)
         self.field_gauss = hypot(*field_enu_gauss)
@@ -110,7 +112,7 @@ class Filter:
         self.gyro_bias_us: int | None = None
 
     def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
-        """Begin at rest: each mean is fused as a measurement, so that the covariance knows what it took from where.
+        """Begin at rest: each mean is fused as a measurement, so that the covariance holds their correlations.
 
         The attitude is found by iteration. A tilt seen by the accelerometer may be its bias, and the magnetic field
         knows better: a covariance linearised where the first guess was would later be taken for knowledge.
@@ -180,7 +182,7 @@ class Filter:
             P[GYRO_BIAS + i, GYRO_BIAS + i] = gain * rate
 
     def record(self) -> FilterRecord:
-        """Return state, covariance and what was believed."""
+        """Return state, covariance, and what was accepted when."""
         return FilterRecord(
             self.x, self.P, [kind.record() for kind in self.kinds], self.accel_bias_us, self.gyro_bias_us
         )
@@ -222,7 +224,7 @@ class Filter:
     def reset_accel_bias(
         self, change_m_s2: Array, variance: float, velocity_m_s: Array, position_m: Array, time_us: int
     ) -> None:
-        """Believe that the accelerometer's bias has changed, and undo what that has done since.
+        """Reset the accelerometer's bias, and undo what its change has done since.
 
         Args:
             change_m_s2: Of the bias, FLU.
@@ -244,7 +246,7 @@ class Filter:
         self.accel_bias_us = time_us
 
     def reset_gyro_bias(self, turned_rad: float, since_s: float, time_us: int) -> None:
-        """Doubt what a gyroscope that is off has spoilt: attitude and bias, and the velocity that is contradicted.
+        """Inflate the covariance of what a gyroscope that is off has spoilt: attitude, bias, the velocity contradicted.
 
         Args:
             turned_rad: By how much the magnetic field has turned.
@@ -269,7 +271,7 @@ class Filter:
 
     @property
     def resets(self) -> int:
-        """How often something was taken anew."""
+        """How often a part of the state was reset."""
         return sum(kind.resets for kind in self.kinds)
 
     def _of_place(self, fix: GpsFix) -> tuple[float, float]:

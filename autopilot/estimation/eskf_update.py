@@ -1,4 +1,4 @@
-"""Error-state Kalman filter: how a measurement corrects state and covariance, if its innovation is believable.
+"""Error-state Kalman filter: how a measurement corrects state and covariance, if its innovation passes the test.
 
 J. Solà, Quaternion kinematics for the error-state Kalman filter, arXiv:1711.02508, section 6: gain and update (275),
 Joseph's form of the covariance, the error put into the nominal state (283) and reset (287).
@@ -62,7 +62,7 @@ def fuse_velocity(x: Array, P: Array, velocity: Array, variance: float, gate: fl
 def fuse_fix(
     x: Array, P: Array, fix: Array, after_s: float, variances: Array, gates: Array, y: Array, nis: Array
 ) -> None:
-    """Correct by the velocity of a GPS fix, then by its place, then by its height, each if it is believable.
+    """Correct by the velocity of a GPS fix, then by its place, then by its height, each if it passes its test.
 
     Args:
         x: Nominal state, (23,).
@@ -132,7 +132,7 @@ def fuse_rest(
 
 @compiled
 def inflate_covariance(P: Array, first: int, count: int, variance: float) -> None:
-    """Add to the variances of a part of the state, so that the next measurement of it is believed again."""
+    """Add to the variances of a part of the state, so that the next measurement of it is accepted again."""
     for i in range(first, first + count):
         P[i, i] += variance
 

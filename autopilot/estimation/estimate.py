@@ -60,11 +60,11 @@ class Health(NamedTuple):
         horizontal_position: Known to 5 m on earth.
         height: Known to 5 m.
         dead_reckoning: GPS holds neither position nor velocity: they drift.
-        gps_lost_since_us: When GPS was last believed, if that is long ago; None while it is.
-        gps_glitch: Fixes come, and are not believed.
+        gps_lost_since_us: When GPS was last accepted, if that is long ago; None while it is.
+        gps_glitch: Fixes come, and are rejected.
         accelerometer: Its values can be used.
         gyroscope: Its values can be used.
-        accel_bias: The accelerometer's bias was not taken anew lately.
+        accel_bias: The accelerometer's bias was not reset lately.
         gyro_bias: Nor the gyroscope's.
         not_accepted: Other sensors whose values are missing or rejected since long.
     """
@@ -118,14 +118,14 @@ _FLAGS: tuple[int, ...] = tuple(
 
 
 class Check(NamedTuple):
-    """The filter at its own time, with its covariance, so that anybody can check whether it errs as it says.
+    """The filter at its own time, with its covariance, so that its consistency can be checked.
 
     Attributes:
         time_us: The filter's time, µs.
         state: Position (m, ENU), velocity (m/s, ENU), attitude (wxyz), 10 numbers.
         covariance: Of position, velocity, and attitude as a rotation vector in the body frame: the upper triangle, 45
             numbers, row by row.
-        nis: Of each kind of `Tests`, the sum of the normalised innovations squared that were believed up to now.
+        nis: Of each kind of `Tests`, the sum of the normalised innovations squared that were accepted up to now.
         accepted: How many they are.
     """
 
@@ -149,7 +149,7 @@ class Estimate(NamedTuple):
         health: What may be flown on.
         tests: How well the measurements agree with it.
         rejected: How many values were rejected since the start, by sensor and reason.
-        resets: How often position, velocity or a reference was taken anew, because measurements had long said so.
+        resets: How often position, velocity or a reference was reset, because measurements had long contradicted it.
         smoothing_m: Part of the published position that is still to move to the filter's, east, north, up.
         check: The filter with its covariance, ten times a second; None between.
     """

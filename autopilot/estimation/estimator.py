@@ -1,13 +1,12 @@
 """The estimator: sensor frames in, the vehicle's state now out, with what it is worth.
 
-GPS tells of the past. The filter therefore runs the delay of GPS behind: inertial samples, magnetic field and pressure
+GPS measures the past. The filter therefore runs the delay of GPS behind: inertial samples, magnetic field and pressure
 wait in a ring until it comes to them, and each fix is fused at the instant that it was measured, so that the update is
 the exact one of a Kalman filter and its covariance is honest. The state now is the filter's, carried on through the
 samples that wait: with the inertial sensors alone, over a tenth of a second, nothing is lost by that. PX4's EKF2 runs
 so too, with an observer in place of the second integration, which is exact and costs a few microseconds.
 """
 
-from collections import deque
 from functools import reduce
 from math import ceil, isfinite
 from operator import or_
@@ -16,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.estimation.accelerometer_bias import AccelerometerWatch
+from colibri.autopilot.estimation.delay_buffer import DelayBuffer, Waiting
 from colibri.autopilot.estimation.eskf import Filter, FilterRecord
-from colibri.autopilot.estimation.eskf_predict import SAMPLE, look_ahead
+from colibri.autopilot.estimation.eskf_predict import look_ahead
 from colibri.autopilot.estimation.estimate import Check, Estimate, Health, Tests
 from colibri.autopilot.estimation.gyroscope_bias import turned_since
 from colibri.autopilot.estimation.measurements.instrument import Instrument, Value
@@ -25,7 +25,7 @@ from colibri.autopilot.estimation.output_smoothing import OutputSmoothing
 from colibri.autopilot.estimation.sensing.alignment import Aligned, Alignment
 from colibri.autopilot.estimation.sensing.clock_resets import MAX_GAP_US, ClockResets
 from colibri.autopilot.estimation.sensing.free_fall import Caught, Falling
-from colibri.autopilot.estimation.sensing.inertial import Inertial, Reading, sample_between
+from colibri.autopilot.estimation.sensing.inertial import Inertial, Reading
 from colibri.autopilot.estimation.sensing.plausibility import GpsWatch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
 from colibri.common.earth.atmosphere import altitude_m
@@ -37,13 +37,11 @@ from colibri.mavlink.hil.sensors import GpsFix, SensorFrame
 from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.sensors import Sensors
 
-_BRIDGED_S = 0.1
-"""A longer gap between two frames is crossed without what was measured at its ends."""
 _SPARE_SAMPLES = 8
 _LATE_US = 1_000_000
-"""Since when nothing was believed that comes several times a second: its source is lost."""
+"""A source of several measurements a second of which none was accepted for so long is lost."""
 _LEARNING_US = 5_000_000
-"""How long a bias taken anew is doubted."""
+"""For so long after its reset a bias counts as not yet learned."""
 _MAX_FIX_AGE_S = 0.5
 """How far from the filter's time a fix may have been measured."""
 _KNOWN_TILT_RAD, _KNOWN_YAW_RAD = 0.17, 0.26
@@ -54,13 +52,6 @@ _CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000
 """Between two fixes: a frame with one has enough to do."""
 _UPPER = np.triu_indices(9)
 _NOTHING = Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
-
-
-class _Waiting(NamedTuple):
-    """What each instrument measured at the end of a sample that the filter has not come to."""
-
-    time_us: int
-    values: list[Value | None] | None
 
 
 class EstimatorRecord(NamedTuple):
@@ -82,7 +73,7 @@ class EstimatorRecord(NamedTuple):
     filter: FilterRecord
     samples: Array
     first: int
-    waiting: list[_Waiting]
+    waiting: list[Waiting]
     reading: Reading
     fix_us: int | None
     position_m: Vector
@@ -91,6 +82,9 @@ class EstimatorRecord(NamedTuple):
 
 class Estimator:
     """Estimates the state of one vehicle.
+
+    It has more attributes than most classes: each part of the way from frame to estimate is one of them, all made new
+    by a restart.
 
     Attributes:
         filter: The filter, as far behind as GPS is.
@@ -107,7 +101,7 @@ class Estimator:
         self._interval_us = interval_us
         self._field = field_enu_gauss(origin)
         self._delay_us = round(sensors.gps.delay_s * 1e6)
-        self._samples = np.zeros((ceil(self._delay_us / interval_us) + _SPARE_SAMPLES, SAMPLE))
+        self._capacity = ceil(self._delay_us / interval_us) + _SPARE_SAMPLES
         self._now = np.zeros(19)
         self._rejected = Rejected()
         self._time_us: int | None = None
@@ -124,7 +118,7 @@ class Estimator:
         Unless `asked`, the estimate before is returned again, which takes half of the time.
 
         A frame whose time does not follow is rejected: the last estimate is given again. When such frames go on, the
-        simulator has begun anew, and so does the estimator.
+        simulator has restarted, and so does the estimator.
         """
         last_us = self._time_us
         if last_us is not None and not 0 < frame.time_us - last_us <= MAX_GAP_US:
@@ -141,11 +135,11 @@ class Estimator:
         values = [read(frame, rejected) for read in self._reads] if reads else None
         fix = self._fix_of(frame)
         if self._estimate is None or last_us is None:
-            told = self._told_at_rest(values)
+            at_rest = self._field_and_height(values)
             if values is not None:
                 self._at_rest = [new or old for new, old in zip(values, self._at_rest, strict=True)]
-            aligned = self._alignment.feed(frame.time_us, self._reading, *told, fix)
-            caught = self._falling.feed(frame.time_us, self._reading, *told, fix)
+            aligned = self._alignment.feed(frame.time_us, self._reading, *at_rest, fix)
+            caught = self._falling.feed(frame.time_us, self._reading, *at_rest, fix)
             if aligned is not None:
                 self._start(aligned, frame.time_us)
             elif caught is not None:
@@ -153,7 +147,7 @@ class Estimator:
             else:
                 return None
         else:
-            self._wait(before, (frame.time_us - last_us) * 1e-6, _Waiting(frame.time_us, values))
+            self._put(before, (frame.time_us - last_us) * 1e-6, Waiting(frame.time_us, values))
             self._catch_up(frame.time_us)
             if fix is not None:
                 self._fuse(fix, frame.time_us)
@@ -170,9 +164,9 @@ class Estimator:
                 self._time_us,
                 self.filter_us,
                 self.filter.record(),
-                self._samples,
-                self._first,
-                list(self._waiting),
+                self._buffer.samples,
+                self._buffer.first,
+                list(self._buffer.waiting),
                 self._reading,
                 self._gps_watch.time_us,
                 self._output_smoothing.position_m,
@@ -185,21 +179,21 @@ class Estimator:
 
         A frame that came before, and whose answer was lost with the process, comes again.
         """
-        kept = of_bytes(EstimatorRecord, record)
-        if kept is None or not 0 <= time_us - kept.time_us <= MAX_GAP_US or kept.samples.shape != self._samples.shape:
+        kept, buffer = of_bytes(EstimatorRecord, record), self._buffer
+        if kept is None or not 0 <= time_us - kept.time_us <= MAX_GAP_US or kept.samples.shape != buffer.samples.shape:
             return False
         if not self.filter.resume(kept.filter):
             return False
-        self._samples[:], self._first = kept.samples, kept.first
-        self._waiting.clear()
-        self._waiting.extend(kept.waiting)
+        buffer.samples[:], buffer.first = kept.samples, kept.first
+        buffer.waiting.clear()
+        buffer.waiting.extend(kept.waiting)
         self.filter_us, self._reading, self._gps_watch.time_us = kept.filter_us, kept.reading, kept.fix_us
         self._output_smoothing.position_m, self._output_smoothing.velocity_m_s = kept.position_m, kept.velocity_m_s
         self._time_us = self._published_us = kept.time_us
         if self._publish(kept.time_us) is None:
             return False
-        if time_us == kept.time_us and self._waiting:
-            self._waiting.pop()
+        if time_us == kept.time_us and buffer.waiting:
+            buffer.waiting.pop()
             self._time_us -= self._interval_us
         return True
 
@@ -220,8 +214,7 @@ class Estimator:
         self._accelerometer_watch = AccelerometerWatch(sensors, self._gravity)
         self._output_smoothing = OutputSmoothing()
         self._clock_resets = ClockResets()
-        self._waiting: deque[_Waiting] = deque()
-        self._first = 0
+        self._buffer = DelayBuffer(self._capacity)
         self.filter_us = 0
         self._reading = _NOTHING
         self._time_us = None
@@ -229,7 +222,7 @@ class Estimator:
         self._estimate: Estimate | None = None
         self._tests: Tests | None = None
 
-    def _told_at_rest(self, values: list[Value | None] | None) -> tuple[Vector | None, float | None]:
+    def _field_and_height(self, values: list[Value | None] | None) -> tuple[Vector | None, float | None]:
         """Return magnetic field and height of the barometer, by which a vehicle is aligned."""
         if values is None:
             return None, None
@@ -261,27 +254,22 @@ class Estimator:
         self.filter.start_in_air(caught, (e + de, n + dn, u + du), time_us)
         self.filter_us = time_us
 
-    def _wait(self, before: Reading, interval_s: float, measured: _Waiting) -> None:
-        """Put a sample into the ring, and what was measured at its end beside it."""
-        if interval_s > _BRIDGED_S:
-            before = before._replace(force_good=False, rate_good=False)
-        if len(self._waiting) == len(self._samples):
+    def _put(self, before: Reading, interval_s: float, measured: Waiting) -> None:
+        """Put a sample into the buffer, and what was measured at its end beside it."""
+        if self._buffer.is_full():
             self._take()
-        last = (self._first + len(self._waiting)) % len(self._samples)
-        self._samples[last] = sample_between(before, self._reading, interval_s)
-        self._waiting.append(measured)
+        self._buffer.put(before, self._reading, interval_s, measured)
 
     def _catch_up(self, now_us: int) -> None:
-        """Bring the filter to the instant that a fix told now would be of."""
-        while self._waiting and now_us - self._waiting[0].time_us >= self._delay_us:
+        """Bring the filter to the instant that a fix received now would be of."""
+        while self._buffer.waiting and now_us - self._buffer.waiting[0].time_us >= self._delay_us:
             self._take()
 
     def _take(self) -> None:
         """Bring the filter on by one sample."""
-        time_us, values = self._waiting.popleft()
         filter_ = self.filter
-        filter_.predict(self._samples, self._first)
-        self._first = (self._first + 1) % len(self._samples)
+        filter_.predict(self._buffer.samples, self._buffer.first)
+        time_us, values = self._buffer.take()
         self.filter_us = time_us
         if values is None:
             return
@@ -318,9 +306,10 @@ class Estimator:
             self.filter.reset_gyro_bias(*turned, now_us)
 
     def _publish(self, now_us: int) -> Estimate | None:
-        """Return the estimate now; None, and all anew, if it is of no vehicle."""
-        filter_ = self.filter
-        look_ahead(filter_.x, filter_.P, self._samples, self._first, len(self._waiting), self._gravity, self._now)
+        """Return the estimate now; None, after a restart, if its numbers can be of no vehicle."""
+        filter_, buffer = self.filter, self._buffer
+        ahead = len(buffer.waiting)
+        look_ahead(filter_.x, filter_.P, buffer.samples, buffer.first, ahead, self._gravity, self._now)
         e, n, u, ve, vn, vu, qw, qx, qy, qz, *sigma = self._now.tolist()
         if not isfinite(sum(sigma) + e + n + u + qw) or not abs(ve) + abs(vn) + abs(vu) < _MAX_SPEED_M_S:
             self._restart()
@@ -401,7 +390,7 @@ class Estimator:
         self.filter.start(aligned, (0.0, 0.0, 0.0), 0)
         rest = Reading(force, (0.0, 0.0, 0.0), True, True)
         typical: list[Value | None] = [instrument.typical() for instrument in self.filter.instruments]
-        self._wait(rest, self._interval_us * 1e-6, _Waiting(self._interval_us, typical))
+        self._put(rest, self._interval_us * 1e-6, Waiting(self._interval_us, typical))
         self._take()
         self._fuse(fix, self._interval_us)
         self._publish(self._interval_us)

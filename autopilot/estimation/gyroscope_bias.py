@@ -3,8 +3,8 @@
 A bias of the rate that is there from one instant on turns the filter's attitude away from the vehicle's. The magnetic
 field is rejected within a tenth of a second, GPS velocity after another second or two, since thrust then points
 elsewhere. Either alone proves nothing: iron turns a field, and a receiver may lie. Together they leave only what they
-have in common. The filter then doubts attitude and bias by as much as the field has turned since, and finds both by
-itself. PX4's EKF2 likewise takes its yaw anew where field and GPS velocity contradict it.
+have in common. The covariance of attitude and bias is then inflated by as much as the field has turned since, and the
+filter finds both by itself. PX4's EKF2 likewise resets its yaw where field and GPS velocity contradict it.
 """
 
 from math import hypot
@@ -15,7 +15,7 @@ from colibri.autopilot.estimation.eskf import Filter
 _REJECTED_US = 200_000
 """Of GPS velocity, before it is a witness: three fixes at 10 Hz."""
 _MAX_TURN_RAD = 0.3
-"""Beyond that the field is not believable either."""
+"""Beyond that the field is not plausible either."""
 
 
 class Turned(NamedTuple):

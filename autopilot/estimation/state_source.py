@@ -1,4 +1,4 @@
-"""What the autopilot knows of its vehicle: the state that it is told, or the one that it estimates from sensors."""
+"""Where the vehicle's state comes from: the simulator's frames, or the estimate from sensors."""
 
 from collections.abc import Callable
 from typing import Any, Protocol, TypeAlias
@@ -37,7 +37,7 @@ Estimator: TypeAlias = Callable[[int], Estimating]
 
 
 def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> Estimator | None:
-    """Return what estimates the state of `vehicle`, whose ENU frame begins at `origin`; None where it is told.
+    """Return the estimator of `vehicle`, whose ENU frame begins at `origin`; None where the simulator sends the state.
 
     Raises:
         VehicleError: Sensors are asked for that the vehicle has not.
@@ -62,7 +62,7 @@ class StateSource:
     """Turns any frame into a state.
 
     Attributes:
-        estimate: The last one; None before the first, and where the state is told.
+        estimate: The last one; None before the first, and where the simulator sends the state.
         sensed: What was measured on board last.
         latest: The last of each sensor that tells in a message of its own, by the frame's field.
     """
@@ -123,7 +123,7 @@ class StateSource:
         return None if self.estimate is None else self.estimate.frame
 
     def has_gps(self, now_us: int) -> bool:
-        """Whether there is GPS; where the state is told there is what it would tell."""
+        """Whether there is GPS; where the simulator sends the state, there always is."""
         if self._make is None:
             return True
         fix = self.fix

@@ -1,4 +1,4 @@
-"""Whether the vehicle stands: told from a reference that sinks on while the vehicle does not."""
+"""Whether the vehicle stands: detected by a reference that sinks on while the vehicle does not."""
 
 from typing import NamedTuple
 
@@ -34,7 +34,7 @@ def watch(
 ) -> tuple[Landing, bool]:
     """Return what to remember, and whether the vehicle stands: its signs have lasted.
 
-    Only the ground can hold a vehicle that `sinks`: that is told to, or whose rotors do not turn, and yet is still.
+    Only the ground can hold a vehicle that `sinks`: one commanded to, or whose rotors do not turn, and yet still.
 
     Where the estimate of the velocity `drifts`, as without GPS, it says nothing, and less after the blow of the ground;
     but it still follows the accelerometer. Such a vehicle sinks where its thrust carries half of it, and would fall

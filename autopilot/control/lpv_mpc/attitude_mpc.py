@@ -1,4 +1,4 @@
-"""The attitude LPV-MPC: predicts, condenses, solves, and says what it planned."""
+"""The attitude LPV-MPC: predicts, condenses, solves and reads the plan."""
 
 from math import radians
 from typing import Literal, NamedTuple, TypeAlias
@@ -173,7 +173,7 @@ class AttitudeMpc:
     def read(
         self, now: InitialState, target: Target, qp: Qp, z: Array, solve_time_s: float
     ) -> tuple[Plan, Diagnostics]:
-        """Return the plan that the QP's solution `z` (n,) stands for, and what there is to say of it."""
+        """Return the plan that the QP's solution `z` (n,) stands for, and its diagnostics."""
         states, moments, squared = condensing.read_plan(self._responses, self._packed, now.u, z, target.thrust_n)
         active = condensing.count_active(qp.G, qp.h, qp.lower, qp.upper, z, self._rotor_rows, _BINDING)
         diagnostics = Diagnostics(

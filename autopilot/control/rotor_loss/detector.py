@@ -1,4 +1,4 @@
-"""Whether a rotor is lost: told from thrust and moments that the commanded rotors should make and the vehicle misses.
+"""Whether a rotor is lost: detected by thrust and moments that the commanded rotors should make and the vehicle misses.
 
 Newton and Euler, backwards: from one control sample to the next the vehicle's velocity and rates say which force along
 its z axis and which moments acted. What the rotors were commanded to make, their lag followed, is taken off; a dead
@@ -118,7 +118,7 @@ class RotorWatch:
         self._battery = BatteryModel(vehicle)
 
     def begin(self, controls: tuple[float, float, float, float]) -> None:
-        """Begin anew with the rotors at `controls`, parts of the largest speed: no sample was before."""
+        """Reset, with the rotors at `controls`, parts of the largest speed: no sample was before."""
         self.speeds = np.array(controls)
         self.evidence[:] = self._residual[:] = self._noise[:] = 0.0
         self._before = None

@@ -15,7 +15,7 @@ _CLEAR_M = 0.3
 
 
 class Permission(Protocol):
-    """What says whether a vehicle may be landed on three rotors."""
+    """The conditions under which a vehicle may be landed on three rotors."""
 
     @property
     def land_on_three(self) -> bool:

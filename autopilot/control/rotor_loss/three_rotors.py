@@ -40,7 +40,7 @@ class Descent(NamedTuple):
         far_m: How far that is.
         wind_tilt_deg: Largest tilt of the mean thrust at all.
         wind_rad_s: Frequency at which what the model does not explain is observed: wind, most of all.
-        max_wind_m_s2: Largest of that believed.
+        max_wind_m_s2: Largest of that estimated.
         settle_s: So long it stays at its height.
         sink_m_s: Then it sinks.
         land_m_s: At this speed close to the ground.
@@ -64,7 +64,7 @@ class Descent(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """When the ground holds a vehicle that is told to sink: it knocks, or the vehicle stays. Rates do not count.
+    """When the ground holds a vehicle commanded to sink: it knocks, or the vehicle stays. Rates do not count.
 
     Attributes:
         knock: Upward acceleration of one sample that nothing else makes, in parts of gravity, where the ground is near.
@@ -82,6 +82,8 @@ DESCENT, CONTACT, WEIGHTS = Descent(), Contact(), Weights()
 
 class ThreeRotors:
     """Flies one vehicle that has lost a rotor, until the ground holds it.
+
+    It has more attributes than most classes: the vehicle's numbers, and the state of observer, descent and contact.
 
     Attributes:
         controls: Rotor commands, parts of the largest speed.
@@ -111,7 +113,7 @@ class ThreeRotors:
             state: The vehicle now. It lands where it can stop.
             ground_m: Height of the ground, z of ENU, as far as it is known.
             descent: How it is flown.
-            contact: How the ground is told.
+            contact: How the ground is detected.
             weights: Of the attitude.
         """
         self._vehicle, self._interval_s, self._descent, self._contact = vehicle, interval_s, descent, contact
@@ -219,7 +221,7 @@ class ThreeRotors:
         return -how.sink_m_s if state.position_enu_m[2] - self._ground_m > how.land_above_m else -how.land_m_s
 
     def _watch_ground(self, state: VehicleState) -> None:
-        """Land where the ground knocks at a vehicle that is low, or holds one that is told to sink."""
+        """Land where the ground knocks at a vehicle that is low, or holds one that is commanded to sink."""
         how = self._contact
         sinks = self._climb_m_s(state) < 0.0
         slow = hypot(*state.velocity_enu_m_s) < how.slower_m_s

@@ -1,1 +1,1 @@
-"""What a law believes of the vehicle: allocation, rotor lag, battery, airframe, the disturbance observed."""
+"""The vehicle as a law models it: allocation, rotor lag, battery, airframe, the disturbance observed."""

@@ -19,11 +19,11 @@ _APART = 0.02
 
 
 def estimated(model_ah: float, reported_ah: float, vehicle: Vehicle) -> float:
-    """Return the charge taken, Ah, that is believed where a model and the battery itself say different things.
+    """Return the charge taken, Ah, estimated from a model and from what the battery itself reports.
 
     Args:
-        model_ah: What the model has counted.
-        reported_ah: What the battery says.
+        model_ah: What the model has integrated.
+        reported_ah: What the battery reports.
         vehicle: Whose battery it is.
     """
     if vehicle.battery is None:

@@ -29,7 +29,7 @@ class Barometer:
         kind: Its tests.
         group: Of `Updated`.
         smoothed: Its corrections are not given in with time.
-        height_m: What pressure told last.
+        height_m: Of the last pressure.
     """
 
     source: str = Source.BAROMETER

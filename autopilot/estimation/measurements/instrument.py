@@ -15,7 +15,7 @@ Value: TypeAlias = tuple[float, ...]
 
 
 class Ratio(IntEnum):
-    """A ratio of ESTIMATOR_STATUS, in the order of its fields; the largest of its kinds is told."""
+    """A ratio of ESTIMATOR_STATUS, in the order of its fields; the largest of its kinds is reported."""
 
     VELOCITY = 0
     POSITION = 1

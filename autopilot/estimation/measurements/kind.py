@@ -15,7 +15,7 @@ FIVE_SIGMA = (25.0, 28.74, 31.81)
 
 
 class KindRecord(NamedTuple):
-    """When a kind of measurement was last believed, since when it is not, and how often it had to be."""
+    """When a kind of measurement was last accepted, since when it is rejected, and how often it was forced."""
 
     accepted_us: int
     rejected_us: int | None
@@ -28,15 +28,15 @@ class Kind:
     Attributes:
         name: In tests and logs.
         test: The last.
-        accepted_us: When it was last believed.
+        accepted_us: When it was last accepted.
         rejected_us: Since when it is not; None while it is.
-        resets: How often it had to be believed.
-        nis: Sum of the normalised innovations squared that were believed at once.
+        resets: How often it was accepted by force.
+        nis: Sum of the normalised innovations squared that were accepted at once.
         accepted: How many they are.
     """
 
     def __init__(self, name: str, numbers: int, patience_us: int, inflated: tuple[int, int, float]) -> None:
-        """Measure `numbers` at once; after `patience_us` of rejections, doubt (first state, count, σ) and believe."""
+        """Measure `numbers` at once; after `patience_us` of rejections, inflate (first state, count, σ), accept."""
         self.name = name
         self.gate = FIVE_SIGMA[numbers - 1]
         self.test = Test(-1, (0.0,) * numbers, 0.0, self.gate)
@@ -50,14 +50,14 @@ class Kind:
         self.accepted = 0
 
     def fuse(self, x: Array, P: Array, time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
-        """Fuse a measurement into state and covariance; return whether it was believed."""
+        """Fuse a measurement into state and covariance; return whether it was accepted."""
         nis = kernel(x, P, *arguments, self.gate, self._y)
         if self.note(time_us, tuple(self._y.tolist()), nis):
             return True
         return self.force_accept(x, P, time_us, kernel, *arguments)
 
     def note(self, time_us: int, innovation: tuple[float, ...], nis: float) -> bool:
-        """Note a test; return whether the measurement was believed."""
+        """Note a test; return whether the measurement was accepted."""
         self.test = Test(time_us, innovation, nis, self.gate)
         if nis <= self.gate:
             self.accepted_us, self.rejected_us = time_us, None
@@ -67,7 +67,7 @@ class Kind:
         return False
 
     def force_accept(self, x: Array, P: Array, time_us: int, kernel: Callable[..., float], *arguments: Any) -> bool:
-        """Reject a measurement, but believe it if this has lasted too long; return whether it was believed."""
+        """Reject a measurement, but accept it by force if this has lasted too long; return whether that was so."""
         if not self.reject(time_us):
             return False
         first, count, sigma = self._inflated
@@ -78,18 +78,18 @@ class Kind:
         return True
 
     def accept(self, time_us: int) -> None:
-        """Note that a measurement was believed."""
+        """Note that a measurement was accepted."""
         self.accepted_us = time_us
         self.rejected_us = None
 
     def reject(self, time_us: int) -> bool:
-        """Note that a measurement was not believed; return whether this has lasted too long."""
+        """Note that a measurement was rejected; return whether this has lasted too long."""
         if self.rejected_us is None:
             self.rejected_us = time_us
         return time_us - self.rejected_us >= self._patience_us
 
     def record(self) -> KindRecord:
-        """Return when it was believed."""
+        """Return when it was accepted, and what else a restart needs."""
         return KindRecord(self.accepted_us, self.rejected_us, self.resets)
 
     def resume(self, record: KindRecord) -> None:

@@ -1,7 +1,7 @@
 """The rangefinder: height above the ground, which is flat, seen down the vehicle's own axis.
 
 Near the ground, and upright, its distance is that height over the cosine of the tilt, less half of the beam. The ground
-is where the vehicle stands at the start, height 0, until the distance contradicts that for long: it is then taken anew,
+is where the vehicle stands at the start, height 0, until the distance contradicts that for long: it is then reset,
 and height stays.
 """
 

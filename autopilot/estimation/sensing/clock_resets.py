@@ -1,4 +1,4 @@
-"""Frames whose time does not follow: some are strays; many that follow one another are a clock begun anew."""
+"""Frames whose time does not follow: a few are strays; many in sequence are a clock that was reset."""
 
 MAX_GAP_US = 1_000_000
 _SETTLED = 25

@@ -2,7 +2,7 @@
 
 Who was restarted in flight and has nothing to go on with cannot rest for a second. But until there is an estimate the
 rotors stand, so a vehicle in the air falls at once; accelerometer and GPS both show it. In a fall nothing shows where
-up is: the vehicle is taken to have been level, its heading is the magnetic field's, and the filter is told how little
+up is: the vehicle is taken to have been level, its heading is the magnetic field's, and the covariance holds how little
 that is worth. The first corrections by GPS find the tilt.
 """
 
@@ -21,7 +21,7 @@ _FALLS_PART = 0.35
 _FALLS_FOR_US = 40_000
 _SINKS_M_S = 0.5
 _SURELY_US = 400_000
-"""GPS sees a fall late; after so long it is believed without, so that one that was rising is caught, too."""
+"""GPS sees a fall late; after so long it is assumed without, so that one that was rising is caught, too."""
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -47,7 +47,7 @@ class Falling:
     """Waits for a fall, from a frame on that is not a flight's first."""
 
     def __init__(self, gravity_m_s2: float, field_enu_gauss: Vector, delay_s: float) -> None:
-        """Wait where the field is `field_enu_gauss`, for fixes told `delay_s` after they were measured."""
+        """Wait where the field is `field_enu_gauss`, for fixes received `delay_s` after they were measured."""
         self._gravity = gravity_m_s2
         self._earth_field = np.array(field_enu_gauss)
         self._delay_us = round(delay_s * 1e6)

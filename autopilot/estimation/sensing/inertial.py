@@ -40,7 +40,7 @@ class _Axes:
 
 
 class Reading(NamedTuple):
-    """What accelerometer and gyroscope say at one frame: m/s² and rad/s, FLU, and whether either can be used."""
+    """What accelerometer and gyroscope measured at one frame: m/s² and rad/s, FLU, and whether either can be used."""
 
     force: Vector
     rate: Vector

@@ -1,4 +1,4 @@
-"""Whether a sensor can have measured what it says: finite, within its range, and alive."""
+"""Whether a sensor can have measured its value: finite, within its range, and alive."""
 
 from math import inf, isfinite
 
@@ -54,7 +54,7 @@ class GpsWatch:
         self._alive = Watch(-inf, inf, _GPS_PATIENCE_US)
 
     def reason(self, fix: GpsFix, now_us: int) -> Reason | None:
-        """Return why a fix, told by `now_us`, must be rejected; None if it need not."""
+        """Return why a fix, received by `now_us`, must be rejected; None if it need not."""
         if not _MIN_FIX <= fix.fix_type <= _BEST_FIX or fix.place[:2] == _NOWHERE:
             return Reason.NO_FIX
         numbers = (*fix.place, *fix.velocity_enu_m_s)

@@ -34,7 +34,7 @@ class TiltLoop:
         self._memory: ReferenceMemory | None = None
 
     def forget(self) -> None:
-        """Begin anew at the next demand."""
+        """Reset at the next demand."""
         self._memory = None
 
     def by_setpoint(self, setpoint: AttitudeSetpoint, context: TaskContext) -> AttitudeMotion:

@@ -115,7 +115,7 @@ class AttitudeMotion(NamedTuple):
         reference: Where the reference stands meanwhile.
         lifts: Whether a vehicle that stands must leave the ground for it.
         sinks: Whether a vehicle in the air must sink.
-        drifts: Whether the velocity is not to be believed: see `landing.watch`.
+        drifts: Whether the velocity is unreliable: see `landing.watch`.
     """
 
     demand: AttitudeDemand
