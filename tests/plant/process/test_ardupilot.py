@@ -1,6 +1,7 @@
 """ArduPilot's JSON interface: the conversation, the order of the rotors, and a flight through it."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from math import atan2, radians
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.ardupilot import ArduPilotEnd
 from colibri.plant.vehicle.description import Rotors, VehicleError, load_vehicle
 from tests.plant.process.ardupilot import pulses, read, request
-from tools.harness.processes import GIVE_UP_AFTER_S, Process, running
+from tools.harness.processes import GIVE_UP_AFTER_S, Process, begins_as_recorded, running
 
 VEHICLE = load_vehicle("hummingbird")
 PHYSICS = Physics(VEHICLE, "rk4")
@@ -179,19 +180,19 @@ def plant(tmp_path: Path) -> Iterator[Process]:
         yield process
 
 
+@begins_as_recorded
 def test_the_process_answers_whoever_asks_and_keeps_what_was_flown(plant: Process, tmp_path: Path) -> None:
-    link = open_link(plant.wait_for("listening")["url"].replace("udpin", "udpout"))
-    assert plant.wait_for("frame")["frame_type"] == 6
-    end, told = standing(), None
-    for count in range(300):
-        sent = request(count, pulses(told, TARGET_NED_M) if told else (1000,) * 4)
-        for _ in range(3 if count == 0 else 1):  # it asks again while the plant is still loading
-            link.send(sent)
-        received = link.receive(GIVE_UP_AFTER_S)
-        assert received is not None
-        assert received[0] == answered(end, sent)
-        told = read(received[0])
-    link.close()
+    with closing(open_link(plant.wait_for("listening")["url"].replace("udpin", "udpout"))) as link:
+        assert plant.wait_for("frame")["frame_type"] == 6
+        end, told = standing(), None
+        for count in range(300):
+            sent = request(count, pulses(told, TARGET_NED_M) if told else (1000,) * 4)
+            for _ in range(3 if count == 0 else 1):  # it asks again while the plant is still loading
+                link.send(sent)
+            received = link.receive(GIVE_UP_AFTER_S)
+            assert received is not None
+            assert received[0] == answered(end, sent)
+            told = read(received[0])
     plant.process.terminate()
     assert plant.wait() == 130
     ended = plant.events("ended")[0]
