@@ -7,14 +7,17 @@ from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 from time import perf_counter
+from types import ModuleType
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc
 from colibri.autopilot.control.lpv_mpc.law import LpvMpc
+from colibri.autopilot.control.lpv_mpc.outer_loop import OuterLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus, installed_solvers
+from colibri.autopilot.control.vehicle_model import rotor_lag
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.bench.variants import CONTROLLER, TRACK, plan_of, with_moves
 from colibri.flights.in_process import fly_locally
@@ -43,22 +46,22 @@ _ECHO_ENDS_AFTER_S = 10.0
 
 
 class Stage(NamedTuple):
-    """A stage: what it is called, and the method that is it."""
+    """A stage: its name, and the method or function that it is."""
 
     name: str
-    owner: type
+    owner: type | ModuleType
     method: str
 
 
 CONTROL_STEP = Stage("control step", Autopilot, "step")
 STAGES = (
     Stage("estimate", LpvMpc, "estimate"),
-    Stage("position", LpvMpc, "position"),
+    Stage("position", OuterLoop, "track"),
     Stage("LPV", AttitudeMpc, "predict"),
     Stage("condense", AttitudeMpc, "condense"),
     Stage("QP", QpSolver, "solve"),
     Stage("read plan", AttitudeMpc, "read"),
-    Stage("mixer", LpvMpc, "mix"),
+    Stage("mixer", rotor_lag, "actuate"),
     CONTROL_STEP,
 )
 FRAME_SENT = Stage("encode frame", PlantEnd, "offer")

@@ -184,7 +184,7 @@ class LpvMpc:
     def _inputs(self, memory: Memory, state: VehicleState) -> LawInputs:
         rotation = np.array(rotation_matrix(state.attitude))
         measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2].tolist()])
-        estimate = self._estimate(memory, measured)
+        estimate = self.estimate(memory, measured)
         phi, theta, psi = state.euler
         p, q, r = state.rate_flu_rad_s
         thrust_n, *moments_n_m = memory.wrench.tolist()
@@ -215,7 +215,7 @@ class LpvMpc:
         phi, theta, psi = setpoint.target.angles[0].tolist()
         return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), choice.diagnostics)
 
-    def _estimate(self, memory: Memory, measured: Array) -> Array:
+    def estimate(self, memory: Memory, measured: Array) -> Array:
         """Return the observer's estimate, (12,), with the measurement `measured`, (9,)."""
         if memory.measured is None:
             return disturbance_observer.first_estimate(measured)

@@ -37,8 +37,8 @@ def test_offboard_needs_setpoints_first() -> None:
 
 
 def test_offboard_positions_and_that_a_jump_of_them_is_flown_smoothly() -> None:
-    flight = offboard(position=(0.0, 0.0, 5.0), yaw_rad=0.5 * pi)
-    stream(flight, 0.5, position=(0.0, 0.0, 5.0), yaw_rad=0.5 * pi)  # it is there, to the last bit
+    flight = offboard(position=(0.0, 0.0, 5.0), yaw=0.5 * pi)
+    stream(flight, 0.5, position=(0.0, 0.0, 5.0), yaw=0.5 * pi)  # it is there, to the last bit
     speeds = []
     for _ in range(45):
         flight.setpoint(position=(4.0, 2.0, 6.0), yaw=0.0)
@@ -50,8 +50,8 @@ def test_offboard_positions_and_that_a_jump_of_them_is_flown_smoothly() -> None:
 
 
 def test_offboard_velocity_and_yaw_rate_and_what_silence_does() -> None:
-    flight = offboard(velocity=(2.0, -1.0, 0.5), yaw_rate_rad_s=0.5)
-    stream(flight, 3.0, velocity=(2.0, -1.0, 0.5), yaw_rate_rad_s=0.5)
+    flight = offboard(velocity=(2.0, -1.0, 0.5), yaw_rate=0.5)
+    stream(flight, 3.0, velocity=(2.0, -1.0, 0.5), yaw_rate=0.5)
     assert flight.velocity == pytest.approx((2.0, -1.0, 0.5), abs=0.05)
     assert flight.copter.pilot.context().state.rate_flu_rad_s[2] == pytest.approx(0.5, abs=0.05)
     flight.run(0.8)
