@@ -29,6 +29,7 @@ class Wire:
         self.write = sock.sendall
 
 
+@pytest.mark.long
 def test_a_client_of_the_tcp_server(tmp_path: Path) -> None:
     """Two at once; what it reads comes in pieces, as TCP cuts them."""
     with vehicle(tmp_path, links=("tcpin:127.0.0.1:0",), speed=4.0) as flown:

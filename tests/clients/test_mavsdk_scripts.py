@@ -63,6 +63,7 @@ def lands(seen: Observer, where: Vector) -> None:
     assert away_m(landed, where) < 0.3
 
 
+@pytest.mark.long
 def test_services(tmp_path: Path) -> None:
     """What needs no flight, one script after another, with one vehicle."""
     with vehicle(tmp_path, speed=SPEED) as flown:

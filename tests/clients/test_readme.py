@@ -64,6 +64,7 @@ def test_the_command_is_all_that_qgroundcontrol_needs() -> None:
     assert snippets(" / DroneKit")[0] == ".venv/bin/colibri sitl\n"
 
 
+@pytest.mark.long
 def test_mavsdk(tmp_path: Path) -> None:
     port = free_port()
     with vehicle(tmp_path, links=(f"udpout:127.0.0.1:{port}",), speed=SPEED) as flown:

@@ -52,7 +52,7 @@ def flown(launcher: Launcher | None, fly: Callable[[Sitl], object], **setting: A
         return sitl.sha256, sitl.texts
 
 
-@pytest.mark.parametrize("feedback", ["state", "sensors"])
+@pytest.mark.parametrize("feedback", ["sensors", pytest.param("state", marks=pytest.mark.long)])
 def test_the_same_flight_over_udp(forked: Launcher, feedback: str) -> None:
     in_memory = flown(None, up_and_on, feedback=feedback, **IN_WIND)
     assert flown(forked, up_and_on, feedback=feedback, **IN_WIND) == in_memory

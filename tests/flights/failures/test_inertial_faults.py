@@ -68,6 +68,7 @@ def test_a_gyroscope_that_is_suddenly_off_is_learned_and_its_end_too(bias: Vecto
     assert not flight.client.said("lost")
 
 
+@pytest.mark.long
 def test_a_gyroscope_that_drifts_is_followed() -> None:
     flight = CopterFlight(feedback=Feedback.SENSORS, seed=3)
     flight.takeoff(10.0)

@@ -63,6 +63,7 @@ def test_two_processes_fly_the_same_flight(tmp_path: Path) -> None:
     assert len(flown[0].splitlines()) == 1 + 1501
 
 
+@pytest.mark.long
 def test_daqp_and_clarabel_give_the_same_inputs(tmp_path: Path) -> None:
     """Catching the lemniscate up, where limits bind, and along it: every input to 1e-4 N and N m."""
     flown = []

@@ -131,6 +131,7 @@ def test_a_flood_ends_no_flight(logs: Path) -> None:
         assert autopilot.errors() == ""
 
 
+@pytest.mark.long
 def test_clients_that_fall_asleep_or_vanish_are_nobodys_trouble(logs: Path) -> None:
     with hovering(logs, "tcpin:127.0.0.1:0") as (_, autopilot, seen, _):
         (port,) = waiting_ports(autopilot)

@@ -29,6 +29,7 @@ def logs(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.long
 def test_a_bad_link_does_not_change_the_flight(tmp_path: Path, logs: Path) -> None:
     """20 % lost, 10 % duplicated, 10 % reordered, both ways."""
     duration = ("--duration", "20")
@@ -59,6 +60,7 @@ def test_the_autopilot_may_start_first(tmp_path: Path, logs: Path) -> None:
             assert plant.wait() == 0
 
 
+@pytest.mark.long
 def test_a_killed_autopilot_is_replaced_in_mid_flight(tmp_path: Path, logs: Path) -> None:
     out = tmp_path / "flight"
     plant, url = start_plant(logs, out, *START)

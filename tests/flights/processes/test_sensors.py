@@ -46,6 +46,7 @@ def test_a_bad_link_does_not_change_what_sensors_tell(tmp_path: Path) -> None:
     assert plant.errors() + autopilot.errors() == ""
 
 
+@pytest.mark.long
 def test_two_processes_fly_the_same_flight_as_one(tmp_path: Path) -> None:
     figures = [
         fly(tmp_path / link, *ON_SENSORS, "--link", link, "--seed", "1", "--duration", "8")

@@ -82,6 +82,7 @@ def test_wind_carries_a_flight_away_and_comes_from_where_it_is_said_to(tmp_path:
     assert west["x"][-1] - calm["x"][-1] > 0.1
 
 
+@pytest.mark.long
 def test_the_same_seed_is_the_same_weather_over_every_link(tmp_path: Path) -> None:
     options = (
         "hover",
