@@ -22,7 +22,7 @@ from colibri.mavlink.wire.refusal import Refusal
 
 
 class Missions:
-    """The mission of one vehicle, and the fence that it must keep to.
+    """The mission of one vehicle, and the fence that it must keep to: a method for each order about them.
 
     Attributes:
         changes: How often a plan was replaced.

@@ -35,6 +35,8 @@ _STANDING_SAMPLES = 50
 class Ground:
     """Serves ground stations beside the plant, and keeps what must outlive the process.
 
+    It has more attributes than most classes: what a vehicle is made of, to make another one after a restart.
+
     Attributes:
         copter: The vehicle; another one after a restart.
         shut_down: Whether a ground station has asked for the end.

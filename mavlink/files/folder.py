@@ -68,7 +68,7 @@ def _refusing(
 
 
 class Folder:
-    """Files in a folder of the disk.
+    """Files in a folder of the disk: a method for each operation of `Files`, and what they share.
 
     Nobody else is expected to fill it: how much it holds is counted once, and then with what is done here.
     """

@@ -82,7 +82,7 @@ class _Checksum:
 
 
 class Ftp:
-    """Serves files.
+    """Serves files. Each opcode has a method of its own, so it has more than most classes.
 
     Attributes:
         handles: FILE_TRANSFER_PROTOCOL.

@@ -52,6 +52,8 @@ class Outgoing(NamedTuple):
 class PlantEnd:
     """The plant's end: offers a frame, waits for its answer.
 
+    It has more attributes than most classes: they are one conversation, its frame, its peer, its faults and its counts.
+
     Attributes:
         peer: Where the autopilot is, None until one has called.
         frame_interval_us: Time between frames; fixed once the first frame was offered.

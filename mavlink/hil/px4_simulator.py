@@ -64,6 +64,8 @@ class Truth(NamedTuple):
 class SimulatorEnd:
     """The simulator's end: offers frames, receives motor commands.
 
+    It has more attributes than most classes: they are one conversation, as those of `PlantEnd`.
+
     Attributes:
         peer: Where PX4 is; None until it has called, and after it has gone.
         calls: How many times a PX4 has begun to be served.

@@ -74,7 +74,7 @@ class Vehicle(NamedTuple):
 
 
 class MissionService:
-    """Holds the three plans and speaks the mission protocol about them.
+    """Holds the three plans and speaks the mission protocol about them: a method for each of its messages.
 
     Attributes:
         plans: By MAV_MISSION_TYPE.

@@ -49,7 +49,8 @@ class ChannelObserver(Protocol):
 class Hub:
     """A component on any number of links.
 
-    A channel is one remote address on one link. It opens with the first valid message from there.
+    A channel is one remote address on one link. It opens with the first valid message from there. Services, links and
+    the owner each see some of its methods, so it has more than most classes.
 
     Attributes:
         accepts_only: The messages dispatched to services for the time being; None for all.

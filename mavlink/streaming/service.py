@@ -41,7 +41,8 @@ _OLD_REQUESTS = {
 class StreamService:
     """Streams telemetry to every channel at its own rates, and sends messages on request.
 
-    The owner sets each frame's snapshot by `update` before `poll`.
+    The owner sets each frame's snapshot by `update` before `poll`. Each command and message about streams has a
+    method of its own, so it has more than most classes.
     """
 
     handles = frozenset({"REQUEST_DATA_STREAM"})

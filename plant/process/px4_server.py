@@ -37,7 +37,10 @@ def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) 
 
 
 class Simulator:
-    """Serves one PX4 after the other, each from the start."""
+    """Serves one PX4 after the other, each from the start.
+
+    It has more attributes than most classes: all that a flight begins with is kept, to begin the next one with.
+    """
 
     def __init__(self, args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> None:
         """Fly as the command line says.

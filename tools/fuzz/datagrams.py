@@ -36,7 +36,7 @@ _QUATERNIONS = ((1.0, 0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5), (0.0, 0.6, 0.8, 0.0)
 
 
 class Fuzzer:
-    """Makes datagrams by chance, for one receiver.
+    """Makes datagrams by chance, for one receiver: a method for each kind of them.
 
     Attributes:
         moment_us: Simulated time that the flight is at, beyond its start: broken messages name it, valid ones never.

@@ -104,7 +104,7 @@ class MissionRecord(NamedTuple):
 
 
 class MissionExecutor:
-    """Flies one plan.
+    """Flies one plan: a method for each order about the mission, and for each thing that an item may do to it.
 
     Attributes:
         progress: State, current item; a new object whenever that changes.
