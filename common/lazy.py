@@ -7,12 +7,7 @@ from typing import Any
 
 
 def public(package: str, places: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return the `__getattr__` and the `__dir__` of a package.
-
-    Args:
-        package: Its `__name__`.
-        places: The public names that a module defines, parted by blanks, by the name of the module.
-    """
+    """Return a package's `__getattr__` and `__dir__`; `places` has the names of each module, parted by blanks."""
     place_of = {name: place for place, names in places.items() for name in names.split()}
 
     def get(name: str) -> Any:

@@ -19,9 +19,7 @@ class Geodetic(NamedTuple):
     """A place on earth.
 
     Attributes:
-        latitude_deg: North, degrees.
-        longitude_deg: East, degrees.
-        altitude_m: Above mean sea level, m.
+        altitude_m: Above mean sea level.
     """
 
     latitude_deg: float

@@ -13,8 +13,6 @@ class HomePlace(NamedTuple):
     """Where the vehicle stands when everything begins; the origin of the ENU frame is there.
 
     Attributes:
-        latitude_deg: North, degrees.
-        longitude_deg: East, degrees.
         altitude_m: Above mean sea level.
         yaw_deg: Heading, clockwise from north.
     """

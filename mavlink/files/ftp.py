@@ -82,11 +82,7 @@ class _Checksum:
 
 
 class Ftp:
-    """Serves files. Each opcode has a method of its own, so it has more than most classes.
-
-    Attributes:
-        handles: FILE_TRANSFER_PROTOCOL.
-    """
+    """Serves files. Each opcode has a method of its own, so it has more than most classes."""
 
     handles = frozenset({"FILE_TRANSFER_PROTOCOL"})
 

@@ -65,12 +65,6 @@ class Request(NamedTuple):
     """A request of a client.
 
     Attributes:
-        peer: The client.
-        now_us: Simulated time.
-        payload: The whole of it.
-        sequence: Its number.
-        session: Number of the session.
-        opcode: What to do.
         size: Length of the data, or of what to read.
         offset: In a file, or among the entries of a folder.
         data: Not more than `size` bytes.

@@ -52,24 +52,14 @@ class _Transfer:
 
 
 class Logs:
-    """Serves the logs in a folder.
-
-    Attributes:
-        handles: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_ERASE, LOG_REQUEST_END.
-    """
+    """Serves the logs in a folder."""
 
     handles = frozenset({"LOG_REQUEST_LIST", "LOG_REQUEST_DATA", "LOG_ERASE", "LOG_REQUEST_END"})
 
     def __init__(
         self, files: Files, folder: Names = (), being_written: Callable[[], str | None] = lambda: None
     ) -> None:
-        """Serve the files in `folder`, all of which are logs.
-
-        Args:
-            files: Where they are.
-            folder: Which of them are logs.
-            being_written: Returns the name of the log that is still written to, which is not erased; None for none.
-        """
+        """Serve the files in `folder`, all of which are logs; the one that is `being_written` is not erased."""
         self._files = files
         self._folder = folder
         self._being_written = being_written

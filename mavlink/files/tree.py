@@ -32,8 +32,6 @@ class Entry(NamedTuple):
     """What a folder holds.
 
     Attributes:
-        name: In the folder.
-        is_folder: Or else a file.
         size: Bytes; 0 of a folder.
         modified_s: Last modification, s since 1970 UTC; 0 where nobody knows.
     """
@@ -73,39 +71,30 @@ class Files(Protocol):
 
     def list(self, names: Names) -> list[Entry] | FileRefusal:
         """Return what a folder holds, by name."""
-        ...
 
     def open(self, names: Names) -> Reading | FileRefusal:
         """Open a file to read it."""
-        ...
 
     def create(self, names: Names) -> FileRefusal | None:
         """Make an empty file; one that exists is emptied."""
-        ...
 
     def write(self, names: Names, offset: int, data: bytes) -> FileRefusal | None:
         """Put `data` into a file; a gap before it is zeros."""
-        ...
 
     def truncate(self, names: Names, size: int) -> FileRefusal | None:
         """Keep the first `size` bytes of a file; nothing where it has fewer."""
-        ...
 
     def remove(self, names: Names) -> FileRefusal | None:
         """Remove a file."""
-        ...
 
     def rename(self, old: Names, new: Names) -> FileRefusal | None:
         """Give a file or folder another place, where nothing is yet."""
-        ...
 
     def make_folder(self, names: Names) -> FileRefusal | None:
         """Make a folder."""
-        ...
 
     def remove_folder(self, names: Names) -> FileRefusal | None:
         """Remove an empty folder."""
-        ...
 
 
 def names_of(path: str) -> Names | FileRefusal:

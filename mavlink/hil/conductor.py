@@ -26,7 +26,6 @@ class Parcel(NamedTuple):
 
     Attributes:
         station: Number of the ground station that sends or receives it.
-        datagram: The bytes.
     """
 
     station: int
@@ -37,8 +36,6 @@ class StepMessage(NamedTuple):
     """All datagrams of one time in one direction.
 
     Attributes:
-        time_us: Simulated time.
-        parcels: In order.
         custom_mode: The mode that the vehicle is in, as its HEARTBEAT has it; 0 from ground stations.
         armed: Whether its rotors may turn; False from ground stations.
     """

@@ -69,10 +69,8 @@ class Value(NamedTuple):
     """What one of the numbers means.
 
     Attributes:
-        name: What it is.
         unit: SI, or the sensor's.
-        minimum: Smallest that is taken.
-        maximum: Largest that is taken.
+        minimum, maximum: Smallest and largest that is taken.
         usual: Taken where none of a fault's numbers is given.
         rest: Taken where another is given and this is not.
     """
@@ -89,10 +87,7 @@ class Row(NamedTuple):
     """One kind of fault.
 
     Attributes:
-        unit: FAILURE_UNIT.
-        kind: FAILURE_TYPE.
         part: What the plant must have.
-        meaning: What it does.
         values: What param4 and those behind it mean.
         instances: How many there are of the unit.
     """

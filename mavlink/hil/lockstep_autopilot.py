@@ -32,7 +32,6 @@ class AutopilotEnd:
     Attributes:
         refused: The plant's refusal of the frames asked for (a MAV_RESULT), None if there was none.
         repeated: How many frames came again and got the remembered answer.
-        dropped: What was received and not used, by reason.
     """
 
     def __init__(

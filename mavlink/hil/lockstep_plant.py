@@ -58,8 +58,6 @@ class PlantEnd:
         peer: Where the autopilot is, None until one has called.
         frame_interval_us: Time between frames; fixed once the first frame was offered.
         feedback: Which frames the autopilot wants; fixed then, too.
-        resent: How many times a frame was sent again.
-        dropped: What was received and not used, by reason.
         received: Frames of the autopilot that were understood, in order; the owner may log and clear it.
         waits: Whether a frame is sent again until it is answered; else the plant runs freely.
     """

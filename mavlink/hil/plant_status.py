@@ -16,8 +16,6 @@ class PlantBattery(NamedTuple):
     """A battery as the plant has it, and no model of it.
 
     Attributes:
-        voltage_v: At its terminals.
-        current_a: Out of it.
         used_ah: Charge taken since it was full.
         remaining: Part of its charge that is left.
     """
@@ -29,13 +27,7 @@ class PlantBattery(NamedTuple):
 
 
 class FaultResult(NamedTuple):
-    """What became of a fault that was asked for.
-
-    Attributes:
-        unit: FAILURE_UNIT.
-        kind: FAILURE_TYPE.
-        result: MAV_RESULT.
-    """
+    """What became of a fault that was asked for."""
 
     unit: int
     kind: int

@@ -34,16 +34,12 @@ class FlierEnd:
     Attributes:
         refused: None: a simulator is not asked for anything.
         repeated: How many frames came again and got the remembered answer.
-        dropped: What was received and not used, by reason.
     """
 
     def __init__(self, *, system_id: int, now_s: float, to_motors: Callable[[FourRotors], FourRotors]) -> None:
         """Speak as the autopilot of `system_id`.
 
-        Args:
-            system_id: MAVLink system.
-            now_s: Wall-clock time.
-            to_motors: Parts of the rotors' top speeds, in the order of the vehicle file -> what the simulator takes.
+        `to_motors` makes what the simulator takes of parts of the rotors' top speeds in the vehicle file's order.
         """
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
         self._to_motors = to_motors

@@ -49,8 +49,6 @@ class Truth(NamedTuple):
     """The true state that HIL_STATE_QUATERNION holds: PX4 only logs it.
 
     Attributes:
-        state: Attitude, rates and velocity.
-        place: Position.
         acceleration_enu_m_s2: Of the vehicle against the ground.
         airspeed_m_s: Through the air.
     """
@@ -72,8 +70,6 @@ class SimulatorEnd:
         lockstep: Whether PX4 answers each frame, and is to be waited for.
         answered: Whether the last frame has been answered.
         motors: The last command.
-        resent: How many times a frame was sent again.
-        dropped: What was received and not used, by reason.
         received: Frames of PX4 that were understood, in order; the owner may log and clear it.
     """
 

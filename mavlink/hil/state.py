@@ -26,10 +26,7 @@ class StateFrame:
 
     Attributes:
         time_us: Simulated time, µs; whole milliseconds on the wire.
-        position_enu_m: Position, m, ENU.
-        velocity_enu_m_s: Velocity, m/s, ENU.
         attitude: Unit quaternion, FLU body to ENU earth.
-        rate_flu_rad_s: Body rates p, q, r, rad/s, FLU.
     """
 
     time_us: int

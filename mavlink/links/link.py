@@ -26,10 +26,6 @@ class GroundLink(Protocol):
 
     Each time: `receive_now`, then open channels for `take_opened`, take in what was received, and close channels for
     `take_closed`.
-
-    Attributes:
-        url: The URL of the endpoint, with the port that it really has.
-        target: Whom it calls; None where it waits for others.
     """
 
     url: str
@@ -37,40 +33,28 @@ class GroundLink(Protocol):
     @property
     def target(self) -> Address | None:
         """Whom it calls; None where it waits for others."""
-        ...
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
         """Send whole frames to `address`; what cannot be sent now is lost."""
-        ...
 
     def receive_now(self) -> list[tuple[bytes, Address]]:
         """Return what has come, as whole frames, and from where."""
-        ...
 
     def wait(self, timeout_s: float) -> None:
         """Sleep until something has come, but no longer than `timeout_s`."""
-        ...
 
     def take_opened(self) -> list[Address]:
         """Return the addresses to send to first, since the last call: the one the link calls, those that connected."""
-        ...
 
     def take_closed(self) -> list[Address]:
         """Return whose connections have ended since last asked."""
-        ...
 
     def close(self) -> None:
         """Close every socket."""
-        ...
 
 
 class Endpoint:
-    """What every link keeps besides its socket.
-
-    Attributes:
-        url: The URL of the endpoint, with its actual port.
-        target: The address that it calls; None where it waits for others.
-    """
+    """What every link keeps besides its socket."""
 
     def __init__(self, url: str, target: Address | None) -> None:
         """Begin without connections."""
@@ -91,11 +75,7 @@ class Endpoint:
 
 
 class BlockingReceiver:
-    """A link of any kind, used as `UdpLink` is: what has come is handed out one by one.
-
-    Attributes:
-        url: The URL of the endpoint.
-    """
+    """A link of any kind, used as `UdpLink` is: what has come is handed out one by one."""
 
     def __init__(self, link: GroundLink) -> None:
         """Use `link`."""

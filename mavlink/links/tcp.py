@@ -22,12 +22,7 @@ _CHUNKS_AT_ONCE = 16
 
 
 class Connection:
-    """One connection.
-
-    Attributes:
-        address: The other end.
-        alive: False once the other end is gone.
-    """
+    """One connection."""
 
     def __init__(self, sock: socket.socket, address: Address) -> None:
         """Take over a connected socket."""

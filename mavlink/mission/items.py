@@ -47,10 +47,7 @@ class MissionItem(NamedTuple):
         frame: MAV_FRAME.
         command: MAV_CMD.
         autocontinue: Whether the next item follows by itself.
-        p1: First parameter.
-        p2: Second parameter.
-        p3: Third parameter.
-        p4: Fourth parameter.
+        p1, p2, p3, p4: Parameters one to four.
         x: Latitude, degE7; or the fifth parameter.
         y: Longitude, degE7; or the sixth parameter.
         z: Altitude, m; or the seventh parameter.

@@ -42,7 +42,6 @@ class Progress(NamedTuple):
     """Where the mission stands.
 
     Attributes:
-        seq: The current item.
         state: MISSION_STATE.
         mode: 1 while the vehicle flies the mission, 2 while it does something else.
     """

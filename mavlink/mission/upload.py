@@ -32,7 +32,6 @@ class Rules(NamedTuple):
     Attributes:
         check_item: (item) -> MAV_MISSION_RESULT, of an item by itself.
         check_plan: (items) -> MAV_MISSION_RESULT, of all of them, each checked before.
-        maximum: Items there is space for.
     """
 
     check_item: Callable[[MissionItem], int]

@@ -15,12 +15,9 @@ class ChannelState(NamedTuple):
     """What a channel was used for so far.
 
     Attributes:
-        number: Of the channel.
         link: Number of its link.
-        address: The remote address.
-        sources: System and component ids received.
+        sources: System and component ids.
         received_us: Simulated time of the last message, µs; None before the first.
-        received: Messages.
         sent: Messages, forwarded ones too.
         dropped: Pieces of input that were not used.
         lost: Messages that never came, by the gaps in their numbers.
@@ -41,9 +38,6 @@ class Channel:
     """Numbers, packs and counts the traffic with one remote address.
 
     Attributes:
-        number: Of the channel.
-        link: Number of its link.
-        address: The remote address.
         fixed: Whether it stays open however long it is silent.
         codec: Its own, for sequence numbers are counted per channel.
         active_us: Simulated time when it was opened or a message received last, µs.

@@ -24,9 +24,7 @@ class Outgoing(NamedTuple):
     """A datagram of whole frames to send.
 
     Attributes:
-        link: Number of the link.
         address: Where to; None where the link knows.
-        datagram: The bytes.
     """
 
     link: int
@@ -39,11 +37,9 @@ class ChannelObserver(Protocol):
 
     def opened(self, channel: int, now_us: int) -> None:
         """Take note that `channel` was opened."""
-        ...
 
     def closed(self, channel: int) -> None:
         """Take note that `channel` is no more; no other will have its number."""
-        ...
 
 
 class Hub:

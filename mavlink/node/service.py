@@ -19,8 +19,6 @@ class Peer(NamedTuple):
 
     Attributes:
         channel: Number of the channel: one remote address on one link.
-        system: System id.
-        component: Component id.
     """
 
     channel: int
@@ -33,7 +31,6 @@ class Send(NamedTuple):
 
     Attributes:
         name: Message name as MAVLink has it, "COMMAND_ACK".
-        fields: Its fields.
         channel: The channel to take; None for all of them.
     """
 
@@ -53,11 +50,9 @@ class Service(Protocol):
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:
         """Take in one message; return what to send at once."""
-        ...
 
     def poll(self, now_us: int) -> Iterable[Send]:
         """Do what is due at `now_us`; return what to send. Called once a frame of the plant."""
-        ...
 
 
 def to(peer: Peer, name: str, *fields: Any) -> Send:

@@ -55,7 +55,6 @@ class Changes(NamedTuple):
     """What has changed.
 
     Attributes:
-        names: Of the parameters.
         made: The newest that was made for one of them; None for nothing.
     """
 
@@ -69,15 +68,8 @@ class Parameter:
 
     Attributes:
         name: At most 16 capitals, digits and underscores.
-        kind: INT or REAL.
         default: Its value until somebody changes it.
-        minimum: Least value.
-        maximum: Largest value.
-        unit: Of the value.
         decimals: How many a ground station should show.
-        description: In a few words.
-        details: The rest.
-        group: What it is listed under.
         reboot_required: Whether it takes effect only at the next start.
         values: The only values that it may have, and what each stands for; none: all between the bounds.
         read_only: Whether ground stations cannot change it.

@@ -58,16 +58,9 @@ class Command(NamedTuple):
 
     Attributes:
         id: MAV_CMD.
-        p1: First parameter; nan in any of them means that it is not given.
-        p2: Second parameter.
-        p3: Third parameter.
-        p4: Fourth parameter.
-        x: Fifth: in degrees where it is a latitude, nan where a COMMAND_INT does not give it (INT32_MAX).
-        y: Sixth: likewise.
-        z: Seventh.
+        p1, p2, p3, p4: Parameters one to four; nan in any of the seven means that it is not given.
+        x, y, z: Five to seven; x and y in degrees where they are a place, nan where a COMMAND_INT has INT32_MAX.
         frame: MAV_FRAME of a COMMAND_INT; None of a COMMAND_LONG.
-        peer: Who asks.
-        now_us: Simulated time.
     """
 
     id: int
@@ -112,7 +105,6 @@ class Entry(NamedTuple):
     """A handler, and how its command may come.
 
     Attributes:
-        handler: Obeys it.
         frames: MAV_FRAMEs of a COMMAND_INT that it takes; None where the command names no place: x and y then are
             plain numbers, and whatever the frame says is ignored.
         cancel: Called with the command in progress when a COMMAND_CANCEL comes; CANCELLED or ACCEPTED ends it. None

@@ -36,7 +36,6 @@ class Identity:
 
     Attributes:
         name: As the user writes it.
-        autopilot: MAV_AUTOPILOT.
         speaks: The release whose interface it follows, sent as the version of the flight software; None for its own.
     """
 

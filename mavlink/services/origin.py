@@ -20,8 +20,6 @@ class Setters(NamedTuple):
     """What obeys; each returns why not, None if it is done.
 
     Attributes:
-        origin: Of the ENU frame.
-        home: Where to return to.
         mode: (base mode, custom mode).
     """
 
@@ -31,11 +29,7 @@ class Setters(NamedTuple):
 
 
 class OriginService:
-    """Hears the messages.
-
-    Attributes:
-        handles: Their names.
-    """
+    """Hears the messages."""
 
     handles = frozenset({"SET_GPS_GLOBAL_ORIGIN", "SET_HOME_POSITION", "SET_MODE"})
 

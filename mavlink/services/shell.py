@@ -25,11 +25,7 @@ Command: TypeAlias = Callable[[list[str]], str]
 
 
 class Shell:
-    """Answers lines.
-
-    Attributes:
-        handles: SERIAL_CONTROL.
-    """
+    """Answers lines."""
 
     handles = frozenset({"SERIAL_CONTROL"})
 

@@ -20,7 +20,6 @@ class ModeInfo(NamedTuple):
     """A flight mode, as ground stations list it.
 
     Attributes:
-        name: For people.
         custom_mode: Its number in HEARTBEAT.
         standard_mode: MAV_STANDARD_MODE; 0 where it is none.
         selectable: Whether people may choose it.

@@ -28,8 +28,6 @@ class StreamedService(ABC, Generic[Value]):
     """A service that keeps the latest setpoint of each client, and never answers.
 
     Attributes:
-        handles: Names of the messages that carry the setpoints.
-        dropped: Number of messages that were not used, by reason.
         source: The client that is obeyed; None before the first setpoint.
     """
 

@@ -94,9 +94,6 @@ class Whereabouts(NamedTuple):
     """What setpoints count from.
 
     Attributes:
-        position_enu_m: Of the vehicle.
-        yaw_rad: Of the vehicle.
-        origin: Of the ENU frame.
         home: None until it is known.
     """
 
@@ -207,12 +204,7 @@ def _counted_from_m(frame: int, here: Whereabouts) -> float:
 
 
 def group(wire: Vector, masked: int, maximum: float) -> Vector:
-    """Return a group's fields, nan where masked.
-
-    Args:
-        wire: As they came.
-        masked: Bit n is set where field n is masked.
-        maximum: Largest length of those that are not.
+    """Return a group's fields, nan where masked (bit n of `masked`); the others have a length of at most `maximum`.
 
     Raises:
         Refused: A field that is not masked cannot be flown, unless all of them are NaN.

@@ -21,7 +21,6 @@ class PositionSetpoint(NamedTuple):
         velocity_m_s: ENU; where `body`, FLU of a level vehicle that looks along its heading.
         acceleration_m_s2: In the same axes: feed-forward, or all there is.
         yaw_rad: Counter-clockwise from east, -pi..pi.
-        yaw_rate_rad_s: Counter-clockwise.
         body: Whether velocity and acceleration turn with the vehicle: see `in_enu`.
         time_us: When it came, simulated time.
     """
@@ -86,9 +85,7 @@ class TargetState(NamedTuple):
     """Where what is to be followed is.
 
     Attributes:
-        position_enu_m: From the origin, m.
-        velocity_enu_m_s: Zero where it is not known.
-        acceleration_enu_m_s2: Zero where it is not known.
+        velocity_enu_m_s, acceleration_enu_m_s2: Zero where they are not known.
         received_us: When it was received, simulated time.
         time_us: What it is the state at.
     """

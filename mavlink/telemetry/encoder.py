@@ -31,7 +31,6 @@ class Constants:
 
     Attributes:
         boot_unix_us: Unix time at the start, µs; 0 where nobody knows it.
-        gravity_m_s2: Of the place.
     """
 
     boot_unix_us: int = 0

@@ -19,7 +19,6 @@ class Home(NamedTuple):
     """Where the vehicle returns to.
 
     Attributes:
-        position_enu_m: m, ENU from the origin.
         yaw_rad: Heading there, counter-clockwise from east.
     """
 
@@ -31,13 +30,8 @@ class BatteryState(NamedTuple):
     """The battery, as the autopilot estimates it.
 
     Attributes:
-        cells: In series.
-        voltage_v: Terminal voltage.
-        current_a: Drawn now.
-        used_ah: Charge taken.
         remaining: Part of the charge that is left, 0..1.
         remaining_s: Time until it is empty at this current; nan while none flows.
-        used_wh: Energy taken.
         charge_state: MAV_BATTERY_CHARGE_STATE.
     """
 
@@ -55,13 +49,8 @@ class Setpoint(NamedTuple):
     """What the control law steers to now; nan where it steers to nothing.
 
     Attributes:
-        position_enu_m: m.
-        velocity_enu_m_s: m/s.
-        acceleration_enu_m_s2: m/s².
         yaw_rad: Counter-clockwise from east.
-        yaw_rate_rad_s: rad/s.
         attitude: Unit quaternion, FLU to ENU.
-        rate_flu_rad_s: Body rates.
         thrust: Part of the largest, 0..1.
     """
 
@@ -79,12 +68,7 @@ class Forecast(NamedTuple):
     """A point of the predicted horizon.
 
     Attributes:
-        after_s: From now.
-        position_enu_m: m.
-        velocity_enu_m_s: m/s.
-        acceleration_enu_m_s2: m/s².
         yaw_rad: Counter-clockwise from east.
-        yaw_rate_rad_s: rad/s.
     """
 
     after_s: float
@@ -102,13 +86,9 @@ class SolverState(NamedTuple):
         status: Code of `colibri.autopilot.control.qp.QpStatus`, 0 is solved; -1 without a QP.
         fallback: Code of `colibri.autopilot.control.interface.Fallback`; -1 is none.
         iterations: Of the solver; -1 where it reports none.
-        solve_time_s: Of the QP.
-        step_time_s: Of the whole control step.
-        cost: At the solution.
         slack: By how much soft limits are exceeded, in parts of each: the largest.
         active: Constraints that bind: rotors, increments, angles, rates.
         planned_squared: Squared rotor speeds of the plan's steps, parts of the largest.
-        horizon: Where the plan leads.
     """
 
     status: int = -1
@@ -130,8 +110,6 @@ class EstimatorState(NamedTuple):
         flags: ESTIMATOR_STATUS_FLAGS.
         ratios: Of the last tests of velocity, horizontal position, height, magnetic field, height above the ground and
             airspeed: above 1 one was rejected.
-        horizontal_accuracy_m: Standard deviation.
-        vertical_accuracy_m: Standard deviation.
         sensors: MAV_SYS_STATUS_SENSOR bits of those that it reads.
         failed_sensors: MAV_SYS_STATUS_SENSOR bits of those that are rejected.
     """
@@ -163,29 +141,18 @@ class Snapshot:
         failsafe: Whether the vehicle acts on its own to save itself.
         emergency: Whether it comes down for that.
         armable: Whether every check before arming passes.
-        position_enu_m: From the origin, m.
-        velocity_enu_m_s: m/s.
-        acceleration_enu_m_s2: Coordinate acceleration, m/s².
         attitude: Unit quaternion, FLU to ENU.
-        rate_flu_rad_s: Body rates.
-        origin: Of the ENU frame.
         home: None until it is known.
         rotor_speeds_rad_s: As the autopilot estimates them.
         controls: Commanded, parts of the largest speed.
         battery: None without one.
-        setpoint: Of the control law.
-        solver: Of the last decision.
         wind_enu_m_s: Estimated; nan where none is.
         sticks: Of the last MANUAL_CONTROL: pitch, roll, thrust, yaw, -1..1 (thrust 0..1); None without one.
-        flight_started_us: Time of the last arming; 0 before.
-        takeoff_us: Time of the last take-off; 0 before.
-        landing_us: Time of the last landing; 0 before.
+        flight_started_us, takeoff_us, landing_us: Of the last arming, take-off and landing; 0 before.
         flights: How often it was armed.
         terminated: Whether the flight was ended for good.
         ground_m: Height of the ground below, over the origin.
         target_enu_m: Where the way leads, the next waypoint; nan for the setpoint itself.
-        gps_ok: Whether there is GPS.
-        fence_enabled: Whether the geofence is watched.
         fence_breached: Whether the vehicle is where it must not be.
         load: Part of the time between two frames that the autopilot computes, 0..1.
         sensed: What was measured on board last; None with state feedback.

@@ -71,11 +71,7 @@ class Message(NamedTuple):
 
 
 class Bits(NamedTuple):
-    """A float field by its bits: a Python float would change those of a signalling NaN.
-
-    Attributes:
-        pattern: The 32 bits as an unsigned integer.
-    """
+    """A float field by its bits: a Python float would change those of a signalling NaN."""
 
     pattern: int
 
@@ -178,11 +174,7 @@ class Codec:
 
 
 class _Layout:
-    """How a message lies in a frame.
-
-    Attributes:
-        name: Message name.
-    """
+    """How a message lies in a frame."""
 
     def __init__(self, definition: Any) -> None:
         """Take the layout from pymavlink's class of the message."""

@@ -17,7 +17,6 @@ class Logged(NamedTuple):
 
     Attributes:
         time_us: When, µs; of a flight's log simulated time.
-        frame: The bytes.
     """
 
     time_us: int

@@ -37,15 +37,7 @@ class Air:
     def go_on(
         self, eddies: Eddies | None, time_us: int, height_m: float, velocity_enu_m_s: Vector, duration_us: int
     ) -> tuple[Vector, Eddies | None]:
-        """Return the air's velocity, ENU, m/s, and its eddies, at the end of a frame.
-
-        Args:
-            eddies: At its beginning.
-            time_us: Simulated time of its end.
-            height_m: Of the vehicle above ground.
-            velocity_enu_m_s: Of the vehicle.
-            duration_us: Of the frame.
-        """
+        """Return the air's velocity, ENU, m/s, and its eddies, at `time_us`, the end of a frame begun with `eddies`."""
         time_s = time_us * 1e-6
         wind = self._mean_at(time_s)
         moving = self._with_gusts(wind, time_s)

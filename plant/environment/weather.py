@@ -22,7 +22,6 @@ class Wind(NamedTuple):
     """A constant wind, as meteorology says it.
 
     Attributes:
-        speed_m_s: Speed.
         from_deg: Where it blows from, degrees clockwise from north: 270 blows from west to east.
     """
 
@@ -53,7 +52,6 @@ class RecordedWind(NamedTuple):
     """A wind from a file: linear between its times, constant before the first and after the last.
 
     Attributes:
-        path: The file.
         times_s: Simulated time, rising.
         velocities_enu_m_s: One for each time.
     """
@@ -113,10 +111,7 @@ class Weather(NamedTuple):
     """All that moves the air.
 
     Attributes:
-        wind: The mean wind.
-        gusts: What is added to it.
-        turbulence: How strong it is; None for none.
-        seed: Of the turbulence.
+        turbulence: None for none; `seed` is its.
     """
 
     wind: Wind | RecordedWind

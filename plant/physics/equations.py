@@ -29,29 +29,22 @@ class Parameters(NamedTuple):
     A kernel sees them as a record of the same fields: see `packed`.
 
     Attributes:
-        mass_kg: Mass.
         gravity_m_s2: Gravitational acceleration, towards -z of ENU.
         inertia_kg_m2: Ix, Iy, Iz about the FLU axes.
         thrust: Of each rotor along body z, N per speed unit squared.
         yaw_moment: Of each rotor about body z, with its sign, N m per speed unit squared.
         momentum: Angular momentum of each rotor along body z, with its sign, N m s per speed unit.
-        rotor_x_m: x forward of each rotor.
-        rotor_y_m: y left of each rotor.
-        top_speed: The largest rotor speed at the battery's full voltage.
-        lag_up_s: Time constant of a rotor that speeds up; infinite where rotors follow at once.
-        lag_down_s: Time constant of a rotor that slows down; infinite where rotors follow at once.
+        rotor_x_m, rotor_y_m: Forward and left of each rotor.
+        top_speed: Of a rotor, at the battery's full voltage.
+        lag_up_s, lag_down_s: Time constants of rotors that speed up and slow down; infinite where they follow at once.
         linear_drag_n_s_m: Of the airframe, along the FLU axes.
         rotor_drag: Of one rotor in its plane, N per m/s and per speed unit.
-        wind_enu_m_s: Velocity of the air.
         power: Electrical power of each rotor, W per speed unit cubed.
-        full_voltage_v: Open-circuit voltage of the full battery.
-        empty_voltage_v: Open-circuit voltage of the empty battery.
-        resistance_ohm: The battery's internal resistance.
+        full_voltage_v, empty_voltage_v: Open-circuit voltage of the full and of the empty battery.
         capacity_ah: The charge that empties it.
         contacts_m: Points in FLU that the ground can touch, (8, 3).
         ground_m: Height of the ground, z of ENU; -inf for none.
-        stiffness_n_m: Of the ground at one point.
-        damping_n_s_m: Of the ground at one point, against sinking in and coming out.
+        stiffness_n_m, damping_n_s_m: Of the ground at one point; the damping is against sinking in and coming out.
         friction: Coulomb's coefficient.
         slip_damping_n_s_m: Friction of one point that creeps, before Coulomb's limit: N for each m/s.
     """
@@ -84,12 +77,7 @@ class Parameters(NamedTuple):
 
 
 class Wrench(NamedTuple):
-    """What acts on the body at its centre of mass, in FLU.
-
-    Attributes:
-        force_n: Force, N.
-        moment_n_m: Moment, N m.
-    """
+    """What acts on the body at its centre of mass, in FLU."""
 
     force_n: Vector
     moment_n_m: Vector
@@ -216,13 +204,7 @@ def battery(speeds: FourRotors, charge_ah: float, parameters: Parameters) -> tup
 
 @compiled
 def derivative(x: Array, target: FourRotors, parameters: Packed) -> Array:
-    """Return x' = f(x) while the rotors are commanded to `target`, (18,).
-
-    Args:
-        x: State, rotor speeds and charge, (18,).
-        target: Commanded rotor speeds, the vehicle's unit.
-        parameters: Of vehicle and air.
-    """
+    """Return x' = f(x), (18,), while the rotors are commanded to the speeds `target`, the vehicle's unit."""
     change = np.empty_like(x)
     write_derivative(change, x, target, parameters[0])
     return change

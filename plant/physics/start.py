@@ -23,18 +23,10 @@ class Start(NamedTuple):
     """How the vehicle begins. Angles are Z-Y'-X''.
 
     Attributes:
-        x: Position, ENU, m.
-        y: Position, ENU, m.
-        z: Position, ENU, m.
-        phi: Roll, degrees.
-        theta: Pitch, degrees.
-        psi: Yaw, degrees.
-        vx: Velocity, ENU, m/s.
-        vy: Velocity, ENU, m/s.
-        vz: Velocity, ENU, m/s.
-        p: Body rate, FLU, rad/s.
-        q: Body rate, FLU, rad/s.
-        r: Body rate, FLU, rad/s.
+        x, y, z: Position, ENU, m.
+        phi, theta, psi: Roll, pitch, yaw, degrees.
+        vx, vy, vz: Velocity, ENU, m/s.
+        p, q, r: Body rates, FLU, rad/s.
         rotors: Speed of every rotor, turns per minute.
     """
 

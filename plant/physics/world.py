@@ -31,13 +31,11 @@ class World:
     """Everything that the next step depends on.
 
     Attributes:
-        time_us: Simulated time, µs.
-        state: `colibri.plant.physics.equations.STATE`, 13 values.
+        state: `equations.STATE`, 13 values.
         rotor_speeds: What the rotors turn at, in the vehicle's unit; without lag, what they turned at up to now.
         charge_used_ah: Charge taken from the battery, Ah.
         voltage_v: The battery's terminal voltage, V; nan before the first step, and without a battery.
         wind_enu_m_s: Velocity of the air where the vehicle is, held until the next step ends.
-        eddies: What the turbulence remembers; None where there is none.
     """
 
     time_us: int

@@ -39,7 +39,6 @@ class ArduPilotEnd:
     Attributes:
         world: The world as it was last sent.
         peer: Where ArduPilot is, None until it has called.
-        steps: How many times the world was advanced.
         restarts: How many times an ArduPilot restarted.
         dropped: What was received and not obeyed, by reason.
     """

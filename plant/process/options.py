@@ -44,13 +44,7 @@ def latency(text: str) -> float:
 
 
 def add_world_arguments(parser: ArgumentParser, *, start: str, of_whom: str = "") -> None:
-    """Add the options of `WorldSetting`, but for `--seed`.
-
-    Args:
-        parser: To add them to.
-        start: What is overridden by `--start`, for its help.
-        of_whom: Whose model `--without` concerns, for its help.
-    """
+    """Add the options of `WorldSetting` but for `--seed`; `start` and `of_whom` are words of the helps."""
     add_weather_arguments(parser)
     add = parser.add_argument
     add(

@@ -20,9 +20,6 @@ class Pace:
     """When each frame is due by the wall clock.
 
     A flight that was held up for longer than a moment stays late: it does not hurry past those who fly it.
-
-    Attributes:
-        speed: Times real time.
     """
 
     def __init__(self, speed: float, now_s: float) -> None:

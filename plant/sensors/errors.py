@@ -11,19 +11,10 @@ class GaussMarkov:
     """A drift that forgets: first-order, of constant variance, x' = -x / T + w.
 
     After Δ it is x exp(-Δ / T) plus chance of variance σ² (1 - exp(-2 Δ / T)).
-
-    Attributes:
-        value: The drift now.
     """
 
     def __init__(self, deviation: float, time_s: float, chance: Iterator[float]) -> None:
-        """Begin somewhere in the stationary distribution.
-
-        Args:
-            deviation: σ, in the unit of the value.
-            time_s: T, the correlation time.
-            chance: Standard normal numbers.
-        """
+        """Begin somewhere in the stationary distribution of σ = `deviation`, with T = `time_s`."""
         self._deviation = deviation
         self._time_s = time_s
         self._chance = chance
@@ -40,9 +31,6 @@ class Triad:
     """Three axes of white noise on a bias that walks at random, sampled at an interval, cut at the sensor's range.
 
     White noise is that of a mean over the interval, density / √interval (IEEE Std 952, annex C).
-
-    Attributes:
-        bias: Of each axis, in the unit that is measured.
     """
 
     def __init__(

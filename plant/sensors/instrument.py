@@ -15,13 +15,7 @@ _ROUNDING = 1e-9
 
 
 class Setting(NamedTuple):
-    """Where the sensors of one vehicle are.
-
-    Attributes:
-        physics: Of the world that they measure.
-        origin: Of the ENU frame.
-        interval_s: Between two frames.
-    """
+    """Where the sensors of one vehicle are."""
 
     physics: Physics
     origin: Geodetic
@@ -35,7 +29,6 @@ class Instrument(NamedTuple):
         part: Its table in the vehicle file's sensors; a vehicle without it has no such sensor.
         field: Of `SensorFrame`.
         group: Of `Updated`: its field then holds the last output; 0 where that is None between two values.
-        unit: FAILURE_UNIT.
         switched_on: (table, setting, standard normal numbers of its own) -> its measure.
         add: (value, error of a fault) -> value with that error.
         at: (value, simulated time in µs) -> value that claims to be of that time.

@@ -58,16 +58,7 @@ class SensorSuite:
         interval_us: int,
         faults: SensorFaults | None = None,
     ) -> None:
-        """Switch them on.
-
-        Args:
-            parts: What they are.
-            physics: Of the world that they measure.
-            origin: Of the ENU frame.
-            seed: Of their chance, not negative.
-            interval_us: Between two frames.
-            faults: What frames go through; None where nothing can fail.
-        """
+        """Switch on `parts`, by the chance of `seed` (not negative); frames go through `faults`, where given."""
         self._faults = faults
         self._origin = origin
         setting, chances = Setting(physics, origin, interval_us * 1e-6), streams(seed, Source.SENSORS, len(ROWS))

@@ -25,14 +25,7 @@ class Faults:
     """
 
     def __init__(self, vehicle: Vehicle, physics: Physics, feedback: Feedback, *, seed: int) -> None:
-        """Begin with everything well.
-
-        Args:
-            vehicle: The plant's.
-            physics: Of its world; rotors and battery fail in it.
-            feedback: What the autopilot receives of it.
-            seed: Of chance.
-        """
+        """Begin with everything well; rotors and battery fail in `physics`."""
         self._physics = physics
         self._battery = vehicle.battery
         self.sensors = SensorFaults(seed, vehicle.sensors)

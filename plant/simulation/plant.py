@@ -19,13 +19,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class Plant:
-    """One vehicle in its world.
-
-    Attributes:
-        world: As it is now.
-        faults: What has gone wrong.
-        interval_us: Between two frames.
-    """
+    """One vehicle in its world."""
 
     def __init__(
         self,
@@ -39,19 +33,7 @@ class Plant:
         interval_us: int,
         latency_us: int = 0,
     ) -> None:
-        """Begin with `world`.
-
-        Args:
-            world: Now.
-            vehicle: That flies in it.
-            physics: Its laws.
-            feedback: What the autopilot receives of it.
-            origin: Of the ENU frame.
-            seed: Of everything random.
-            interval_us: Between two frames.
-            latency_us: From the plant to the autopilot, and as much back: the command that answers a frame acts from
-                twice that later on.
-        """
+        """Begin with `world`; the command that answers a frame acts from twice `latency_us` later: there and back."""
         self.world = world
         self.faults = Faults(vehicle, physics, feedback, seed=seed)
         self.interval_us = interval_us
@@ -93,12 +75,7 @@ class Plant:
 
 
 class PlantBuilder:
-    """Builds plants of one vehicle in one world: all of them but what an autopilot asks for.
-
-    Attributes:
-        vehicle: That flies.
-        starts: How it begins, by what the autopilot may ask for.
-    """
+    """Builds plants of one vehicle in one world: all of them but what an autopilot asks for."""
 
     def __init__(
         self,
@@ -111,12 +88,7 @@ class PlantBuilder:
     ) -> None:
         """Fly `vehicle` from one of `starts` in the world of `setting`; what is compiled is loaded here.
 
-        Args:
-            setting: The world, as options read it; `vehicle` and `starts` have their part of it already.
-            vehicle: That flies.
-            starts: How it begins, by what the autopilot may ask for.
-            integrator: Of its motion.
-            origin: Of the ENU frame.
+        `vehicle` and `starts` have their part of `setting` already.
 
         Raises:
             VehicleError: It cannot start like that.

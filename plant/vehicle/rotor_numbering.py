@@ -26,7 +26,6 @@ class Numbering(NamedTuple):
     """How others number the rotors of a vehicle.
 
     Attributes:
-        shape: '+' or 'x'.
         reverse: Whether every rotor turns the other way than is usual.
         rotors: For each of their motors in turn, the index of the rotor in the vehicle file.
     """
