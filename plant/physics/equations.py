@@ -6,7 +6,7 @@ in FLU, position m in ENU, and the unit quaternion that turns FLU into ENU.
 """
 
 from collections.abc import Sequence
-from math import sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ _HALVINGS = 60
 
 
 class Parameters(NamedTuple):
-    """The numbers of a vehicle and of the air around it. What is not modelled has numbers that leave no trace.
+    """The numbers of a vehicle and of the air around it. What is not modelled has the defaults, which leave no trace.
 
     A kernel sees them as a record of the same fields: see `packed`.
 
@@ -58,22 +58,22 @@ class Parameters(NamedTuple):
     rotor_x_m: FourRotors
     rotor_y_m: FourRotors
     top_speed: float
-    lag_up_s: float
-    lag_down_s: float
-    linear_drag_n_s_m: Vector
-    rotor_drag: float
     wind_enu_m_s: Vector
-    power: FourRotors
-    full_voltage_v: float
-    empty_voltage_v: float
-    resistance_ohm: float
-    capacity_ah: float
-    contacts_m: Array
-    ground_m: float
-    stiffness_n_m: float
-    damping_n_s_m: float
-    friction: float
-    slip_damping_n_s_m: float
+    lag_up_s: float = inf
+    lag_down_s: float = inf
+    linear_drag_n_s_m: Vector = (0.0, 0.0, 0.0)
+    rotor_drag: float = 0.0
+    power: FourRotors = (0.0, 0.0, 0.0, 0.0)
+    full_voltage_v: float = 1.0
+    empty_voltage_v: float = 1.0
+    resistance_ohm: float = 0.0
+    capacity_ah: float = inf
+    contacts_m: Array = np.zeros((8, 3))
+    ground_m: float = -inf
+    stiffness_n_m: float = 0.0
+    damping_n_s_m: float = 0.0
+    friction: float = 0.0
+    slip_damping_n_s_m: float = 0.0
 
 
 class Wrench(NamedTuple):

@@ -7,7 +7,7 @@ from colibri.mavlink.hil.faults import BAROMETER
 from colibri.mavlink.hil.sensors import Updated
 from colibri.plant.physics.world import World
 from colibri.plant.sensors.errors import GaussMarkov
-from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting, as_it_is
+from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting
 from colibri.plant.vehicle.sensors import Barometer
 
 
@@ -35,5 +35,4 @@ ROW = Instrument(
     unit=BAROMETER,
     switched_on=_switched_on,
     add=lambda pascal, error: pascal + error[0],
-    at=as_it_is,
 )

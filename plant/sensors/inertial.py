@@ -6,7 +6,7 @@ from colibri.mavlink.hil.faults import ACCELEROMETER, GYROSCOPE
 from colibri.mavlink.hil.sensors import Updated
 from colibri.plant.physics.world import World
 from colibri.plant.sensors.errors import Triad
-from colibri.plant.sensors.instrument import Instrument, Measure, Setting, as_it_is, vector_sum
+from colibri.plant.sensors.instrument import Instrument, Measure, Setting
 from colibri.plant.vehicle.sensors import Accelerometer, Gyroscope
 
 
@@ -34,8 +34,6 @@ ACCELEROMETER_ROW = Instrument(
     group=Updated.ACCELEROMETER,
     unit=ACCELEROMETER,
     switched_on=_accelerometer,
-    add=vector_sum,
-    at=as_it_is,
 )
 GYROSCOPE_ROW = Instrument(
     part="gyroscope",
@@ -43,6 +41,4 @@ GYROSCOPE_ROW = Instrument(
     group=Updated.GYROSCOPE,
     unit=GYROSCOPE,
     switched_on=_gyroscope,
-    add=vector_sum,
-    at=as_it_is,
 )

@@ -14,6 +14,16 @@ Measure: TypeAlias = Callable[[World], Any]
 _ROUNDING = 1e-9
 
 
+def as_it_is(value: T, _now_us: int) -> T:
+    """Return a value that says nothing of its time."""
+    return value
+
+
+def vector_sum(value: Vector, error: Vector) -> Vector:
+    """Return a vector with an error."""
+    return (value[0] + error[0], value[1] + error[1], value[2] + error[2])
+
+
 class Setting(NamedTuple):
     """Where the sensors of one vehicle are."""
 
@@ -39,8 +49,8 @@ class Instrument(NamedTuple):
     group: int
     unit: int
     switched_on: Callable[[Any, Setting, Iterator[float]], Measure]
-    add: Callable[[Any, Vector], Any]
-    at: Callable[[Any, int], Any]
+    add: Callable[[Any, Vector], Any] = vector_sum
+    at: Callable[[Any, int], Any] = as_it_is
 
 
 class Rate:
@@ -57,13 +67,3 @@ class Rate:
         due = samples > self._samples
         self._samples = samples
         return due
-
-
-def as_it_is(value: T, _now_us: int) -> T:
-    """Return a value that says nothing of its time."""
-    return value
-
-
-def vector_sum(value: Vector, error: Vector) -> Vector:
-    """Return a vector with an error."""
-    return (value[0] + error[0], value[1] + error[1], value[2] + error[2])

@@ -9,7 +9,7 @@ from colibri.mavlink.hil.faults import MAGNETOMETER
 from colibri.mavlink.hil.sensors import Updated
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
-from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting, as_it_is, vector_sum
+from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting
 from colibri.plant.vehicle.sensors import Magnetometer
 
 
@@ -38,6 +38,4 @@ ROW = Instrument(
     group=Updated.MAGNETOMETER,
     unit=MAGNETOMETER,
     switched_on=_switched_on,
-    add=vector_sum,
-    at=as_it_is,
 )

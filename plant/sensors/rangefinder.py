@@ -8,7 +8,7 @@ from colibri.mavlink.hil.faults import RANGEFINDER
 from colibri.mavlink.hil.sensors import Distance
 from colibri.plant.physics.equations import attitude_of
 from colibri.plant.physics.world import World
-from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting, as_it_is
+from colibri.plant.sensors.instrument import Instrument, Measure, Rate, Setting
 from colibri.plant.vehicle.sensors import Rangefinder
 
 _FLATTEST_COSINE = 1e-3
@@ -42,5 +42,4 @@ ROW = Instrument(
     unit=RANGEFINDER,
     switched_on=_switched_on,
     add=lambda reported, error: reported._replace(distance_m=max(0.0, reported.distance_m + error[0])),
-    at=as_it_is,
 )

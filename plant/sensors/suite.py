@@ -4,40 +4,19 @@ What they measure depends on the seed, the simulated time and the truth alone: e
 and the same frame asked for twice is the same frame.
 """
 
-from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any
 
 from colibri.common.earth.atmosphere import temperature_c
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.sensors import Frame, SensorFrame
+from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.plant.environment.random_streams import Source, streams
-from colibri.plant.physics.world import Physics, World, state_frame
+from colibri.plant.physics.world import Physics, World
 from colibri.plant.sensors.faults import SensorFaults
 from colibri.plant.sensors.instrument import Setting
 from colibri.plant.sensors.table import ROWS, is_fitted
 from colibri.plant.vehicle.description import Vehicle
 from colibri.plant.vehicle.sensors import Sensors
-
-FrameMaker: TypeAlias = Callable[[World], Frame]
-"""World -> the frame that the plant sends of it."""
-
-
-def frame_maker(
-    feedback: Feedback,
-    vehicle: Vehicle,
-    physics: Physics,
-    origin: Geodetic,
-    *,
-    seed: int,
-    interval_us: int,
-    faults: SensorFaults | None = None,
-) -> FrameMaker:
-    """Return the function that makes the frame of each world, in order; `faults` may change it."""
-    if feedback is Feedback.STATE:
-        return state_frame
-    assert vehicle.sensors is not None, "only what has sensors serves them"
-    return SensorSuite(vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults).measure
 
 
 def served_by(vehicle: Vehicle) -> list[Feedback]:

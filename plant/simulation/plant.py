@@ -1,21 +1,45 @@
 """The plant as a pure composition, measured frame by frame, that goes on with each answer; and what builds it."""
 
-from collections.abc import Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult, PlantStatus, ReceivedFrame
+from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.environment.weather import weather_of
 from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.start import Start
-from colibri.plant.physics.world import Physics, World, starting_world
-from colibri.plant.sensors.suite import frame_maker
-from colibri.plant.simulation.command_delay import Actuation
+from colibri.plant.physics.world import Physics, World, starting_world, state_frame
+from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.simulation.faults import Faults
 from colibri.plant.simulation.setting import WorldSetting
 from colibri.plant.vehicle.description import Vehicle
+
+
+class Actuation:
+    """Commands on their way to the rotors, which follow the last that has arrived, also between two frames."""
+
+    def __init__(self, first: ActuatorCommand) -> None:
+        """Follow `first` until another arrives."""
+        self._now = first
+        self._coming: deque[tuple[int, ActuatorCommand]] = deque()
+
+    def arrive(self, from_us: int, command: ActuatorCommand) -> None:
+        """Have a command arrive at a simulated time, not before those that were sent earlier."""
+        self._coming.append((from_us, command))
+
+    def spans(self, begin_us: int, end_us: int) -> Iterator[tuple[ActuatorCommand, int]]:
+        """Yield what is followed from one time to another, and for how long, µs."""
+        now_us = begin_us
+        while now_us < end_us:
+            while self._coming and self._coming[0][0] <= now_us:
+                self._now = self._coming.popleft()[1]
+            until_us = min(end_us, self._coming[0][0]) if self._coming else end_us
+            yield self._now, until_us - now_us
+            now_us = until_us
 
 
 class Plant:
@@ -38,9 +62,13 @@ class Plant:
         self.faults = Faults(vehicle, physics, feedback, seed=seed)
         self.interval_us = interval_us
         self._physics = physics
-        self._measure = frame_maker(
-            feedback, vehicle, physics, origin, seed=seed, interval_us=interval_us, faults=self.faults.sensors
-        )
+        self._measure: Callable[[World], Frame] = state_frame
+        if feedback is Feedback.SENSORS:
+            assert vehicle.sensors is not None, "only what has sensors serves them"
+            faults = self.faults.sensors
+            self._measure = SensorSuite(
+                vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults
+            ).measure
         self._actuation = Actuation(_held(world, vehicle))
         self._round_trip_us = 2 * latency_us
         self._results: tuple[FaultResult, ...] = ()

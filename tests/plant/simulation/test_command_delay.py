@@ -7,8 +7,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world
-from colibri.plant.simulation.command_delay import Actuation
-from colibri.plant.simulation.plant import Plant
+from colibri.plant.simulation.plant import Actuation, Plant
 from colibri.plant.vehicle.description import load_vehicle
 
 VEHICLE = load_vehicle("hummingbird").without(["battery"])
