@@ -16,8 +16,8 @@ def telemetry(constants: Constants | None = None) -> dict[str, Encoder]:
     An encoder raises nothing, whatever the snapshot holds; its fields fit their types.
     """
     c = Constants() if constants is None else constants
-    encoders = {name: encoder for module in _PLAIN for name, encoder in module.items()}
-    encoders |= {name: partial(encoder, c=c) for name, encoder in _WITH_CONSTANTS.items()}
+    encoders: dict[str, Encoder] = {encoder.__name__.upper(): encoder for encoder in _PLAIN}
+    encoders |= {encoder.__name__.upper(): partial(encoder, c=c) for encoder in _WITH_CONSTANTS}
     for row in OWN_MESSAGES:
         if row.passed_on:
             encoders[row.message] = _passed_on(row, encoders.get(row.message))
@@ -36,54 +36,46 @@ def _passed_on(row: OwnMessage, otherwise: Encoder | None) -> Encoder:
     return encoder
 
 
-_POSITION: dict[str, Encoder] = {
-    "GLOBAL_POSITION_INT": position.global_position_int,
-    "LOCAL_POSITION_NED": position.local_position_ned,
-    "HOME_POSITION": position.home_position,
-    "GPS_GLOBAL_ORIGIN": position.gps_global_origin,
-    "GPS_RAW_INT": position.gps_raw_int,
-    "ALTITUDE": position.altitude,
-    "VFR_HUD": position.vfr_hud,
-    "DISTANCE_SENSOR": position.distance_sensor,
-    "WIND_COV": position.wind_cov,
-}
-_ATTITUDE: dict[str, Encoder] = {
-    "ATTITUDE": attitude.attitude,
-    "ATTITUDE_QUATERNION": attitude.attitude_quaternion,
-    "ODOMETRY": attitude.odometry,
-    "HIL_STATE_QUATERNION": attitude.hil_state_quaternion,
-}
-_STATUS: dict[str, Encoder] = {
-    "SYS_STATUS": status.sys_status,
-    "EXTENDED_SYS_STATE": status.extended_sys_state,
-    "CURRENT_MODE": status.current_mode,
-    "FLIGHT_INFORMATION": status.flight_information,
-    "ESTIMATOR_STATUS": status.estimator_status,
-    "SCALED_PRESSURE": sensors.scaled_pressure,
-    "VIBRATION": sensors.vibration,
-}
-_POWER: dict[str, Encoder] = {
-    "BATTERY_STATUS": power.battery_status,
-    "ESC_STATUS": power.esc_status,
-    "ESC_INFO": power.esc_info,
-    "SERVO_OUTPUT_RAW": power.servo_output_raw,
-    "ACTUATOR_OUTPUT_STATUS": power.actuator_output_status,
-    "ACTUATOR_CONTROL_TARGET": power.actuator_control_target,
-    "RC_CHANNELS": power.rc_channels,
-}
-_CONTROLLER: dict[str, Encoder] = {
-    "ATTITUDE_TARGET": controller.attitude_target,
-    "POSITION_TARGET_LOCAL_NED": controller.position_target_local_ned,
-    "POSITION_TARGET_GLOBAL_INT": controller.position_target_global_int,
-    "NAV_CONTROLLER_OUTPUT": controller.nav_controller_output,
-    "TRAJECTORY_REPRESENTATION_WAYPOINTS": controller.trajectory_representation_waypoints,
-    "DEBUG_FLOAT_ARRAY": controller.debug_float_array,
-    "NAMED_VALUE_FLOAT": controller.named_value_float,
-}
-_PLAIN = (_POSITION, _ATTITUDE, _STATUS, _POWER, _CONTROLLER)
-_WITH_CONSTANTS: dict[str, Callable[..., Fields | None]] = {
-    "SYSTEM_TIME": status.system_time,
-    "HIGHRES_IMU": sensors.highres_imu,
-    "SCALED_IMU": sensors.scaled_imu,
-    "RAW_IMU": sensors.raw_imu,
-}
+_PLAIN: tuple[Encoder, ...] = (
+    position.global_position_int,
+    position.local_position_ned,
+    position.home_position,
+    position.gps_global_origin,
+    position.gps_raw_int,
+    position.altitude,
+    position.vfr_hud,
+    position.distance_sensor,
+    position.wind_cov,
+    attitude.attitude,
+    attitude.attitude_quaternion,
+    attitude.odometry,
+    attitude.hil_state_quaternion,
+    status.sys_status,
+    status.extended_sys_state,
+    status.current_mode,
+    status.flight_information,
+    status.estimator_status,
+    sensors.scaled_pressure,
+    sensors.vibration,
+    power.battery_status,
+    power.esc_status,
+    power.esc_info,
+    power.servo_output_raw,
+    power.actuator_output_status,
+    power.actuator_control_target,
+    power.rc_channels,
+    controller.attitude_target,
+    controller.position_target_local_ned,
+    controller.position_target_global_int,
+    controller.nav_controller_output,
+    controller.trajectory_representation_waypoints,
+    controller.debug_float_array,
+    controller.named_value_float,
+)
+"""Each is called as the message that it encodes."""
+_WITH_CONSTANTS: tuple[Callable[..., Fields | None], ...] = (
+    status.system_time,
+    sensors.highres_imu,
+    sensors.scaled_imu,
+    sensors.raw_imu,
+)

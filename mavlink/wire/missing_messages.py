@@ -4,6 +4,7 @@ Source: mavlink.io/en/messages/common.html. A message's CRC_EXTRA follows from i
 makes every peer drop the message: mavlink.io/en/guide/serialization.html.
 """
 
+from re import findall
 from struct import Struct
 from typing import Any, NamedTuple
 
@@ -35,43 +36,26 @@ class Definition(NamedTuple):
     fields: tuple[Field, ...]
 
 
+def _defined(number: int, name: str, fields: str) -> Definition:
+    """Return a message whose fields stand behind each other as MAVLink writes one: "uint16_t[4] failure_flags"."""
+    found = findall(r"(\w+)(?:\[(\d+)\])? (\w+)", fields)
+    return Definition(number, name, tuple(Field(kind, field, int(length or 0)) for kind, length, field in found))
+
+
 MISSING = (
-    Definition(
-        80,
-        "COMMAND_CANCEL",
-        (Field("uint8_t", "target_system"), Field("uint8_t", "target_component"), Field("uint16_t", "command")),
-    ),
-    Definition(
+    _defined(80, "COMMAND_CANCEL", "uint8_t target_system, uint8_t target_component, uint16_t command"),
+    _defined(
         290,
         "ESC_INFO",
-        (
-            Field("uint8_t", "index"),
-            Field("uint64_t", "time_usec"),
-            Field("uint16_t", "counter"),
-            Field("uint8_t", "count"),
-            Field("uint8_t", "connection_type"),
-            Field("uint8_t", "info"),
-            Field("uint16_t", "failure_flags", 4),
-            Field("uint32_t", "error_count", 4),
-            Field("int16_t", "temperature", 4),
-        ),
+        "uint8_t index, uint64_t time_usec, uint16_t counter, uint8_t count, uint8_t connection_type, uint8_t info, "
+        "uint16_t[4] failure_flags, uint32_t[4] error_count, int16_t[4] temperature",
     ),
-    Definition(
+    _defined(
         291,
         "ESC_STATUS",
-        (
-            Field("uint8_t", "index"),
-            Field("uint64_t", "time_usec"),
-            Field("int32_t", "rpm", 4),
-            Field("float", "voltage", 4),
-            Field("float", "current", 4),
-        ),
+        "uint8_t index, uint64_t time_usec, int32_t[4] rpm, float[4] voltage, float[4] current",
     ),
-    Definition(
-        397,
-        "COMPONENT_METADATA",
-        (Field("uint32_t", "time_boot_ms"), Field("uint32_t", "file_crc"), Field("char", "uri", 100)),
-    ),
+    _defined(397, "COMPONENT_METADATA", "uint32_t time_boot_ms, uint32_t file_crc, char[100] uri"),
 )
 
 
