@@ -1,6 +1,6 @@
 """Strict tables: what vehicle files, profiles and control laws are read into."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, TypeVar
@@ -64,12 +64,18 @@ class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """A table of numbers, every one of them finite."""
 
     def __post_init__(self) -> None:
-        """Check what a range cannot say."""
+        """Check that every number is finite."""
         for key in self.__struct_fields__:
-            value = getattr(self, key)
-            numbers = value if isinstance(value, tuple) else (value,)
-            if any(isinstance(number, float) and not isfinite(number) for number in numbers):
+            if not all(map(isfinite, _numbers(getattr(self, key)))):
                 raise ValueError(f"{key}: must be finite")
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    if isinstance(value, tuple):
+        for part in value:
+            yield from _numbers(part)
+    elif isinstance(value, float):
+        yield value
 
 
 def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:

@@ -27,8 +27,7 @@ from colibri.mavlink.mission.items import FENCE, MISSION, RALLY
 from colibri.mavlink.mission.service import MissionService, Vehicle
 from colibri.mavlink.node.hub import Hub, Outgoing
 from colibri.mavlink.node.service import to
-from colibri.mavlink.parameters.metadata import Metadata
-from colibri.mavlink.parameters.metadata_json import metadata_json
+from colibri.mavlink.parameters.metadata import Metadata, metadata_json
 from colibri.mavlink.parameters.pack import packed_for
 from colibri.mavlink.parameters.service import ParameterService
 from colibri.mavlink.parameters.store import Parameters

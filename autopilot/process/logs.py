@@ -11,7 +11,7 @@ from colibri.autopilot.core.step import Step
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.measurements.table import kinds_of
 from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup, line
-from colibri.common.process.log_files import CsvLog, LineLog
+from colibri.common.process.log_files import CsvLog, open_for_writing
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
 from colibri.plant.vehicle.description import load_vehicle
@@ -54,7 +54,7 @@ class AutopilotLog:
         self._setup = setup
         self._begins = True
         self._time_us = 0
-        self._inputs = LineLog(folder / "inputs.jsonl")
+        self._inputs = open_for_writing(folder / "inputs.jsonl", "ab")
         self._decisions = CsvLog(folder / "autopilot.csv", DECISION_COLUMNS)
         self._estimates = self._checks = None
         if setup.feedback is Feedback.SENSORS:

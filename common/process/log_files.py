@@ -33,22 +33,6 @@ class CsvLog:
         self._file.close()
 
 
-class LineLog:
-    """A file of lines, each of which reaches the system before the next; what is there already stays."""
-
-    def __init__(self, path: Path) -> None:
-        """Create the file where there is none."""
-        self._file = open_for_writing(path, "ab")
-
-    def write(self, line: bytes) -> None:
-        """Append a line, its end included."""
-        self._file.write(line)
-
-    def close(self) -> None:
-        """Close."""
-        self._file.close()
-
-
 def open_for_writing(path: Path, how: Literal["wb", "ab"] = "wb") -> FileIO:
     """Open a file whose every write reaches the system, its folder made where it is missing, or end with one line."""
     try:

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 from colibri.common.types import FourRotors
 from colibri.mavlink.hil.faults import Fault
+from colibri.mavlink.hil.lockstep import encode_heartbeat
 from colibri.mavlink.hil.plant_status import ReceivedFrame
 from colibri.mavlink.hil.sensors import GpsFix, SensorFrame, Updated, decode_gps, decode_sensors
 from colibri.mavlink.hil.state import ActuatorCommand, encode_actuators
@@ -119,7 +120,4 @@ class FlierEnd:
         )
 
     def _heartbeat(self) -> bytes:
-        mode = dialect.MODE_ARMED if self._armed else 0
-        return self._codec.encode(
-            "HEARTBEAT", dialect.TYPE_QUADROTOR, dialect.AUTOPILOT_GENERIC, mode, 0, dialect.STATE_ACTIVE, 3
-        )
+        return encode_heartbeat(self._codec, dialect.TYPE_QUADROTOR, dialect.AUTOPILOT_GENERIC, self._armed)

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Address, FourRotors, Vector
+from colibri.mavlink.hil.lockstep import HEARTBEAT_EVERY_US, encode_heartbeat
 from colibri.mavlink.hil.sensors import SensorFrame, encode_sensors
 from colibri.mavlink.hil.state import LOCKSTEP_FLAG, ROTORS, StateFrame
 from colibri.mavlink.wire import dialect
@@ -25,7 +26,6 @@ from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_fro
 RESEND_AFTER_S = 1.0
 """Wall-clock silence after which a frame is sent again: PX4 may have been restarted, or a datagram lost."""
 CALL_EVERY_S = 0.5
-HEARTBEAT_EVERY_US = 1_000_000
 
 _BEGINNING = ("HEARTBEAT", "COMMAND_LONG")
 _STOPPED: FourRotors = (0.0, 0.0, 0.0, 0.0)
@@ -182,9 +182,7 @@ class SimulatorEnd:
         self._truth_at_us = 0
 
     def _heartbeat(self) -> bytes:
-        return self._codec.encode(
-            "HEARTBEAT", dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, 0, 0, dialect.STATE_ACTIVE, 3
-        )
+        return encode_heartbeat(self._codec, dialect.TYPE_GENERIC, dialect.AUTOPILOT_INVALID, armed=False)
 
     def _encode_truth(self, truth: Truth) -> bytes:
         state, place = truth.state, truth.place

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from zlib import crc32
 
 from colibri.mavlink.node.service import Fields, Peer
+from colibri.mavlink.services.command import GLOBAL_FRAMES, NOT_GIVEN
 from colibri.mavlink.wire.dialect import mav
 
 MISSION: int = mav.MAV_MISSION_TYPE_MISSION
@@ -19,22 +20,6 @@ ALL: int = mav.MAV_MISSION_TYPE_ALL
 PLAN_TYPES = (MISSION, FENCE, RALLY)
 
 ACCEPTED: int = mav.MAV_MISSION_ACCEPTED
-NOT_GIVEN = 2**31 - 1
-"""A latitude or longitude that says nothing, as in a COMMAND_INT."""
-DEGREES = 1e-7
-
-GLOBAL_FRAMES: frozenset[int] = frozenset(
-    (
-        mav.MAV_FRAME_GLOBAL,
-        mav.MAV_FRAME_GLOBAL_INT,
-        mav.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-        mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
-        mav.MAV_FRAME_GLOBAL_TERRAIN_ALT,
-        mav.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
-    )
-)
-"""Frames whose x and y are latitude and longitude. MISSION_ITEM_INT has them in degE7 whether or not the frame's name
-ends in INT: so does everybody send them."""
 
 _PACKED = Struct("<BHBffffiif")
 _INT32 = range(-(2**31), 2**31)
@@ -97,18 +82,8 @@ def item_of(message_name: str, fields: Any) -> MissionItem | int:
             return int(mav.MAV_MISSION_INVALID_PARAM5_X)
         if y is None:
             return int(mav.MAV_MISSION_INVALID_PARAM6_Y)
-    return MissionItem(
-        fields.frame,
-        fields.command,
-        fields.autocontinue,
-        fields.param1,
-        fields.param2,
-        fields.param3,
-        fields.param4,
-        x,
-        y,
-        fields.z,
-    )
+    numbers = (fields.param1, fields.param2, fields.param3, fields.param4, x, y, fields.z)
+    return MissionItem(fields.frame, fields.command, fields.autocontinue, *numbers)
 
 
 def item_fields(peer: Peer, seq: int, item: MissionItem, current: bool, plan_type: int) -> Fields:

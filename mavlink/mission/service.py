@@ -1,7 +1,7 @@
 """The mission microservice: plans up and down, which item is current, what was reached.
 
 Specification: https://mavlink.io/en/services/mission.html. Mission, geofence and rally points are three plans, each
-stored and handled by itself. Uploads are in `mission_upload`, downloads in `mission_download`.
+stored and handled by itself. Uploads are in `upload`, downloads in `download`.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -13,9 +13,7 @@ from colibri.mavlink.mission.download import Downloads
 from colibri.mavlink.mission.items import (
     ACCEPTED,
     ALL,
-    DEGREES,
     FENCE,
-    GLOBAL_FRAMES,
     MISSION,
     NO_PLAN,
     PLAN_TYPES,
@@ -26,7 +24,7 @@ from colibri.mavlink.mission.items import (
 )
 from colibri.mavlink.mission.upload import Rules, Uploads, ack
 from colibri.mavlink.node.service import Fields, Peer, Send, to_all
-from colibri.mavlink.services.command import DENIED, Command, Outcome, outcome_of
+from colibri.mavlink.services.command import DEGREES, DENIED, GLOBAL_FRAMES, Command, Outcome, outcome_of
 from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
 from colibri.mavlink.wire.refusal import Refusal

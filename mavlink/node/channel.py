@@ -1,7 +1,5 @@
 """A channel: one remote address on one link, with counts of what was received and frames to send."""
 
-from typing import NamedTuple
-
 from colibri.common.types import Address
 from colibri.mavlink.node.router import SOURCES, Source
 from colibri.mavlink.wire.dialect import Codec, Message, sequence_of
@@ -11,35 +9,15 @@ DATAGRAM_BYTES = 1400
 _SEQUENCES = 256
 
 
-class ChannelState(NamedTuple):
-    """What a channel was used for so far.
-
-    Attributes:
-        link: Number of its link.
-        sources: System and component ids.
-        received_us: Simulated time of the last message, µs; None before the first.
-        sent: Messages, forwarded ones too.
-        dropped: Pieces of input that were not used.
-        lost: Messages that never came, by the gaps in their numbers.
-    """
-
-    number: int
-    link: int
-    address: Address | None
-    sources: tuple[Source, ...]
-    received_us: int | None
-    received: int
-    sent: int
-    dropped: int
-    lost: int
-
-
 class Channel:
     """Numbers, packs and counts the traffic with one remote address.
 
     Attributes:
         fixed: Whether it stays open however long it is silent.
         codec: Its own, for sequence numbers are counted per channel.
+        received: How many messages were received.
+        sent: How many were sent, forwarded ones too.
+        lost: How many never came, by the gaps in their numbers.
         active_us: Simulated time when it was opened or a message received last, µs.
     """
 
@@ -53,30 +31,30 @@ class Channel:
         self.fixed = fixed
         self.codec = codec
         self.active_us = now_us
-        self._received = 0
-        self._sent = 0
-        self._lost = 0
+        self.received = 0
+        self.sent = 0
+        self.lost = 0
         self._sequences: dict[Source, int] = {}
         self._pending: list[bytes] = []
 
     def receive(self, message: Message, now_us: int) -> None:
         """Count a received message, and the lost ones before it."""
         self.active_us = now_us
-        self._received += 1
+        self.received += 1
         sequence = sequence_of(message.frame)
         last = self._sequences.get(message.source)
         if last is not None:
             gap = (sequence - last - 1) % _SEQUENCES
             if gap >= _SEQUENCES // 2:
                 return  # one that was overtaken, or came twice
-            self._lost += gap
+            self.lost += gap
         elif len(self._sequences) == SOURCES:
             del self._sequences[next(iter(self._sequences))]
         self._sequences[message.source] = sequence
 
     def say(self, frame: bytes) -> None:
         """Send a whole frame."""
-        self._sent += 1
+        self.sent += 1
         self._pending.append(frame)
 
     def take(self) -> list[bytes]:
@@ -95,16 +73,17 @@ class Channel:
         self._pending = []
         return [*datagrams, b"".join(packed)]
 
-    def state(self) -> ChannelState:
-        """Return what it was used for so far."""
-        return ChannelState(
-            self.number,
-            self.link,
-            self.address,
-            tuple(self._sequences),
-            self.active_us if self._received else None,
-            self._received,
-            self._sent,
-            self.codec.dropped.total(),
-            self._lost,
-        )
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """System and component ids received."""
+        return tuple(self._sequences)
+
+    @property
+    def received_us(self) -> int | None:
+        """Simulated time of the last message, µs; None before the first."""
+        return self.active_us if self.received else None
+
+    @property
+    def dropped(self) -> int:
+        """How many pieces of input were not used."""
+        return self.codec.dropped.total()

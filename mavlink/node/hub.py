@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol
 
 from colibri.common.types import Address
-from colibri.mavlink.node.channel import Channel, ChannelState
+from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.router import Router, target_of
 from colibri.mavlink.node.service import Peer, Send, Service
 from colibri.mavlink.wire.dialect import UNKNOWN, Codec, Message
@@ -79,9 +79,9 @@ class Hub:
         self._dropped_before: Counter[str] = Counter()
 
     @property
-    def channels(self) -> tuple[ChannelState, ...]:
-        """What each open channel was used for so far."""
-        return tuple(channel.state() for channel in self._channels.values())
+    def channels(self) -> tuple[Channel, ...]:
+        """The open channels, with what each was used for so far."""
+        return tuple(self._channels.values())
 
     @property
     def dropped(self) -> Counter[str]:

@@ -1,20 +1,25 @@
 """The component metadata protocol: where ground stations can read what this vehicle and its parameters are.
 
-Specification: https://mavlink.io/en/services/component_metadata.html. The files themselves go by file transfer.
+Specification: https://mavlink.io/en/services/component_metadata.html. The files themselves go by file transfer. Their
+version is 1: QGroundControl takes no other.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Any
 from zlib import crc32
 
 from colibri.mavlink.files.tree import Generator
 from colibri.mavlink.node.service import Peer, Send, to
+from colibri.mavlink.parameters.store import FLOAT32_MAX, INT32_MAX, INT32_MIN, Kind, Parameter
 
 GENERAL = "general.json"
 PARAMETERS = "parameter.json"
 TYPE_PARAMETER = 1
 """COMP_METADATA_TYPE_PARAMETER."""
 
+_VERSION = 1
+_TYPES = {Kind.INT: "Int32", Kind.REAL: "Float"}
 _UINT32_MAX = 0xFFFFFFFF
 
 
@@ -29,7 +34,7 @@ class Metadata:
         """Describe the component by the JSON of its parameters, which never changes."""
         self._parameters = parameters
         types = [{"type": TYPE_PARAMETER, "uri": f"mftp:///{PARAMETERS}", "fileCrc": checksum(parameters)}]
-        self.general = json.dumps({"version": 1, "metadataTypes": types}).encode()
+        self.general = json.dumps({"version": _VERSION, "metadataTypes": types}).encode()
 
     @property
     def files(self) -> Mapping[str, Generator]:
@@ -45,3 +50,41 @@ class Metadata:
 def checksum(data: bytes) -> int:
     """Return MAVLink's CRC32, which begins with 0 and inverts nothing: https://mavlink.io/en/guide/crc.html."""
     return crc32(data, _UINT32_MAX) ^ _UINT32_MAX
+
+
+def metadata_json(parameters: Iterable[Parameter]) -> bytes:
+    """Return what parameters mean as a file of the MAVLink repository's component_metadata/parameter.schema.json."""
+    content = {"version": _VERSION, "parameters": [_entry(parameter) for parameter in parameters]}
+    return json.dumps(content, separators=(",", ":")).encode()
+
+
+def _entry(parameter: Parameter) -> dict[str, Any]:
+    """Return a parameter as the schema has it; what is at the schema's default is left out."""
+    entry: dict[str, Any] = {
+        "name": parameter.name,
+        "type": _TYPES[parameter.kind],
+        "default": _shortest(parameter, parameter.default),
+        "shortDesc": parameter.description,
+        "longDesc": parameter.details,
+        "group": parameter.group,
+        "units": parameter.unit,
+    }
+    if parameter.minimum not in (INT32_MIN, -FLOAT32_MAX):
+        entry["min"] = _shortest(parameter, parameter.minimum)
+    if parameter.maximum not in (INT32_MAX, FLOAT32_MAX):
+        entry["max"] = _shortest(parameter, parameter.maximum)
+    if parameter.kind == Kind.REAL:
+        entry["decimalPlaces"] = parameter.decimals
+        entry["increment"] = float(f"1e-{min(parameter.decimals, 2)}")
+    if parameter.values:
+        entry["values"] = [{"value": value, "description": what} for value, what in parameter.values]
+    if parameter.reboot_required:
+        entry["rebootRequired"] = True
+    if parameter.read_only:
+        entry["readOnly"] = True
+    return {key: value for key, value in entry.items() if value != ""}
+
+
+def _shortest(parameter: Parameter, value: float) -> float:
+    """Return a number as it was meant before it was rounded to 32 bits, if seven digits say it."""
+    return value if parameter.kind == Kind.INT else float(f"{value:.7g}")

@@ -43,6 +43,8 @@ GLOBAL_FRAMES: frozenset[int] = frozenset(
         mav.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
     )
 )
+"""Frames whose x and y are latitude and longitude. MISSION_ITEM_INT has them in degE7 whether or not the frame's name
+ends in INT: so does everybody send them."""
 PLACES: frozenset[int] = GLOBAL_FRAMES | {mav.MAV_FRAME_MISSION}
 """Frames of a command that goes to a place; MAV_FRAME_MISSION is no frame: the command then names no place."""
 

@@ -18,6 +18,7 @@ from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, enu_of, is_on
 from colibri.common.kernels import cos, sin
 from colibri.common.rotations import nearest_turn
 from colibri.common.types import Quaternion, Vector
+from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES
 from colibri.mavlink.setpoints.arbitration import Refused
 from colibri.mavlink.setpoints.setpoints import NOWHERE, AttitudeSetpoint, PositionSetpoint, turned
 from colibri.mavlink.telemetry.snapshot import Home
@@ -32,8 +33,6 @@ MAX_YAW_RATE_RAD_S = 35.0
 MAX_YAW_RAD = 1e3
 UNIT_WITHIN = 0.01
 """How far the length of a quaternion may be from 1: clients compute in single precision, some round."""
-
-_DEG = 1e-7
 
 _POSITION, _VELOCITY, _ACCELERATION = 0, 3, 6
 """First bit of the three of each group in POSITION_TARGET_TYPEMASK."""
@@ -80,14 +79,6 @@ LOCAL_FRAMES: dict[int, Frame] = {
     mav.MAV_FRAME_LOCAL_FLU: _ALONG_HEADING._replace(from_vehicle=False, up=True),
 }
 AMSL_FRAMES = frozenset({mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT})
-RELATIVE_FRAMES = frozenset(
-    {
-        mav.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-        mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
-        mav.MAV_FRAME_GLOBAL_TERRAIN_ALT,
-        mav.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
-    }
-)
 
 
 class Whereabouts(NamedTuple):
@@ -125,7 +116,7 @@ def decode_global(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoi
     Raises:
         Refused: It cannot be flown.
     """
-    if fields.coordinate_frame not in AMSL_FRAMES and fields.coordinate_frame not in RELATIVE_FRAMES:
+    if fields.coordinate_frame not in GLOBAL_FRAMES:
         raise Refused("frame")
     velocity, acceleration = _derivatives(fields, body=False, up=False)
     yaw_rad, yaw_rate_rad_s = _yaw(fields, 0.5 * pi, up=False)
@@ -182,8 +173,8 @@ def _along_heading(flu: Vector, frame: Frame, here: Whereabouts) -> Vector:
 def _position_of(fields: Any, here: Whereabouts) -> Vector:
     """Return the position of a SET_POSITION_TARGET_GLOBAL_INT: masked are latitude, longitude, altitude."""
     no_latitude, no_longitude, no_altitude = (bool(fields.type_mask >> axis & 1) for axis in range(3))
-    latitude = here.origin.latitude_deg if no_latitude else fields.lat_int * _DEG
-    longitude = here.origin.longitude_deg if no_longitude else fields.lon_int * _DEG
+    latitude = here.origin.latitude_deg if no_latitude else fields.lat_int * DEGREES
+    longitude = here.origin.longitude_deg if no_longitude else fields.lon_int * DEGREES
     if not is_on_earth(latitude, longitude):
         raise Refused("out of range")
     east, north, _ = enu_of(Geodetic(latitude, longitude, 0.0), here.origin)

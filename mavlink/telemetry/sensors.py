@@ -78,7 +78,7 @@ def measured_rate_frd(s: Snapshot) -> Vector:
 
 def static_hpa(s: Snapshot) -> float:
     """What a barometer measures."""
-    return pressure_hpa(altitude_amsl_m(s)) if s.sensed is None else s.sensed.pressure_pa / 100.0
+    return (pressure_pa(altitude_amsl_m(s)) if s.sensed is None else s.sensed.pressure_pa) / 100.0
 
 
 def air_c(s: Snapshot) -> float:
@@ -89,11 +89,6 @@ def air_c(s: Snapshot) -> float:
 def altitude_amsl_m(s: Snapshot) -> float:
     """Altitude above the sea."""
     return s.origin.altitude_m + s.position_enu_m[2]
-
-
-def pressure_hpa(altitude_m: float) -> float:
-    """Pressure of the standard atmosphere."""
-    return pressure_pa(altitude_m) / 100.0
 
 
 def _thousandths(s: Snapshot, c: Constants) -> tuple[float, ...]:

@@ -1,14 +1,14 @@
 """The airframe: numbers with units and source, read strictly from a TOML file."""
 
 from collections.abc import Callable, Iterable
-from math import inf, isfinite, pi, sqrt
+from math import inf, pi, sqrt
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 import numpy as np
 
-from colibri.common.config import NotNegative, Positive, read_named, toml_names
+from colibri.common.config import NotNegative, Positive, Table, read_named, toml_names
 from colibri.common.elementary import square
 from colibri.common.types import Array, FourRotors
 from colibri.plant.errors import PlantError
@@ -31,7 +31,7 @@ class VehicleError(PlantError):
     """A vehicle file that cannot be flown; the message names file and key."""
 
 
-class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Body(Table, frozen=True, kw_only=True):
     """The rigid body."""
 
     mass_kg: Positive
@@ -39,14 +39,14 @@ class Body(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Ix, Iy, Iz about the FLU axes."""
 
     def __post_init__(self) -> None:
-        """Check what a range cannot say."""
-        _check_finite(self.mass_kg, *self.inertia_kg_m2)
+        """Check what ranges of single numbers cannot."""
+        super().__post_init__()
         ix, iy, iz = sorted(self.inertia_kg_m2)
         if ix + iy < iz:
             raise ValueError("inertia_kg_m2: no body has one moment of inertia above the sum of the other two")
 
 
-class RotorLag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class RotorLag(Table, frozen=True, kw_only=True):
     """A rotor's speed follows its command as a first-order lag."""
 
     time_constant_up_s: TimeConstant
@@ -54,12 +54,8 @@ class RotorLag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     time_constant_down_s: TimeConstant
     """While it slows down."""
 
-    def __post_init__(self) -> None:
-        """Check what a range cannot say."""
-        _check_finite(self.time_constant_up_s, self.time_constant_down_s)
 
-
-class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Rotors(Table, frozen=True, kw_only=True):
     """The four rotors, all alike. Speeds and coefficients are in the file's own `speed_unit`."""
 
     speed_unit: Literal["rad/s", "rpm"]
@@ -86,9 +82,8 @@ class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Without it, rotors follow their commands at once."""
 
     def __post_init__(self) -> None:
-        """Check what a range cannot say."""
-        numbers = (self.thrust_coefficient, self.torque_coefficient, self.inertia_kg_m2, self.max_speed)
-        _check_finite(*numbers, *(metre for position in self.position_m for metre in position))
+        """Check what ranges of single numbers cannot."""
+        super().__post_init__()
         if self.idle_speed >= self.max_speed:
             raise ValueError("idle_speed: must lie below max_speed")
         if np.linalg.matrix_rank(_allocation(self)) < len(self.position_m):
@@ -122,7 +117,7 @@ class Rotors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return found
 
 
-class Drag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Drag(Table, frozen=True, kw_only=True):
     """Forces against the motion through the air."""
 
     linear_n_s_m: tuple[NotNegative, NotNegative, NotNegative]
@@ -130,12 +125,8 @@ class Drag(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     rotor_coefficient: NotNegative
     """Of one rotor, in its plane: N for each m/s and for each of its speed unit."""
 
-    def __post_init__(self) -> None:
-        """Check what a range cannot say."""
-        _check_finite(*self.linear_n_s_m, self.rotor_coefficient)
 
-
-class Ground(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Ground(Table, frozen=True, kw_only=True):
     """How the vehicle stands on the ground: on four feet, or on its four rotors when it has fallen on its back.
 
     Height 0 is that of the centre of mass of the vehicle at rest on its feet.
@@ -154,18 +145,13 @@ class Ground(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     slip_damping_n_s_m: NotNegative
     """Friction of one foot that creeps, before Coulomb's limit: N for each m/s."""
 
-    def __post_init__(self) -> None:
-        """Check what a range cannot say."""
-        numbers = (self.foot_depth_m, self.stiffness_n_m, self.damping_n_s_m, self.friction_coefficient)
-        _check_finite(*numbers, self.slip_damping_n_s_m, *(metre for foot in self.foot_position_m for metre in foot))
-
     def contacts_m(self, rotors: Rotors) -> Array:
         """Return the points in FLU that can touch the ground, (8, 3): the feet, and the rotors in the plane z = 0."""
         feet = [(x, y, -self.foot_depth_m) for x, y in self.foot_position_m]
         return np.array([*feet, *((x, y, 0.0) for x, y in rotors.position_m)])
 
 
-class Battery(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Battery(Table, frozen=True, kw_only=True):
     """A battery: a voltage that falls linearly with the charge taken, behind a resistance.
 
     The rotors' top speed is proportional to its terminal voltage.
@@ -181,13 +167,13 @@ class Battery(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Mechanical power of the rotors over electrical power."""
 
     def __post_init__(self) -> None:
-        """Check what a range cannot say."""
-        _check_finite(self.full_voltage_v, self.empty_voltage_v, self.resistance_ohm, self.capacity_ah)
+        """Check what ranges of single numbers cannot."""
+        super().__post_init__()
         if self.empty_voltage_v > self.full_voltage_v:
             raise ValueError("empty_voltage_v: must not lie above full_voltage_v")
 
 
-class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Vehicle(Table, frozen=True, kw_only=True):
     """A quadrotor, described in SI but for its rotor speeds (`rotors.speed_unit`).
 
     What is None is not modelled.
@@ -203,8 +189,8 @@ class Vehicle(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     sensors: Sensors | None = None
 
     def __post_init__(self) -> None:
-        """Check what a range cannot say."""
-        _check_finite(self.gravity_m_s2)
+        """Check what ranges of single numbers cannot."""
+        super().__post_init__()
         if self.hover_speed >= self.rotors.max_speed:
             raise ValueError(f"rotors.max_speed: hover needs {self.hover_speed:.0f} {self.rotors.speed_unit}")
         if self.ground is not None and _max_contact_frequency_rad_s(self, self.ground) > _MAX_CONTACT_FREQUENCY_RAD_S:
@@ -312,11 +298,6 @@ def _contact_matrix(contacts_m: Array, along_axes: tuple[float, float, float]) -
         motion = np.array([[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]])
         matrix += (weights * motion[:, :, None] * motion[:, None, :]).sum(axis=0)
     return matrix
-
-
-def _check_finite(*numbers: float) -> None:
-    if not all(map(isfinite, numbers)):
-        raise ValueError("every number must be finite")
 
 
 _WITHOUT: dict[str, Callable[[Vehicle], dict[str, Any]]] = {

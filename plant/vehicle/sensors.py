@@ -3,31 +3,21 @@
 The plant measures by them; the autopilot's estimator assumes them.
 """
 
-from math import isfinite
-from typing import Annotated, TypeAlias
+from typing import Annotated
 
 import msgspec
 
-Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
-NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
+from colibri.common.config import NotNegative, Positive, Table
 
 
-class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Part(Table, frozen=True, kw_only=True):
     """A part that can be bought."""
 
     part: str
     """What it is, with maker."""
 
-    def __post_init__(self) -> None:
-        """Check what a range cannot say."""
-        for name in self.__struct_fields__:
-            value = getattr(self, name)
-            numbers = value if isinstance(value, tuple) else (value,) if isinstance(value, float) else ()
-            if not all(map(isfinite, numbers)):
-                raise ValueError(f"{name}: must be finite")
 
-
-class Accelerometer(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Accelerometer(Part, frozen=True, kw_only=True):
     """Measures specific force along the FLU axes, at every frame."""
 
     noise_density_m_s2_rthz: NotNegative
@@ -40,7 +30,7 @@ class Accelerometer(Part, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """What is larger is cut."""
 
 
-class Gyroscope(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Gyroscope(Part, frozen=True, kw_only=True):
     """Measures rates about the FLU axes, at every frame."""
 
     noise_density_rad_s_rthz: NotNegative
@@ -53,7 +43,7 @@ class Gyroscope(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What is larger is cut."""
 
 
-class Magnetometer(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Magnetometer(Part, frozen=True, kw_only=True):
     """Measures the magnetic field along the FLU axes."""
 
     rate_hz: Positive
@@ -63,7 +53,7 @@ class Magnetometer(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Standard deviation, along each axis, of the field of the vehicle itself that calibration has left."""
 
 
-class Barometer(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Barometer(Part, frozen=True, kw_only=True):
     """Measures static pressure."""
 
     rate_hz: Positive
@@ -75,7 +65,7 @@ class Barometer(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Its correlation time."""
 
 
-class Gps(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Gps(Part, frozen=True, kw_only=True):
     """Measures position and velocity, some time ago.
 
     Errors of position are the sum of white noise and a first-order Gauss-Markov process.
@@ -101,7 +91,7 @@ class Gps(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
     satellites: Annotated[int, msgspec.Meta(ge=4, le=64)]
 
 
-class Rangefinder(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Rangefinder(Part, frozen=True, kw_only=True):
     """Measures the distance to the ground along the vehicle's own axis, downward."""
 
     rate_hz: Positive
@@ -119,7 +109,7 @@ class Rangefinder(Part, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Of the sensor above the ground while the vehicle stands on its feet."""
 
     def __post_init__(self) -> None:
-        """Check what a range cannot say."""
+        """Check what ranges of single numbers cannot."""
         super().__post_init__()
         if self.min_m >= self.max_m:
             raise ValueError("min_m: must lie below max_m")

@@ -14,8 +14,9 @@ import numpy as np
 from colibri.autopilot.guidance.mission.items import MAX_DISTANCE_M, check_place
 from colibri.common.earth.geodesy import Geodetic, enu_of
 from colibri.common.types import Array, Vector
-from colibri.mavlink.mission.items import ACCEPTED, DEGREES, GLOBAL_FRAMES, MissionItem
+from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.mission.upload import Rules
+from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 

@@ -10,8 +10,9 @@ from typing import NamedTuple, TypeAlias
 
 from colibri.common.earth.geodesy import MAX_LATITUDE_DEG, MAX_LONGITUDE_DEG, Geodetic, enu_of
 from colibri.common.types import Vector
-from colibri.mavlink.mission.items import ACCEPTED, DEGREES, GLOBAL_FRAMES, NOT_GIVEN, MissionItem
+from colibri.mavlink.mission.items import ACCEPTED, MissionItem
 from colibri.mavlink.mission.upload import Rules
+from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES, NOT_GIVEN
 from colibri.mavlink.wire.dialect import mav
 
 MAX_HEIGHT_M = 10_000.0

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.mavlink.mission.items import ACCEPTED, FENCE, MISSION, NO_PLAN, NOT_GIVEN, RALLY, MissionItem, plan_of
+from colibri.mavlink.mission.items import ACCEPTED, FENCE, MISSION, NO_PLAN, RALLY, MissionItem, plan_of
 from colibri.mavlink.mission.upload import Rules
+from colibri.mavlink.services.command import NOT_GIVEN
 from colibri.mavlink.wire.dialect import Codec, mav
 from tests.mavlink.mission.missions import (
     CANCELLED,

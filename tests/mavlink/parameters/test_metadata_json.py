@@ -2,7 +2,7 @@
 
 import json
 
-from colibri.mavlink.parameters.metadata_json import metadata_json
+from colibri.mavlink.parameters.metadata import metadata_json
 from colibri.mavlink.parameters.store import Kind, Parameter
 
 SPEED = Parameter(

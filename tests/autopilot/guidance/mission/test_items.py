@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from colibri.autopilot.guidance.mission.geofence import FENCE_RULES
 from colibri.autopilot.guidance.mission.items import FLOWN, MISSION_RULES, RALLY_RULES, SKIPPED, places
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
-from colibri.mavlink.mission.items import ACCEPTED, GLOBAL_FRAMES, NOT_GIVEN, MissionItem
+from colibri.mavlink.mission.items import ACCEPTED, MissionItem
+from colibri.mavlink.services.command import GLOBAL_FRAMES, NOT_GIVEN
 from colibri.mavlink.wire.dialect import mav
 
 P1, P2, P3, P4 = (getattr(mav, f"MAV_MISSION_INVALID_PARAM{number}") for number in (1, 2, 3, 4))
