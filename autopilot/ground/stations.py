@@ -34,7 +34,6 @@ from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import (
     Command,
     CommandService,
-    Entry,
     Handler,
     Outcome,
     outcome_of,
@@ -238,7 +237,7 @@ class Stations:
         provide("COMPONENT_METADATA", lambda command: metadata.provide(command.peer, command.now_us))
         provide("MISSION_CURRENT", lambda command: [to(command.peer, "MISSION_CURRENT", *self.plans.current())])
 
-    def _handlers(self, commands: Commands, modes: StandardModes) -> Mapping[int, Handler | Entry]:
+    def _handlers(self, commands: Commands, modes: StandardModes) -> Mapping[int, Handler]:
         flight = commands.handlers()
         return {
             **flight,

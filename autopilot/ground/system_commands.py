@@ -10,7 +10,7 @@ from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.ground.calibration import Calibration
 from colibri.common.earth.geodesy import Geodetic, is_on_earth
 from colibri.mavlink.parameters.store import Parameters
-from colibri.mavlink.services.command import ACCEPTED, DENIED, Command, Entry, Handler, Outcome, outcome_of
+from colibri.mavlink.services.command import ACCEPTED, DENIED, Command, Handler, Outcome, outcome_of
 from colibri.mavlink.services.identity import IDENTITIES, autopilot_version, banner, version_of
 from colibri.mavlink.services.shell import Command as ShellCommand
 from colibri.mavlink.wire.dialect import mav
@@ -39,10 +39,10 @@ class SystemCommands:
         self.version: Sequence[object] = autopilot_version(IDENTITIES[identity], version_of(VERSION), system_id)
         self.restart = 0.0
 
-    def handlers(self) -> Mapping[int, Handler | Entry]:
+    def handlers(self) -> Mapping[int, Handler]:
         """Return the handlers of the commands."""
         return {
-            mav.MAV_CMD_PREFLIGHT_CALIBRATION: Entry(self._calibrate, frames=None, interruptible=True),
+            mav.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
             mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._restart,
             mav.MAV_CMD_PREFLIGHT_STORAGE: self._storage,
             mav.MAV_CMD_DO_SET_GLOBAL_ORIGIN: lambda command: outcome_of(

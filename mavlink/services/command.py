@@ -19,19 +19,17 @@ DENIED: int = mav.MAV_RESULT_DENIED
 UNSUPPORTED: int = mav.MAV_RESULT_UNSUPPORTED
 FAILED: int = mav.MAV_RESULT_FAILED
 IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
-CANCELLED = 6
-COMMAND_INT_ONLY: int = mav.MAV_RESULT_COMMAND_INT_ONLY
 UNSUPPORTED_MAV_FRAME = 9
-"""MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; pymavlink's dialects leave it out, and MAV_RESULT_CANCELLED."""
+"""MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME; pymavlink's dialects leave it out."""
 
 LATER = -1
 """The result of a command that is obeyed within a few frames: its sender receives nothing before `finish`."""
 
 PROGRESS_UNKNOWN = 0xFF
+"""COMMAND_ACK.progress of a command that is obeyed later."""
 NOT_GIVEN = 2**31 - 1
 """What x and y of a COMMAND_INT hold where a COMMAND_LONG would hold nan."""
 DEGREES = 1e-7
-METRES = 1e-4
 
 GLOBAL_FRAMES: frozenset[int] = frozenset(
     (
@@ -85,13 +83,11 @@ class Outcome(NamedTuple):
         result: MAV_RESULT.
         reason: Why it was refused, for the STATUSTEXT that goes with the COMMAND_ACK; empty for none.
         param2: COMMAND_ACK.result_param2.
-        progress: Percent of a command in progress; 255 where nobody knows.
     """
 
     result: int = ACCEPTED
     reason: str = ""
     param2: int = 0
-    progress: int = PROGRESS_UNKNOWN
 
 
 def outcome_of(refusal: Refusal | None) -> Outcome:
@@ -103,29 +99,9 @@ Handler: TypeAlias = Callable[[Command], Outcome]
 """Obeys one kind of command. Must check every parameter that it uses: they may be anything."""
 
 
-class Entry(NamedTuple):
-    """A handler, and how its command may come.
-
-    Attributes:
-        frames: MAV_FRAMEs of a COMMAND_INT that it takes; None where the command names no place: x and y then are
-            plain numbers, and whatever the frame says is ignored.
-        cancel: Called with the command in progress when a COMMAND_CANCEL comes; CANCELLED or ACCEPTED ends it. None
-            where it cannot be cancelled so.
-        interruptible: Whether such a command is handed on, to update or end it, while another is in progress.
-        int_only: Whether a COMMAND_LONG is refused, as one that needs a frame or the precision.
-    """
-
-    handler: Handler
-    frames: frozenset[int] | None = PLACES
-    cancel: Handler | None = None
-    interruptible: bool = False
-    int_only: bool = False
-
-
 @dataclass(slots=True)
 class _Running:
     command: Command
-    progress: int
     report_at_us: int
 
 
@@ -145,13 +121,9 @@ class CommandService:
 
     handles = frozenset({"COMMAND_LONG", "COMMAND_INT", "COMMAND_CANCEL"})
 
-    def __init__(self, handlers: Mapping[int, Handler | Entry], text: StatusText) -> None:
-        """Obey the commands of `handlers`, by MAV_CMD; say with `text` why one is refused.
-
-        A bare handler takes every global frame if MAVLink defines its command as one that goes to a place, and
-        ignores the frame if it does not.
-        """
-        self._entries = {number: _entry(number, handler) for number, handler in handlers.items()}
+    def __init__(self, handlers: Mapping[int, Handler], text: StatusText) -> None:
+        """Obey the commands of `handlers`, by MAV_CMD; send with `text` why one is refused."""
+        self._handlers = handlers
         self._text = text
         self.closed = ""
         self._running: dict[int, _Running] = {}
@@ -167,49 +139,44 @@ class CommandService:
         """Obey a command, or cancel one."""
         fields = message.fields
         if message.name == "COMMAND_CANCEL":
-            return self._cancel(fields.command, peer, now_us)
+            # Nothing can be cancelled: what is in progress goes on. "If it has already completed [it] can be ignored".
+            return [_ack(fields.command, peer, Outcome(IN_PROGRESS))] if fields.command in self._running else []
         if self.closed:
             return [_ack(fields.command, peer, Outcome(DENIED)), *self._reason(Outcome(DENIED, self.closed), now_us)]
-        entry = self._entries.get(fields.command)
-        if entry is None:
+        handler = self._handlers.get(fields.command)
+        if handler is None:
             return [_ack(fields.command, peer, Outcome(UNSUPPORTED))]
         if message.name == "COMMAND_LONG":
-            if entry.int_only:
-                return [_ack(fields.command, peer, Outcome(COMMAND_INT_ONLY))]
-            return self._obey(entry, _from_long(fields, peer, now_us), fields.confirmation)
-        if entry.frames is not None and fields.frame not in entry.frames:
+            return self._obey(handler, _from_long(fields, peer, now_us), fields.confirmation)
+        goes_to_a_place = _goes_to_a_place(fields.command)
+        if goes_to_a_place and fields.frame not in PLACES:
             return [_ack(fields.command, peer, Outcome(UNSUPPORTED_MAV_FRAME))]
-        return self._obey(entry, _from_int(fields, entry, peer, now_us), 0)
+        return self._obey(handler, _from_int(fields, goes_to_a_place, peer, now_us), 0)
 
     def poll(self, now_us: int) -> Iterable[Send]:
-        """Tell once a second how far the commands in progress are."""
+        """Report once a second the commands in progress."""
         if self._report_at_us is None or 0 < self._report_at_us - now_us <= PROGRESS_EVERY_US:
             return ()
         sends = []
         for number, running in self._running.items():
             if not 0 < running.report_at_us - now_us <= PROGRESS_EVERY_US:
                 running.report_at_us = now_us + PROGRESS_EVERY_US
-                sends.append(_progress(number, running))
+                sends.append(_ack(number, running.command.peer, Outcome(IN_PROGRESS)))
         self._schedule()
         return sends
-
-    def progress(self, command_id: int, peer: Peer, percent: int) -> None:
-        """Note how far the command of `peer` is, 0 to 100."""
-        running = self._running.get(command_id)
-        if running is not None and running.command.peer == peer:
-            running.progress = max(0, min(100, percent))
 
     def finish(self, command_id: int, peer: Peer, outcome: Outcome) -> list[Send]:
         """Return the last COMMAND_ACK of the command of `peer` that was in progress; nothing if none was."""
         running = self._running.get(command_id)
         if running is None or running.command.peer != peer:
             return []
-        self._forget(command_id)
+        del self._running[command_id]
+        self._schedule()
         now_us = running.command.now_us
         self._remember(running.command, 0, outcome, now_us)
         return [_ack(command_id, peer, outcome), *self._reason(outcome, now_us)]
 
-    def _obey(self, entry: Entry, command: Command, confirmation: int) -> list[Send]:
+    def _obey(self, handler: Handler, command: Command, confirmation: int) -> list[Send]:
         """Obey a command unless it was sent again only because its answer got lost, or another is in progress.
 
         "If no acknowledgement is received the command must be automatically re-sent", with a larger confirmation.
@@ -217,49 +184,19 @@ class CommandService:
         running = self._running.get(command.id)
         if running is not None:
             if running.command.peer == command.peer and _parameters(running.command) == _parameters(command):
-                return [_progress(command.id, running)]
-            if not entry.interruptible:
-                return [_ack(command.id, command.peer, Outcome(TEMPORARILY_REJECTED))]
+                return [_ack(command.id, command.peer, Outcome(IN_PROGRESS))]
+            return [_ack(command.id, command.peer, Outcome(TEMPORARILY_REJECTED))]
         before = self._answered.get((command.peer, command.id))
         if before is not None and _is_sent_again(command, confirmation, before):
             self._remember(command, confirmation, before.outcome, before.at_us)
             return [_ack(command.id, command.peer, before.outcome)]
-        outcome = entry.handler(command)
-        sends = self._interrupt(running, command, outcome) if running is not None else []
-        if outcome.result in (IN_PROGRESS, LATER):
-            self._running[command.id] = _Running(command, outcome.progress, command.now_us + PROGRESS_EVERY_US)
-            self._schedule()
-        else:
-            self._remember(command, confirmation, outcome, command.now_us)
+        outcome = handler(command)
         if outcome.result == LATER:
-            return sends
-        return [*sends, _ack(command.id, command.peer, outcome), *self._reason(outcome, command.now_us)]
-
-    def _interrupt(self, running: _Running, command: Command, outcome: Outcome) -> list[Send]:
-        """Forget the command in progress that another has replaced or ended; notify its sender if that is another."""
-        if outcome.result not in (ACCEPTED, IN_PROGRESS, LATER, CANCELLED) or command.id not in self._running:
+            self._running[command.id] = _Running(command, command.now_us + PROGRESS_EVERY_US)
+            self._schedule()
             return []
-        self._forget(command.id)
-        peer = running.command.peer
-        return [] if peer == command.peer else [_ack(command.id, peer, Outcome(CANCELLED))]
-
-    def _cancel(self, command_id: int, peer: Peer, now_us: int) -> list[Send]:
-        """Cancel what is in progress: its sender gets CANCELLED. "If it has already completed [it] can be ignored"."""
-        running, entry = self._running.get(command_id), self._entries.get(command_id)
-        if running is None or entry is None:
-            return []
-        owner = running.command.peer
-        outcome = entry.cancel(running.command._replace(now_us=now_us)) if entry.cancel else Outcome(IN_PROGRESS)
-        if outcome.result not in (ACCEPTED, CANCELLED):
-            # It goes on, and so do its progress reports.
-            return [_ack(command_id, peer, Outcome(IN_PROGRESS, progress=running.progress))]
-        self._forget(command_id)
-        cancelled = outcome._replace(result=CANCELLED)
-        return [_ack(command_id, each, cancelled) for each in dict.fromkeys((owner, peer))]
-
-    def _forget(self, command_id: int) -> None:
-        self._running.pop(command_id, None)
-        self._schedule()
+        self._remember(command, confirmation, outcome, command.now_us)
+        return [_ack(command.id, command.peer, outcome), *self._reason(outcome, command.now_us)]
 
     def _schedule(self) -> None:
         self._report_at_us = min((running.report_at_us for running in self._running.values()), default=None)
@@ -272,7 +209,7 @@ class CommandService:
         self._answered[key] = _Answered(_parameters(command), confirmation, at_us, outcome)
 
     def _reason(self, outcome: Outcome, now_us: int) -> list[Send]:
-        """Tell everybody why a command was refused, the same reason not more than once a second."""
+        """Send to all why a command was refused, the same reason not more than once a second."""
         if not outcome.reason or outcome.result not in _REFUSED:
             return []
         reason, at_us = self._said
@@ -282,11 +219,10 @@ class CommandService:
         return self._text.say(ERROR if outcome.result == FAILED else WARNING, outcome.reason)
 
 
-def _entry(number: int, handler: Handler | Entry) -> Entry:
-    if isinstance(handler, Entry):
-        return handler
+def _goes_to_a_place(number: int) -> bool:
+    """Whether x and y of a command are a place, as MAVLink defines it: its frame then counts, and only then."""
     definition = mav.enums["MAV_CMD"].get(number)
-    return Entry(handler, PLACES if definition is not None and definition.has_location else None)
+    return definition is not None and definition.has_location
 
 
 def _from_long(fields: Any, peer: Peer, now_us: int) -> Command:
@@ -294,14 +230,11 @@ def _from_long(fields: Any, peer: Peer, now_us: int) -> Command:
     return Command(fields.command, *numbers, None, peer, now_us)
 
 
-def _from_int(fields: Any, entry: Entry, peer: Peer, now_us: int) -> Command:
-    """Bring x and y into degrees or metres: "PARAM5 / local: x position in meters * 1e4, global: latitude * 10^7"."""
-    if entry.frames is None:
-        scale = 1.0
-    elif fields.frame in GLOBAL_FRAMES:
-        scale = DEGREES
-    else:
-        scale = nan if fields.frame == mav.MAV_FRAME_MISSION else METRES
+def _from_int(fields: Any, goes_to_a_place: bool, peer: Peer, now_us: int) -> Command:
+    """Bring x and y of a place into degrees: "PARAM5 / global: latitude * 10^7"; MAV_FRAME_MISSION names no place."""
+    scale = 1.0
+    if goes_to_a_place:
+        scale = DEGREES if fields.frame in GLOBAL_FRAMES else nan
     x, y = (nan if number == NOT_GIVEN else number * scale for number in (fields.x, fields.y))
     numbers = (fields.param1, fields.param2, fields.param3, fields.param4, x, y, fields.z)
     return Command(fields.command, *numbers, fields.frame, peer, now_us)
@@ -319,9 +252,5 @@ def _is_sent_again(command: Command, confirmation: int, before: _Answered) -> bo
 
 def _ack(command_id: int, peer: Peer, outcome: Outcome) -> Send:
     """Return the COMMAND_ACK to the sender. Only a command in progress has a progress."""
-    progress = outcome.progress if outcome.result == IN_PROGRESS else 0
+    progress = PROGRESS_UNKNOWN if outcome.result == IN_PROGRESS else 0
     return to(peer, "COMMAND_ACK", command_id, outcome.result, progress, outcome.param2, peer.system, peer.component)
-
-
-def _progress(command_id: int, running: _Running) -> Send:
-    return _ack(command_id, running.command.peer, Outcome(IN_PROGRESS, progress=running.progress))

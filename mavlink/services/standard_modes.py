@@ -7,11 +7,10 @@ from collections.abc import Callable, Iterable, Sequence
 from math import isnan
 from typing import NamedTuple, TypeAlias
 
-from colibri.mavlink.node.service import Fields, Peer, Send, to, to_all
-from colibri.mavlink.services.command import DENIED, FAILED, Command, Entry, Handler, Outcome
+from colibri.mavlink.node.service import Fields, Peer, Send, to
+from colibri.mavlink.services.command import DENIED, FAILED, Command, Handler, Outcome
 from colibri.mavlink.wire.dialect import Message, mav
 
-MONITOR_EVERY_US = 10_000_000
 NAME_BYTES = 34
 """Of AVAILABLE_MODES.mode_name, which ends with a zero."""
 
@@ -46,28 +45,16 @@ class StandardModes:
         """Offer `modes`; `set_mode` sets one."""
         self._modes = tuple(modes)
         self._set_mode = set_mode
-        self._sequence = 0
-        self._monitor_at_us: int | None = None
-        self._changed = False
 
     def receive(self, message: Message, peer: Peer, now_us: int) -> Iterable[Send]:  # noqa: ARG002
         """Everything comes as a command."""
         return ()
 
-    def poll(self, now_us: int) -> Iterable[Send]:
-        """Tell at a low rate that the modes have changed, once they have."""
-        if not self._changed and (self._monitor_at_us is None or 0 < self._monitor_at_us - now_us <= MONITOR_EVERY_US):
-            return ()
-        self._changed, self._monitor_at_us = False, now_us + MONITOR_EVERY_US
-        return (to_all("AVAILABLE_MODES_MONITOR", self._sequence),)
+    def poll(self, now_us: int) -> Iterable[Send]:  # noqa: ARG002
+        """The modes never change, so nothing is ever due."""
+        return ()
 
-    def change(self, modes: Sequence[ModeInfo]) -> None:
-        """Offer other modes from now on; ground stations are notified and request them."""
-        self._modes = tuple(modes)
-        self._sequence = (self._sequence + 1) % 256
-        self._changed = True
-
-    def handlers(self) -> dict[int, Handler | Entry]:
+    def handlers(self) -> dict[int, Handler]:
         """Return who obeys the commands of this service."""
         return {mav.MAV_CMD_DO_SET_STANDARD_MODE: self._set_standard_mode}
 
@@ -83,7 +70,7 @@ class StandardModes:
 
     def monitor(self, command: Command) -> list[Send]:
         """Answer REQUEST_MESSAGE of AVAILABLE_MODES_MONITOR."""
-        return [to(command.peer, "AVAILABLE_MODES_MONITOR", self._sequence)]
+        return [to(command.peer, "AVAILABLE_MODES_MONITOR", 0)]
 
     def _fields(self, index: int) -> Fields:
         mode = self._modes[index - 1]

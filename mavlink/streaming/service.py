@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias
 
 from colibri.mavlink.node.service import Fields, Peer, Send, to
-from colibri.mavlink.services.command import DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Entry, Handler, Outcome
+from colibri.mavlink.services.command import DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Handler, Outcome
 from colibri.mavlink.streaming.rates import ALL_GROUPS, DEFAULTS, GCS, GROUPS, SILENT
 from colibri.mavlink.streaming.schedule import Schedule
 from colibri.mavlink.telemetry.encoder import Encoder
@@ -47,14 +47,12 @@ class StreamService:
 
     handles = frozenset({"REQUEST_DATA_STREAM"})
 
-    def __init__(self, telemetry: Mapping[str, Encoder], providers: Mapping[str, Provider] | None = None) -> None:
-        """Stream the messages of `telemetry`; have `providers` answer for messages of other services, by name."""
+    def __init__(self, telemetry: Mapping[str, Encoder]) -> None:
+        """Stream the messages of `telemetry`."""
         self._telemetry = dict(telemetry)
         self._spread = {name: number for number, name in enumerate(telemetry)}
         self._names = {_message_id(name): name for name in telemetry}
         self._providers: dict[int, Provider] = {mav.MAVLINK_MSG_ID_MESSAGE_INTERVAL: self._interval_requested}
-        for name, provider in (providers or {}).items():
-            self.provide(name, provider)
         self._schedule: Schedule[tuple[int, str]] = Schedule()
         self._kinds: dict[int, str] = {}
         self._open: set[int] = set()
@@ -119,9 +117,9 @@ class StreamService:
             sends.extend([Send(name, fields, channel) for fields in self._encode(name)])
         return sends
 
-    def handlers(self) -> dict[int, Handler | Entry]:
+    def handlers(self) -> dict[int, Handler]:
         """Return who obeys the commands of this service."""
-        commands: dict[int, Handler | Entry] = {
+        commands: dict[int, Handler] = {
             mav.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
             mav.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
             mav.MAV_CMD_REQUEST_MESSAGE: self._request_message,

@@ -73,16 +73,3 @@ def test_a_mode_that_does_not_exist_or_may_not_be_chosen_fails(p1: float) -> Non
     assert callable(handler)
     assert handler(command(p1)).result == FAILED
     assert vehicle.flown == []
-
-
-def test_a_change_of_the_modes_is_told_at_once_and_then_every_ten_seconds() -> None:
-    service = StandardModes(MODES, Vehicle())
-    assert [send for now_us in range(0, 30_000_000, 4_000) for send in service.poll(now_us)] == []
-    service.change(MODES[:1])
-    told = [(now_us, send.fields) for now_us in range(0, 25_000_000, 4_000) for send in service.poll(now_us)]
-    assert told == [(0, (1,)), (10_000_000, (1,)), (20_000_000, (1,))]
-    (send,) = service.monitor(command())
-    assert send.fields == (1,)
-    answer = service.available_modes(command())
-    assert isinstance(answer, list)
-    assert len(answer) == 1

@@ -25,7 +25,8 @@ MESSAGE_IDS = FLOATS | st.sampled_from([30.0, 242.0, 244.0])
 
 
 def flying(kind: str = SILENT) -> StreamService:
-    stream = StreamService(TELEMETRY, {"AUTOPILOT_VERSION": lambda command: [to(command.peer, "AUTOPILOT_VERSION")]})
+    stream = StreamService(TELEMETRY)
+    stream.provide("AUTOPILOT_VERSION", lambda command: [to(command.peer, "AUTOPILOT_VERSION")])
     stream.update(FLYING)
     for peer in (GROUND, OTHER):
         stream.use(peer.channel, kind)
