@@ -1,21 +1,283 @@
 """The offboard microservice: setpoints that a client streams.
 
-Specification: https://mavlink.io/en/services/offboard_control.html. Setpoints are never answered. One that cannot be
-flown is dropped and counted, and keeps no stream alive. SET_ACTUATOR_CONTROL_TARGET is ignored: only the
-control law commands rotors.
+Specification: https://mavlink.io/en/services/offboard_control.html, and common.xml's MAV_FRAME,
+POSITION_TARGET_TYPEMASK and ATTITUDE_TARGET_TYPEMASK. Setpoints are never answered. One that cannot be flown is dropped
+and counted, and keeps no stream alive. SET_ACTUATOR_CONTROL_TARGET is ignored: only the control law commands rotors.
+What the specification leaves open, here:
+
+- A group of which every field that is not masked is NaN counts as masked, as PX4 has it.
+- Bits of a type mask that have no meaning are not looked at.
+- Body frames are level: they turn with the heading, not with roll and pitch.
+- A masked axis of a group whose other horizontal axis is given in a body frame, so that no axis of the earth is masked,
+  counts as: stay at that place, do not move, do not accelerate.
+- Altitude above terrain is altitude above home: the ground is flat.
 """
 
 from collections.abc import Callable
-from typing import Any
+from math import hypot, isfinite, isnan, nan, pi, sqrt
+from typing import Any, NamedTuple
 
-from colibri.common.earth.geodesy import Geodetic
-from colibri.common.types import Vector
+from colibri.common.earth.geodesy import DEFAULT_ORIGIN, Geodetic, enu_of, is_on_earth
+from colibri.common.kernels import cos, sin
+from colibri.common.rotations import nearest_turn
+from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.node.service import Peer
-from colibri.mavlink.setpoints.arbitration import StreamedService
-from colibri.mavlink.setpoints.decoding import Whereabouts, decode_attitude, decode_global, decode_local
-from colibri.mavlink.setpoints.setpoints import OffboardSetpoint
+from colibri.mavlink.services.command import DEGREES, GLOBAL_FRAMES
+from colibri.mavlink.setpoints.arbitration import Refused, StreamedService
+from colibri.mavlink.setpoints.setpoints import NOWHERE, AttitudeSetpoint, OffboardSetpoint, PositionSetpoint, turned
 from colibri.mavlink.telemetry.snapshot import Home
-from colibri.mavlink.wire.dialect import Message
+from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
+
+MAX_SPEED_M_S = 50.0
+MAX_ACCELERATION_M_S2 = 50.0
+MAX_DISTANCE_M = 1e6
+MAX_YAW_RATE_RAD_S = 35.0
+"""Body rates: 2000 degrees a second, the range of a vehicle's gyroscopes."""
+MAX_YAW_RAD = 1e3
+UNIT_WITHIN = 0.01
+"""How far the length of a quaternion may be from 1: clients compute in single precision, some round."""
+
+_POSITION, _VELOCITY, _ACCELERATION = 0, 3, 6
+"""First bit of the three of each group in POSITION_TARGET_TYPEMASK."""
+_FORCE: int = mav.POSITION_TARGET_TYPEMASK_FORCE_SET
+_NO_YAW: int = mav.POSITION_TARGET_TYPEMASK_YAW_IGNORE
+_NO_YAW_RATE: int = mav.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
+_NO_RATE: tuple[int, int, int] = (
+    mav.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE,
+    mav.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE,
+    mav.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE,
+)
+_NO_THRUST: int = mav.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
+_NO_ATTITUDE: int = mav.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
+
+
+class Frame(NamedTuple):
+    """What a local MAV_FRAME means.
+
+    Attributes:
+        from_vehicle: Whether positions count from the vehicle.
+        turned_position: Whether positions are along the heading.
+        body: Whether velocities and accelerations are along the heading.
+        turned_yaw: Whether yaw counts from the heading.
+        up: Whether the axes are FLU and not FRD.
+    """
+
+    from_vehicle: bool = False
+    turned_position: bool = False
+    body: bool = False
+    turned_yaw: bool = False
+    up: bool = False
+
+
+_ALONG_HEADING = Frame(from_vehicle=True, turned_position=True, body=True, turned_yaw=True)
+LOCAL_FRAMES: dict[int, Frame] = {
+    mav.MAV_FRAME_LOCAL_NED: Frame(),
+    mav.MAV_FRAME_LOCAL_OFFSET_NED: Frame(from_vehicle=True),
+    # "Same as MAV_FRAME_LOCAL_NED when used to represent position values. Same as MAV_FRAME_BODY_FRD when used with
+    # velocity/acceleration values." Yaw stays from north, as PX4 has it.
+    mav.MAV_FRAME_BODY_NED: Frame(body=True),
+    mav.MAV_FRAME_BODY_OFFSET_NED: _ALONG_HEADING,  # "This is the same as MAV_FRAME_BODY_FRD."
+    mav.MAV_FRAME_BODY_FRD: _ALONG_HEADING,
+    mav.MAV_FRAME_LOCAL_FRD: _ALONG_HEADING._replace(from_vehicle=False),
+    mav.MAV_FRAME_LOCAL_FLU: _ALONG_HEADING._replace(from_vehicle=False, up=True),
+}
+AMSL_FRAMES = frozenset({mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT})
+
+
+class Whereabouts(NamedTuple):
+    """What setpoints count from.
+
+    Attributes:
+        home: None until it is known.
+    """
+
+    position_enu_m: Vector = (0.0, 0.0, 0.0)
+    yaw_rad: float = 0.0
+    origin: Geodetic = DEFAULT_ORIGIN
+    home: Home | None = None
+
+
+def decode_local(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoint:
+    """Decode a SET_POSITION_TARGET_LOCAL_NED.
+
+    Raises:
+        Refused: It cannot be flown.
+    """
+    frame = LOCAL_FRAMES.get(fields.coordinate_frame)
+    if frame is None:
+        raise Refused("frame")
+    velocity, acceleration = _derivatives(fields, body=frame.body, up=frame.up)
+    place = group((fields.x, fields.y, fields.z), fields.type_mask >> _POSITION, MAX_DISTANCE_M)
+    yaw_rad, yaw_rate_rad_s = _yaw(fields, here.yaw_rad if frame.turned_yaw else 0.5 * pi, up=frame.up)
+    position = _position_from(place, frame, here)
+    return _checked(PositionSetpoint(position, velocity, acceleration, yaw_rad, yaw_rate_rad_s, frame.body, now_us))
+
+
+def decode_global(fields: Any, here: Whereabouts, now_us: int) -> PositionSetpoint:
+    """Decode a SET_POSITION_TARGET_GLOBAL_INT.
+
+    Raises:
+        Refused: It cannot be flown.
+    """
+    if fields.coordinate_frame not in GLOBAL_FRAMES:
+        raise Refused("frame")
+    velocity, acceleration = _derivatives(fields, body=False, up=False)
+    yaw_rad, yaw_rate_rad_s = _yaw(fields, 0.5 * pi, up=False)
+    return _checked(
+        PositionSetpoint(
+            _position_of(fields, here), velocity, acceleration, yaw_rad, yaw_rate_rad_s, body=False, time_us=now_us
+        )
+    )
+
+
+def decode_attitude(fields: Any, here: Whereabouts, now_us: int) -> AttitudeSetpoint:
+    """Decode a SET_ATTITUDE_TARGET.
+
+    Raises:
+        Refused: It cannot be flown.
+    """
+    del here
+    mask = fields.type_mask
+    masked = sum(1 << axis for axis, bit in enumerate(_NO_RATE) if mask & bit)
+    wire = (fields.body_roll_rate, fields.body_pitch_rate, fields.body_yaw_rate)
+    rate = frd_from_flu(group(wire, masked, MAX_YAW_RATE_RAD_S))
+    attitude = None if mask & _NO_ATTITUDE else _attitude(fields.q)
+    thrust = nan if mask & _NO_THRUST else fields.thrust
+    if not mask & _NO_THRUST and not 0.0 <= thrust <= 1.0:
+        raise Refused("out of range" if isfinite(thrust) else "not finite")
+    if attitude is None and all(map(isnan, rate)):
+        raise Refused("empty")
+    return AttitudeSetpoint(attitude, rate, thrust, now_us)
+
+
+def _position_from(place: Vector, frame: Frame, here: Whereabouts) -> Vector:
+    """Return a position of a local frame in ENU from the origin."""
+    if frame.turned_position:
+        x, y, z = _along_heading(place if frame.up else frd_from_flu(place), frame, here)
+    else:
+        x, y, z = ned_from_enu(place)
+    if not frame.from_vehicle:
+        return (x, y, z)
+    px, py, pz = here.position_enu_m
+    return (px + x, py + y, pz + z)
+
+
+def _along_heading(flu: Vector, frame: Frame, here: Whereabouts) -> Vector:
+    """Return a position along the heading in ENU; one of two horizontal axes that is masked stays where it is."""
+    ahead, left, up = flu
+    if isnan(ahead) != isnan(left):
+        c, s = cos(here.yaw_rad), sin(here.yaw_rad)
+        px, py = (0.0, 0.0) if frame.from_vehicle else here.position_enu_m[:2]
+        ahead = c * px + s * py if isnan(ahead) else ahead
+        left = c * py - s * px if isnan(left) else left
+    return turned((ahead, left, up), here.yaw_rad)
+
+
+def _position_of(fields: Any, here: Whereabouts) -> Vector:
+    """Return the position of a SET_POSITION_TARGET_GLOBAL_INT: masked are latitude, longitude, altitude."""
+    no_latitude, no_longitude, no_altitude = (bool(fields.type_mask >> axis & 1) for axis in range(3))
+    latitude = here.origin.latitude_deg if no_latitude else fields.lat_int * DEGREES
+    longitude = here.origin.longitude_deg if no_longitude else fields.lon_int * DEGREES
+    if not is_on_earth(latitude, longitude):
+        raise Refused("out of range")
+    east, north, _ = enu_of(Geodetic(latitude, longitude, 0.0), here.origin)
+    if hypot(east, north) > MAX_DISTANCE_M:
+        raise Refused("out of range")
+    altitude_m = single(fields.alt, no_altitude, MAX_DISTANCE_M)
+    up = altitude_m if isnan(altitude_m) else altitude_m + _counted_from_m(fields.coordinate_frame, here)
+    return (nan if no_longitude else east, nan if no_latitude else north, up)
+
+
+def _counted_from_m(frame: int, here: Whereabouts) -> float:
+    """Return what altitudes of a global frame count from, m, ENU."""
+    if frame in AMSL_FRAMES:
+        return -here.origin.altitude_m
+    if here.home is None:
+        raise Refused("no home")
+    return here.home.position_enu_m[2]
+
+
+def group(wire: Vector, masked: int, maximum: float) -> Vector:
+    """Return a group's fields, nan where masked (bit n of `masked`); the others have a length of at most `maximum`.
+
+    Raises:
+        Refused: A field that is not masked cannot be flown, unless all of them are NaN.
+    """
+    given = [value for axis, value in enumerate(wire) if not masked >> axis & 1]
+    if all(map(isnan, given)):
+        return NOWHERE
+    if not all(map(isfinite, given)):
+        raise Refused("not finite")
+    if hypot(*given) > maximum:
+        raise Refused("out of range")
+    x, y, z = (nan if masked >> axis & 1 else value for axis, value in enumerate(wire))
+    return (x, y, z)
+
+
+def single(wire: float, masked: int, maximum: float) -> float:
+    """Return the one field of a group of its own, likewise."""
+    value, _, _ = group((wire, nan, nan), 0b110 | bool(masked), maximum)
+    return value
+
+
+def _derivatives(fields: Any, *, body: bool, up: bool) -> tuple[Vector, Vector]:
+    """Return velocity and acceleration, in ENU or, where `body`, FLU."""
+    mask = fields.type_mask
+    velocity = group((fields.vx, fields.vy, fields.vz), mask >> _VELOCITY, MAX_SPEED_M_S)
+    acceleration = group((fields.afx, fields.afy, fields.afz), mask >> _ACCELERATION, MAX_ACCELERATION_M_S2)
+    if mask & _FORCE and not all(map(isnan, acceleration)):
+        raise Refused("force")
+    if not body:
+        return ned_from_enu(velocity), ned_from_enu(acceleration)
+    if not up:
+        velocity, acceleration = frd_from_flu(velocity), frd_from_flu(acceleration)
+    return _whole(velocity), _whole(acceleration)
+
+
+def _whole(flu: Vector) -> Vector:
+    """Return a vector of which one horizontal axis is masked with zero there."""
+    ahead, left, up = flu
+    if isnan(ahead) == isnan(left):
+        return flu
+    return (0.0 if isnan(ahead) else ahead, 0.0 if isnan(left) else left, up)
+
+
+def _yaw(fields: Any, zero_rad: float, *, up: bool) -> tuple[float, float]:
+    """Return yaw, which the frame counts from `zero_rad`, and its rate, both counter-clockwise."""
+    yaw = single(fields.yaw, fields.type_mask & _NO_YAW, MAX_YAW_RAD)
+    rate = single(fields.yaw_rate, fields.type_mask & _NO_YAW_RATE, MAX_YAW_RATE_RAD_S)
+    turn = 1.0 if up else -1.0
+    return (nan if isnan(yaw) else nearest_turn(zero_rad + turn * yaw, 0.0), turn * rate)
+
+
+def _attitude(q: Any) -> Quaternion:
+    w, x, y, z = q
+    length = sqrt(w * w + x * x + y * y + z * z)
+    if not isfinite(length):
+        raise Refused("not finite")
+    if abs(length - 1.0) > UNIT_WITHIN:
+        raise Refused("not a unit quaternion")
+    return ned_frd_from_enu_flu((w / length, x / length, y / length, z / length))
+
+
+def _checked(setpoint: PositionSetpoint) -> PositionSetpoint:
+    """Return a setpoint that asks for something.
+
+    Raises:
+        Refused: It does not.
+    """
+    asked = (
+        *setpoint.position_enu_m,
+        *setpoint.velocity_m_s,
+        *setpoint.acceleration_m_s2,
+        setpoint.yaw_rad,
+        setpoint.yaw_rate_rad_s,
+    )
+    if all(map(isnan, asked)):
+        raise Refused("empty")
+    return setpoint
+
 
 _DECODERS: dict[str, Callable[[Any, Whereabouts, int], OffboardSetpoint]] = {
     "SET_POSITION_TARGET_LOCAL_NED": decode_local,

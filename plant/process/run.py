@@ -11,7 +11,7 @@ from colibri.plant.physics.start import DEFAULT_STARTS
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.options import nudged
 from colibri.plant.process.reports import closing
-from colibri.plant.process.server import Server
+from colibri.plant.process.server import FreeServer, Server
 from colibri.plant.sensors.suite import served_by
 from colibri.plant.simulation.plant import PlantBuilder
 from colibri.plant.simulation.setting import WorldSetting, world_values
@@ -45,8 +45,6 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     )
     server = Server(link, end, status, stop, logs, streams_truth=args.truth)
     if args.realtime:
-        from colibri.plant.process.free_running import FreeServer
-
         server = FreeServer(link, end, status, stop, logs, cut_after_s=args.cut_after)
     with closing(link, logs):
         if server.wait():
