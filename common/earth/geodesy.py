@@ -16,11 +16,7 @@ MAX_LONGITUDE_DEG = 180.0
 
 
 class Geodetic(NamedTuple):
-    """A place on earth.
-
-    Attributes:
-        altitude_m: Above mean sea level.
-    """
+    """A place on earth; its altitude is above mean sea level."""
 
     latitude_deg: float
     longitude_deg: float

@@ -67,7 +67,6 @@ class Request(NamedTuple):
     Attributes:
         size: Length of the data, or of what to read.
         offset: In a file, or among the entries of a folder.
-        data: Not more than `size` bytes.
     """
 
     peer: Peer

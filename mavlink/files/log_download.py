@@ -37,12 +37,7 @@ class _Listing:
 
 @dataclass(slots=True)
 class _Transfer:
-    """A part of a log on its way to a client.
-
-    Attributes:
-        offset: Of what is sent next.
-        end: Where the part ends, as the client asked for it.
-    """
+    """A part of a log on its way to a client, who asked for it up to `end`."""
 
     peer: Peer
     id: int

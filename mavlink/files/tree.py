@@ -55,12 +55,7 @@ class Reading(NamedTuple):
 
 
 class Quota(NamedTuple):
-    """How much may be kept.
-
-    Attributes:
-        size: Bytes, of all files together.
-        entries: Files and folders.
-    """
+    """How much may be kept."""
 
     size: int
     entries: int

@@ -22,11 +22,7 @@ MAX_PARCEL_BYTES = 4096
 
 
 class Parcel(NamedTuple):
-    """A datagram on its way.
-
-    Attributes:
-        station: Number of the ground station that sends or receives it.
-    """
+    """A datagram on its way from or to the ground station of that number."""
 
     station: int
     datagram: bytes

@@ -53,10 +53,8 @@ class Fault(NamedTuple):
     """Something that goes wrong, or is well again.
 
     Attributes:
-        unit: FAILURE_UNIT, where.
-        kind: FAILURE_TYPE, how.
+        unit, kind: FAILURE_UNIT and FAILURE_TYPE, where and how; `values` are param4 to param7.
         instance: Which, from 1 on; 0 for all.
-        values: param4 to param7.
     """
 
     unit: int
@@ -69,7 +67,6 @@ class Value(NamedTuple):
     """What one of the numbers means.
 
     Attributes:
-        unit: SI, or the sensor's.
         minimum, maximum: Smallest and largest that is taken.
         usual: Taken where none of a fault's numbers is given.
         rest: Taken where another is given and this is not.
@@ -87,7 +84,6 @@ class Row(NamedTuple):
     """One kind of fault.
 
     Attributes:
-        part: What the plant must have.
         values: What param4 and those behind it mean.
         instances: How many there are of the unit.
     """

@@ -34,24 +34,14 @@ _INT16_MAX, _UINT16_MAX = 32767, 65535
 
 
 class Motors(NamedTuple):
-    """What PX4 commands.
-
-    Attributes:
-        controls: Of its first four motors in its own order, 0 to 1.
-        armed: Whether they may turn.
-    """
+    """What PX4 commands: controls, 0 to 1, of its first four motors in its own order."""
 
     controls: FourRotors
     armed: bool
 
 
 class Truth(NamedTuple):
-    """The true state that HIL_STATE_QUATERNION holds: PX4 only logs it.
-
-    Attributes:
-        acceleration_enu_m_s2: Of the vehicle against the ground.
-        airspeed_m_s: Through the air.
-    """
+    """The true state that HIL_STATE_QUATERNION holds, its acceleration against the ground: PX4 only logs it."""
 
     state: StateFrame
     place: Geodetic
@@ -68,8 +58,6 @@ class SimulatorEnd:
         peer: Where PX4 is; None until it has called, and after it has gone.
         calls: How many times a PX4 has begun to be served.
         lockstep: Whether PX4 answers each frame, and is to be waited for.
-        answered: Whether the last frame has been answered.
-        motors: The last command.
         received: Frames of PX4 that were understood, in order; the owner may log and clear it.
     """
 

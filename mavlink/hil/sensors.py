@@ -52,11 +52,7 @@ class GpsFix:
     Attributes:
         time_us: Simulated time from which it is sent, µs; it was measured the receiver's delay before, exactly.
         fix_type: How good it is (`FixType`, or any number that a simulator sends).
-        place: Position.
-        velocity_enu_m_s: Velocity, m/s, ENU.
-        horizontal_accuracy_m: Standard deviation that it claims.
-        vertical_accuracy_m: Standard deviation that it claims.
-        satellites: How many are used.
+        horizontal_accuracy_m, vertical_accuracy_m: Standard deviations that it claims.
     """
 
     time_us: int
@@ -73,8 +69,7 @@ class Distance(NamedTuple):
 
     Attributes:
         distance_m: To the ground, along the vehicle's own axis; infinite where it sees none.
-        min_m: What is nearer it does not see.
-        max_m: What is farther it does not see.
+        min_m, max_m: What is nearer or farther it does not see.
         field_of_view_rad: Angle of its beam's cone.
     """
 
@@ -91,12 +86,8 @@ class SensorFrame:
     A group that `updated` leaves out holds its last value, or zeros.
 
     Attributes:
-        time_us: Simulated time, µs.
         updated: Which groups are new (`Updated`).
         specific_force_flu_m_s2: Of the accelerometer: (0, 0, 9.81) at rest and level.
-        rate_flu_rad_s: Of the gyroscope.
-        magnetic_field_flu_gauss: Of the magnetometer.
-        pressure_pa: Static pressure.
         temperature_c: Of the barometer, degrees Celsius.
         gps: None between two fixes.
         distance: Of the rangefinder; None between two samples, and without one.
@@ -122,9 +113,7 @@ class OwnMessage(NamedTuple):
 
     Attributes:
         field: Of `SensorFrame`; None there where nothing is new.
-        message: Its name.
         encoded: (value, simulated time in µs) -> fields of the message.
-        decoded: Message -> value.
         passed_on: Whether ground stations receive the same message.
     """
 

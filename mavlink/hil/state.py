@@ -38,13 +38,7 @@ class StateFrame:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorCommand:
-    """The rotor speeds that answer a frame.
-
-    Attributes:
-        time_us: The `time_us` of the frame answered.
-        controls: Rotor speed / maximum rotor speed of each rotor, 0..1, in the vehicle's rotor order.
-        armed: Whether the rotors may turn.
-    """
+    """The rotor speeds that answer the frame of `time_us`, 0..1 of the maximum, in the vehicle's rotor order."""
 
     time_us: int
     controls: tuple[float, float, float, float]

@@ -13,11 +13,7 @@ _DATAGRAMS_AT_ONCE = 64
 
 
 class UdpLink(Endpoint):
-    """A UDP socket that blocks for no longer than the time given.
-
-    Attributes:
-        spin_s: How long to poll for a datagram before sleeping.
-    """
+    """A UDP socket that blocks for no longer than the time given, and polls for `spin_s` before it sleeps."""
 
     def __init__(self, sock: socket.socket, url: str, target: Address | None) -> None:
         """Wrap a bound socket; with a `target`, drop datagrams from other addresses."""

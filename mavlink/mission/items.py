@@ -29,12 +29,9 @@ class MissionItem(NamedTuple):
     """An item of a plan, in wire units.
 
     Attributes:
-        frame: MAV_FRAME.
-        command: MAV_CMD.
         autocontinue: Whether the next item follows by itself.
         p1, p2, p3, p4: Parameters one to four.
-        x: Latitude, degE7; or the fifth parameter.
-        y: Longitude, degE7; or the sixth parameter.
+        x, y: Latitude and longitude, degE7; or parameters five and six.
         z: Altitude, m; or the seventh parameter.
     """
 
@@ -51,12 +48,7 @@ class MissionItem(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """The items of one type that the vehicle holds.
-
-    Attributes:
-        items: In sequence.
-        id: The opaque id: changes with the items; 0 without any.
-    """
+    """The items of one type that the vehicle holds; the opaque id changes with them, and is 0 without any."""
 
     items: tuple[MissionItem, ...] = ()
     id: int = 0

@@ -71,11 +71,7 @@ class Vehicle(NamedTuple):
 
 
 class MissionService:
-    """Holds the three plans and speaks the mission protocol about them: a method for each of its messages.
-
-    Attributes:
-        plans: By MAV_MISSION_TYPE.
-    """
+    """Holds the three plans and speaks the mission protocol about them: a method for each of its messages."""
 
     def __init__(self, rules: Mapping[int, Rules], vehicle: Vehicle, text: StatusText) -> None:
         """Begin without plans; `rules` are those of each of the three types."""

@@ -95,11 +95,7 @@ class _Upload:
 
 
 class Uploads:
-    """The uploads under way: at most one of a type, and one of a ground station.
-
-    Attributes:
-        due_us: When `poll` has something to do.
-    """
+    """The uploads under way, at most one of a type and one of a ground station; `poll` has to do at `due_us`."""
 
     def __init__(self, rules: Mapping[int, Rules], store: Callable[[int, Sequence[MissionItem]], Plan]) -> None:
         """Check items by the `rules` of each type; hand a whole valid plan to `store`."""

@@ -21,11 +21,7 @@ _OPENS_NOTHING = frozenset({UNKNOWN, "RADIO_STATUS"})
 
 
 class Outgoing(NamedTuple):
-    """A datagram of whole frames to send.
-
-    Attributes:
-        address: Where to; None where the link knows.
-    """
+    """A datagram of whole frames to send, by the number of its link; without an address, where the link knows."""
 
     link: int
     address: Address | None

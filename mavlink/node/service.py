@@ -15,11 +15,7 @@ Fields: TypeAlias = tuple[Any, ...]
 
 
 class Peer(NamedTuple):
-    """Who sent a message, and the channel that an answer takes.
-
-    Attributes:
-        channel: Number of the channel: one remote address on one link.
-    """
+    """Who sent a message, and the number of the channel (a remote address on a link) that an answer takes."""
 
     channel: int
     system: int
@@ -40,11 +36,7 @@ class Send(NamedTuple):
 
 
 class Service(Protocol):
-    """A microservice.
-
-    Attributes:
-        handles: Names of the messages that `receive` is to be given.
-    """
+    """A microservice, and the names of the messages that its `receive` is to be given."""
 
     handles: frozenset[str]
 

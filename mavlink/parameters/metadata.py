@@ -24,11 +24,7 @@ _UINT32_MAX = 0xFFFFFFFF
 
 
 class Metadata:
-    """What describes this component.
-
-    Attributes:
-        general: The general file, which names the others with their checksums.
-    """
+    """What describes this component; the general file names the others with their checksums."""
 
     def __init__(self, parameters: bytes) -> None:
         """Describe the component by the JSON of its parameters, which never changes."""

@@ -38,11 +38,7 @@ class ParamError(IntEnum):
 
 
 class Prepared(NamedTuple):
-    """A change that may be made.
-
-    Attributes:
-        made: What was made for it, which whoever adopts the change needs not make again; None for nothing.
-    """
+    """A change that may be made, and what was made for it, so that nobody makes it again; None for nothing."""
 
     made: object | None = None
 
@@ -52,11 +48,7 @@ Prepare: TypeAlias = Callable[[str, Mapping[str, Value]], Prepared | ParamError]
 
 
 class Changes(NamedTuple):
-    """What has changed.
-
-    Attributes:
-        made: The newest that was made for one of them; None for nothing.
-    """
+    """Parameters that have changed, and the newest that was made for one of them; None for nothing."""
 
     names: tuple[str, ...]
     made: object | None
@@ -68,11 +60,8 @@ class Parameter:
 
     Attributes:
         name: At most 16 capitals, digits and underscores.
-        default: Its value until somebody changes it.
         decimals: How many a ground station should show.
-        reboot_required: Whether it takes effect only at the next start.
         values: The only values that it may have, and what each stands for; none: all between the bounds.
-        read_only: Whether ground stations cannot change it.
     """
 
     name: str
@@ -118,12 +107,7 @@ class Parameter:
 
 
 class Parameters:
-    """The parameters in the order of their names, and their values.
-
-    Attributes:
-        prepare: Asked before a value changes, after the parameter's own bounds; None: all may be.
-        revision: Counts the changes.
-    """
+    """The parameters in the order of their names, and their values; `prepare` is called before one changes."""
 
     def __init__(self, definitions: Iterable[Parameter], prepare: Prepare | None = None) -> None:
         """Begin with every parameter at its default.

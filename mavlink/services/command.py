@@ -80,7 +80,6 @@ class Outcome(NamedTuple):
     """What became of a command.
 
     Attributes:
-        result: MAV_RESULT.
         reason: Why it was refused, for the STATUSTEXT that goes with the COMMAND_ACK; empty for none.
         param2: COMMAND_ACK.result_param2.
     """
@@ -113,11 +112,7 @@ class _Answered(NamedTuple):
 
 
 class CommandService:
-    """Hands commands to their handlers and acknowledges each to whoever sent it.
-
-    Attributes:
-        closed: Why every command is denied for the time being; empty if they are obeyed.
-    """
+    """Hands commands to their handlers and acknowledges each to its sender; denies all, where `closed` for a reason."""
 
     handles = frozenset({"COMMAND_LONG", "COMMAND_INT", "COMMAND_CANCEL"})
 

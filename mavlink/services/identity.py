@@ -32,12 +32,7 @@ CAPABILITIES: int = (
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """How the vehicle introduces itself.
-
-    Attributes:
-        name: As the user writes it.
-        speaks: The release whose interface it follows, sent as the version of the flight software; None for its own.
-    """
+    """How the vehicle introduces itself; `speaks` is the release whose interface it follows, None for its own."""
 
     name: str
     autopilot: int

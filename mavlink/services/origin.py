@@ -17,11 +17,7 @@ _MIN_HEIGHT_MM, _MAX_HEIGHT_MM = -1_000_000, 20_000_000
 
 
 class Setters(NamedTuple):
-    """What obeys; each returns why not, None if it is done.
-
-    Attributes:
-        mode: (base mode, custom mode).
-    """
+    """What obeys; each returns why not, None if it is done. `mode` takes base mode and custom mode."""
 
     origin: Callable[[Geodetic], Refusal | None]
     home: Callable[[Geodetic], Refusal | None]

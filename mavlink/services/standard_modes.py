@@ -21,7 +21,6 @@ class ModeInfo(NamedTuple):
     Attributes:
         custom_mode: Its number in HEARTBEAT.
         standard_mode: MAV_STANDARD_MODE; 0 where it is none.
-        selectable: Whether people may choose it.
         advanced: Whether it is "harder to fly".
     """
 

@@ -25,11 +25,7 @@ class Refused(Exception):  # noqa: N818 (what happened to a setpoint, not an err
 
 
 class StreamedService(ABC, Generic[Value]):
-    """A service that keeps the latest setpoint of each client, and never answers.
-
-    Attributes:
-        source: The client that is obeyed; None before the first setpoint.
-    """
+    """A service that keeps the latest setpoint of each client, obeys that of `source`, and never answers."""
 
     handles: frozenset[str]
 

@@ -86,11 +86,7 @@ AMSL_FRAMES = frozenset({mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT})
 
 
 class Whereabouts(NamedTuple):
-    """What setpoints count from.
-
-    Attributes:
-        home: None until it is known.
-    """
+    """What setpoints count from."""
 
     position_enu_m: Vector = (0.0, 0.0, 0.0)
     yaw_rad: float = 0.0

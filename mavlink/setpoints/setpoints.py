@@ -22,7 +22,6 @@ class PositionSetpoint(NamedTuple):
         acceleration_m_s2: In the same axes: feed-forward, or all there is.
         yaw_rad: Counter-clockwise from east, -pi..pi.
         body: Whether velocity and acceleration turn with the vehicle: see `in_enu`.
-        time_us: When it came, simulated time.
     """
 
     position_enu_m: Vector = NOWHERE
@@ -51,7 +50,6 @@ class AttitudeSetpoint(NamedTuple):
         attitude: Unit quaternion, FLU to ENU; None where only rates are asked for.
         rate_flu_rad_s: Body rates, nan on the axes that are not given; beside an attitude they are feed-forward.
         thrust: Part of the largest, 0..1; nan where it is not given.
-        time_us: When it came, simulated time.
     """
 
     attitude: Quaternion | None
@@ -71,7 +69,6 @@ class Sticks(NamedTuple):
         roll: To the right, -1..1.
         thrust: 0..1, the middle is 0.5.
         yaw: To the right, -1..1: positive turns clockwise seen from above.
-        time_us: When they were last moved or confirmed, simulated time.
     """
 
     pitch: float
@@ -86,7 +83,6 @@ class TargetState(NamedTuple):
 
     Attributes:
         velocity_enu_m_s, acceleration_enu_m_s2: Zero where they are not known.
-        received_us: When it was received, simulated time.
         time_us: What it is the state at.
     """
 

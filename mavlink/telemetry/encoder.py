@@ -27,11 +27,7 @@ FLOAT32_MAX = 3.4028234663852886e38
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constants:
-    """What telemetry sends that does not change in flight.
-
-    Attributes:
-        boot_unix_us: Unix time at the start, µs; 0 where nobody knows it.
-    """
+    """What telemetry sends that does not change in flight; a Unix time of 0 at the start is not known."""
 
     boot_unix_us: int = 0
     gravity_m_s2: float = 9.81

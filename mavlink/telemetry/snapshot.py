@@ -16,11 +16,7 @@ CHARGE_OK = 1
 
 
 class Home(NamedTuple):
-    """Where the vehicle returns to.
-
-    Attributes:
-        yaw_rad: Heading there, counter-clockwise from east.
-    """
+    """Where the vehicle returns to; yaw is counter-clockwise from east."""
 
     position_enu_m: Vector
     yaw_rad: float
@@ -50,7 +46,6 @@ class Setpoint(NamedTuple):
 
     Attributes:
         yaw_rad: Counter-clockwise from east.
-        attitude: Unit quaternion, FLU to ENU.
         thrust: Part of the largest, 0..1.
     """
 
@@ -65,11 +60,7 @@ class Setpoint(NamedTuple):
 
 
 class Forecast(NamedTuple):
-    """A point of the predicted horizon.
-
-    Attributes:
-        yaw_rad: Counter-clockwise from east.
-    """
+    """A point of the predicted horizon; yaw is counter-clockwise from east."""
 
     after_s: float
     position_enu_m: Vector
@@ -142,21 +133,15 @@ class Snapshot:
         emergency: Whether it comes down for that.
         armable: Whether every check before arming passes.
         attitude: Unit quaternion, FLU to ENU.
-        home: None until it is known.
         rotor_speeds_rad_s: As the autopilot estimates them.
         controls: Commanded, parts of the largest speed.
-        battery: None without one.
-        wind_enu_m_s: Estimated; nan where none is.
         sticks: Of the last MANUAL_CONTROL: pitch, roll, thrust, yaw, -1..1 (thrust 0..1); None without one.
         flight_started_us, takeoff_us, landing_us: Of the last arming, take-off and landing; 0 before.
-        flights: How often it was armed.
-        terminated: Whether the flight was ended for good.
         ground_m: Height of the ground below, over the origin.
         target_enu_m: Where the way leads, the next waypoint; nan for the setpoint itself.
         fence_breached: Whether the vehicle is where it must not be.
         load: Part of the time between two frames that the autopilot computes, 0..1.
         sensed: What was measured on board last; None with state feedback.
-        fix: The last of GPS; None before it.
         latest: The last value of each sensor with a message of its own, by the field of `SensorFrame`.
         estimator: How well the state is known; None with state feedback.
     """

@@ -15,13 +15,7 @@ _CODES |= {"float": "f", "uint64_t": "Q", "int64_t": "q", "double": "d"}
 
 
 class Field(NamedTuple):
-    """A field of a message.
-
-    Attributes:
-        kind: Its type, as MAVLink writes it.
-        name: Its name.
-        length: How many there are in the array; 0 where it is none.
-    """
+    """A field of a message; a `length` of 0 is that of no array."""
 
     kind: str
     name: str

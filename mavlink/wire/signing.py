@@ -64,7 +64,6 @@ class Signing:
     never goes back.
 
     Attributes:
-        active: Whether there is a key.
         timestamp: Our own, ticks since 2015: to be stored now and then, and handed in at the next start.
         key_changed: Whether SETUP_SIGNING has changed the key; the owner may store it and reset this.
     """

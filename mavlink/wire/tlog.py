@@ -13,11 +13,7 @@ STAMP = struct.Struct(">Q")
 
 
 class Logged(NamedTuple):
-    """A frame of a log.
-
-    Attributes:
-        time_us: When, µs; of a flight's log simulated time.
-    """
+    """A frame of a log; the time of a flight's log is simulated."""
 
     time_us: int
     frame: bytes

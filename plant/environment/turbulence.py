@@ -37,10 +37,8 @@ class Eddies(NamedTuple):
     """What the filters remember.
 
     Attributes:
-        frame: How many frames the air has blown.
         u: Along the mean wind.
-        v: Across it: first and second state.
-        w: Upwards: first and second state.
+        v, w: Across it, and upwards: first and second state.
     """
 
     frame: int
@@ -55,8 +53,7 @@ class Scales(NamedTuple):
     Attributes:
         sigma_uv_m_s: σu = σv, standard deviation along and across the mean wind.
         sigma_w_m_s: σw, upwards.
-        length_uv_m: Lu = Lv.
-        length_w_m: Lw.
+        length_uv_m, length_w_m: Lu = Lv, and Lw.
     """
 
     sigma_uv_m_s: float

@@ -19,11 +19,7 @@ MAX_SPEED_M_S = 150.0
 
 
 class Wind(NamedTuple):
-    """A constant wind, as meteorology says it.
-
-    Attributes:
-        from_deg: Where it blows from, degrees clockwise from north: 270 blows from west to east.
-    """
+    """A constant wind as meteorology has it: `from_deg` clockwise from north, 270 blows from west to east."""
 
     speed_m_s: float
     from_deg: float
@@ -49,12 +45,7 @@ class Wind(NamedTuple):
 
 
 class RecordedWind(NamedTuple):
-    """A wind from a file: linear between its times, constant before the first and after the last.
-
-    Attributes:
-        times_s: Simulated time, rising.
-        velocities_enu_m_s: One for each time.
-    """
+    """A wind from a file: linear between its times, constant before the first and after the last."""
 
     path: Path
     times_s: tuple[float, ...]
@@ -85,7 +76,6 @@ class Gust(NamedTuple):
 
     Attributes:
         wind: Its peak, V.
-        start_s: Simulated time at which it begins.
         duration_s: How long it lasts; the peak is in the middle.
     """
 
@@ -108,11 +98,7 @@ class Gust(NamedTuple):
 
 
 class Weather(NamedTuple):
-    """All that moves the air.
-
-    Attributes:
-        turbulence: None for none; `seed` is its.
-    """
+    """All that moves the air; `seed` is the turbulence's."""
 
     wind: Wind | RecordedWind
     gusts: tuple[Gust, ...] = ()

@@ -30,7 +30,6 @@ class Parameters(NamedTuple):
 
     Attributes:
         gravity_m_s2: Gravitational acceleration, towards -z of ENU.
-        inertia_kg_m2: Ix, Iy, Iz about the FLU axes.
         thrust: Of each rotor along body z, N per speed unit squared.
         yaw_moment: Of each rotor about body z, with its sign, N m per speed unit squared.
         momentum: Angular momentum of each rotor along body z, with its sign, N m s per speed unit.
@@ -45,7 +44,6 @@ class Parameters(NamedTuple):
         contacts_m: Points in FLU that the ground can touch, (8, 3).
         ground_m: Height of the ground, z of ENU; -inf for none.
         stiffness_n_m, damping_n_s_m: Of the ground at one point; the damping is against sinking in and coming out.
-        friction: Coulomb's coefficient.
         slip_damping_n_s_m: Friction of one point that creeps, before Coulomb's limit: N for each m/s.
     """
 

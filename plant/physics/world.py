@@ -33,7 +33,6 @@ class World:
     Attributes:
         state: `equations.STATE`, 13 values.
         rotor_speeds: What the rotors turn at, in the vehicle's unit; without lag, what they turned at up to now.
-        charge_used_ah: Charge taken from the battery, Ah.
         voltage_v: The battery's terminal voltage, V; nan before the first step, and without a battery.
         wind_enu_m_s: Velocity of the air where the vehicle is, held until the next step ends.
     """

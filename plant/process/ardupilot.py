@@ -37,9 +37,7 @@ class ArduPilotEnd:
     """The plant's end: steps a world at each request.
 
     Attributes:
-        world: The world as it was last sent.
         peer: Where ArduPilot is, None until it has called.
-        restarts: How many times an ArduPilot restarted.
         dropped: What was received and not obeyed, by reason.
     """
 

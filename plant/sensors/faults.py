@@ -71,11 +71,7 @@ class Reading(Generic[T]):
 
 
 class SensorFaults:
-    """The faults of all sensors of one vehicle.
-
-    Attributes:
-        units: FAILURE_UNIT of what it has.
-    """
+    """The faults of all sensors of one vehicle, whose FAILURE_UNIT are `units`."""
 
     def __init__(self, seed: int, parts: Sensors | None) -> None:
         """Have none; more noise will be by chance of `seed`."""

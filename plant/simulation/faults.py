@@ -17,12 +17,7 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class Faults:
-    """What has gone wrong with one vehicle.
-
-    Attributes:
-        sensors: What its sensors' frames go through.
-        parts: What of it can fail.
-    """
+    """What has gone wrong with one vehicle."""
 
     def __init__(self, vehicle: Vehicle, physics: Physics, feedback: Feedback, *, seed: int) -> None:
         """Begin with everything well; rotors and battery fail in `physics`."""

@@ -16,7 +16,6 @@ class WorldSetting:
         wind: "5@270": 5 m/s from the west; or a .csv file; None for calm.
         gusts: "6@270:start=10,duration=2", each.
         turbulence: "light", "moderate", "severe"; None for none.
-        seed: Of everything random.
         start: How the vehicle begins: x, y, z (m, ENU), phi, theta, psi (degrees), vx, vy, vz (m/s), p, q, r (rad/s),
             rotors (rpm).
         latency: One way between plant and autopilot, ms: commands act so much later, twice.
