@@ -1,4 +1,4 @@
-"""What every package may use; nothing here knows a vehicle or MAVLink."""
+"""What every package may use; nothing of a vehicle or of MAVLink."""
 
 from typing import TYPE_CHECKING
 

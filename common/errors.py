@@ -2,7 +2,7 @@
 
 
 class Error(Exception):
-    """Something that a user can put right; the message is the one line that says what, and where, and how.
+    """Something that a user can put right; the message is the one line of what, where and how.
 
     Below it is one base a package: `MavlinkError`, `PlantError`, `AutopilotError`, `SitlError`. What derives from none
     of them belongs to `common`, or to what a user runs. A mistake in this program is another exception, a traceback.
@@ -10,4 +10,4 @@ class Error(Exception):
 
 
 class InFlightError(Error):
-    """A flight that was begun and came to no end, whichever package knows why; what was logged is there."""
+    """A flight that was begun and came to no end, in whichever package; what was logged is there."""

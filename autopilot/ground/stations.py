@@ -49,7 +49,6 @@ from colibri.mavlink.setpoints.manual_control import Manual
 from colibri.mavlink.setpoints.offboard import Offboard
 from colibri.mavlink.streaming.heartbeat import HeartbeatService
 from colibri.mavlink.streaming.service import StreamService
-from colibri.mavlink.telemetry.encoder import Constants
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.telemetry.table import telemetry
 from colibri.mavlink.wire.dialect import AUTOPILOT_COMPONENT, mav
@@ -141,7 +140,7 @@ class Stations:
         vehicle = Vehicle(missions.load, missions.progress, missions.set_current, commands.motion.guided_goto)
         self.plans = MissionService(PLAN_RULES, vehicle, self._text)
         self._heartbeat = HeartbeatService(identity)
-        self._streams = StreamService(telemetry(Constants(boot_unix_us=settings.boot_unix_us)))
+        self._streams = StreamService(telemetry(settings.boot_unix_us))
         modes = StandardModes(
             [ModeInfo(row.mode.title(), custom_mode(row.mode), row.standard, row.selectable) for row in MODES],
             lambda number, _: outcome_of(commands.select(mode_of_custom(number))),

@@ -1,4 +1,4 @@
-"""Ground stations that a conductor speaks for: it holds simulated time still, so no clock says what is heard when."""
+"""Ground stations that a conductor stands for: it holds simulated time still, so no clock decides what comes when."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -19,12 +19,12 @@ _MAX_WAIT_S = 0.1
 class Conductor(Protocol):
     """Whoever speaks for the ground stations."""
 
-    def hear(self) -> StepMessage | None:
-        """Return what they say at this instant; None where there will be nothing more."""
+    def receive(self) -> StepMessage | None:
+        """Return what they send at this instant; None where there will be nothing more."""
         ...
 
-    def tell(self, step_message: StepMessage) -> None:
-        """Tell them what the vehicle says."""
+    def send(self, step_message: StepMessage) -> None:
+        """Send them what the vehicle sends."""
         ...
 
     def close(self) -> None:
@@ -42,7 +42,7 @@ class UdpConductor:
         self._gathering = Gathering()
         link.send(b"")
 
-    def hear(self) -> StepMessage | None:
+    def receive(self) -> StepMessage | None:
         """Wait for its step message."""
         while not self._ended():
             received = self._link.receive(_MAX_WAIT_S)
@@ -51,7 +51,7 @@ class UdpConductor:
                 return step_message
         return None
 
-    def tell(self, step_message: StepMessage) -> None:
+    def send(self, step_message: StepMessage) -> None:
         """Send a step message."""
         for packet in packets(step_message):
             self._link.send(packet)
@@ -75,19 +75,19 @@ class ConductedLinks:
         """Open nothing: each channel opens with the first message on it."""
 
     def receive(self, stations: Stations) -> Iterator[Received]:
-        """Wait for what is said at this instant, then yield it; what is not taken is yielded the next time."""
+        """Wait for what is sent at this instant, then yield it; what is not taken is yielded the next time."""
         del stations
-        step_message = self._conductor.hear()
+        step_message = self._conductor.receive()
         if step_message is not None:
             self._time_us = step_message.time_us
             self._waiting.extend(step_message.parcels)
         return self._taken()
 
     def send(self, outbox: Iterable[Outgoing]) -> None:
-        """Tell the conductor what the vehicle says."""
+        """Send the conductor what the vehicle sends."""
         parcels = [Parcel(address[1], datagram) for _, address, datagram in outbox if address is not None]
         mode, armed = self._state()
-        self._conductor.tell(StepMessage(self._time_us, parcels, custom_mode(mode), armed))
+        self._conductor.send(StepMessage(self._time_us, parcels, custom_mode(mode), armed))
 
     def facts(self, stations: Stations, interval_s: float) -> list[dict[str, Any]]:
         """Return nothing: nobody watches a terminal."""

@@ -1,4 +1,4 @@
-"""Where on earth a vehicle begins, as the command line says it: LAT,LON,ALT,YAW."""
+"""Where on earth a vehicle begins: LAT,LON,ALT,YAW of the command line."""
 
 from argparse import ArgumentTypeError
 from math import isfinite

@@ -35,5 +35,5 @@ def field_enu_gauss(place: Geodetic, year: float = YEAR) -> Vector:
 
 
 def _gauss(field_nt: float) -> float:
-    """Return a component in gauss, rounded far below what the model knows: libm's last bits differ by computer."""
+    """Return a component in gauss, rounded far below the model's accuracy: libm's last bits differ by computer."""
     return round(field_nt, _DECIMALS_NT) * _GAUSS_PER_NT

@@ -60,8 +60,8 @@ class Stop:
     def __init__(self, *, parent: int | None = None, starting: bool = False) -> None:
         """Take over SIGINT and SIGTERM; `starting`: until first asked they end the process at once.
 
-        What is still loading has nothing to put in order, and may load for seconds before it asks. The parent says who
-        it is: it may have died before this process could ask.
+        What is still loading has nothing to put in order, and may load for seconds before it asks. The parent passes
+        its id: it may have died before this process could ask.
         """
         self._signalled = False
         self._starting = starting

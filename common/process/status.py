@@ -6,7 +6,7 @@ from typing import Any
 
 
 class Status:
-    """Tells what the process is doing: lines for a person on standard error, or JSON lines on standard output."""
+    """Reports what the process is doing: lines for a person on standard error, or JSON lines on standard output."""
 
     def __init__(self, name: str, *, as_json: bool) -> None:
         """Speak as `name`."""

@@ -185,7 +185,7 @@ class Folder:
             raise _RefusedError(FileRefusal.NO_SPACE)
 
     def _existing(self, folder: int, name: str) -> os.stat_result:
-        """Return what the system knows of a file or folder that is shown."""
+        """Return the status of a file or folder that is shown."""
         status = os.stat(name, dir_fd=folder, follow_symlinks=False)
         if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
             raise _RefusedError(FileRefusal.NOT_FOUND)

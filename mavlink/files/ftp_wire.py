@@ -1,4 +1,4 @@
-"""What the file transfer protocol says on the wire: requests, answers, errors, the lines of a folder.
+"""The file transfer protocol on the wire: requests, answers, errors, the lines of a folder.
 
 Specification: https://mavlink.io/en/services/ftp.html, "Payload Format" and what follows it.
 """

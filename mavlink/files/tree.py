@@ -33,7 +33,7 @@ class Entry(NamedTuple):
 
     Attributes:
         size: Bytes; 0 of a folder.
-        modified_s: Last modification, s since 1970 UTC; 0 where nobody knows.
+        modified_s: Last modification, s since 1970 UTC; 0 where it is not known.
     """
 
     name: str

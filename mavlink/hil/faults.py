@@ -1,7 +1,7 @@
 """Faults by the names of MAV_CMD_INJECT_FAILURE: which there are, and what the numbers of each mean.
 
 param1 is the FAILURE_UNIT, param2 the FAILURE_TYPE, param3 the instance from 1 on or 0 for all, as
-https://mavlink.io/en/messages/common.html#MAV_CMD_INJECT_FAILURE has them. param4 to param7 mean what `TABLE` says: a
+https://mavlink.io/en/messages/common.html#MAV_CMD_INJECT_FAILURE has them. param4 to param7 mean what is in `TABLE`: a
 number that is 0 or nan is not given. One fault at a time: another one of the same part takes its place, OK ends it.
 """
 
@@ -112,11 +112,11 @@ def _sensor(unit: int, wrong: tuple[Value, ...], drift: tuple[Value, ...], noise
     return (
         Row(unit, OK, part, "is well again"),
         Row(unit, OFF, part, "measures nothing new"),
-        Row(unit, STUCK, part, "tells what it told last, again and again, as if it were new"),
+        Row(unit, STUCK, part, "reports its last value again and again, as if it were new"),
         Row(unit, GARBAGE, part, "has more noise: white, normal", (noise,)),
         Row(unit, WRONG, part, f"is off by {what}", wrong),
         Row(unit, SLOW, part, "drifts away: is off as by WRONG, and more from now on", drift),
-        Row(unit, DELAYED, part, "tells later", (late,)),
+        Row(unit, DELAYED, part, "reports later", (late,)),
     )
 
 

@@ -15,8 +15,8 @@ Beside its frame the plant sends its battery twice a second, and to whoever has 
 faults, COMMAND_LONG with MAV_CMD_INJECT_FAILURE, to the datagram that answers a frame: they are taken with that answer
 and with no other datagram, so each happens once, at that time; the next frame brings their COMMAND_ACK.
 
-A plant that runs freely waits for nobody: it says so in its HEARTBEAT, sends each frame once, and takes any answer that
-is newer than the last. The autopilot then goes on from whatever newer frame it gets.
+A plant that runs freely waits for nobody: `FREE_RUNNING` in its HEARTBEAT. It sends each frame once, and takes any
+answer that is newer than the last. The autopilot then goes on from whatever newer frame it gets.
 """
 
 from colibri.mavlink.hil.feedback import Feedback

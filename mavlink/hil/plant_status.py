@@ -67,7 +67,7 @@ def encode_battery(codec: Codec, battery: PlantBattery) -> bytes:
 
 
 def decode_battery(message: Message) -> PlantBattery | None:
-    """Decode a BATTERY_STATUS; None where it does not say what the battery is like."""
+    """Decode a BATTERY_STATUS; None where it has no voltage, charge or remaining part."""
     fields = message.fields
     cells_mv = [cell for cell in fields.voltages if cell != _NO_CELL]
     if not cells_mv or fields.current_consumed < 0 or not 0 <= fields.battery_remaining <= 100:
@@ -77,7 +77,7 @@ def decode_battery(message: Message) -> PlantBattery | None:
 
 
 def encode_results(codec: Codec, results: Sequence[FaultResult], target: tuple[int, int]) -> list[bytes]:
-    """Encode results as COMMAND_ACK; `result_param2` says of which fault: 256 unit + type."""
+    """Encode results as COMMAND_ACK; `result_param2` is the fault's: 256 unit + type."""
     return [
         codec.encode("COMMAND_ACK", faults.COMMAND, it.result, 0, it.unit << 8 | it.kind, *target) for it in results
     ]

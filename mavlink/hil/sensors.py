@@ -1,7 +1,7 @@
 """What sensors send the autopilot: dataclasses in SI, ENU/FLU, and the messages of PX4's simulator interface.
 
-HIL_SENSOR has what is measured on board; its `fields_updated` says which groups are new. HIL_GPS comes at its own rate,
-and is of the past; each other message of a sensor's own is a row of `OWN_MESSAGES`. Units and frames are those
+HIL_SENSOR has what is measured on board; its `fields_updated` has the groups that are new. HIL_GPS comes at its own
+rate, and is of the past; each other message of a sensor's own is a row of `OWN_MESSAGES`. Units and frames are those
 that PX4 reads: https://docs.px4.io/main/en/simulation/ and https://mavlink.io/en/messages/common.html. Nothing is
 judged here: an autopilot must cope with any number that a broken sensor sends.
 """

@@ -42,7 +42,7 @@ class Connection:
         self.flush()
 
     def fileno(self) -> int:
-        """Return what `select` knows the socket by."""
+        """Return the socket's descriptor, for `select`."""
         return self._socket.fileno()
 
     def flush(self) -> None:

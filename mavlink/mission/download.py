@@ -38,7 +38,7 @@ class Downloads:
         return to(peer, "MISSION_COUNT", *target, len(plan.items), plan_type, plan.id)
 
     def item(self, peer: Peer, plan_type: int, seq: int, newest: Plan, current: int, now_us: int) -> Send:
-        """Tell an item of the plan that was announced, or of the newest; `current` is the one being flown of that.
+        """Return an item of the plan that was announced, or of the newest; `current` is the one being flown of that.
 
         MISSION_REQUEST, too, is answered by a MISSION_ITEM_INT: "Deprecated Types: MISSION_ITEM".
         """

@@ -119,7 +119,7 @@ class MissionService:
         return sends
 
     def reached(self, seq: int) -> None:
-        """Tell everybody, at the next poll, that an item is reached ("Monitor Mission Progress")."""
+        """Send to all, at the next poll, that an item is reached ("Monitor Mission Progress")."""
         self._outbox.append(to_all("MISSION_ITEM_REACHED", seq))
 
     def current(self) -> Fields:

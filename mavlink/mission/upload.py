@@ -145,7 +145,7 @@ class Uploads:
         return self._complete(upload, now_us)
 
     def acknowledged(self, peer: Peer, plan_type: int, result: int, now_us: int) -> Send | None:
-        """Take a MISSION_ACK in: it cancels an upload, or says that MISSION_REQUEST is not known."""
+        """Take a MISSION_ACK in: it cancels an upload, or refuses MISSION_REQUEST."""
         upload = self._under_way.get(plan_type)
         if upload is None or upload.peer != peer or result == ACCEPTED:  # a late one of a download accepts
             return None

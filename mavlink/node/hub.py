@@ -107,7 +107,7 @@ class Hub:
     def receive(
         self, datagram: bytes, link: int, address: Address | None, now_us: int, *, loopback: bool = True
     ) -> None:
-        """Take in what came on a link from an address; `loopback` says whether from this computer."""
+        """Take in what came on a link from an address; `loopback`: whether from this computer."""
         self._now_us = now_us
         number = self._numbers.get((link, address), self._numbers.get((link, None)))
         channel = None if number is None else self._channels[number]

@@ -61,9 +61,9 @@ def _leads_to(target: Source, sources: dict[Source, None]) -> bool:
 
 
 def target_of(fields: object) -> Source:
-    """Return whom a message is for, 0 where it does not say.
+    """Return system and component id of a message's target, 0 for all.
 
-    MANUAL_CONTROL alone says it otherwise: its `target` is a system.
+    MANUAL_CONTROL alone has another field for it, `target`, a system id.
     """
     system = getattr(fields, "target_system", None)
     if system is None:

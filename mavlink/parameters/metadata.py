@@ -82,5 +82,5 @@ def _entry(parameter: Parameter) -> dict[str, Any]:
 
 
 def _shortest(parameter: Parameter, value: float) -> float:
-    """Return a number as it was meant before it was rounded to 32 bits, if seven digits say it."""
+    """Return a number as it was meant before it was rounded to 32 bits, if seven digits hold it."""
     return value if parameter.kind == Kind.INT else float(f"{value:.7g}")

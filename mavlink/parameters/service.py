@@ -107,8 +107,8 @@ class ParameterService:
 def _meant(definition: Parameter, wire_type: int, bits: int) -> Value | ParamError:
     """Return the value that somebody sent.
 
-    The type must be the parameter's, with one exception. Who has read the packed file (MAVProxy), or knows no types
-    (DroneKit), sets integers as REAL32 and relies on the vehicle to know better:
+    The type must be the parameter's, with one exception. Who has read the packed file (MAVProxy), or has no types
+    (DroneKit), sets integers as REAL32 and relies on the vehicle to convert them:
     https://mavlink.io/en/services/parameter_ftp.html, downloading parameters. That is obeyed where a float can mean
     but one integer.
     """

@@ -27,7 +27,7 @@ class Kind(IntEnum):
 
 
 class ParamError(IntEnum):
-    """Why a parameter is not what somebody wants: MAV_PARAM_ERROR, of which pymavlink knows only the first half."""
+    """Why a parameter is not what somebody wants: MAV_PARAM_ERROR, of which pymavlink has only the first half."""
 
     DOES_NOT_EXIST = 1
     VALUE_OUT_OF_RANGE = 2

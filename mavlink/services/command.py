@@ -77,16 +77,10 @@ class Command(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What became of a command.
-
-    Attributes:
-        reason: Why it was refused, for the STATUSTEXT that goes with the COMMAND_ACK; empty for none.
-        param2: COMMAND_ACK.result_param2.
-    """
+    """What became of a command; where it was refused, why, for the STATUSTEXT that goes with the COMMAND_ACK."""
 
     result: int = ACCEPTED
     reason: str = ""
-    param2: int = 0
 
 
 def outcome_of(refusal: Refusal | None) -> Outcome:
@@ -248,4 +242,4 @@ def _is_sent_again(command: Command, confirmation: int, before: _Answered) -> bo
 def _ack(command_id: int, peer: Peer, outcome: Outcome) -> Send:
     """Return the COMMAND_ACK to the sender. Only a command in progress has a progress."""
     progress = PROGRESS_UNKNOWN if outcome.result == IN_PROGRESS else 0
-    return to(peer, "COMMAND_ACK", command_id, outcome.result, progress, outcome.param2, peer.system, peer.component)
+    return to(peer, "COMMAND_ACK", command_id, outcome.result, progress, 0, peer.system, peer.component)

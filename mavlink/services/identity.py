@@ -1,8 +1,8 @@
-"""Who the autopilot says that it is.
+"""The identity that the autopilot sends.
 
 Ground stations choose how they speak to a vehicle by MAV_AUTOPILOT. As `px4` they offer everything that they can do
 with a PX4, whose custom modes and conventions Colibri follows; as `generic` only what needs no such knowledge. Either
-way AUTOPILOT_VERSION and the text at the start say that this is Colibri.
+way AUTOPILOT_VERSION and the text at the start name Colibri.
 """
 
 from dataclasses import dataclass

@@ -25,12 +25,12 @@ class Setters(NamedTuple):
 
 
 class OriginService:
-    """Hears the messages."""
+    """Obeys SET_GPS_GLOBAL_ORIGIN, SET_HOME_POSITION and SET_MODE."""
 
     handles = frozenset({"SET_GPS_GLOBAL_ORIGIN", "SET_HOME_POSITION", "SET_MODE"})
 
     def __init__(self, setters: Setters, text: StatusText) -> None:
-        """Hand what is asked for to `setters`; say why it is refused."""
+        """Hand what is asked for to `setters`; report why one is refused."""
         self._setters = setters
         self._text = text
 

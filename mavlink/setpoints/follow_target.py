@@ -1,7 +1,7 @@
 """Follow-me: the state of the target from FOLLOW_TARGET.
 
 Specification: https://mavlink.io/en/messages/common.html#FOLLOW_TARGET. Never answered. Of `est_capabilities` only the
-position's bit is asked for: velocity counts where it is finite, since the message itself says that (0, 0, 0) is an
+position's bit is asked for: velocity counts where it is finite, since by the message's own text (0, 0, 0) is an
 unknown one, and clients that send one leave its bit out.
 """
 

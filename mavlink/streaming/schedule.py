@@ -1,17 +1,17 @@
 """When each message is due on each channel: a grid of simulated time for each, without drift and without bursts."""
 
-from collections.abc import Hashable
 from heapq import heapify, heappop, heappush
-from typing import Generic, TypeVar
+from typing import TypeAlias
 
-Key = TypeVar("Key", bound=Hashable)
+Key: TypeAlias = tuple[int, str]
+"""Number of a channel, name of a message."""
 
 GOLDEN = 0.6180339887498949
 """Multiples of it, without their whole part, spread evenly however many there are."""
 STALE_ALLOWED = 64
 
 
-class _Entry(Generic[Key]):
+class _Entry:
     __slots__ = ("interval_us", "key", "live", "phase_us")
 
     def __init__(self, key: Key, interval_us: int, phase_us: int) -> None:
@@ -25,13 +25,13 @@ class _Entry(Generic[Key]):
         return now_us + self.interval_us - (now_us - self.phase_us) % self.interval_us
 
 
-class Schedule(Generic[Key]):
-    """Tells which keys are due. Keys of the same interval and phase are due together, whenever they were set."""
+class Schedule:
+    """Which keys are due. Keys of the same interval and phase are due together, whenever they were set."""
 
     def __init__(self) -> None:
         """Begin with nothing due ever."""
-        self._entries: dict[Key, _Entry[Key]] = {}
-        self._heap: list[tuple[int, int, _Entry[Key]]] = []
+        self._entries: dict[Key, _Entry] = {}
+        self._heap: list[tuple[int, int, _Entry]] = []
         self._count = 0
         self._now_us = 0
 
@@ -74,7 +74,7 @@ class Schedule(Generic[Key]):
                 self._push(entry, now_us)
         return keys
 
-    def _push(self, entry: _Entry[Key], now_us: int) -> None:
+    def _push(self, entry: _Entry, now_us: int) -> None:
         self._count += 1
         heappush(self._heap, (entry.after(now_us), self._count, entry))
 

@@ -16,7 +16,7 @@ from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.wire.dialect import Message, mav
 
 Provider: TypeAlias = Callable[[Command], list[Send] | Outcome]
-"""Answers REQUEST_MESSAGE for a message of another service: param2 to param6 are the command's; or says why not."""
+"""Answers REQUEST_MESSAGE for a message of another service: param2 to param6 are the command's; or refuses."""
 
 MIN_INTERVAL_US = 1_000
 MIN_GROUP_INTERVAL_US = 20_000
@@ -53,7 +53,7 @@ class StreamService:
         self._spread = {name: number for number, name in enumerate(telemetry)}
         self._names = {_message_id(name): name for name in telemetry}
         self._providers: dict[int, Provider] = {mav.MAVLINK_MSG_ID_MESSAGE_INTERVAL: self._interval_requested}
-        self._schedule: Schedule[tuple[int, str]] = Schedule()
+        self._schedule = Schedule()
         self._kinds: dict[int, str] = {}
         self._open: set[int] = set()
         self._waiting: list[Send] = []
@@ -155,7 +155,7 @@ class StreamService:
         return [] if outcome == Outcome() else outcome
 
     def _report_interval(self, message_id: int, peer: Peer) -> Outcome:
-        """Tell the interval: -1 means that the message is not streamed."""
+        """Send the interval: -1 means that the message is not streamed."""
         if message_id == mav.MAVLINK_MSG_ID_HEARTBEAT:
             interval_us = HEARTBEAT_US
         elif message_id in self._names:

@@ -1,7 +1,6 @@
 """Numbers -> what a message's fields can hold; and the quantities that several messages hold in the same wire units."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import degrees, hypot, isfinite, pi
 from typing import Any, TypeAlias
 
@@ -23,14 +22,6 @@ STANDARD_GRAVITY_M_S2 = 9.80665
 MILLI_G = 1000.0 / STANDARD_GRAVITY_M_S2
 FULL_TURN_CDEG = 36_000
 FLOAT32_MAX = 3.4028234663852886e38
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Constants:
-    """What telemetry sends that does not change in flight; a Unix time of 0 at the start is not known."""
-
-    boot_unix_us: int = 0
-    gravity_m_s2: float = 9.81
 
 
 def fitted(name: str, encoder: Encoder) -> Encoder:

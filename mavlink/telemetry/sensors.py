@@ -3,11 +3,12 @@
 from colibri.common.earth.atmosphere import pressure_pa, temperature_c
 from colibri.common.types import Vector
 from colibri.mavlink.node.service import Fields
-from colibri.mavlink.telemetry.encoder import MILLI_G, Constants, boot_ms, in_body_frd, times
+from colibri.mavlink.telemetry.encoder import MILLI_G, boot_ms, in_body_frd, times
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.ned import frd_from_flu
 
+GRAVITY_M_S2 = 9.81
 EARTH_FIELD_NED_GAUSS: Vector = (0.2152, 0.0124, 0.4312)
 """The earth's field at Zurich: 0.482 gauss, dipping 63.4° below the horizon, 3.3° east of true north. Taken everywhere:
 nothing in here steers by it."""
@@ -28,21 +29,21 @@ UPDATED: int = (
 )
 
 
-def highres_imu(s: Snapshot, c: Constants) -> Fields:
+def highres_imu(s: Snapshot) -> Fields:
     """HIGHRES_IMU (105): m/s², rad/s, gauss, hPa, m, °C."""
     altitude_m = altitude_amsl_m(s)
     air = (static_hpa(s), 0.0, altitude_m, air_c(s))
-    return (s.time_us, *specific_force_frd(s, c), *measured_rate_frd(s), *field_frd(s), *air, UPDATED, 0)
+    return (s.time_us, *specific_force_frd(s), *measured_rate_frd(s), *field_frd(s), *air, UPDATED, 0)
 
 
-def scaled_imu(s: Snapshot, c: Constants) -> Fields:
+def scaled_imu(s: Snapshot) -> Fields:
     """SCALED_IMU (26): mG, mrad/s, mgauss, centidegrees Celsius."""
-    return (boot_ms(s), *_thousandths(s, c), _temperature_cdeg(s))
+    return (boot_ms(s), *_thousandths(s), _temperature_cdeg(s))
 
 
-def raw_imu(s: Snapshot, c: Constants) -> Fields:
+def raw_imu(s: Snapshot) -> Fields:
     """RAW_IMU (27): counts of a sensor whose units are those of SCALED_IMU."""
-    return (s.time_us, *_thousandths(s, c), 0, _temperature_cdeg(s))
+    return (s.time_us, *_thousandths(s), 0, _temperature_cdeg(s))
 
 
 def scaled_pressure(s: Snapshot) -> Fields:
@@ -55,12 +56,12 @@ def vibration(s: Snapshot) -> Fields:
     return (s.time_us, 0.0, 0.0, 0.0, 0, 0, 0)
 
 
-def specific_force_frd(s: Snapshot, c: Constants) -> Vector:
+def specific_force_frd(s: Snapshot) -> Vector:
     """What accelerometers measure: acceleration without gravity's, m/s², in the body's FRD."""
     if s.sensed is not None:
         return frd_from_flu(s.sensed.specific_force_flu_m_s2)
     east, north, up = s.acceleration_enu_m_s2
-    return in_body_frd(s.attitude, (east, north, up + c.gravity_m_s2))
+    return in_body_frd(s.attitude, (east, north, up + GRAVITY_M_S2))
 
 
 def field_frd(s: Snapshot) -> Vector:
@@ -91,9 +92,9 @@ def altitude_amsl_m(s: Snapshot) -> float:
     return s.origin.altitude_m + s.position_enu_m[2]
 
 
-def _thousandths(s: Snapshot, c: Constants) -> tuple[float, ...]:
+def _thousandths(s: Snapshot) -> tuple[float, ...]:
     rate = times(1e3, measured_rate_frd(s))
-    return (*times(MILLI_G, specific_force_frd(s, c)), *rate, *times(1e3, field_frd(s)))
+    return (*times(MILLI_G, specific_force_frd(s)), *rate, *times(1e3, field_frd(s)))
 
 
 def _temperature_cdeg(s: Snapshot) -> int:

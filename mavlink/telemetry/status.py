@@ -3,7 +3,7 @@
 from math import isfinite
 
 from colibri.mavlink.node.service import Fields
-from colibri.mavlink.telemetry.encoder import UNKNOWN_U16, Constants, boot_ms
+from colibri.mavlink.telemetry.encoder import UNKNOWN_U16, boot_ms
 from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.wire.dialect import mav
 
@@ -71,9 +71,9 @@ def current_mode(s: Snapshot) -> Fields:
     return (s.standard_mode, s.custom_mode, s.intended_custom_mode)
 
 
-def system_time(s: Snapshot, c: Constants) -> Fields:
+def system_time(s: Snapshot, boot_unix_us: int = 0) -> Fields:
     """SYSTEM_TIME (2): Unix time µs, 0 where it is not known; ms since the start."""
-    return (c.boot_unix_us + s.time_us if c.boot_unix_us else 0, boot_ms(s))
+    return (boot_unix_us + s.time_us if boot_unix_us else 0, boot_ms(s))
 
 
 def flight_information(s: Snapshot) -> Fields:

@@ -1,23 +1,21 @@
 """Every message of telemetry, by name."""
 
-from collections.abc import Callable
 from functools import partial
 
 from colibri.mavlink.hil.sensors import OWN_MESSAGES, OwnMessage
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry import attitude, controller, position, power, sensors, status
-from colibri.mavlink.telemetry.encoder import Constants, Encoder, fitted
+from colibri.mavlink.telemetry.encoder import Encoder, fitted
 from colibri.mavlink.telemetry.snapshot import Snapshot
 
 
-def telemetry(constants: Constants | None = None) -> dict[str, Encoder]:
-    """Return the encoder of each message, by name, for what does not change in flight.
+def telemetry(boot_unix_us: int = 0) -> dict[str, Encoder]:
+    """Return the encoder of each message, by name; `boot_unix_us`: Unix time at the start, 0 where it is not known.
 
     An encoder raises nothing, whatever the snapshot holds; its fields fit their types.
     """
-    c = Constants() if constants is None else constants
-    encoders: dict[str, Encoder] = {encoder.__name__.upper(): encoder for encoder in _PLAIN}
-    encoders |= {encoder.__name__.upper(): partial(encoder, c=c) for encoder in _WITH_CONSTANTS}
+    encoders: dict[str, Encoder] = {encoder.__name__.upper(): encoder for encoder in _ENCODERS}
+    encoders["SYSTEM_TIME"] = partial(status.system_time, boot_unix_us=boot_unix_us)
     for row in OWN_MESSAGES:
         if row.passed_on:
             encoders[row.message] = _passed_on(row, encoders.get(row.message))
@@ -36,7 +34,7 @@ def _passed_on(row: OwnMessage, otherwise: Encoder | None) -> Encoder:
     return encoder
 
 
-_PLAIN: tuple[Encoder, ...] = (
+_ENCODERS: tuple[Encoder, ...] = (
     position.global_position_int,
     position.local_position_ned,
     position.home_position,
@@ -71,11 +69,9 @@ _PLAIN: tuple[Encoder, ...] = (
     controller.trajectory_representation_waypoints,
     controller.debug_float_array,
     controller.named_value_float,
-)
-"""Each is called as the message that it encodes."""
-_WITH_CONSTANTS: tuple[Callable[..., Fields | None], ...] = (
     status.system_time,
     sensors.highres_imu,
     sensors.scaled_imu,
     sensors.raw_imu,
 )
+"""Each is called as the message that it encodes."""

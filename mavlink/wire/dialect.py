@@ -1,4 +1,4 @@
-"""Bytes ⇄ MAVLink 2 messages; the one place that knows pymavlink. Nothing malformed ever raises: it is counted."""
+"""Bytes ⇄ MAVLink 2 messages; the one place that imports pymavlink. Nothing malformed ever raises: it is counted."""
 
 from collections import Counter, namedtuple
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +19,7 @@ mav: Any = development
 AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
 PLANT_COMPONENT: int = mav.MAV_COMP_ID_USER1
 TRUTH_COMPONENT: int = mav.MAV_COMP_ID_USER2
-"""Tells whoever stands between plant and autopilot how the vehicle really is."""
+"""Sends the true state, for whoever stands between plant and autopilot."""
 
 TYPE_QUADROTOR: int = mav.MAV_TYPE_QUADROTOR
 TYPE_GENERIC: int = mav.MAV_TYPE_GENERIC

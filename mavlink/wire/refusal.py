@@ -9,7 +9,7 @@ class Refusal(NamedTuple):
     """Why something is not done. What is done returns None, or what came of it, instead.
 
     Attributes:
-        reason: In words, as a ground station shows them; empty where the result says it all.
+        reason: In words, as a ground station shows them; empty where the result suffices.
         result: MAV_RESULT.
     """
 

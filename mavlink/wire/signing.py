@@ -89,7 +89,7 @@ class Signing:
         return self._key if self.active else None
 
     def sign(self, frame: bytes, link_id: int, now_us: int) -> bytes:
-        """Return the signature of `frame`, which is whole but for that and says that it has one."""
+        """Return the signature of `frame`, which is whole but for that, its flag set."""
         self._advance(now_us)
         self.timestamp = min(self.timestamp + 1, LAST_TICK)
         head = bytes([link_id & 0xFF]) + self.timestamp.to_bytes(_TIMESTAMP_BYTES, "little")

@@ -20,7 +20,7 @@ class Logged(NamedTuple):
 
 
 class TlogError(MavlinkError):
-    """What is no telemetry log; the message says where it ceases to be one."""
+    """What is no telemetry log; the message has the byte where it ceases to be one."""
 
 
 def decode(log: bytes) -> Iterator[Logged]:

@@ -17,7 +17,7 @@ class Air:
     """
 
     def __init__(self, weather: Weather) -> None:
-        """Blow as `weather` says."""
+        """Begin with the mean wind, gusts and turbulence of `weather`."""
         self._wind = weather.wind
         self._gusts = weather.gusts
         self._intensity = weather.turbulence

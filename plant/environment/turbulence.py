@@ -21,7 +21,7 @@ from colibri.plant.environment.weather import Intensity
 FEET_PER_M = 1.0 / 0.3048
 KNOT_M_S = 1852.0 / 3600.0
 W20_KNOTS: dict[Intensity, float] = {"light": 15.0, "moderate": 30.0, "severe": 45.0}
-"""Wind at 20 feet, which says how strong the turbulence is."""
+"""Wind at 20 feet, the measure of the turbulence."""
 MIN_HEIGHT_M = 10.0 / FEET_PER_M
 MAX_HEIGHT_M = 1000.0 / FEET_PER_M
 """The formulas hold between these; what is lower or higher is as at the nearer one."""

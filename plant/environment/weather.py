@@ -1,6 +1,6 @@
-"""The weather that a flight is flown in, as the command line says it: wind, gusts, turbulence.
+"""The weather that a flight is flown in: wind, gusts, turbulence.
 
-Velocities are those of the air, ENU, m/s. `plant.air` makes it blow.
+Velocities are those of the air, ENU, m/s. `air` makes one velocity of them.
 """
 
 from bisect import bisect_right

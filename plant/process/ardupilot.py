@@ -42,7 +42,7 @@ class ArduPilotEnd:
     """
 
     def __init__(self, physics: Physics, start: World, motors: Numbering, rotors: Rotors) -> None:
-        """Let `physics` go on from `start`; `motors` says which of the `rotors` is ArduPilot's first."""
+        """Let `physics` go on from `start`; `motors` has ArduPilot's order of the `rotors`."""
         self._physics = physics
         self._start = start
         self._motors = motors

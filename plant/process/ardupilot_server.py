@@ -21,7 +21,7 @@ from colibri.plant.vehicle.description import load_vehicle
 
 
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
-    """Serve ArduPilot on `link` as the command line says; return the exit code."""
+    """Serve ArduPilot on `link` as the command line asks; return the exit code."""
     try:
         weather = weather_of(args)
         vehicle = load_vehicle(args.vehicle).without(args.without)
@@ -70,8 +70,8 @@ def _serve(
 def _answer(end: ArduPilotEnd, link: UdpLink, received: tuple[bytes, Address], now_s: float) -> bool:
     """Answer what has come; return whether anything was answered.
 
-    A request that has come again before it was answered, while the plant was loading say, is answered once: ArduPilot
-    would take the second reply for that to its next request, and so fly a step late for good.
+    A request that has come again before it was answered, for instance while the plant was loading, is answered once:
+    ArduPilot would take the second reply for that to its next request, and so fly a step late for good.
     """
     answered = False
     for datagram, sender in dict.fromkeys([received, *link.receive_now()]):

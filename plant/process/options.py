@@ -16,7 +16,7 @@ MAX_LATENCY_MS = 1000.0
 
 
 def nudged(start: Start) -> Start:
-    """Return where a flight really begins: `nudge_m` east and north of its start, which is at it unless tests say."""
+    """Return where a flight really begins: `nudge_m` east and north of its start, which is at it except in tests."""
     return start._replace(x=start.x + nudge_m(), y=start.y + nudge_m())
 
 

@@ -26,7 +26,7 @@ from colibri.plant.vehicle.description import VehicleError, load_vehicle
 
 
 def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> int:
-    """Serve PX4 on `link` as the command line says; return the exit code."""
+    """Serve PX4 on `link` as the command line asks; return the exit code."""
     try:
         simulator = Simulator(args, link, status, stop)
     except Error as error:
@@ -43,7 +43,7 @@ class Simulator:
     """
 
     def __init__(self, args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> None:
-        """Fly as the command line says.
+        """Fly as the command line asks.
 
         Raises:
             VehicleError: There is no such vehicle, or PX4 cannot fly it.

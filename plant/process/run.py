@@ -31,7 +31,7 @@ def builder_of(args: argparse.Namespace) -> PlantBuilder:
 
 
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
-    """Serve one flight on `link` as the command line says; return the exit code."""
+    """Serve one flight on `link` as the command line asks; return the exit code."""
     try:
         builder = builder_of(args)
     except Error as error:

@@ -84,7 +84,7 @@ class Server:
         )
 
     def _own_figures(self) -> tuple[str, dict[str, float]]:
-        """Return what the last line says besides the frames, in words and as figures."""
+        """Return what the last line has besides the frames, as text and as figures."""
         return "", {}
 
     def _advance(self, plant: Plant, pace: Pace) -> bool:

@@ -1,44 +1,38 @@
 """What faults do to the output of sensors: each frame goes through them on its way out."""
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any
 
 from colibri.common.types import Vector
 from colibri.mavlink.hil.faults import DELAYED, GARBAGE, OFF, OK, SENSORS, SLOW, STUCK, WRONG, Fault
 from colibri.mavlink.hil.sensors import SensorFrame
 from colibri.plant.environment.random_streams import Source, streams
+from colibri.plant.sensors.instrument import Instrument
 from colibri.plant.sensors.table import ROWS, is_fitted
 from colibri.plant.vehicle.sensors import Sensors
 
-T = TypeVar("T")
-Add: TypeAlias = Callable[[T, Vector], T]
-"""(value, error) -> value with that error."""
-At: TypeAlias = Callable[[T, int], T]
-"""(value, simulated time in µs) -> value that claims to be of that time."""
 
-
-class Reading(Generic[T]):
+class Reading:
     """The output of one sensor, with a fault or none."""
 
-    def __init__(self, add: Add[T], at: At[T], chance: Iterator[float]) -> None:
+    def __init__(self, row: Instrument, chance: Iterator[float]) -> None:
         """Be well; `chance` are standard normal numbers, drawn only for more noise."""
-        self._add = add
-        self._at = at
+        self._add, self._at = row.add, row.at
         self._chance = chance
         self._fault: Fault | None = None
         self._since_us = 0
-        self._last: T | None = None
-        self._later: deque[tuple[int, T]] = deque()
+        self._last: Any = None
+        self._later: deque[tuple[int, Any]] = deque()
 
-    def begin(self, fault: Fault, now_us: int, last: T | None) -> None:
+    def begin(self, fault: Fault, now_us: int, last: Any) -> None:
         """Have a fault from now on, in place of any other; or none, where it is OK. `last` was its last output."""
         self._fault = None if fault.kind == OK else fault
         self._since_us, self._last = now_us, last
         self._later.clear()
 
-    def report(self, now_us: int, value: T | None) -> T | None:
+    def report(self, now_us: int, value: Any) -> Any:
         """Return the output for a measurement; either is None where there is nothing new."""
         fault = self._fault
         if fault is None:
@@ -61,7 +55,7 @@ class Reading(Generic[T]):
         assert fault.kind == GARBAGE, "that is all that the table has"
         return (x * next(self._chance), x * next(self._chance), x * next(self._chance))
 
-    def _late(self, now_us: int, value: T | None, late_us: int) -> T | None:
+    def _late(self, now_us: int, value: Any, late_us: int) -> Any:
         if value is not None:
             self._later.append((now_us + late_us, value))
         reported = None
@@ -77,7 +71,7 @@ class SensorFaults:
         """Have none; more noise will be by chance of `seed`."""
         chances = dict(zip(SENSORS, streams(seed, Source.FAULTS, len(SENSORS)), strict=True))
         rows = [] if parts is None else [row for row in ROWS if is_fitted(row, parts)]
-        self._readings = {row.unit: (row, Reading[Any](row.add, row.at, chances[row.unit])) for row in rows}
+        self._readings = {row.unit: (row, Reading(row, chances[row.unit])) for row in rows}
         self.units = frozenset(self._readings)
         self._reported: SensorFrame | None = None
         self._last: dict[str, Any] = {}

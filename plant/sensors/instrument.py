@@ -15,7 +15,7 @@ _ROUNDING = 1e-9
 
 
 def as_it_is(value: T, _now_us: int) -> T:
-    """Return a value that says nothing of its time."""
+    """Return a value that has no time of its own."""
     return value
 
 

@@ -31,6 +31,6 @@ class WorldSetting:
 
 
 def world_values(of: object) -> dict[str, Any]:
-    """Return what a setting, or a command line that was read, says of the world."""
+    """Return what a setting, or a command line that was read, has of the world."""
     values = {each.name: getattr(of, each.name) for each in fields(WorldSetting)}
     return {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}

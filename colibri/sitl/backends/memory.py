@@ -198,11 +198,11 @@ class _StationRegistry:
         self.from_stations: StepMessage | None = None
         self.to_stations: StepMessage | None = None
 
-    def hear(self) -> StepMessage | None:
+    def receive(self) -> StepMessage | None:
         """Return what ground stations send at this time."""
         return self.from_stations
 
-    def tell(self, step_message: StepMessage) -> None:
+    def send(self, step_message: StepMessage) -> None:
         """Take in what the vehicle sends."""
         self.to_stations = step_message
 

@@ -138,9 +138,9 @@ def test_a_command_without_a_place_takes_any_frame_and_plain_numbers(vehicle: Ve
 
 @pytest.mark.parametrize(("result", "severity"), [(DENIED, WARNING), (TEMPORARILY_REJECTED, WARNING), (FAILED, ERROR)])
 def test_a_refusal_says_why_to_all(result: int, severity: int) -> None:
-    service = service_of({ARM: Vehicle(Outcome(result, "Arming refused: no battery", 7))})
+    service = service_of({ARM: Vehicle(Outcome(result, "Arming refused: no battery"))})
     ack, text = receive(service, command_long(ARM, 1.0))
-    assert ack.fields[:4] == (ARM, result, 0, 7)
+    assert ack.fields[:4] == (ARM, result, 0, 0)
     assert (text.name, text.channel) == ("STATUSTEXT", None)
     assert text.fields[:2] == (severity, b"Arming refused: no battery")
 
@@ -156,7 +156,7 @@ def test_success_says_nothing() -> None:
 
 
 def test_a_command_sent_again_is_answered_and_not_obeyed_again(vehicle: Vehicle) -> None:
-    vehicle.outcome = Outcome(FAILED, param2=3)
+    vehicle.outcome = Outcome(FAILED)
     service = service_of({ARM: vehicle})
     first = receive(service, command_long(ARM, 1.0, NAN))
     vehicle.outcome = Outcome(ACCEPTED)
