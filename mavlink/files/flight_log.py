@@ -96,7 +96,6 @@ class FlightLog:
             self.name = None
 
     def _logs(self) -> list[Entry]:
-        """Return the logs, the oldest first."""
         found = self._files.list(self._folder)
         entries = [] if isinstance(found, FileRefusal) else found
         return sorted((entry for entry in entries if _number(entry.name)), key=lambda entry: _number(entry.name))

@@ -233,7 +233,6 @@ class Ftp:
         )
 
     def _opened(self, request: Request, names: Names, reading: Reading | None) -> Nak | None:
-        """Open a session, or return why not."""
         refused = self._no_session(request, names, reading)
         if refused is None:
             self._close(request.key)
@@ -241,7 +240,6 @@ class Ftp:
         return refused
 
     def _no_session(self, request: Request, names: Names, reading: Reading | None) -> Nak | None:
-        """Return why no session can be opened."""
         session = self._sessions.get(request.key)
         if session is not None:
             again = session.names == names and (session.reading is None) == (reading is None)
@@ -279,7 +277,6 @@ class Ftp:
         return None
 
     def _packets(self, burst: _Burst, maximum: int) -> Iterator[Send]:
-        """Send the next packets of a burst."""
         size = burst.request.size or DATA_BYTES
         wanted = min(maximum * size, burst.reading.size - burst.request.offset)
         data = burst.reading.read(burst.request.offset, wanted)

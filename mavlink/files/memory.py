@@ -114,7 +114,6 @@ class Memory:
         return None
 
     def _no_file(self, names: Names) -> FileRefusal | None:
-        """Return why there is no file."""
         if names in self._files:
             return None
         if names in self._folders:
@@ -122,7 +121,6 @@ class Memory:
         return self._no_way(names) or FileRefusal.NOT_FOUND
 
     def _no_place(self, names: Names) -> FileRefusal | None:
-        """Return why nothing can be put there."""
         if not names:
             return FileRefusal.PROTECTED
         if names in self._files or names in self._folders:
@@ -130,7 +128,6 @@ class Memory:
         return self._no_way(names) or (None if can_be_new(names[-1]) else FileRefusal.BAD_NAME)
 
     def _no_room(self, names: Names) -> FileRefusal | None:
-        """Return why nothing new can be made there."""
         full = len(self._files) + len(self._folders) > self._quota.entries  # the root is no entry
         return self._no_place(names) or (FileRefusal.NO_SPACE if full else None)
 

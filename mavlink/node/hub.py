@@ -153,7 +153,6 @@ class Hub:
         ]
 
     def _refusal(self, message: Message, *, known: bool) -> str | None:
-        """Return why a message is not to be taken in."""
         if message.source == self._own:
             return "echo"
         if not known and message.name in _OPENS_NOTHING:

@@ -96,7 +96,6 @@ class ParameterService:
         return (answer,) if refusal is None else (_refuse(peer, name, index, refusal), answer)
 
     def _value(self, index: int, channel: int | None = None) -> Send:
-        """Return the PARAM_VALUE for a channel, or for all of them."""
         definition = self._parameters.at(index)
         assert definition is not None, "indices are checked where they come from"
         bits = Bits(bits_of(definition.kind, self._parameters[definition.name]))

@@ -218,7 +218,6 @@ def single(wire: float, masked: int, maximum: float) -> float:
 
 
 def _derivatives(fields: Any, *, body: bool, up: bool) -> tuple[Vector, Vector]:
-    """Return velocity and acceleration, in ENU or, where `body`, FLU."""
     mask = fields.type_mask
     velocity = group((fields.vx, fields.vy, fields.vz), mask >> _VELOCITY, MAX_SPEED_M_S)
     acceleration = group((fields.afx, fields.afy, fields.afz), mask >> _ACCELERATION, MAX_ACCELERATION_M_S2)

@@ -5,7 +5,7 @@ from colibri.common.types import Vector
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry.encoder import MILLI_G, boot_ms, in_body_frd, times
 from colibri.mavlink.telemetry.snapshot import Snapshot
-from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.dialect import bits
 from colibri.mavlink.wire.ned import frd_from_flu
 
 GRAVITY_M_S2 = 9.81
@@ -13,19 +13,9 @@ EARTH_FIELD_NED_GAUSS: Vector = (0.2152, 0.0124, 0.4312)
 """The earth's field at Zurich: 0.482 gauss, dipping 63.4° below the horizon, 3.3° east of true north. Taken everywhere:
 nothing in here steers by it."""
 
-UPDATED: int = (
-    mav.HIGHRES_IMU_UPDATED_XACC
-    | mav.HIGHRES_IMU_UPDATED_YACC
-    | mav.HIGHRES_IMU_UPDATED_ZACC
-    | mav.HIGHRES_IMU_UPDATED_XGYRO
-    | mav.HIGHRES_IMU_UPDATED_YGYRO
-    | mav.HIGHRES_IMU_UPDATED_ZGYRO
-    | mav.HIGHRES_IMU_UPDATED_XMAG
-    | mav.HIGHRES_IMU_UPDATED_YMAG
-    | mav.HIGHRES_IMU_UPDATED_ZMAG
-    | mav.HIGHRES_IMU_UPDATED_ABS_PRESSURE
-    | mav.HIGHRES_IMU_UPDATED_PRESSURE_ALT
-    | mav.HIGHRES_IMU_UPDATED_TEMPERATURE
+UPDATED = bits(
+    "HIGHRES_IMU_UPDATED_",
+    "XACC YACC ZACC XGYRO YGYRO ZGYRO XMAG YMAG ZMAG ABS_PRESSURE PRESSURE_ALT TEMPERATURE",
 )
 
 

@@ -54,6 +54,11 @@ _CRC_BYTES = 2
 _CRC_START = 0xFFFF
 
 
+def bits(prefix: str, names: str) -> int:
+    """Return the sum of enumeration members that begin with `prefix` and go on as `names` do, parted by blanks."""
+    return sum(getattr(mav, prefix + name) for name in names.split())
+
+
 class Message(NamedTuple):
     """A decoded message: whose CRC holds, whose values nobody has checked yet.
 
@@ -292,7 +297,6 @@ def _layout_named(name: str) -> _Layout:
 
 @cache
 def _layout(message_id: int) -> _Layout | None:
-    """Return the layout of a message; None where the dialect has none."""
     definition = mav.mavlink_map.get(message_id)
     return None if definition is None else _layout_named(definition.msgname)
 

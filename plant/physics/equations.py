@@ -261,7 +261,6 @@ def write_derivative(change: Array, x: Array, target: FourRotors, parameters: Pa
 
 @compiled
 def _wrench(x: Array, R: Matrix, speeds: FourRotors, parameters: Parameters) -> Wrench:
-    """Return the sum of all that acts on the body but gravity."""
     velocity, rate = (x[0], x[1], x[2]), (x[3], x[4], x[5])
     wind = _rotated_back(R, parameters.wind_enu_m_s)
     rotors = rotor_wrench(speeds, parameters)

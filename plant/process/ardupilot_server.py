@@ -43,7 +43,6 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
 def _serve(
     end: ArduPilotEnd, link: UdpLink, status: Status, stop: Stop, log: CsvLog | None, *, duration_s: float
 ) -> None:
-    """Answer until the simulated time is over or a signal ends the process."""
     began_s = perf_counter()
     silence = Silence(status, SILENT_AFTER_S, "ArduPilot asks again", began_s)
     progress, logged = Progress(status), None

@@ -194,7 +194,6 @@ class FreeServer(Server):
         return True
 
     def _next_command(self, until_s: float) -> ActuatorCommand | None:
-        """Return the next command received before a wall-clock time; None if there is none."""
         while not self._stop:
             left_s = until_s - perf_counter()
             command = self._receive(max(0.0, left_s))

@@ -50,9 +50,7 @@ class RotorLag(Table, frozen=True, kw_only=True):
     """A rotor's speed follows its command as a first-order lag."""
 
     time_constant_up_s: TimeConstant
-    """While it speeds up."""
     time_constant_down_s: TimeConstant
-    """While it slows down."""
 
 
 class Rotors(Table, frozen=True, kw_only=True):
@@ -129,6 +127,7 @@ class Drag(Table, frozen=True, kw_only=True):
 class Ground(Table, frozen=True, kw_only=True):
     """How the vehicle stands on the ground: on four feet, or on its four rotors when it has fallen on its back.
 
+    Stiffness, damping and Coulomb's friction are those of the ground at one foot; it damps sinking in and coming out.
     Height 0 is that of the centre of mass of the vehicle at rest on its feet.
     """
 
@@ -137,11 +136,8 @@ class Ground(Table, frozen=True, kw_only=True):
     foot_depth_m: Positive
     """How far the feet are below the centre of mass."""
     stiffness_n_m: Positive
-    """Of the ground at one foot."""
     damping_n_s_m: NotNegative
-    """Of the ground at one foot, against sinking in and coming out."""
     friction_coefficient: NotNegative
-    """Coulomb's."""
     slip_damping_n_s_m: NotNegative
     """Friction of one foot that creeps, before Coulomb's limit: N for each m/s."""
 
@@ -154,13 +150,11 @@ class Ground(Table, frozen=True, kw_only=True):
 class Battery(Table, frozen=True, kw_only=True):
     """A battery: a voltage that falls linearly with the charge taken, behind a resistance.
 
-    The rotors' top speed is proportional to its terminal voltage.
+    Full and empty voltage are without load. The rotors' top speed is proportional to the terminal voltage.
     """
 
     full_voltage_v: Positive
-    """Without load."""
     empty_voltage_v: Positive
-    """Without load."""
     resistance_ohm: NotNegative
     capacity_ah: Positive
     efficiency: Efficiency

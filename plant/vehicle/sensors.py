@@ -1,6 +1,8 @@
 """The sensors of a vehicle: numbers of named parts with units, as tables of the vehicle file.
 
-The plant measures by them; the autopilot's estimator assumes them.
+The plant measures by them; the autopilot's estimator assumes them. Noise, drift and the bias at the start are standard
+deviations, along each axis; noise is white, drift a first-order Gauss-Markov process. Densities and walks are for each
+root of hertz. What is beyond a range is cut; what is nearer or farther than a rangefinder's is not seen.
 """
 
 from typing import Annotated
@@ -21,26 +23,18 @@ class Accelerometer(Part, frozen=True, kw_only=True):
     """Measures specific force along the FLU axes, at every frame."""
 
     noise_density_m_s2_rthz: NotNegative
-    """White noise, m/s² for each root of hertz."""
     bias_walk_m_s3_rthz: NotNegative
-    """How the bias walks, m/s³ for each root of hertz."""
     turn_on_bias_m_s2: NotNegative
-    """Standard deviation of the bias at the start, along each axis."""
     range_m_s2: Positive
-    """What is larger is cut."""
 
 
 class Gyroscope(Part, frozen=True, kw_only=True):
     """Measures rates about the FLU axes, at every frame."""
 
     noise_density_rad_s_rthz: NotNegative
-    """White noise, rad/s for each root of hertz."""
     bias_walk_rad_s2_rthz: NotNegative
-    """How the bias walks, rad/s² for each root of hertz."""
     turn_on_bias_rad_s: NotNegative
-    """Standard deviation of the bias at the start, about each axis."""
     range_rad_s: Positive
-    """What is larger is cut."""
 
 
 class Magnetometer(Part, frozen=True, kw_only=True):
@@ -48,7 +42,6 @@ class Magnetometer(Part, frozen=True, kw_only=True):
 
     rate_hz: Positive
     noise_gauss: NotNegative
-    """Standard deviation of a sample."""
     hard_iron_gauss: NotNegative
     """Standard deviation, along each axis, of the field of the vehicle itself that calibration has left."""
 
@@ -58,18 +51,13 @@ class Barometer(Part, frozen=True, kw_only=True):
 
     rate_hz: Positive
     noise_pa: NotNegative
-    """Standard deviation of a sample."""
     drift_pa: NotNegative
-    """Standard deviation of the drift of sensor and weather, which is a first-order Gauss-Markov process."""
+    """Of sensor and weather together."""
     drift_time_s: Positive
-    """Its correlation time."""
 
 
 class Gps(Part, frozen=True, kw_only=True):
-    """Measures position and velocity, some time ago.
-
-    Errors of position are the sum of white noise and a first-order Gauss-Markov process.
-    """
+    """Measures position, with noise and drift, and velocity, with noise, some time ago."""
 
     rate_hz: Positive
     delay_s: NotNegative
@@ -77,17 +65,11 @@ class Gps(Part, frozen=True, kw_only=True):
     fix_type: Annotated[int, msgspec.Meta(ge=3, le=6)]
     """Of GPS_FIX_TYPE: 3 on its own, 6 with carrier phase fixed (RTK)."""
     horizontal_noise_m: NotNegative
-    """White, standard deviation along each axis."""
     vertical_noise_m: NotNegative
-    """White, standard deviation."""
     horizontal_drift_m: NotNegative
-    """Correlated, standard deviation along each axis."""
     vertical_drift_m: NotNegative
-    """Correlated, standard deviation."""
     drift_time_s: Positive
-    """Correlation time."""
     velocity_noise_m_s: NotNegative
-    """White, standard deviation along each axis."""
     satellites: Annotated[int, msgspec.Meta(ge=4, le=64)]
 
 
@@ -96,13 +78,11 @@ class Rangefinder(Part, frozen=True, kw_only=True):
 
     rate_hz: Positive
     min_m: NotNegative
-    """What is nearer is not seen."""
     max_m: Positive
-    """What is farther is not seen."""
     noise_m: NotNegative
-    """White, standard deviation of a sample near by."""
+    """Of a sample near by."""
     noise_part: NotNegative
-    """Of the distance, standard deviation: adds to that in square."""
+    """Of the distance: adds to that in square."""
     field_of_view_rad: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
     """Angle of the beam's cone; what is nearest in it is measured."""
     height_m: Positive
