@@ -28,7 +28,7 @@ from colibri.mavlink.mission.service import MissionService, Vehicle
 from colibri.mavlink.node.hub import Hub, Outgoing
 from colibri.mavlink.node.service import to
 from colibri.mavlink.parameters.metadata import Metadata, metadata_json
-from colibri.mavlink.parameters.pack import packed_for
+from colibri.mavlink.parameters.pack import packed
 from colibri.mavlink.parameters.service import ParameterService
 from colibri.mavlink.parameters.store import Parameters
 from colibri.mavlink.services.command import (
@@ -261,6 +261,6 @@ class Stations:
 
 
 def _files(settings: StationSettings, metadata: Metadata, parameters: Parameters) -> Files:
-    pack = {"@PARAM/param.pck": lambda query: packed_for(parameters, query) or b""}
+    pack = {"@PARAM/param.pck": lambda query: packed(parameters, query) or b""}
     mounts = {} if settings.logs is None else {LOGS: settings.logs}
     return Tree(settings.files or Memory(), mounts, {**metadata.files, **pack}, {"@MAV_LOG": LOGS})

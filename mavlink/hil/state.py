@@ -3,7 +3,6 @@
 Anything that a receiver could not fly on (not finite, out of range, halves of different frames) decodes to None.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -69,7 +68,8 @@ def decode_state(attitude: Message, position: Message) -> StateFrame | None:
     a, p = attitude.fields, position.fields
     q = (a.q1, a.q2, a.q3, a.q4)
     vectors = (a.rollspeed, a.pitchspeed, a.yawspeed, p.x, p.y, p.z, p.vx, p.vy, p.vz)
-    if a.time_boot_ms != p.time_boot_ms or not _finite(vectors) or not _unit(q):
+    is_unit = abs(sum(component * component for component in q) - 1.0) < _UNIT_NORM_TOLERANCE
+    if a.time_boot_ms != p.time_boot_ms or not all(map(isfinite, vectors)) or not is_unit:
         return None
     return StateFrame(
         time_us=a.time_boot_ms * 1000,
@@ -93,11 +93,3 @@ def decode_actuators(message: Message) -> ActuatorCommand | None:
     if not all(0.0 <= control <= 1.0 for control in (c1, c2, c3, c4)):
         return None
     return ActuatorCommand(message.fields.time_usec, (c1, c2, c3, c4), bool(message.fields.mode & MODE_ARMED))
-
-
-def _finite(values: Sequence[float]) -> bool:
-    return all(map(isfinite, values))
-
-
-def _unit(q: Quaternion) -> bool:
-    return abs(sum(component * component for component in q) - 1.0) < _UNIT_NORM_TOLERANCE

@@ -1,7 +1,7 @@
 """The mission microservice: plans up and down, which item is current, what was reached.
 
 Specification: https://mavlink.io/en/services/mission.html. Mission, geofence and rally points are three plans, each
-stored and handled by itself. Uploads are in `upload`, downloads in `download`.
+stored and handled by itself. Uploads are in `upload`.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -9,7 +9,6 @@ from math import isfinite, isnan
 from typing import Any, NamedTuple, TypeAlias
 
 from colibri.common.earth.geodesy import MAX_LATITUDE_DEG, MAX_LONGITUDE_DEG
-from colibri.mavlink.mission.download import Downloads
 from colibri.mavlink.mission.items import (
     ACCEPTED,
     ALL,
@@ -20,10 +19,11 @@ from colibri.mavlink.mission.items import (
     RALLY,
     MissionItem,
     Plan,
+    item_fields,
     plan_of,
 )
 from colibri.mavlink.mission.upload import Rules, Uploads, ack
-from colibri.mavlink.node.service import Fields, Peer, Send, to_all
+from colibri.mavlink.node.service import Fields, Peer, Send, to, to_all
 from colibri.mavlink.services.command import DEGREES, DENIED, GLOBAL_FRAMES, Command, Outcome, outcome_of
 from colibri.mavlink.services.statustext import WARNING, StatusText
 from colibri.mavlink.wire.dialect import Message, mav
@@ -34,6 +34,60 @@ NO_MISSION_TOTAL = 0xFFFF
 """MISSION_CURRENT.total of a vehicle without a mission."""
 GUIDED = 2
 """MISSION_ITEM.current of an item that is no part of a mission but a place to fly to now, as DroneKit's simple_goto."""
+FORGOTTEN_AFTER_US = 5_000_000
+"""A reader that requests nothing so long is sent the newest plan after."""
+MAX_READERS = 32
+
+
+class _Reading(NamedTuple):
+    """What a ground station is reading."""
+
+    plan: Plan
+    received_us: int
+
+
+class Downloads:
+    """Answers MISSION_REQUEST_LIST, MISSION_REQUEST_INT and MISSION_REQUEST, from any number of readers at once.
+
+    It remembers which plan was announced to whom, so that nobody receives the first half of one plan and the second
+    half of the one that replaced it meanwhile: "Download a Mission from the Vehicle".
+    """
+
+    def __init__(self) -> None:
+        """Begin with no reader."""
+        self._readings: dict[tuple[Peer, int], _Reading] = {}
+
+    def begin(self, peer: Peer, plan_type: int, plan: Plan, now_us: int) -> Send:
+        """Announce `plan`."""
+        self._remember(peer, plan_type, plan, now_us)
+        target = (peer.system, peer.component)
+        return to(peer, "MISSION_COUNT", *target, len(plan.items), plan_type, plan.id)
+
+    def item(self, peer: Peer, plan_type: int, seq: int, newest: Plan, current: int, now_us: int) -> Send:
+        """Return an item of the plan that was announced, or of the newest; `current` is the one being flown of that.
+
+        MISSION_REQUEST, too, is answered by a MISSION_ITEM_INT: "Deprecated Types: MISSION_ITEM".
+        """
+        reading = self._readings.get((peer, plan_type))
+        plan = newest
+        if reading is not None and now_us - reading.received_us < FORGOTTEN_AFTER_US:
+            plan = reading.plan
+            self._remember(peer, plan_type, plan, now_us)
+        if seq >= len(plan.items):
+            return ack(peer, mav.MAV_MISSION_INVALID_SEQUENCE, plan_type)
+        is_current = plan is newest and seq == current
+        return to(peer, "MISSION_ITEM_INT", *item_fields(peer, seq, plan.items[seq], is_current, plan_type))
+
+    def end(self, peer: Peer, plan_type: int) -> None:
+        """Forget what `peer` was reading: it has acknowledged."""
+        self._readings.pop((peer, plan_type), None)
+
+    def _remember(self, peer: Peer, plan_type: int, plan: Plan, now_us: int) -> None:
+        self._readings.pop((peer, plan_type), None)
+        if plan is not NO_PLAN:
+            self._readings[peer, plan_type] = _Reading(plan, now_us)
+        if len(self._readings) > MAX_READERS:
+            del self._readings[next(iter(self._readings))]
 
 
 class Progress(NamedTuple):

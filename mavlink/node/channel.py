@@ -21,14 +21,12 @@ class Channel:
         active_us: Simulated time when it was opened or a message received last, µs.
     """
 
-    def __init__(
-        self, number: int, link: int, address: Address | None, codec: Codec, *, fixed: bool, now_us: int
-    ) -> None:
+    def __init__(self, number: int, link: int, address: Address | None, codec: Codec, now_us: int) -> None:
         """Open at `now_us`."""
         self.number = number
         self.link = link
         self.address = address
-        self.fixed = fixed
+        self.fixed = False
         self.codec = codec
         self.active_us = now_us
         self.received = 0

@@ -213,7 +213,7 @@ class Hub:
 
     def _open(self, link: int, address: Address | None) -> Channel:
         codec = Codec(*self._own, keep_unknown=True)
-        channel = Channel(self._next_number, link, address, codec, fixed=False, now_us=self._now_us)
+        channel = Channel(self._next_number, link, address, codec, self._now_us)
         self._next_number += 1
         self._channels[channel.number] = channel
         self._numbers[link, address] = channel.number

@@ -19,16 +19,18 @@ _VALUE_BYTES = 4
 _MAX_COMMON_CHARS = 15
 
 
-def packed(parameters: Parameters, with_defaults: bool = False, start: int = 0, count: int = 0) -> bytes | None:
-    """Return the file; None where there is nothing at `start`.
-
-    Args:
-        parameters: What to pack.
-        with_defaults: Whether to add the default where a value differs from it.
-        start: Index of the first parameter.
-        count: How many at most; 0 for all that follow.
-    """
-    if start < 0 or count < 0 or start >= max(len(parameters), 1):
+def packed(parameters: Parameters, query: str = "") -> bytes | None:
+    """Return the file as the part of its path behind the question mark asks for it; None where it cannot be."""
+    wanted = {"withdefaults": 0, "start": 0, "count": 0}
+    for pair in filter(None, query.split("&")):
+        key, _, digits = pair.partition("=")
+        if key not in wanted:
+            continue
+        if not digits.isascii() or not digits.isdigit() or len(digits) > 5:
+            return None
+        wanted[key] = int(digits)
+    with_defaults, start, count = wanted["withdefaults"] == 1, wanted["start"], wanted["count"]
+    if start >= max(len(parameters), 1):
         return None
     chosen = tuple(parameters)[start : start + count if count else None]
     magic = _MAGIC_WITH_DEFAULTS if with_defaults else _MAGIC
@@ -45,19 +47,6 @@ def packed(parameters: Parameters, with_defaults: bool = False, start: int = 0, 
         file += entry
         before = parameter.name
     return bytes(file)
-
-
-def packed_for(parameters: Parameters, query: str) -> bytes | None:
-    """Return the file as the part of its path behind the question mark asks for it; None where it cannot be."""
-    wanted = {"withdefaults": 0, "start": 0, "count": 0}
-    for pair in filter(None, query.split("&")):
-        key, _, value = pair.partition("=")
-        if key not in wanted:
-            continue
-        if not value.isascii() or not value.isdigit() or len(value) > 5:
-            return None
-        wanted[key] = int(value)
-    return packed(parameters, wanted["withdefaults"] == 1, wanted["start"], wanted["count"])
 
 
 def _name(parameter: Parameter, before: str, has_default: bool) -> bytes:

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from pymavlink.dialects.v20 import development
 
 from colibri.mavlink.wire import missing_messages
-from colibri.mavlink.wire.later_fields import with_later_fields
 
 missing_messages.add_to(development)
 mav: Any = development
@@ -183,7 +182,7 @@ class _Layout:
 
     def __init__(self, definition: Any) -> None:
         """Take the layout from pymavlink's class of the message."""
-        definition = with_later_fields(definition)
+        definition = missing_messages.with_later_fields(definition)
         self.name: str = definition.msgname
         self._id: int = definition.id
         self._size: int = definition.unpacker.size

@@ -2,6 +2,9 @@
 
 Source: mavlink.io/en/messages/common.html. A message's CRC_EXTRA follows from its definition, so that a mistake here
 makes every peer drop the message: mavlink.io/en/guide/serialization.html.
+
+And extension fields that the specification gained later. The checksum of a message does not cover those, and receivers
+cut off or fill with zeros what they know differently (…/serialization.html#message-extensions): anybody may get them.
 """
 
 from re import findall
@@ -51,6 +54,12 @@ MISSING = (
     ),
     _defined(397, "COMPONENT_METADATA", "uint32_t time_boot_ms, uint32_t file_crc, char[100] uri"),
 )
+LATER: dict[str, tuple[tuple[str, str], ...]] = {
+    "MISSION_COUNT": (("opaque_id", "uint32_t"),),
+    "MISSION_ACK": (("opaque_id", "uint32_t"),),
+    "MISSION_CURRENT": (("mission_id", "uint32_t"), ("fence_id", "uint32_t"), ("rally_points_id", "uint32_t")),
+}
+"""Names and types of the fields, by message, in the order of their definition, which is that of the wire."""
 
 
 def add_to(dialect: Any) -> None:
@@ -112,3 +121,26 @@ def _crc_extra(name: str, ordered: list[Field], dialect: Any) -> int:
             data.append(field.length)
     crc: int = dialect.x25crc(data).crc
     return (crc & 0xFF) ^ (crc >> 8)
+
+
+def with_later_fields(definition: Any) -> Any:
+    """Return pymavlink's class of a message with the extension fields that it lacks."""
+    later = [field for field in LATER.get(definition.msgname, ()) if field[0] not in definition.fieldnames]
+    if not later:
+        return definition
+    names, kinds = [name for name, _ in later], [kind for _, kind in later]
+
+    def initialize(*_: Any) -> None:
+        raise TypeError("a layout only, not a message of pymavlink's")
+
+    initialize.__defaults__ = (*(definition.__init__.__defaults__ or ()), *[0] * len(later))
+    attributes = {
+        "fieldnames": [*definition.fieldnames, *names],
+        "ordered_fieldnames": [*definition.ordered_fieldnames, *names],
+        "fieldtypes": [*definition.fieldtypes, *kinds],
+        "lengths": [*definition.lengths, *[1] * len(later)],
+        "array_lengths": [*definition.array_lengths, *[0] * len(later)],
+        "unpacker": Struct(definition.unpacker.format + "".join(_CODES[kind] for kind in kinds)),
+        "__init__": initialize,
+    }
+    return type(definition.__name__, (definition,), attributes)

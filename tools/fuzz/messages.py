@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.wire.dialect import Codec, mav
-from colibri.mavlink.wire.later_fields import with_later_fields
+from colibri.mavlink.wire.missing_messages import with_later_fields
 
 VEHICLE = (1, 1)
 SOURCES = ((255, 190), (245, 190), (255, 0), (1, 191), (2, 1), (0, 0), VEHICLE)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.mavftp import MAVFTP
 
-from colibri.mavlink.parameters.pack import BLOCK_BYTES, packed, packed_for
+from colibri.mavlink.parameters.pack import BLOCK_BYTES, packed
 from colibri.mavlink.parameters.store import INT32_MAX, INT32_MIN, Kind, Parameter, Parameters
 
 
@@ -45,14 +45,14 @@ def test_values_and_defaults_come_back(names: list[str]) -> None:
     parameters = parameters_of(names)
     assert unpacked(packed(parameters)) == (parameters.values, None)
     defaults = {parameter.name: parameter.default for parameter in parameters}
-    assert unpacked(packed(parameters, with_defaults=True)) == (parameters.values, defaults)
+    assert unpacked(packed(parameters, "withdefaults=1")) == (parameters.values, defaults)
 
 
 @pytest.mark.parametrize("value", [INT32_MIN, INT32_MAX, -8388607, -4194305, 2139095041, 2143289343, 0, -1])
 def test_integers_are_packed_as_integers(value: int) -> None:
     parameters = Parameters([Parameter(name="X", kind=Kind.INT, default=5, description="")])
     parameters.set("X", value)
-    assert unpacked(packed(parameters, with_defaults=True)) == ({"X": value}, {"X": 5})
+    assert unpacked(packed(parameters, "withdefaults=1")) == ({"X": value}, {"X": 5})
 
 
 def test_a_name_that_begins_another() -> None:
@@ -63,7 +63,7 @@ def test_a_name_that_begins_another() -> None:
 
 @given(NAMES)
 def test_no_value_lies_across_two_blocks(names: list[str]) -> None:
-    file = packed(parameters_of(names), with_defaults=True)
+    file = packed(parameters_of(names), "withdefaults=1")
     assert file is not None
     at = 6
     while at < len(file):
@@ -89,7 +89,7 @@ def test_no_value_lies_across_two_blocks(names: list[str]) -> None:
     ],
 )
 def test_what_a_query_asks_for(query: str, magic: int, count: int) -> None:
-    file = packed_for(parameters_of([f"P{i}" for i in range(10)]), query)
+    file = packed(parameters_of([f"P{i}" for i in range(10)]), query)
     assert file is not None
     assert unpack("<HHH", file[:6]) == (magic, count, 10)
     assert len(unpacked(file)[0]) == count
@@ -97,4 +97,4 @@ def test_what_a_query_asks_for(query: str, magic: int, count: int) -> None:
 
 @pytest.mark.parametrize("query", ["start=10", "start=-1", "count=x", "start=", "count=999999", "start=²"])
 def test_a_query_that_cannot_be(query: str) -> None:
-    assert packed_for(parameters_of([f"P{i}" for i in range(10)]), query) is None
+    assert packed(parameters_of([f"P{i}" for i in range(10)]), query) is None
