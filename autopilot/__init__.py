@@ -5,74 +5,33 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
-    from colibri.autopilot.control.interface import (
-        Active,
-        AttitudeController,
-        AttitudeDemand,
-        Controller,
-        Decision,
-        Diagnostics,
-        Fallback,
-        Horizon,
-        Preview,
-        VehicleState,
-    )
-    from colibri.autopilot.control.profile import Profile, ProfileError, load_profile
-    from colibri.autopilot.control.qp import QpStatus, SolverError, installed_solvers
-    from colibri.autopilot.control.registry import ControllerError, DecisionError, controller_names, load_controller
-    from colibri.autopilot.control.vehicle_model.mixer import Mixer
-    from colibri.autopilot.core.copter import Copter
-    from colibri.autopilot.core.step import Step
-    from colibri.autopilot.core.track_autopilot import Autopilot
-    from colibri.autopilot.errors import AutopilotError
-    from colibri.autopilot.guidance.trajectories.tracks import Track, TrackError, track
+    from colibri.autopilot.control.interface import Active as Active
+    from colibri.autopilot.control.interface import AttitudeController as AttitudeController
+    from colibri.autopilot.control.interface import AttitudeDemand as AttitudeDemand
+    from colibri.autopilot.control.interface import Controller as Controller
+    from colibri.autopilot.control.interface import Decision as Decision
+    from colibri.autopilot.control.interface import Diagnostics as Diagnostics
+    from colibri.autopilot.control.interface import Fallback as Fallback
+    from colibri.autopilot.control.interface import Horizon as Horizon
+    from colibri.autopilot.control.interface import Preview as Preview
+    from colibri.autopilot.control.interface import VehicleState as VehicleState
+    from colibri.autopilot.control.profile import Profile as Profile
+    from colibri.autopilot.control.profile import ProfileError as ProfileError
+    from colibri.autopilot.control.profile import load_profile as load_profile
+    from colibri.autopilot.control.qp import QpStatus as QpStatus
+    from colibri.autopilot.control.qp import SolverError as SolverError
+    from colibri.autopilot.control.qp import installed_solvers as installed_solvers
+    from colibri.autopilot.control.registry import ControllerError as ControllerError
+    from colibri.autopilot.control.registry import DecisionError as DecisionError
+    from colibri.autopilot.control.registry import controller_names as controller_names
+    from colibri.autopilot.control.registry import load_controller as load_controller
+    from colibri.autopilot.control.vehicle_model.mixer import Mixer as Mixer
+    from colibri.autopilot.core.copter import Copter as Copter
+    from colibri.autopilot.core.step import Step as Step
+    from colibri.autopilot.core.track_autopilot import Autopilot as Autopilot
+    from colibri.autopilot.errors import AutopilotError as AutopilotError
+    from colibri.autopilot.guidance.trajectories.tracks import Track as Track
+    from colibri.autopilot.guidance.trajectories.tracks import TrackError as TrackError
+    from colibri.autopilot.guidance.trajectories.tracks import track as track
 else:
-    __getattr__, __dir__ = public(
-        __name__,
-        {
-            "colibri.autopilot.control.interface": (
-                "Active AttitudeController AttitudeDemand Controller Decision Diagnostics Fallback Horizon "
-                "Preview VehicleState"
-            ),
-            "colibri.autopilot.control.profile": "Profile ProfileError load_profile",
-            "colibri.autopilot.control.qp": "QpStatus SolverError installed_solvers",
-            "colibri.autopilot.control.registry": "ControllerError DecisionError controller_names load_controller",
-            "colibri.autopilot.control.vehicle_model.mixer": "Mixer",
-            "colibri.autopilot.core.copter": "Copter",
-            "colibri.autopilot.core.step": "Step",
-            "colibri.autopilot.core.track_autopilot": "Autopilot",
-            "colibri.autopilot.errors": "AutopilotError",
-            "colibri.autopilot.guidance.trajectories.tracks": "Track TrackError track",
-        },
-    )
-
-__all__ = [
-    "Active",
-    "AttitudeController",
-    "AttitudeDemand",
-    "Autopilot",
-    "AutopilotError",
-    "Controller",
-    "ControllerError",
-    "Copter",
-    "Decision",
-    "DecisionError",
-    "Diagnostics",
-    "Fallback",
-    "Horizon",
-    "Mixer",
-    "Preview",
-    "Profile",
-    "ProfileError",
-    "QpStatus",
-    "SolverError",
-    "Step",
-    "Track",
-    "TrackError",
-    "VehicleState",
-    "controller_names",
-    "installed_solvers",
-    "load_controller",
-    "load_profile",
-    "track",
-]
+    __getattr__, __dir__ = public(__name__)

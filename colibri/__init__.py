@@ -5,84 +5,39 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
-    from colibri.analysis import Recording, read_recording
-    from colibri.autopilot import (
-        Active,
-        AttitudeController,
-        AttitudeDemand,
-        AutopilotError,
-        Controller,
-        Decision,
-        Diagnostics,
-        Fallback,
-        Horizon,
-        Mixer,
-        Preview,
-        Profile,
-        QpStatus,
-        Track,
-        VehicleState,
-        controller_names,
-        load_controller,
-        load_profile,
-        track,
-    )
-    from colibri.common import Error, InFlightError, Table, read_settings
-    from colibri.flights import FlightPlan, fly_plan
-    from colibri.mavlink import MavlinkError
-    from colibri.plant import PlantError, Vehicle, load_vehicle, vehicle_names
-    from colibri.sitl import Sitl, SitlError
+    from colibri.analysis import Recording as Recording
+    from colibri.analysis import read_recording as read_recording
+    from colibri.autopilot import Active as Active
+    from colibri.autopilot import AttitudeController as AttitudeController
+    from colibri.autopilot import AttitudeDemand as AttitudeDemand
+    from colibri.autopilot import AutopilotError as AutopilotError
+    from colibri.autopilot import Controller as Controller
+    from colibri.autopilot import Decision as Decision
+    from colibri.autopilot import Diagnostics as Diagnostics
+    from colibri.autopilot import Fallback as Fallback
+    from colibri.autopilot import Horizon as Horizon
+    from colibri.autopilot import Mixer as Mixer
+    from colibri.autopilot import Preview as Preview
+    from colibri.autopilot import Profile as Profile
+    from colibri.autopilot import QpStatus as QpStatus
+    from colibri.autopilot import Track as Track
+    from colibri.autopilot import VehicleState as VehicleState
+    from colibri.autopilot import controller_names as controller_names
+    from colibri.autopilot import load_controller as load_controller
+    from colibri.autopilot import load_profile as load_profile
+    from colibri.autopilot import track as track
+    from colibri.common import Error as Error
+    from colibri.common import InFlightError as InFlightError
+    from colibri.common import Table as Table
+    from colibri.common import read_settings as read_settings
+    from colibri.flights import FlightPlan as FlightPlan
+    from colibri.flights import fly_plan as fly_plan
+    from colibri.mavlink import MavlinkError as MavlinkError
+    from colibri.plant import PlantError as PlantError
+    from colibri.plant import Vehicle as Vehicle
+    from colibri.plant import load_vehicle as load_vehicle
+    from colibri.plant import vehicle_names as vehicle_names
+    from colibri.sitl import Sitl as Sitl
+    from colibri.sitl import SitlError as SitlError
 else:
-    __getattr__, __dir__ = public(
-        __name__,
-        {
-            "colibri.analysis": "Recording read_recording",
-            "colibri.autopilot": (
-                "Active AttitudeController AttitudeDemand AutopilotError Controller Decision Diagnostics Fallback "
-                "Horizon Mixer Preview Profile QpStatus Track VehicleState controller_names load_controller "
-                "load_profile track"
-            ),
-            "colibri.common": "Error InFlightError Table read_settings",
-            "colibri.flights": "FlightPlan fly_plan",
-            "colibri.mavlink": "MavlinkError",
-            "colibri.plant": "PlantError Vehicle load_vehicle vehicle_names",
-            "colibri.sitl": "Sitl SitlError",
-        },
-    )
-
-__all__ = [
-    "Active",
-    "AttitudeController",
-    "AttitudeDemand",
-    "AutopilotError",
-    "Controller",
-    "Decision",
-    "Diagnostics",
-    "Error",
-    "Fallback",
-    "FlightPlan",
-    "Horizon",
-    "InFlightError",
-    "MavlinkError",
-    "Mixer",
-    "PlantError",
-    "Preview",
-    "Profile",
-    "QpStatus",
-    "Recording",
-    "Sitl",
-    "SitlError",
-    "Table",
-    "Track",
-    "Vehicle",
-    "VehicleState",
-    "controller_names",
-    "fly_plan",
-    "load_controller",
-    "load_profile",
-    "load_vehicle",
-    "read_recording",
-    "read_settings",
-    "track",
-    "vehicle_names",
-]
+    __getattr__, __dir__ = public(__name__)

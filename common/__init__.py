@@ -5,43 +5,24 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
-    from colibri.common.config import SettingsError, Table, read_settings
-    from colibri.common.earth.geodesy import Geodetic, enu_of, geodetic_of
-    from colibri.common.errors import Error, InFlightError
-    from colibri.common.jit import compiled
-    from colibri.common.rotations import earth_from_body, euler_from_quaternion, quaternion_from_euler, rotation_matrix
-    from colibri.common.types import Address, Array, FourRotors, Matrix, Quaternion, Vector
+    from colibri.common.config import SettingsError as SettingsError
+    from colibri.common.config import Table as Table
+    from colibri.common.config import read_settings as read_settings
+    from colibri.common.earth.geodesy import Geodetic as Geodetic
+    from colibri.common.earth.geodesy import enu_of as enu_of
+    from colibri.common.earth.geodesy import geodetic_of as geodetic_of
+    from colibri.common.errors import Error as Error
+    from colibri.common.errors import InFlightError as InFlightError
+    from colibri.common.jit import compiled as compiled
+    from colibri.common.rotations import earth_from_body as earth_from_body
+    from colibri.common.rotations import euler_from_quaternion as euler_from_quaternion
+    from colibri.common.rotations import quaternion_from_euler as quaternion_from_euler
+    from colibri.common.rotations import rotation_matrix as rotation_matrix
+    from colibri.common.types import Address as Address
+    from colibri.common.types import Array as Array
+    from colibri.common.types import FourRotors as FourRotors
+    from colibri.common.types import Matrix as Matrix
+    from colibri.common.types import Quaternion as Quaternion
+    from colibri.common.types import Vector as Vector
 else:
-    __getattr__, __dir__ = public(
-        __name__,
-        {
-            "colibri.common.config": "SettingsError Table read_settings",
-            "colibri.common.earth.geodesy": "Geodetic enu_of geodetic_of",
-            "colibri.common.errors": "Error InFlightError",
-            "colibri.common.jit": "compiled",
-            "colibri.common.rotations": "earth_from_body euler_from_quaternion quaternion_from_euler rotation_matrix",
-            "colibri.common.types": "Address Array FourRotors Matrix Quaternion Vector",
-        },
-    )
-
-__all__ = [
-    "Address",
-    "Array",
-    "Error",
-    "FourRotors",
-    "Geodetic",
-    "InFlightError",
-    "Matrix",
-    "Quaternion",
-    "SettingsError",
-    "Table",
-    "Vector",
-    "compiled",
-    "earth_from_body",
-    "enu_of",
-    "euler_from_quaternion",
-    "geodetic_of",
-    "quaternion_from_euler",
-    "read_settings",
-    "rotation_matrix",
-]
+    __getattr__, __dir__ = public(__name__)

@@ -5,39 +5,20 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
-    from colibri.plant.environment.weather import Gust, RecordedWind, Weather, Wind
-    from colibri.plant.errors import PlantError
-    from colibri.plant.physics.start import IntegrationError, Start
-    from colibri.plant.physics.world import Physics, World, starting_world
-    from colibri.plant.simulation.plant import Plant
-    from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicle, vehicle_names
+    from colibri.plant.environment.weather import Gust as Gust
+    from colibri.plant.environment.weather import RecordedWind as RecordedWind
+    from colibri.plant.environment.weather import Weather as Weather
+    from colibri.plant.environment.weather import Wind as Wind
+    from colibri.plant.errors import PlantError as PlantError
+    from colibri.plant.physics.start import IntegrationError as IntegrationError
+    from colibri.plant.physics.start import Start as Start
+    from colibri.plant.physics.world import Physics as Physics
+    from colibri.plant.physics.world import World as World
+    from colibri.plant.physics.world import starting_world as starting_world
+    from colibri.plant.simulation.plant import Plant as Plant
+    from colibri.plant.vehicle.description import Vehicle as Vehicle
+    from colibri.plant.vehicle.description import VehicleError as VehicleError
+    from colibri.plant.vehicle.description import load_vehicle as load_vehicle
+    from colibri.plant.vehicle.description import vehicle_names as vehicle_names
 else:
-    __getattr__, __dir__ = public(
-        __name__,
-        {
-            "colibri.plant.environment.weather": "Gust RecordedWind Weather Wind",
-            "colibri.plant.errors": "PlantError",
-            "colibri.plant.physics.start": "IntegrationError Start",
-            "colibri.plant.physics.world": "Physics World starting_world",
-            "colibri.plant.simulation.plant": "Plant",
-            "colibri.plant.vehicle.description": "Vehicle VehicleError load_vehicle vehicle_names",
-        },
-    )
-
-__all__ = [
-    "Gust",
-    "IntegrationError",
-    "Physics",
-    "Plant",
-    "PlantError",
-    "RecordedWind",
-    "Start",
-    "Vehicle",
-    "VehicleError",
-    "Weather",
-    "Wind",
-    "World",
-    "load_vehicle",
-    "starting_world",
-    "vehicle_names",
-]
+    __getattr__, __dir__ = public(__name__)

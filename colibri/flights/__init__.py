@@ -5,30 +5,15 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
-    from colibri.flights.fly import fly_plan, prepare
-    from colibri.flights.plan import FlightPlan, PlanError, Summary
-    from colibri.flights.processes import FlightError
-    from colibri.flights.replay import Difference, Replayed, ReplayError, replay_flight
+    from colibri.flights.fly import fly_plan as fly_plan
+    from colibri.flights.fly import prepare as prepare
+    from colibri.flights.plan import FlightPlan as FlightPlan
+    from colibri.flights.plan import PlanError as PlanError
+    from colibri.flights.plan import Summary as Summary
+    from colibri.flights.processes import FlightError as FlightError
+    from colibri.flights.replay import Difference as Difference
+    from colibri.flights.replay import Replayed as Replayed
+    from colibri.flights.replay import ReplayError as ReplayError
+    from colibri.flights.replay import replay_flight as replay_flight
 else:
-    __getattr__, __dir__ = public(
-        __name__,
-        {
-            "colibri.flights.fly": "fly_plan prepare",
-            "colibri.flights.plan": "FlightPlan PlanError Summary",
-            "colibri.flights.processes": "FlightError",
-            "colibri.flights.replay": "Difference ReplayError Replayed replay_flight",
-        },
-    )
-
-__all__ = [
-    "Difference",
-    "FlightError",
-    "FlightPlan",
-    "PlanError",
-    "ReplayError",
-    "Replayed",
-    "Summary",
-    "fly_plan",
-    "prepare",
-    "replay_flight",
-]
+    __getattr__, __dir__ = public(__name__)

@@ -5,41 +5,16 @@ from typing import TYPE_CHECKING
 from colibri.common.lazy import public
 
 if TYPE_CHECKING:
-    from colibri.sitl.backends.lockstep import SessionError
-    from colibri.sitl.backends.setting import Setting, SettingError
-    from colibri.sitl.errors import SitlError
-    from colibri.sitl.fleet import Fleet
-    from colibri.sitl.flight_record import Record
-    from colibri.sitl.ground_station import RefusedError, Station
-    from colibri.sitl.session import Flights
-    from colibri.sitl.stepping import NotInTimeError
-    from colibri.sitl.vehicle import Sitl
+    from colibri.sitl.backends.lockstep import SessionError as SessionError
+    from colibri.sitl.backends.setting import Setting as Setting
+    from colibri.sitl.backends.setting import SettingError as SettingError
+    from colibri.sitl.errors import SitlError as SitlError
+    from colibri.sitl.fleet import Fleet as Fleet
+    from colibri.sitl.flight_record import Record as Record
+    from colibri.sitl.ground_station import RefusedError as RefusedError
+    from colibri.sitl.ground_station import Station as Station
+    from colibri.sitl.session import Flights as Flights
+    from colibri.sitl.stepping import NotInTimeError as NotInTimeError
+    from colibri.sitl.vehicle import Sitl as Sitl
 else:
-    __getattr__, __dir__ = public(
-        __name__,
-        {
-            "colibri.sitl.backends.setting": "Setting SettingError",
-            "colibri.sitl.backends.lockstep": "SessionError",
-            "colibri.sitl.errors": "SitlError",
-            "colibri.sitl.fleet": "Fleet",
-            "colibri.sitl.flight_record": "Record",
-            "colibri.sitl.ground_station": "RefusedError Station",
-            "colibri.sitl.session": "Flights",
-            "colibri.sitl.stepping": "NotInTimeError",
-            "colibri.sitl.vehicle": "Sitl",
-        },
-    )
-
-__all__ = [
-    "Fleet",
-    "Flights",
-    "NotInTimeError",
-    "Record",
-    "RefusedError",
-    "SessionError",
-    "Setting",
-    "SettingError",
-    "Sitl",
-    "SitlError",
-    "Station",
-]
+    __getattr__, __dir__ = public(__name__)
