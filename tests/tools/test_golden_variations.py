@@ -10,7 +10,7 @@ from colibri.cli.main import main
 from colibri.verification.golden_flights import FLIGHTS
 from tools.golden.__main__ import main as golden_main
 from tools.golden.__main__ import table
-from tools.golden.pythons import environments, other_pythons, set_up
+from tools.golden.pythons import environments, is_stale, other_pythons, set_up
 from tools.golden.variations import Flown, Variation, fly, variations
 from tools.harness.processes import begins_as_recorded
 
@@ -93,15 +93,20 @@ def test_an_unknown_variation_is_refused_in_one_line(capsys: pytest.CaptureFixtu
     assert error.count("\n") == 1
 
 
-def test_environments_are_those_that_are_set_up_and_newer_than_the_lock_they_stay(tmp_path: Path) -> None:
-    (tmp_path / "requirements.lock").touch()
+def test_environments_are_those_that_are_set_up_and_newer_than_lock_and_package_they_stay(tmp_path: Path) -> None:
+    for name in ("requirements.lock", "pyproject.toml"):
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (0.0, 0.0))
     for version in ("3.10", "3.12", "3.13"):
         (tmp_path / f".venv-{version}").mkdir()
     for version in ("3.10", "3.12"):
         (tmp_path / f".venv-{version}" / ".ready").touch()
-    os.utime(tmp_path / "requirements.lock", (0.0, 0.0))
     assert environments(tmp_path) == {"3.12": tmp_path / ".venv-3.12" / "bin" / "python"}
     set_up(tmp_path, "3.12", Path("/no/such/python"))
+    assert [is_stale(tmp_path, version) for version in ("3.12", "3.13")] == [False, True]
+    os.utime(tmp_path / ".venv-3.12" / ".ready", (0.0, 0.0))
+    with pytest.raises(FileNotFoundError):
+        set_up(tmp_path, "3.12", Path("/no/such/python"))
 
 
 def test_other_pythons_are_of_other_versions_that_can_run_the_project() -> None:

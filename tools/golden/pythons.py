@@ -7,6 +7,8 @@ from pathlib import Path
 
 MIN_MINOR, MAX_MINOR = 11, 19
 """Minor versions of Python 3 to look for."""
+_MADE_FROM = ("requirements.lock", "pyproject.toml")
+"""What an environment is installed from: one that is older is stale."""
 _SAYS_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
 
 
@@ -31,24 +33,29 @@ def other_pythons() -> dict[str, Path]:
     return found
 
 
+def is_stale(root: Path, version: str) -> bool:
+    """Return whether the environment of a version is not there, or lock or package have changed since it was made."""
+    ready = root / f".venv-{version}" / ".ready"
+    return not ready.exists() or ready.stat().st_mtime <= max((root / name).stat().st_mtime for name in _MADE_FROM)
+
+
 def set_up(root: Path, version: str, python: Path) -> None:
-    """Make the environment of a version from the lock, unless there is one that is newer than the lock.
+    """Make the environment of a version from the lock, unless there is one that is not stale.
 
     Raises:
         subprocess.CalledProcessError: It cannot be made; its output says why.
     """
-    folder, lock = root / f".venv-{version}", root / "requirements.lock"
-    ready = folder / ".ready"
-    if ready.exists() and ready.stat().st_mtime > lock.stat().st_mtime:
+    if not is_stale(root, version):
         return
+    folder = root / f".venv-{version}"
     pip = (str(folder / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
     for command in (
         (str(python), "-m", "venv", "--clear", str(folder)),
-        (*pip, "--require-hashes", "-r", str(lock)),
+        (*pip, "--require-hashes", "-r", str(root / "requirements.lock")),
         (*pip, "--no-deps", "--no-build-isolation", "--editable", str(root)),
     ):
         subprocess.run(command, check=True, capture_output=True, text=True, cwd=root)
-    ready.touch()
+    (folder / ".ready").touch()
 
 
 def _candidates(minor: int) -> list[Path]:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.verification.golden import FOUND
-from tools.golden.pythons import environments
+from tools.golden.pythons import environments, is_stale
 
 ROOT = Path(__file__).parents[2]
 HASHES = ROOT / "tests" / "golden" / "hashes.json"
@@ -85,7 +85,7 @@ def variations() -> list[Variation]:
             lacks="" if platform.libc_ver()[0] == "glibc" else "the C library is not glibc",
         ),
         Variation(name="two-threads", environment=dict.fromkeys(ONE_THREAD, "2")),
-        *(Variation(name=f"python-{version}", python=python) for version, python in environments(ROOT).items()),
+        *(_python(version, python) for version, python in environments(ROOT).items()),
     ]
 
 
@@ -113,6 +113,13 @@ def _numba(cpu: str, needs: Sequence[str]) -> Variation:
     environment = {"NUMBA_CPU_NAME": cpu, "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(kept)}
     lacks = "" if platform.machine() in ("x86_64", "AMD64") else "not an x86 CPU"
     return Variation(name=f"numba-{cpu}", environment=environment, needs=needs, lacks=lacks)
+
+
+def _python(version: str, python: Path) -> Variation:
+    lacks = (
+        f".venv-{version} is older than the lock or the package: make verify-pythons" if is_stale(ROOT, version) else ""
+    )
+    return Variation(name=f"python-{version}", python=python, lacks=lacks)
 
 
 @cache

@@ -1,6 +1,5 @@
-"""`python -m tools.pages.latency FOLDER`: flies profile `flight` over ever slower links; writes latency.md and .png."""
+"""`latency.md` and `latency.png`: profile `flight` flown over ever slower links."""
 
-import sys
 from collections.abc import Sequence
 from math import pi
 from pathlib import Path
@@ -24,7 +23,7 @@ _HEAD = """# Latency between plant and autopilot
 
 Profile `flight`, `hummingbird`, state feedback. The command that answers a frame acts a round trip after it, the one
 before it is held until then (`colibri fly --latency MS`, one way: half of it). The control law knows nothing of it.
-Written by `python -m tools.pages.latency docs`; simulated, so the same again bit for bit.
+Written by `python -m tools.pages latency docs`; simulated, so the same again bit for bit.
 
 Step: hover, begun 1 m beside it at rest, 12 s; the error is that of the last 4 s, RMS; overshoot is how far it goes
 past. Lemniscate: 4 m, 6 s a lap, 5.9 m/s at most, begun at its speed, 20 s; RMS from 8 s on. *Lost*: more than 5 m
@@ -184,14 +183,8 @@ def draw(points: Sequence[Point], path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
-def main() -> int:
-    """Write page and picture into the folder that the command line names."""
-    folder = Path(sys.argv[1])
+def write(folder: Path) -> None:
+    """Fly; write page and picture."""
     points = sweep(ROUND_TRIPS_MS)
     (folder / "latency.md").write_text(page(points), encoding="utf-8")
     draw(points, folder / "latency.png")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,12 +1,15 @@
-"""`python -m tools.pages.modes FOLDER`: writes `modes.md` and `modes.png` from the autopilot's own tables."""
+"""Tables of `modes.md`, and `modes.png`, from the autopilot's own tables."""
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from colibri.autopilot.commander.rules.modes import MODES, ROWS, TRANSITIONS, Event, Mode, Transition, custom_mode
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch
 
-_PLACES = {
+from colibri.autopilot.commander.rules.modes import MODES, ROWS, TRANSITIONS, Event, Mode, Transition, custom_mode
+from tools.pages.tables import renew_tables
+
+PLACES = {
     Mode.STABILIZED: (0.0, 3.0),
     Mode.ALTITUDE: (0.0, 2.0),
     Mode.POSITION: (0.0, 1.0),
@@ -22,23 +25,11 @@ _PLACES = {
 }
 _DISARMED = (11.9, 1.5)
 _ANY = (5.2, 1.0)
-_HEAD = """# Flight modes
-
-This page and its picture are written from the tables in `autopilot/commander/rules/modes.py` by
-`python -m tools.pages.modes docs`; a test holds that they agree.
-
-![The transitions, drawn from the table](modes.png)
-
-Any mode can be selected at any time if what it needs is there; on the ground, disarmed, it need not be yet. A refusal
-says why, in the COMMAND_ACK's company by a STATUSTEXT. Arming asks for more, see [Arming](ground-stations.md#arming).
-What leads to a failsafe, and which of them wins, has [a table of its own](failsafes.md).
-
-"""
 
 
-def page() -> str:
-    """Return the page."""
-    return _HEAD + "\n".join([*_modes(), "", "## Transitions", "", *_transitions()]) + "\n"
+def tables() -> list[str]:
+    """Return the tables of the page: modes, and transitions between them."""
+    return ["\n".join(_modes()), "\n".join(_transitions())]
 
 
 def _modes() -> Iterator[str]:
@@ -68,13 +59,8 @@ def _yes(value: bool) -> str:
 
 def draw(path: Path) -> None:
     """Draw the transitions as a PNG."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-    from matplotlib.patches import FancyBboxPatch
-
-    figure, axes = plt.subplots(figsize=(13.0, 5.2))
+    figure = Figure(figsize=(13.0, 5.2))
+    axes = figure.subplots()
     axes.set_xlim(-1.2, 13.0)
     axes.set_ylim(-1.1, 3.9)
     axes.axis("off")
@@ -83,7 +69,7 @@ def draw(path: Path) -> None:
     )
     axes.text(-0.9, -0.95, "armed: any mode can be selected whose needs are met", fontsize=10, color="#445566")
     style = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": "#223344"}
-    for mode, place in _PLACES.items():
+    for mode, place in PLACES.items():
         needs = ROWS[mode].needs
         axes.text(*place, mode + ("*" if needs else ""), ha="center", va="center", fontsize=11, bbox=style, zorder=3)
     axes.text(*_DISARMED, "disarmed", ha="center", va="center", fontsize=11, bbox=style, zorder=3)
@@ -115,23 +101,16 @@ def draw(path: Path) -> None:
     )
     axes.text(10.3, 1.15, "armed, in the\nsame mode", fontsize=8.5, color="#225588", ha="center", va="top")
     figure.savefig(path, dpi=110, bbox_inches="tight")
-    plt.close(figure)
 
 
 def _edges(row: Transition) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
     if row.target is None or row.disarms:
         return
-    for source in [_PLACES[mode] for mode in row.sources] or [_ANY]:
-        yield source, _PLACES[row.target]
+    for source in [PLACES[mode] for mode in row.sources] or [_ANY]:
+        yield source, PLACES[row.target]
 
 
-def main() -> int:
-    """Write page and picture into the folder that the command line names."""
-    folder = Path(sys.argv[1])
-    (folder / "modes.md").write_text(page())
+def write(folder: Path) -> None:
+    """Write tables and picture."""
+    renew_tables(folder / "modes.md", tables())
     draw(folder / "modes.png")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,6 +1,5 @@
-"""`python -m tools.pages.parameters FOLDER`: writes `parameters.md`, the parameters of profile `flight`."""
+"""`parameters.md`: the parameters of profile `flight`."""
 
-import sys
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
@@ -14,7 +13,7 @@ _HEAD = """# Parameters
 
 What a ground station can change, in flight too, of profile `flight` on its vehicle; another control law brings the
 numbers of its own table. Changes are kept in `--state` and hold at the next start. Written by
-`python -m tools.pages.parameters docs` from the definitions themselves; a test holds that they agree.
+`python -m tools.pages parameters docs` from the definitions themselves; a test holds that they agree.
 """
 
 
@@ -45,11 +44,6 @@ def _number(parameter: Parameter, value: float) -> str:
     return "" if abs(value) >= FLOAT32_MAX else f"{value:.6g}"
 
 
-def main() -> int:
-    """Write the page into the folder that the command line names."""
-    (Path(sys.argv[1]) / "parameters.md").write_text(page())
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def write(folder: Path) -> None:
+    """Write the page."""
+    (folder / "parameters.md").write_text(page(), encoding="utf-8")

@@ -1,7 +1,5 @@
-"""`python -m tools.pages.rotor_loss FOLDER`: flies losses of a rotor, writes figure and table of `rotor-loss.md`."""
+"""Table and figure of `rotor-loss.md`: losses of a rotor, flown."""
 
-import re
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +13,7 @@ from colibri.analysis.tables import markdown
 from colibri.common.types import Array
 from colibri.mavlink.hil.feedback import Feedback
 from tools.pages.rotor_loss_flights import COLUMNS, HEIGHT_M, UPRIGHT_DEG, Case, Flown, fly_all
+from tools.pages.tables import renew_tables
 
 SEEDS = range(50)
 CASES = (
@@ -40,8 +39,6 @@ _GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
 _MANY, _ONE, _LIMIT = "#9DB8D2", "#0B3C6F", "#D55E00"
 _ROTORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 _FIRST_S, _WHOLE_S = (-0.1, 2.0), (-0.5, 16.0)
-_TABLE = re.compile(r"^\| 50 flights each .*?\n(?=\n)", re.MULTILINE | re.DOTALL)
-"""Of the page: everything else there is written by hand."""
 
 
 def table(flown: Mapping[Case, Sequence[Flown]]) -> str:
@@ -104,16 +101,10 @@ def _cells(flown: Sequence[Flown]) -> list[str]:
     return cells
 
 
-def main() -> int:
-    """Fly, and write into the folder that the command line names; 1 if a flight was not well, the last case aside."""
-    folder = Path(sys.argv[1])
+def write(folder: Path) -> bool:
+    """Fly; write table and figure; return whether every flight was well, those of the last case aside."""
     flown = fly_all(CASES, SEEDS)
-    written = folder / "rotor-loss.md"
-    written.write_text(_TABLE.sub(table(flown), written.read_text(encoding="utf-8")), encoding="utf-8")
+    renew_tables(folder / "rotor-loss.md", [table(flown)])
     title = f"A rotor lost at {HEIGHT_M:.0f} m, {len(SEEDS)} seeds: {_DRAWN.name}"
     write_figure(draw(flown[_DRAWN], title), folder / "rotor-loss")
-    return 0 if all(one.well for case in CASES[:-1] for one in flown[case]) else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return all(one.well for case in CASES[:-1] for one in flown[case])

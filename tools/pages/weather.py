@@ -1,6 +1,5 @@
-"""`python -m tools.pages.weather FOLDER`: draws `weather.png`, what the air does at each strength of turbulence."""
+"""`weather.png` and `.svg`: what the air does at each strength of turbulence."""
 
-import sys
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -86,11 +85,6 @@ def _dryden(intensity: Intensity, axis: int, hz: Array) -> Array:
     return spectrum
 
 
-def main() -> int:
-    """Draw into the folder that the command line names."""
-    write_figure(draw(), Path(sys.argv[1]) / "weather")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def write(folder: Path) -> None:
+    """Draw into `folder`."""
+    write_figure(draw(), folder / "weather")

@@ -24,7 +24,8 @@ from colibri.autopilot.commander.rules.modes import (
     next_state,
 )
 from colibri.mavlink.wire.refusal import Refusal
-from tools.pages.modes import page
+from tools.pages.modes import PLACES, tables
+from tools.pages.tables import with_tables
 
 PAGE = Path(__file__).parents[4] / "docs" / "modes.md"
 
@@ -112,4 +113,9 @@ def test_on_the_ground_needs_hold_back_arming_and_not_the_choice(mode: Mode) -> 
 
 
 def test_the_page_is_current() -> None:
-    assert PAGE.read_text(encoding="utf-8") == page()
+    page = PAGE.read_text(encoding="utf-8")
+    assert page == with_tables(page, tables())
+
+
+def test_every_mode_has_its_place_in_the_picture() -> None:
+    assert PLACES.keys() == set(Mode)

@@ -1,0 +1,27 @@
+"""The tables of a page that is written by hand otherwise."""
+
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+_TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
+
+
+def renew_tables(path: Path, tables: Sequence[str]) -> None:
+    """Write `tables` into the page at `path`."""
+    path.write_text(with_tables(path.read_text(encoding="utf-8"), tables), encoding="utf-8")
+
+
+def with_tables(page: str, tables: Iterable[str]) -> str:
+    """Return a page with `tables` in it: each, in order, takes the place of the next that has the same headings."""
+    ahead = list(tables)
+
+    def newest(found: re.Match[str]) -> str:
+        headings = found[0].partition("\n")[0]
+        if not ahead or not ahead[0].startswith(headings + "\n"):
+            return found[0]
+        return ahead.pop(0).rstrip() + "\n"
+
+    page = _TABLE.sub(newest, page)
+    assert not ahead, f"the page has no table {ahead[0].partition(chr(10))[0]}"
+    return page
