@@ -2,7 +2,7 @@
 
 from argparse import ArgumentTypeError, Namespace
 
-from colibri.cli.shared_options import add_feedback, add_out
+from colibri.cli.shared.options import add_feedback, add_out
 from colibri.common.process.arguments import ArgumentParser, positive
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import NO_WIND

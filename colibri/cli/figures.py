@@ -2,7 +2,7 @@
 
 from argparse import Namespace
 
-from colibri.cli.shared_options import add_out
+from colibri.cli.shared.options import add_out
 from colibri.common.process.arguments import ArgumentParser
 
 

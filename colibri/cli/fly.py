@@ -2,7 +2,7 @@
 
 from argparse import Namespace
 
-from colibri.cli.shared_options import add_feedback, add_out, add_signing
+from colibri.cli.shared.options import add_feedback, add_out, add_signing
 from colibri.common.process.arguments import ArgumentParser, natural, positive, speed
 from colibri.plant.process.options import add_world_arguments
 
@@ -55,6 +55,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Fly as the command line says; return the exit code."""
-    from colibri.cli.fly_and_report import fly
+    from colibri.cli.shared.fly_and_report import fly
 
     return fly(args)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Protocol, cast
 
-from colibri.cli.processes import PROCESSES, run_process
+from colibri.cli.shared.processes import PROCESSES, run_process
 from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, end_quickly, fail, use_one_thread

@@ -4,7 +4,7 @@ from argparse import Namespace
 from math import inf
 from pathlib import Path
 
-from colibri.cli.shared_options import add_feedback, add_signing
+from colibri.cli.shared.options import add_feedback, add_signing
 from colibri.common.earth.home import DEFAULT_HOME, home
 from colibri.common.process.arguments import ArgumentParser, natural, positive, speed
 from colibri.plant.process.options import add_world_arguments

@@ -3,7 +3,7 @@
 from argparse import Namespace
 from pathlib import Path
 
-from colibri.cli.shared_options import add_out
+from colibri.cli.shared.options import add_out
 from colibri.common.process.arguments import ArgumentParser, positive
 
 GOLDEN_HASHES = Path("tests/golden/hashes.json")

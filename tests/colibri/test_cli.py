@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 from colibri.cli.main import SUBCOMMANDS, main
-from colibri.cli.processes import PROCESSES
+from colibri.cli.shared.processes import PROCESSES
 from colibri.mavlink.links.open import open_link
 from tools.harness.processes import wait_for
 
@@ -24,7 +24,7 @@ MAX_HELP_S = 0.2
 HELP = """
 import sys
 from colibri.cli.main import SUBCOMMANDS, main
-from colibri.cli.processes import PROCESSES
+from colibri.cli.shared.processes import PROCESSES
 try:
     main(["--help"])
 finally:

@@ -165,6 +165,6 @@ def test_a_flight_that_ends_says_where_its_logs_are_and_one_that_never_began_doe
     def fail(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr("colibri.cli.fly_and_report.fly_plan", fail)
+    monkeypatch.setattr("colibri.cli.shared.fly_and_report.fly_plan", fail)
     assert exit_code("fly", "hover", "--quiet", "--out", str(tmp_path)) == code
     assert capsys.readouterr().err == line.format(out=tmp_path)

@@ -1,0 +1,1 @@
+"""What is no subcommand: options that several have, a flight with its progress and report, the two processes."""
