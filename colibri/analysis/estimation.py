@@ -72,9 +72,9 @@ class Estimation(NamedTuple):
         horizontal = np.hypot(self.position_m[:, 0], self.position_m[:, 1])
         angles = np.degrees(self.attitude_rad)
         values = (
-            _rms(self.control_m),
-            {"horizontal": _rms(horizontal), "vertical": _rms(self.position_m[:, 2])},
-            {name: _rms(angles[:, axis]) for axis, name in enumerate(("roll", "pitch", "yaw"))},
+            rms(self.control_m),
+            {"horizontal": rms(horizontal), "vertical": rms(self.position_m[:, 2])},
+            {name: rms(angles[:, axis]) for axis, name in enumerate(("roll", "pitch", "yaw"))},
             float(self.nees.mean()),
             self._mean_nis(),
         )
@@ -153,5 +153,6 @@ def _errors(check: Array, real: Array) -> Errors:
     return Errors(np.concatenate([place - check[1:4], velocity - check[4:7], small]), covariance)
 
 
-def _rms(values: Array) -> float:
+def rms(values: Array) -> float:
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(values**2)))

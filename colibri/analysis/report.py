@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.analysis.estimation import FIGURES, read_estimation
+from colibri.analysis.estimation import FIGURES, read_estimation, rms
 from colibri.analysis.recording import INPUT, Recording
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Active, Fallback
 from colibri.autopilot.control.qp import QpStatus
@@ -48,12 +48,12 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
         "sim_time_s": sim_time_s,
         "wall_time_s": summary.wall_time_s,
         "real_time_factor": sim_time_s / summary.wall_time_s,
-        "rmse_m": _rms(error),
+        "rmse_m": rms(error),
         "max_error_m": float(error.max()),
-        "rmse_after_20s_m": _rms(settled) if len(settled) else None,
+        "rmse_after_20s_m": rms(settled) if len(settled) else None,
         "max_error_after_20s_m": float(settled.max()) if len(settled) else None,
         **_estimation_figures(plan, settled),
-        "effort_n_m": _rms(np.linalg.norm(recording.columns(INPUT[1:]), axis=1)),
+        "effort_n_m": rms(np.linalg.norm(recording.columns(INPUT[1:]), axis=1)),
         "solve_time_us": _quantiles(recording.solve_time_us),
         "control_step_us": _quantiles(recording.control_step_us),
         "frames": summary.frames,
@@ -73,7 +73,7 @@ def _estimation_figures(plan: FlightPlan, settled: Array) -> Report:
     """Return how far estimate and reference, estimate and truth are apart; without an estimator the former alone."""
     if plan.feedback is Feedback.SENSORS:
         return read_estimation(plan).after(SETTLED_AFTER_S).figures()
-    return dict.fromkeys(FIGURES) | {FIGURES[0]: _rms(settled) if len(settled) else None}
+    return dict.fromkeys(FIGURES) | {FIGURES[0]: rms(settled) if len(settled) else None}
 
 
 def write_report(figures: Report, path: Path) -> None:
@@ -137,10 +137,6 @@ def length(metres: float) -> str:
 
 def _counts(codes: NDArray[np.int64], names: dict[str, int]) -> dict[str, int]:
     return {name: int(np.count_nonzero(codes == code)) for name, code in names.items()}
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _quantiles(values: Array) -> dict[str, float]:

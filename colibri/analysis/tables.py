@@ -8,6 +8,8 @@ from typing import TypeAlias
 
 Row: TypeAlias = tuple[str, ...]
 
+_MAX_WIDTH = 400
+
 
 def write_table(path: Path, headings: Row, rows: Sequence[Row], *, names: int) -> list[Path]:
     """Write a table as `path` with the suffixes md and csv; return what was written.
@@ -29,6 +31,20 @@ def markdown(headings: Row, rows: Sequence[Row], *, names: int) -> str:
     """Return a Markdown table, its first columns names, the others numbers."""
     lines = [headings, (*["---"] * names, *["---:"] * (len(headings) - names)), *rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def print_table(title: str, headings: Row, rows: Sequence[Row], *, names: int) -> None:
+    """Show a table on standard output, a line below each first name; wider than the terminal, its lines wrap."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left")
+    for number, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if number < names else "right", no_wrap=True)
+    for row, following in zip(rows, [*rows[1:], ("",)], strict=True):
+        table.add_row(*row, end_section=following[0] != row[0])
+    needed = Console(width=_MAX_WIDTH).measure(table).maximum
+    Console(width=max(Console().width, needed)).print(table)
 
 
 def comma_separated(headings: Row, rows: Sequence[Row]) -> str:

@@ -17,14 +17,15 @@ from rich.table import Table
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
 from colibri.bench.sensing import FLIGHTS_A_RUN, sensing_figures
-from colibri.bench.serving import ALONE, CHANNELS, WATCHED, serving_figures
+from colibri.bench.serving import CHANNELS, serving_figures
 from colibri.bench.speed import CONTROL_S, LINKS, THESIS_LINKS, Peer, Report, rate_figures, thesis_figures
 from colibri.bench.stages import MOVES, STAGES, stage_figures
 from colibri.common.process.lifecycle import fail
 
 PROFILE = "flight"
 MIN_DURATION_S, MAX_DURATION_S = 0.1, 1000.0
-_SERVED = ("p50 µs", "p99 µs", "messages a second")
+_SERVED = {"p50 µs": "p50", "p99 µs": "p99", "messages a second": "messages_hz"}
+_QUANTILES = {"p50": "p50", "p99": "p99"}
 
 
 def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
@@ -114,31 +115,19 @@ def _stage_tables(stages: Mapping[str, Any]) -> Iterator[Table]:
     }
     yield _by_horizon(f"{stages['track']}, profile {PROFILE}: stages of a control step, p50 / p99 µs", of)
     yield _by_horizon("QP by solver, p50 / p99 µs, part solved", stages["solvers"])
-    link = _table("link, µs", ("p50", "p99"))
-    for name, figure in stages["link"].items():
-        link.add_row(name, _number(figure["p50"]), _number(figure["p99"]))
-    yield link
+    yield _columns("link, µs", stages["link"], _QUANTILES)
 
 
 def _sensor_tables(sensors: Mapping[str, Any], runs: int) -> Iterator[Table]:
-    steps = _table("step of the estimator, µs", ("p50", "p99"))
-    for name, figure in sensors["estimator_us"].items():
-        steps.add_row(name, _number(figure["p50"]), _number(figure["p99"]))
-    yield steps
+    yield _columns("step of the estimator, µs", sensors["estimator_us"], _QUANTILES)
     title = f"{sensors['track']}, profile {PROFILE}, frames at 250 Hz, times real time, {runs} runs"
     yield _spread(title, sensors["real_time_factor"])
 
 
 def _ground_tables(ground: Mapping[str, Any]) -> Iterator[Table]:
-    serve = _table(f"{ground['track']}, profile {PROFILE}: to serve ground stations after a frame", _SERVED)
-    for channels, figure in ground["serve"].items():
-        serve.add_row(f"{channels} connected", *(_number(figure[name]) for name in ("p50", "p99", "messages_hz")))
-    yield serve
-    steps = _table("control step at real time, µs", ("p50", "p99"))
-    for name in (ALONE, WATCHED):
-        figure = ground["control_step_us"][name]
-        steps.add_row(name, _number(figure["p50"]), _number(figure["p99"]))
-    yield steps
+    title = f"{ground['track']}, profile {PROFILE}: to serve ground stations after a frame"
+    yield _columns(title, {f"{channels} connected": figure for channels, figure in ground["serve"].items()}, _SERVED)
+    yield _columns("control step at real time, µs", ground["control_step_us"], _QUANTILES)
 
 
 def _by_horizon(title: str, figures: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
@@ -154,13 +143,18 @@ def _of_stage(figure: Mapping[str, float]) -> str:
 
 
 def _spread(title: str, rows: Mapping[str, Mapping[str, float]]) -> Table:
-    table = _table(title, ("min", "median", "max"))
+    return _columns(title, rows, {name: name for name in ("min", "median", "max")})
+
+
+def _columns(title: str, rows: Mapping[str, Mapping[str, float]], columns: Mapping[str, str]) -> Table:
+    """Return a table with some figures of each row, by their headings."""
+    table = _table(title, list(columns))
     for name, figure in rows.items():
-        table.add_row(name, *map(_number, figure.values()))
+        table.add_row(name, *(_number(figure[key]) for key in columns.values()))
     return table
 
 
-def _table(title: str, columns: list[str] | tuple[str, ...]) -> Table:
+def _table(title: str, columns: list[str]) -> Table:
     table = Table(title=title, title_justify="left")
     table.add_column("")
     for column in columns:

@@ -6,16 +6,14 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.estimation.estimator import Estimator
-from colibri.bench.speed import Report, Samples, summarised
+from colibri.bench.speed import Report, Samples, real_time_factor, summarised
+from colibri.bench.stages import summary
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
-from colibri.common.process.lifecycle import EXIT_FAILED, fail
-from colibri.flights.in_process import SYSTEM_ID, fly_locally
+from colibri.flights.fly import fly_plan
+from colibri.flights.in_process import SYSTEM_ID
 from colibri.flights.plan import FlightPlan
-from colibri.flights.processes import FlightError, fly_processes
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.sensors import OWN_MESSAGES, SensorFrame, decode_sensors
 from colibri.mavlink.wire import dialect
@@ -38,11 +36,11 @@ def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int
     """Time the estimator on the frames of a flight; fly on sensors and on the state, in turn, in every run."""
     duration_s = max(duration_s, _MIN_S)
     report("estimator")
-    fly_locally(_plan(profile, folder, duration_s, "memory", Feedback.SENSORS), _unseen)
+    fly_plan(_plan(profile, folder, duration_s, "memory", Feedback.SENSORS))
     frames = list(sensor_frames((folder / "flight.tlog").read_bytes()))
     steps = {
-        ALWAYS: _quantiles(_timed(profile, frames, lambda _time_us: True)),
-        IN_FLIGHT: _quantiles(_timed(profile, frames, lambda time_us: time_us % CONTROL_US == 0)),
+        ALWAYS: summary(_timed(profile, frames, lambda _time_us: True)),
+        IN_FLIGHT: summary(_timed(profile, frames, lambda time_us: time_us % CONTROL_US == 0)),
     }
     samples: Samples = {}
     for run in range(runs):
@@ -50,7 +48,7 @@ def sensing_figures(profile: Profile, folder: Path, duration_s: float, runs: int
             for feedback in Feedback:
                 name = f"{link}, {feedback}"
                 report(f"{name}, {run + 1} of {runs}")
-                factor = _real_time_factor(_plan(profile, folder, duration_s, link, feedback))
+                factor = real_time_factor(_plan(profile, folder, duration_s, link, feedback))
                 samples.setdefault(name, []).append(factor)
     return {
         "track": TRACK,
@@ -77,36 +75,19 @@ def sensor_frames(tlog: bytes) -> Iterator[SensorFrame]:
 
 
 def _timed(profile: Profile, frames: list[SensorFrame], asked: Callable[[int], bool]) -> list[float]:
-    """Return how long the estimator takes for each frame, s."""
+    """Return how long the estimator takes for each frame, µs."""
     vehicle = load_vehicle(profile.simulation.vehicle)
     assert vehicle.sensors is not None, "the profile's vehicle has sensors"
     estimator = Estimator(vehicle.sensors, vehicle.gravity_m_s2, DEFAULT_ORIGIN, FRAME_US)
-    times_s = []
+    times_us = []
     for frame in frames:
         wanted = asked(frame.time_us)
         began_s = perf_counter()
         estimator.step(frame, asked=wanted)
-        times_s.append(perf_counter() - began_s)
-    return times_s[_SETTLED:]
+        times_us.append((perf_counter() - began_s) * 1e6)
+    return times_us[_SETTLED:]
 
 
 def _plan(profile: Profile, folder: Path, duration_s: float, link: str, feedback: Feedback) -> FlightPlan:
     plan = FlightPlan.of_options(folder, track=TRACK, profile=profile.name, link=link, feedback=feedback)
     return replace(plan, duration_s=duration_s)
-
-
-def _real_time_factor(plan: FlightPlan) -> float:
-    try:
-        summary = fly_processes(plan, _unseen) if plan.link == "udp" else fly_locally(plan, _unseen)
-    except FlightError as error:
-        fail(str(error), EXIT_FAILED)
-    return plan.duration_s / summary.wall_time_s
-
-
-def _quantiles(times_s: list[float]) -> dict[str, float]:
-    p50, p99 = np.quantile(np.array(times_s) * 1e6, [0.5, 0.99])
-    return {"p50": float(p50), "p99": float(p99), "samples": len(times_s)}
-
-
-def _unseen(_sim_time_s: float) -> None:
-    """Show no progress within a flight."""

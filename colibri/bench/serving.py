@@ -77,7 +77,7 @@ def control_steps_us(plan: FlightPlan, stations: int) -> Figures:
         ground = GroundAccess(tuple(f"udpout:127.0.0.1:{port}" for port in ports))
         watched = replace(plan, speed=1.0, ground=ground)
         try:
-            fly_processes(watched, lambda _sim_time_s: None)
+            fly_processes(watched)
         except FlightError as error:
             fail(str(error), EXIT_FAILED)
         return summary(read_recording(watched).control_step_us[1:].tolist())

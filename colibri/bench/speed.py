@@ -13,9 +13,9 @@ from typing import Any, NamedTuple, TypeAlias
 from colibri.autopilot.control.profile import Profile
 from colibri.bench.variants import TRACK, plan_of, with_intervals
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
-from colibri.flights.in_process import fly_locally
-from colibri.flights.plan import Summary
-from colibri.flights.processes import FlightError, fly_processes
+from colibri.flights.fly import fly_plan
+from colibri.flights.plan import FlightPlan
+from colibri.flights.processes import FlightError
 
 Report: TypeAlias = Callable[[str], None]
 Samples: TypeAlias = dict[str, list[float]]
@@ -51,7 +51,7 @@ def rate_figures(
     """
     report("warm up")
     plan = plan_of(profile, folder, _WARM_UP_S, "memory")
-    fly_locally(plan, _unseen)
+    fly_plan(plan)
     samples: dict[int, Samples] = {frames_hz: {} for frames_hz in CONTROL_S}
     for run in range(runs):
         for frames_hz, control_s in CONTROL_S.items():
@@ -59,7 +59,7 @@ def rate_figures(
             flown = samples[frames_hz]
             for link in LINKS:
                 report(f"{frames_hz} Hz, {link}, {run + 1} of {runs}")
-                flown.setdefault(link, []).append(_real_time_factor(chosen, folder, duration_s, link))
+                flown.setdefault(link, []).append(real_time_factor(plan_of(chosen, folder, duration_s, link)))
             if peer is not None:
                 report(f"{frames_hz} Hz, {peer.name}, {run + 1} of {runs}")
                 factor = peer.real_time_factor(frames_hz, min(duration_s, _PEER_MAX_S))
@@ -95,13 +95,12 @@ def _with_ratios(flown: Samples, peer: Peer | None) -> dict[str, dict[str, float
     return figures
 
 
-def _real_time_factor(profile: Profile, folder: Path, duration_s: float, link: str) -> float:
-    plan = plan_of(profile, folder, duration_s, link)
+def real_time_factor(plan: FlightPlan) -> float:
+    """Fly a plan; return simulated over wall-clock time."""
     try:
-        summary: Summary = fly_processes(plan, _unseen) if link == "udp" else fly_locally(plan, _unseen)
+        return plan.duration_s / fly_plan(plan).wall_time_s
     except FlightError as error:
         fail(str(error), EXIT_FAILED)
-    return duration_s / summary.wall_time_s
 
 
 def _command(link: str) -> dict[str, float]:
@@ -121,7 +120,3 @@ def _command(link: str) -> dict[str, float]:
         f"{link}: control step p50, µs": report["control_step_us"]["p50"],
         f"{link}: control step p99, µs": report["control_step_us"]["p99"],
     }
-
-
-def _unseen(_sim_time_s: float) -> None:
-    """Show no progress within a flight."""

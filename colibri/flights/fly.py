@@ -5,7 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 from colibri.common.process.lifecycle import fail
-from colibri.flights.plan import FlightPlan, Summary
+from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.flights.processes import fly_processes
 
 LOGS = (
@@ -15,8 +15,14 @@ LOGS = (
 FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "rotors.png", "error.png")
 
 
-def fly_plan(plan: FlightPlan, progress: Callable[[float], None], say: Callable[[str], None]) -> Summary:
-    """Fly a plan over its link; return what was measured meanwhile."""
+def fly_plan(
+    plan: FlightPlan, progress: Callable[[float], None] = unseen, say: Callable[[str], None] = unseen
+) -> Summary:
+    """Fly a plan over its link; return what was measured meanwhile.
+
+    `progress` is called with the simulated time, s; `say` with a line for each ground link and each ground station that
+    connects.
+    """
     if plan.link == "udp":
         return fly_processes(plan, progress, say)
     from colibri.flights.in_process import fly_locally

@@ -14,7 +14,7 @@ from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import gc_frozen
 from colibri.common.types import Address
-from colibri.flights.plan import FlightPlan, Summary
+from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
@@ -37,7 +37,7 @@ class Exchange(Protocol):
         """Return the autopilot's step and the command that reached the plant."""
 
 
-def fly_locally(plan: FlightPlan, progress: Callable[[float], None]) -> Summary:
+def fly_locally(plan: FlightPlan, progress: Callable[[float], None] = unseen) -> Summary:
     """Fly `plan` in this process; `progress` is called with the simulated time, s.
 
     Raises:

@@ -18,6 +18,10 @@ from colibri.plant.simulation.setting import WorldSetting, world_values
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 
+def unseen(_what: object) -> None:
+    """Show nothing: neither simulated time, s, nor a line of text."""
+
+
 class Summary(NamedTuple):
     """What only the run itself can give: wall-clock time of the flight, frames exchanged and sent again."""
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from colibri.common.errors import InFlightError
 from colibri.flights.children import Child, end_children, events_of, how_it_ended
 from colibri.flights.command_lines import options_of, plant_options
-from colibri.flights.plan import FlightPlan, Summary
+from colibri.flights.plan import FlightPlan, Summary, unseen
 
 _SHOWN = ("ground", "heard", "said")
 """Events of the autopilot that are shown to a user with ground stations."""
@@ -28,7 +28,7 @@ class FlightError(InFlightError):
 
 
 def fly_processes(
-    plan: FlightPlan, progress: Callable[[float], None], say: Callable[[str], None] = lambda _: None
+    plan: FlightPlan, progress: Callable[[float], None] = unseen, say: Callable[[str], None] = unseen
 ) -> Summary:
     """Fly `plan` as two processes on a free port. Both are gone when this returns or raises.
 

@@ -8,7 +8,7 @@ from urllib.parse import quote
 from colibri.analysis.outcome import keep_flight
 from colibri.analysis.parallel import side_by_side
 from colibri.analysis.report import SETTLED_AFTER_S
-from colibri.analysis.tables import write_table
+from colibri.analysis.tables import print_table, write_table
 from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.common.errors import Error
@@ -19,9 +19,6 @@ from colibri.flights.plan import FlightPlan
 
 DEFAULT_PROFILES = ("thesis", "thesis-euler", "thesis:global-lpv-mpc", "se3")
 COLUMNS = ("controller", "track", "RMS (m)", "maximum (m)", "effort (N m)", "QP p50 (µs)", "QP p99 (µs)")
-
-_TABLE_WIDTH = 122
-"""What the table needs; a narrower terminal wraps its lines rather than cut its numbers."""
 
 
 class Job(NamedTuple):
@@ -52,7 +49,8 @@ def compare(args: argparse.Namespace) -> int:
     rows = side_by_side(row_of, jobs, "flights", quiet=args.quiet, worth=lambda _job: 1)
     write_table(args.out / "compare", COLUMNS, rows, names=2)
     if not args.quiet:
-        _print(rows, args.out)
+        title = f"RMS after {SETTLED_AFTER_S:.0f} s; written to {args.out}"
+        print_table(title, COLUMNS, rows, names=2)
     return 0
 
 
@@ -63,7 +61,7 @@ def row_of(job: Job) -> tuple[str, ...]:
     """
     plan = job.plan()
     prepare(plan.out)
-    _, figures = keep_flight(plan, fly_locally(plan, lambda _sim_time_s: None))
+    _, figures = keep_flight(plan, fly_locally(plan))
     return (job.contender, job.track, *_cells(figures))
 
 
@@ -77,17 +75,3 @@ def _cells(figures: dict[str, Any]) -> tuple[str, ...]:
     times = ("-", "-") if figures["solver"] is None else (f"{solve['p50']:.0f}", f"{solve['p99']:.0f}")
     rms, maximum = figures["rmse_after_20s_m"], figures["max_error_m"]
     return (f"{rms:.4g}", f"{maximum:.4g}", f"{figures['effort_n_m']:.4g}", *times)
-
-
-def _print(rows: list[tuple[str, ...]], out: Path) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title=f"RMS after {SETTLED_AFTER_S:.0f} s; written to {out}", title_justify="left")
-    for number, column in enumerate(COLUMNS):
-        table.add_column(column, justify="left" if number < 2 else "right", no_wrap=True)
-    for number, row in enumerate(rows):
-        last = number + 1 == len(rows) or rows[number + 1][0] != row[0]
-        table.add_row(*row, end_section=last)
-    width = Console().width
-    Console(width=max(width, _TABLE_WIDTH)).print(table)

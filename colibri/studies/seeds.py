@@ -8,19 +8,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colibri.analysis.estimation import MEASURED
+from colibri.analysis.estimation import MEASURED, rms
 from colibri.analysis.outcome import keep_flight
 from colibri.analysis.parallel import side_by_side
 from colibri.analysis.report import SETTLED_AFTER_S
-from colibri.analysis.tables import write_table
+from colibri.analysis.tables import print_table, write_table
 from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.common.errors import Error, InFlightError
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.common.types import Array
-from colibri.flights.fly import make_folder
+from colibri.flights.fly import fly_plan, make_folder
 from colibri.flights.plan import FlightPlan
-from colibri.flights.processes import fly_processes
 from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, FlightsLog, Flown, KeptError, kept_flights
 
 DEFAULT_PROFILE = "flight"
@@ -56,7 +55,6 @@ class Job(NamedTuple):
         return FlightPlan.of_options(out, **chosen, **options)
 
 
-_MAX_WIDTH = 400
 _COMMON = ("vehicle", "feedback", "link", "duration")
 _WEATHER = ("wind", "gusts", "turbulence")
 _KEPT_AS = {"gusts": "gust"}
@@ -96,7 +94,8 @@ def compare_seeds(args: argparse.Namespace) -> int:
 
     draw_seeds(flights, args.out)
     if not args.quiet:
-        _print(rows, args.out)
+        over = f"after {SETTLED_AFTER_S:.0f} s, root mean squares over all flights (largest of one)"
+        print_table(f"{over}; written to {args.out}", HEADINGS, rows, names=2)
     return EXIT_FAILED if any(flown.lost for flown in flights) else 0
 
 
@@ -105,7 +104,7 @@ def fly_once(job: Job) -> Flown:
     with TemporaryDirectory() as folder:
         plan = job.plan(Path(folder))
         try:
-            _, figures = keep_flight(plan, _fly(plan))
+            _, figures = keep_flight(plan, fly_plan(plan))
         except InFlightError as error:
             return Flown(
                 job.contender, job.track, job.seed, str(error), (np.nan,) * len(QUANTITIES), _NO_INNOVATIONS, ""
@@ -115,14 +114,6 @@ def fly_once(job: Job) -> Flown:
     nis = figures["nis_mean"]
     innovations = _NO_INNOVATIONS if nis is None else _of_each(nis, "innovations", 0)
     return Flown(job.contender, job.track, job.seed, lost, values, innovations, sha256)
-
-
-def _fly(plan: FlightPlan) -> Any:
-    if plan.link == "udp":
-        return fly_processes(plan, lambda _sim_time_s: None, lambda _text: None)
-    from colibri.flights.in_process import fly_locally
-
-    return fly_locally(plan, lambda _sim_time_s: None)
 
 
 def _values(figures: dict[str, Any]) -> tuple[float, ...]:
@@ -144,7 +135,7 @@ def _row(flights: Sequence[Flown]) -> tuple[str, ...]:
     values = np.array([flown.values for flown in flights if not flown.lost]).reshape(-1, len(QUANTITIES))
     lost = sum(bool(flown.lost) for flown in flights)
     *errors, nees = values.T[: -len(INNOVATIONS)]
-    cells = [*(_cell(column, _rms) for column in errors), _cell(nees, np.mean)]
+    cells = [*(_cell(column, rms) for column in errors), _cell(nees, np.mean)]
     return (flights[0].contender, flights[0].track, str(len(flights)), str(lost), *cells)
 
 
@@ -154,24 +145,6 @@ def _cell(column: Array, middle: Callable[[Array], Any]) -> str:
     return f"{middle(column):.3g} ({column.max():.3g})"
 
 
-def _rms(column: Array) -> Any:
-    return np.sqrt(np.mean(column**2))
-
-
 def _settings(args: argparse.Namespace) -> str:
     """Return what every flight of a comparison has in common."""
     return " ".join(f"{_KEPT_AS.get(name, name)}={getattr(args, name)}" for name in (*_COMMON, *_WEATHER))
-
-
-def _print(rows: Sequence[tuple[str, ...]], out: Path) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    title = f"after {SETTLED_AFTER_S:.0f} s, root mean squares over all flights (largest of one); written to {out}"
-    table = Table(title=title, title_justify="left")
-    for number, column in enumerate(HEADINGS):
-        table.add_column(column, justify="left" if number < 2 else "right", no_wrap=True)
-    for row in rows:
-        table.add_row(*row)
-    needed = Console(width=_MAX_WIDTH).measure(table).maximum
-    Console(width=max(Console().width, needed)).print(table)

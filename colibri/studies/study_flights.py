@@ -197,7 +197,7 @@ def fly(flight: Flight) -> Flown:
         plan = flight.plan(Path(folder))
         failure = None
         try:
-            fly_locally(plan, lambda _sim_time_s: None)
+            fly_locally(plan)
         except InFlightError as error:
             failure = str(error)
         recording = read_recording(plan)

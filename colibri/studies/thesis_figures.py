@@ -105,7 +105,7 @@ def draw(job: Job) -> list[Path]:
     folder = job.out / "flights" / job.flight.name
     prepare(folder)
     plan = FlightPlan.of_track(job.flight.track, folder, profile="thesis", controller=job.flight.controller)
-    recording, _ = keep_flight(plan, fly_locally(plan, lambda _sim_time_s: None))
+    recording, _ = keep_flight(plan, fly_locally(plan))
     series = flight_series(recording, plan)
     paths = []
     for figure in job.figures:

@@ -56,11 +56,11 @@ class Case(NamedTuple):
             _write(out / _WAYPOINTS_FILE, self.waypoints)
         plan = self.plan(out, **more, link=link)
         if link == "udp":
-            summary = fly_processes(plan, lambda _sim_time_s: None)
+            summary = fly_processes(plan)
         else:
             from colibri.flights.in_process import fly_locally
 
-            summary = fly_locally(plan, lambda _sim_time_s: None)
+            summary = fly_locally(plan)
         _, figures = keep_flight(plan, summary)
         sha256: str = figures["trajectory_sha256"]
         return sha256

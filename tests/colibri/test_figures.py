@@ -58,7 +58,7 @@ def fly(out: Path, duration_s: float) -> Flight:
     world: dict[str, Any] = {"wind": NO_WIND, "gusts": (), "turbulence": None, "without": (), "start": {}}
     ground: dict[str, Any] = {"gcs": (), "signing_key": None, "insecure": False}
     plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files, **world, **ground))
-    fly_locally(plan, lambda _sim_time_s: None)
+    fly_locally(plan)
     recording = read_recording(plan)
     series = flight_series(recording, plan)
     drawn = {figure.name: draw_times(series, figure, figure.subject) for figure in flight_figures(series, plan)}

@@ -79,7 +79,7 @@ def test_a_limit_is_both_sides(tmp_path: Path) -> None:
 
 def test_a_flight_is_that_of_the_command_line(short: Flown, tmp_path: Path) -> None:
     plan = short.flight.plan(tmp_path)
-    fly_locally(plan, lambda _sim_time_s: None)
+    fly_locally(plan)
     assert read_recording(plan).trajectory_sha256 == short.recording.trajectory_sha256
 
 

@@ -113,7 +113,7 @@ def fly(case: Case, round_trip_ms: float) -> Merit | None:
             duration=case.duration_s,
         )
         try:
-            fly_locally(plan, lambda _sim_time_s: None)
+            fly_locally(plan)
             return merit(read_recording(plan), case)
         except InFlightError:
             return None

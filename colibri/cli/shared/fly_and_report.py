@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from colibri.common.errors import Error, InFlightError
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
 from colibri.flights.fly import fly_plan, prepare
-from colibri.flights.plan import FlightPlan, Summary
+from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.flights.processes import FlightError
 
 _UPDATES = 500
@@ -67,7 +67,7 @@ def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -
 def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
     """Show on standard error a bar with simulated time and speed, and above it what there is to say."""
     if quiet:
-        yield lambda _sim_time_s: None, lambda _text: None
+        yield unseen, unseen
         return
     from rich.console import Console
     from rich.markup import escape
