@@ -1,6 +1,6 @@
 """Calibrations, gone through as ground stations expect them; with a simulated vehicle there is nothing to find out.
 
-MAV_CMD_PREFLIGHT_CALIBRATION, and the lines "[cal] ..." by which PX4 tells how far one is: ground stations read them.
+MAV_CMD_PREFLIGHT_CALIBRATION, and the lines "[cal] ..." by which PX4 reports progress: ground stations read them.
 """
 
 from colibri.mavlink.services.command import DENIED, TEMPORARILY_REJECTED, UNSUPPORTED, Command, Outcome

@@ -1,7 +1,7 @@
-"""Injected faults, MAV_CMD_INJECT_FAILURE: obeyed only where parameter SYS_FAILURE_EN says so; done by the plant.
+"""Injected faults, MAV_CMD_INJECT_FAILURE: accepted only where parameter SYS_FAILURE_EN is 1; done by the plant.
 
-A fault travels with the answer to the next frame, and the frame after that tells what became of it. Only then is told
-whoever asked: what is accepted has happened.
+A fault travels with the answer to the next frame, and the frame after that has its result. Only then is the command
+acknowledged: what is accepted has happened.
 """
 
 from colibri.mavlink.hil.faults import Fault, Part, fault_from, judged
@@ -23,7 +23,7 @@ class Failures:
         self._relays = relays
         self._parts = [part for part in Part if part is not Part.SENSORS or feedback is Feedback.SENSORS]
         self._to_send: list[Fault] = []
-        self._asked: tuple[Fault, Command] | None = None
+        self._pending: tuple[Fault, Command] | None = None
 
     def inject(self, command: Command, *, enabled: bool) -> Outcome:
         """Obey a command, or say why not; what became of it comes by `poll`."""
@@ -38,7 +38,7 @@ class Failures:
         if isinstance(judgement, Refusal):
             return Outcome(judgement.result, f"failure refused: {judgement.reason}")
         self._to_send.append(judgement)
-        self._asked = (judgement, command)
+        self._pending = (judgement, command)
         return Outcome(LATER)
 
     def take(self) -> tuple[Fault, ...]:
@@ -49,16 +49,16 @@ class Failures:
         return faults
 
     def poll(self, results: tuple[FaultResult, ...], now_us: int) -> tuple[Command, Outcome] | None:
-        """Take in what the plant says of faults; return the command that has come to its end, and how."""
-        if self._asked is None:
+        """Take in the plant's results of faults; return the command that has come to its end, and how."""
+        if self._pending is None:
             return None
-        fault, command = self._asked
-        for told in results:
-            if (told.unit, told.kind) == (fault.unit, fault.kind):
-                self._asked = None
-                return command, _outcome(told.result)
+        fault, command = self._pending
+        for reported in results:
+            if (reported.unit, reported.kind) == (fault.unit, fault.kind):
+                self._pending = None
+                return command, _outcome(reported.result)
         if not 0 <= now_us - command.now_us < ANSWERED_WITHIN_US:
-            self._asked = None
+            self._pending = None
             return command, Outcome(FAILED, "failure refused: the plant does not answer")
         return None
 

@@ -82,7 +82,7 @@ class SnapshotBuilder:
             duration_s: How long it took.
             controls: Rotor commands, parts of the largest speed.
             battery: Its battery; None without one.
-            stations: What ground stations say.
+            stations: The ground stations' side, for the fence.
             state_source: How the state is known.
         """
         sticks = pilot.context().steered.sticks

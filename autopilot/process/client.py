@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from colibri.autopilot.process.ground import Ground
 
 
-_SILENCE_SAID_AFTER_S = 2.0
+_SILENCE_REPORTED_AFTER_S = 2.0
 _MAX_WAIT_S = 0.1
-_UNKNOWN_SAID_AFTER_US = 3_000_000
+_UNKNOWN_REPORTED_AFTER_US = 3_000_000
 """Of simulated time: who rests is known after a second."""
 _UNKNOWN = "no estimate yet: the vehicle must rest for a second, with a GPS fix; until then the rotors stand"
 
@@ -51,12 +51,12 @@ class Client:
         self._stop = stop
         self._log = log
         self._ground = ground
-        self._frame_came = self._heard = False
-        self._refusal_said = self._unknown_said = False
+        self._frame_came = self._flying = False
+        self._refusal_reported = self._unknown_reported = False
         self._unknown_since_us: int | None = None
 
     def fly(self, autopilot: "Autopilot | Copter") -> None:
-        """Answer every frame until told to stop."""
+        """Answer every frame until it is stopped."""
         self._status.say("calling", "waiting for the plant at " + self._link.url.partition(":")[2])
         due_s = 0.0
         while not self._stop:
@@ -71,35 +71,35 @@ class Client:
                 autopilot = self._ground.serve(perf_counter())
                 if self._ground.shut_down:
                     break
-            self._say_what_changed()
+            self._report_changes()
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
     def _answer(self, autopilot: "Autopilot | Copter", datagram: bytes) -> Step | None:
         step = answer(self._end, autopilot, datagram, perf_counter())
         if step is not None:
             self._frame_came = True
-            self._say_if_unknown(step)
+            self._report_if_unknown(step)
         return step
 
-    def _say_if_unknown(self, step: Step) -> None:
-        """Say, once, why a vehicle lies there disarmed, or falls."""
+    def _report_if_unknown(self, step: Step) -> None:
+        """Report, once, why a vehicle without an estimate stays disarmed, or falls."""
         now_us = step.command.time_us
         if step.known:
             self._unknown_since_us = None
         elif self._unknown_since_us is None or now_us < self._unknown_since_us:
-            self._unknown_since_us, self._unknown_said = now_us, False
-        elif now_us - self._unknown_since_us >= _UNKNOWN_SAID_AFTER_US and not self._unknown_said:
-            self._unknown_said = True
+            self._unknown_since_us, self._unknown_reported = now_us, False
+        elif now_us - self._unknown_since_us >= _UNKNOWN_REPORTED_AFTER_US and not self._unknown_reported:
+            self._unknown_reported = True
             self._status.say("unknown", _UNKNOWN)
 
-    def _say_what_changed(self) -> None:
-        silent = self._end.silence_s(perf_counter()) > _SILENCE_SAID_AFTER_S
-        if not self._heard and self._frame_came and not silent:
-            self._heard = True
+    def _report_changes(self) -> None:
+        silent = self._end.silence_s(perf_counter()) > _SILENCE_REPORTED_AFTER_S
+        if not self._flying and self._frame_came and not silent:
+            self._flying = True
             self._status.say("flying", "the plant sends frames")
-        elif self._heard and silent:
-            self._frame_came = self._heard = False
-            self._status.say("silence", f"no frame for {_SILENCE_SAID_AFTER_S:.0f} s, waiting for a plant")
-        if self._end.refused is not None and not self._refusal_said:
-            self._refusal_said = True
+        elif self._flying and silent:
+            self._frame_came = self._flying = False
+            self._status.say("silence", f"no frame for {_SILENCE_REPORTED_AFTER_S:.0f} s, waiting for a plant")
+        if self._end.refused is not None and not self._refusal_reported:
+            self._refusal_reported = True
             self._status.say("refused", _refusal(self._end.refused))

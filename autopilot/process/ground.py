@@ -1,4 +1,4 @@
-"""Ground stations as the process sees them: links, key, parameter file, logs, and what the terminal is told."""
+"""Ground stations as the process sees them: links, key, parameter file, logs, and what is reported on the terminal."""
 
 import argparse
 from collections.abc import Iterable
@@ -16,7 +16,7 @@ from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.autopilot.parameters.definitions import ImpossibleError
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
 from colibri.autopilot.process.state_folder import GroundError, StateFolder
-from colibri.autopilot.process.stepped_links import ConductedLinks, Conductor
+from colibri.autopilot.process.stepped_links import Conductor, SteppedLinks
 from colibri.common.process.status import Status
 from colibri.common.serialization import to_bytes
 from colibri.mavlink.links.link import LinkError
@@ -26,7 +26,7 @@ from colibri.plant.vehicle.description import Vehicle
 if TYPE_CHECKING:
     from colibri.autopilot.process.logs import AutopilotLog
 
-_TELL_EVERY_S = 0.5
+_REPORT_EVERY_S = 0.5
 _SAVE_EVERY_S = 10.0
 _STANDING_SAMPLES = 50
 """A vehicle that is not armed loses nothing in that many control samples."""
@@ -39,7 +39,7 @@ class Ground:
 
     Attributes:
         copter: The vehicle; another one after a restart.
-        shut_down: Whether a ground station has asked for the end.
+        shut_down: Whether a ground station has requested the end.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Ground:
         status: Status,
         conductor: Conductor | None = None,
     ) -> None:
-        """Open links and files as the command line says; a `conductor` speaks for all ground stations.
+        """Open links and files as the command line says; a `conductor` stands for all ground stations.
 
         Raises:
             GroundError: Something of it cannot be used.
@@ -69,49 +69,49 @@ class Ground:
         )
         self._first = track(args.track) if args.track else None
         self._log: AutopilotLog | None = None
-        self.copter = self._vehicle_anew(self._state.history())
+        self.copter = self._new_copter(self._state.history())
         self._kept_samples = self._kept_plans = 0
         self._kept_armed = False
         try:
             links = open_links(args.gcs, signed=self._state.signing.active, insecure=args.insecure)
         except LinkError as error:
             raise GroundError(str(error)) from error
-        self._links: GroundLinks | ConductedLinks = GroundLinks(links, perf_counter, thread_time)
+        self._links: GroundLinks | SteppedLinks = GroundLinks(links, perf_counter, thread_time)
         if conductor is not None:
-            self._links = ConductedLinks(conductor, lambda: self.copter.pilot.state)
-        self.shut_down = self._said_too_much = self._resumed_said = False
+            self._links = SteppedLinks(conductor, lambda: self.copter.pilot.state)
+        self.shut_down = self._full_reported = self._resumed_reported = False
         self._revision = self.copter.parameters.revision
-        self._told_s = self._saved_s = perf_counter()
-        self._told_us = 0
-        self._heard: set[str] = set()
+        self._reported_s = self._saved_s = perf_counter()
+        self._reported_us = 0
+        self._sources: set[str] = set()
         self._mode: tuple[str, bool] | None = None
         for link in links:
             self._status.say("ground", _invitation(link.url), url=link.url)
 
     def record(self, log: "AutopilotLog") -> None:
-        """Note in `log` with what the vehicle begins, and what it hears."""
+        """Record in `log` what the vehicle begins with, and what it receives."""
         self._log = log
         log.begin_again(self._values, self._past_bytes)
 
     def serve(self, now_s: float) -> Copter:
-        """Hear and answer ground stations; return the vehicle that flies on.
+        """Receive from ground stations and answer them; return the vehicle that flies on.
 
-        They are answered last: what an answer says is kept by then, whenever this process is killed.
+        They are answered last: what an answer acknowledges is on disk by then, whenever this process is killed.
         """
         stations = self.copter.stations
         received: Iterable[Received] = self._links.receive(stations)
         if self._log:
-            received = self._log.hear(received)
+            received = self._log.recorded(received)
         outbox = self.copter.serve(received)
         if stations.system.restart:
             self._restart(stations.system.restart)
-        if now_s >= self._told_s + _TELL_EVERY_S and self.copter.pilot.sensed.vehicle is not None:
-            self._tell(now_s)
+        if now_s >= self._reported_s + _REPORT_EVERY_S and self.copter.pilot.sensed.vehicle is not None:
+            self._report(now_s)
         if self.copter.parameters.revision != self._revision:
             self._revision = self.copter.parameters.revision
             self._state.save_parameters(self.copter.parameters)
-        if self.copter.resumed and not self._resumed_said:
-            self._resumed_said = True
+        if self.copter.resumed and not self._resumed_reported:
+            self._resumed_reported = True
             self._status.say("said", self.copter.resumed)
         if self._state.keeps_flights:
             self._keep()
@@ -119,7 +119,7 @@ class Ground:
         return self.copter
 
     def _keep(self) -> None:
-        """Keep what the flight needs to go on, should this process be killed."""
+        """Save what the flight needs to go on, should this process be killed."""
         copter = self.copter
         changes, armed = copter.stations.missions.changes, copter.pilot.state.armed
         changed = armed is not self._kept_armed or changes != self._kept_plans
@@ -129,8 +129,8 @@ class Ground:
             plans = copter.stations.plans.plans
             self._state.save_plans({plan_type: plan.items for plan_type, plan in plans.items()})
         record = copter.record()
-        if record is not None and not self._state.keep(record) and not self._said_too_much:
-            self._said_too_much = True
+        if record is not None and not self._state.keep(record) and not self._full_reported:
+            self._full_reported = True
             self._status.say("said", "the flight is too much to keep: after a restart it would begin in hold")
         self._kept_samples, self._kept_plans, self._kept_armed = copter.samples, changes, armed
 
@@ -147,7 +147,7 @@ class Ground:
             self._status.say("said", "shut down by a ground station")
         elif kind == REBOOT:
             self.copter.stations.log.close()
-            self.copter = self._vehicle_anew(None)
+            self.copter = self._new_copter(None)
             self._kept_samples = self._kept_plans = 0
             self._links.introduce(self.copter.stations)
             if self._log:
@@ -155,7 +155,7 @@ class Ground:
             self._revision = self.copter.parameters.revision
             self._status.say("said", "restarted by a ground station")
 
-    def _vehicle_anew(self, history: History | None) -> Copter:
+    def _new_copter(self, history: History | None) -> Copter:
         args = self._args
         self._values = self._state.parameters()
         self._past_bytes = b"" if history is None else to_bytes(history)
@@ -184,16 +184,16 @@ class Ground:
             raise GroundError(f"{self._state.parameter_path()}: {error}") from error
         return copter
 
-    def _tell(self, now_s: float) -> None:
+    def _report(self, now_s: float) -> None:
         pilot = self.copter.pilot
-        facts = self._links.facts(self.copter.stations, now_s - self._told_s)
+        facts = self._links.facts(self.copter.stations, now_s - self._reported_s)
         if self._status.as_json:
             self._status.say("status", "", **self._facts(now_s), links=facts)
-        self._told_s, self._told_us = now_s, pilot.context().now_us
+        self._reported_s, self._reported_us = now_s, pilot.context().now_us
         for link in facts:
             for who in link["heard"]:
-                if f"{link['url']} {who}" not in self._heard:
-                    self._heard.add(f"{link['url']} {who}")
+                if f"{link['url']} {who}" not in self._sources:
+                    self._sources.add(f"{link['url']} {who}")
                     self._status.say("heard", f"system {who} is heard on {link['url']}")
         if self._state.signing.key_changed or now_s >= self._saved_s + _SAVE_EVERY_S:
             self._saved_s = now_s
@@ -208,24 +208,9 @@ class Ground:
             "position_enu_m": state.position_enu_m,
             "speed_m_s": hypot(*state.velocity_enu_m_s),
             "sim_time_s": now_us * 1e-6,
-            "times_real_time": (now_us - self._told_us) * 1e-6 / (now_s - self._told_s),
+            "times_real_time": (now_us - self._reported_us) * 1e-6 / (now_s - self._reported_s),
             "solve_time_us": self.copter.parts.actuation.solve_time_s * 1e6,
         }
-
-
-def open_ground(
-    args: argparse.Namespace,
-    profile: Profile,
-    vehicle: Vehicle,
-    status: Status,
-    conductor: Conductor | None = None,
-) -> Ground:
-    """Return what serves ground stations as the command line says; a `conductor` speaks for all of them.
-
-    Raises:
-        GroundError: Something of it cannot be used.
-    """
-    return Ground(args, profile, vehicle, status, conductor)
 
 
 def _invitation(url: str) -> str:

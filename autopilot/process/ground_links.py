@@ -17,7 +17,7 @@ from colibri.mavlink.streaming.rates import GCS, SDK
 SDK_PORTS = range(14540, 14550)
 """Where SDKs wait for a PX4, and so for us: they ask for nothing, and expect everything."""
 SHARE = 0.25
-"""Part of all time that hearing others may take: at real time a frame leaves more than half of its time to that."""
+"""Part of all time that receiving may take: at real time a frame leaves more than half of its time to that."""
 MAX_SAVED_S = 0.005
 
 
@@ -42,7 +42,7 @@ def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[Gro
 class Allowance:
     """How much time is left for what others send: a share of all time that passes, whatever they do.
 
-    Who takes more than that is heard less often, and the control law not a moment later. What other processes take of
+    Who takes more than that is read less often, and the control law not a moment later. What other processes take of
     a busy computer meanwhile is no sender's doing: only the processor's time is counted.
     """
 
@@ -74,13 +74,7 @@ class GroundLinks:
     """Carries datagrams between links and a vehicle's hub."""
 
     def __init__(self, links: Sequence[GroundLink], clock: Clock, processor_clock: Clock) -> None:
-        """Serve `links`; those with a target are called, whether anybody hears it or not.
-
-        Args:
-            links: All there are.
-            clock: Runs always, s.
-            processor_clock: Runs while this process does, s.
-        """
+        """Serve `links`; those with a target are called, whether anybody listens or not. Clocks as for `Allowance`."""
         self._links = tuple(links)
         self._waiting: list[deque[tuple[bytes, Address]]] = [deque() for _ in links]
         self._allowance = Allowance(clock, processor_clock)
@@ -142,7 +136,7 @@ class GroundLinks:
         self._allowance.end()
 
     def facts(self, stations: Stations, interval_s: float) -> list[dict[str, Any]]:
-        """Return, for each link, who is heard and how many messages a second come and go."""
+        """Return, for each link, who sends on it and how many messages a second come and go."""
         facts = []
         for number, link in enumerate(self._links):
             channels = [channel for channel in stations.hub.channels if channel.link == number]

@@ -44,12 +44,12 @@ def check_columns(kinds: Sequence[str]) -> tuple[str, ...]:
 
 
 class AutopilotLog:
-    """What the autopilot writes: what it began with and heard, one row a control sample, and what it estimates then."""
+    """What the autopilot writes: its start, what it received, one row a control sample, and what it estimates then."""
 
     def __init__(self, folder: Path, setup: Setup) -> None:
         """Create `autopilot.csv` and `inputs.jsonl` in `folder`; on sensors also `estimate.csv` and `filter.csv`.
 
-        What was heard goes to the end of what the process before heard: it may have died in mid-flight.
+        What is received is appended to what the process before received: it may have died in mid-flight.
         """
         self._setup = setup
         self._begins = True
@@ -62,7 +62,7 @@ class AutopilotLog:
             self._checks = CsvLog(folder / "filter.csv", check_columns(_kinds_of(setup.vehicle)))
 
     def write(self, step: Step) -> None:
-        """Append a control sample; a frame between two of them has nothing to tell but how the filter stands."""
+        """Append a control sample; of a frame between two of them, only the check of the filter."""
         self._time_us = step.command.time_us
         if self._begins:
             self._begins = False
@@ -83,18 +83,18 @@ class AutopilotLog:
         )
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
-        """Note that the next frame is answered by a vehicle that begins with these parameters, and with this past."""
+        """Record that the next frame is answered by a vehicle that begins with these parameters and this history."""
         self._setup = msgspec.structs.replace(self._setup, values=dict(values), history=history)
         self._begins = True
 
-    def hear(self, datagrams: Iterable["Received"]) -> Iterator["Received"]:
-        """Pass on what ground stations sent, and note it."""
+    def recorded(self, datagrams: Iterable["Received"]) -> Iterator["Received"]:
+        """Yield what ground stations sent, and record it."""
         for received in datagrams:
             datagram, link, address, loopback = received
-            heard = ReceivedDatagram(
+            entry = ReceivedDatagram(
                 time_us=self._time_us, link=link, address=address, loopback=loopback, datagram=datagram
             )
-            self._inputs.write(line(heard))
+            self._inputs.write(line(entry))
             yield received
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
-"""What an autopilot was started with and heard, beside the plant's frames: enough to fly a recorded flight again.
+"""What an autopilot was started with and received, beside the plant's frames: enough to fly a recorded flight again.
 
 A log of lines of JSON: how it began, then each datagram of a ground station with the frame after which it was served.
-One that was restarted in mid-flight begins anew in it.
+One that was restarted in mid-flight has another beginning in it.
 """
 
 from collections.abc import Iterable
@@ -16,7 +16,7 @@ from colibri.mavlink.parameters.store import Value
 
 
 class InputsError(AutopilotError):
-    """What is no such log; the message says where."""
+    """A file is no such log; the message names the line."""
 
 
 class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="began", tag_field="what"):
@@ -25,9 +25,9 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     Attributes:
         profile: Name or file.
         controller: Of the profile's control laws.
-        solver: QP solver asked for; None for the profile's.
+        solver: QP solver chosen; None for the profile's.
         vehicle: That it controls, name or file.
-        feedback: What frames told it.
+        feedback: Kind of the frames, states or sensors.
         track: What it flew from the start; None where ground stations say what to fly.
         origin: Of the ENU frame.
         system_id: MAVLink system.

@@ -119,7 +119,7 @@ def _ground(
     stop: Stop,
 ) -> "Ground":
     """Load what serves ground stations only where there are any: it is as much as all the rest."""
-    from colibri.autopilot.process.ground import open_ground
+    from colibri.autopilot.process.ground import Ground
     from colibri.autopilot.process.stepped_links import UdpConductor
 
     conductor = None
@@ -127,4 +127,4 @@ def _ground(
         link = open_link(args.stepped)
         link.spin_s = 0.0
         conductor = UdpConductor(link, lambda: stop)
-    return open_ground(args, profile, vehicle, status, conductor)
+    return Ground(args, profile, vehicle, status, conductor)

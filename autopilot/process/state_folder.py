@@ -27,7 +27,7 @@ LOG_QUOTA = Quota(512 << 20, 200)
 
 
 class GroundError(AutopilotError):
-    """Ground stations cannot be served as asked; the message is the one line that a user needs."""
+    """Ground stations cannot be served as the command line has it; the message is the one line that a user needs."""
 
 
 class StateFolder:
@@ -88,7 +88,7 @@ class StateFolder:
 
     def parameter_path(self) -> Path:
         """Return the file of parameters: each control law and vehicle has its own."""
-        assert self._path is not None, "asked for only where something is kept"
+        assert self._path is not None, "called only where something is kept"
         return self._path / f"{self._profile.controller}-{self._vehicle.name.lower().replace(' ', '-')}.params"
 
     def parameters(self) -> dict[str, Value]:
@@ -137,7 +137,7 @@ class StateFolder:
                 kept.close()
 
     def _read_plans(self) -> dict[int, list[MissionItem]]:
-        assert self._path is not None, "asked for only where something is kept"
+        assert self._path is not None, "called only where something is kept"
         try:
             content = (self._path / PLANS).read_bytes()
         except OSError:

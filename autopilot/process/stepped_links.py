@@ -1,4 +1,4 @@
-"""Ground stations that a conductor stands for: it holds simulated time still, so no clock decides what comes when."""
+"""Ground stations behind a conductor, which holds simulated time still: no clock decides what is received when."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -17,19 +17,16 @@ _MAX_WAIT_S = 0.1
 
 
 class Conductor(Protocol):
-    """Whoever speaks for the ground stations."""
+    """Stands for all ground stations, in lockstep with the vehicle."""
 
     def receive(self) -> StepMessage | None:
         """Return what they send at this instant; None where there will be nothing more."""
-        ...
 
     def send(self, step_message: StepMessage) -> None:
         """Send them what the vehicle sends."""
-        ...
 
     def close(self) -> None:
         """Let go."""
-        ...
 
 
 class UdpConductor:
@@ -61,7 +58,7 @@ class UdpConductor:
         self._link.close()
 
 
-class ConductedLinks:
+class SteppedLinks:
     """Carries datagrams between a conductor and a vehicle's hub."""
 
     def __init__(self, conductor: Conductor, state: Callable[[], State]) -> None:

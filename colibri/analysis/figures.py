@@ -23,6 +23,7 @@ VELOCITY = ("vx", "vy", "vz")
 ATTITUDE = ("phi", "theta", "psi")
 START_S = 10.0
 
+GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
 _WIDTH_IN, _DPI = 8.6, 150
 TOP_IN = 0.8
 """Room above the axes for a title and one row of a legend."""
@@ -126,12 +127,10 @@ def flight_figures(series: Series, plan: FlightPlan) -> tuple[TimeFigure, ...]:
     start = (0.0, START_S) if end_s >= 2.0 * START_S else None
     settled = (SETTLED_AFTER_S, end_s) if end_s > SETTLED_AFTER_S else None
     position = tuple((followed(axis, f"{axis} (m)"), followed(f"v{axis}", f"v{axis} (m/s)")) for axis in POSITION)
-    angles = [followed(name, f"{sign} (°)", held_reference=True) for name, sign in zip(ATTITUDE, "φθψ", strict=True)]
-    inputs = [Panel(f"{name} ({'N' if name == 'U1' else 'N m'})", (Curve(name, "", held=True),)) for name in INPUT]
     return (
         TimeFigure("position", "position and velocity", position),
-        TimeFigure("attitude", "attitude", beside(angles, start)),
-        TimeFigure("inputs", "thrust and moments", beside(inputs, start)),
+        TimeFigure("attitude", "attitude", beside(ANGLES, start)),
+        TimeFigure("inputs", "thrust and moments", beside(INPUTS, start)),
         TimeFigure("rotors", "rotor speeds", beside(_rotor_panels(plan), start)),
         TimeFigure("error", "position error", beside(_error_panels(series), settled)),
     )
@@ -140,6 +139,11 @@ def flight_figures(series: Series, plan: FlightPlan) -> tuple[TimeFigure, ...]:
 def followed(name: str, quantity: str, *, held_reference: bool = False) -> Panel:
     """Return the panel of a series with its reference, named `<name>_ref`, underneath."""
     return Panel(quantity, (Curve(f"{name}_ref", "reference", REFERENCE, held_reference), Curve(name, "flown")))
+
+
+ANGLES = [followed(name, f"{sign} (°)", held_reference=True) for name, sign in zip(ATTITUDE, "φθψ", strict=True)]
+INPUTS = [Panel(f"{name} ({'N' if name == 'U1' else 'N m'})", (Curve(name, "", held=True),)) for name in INPUT]
+"""Panels of every flight: its attitude with its reference, and thrust and moments."""
 
 
 def beside(panels: Iterable[Panel], span_s: tuple[float, float] | None) -> tuple[tuple[Panel, ...], ...]:
@@ -243,7 +247,7 @@ def _draw_panel(axes: Axes, series: Series, panel: Panel) -> None:
     axes.set_xlim(begin_s - margin_s, end_s + margin_s)
     axes.set_ylabel(panel.quantity)
     axes.yaxis.set_label_coords(-_LABEL_IN / _width_in(axes), 0.5)
-    axes.grid(color="#DDDDDD", linewidth=0.6)
+    axes.grid(**GRID)
     axes.yaxis.set_major_locator(round_ticks(6))
     if np.ptp(axes.dataLim.intervaly) < _NOTHING:
         axes.set_ylim(-1.0, 1.0)  # otherwise rounding errors fill the panel

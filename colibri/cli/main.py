@@ -31,11 +31,9 @@ class Subcommand(Protocol):
 
     def add_options(self, parser: ArgumentParser) -> None:
         """Add its options."""
-        ...
 
     def run(self, args: Namespace) -> int:
         """Do it; return the exit code."""
-        ...
 
 
 def main(argv: list[str] | None = None) -> int:

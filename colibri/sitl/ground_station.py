@@ -40,14 +40,14 @@ class SteppedVehicle(Stepped, Protocol):
     @property
     def system(self) -> int:
         """The vehicle's system id."""
-        ...
 
 
 class Station(Inbox):
     """A component on a link of its own; what it has received is in `Inbox`.
 
     What it sends goes out with the next frame; what waits for an answer lets simulated time go on, and repeats the
-    request every half second until the answer comes. Its methods are the vocabulary of tests.
+    request every half second until the answer comes; a `RefusedError` is raised where the vehicle refuses, a
+    `NotInTimeError` where it does not answer within `ANSWER_WITHIN_S`. Its methods are the vocabulary of tests.
 
     Attributes:
         system, component: Its ids.
@@ -151,30 +151,18 @@ class Station(Inbox):
         return self._acknowledged(number, lambda _: self.send("COMMAND_INT", *head, *values, x, y, z))
 
     def command(self, number: int, *params: float, what: str = "") -> None:
-        """Send a COMMAND_LONG.
-
-        Raises:
-            RefusedError: The vehicle does not accept it.
-        """
+        """Send a COMMAND_LONG."""
         said = len(self.texts)
         result = self.order(number, *params)
         self.check(result, said, what or f"command {number}")
 
     def check(self, result: int, said: int, what: str) -> None:
-        """See that a result is ACCEPTED; `said` is how many texts had been received before.
-
-        Raises:
-            RefusedError: It is not.
-        """
+        """See that a result is ACCEPTED; `said` is how many texts had been received before."""
         if result != mav.MAV_RESULT_ACCEPTED:
             raise RefusedError(what, result, "; ".join(self.texts[said:]))
 
     def request(self, send: Callable[[int], None], answered: Callable[[], object], what: str) -> None:
-        """Send a request, and repeat it every half second until it is answered; `send` gets the count of those before.
-
-        Raises:
-            NotInTimeError: It is not answered within `ANSWER_WITHIN_S`.
-        """
+        """Send a request, and repeat it every half second until it is answered; `send` gets how many came before."""
         flight = self._flight
         gives_up_us = flight.time_us + round(ANSWER_WITHIN_S * 1e6)
         tries = 0
@@ -194,21 +182,13 @@ class Station(Inbox):
     # Parameters.
 
     def get_param(self, name: str) -> Value:
-        """Request a parameter.
-
-        Raises:
-            RefusedError: There is no such.
-        """
+        """Request a parameter."""
         self._values.pop(name, None)
         vehicle = (self._flight.system, AUTOPILOT_COMPONENT)
         return self._parameter(name, lambda: self.send("PARAM_REQUEST_READ", *vehicle, name, -1))
 
     def set_param(self, name: str, value: Value) -> Value:
-        """Set a parameter; return the value that it has then.
-
-        Raises:
-            RefusedError: There is no such, or it cannot have that value.
-        """
+        """Set a parameter; return the value that it has then."""
         if name not in self._kinds:
             self.get_param(name)
         kind = self._kinds[name]
@@ -223,11 +203,7 @@ class Station(Inbox):
     # Plans.
 
     def upload(self, items: Sequence[MissionItem], plan: int = MISSION, *, what: str = "mission") -> None:
-        """Upload a mission, fence or rally points.
-
-        Raises:
-            RefusedError: The vehicle does not take it.
-        """
+        """Upload a mission, fence or rally points."""
         said = len(self.texts)
         upload = self.begin_upload(items, plan)
         self._flight.wait_until(lambda: upload.result is not None, within=60.0, what=f"the upload of the {what}")

@@ -22,11 +22,9 @@ class Stepped(Protocol):
     @property
     def time_us(self) -> int:
         """Simulated time, µs."""
-        ...
 
     def step(self) -> None:
         """Fly one frame."""
-        ...
 
     @property
     def time_s(self) -> float:
@@ -78,11 +76,9 @@ class Steered(Protocol):
     @property
     def system(self) -> int:
         """The vehicle's system id."""
-        ...
 
     def send(self, name: str, *fields: Any) -> None:
         """Send a message from the first ground station, with its fields as MAVLink defines them."""
-        ...
 
     def stick(self, pitch: float = 0.0, roll: float = 0.0, thrust: float = 0.5, yaw: float = 0.0) -> None:
         """Send sticks once: forward, right, up (0..1, the middle is 0.5), clockwise, each -1..1."""

@@ -48,7 +48,8 @@ class Sitl(View, Stepped, Steered):
     """A vehicle, its plant, its ground stations, and the links between them.
 
     What can be read of it is in `View`, waiting in `Stepped`, sticks and setpoints in `Steered`. Its methods are the
-    vocabulary of tests: that is why they are many.
+    vocabulary of tests: that is why they are many. Each command, upload or parameter that the vehicle refuses raises a
+    `RefusedError`.
 
     Attributes:
         items: Items of missions and fences, `items.waypoint(3.0, 0.0, 5.0)` say.
@@ -111,26 +112,17 @@ class Sitl(View, Stepped, Steered):
     # Commands.
 
     def arm(self, *, force: bool = False) -> None:
-        """Let the rotors turn.
-
-        Raises:
-            RefusedError: The vehicle refuses.
-        """
+        """Let the rotors turn."""
         self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, FORCE if force else 0.0, what="arming")
 
     def disarm(self, *, force: bool = False) -> None:
-        """Stop the rotors; in the air only by force.
-
-        Raises:
-            RefusedError: The vehicle refuses.
-        """
+        """Stop the rotors; in the air only by force."""
         self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE if force else 0.0, what="disarming")
 
     def takeoff(self, height_m: float = 2.5, *, wait: bool = True, within: float | None = None) -> None:
         """Arm, climb so high above home, and stay.
 
         Raises:
-            RefusedError: The vehicle refuses.
             NotInTimeError: It is not up there `within` s; if None, 5 s and 2 s a metre.
         """
         params = (0.0, 0.0, 0.0, nan, nan, nan, height_m)
@@ -147,7 +139,6 @@ class Sitl(View, Stepped, Steered):
         """Land here, and wait until the rotors have stopped.
 
         Raises:
-            RefusedError: The vehicle refuses.
             NotInTimeError: They do not stop `within` s; if None, 8 s and 2 s a metre.
         """
         max_s = 8.0 + 2.0 * self.position[2] if within is None else within
@@ -178,7 +169,6 @@ class Sitl(View, Stepped, Steered):
             within: Simulated seconds; if None, 10 s and 1 s a metre.
 
         Raises:
-            RefusedError: The vehicle refuses.
             NotInTimeError: It is not there in time.
         """
         there = geodetic_of((east, north, up), self.origin)
@@ -200,22 +190,14 @@ class Sitl(View, Stepped, Steered):
             self.wait_until(lambda: self.is_at(goal), within=max_s, what=f"the way to {goal}")
 
     def fly_track(self, name: str) -> None:
-        """Fly a track of parameter TRACK: arm if need be, and go there first.
-
-        Raises:
-            RefusedError: The vehicle refuses.
-        """
+        """Fly a track of parameter TRACK: arm if need be, and go there first."""
         self.set_param("TRACK", TRACKS.index(name))
         self.select(Mode.TRACK)
         if not self.armed:
             self.arm()
 
     def select(self, mode: Mode | str) -> None:
-        """Choose a mode.
-
-        Raises:
-            RefusedError: The vehicle refuses.
-        """
+        """Choose a mode."""
         number = custom_mode(Mode(mode))
         params = (1.0, number >> 16 & 0xFF, number >> 24 & 0xFF)
         self.gcs.command(mav.MAV_CMD_DO_SET_MODE, *params, what=f"mode {mode}")
@@ -225,53 +207,29 @@ class Sitl(View, Stepped, Steered):
         return self.gcs.order(number, *params)
 
     def start_mission(self) -> None:
-        """Begin the mission, or go on with it; arm if need be.
-
-        Raises:
-            RefusedError: The vehicle refuses.
-        """
+        """Begin the mission, or go on with it; arm if need be."""
         self.select(Mode.MISSION)
         if not self.armed:
             self.arm()
 
     def upload_mission(self, plan: Iterable[Item | MissionItem]) -> None:
-        """Upload a mission.
-
-        Raises:
-            RefusedError: The vehicle does not take it.
-        """
+        """Upload a mission."""
         self.gcs.upload(on_wire(plan, self.origin), MISSION)
 
     def upload_fence(self, plan: Iterable[Item | MissionItem]) -> None:
-        """Upload a geofence, of `items.polygon` and `items.circle`.
-
-        Raises:
-            RefusedError: The vehicle does not take it.
-        """
+        """Upload a geofence, of `items.polygon` and `items.circle`."""
         self.gcs.upload(on_wire(plan, self.origin), FENCE, what="fence")
 
     def upload_rally(self, plan: Iterable[Item | MissionItem]) -> None:
-        """Upload rally points.
-
-        Raises:
-            RefusedError: The vehicle does not take them.
-        """
+        """Upload rally points."""
         self.gcs.upload(on_wire(plan, self.origin), RALLY, what="rally points")
 
     def get_param(self, name: str) -> Value:
-        """Request a parameter.
-
-        Raises:
-            RefusedError: There is no such.
-        """
+        """Request a parameter."""
         return self.gcs.get_param(name)
 
     def set_param(self, name: str, value: Value) -> Value:
-        """Set a parameter; return the value that it has then, which is one of 32 bits.
-
-        Raises:
-            RefusedError: There is no such, or it cannot have that value.
-        """
+        """Set a parameter; return the value that it has then, which is one of 32 bits."""
         return self.gcs.set_param(name, value)
 
     @contextmanager

@@ -10,11 +10,10 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from colibri.analysis.consistency import NAVIGATION, bounds
 from colibri.analysis.estimation import MEASURED
-from colibri.analysis.figures import TOP_IN, axes_grid, put_title, shortened, write_figure
+from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_title, shortened, write_figure
 from colibri.analysis.report import SETTLED_AFTER_S
 from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, Flown
 
-_GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
 _LABEL_IN = 0.8
 _NIS_COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9")
 _PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
@@ -50,7 +49,7 @@ def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
         axes.set_yticks([-place for place in range(len(cases))], names)
         axes.set_ylim(-len(cases) + 0.45, 0.55)
         axes.tick_params(labelbottom=True)
-        axes.grid(axis="x", **_GRID)
+        axes.grid(axis="x", **GRID)
         if axes.get_legend_handles_labels()[1]:
             where: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
             axes.legend(**where, ncols=len(MEASURED), frameon=False)

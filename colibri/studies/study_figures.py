@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from colibri.analysis.figures import LIMIT, TOP_IN, Style, axes_grid, line_style, put_head, round_ticks
+from colibri.analysis.figures import GRID, LIMIT, TOP_IN, Style, axes_grid, line_style, put_head, round_ticks
 from colibri.analysis.recording import ROTORS
 from colibri.analysis.report import SETTLED_AFTER_S
 from colibri.autopilot.control.interface import Active, Fallback
@@ -21,7 +21,6 @@ WINDOW_S = 1.0
 RECOVERY_SHOWN_S = 3.0
 LIMITS_SHOWN_S = 6.0
 
-_GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
 _LEGEND_ROW_IN = 0.24
 _SHADE = "#E8E8E8"
 _CONTENDERS = {"thesis": "#D55E00", "SE(3)": "#0072B2", "LPV-MPC": "#000000"}
@@ -64,7 +63,7 @@ def tracks(results: Sequence[Result]) -> dict[str, Figure]:
     axes.set_xscale("log")
     axes.set_yticks([-place for place in range(len(names))], names)
     axes.set_ylim(-len(names) + 0.5, 0.5)
-    axes.grid(axis="x", **_GRID)
+    axes.grid(axis="x", **GRID)
     axes.set_xlabel(f"position error after {SETTLED_AFTER_S:.0f} s (m)")
     put_head(figure, "Position error, track by track")
     return {"tracks": figure}
@@ -213,7 +212,7 @@ def _limits(result: Result) -> Figure:
         timeline.broken_barh(bars, (-number - 0.35, 0.7), color=color)
     timeline.set_yticks([-number for number in range(len(Active._fields))], Active._fields)
     timeline.set_ylim(-len(Active._fields) + 0.4, 0.6)
-    timeline.grid(axis="x", **_GRID)
+    timeline.grid(axis="x", **GRID)
     error.plot(flown.t[shown], flown.recording.position_error_m[shown], **line_style(Style("#000000", 1.2)))
     if begin_s == 0.0:
         error.set_yscale("log")
@@ -252,7 +251,7 @@ def _dotted(axes: Axes, x: list[float], y: list[float], label: str, color: str, 
 
 def _dress(axes: Axes, quantity: str) -> None:
     axes.set_ylabel(quantity)
-    axes.grid(**_GRID)
+    axes.grid(**GRID)
     if axes.get_yscale() == "linear":
         axes.yaxis.set_major_locator(round_ticks(5))
     else:

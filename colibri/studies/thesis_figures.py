@@ -1,16 +1,16 @@
 """`colibri figures`: fly all that the thesis shows, and draw each of its result figures under its number."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
 from colibri.analysis.figures import (
-    ATTITUDE,
+    ANGLES,
+    INPUTS,
     POSITION,
-    Curve,
     Panel,
     Series,
     TimeFigure,
@@ -22,7 +22,6 @@ from colibri.analysis.figures import (
 )
 from colibri.analysis.outcome import keep_flight
 from colibri.analysis.parallel import side_by_side
-from colibri.analysis.recording import INPUT
 from colibri.common.process.lifecycle import fail
 from colibri.flights.fly import make_folder, prepare
 from colibri.flights.in_process import fly_locally
@@ -122,50 +121,25 @@ class Kind(NamedTuple):
     plot: Callable[[Series, str], Figure]
 
 
-def position(series: Series, title: str) -> Figure:
-    """Draw all three coordinates and their speeds."""
-    rows = tuple((followed(axis, f"{axis} (m)"), followed(f"v{axis}", f"{axis}' (m/s)")) for axis in POSITION)
-    return draw_times(series, TimeFigure("", "", rows), title)
+def over_time(rows: Iterable[tuple[Panel, ...]]) -> Callable[[Series, str], Figure]:
+    """Return the function that draws rows of panels over time."""
+    figure = TimeFigure("", "", tuple(rows))
+    return lambda series, title: draw_times(series, figure, title)
 
 
-def coordinate(axis: str) -> Callable[[Series, str], Figure]:
-    """Return the function that draws one coordinate and its speed."""
-
-    def plot(series: Series, title: str) -> Figure:
-        rows = ((followed(axis, f"{axis} (m)"),), (followed(f"v{axis}", f"{axis}' (m/s)"),))
-        return draw_times(series, TimeFigure("", "", rows), title)
-
-    return plot
-
-
-def angles(span_s: tuple[float, float] | None) -> Callable[[Series, str], Figure]:
-    """Return the function that draws roll, pitch and yaw with their references, in a span of time."""
-
-    def plot(series: Series, title: str) -> Figure:
-        panels = (
-            followed(name, f"{sign} (°)", held_reference=True)._replace(span_s=span_s)
-            for name, sign in zip(ATTITUDE, "φθψ", strict=True)
-        )
-        return draw_times(series, TimeFigure("", "", tuple((panel,) for panel in panels)), title)
-
-    return plot
-
-
-def inputs(series: Series, title: str) -> Figure:
-    """Draw thrust and moments."""
-    panels = (Panel(f"{name} ({'N' if name == 'U1' else 'N m'})", (Curve(name, "", held=True),)) for name in INPUT)
-    return draw_times(series, TimeFigure("", "", tuple((panel,) for panel in panels)), title)
-
-
+_COORDINATES = {axis: (followed(axis, f"{axis} (m)"), followed(f"v{axis}", f"{axis}' (m/s)")) for axis in POSITION}
 KINDS = {
     "trajectory": Kind("trajectory", draw_trajectory),
-    "position": Kind("position and velocity", position),
-    "x": Kind("x and its velocity", coordinate("x")),
-    "y": Kind("y and its velocity", coordinate("y")),
-    "z": Kind("z and its velocity", coordinate("z")),
-    "angles": Kind("angles", angles(None)),
-    "first-seconds": Kind("angles, first seconds", angles(FIRST_SECONDS)),
-    "inputs": Kind("thrust and moments", inputs),
+    "position": Kind("position and velocity", over_time(_COORDINATES.values())),
+    **{
+        axis: Kind(f"{axis} and its velocity", over_time((panel,) for panel in panels))
+        for axis, panels in _COORDINATES.items()
+    },
+    "angles": Kind("angles", over_time((panel,) for panel in ANGLES)),
+    "first-seconds": Kind(
+        "angles, first seconds", over_time((panel._replace(span_s=FIRST_SECONDS),) for panel in ANGLES)
+    ),
+    "inputs": Kind("thrust and moments", over_time((panel,) for panel in INPUTS)),
 }
 
 

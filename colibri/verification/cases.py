@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from colibri.analysis.outcome import keep_flight
 from colibri.common.process.lifecycle import fail
-from colibri.flights.fly import prepare
+from colibri.flights.fly import fly_plan, prepare
 from colibri.flights.plan import FlightPlan
-from colibri.flights.processes import fly_processes
 from colibri.plant.process.options import wind
 from colibri.sitl.backends.setting import setting_of
 
@@ -55,13 +54,7 @@ class Case(NamedTuple):
         if self.waypoints:
             _write(out / _WAYPOINTS_FILE, self.waypoints)
         plan = self.plan(out, **more, link=link)
-        if link == "udp":
-            summary = fly_processes(plan)
-        else:
-            from colibri.flights.in_process import fly_locally
-
-            summary = fly_locally(plan)
-        _, figures = keep_flight(plan, summary)
+        _, figures = keep_flight(plan, fly_plan(plan))
         sha256: str = figures["trajectory_sha256"]
         return sha256
 

@@ -15,7 +15,6 @@ class Talker(Protocol):
 
     def receive(self, datagram: bytes, now_s: float) -> list[bytes]:
         """Take in a datagram of the vehicle; return what to send to it."""
-        ...
 
 
 class OnPort:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.analysis.figures import GRID
 from colibri.analysis.recording import Recording, read_recording
 from colibri.analysis.tables import markdown
 from colibri.common.errors import InFlightError
@@ -178,7 +179,7 @@ def draw(points: Sequence[Point], path: Path) -> None:
     tilts.set_ylabel("largest tilt (°)")
     tilts.set_xlabel("round trip (ms)")
     for axes in (errors, tilts):
-        axes.grid(color="#DDDDDD", linewidth=0.6)
+        axes.grid(**GRID)
         axes.legend(fontsize=8, loc="center right")
     figure.savefig(path, dpi=110)
 

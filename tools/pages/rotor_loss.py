@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from colibri.analysis.figures import put_head, write_figure
+from colibri.analysis.figures import GRID, put_head, write_figure
 from colibri.analysis.tables import markdown
 from colibri.common.types import Array
 from colibri.mavlink.hil.feedback import Feedback
@@ -35,7 +35,6 @@ _MEASURES: tuple[tuple[str, Callable[[Flown], float], str], ...] = (
     ("touch-down (m/s)", lambda flown: flown.touched_m_s, ".2f"),
     ("spin (rad/s)", lambda flown: flown.spin_rad_s, ".1f"),
 )
-_GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
 _MANY, _ONE, _LIMIT = "#9DB8D2", "#0B3C6F", "#D55E00"
 _ROTORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 _FIRST_S, _WHOLE_S = (-0.1, 2.0), (-0.5, 16.0)
@@ -87,7 +86,7 @@ def _draw_rotors(axes: Axes, flown: Flown) -> None:
 def _finish(axes: Axes, name: str, shown: tuple[float, float], *, last: bool = False) -> None:
     axes.set_xlim(*shown)
     axes.set_ylabel(name)
-    axes.grid(**_GRID)
+    axes.grid(**GRID)
     axes.tick_params(labelbottom=last)
     if last:
         axes.set_xlabel("since the loss (s)")

@@ -2,14 +2,13 @@
 
 from math import pi
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.signal import welch
 
-from colibri.analysis.figures import put_head, write_figure
+from colibri.analysis.figures import GRID, put_head, write_figure
 from colibri.common.types import Array
 from colibri.plant.environment.air import CALM, Air
 from colibri.plant.environment.turbulence import scales
@@ -24,7 +23,6 @@ _MEASURED_S = 1000.0
 _RESOLVED_HZ = 0.05
 """Below, windows of 65 s blur what they measure."""
 _COLORS = {"light": "#E69F00", "moderate": "#0072B2", "severe": "#D55E00"}
-_GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
 
 
 def blow(weather: Weather, duration_s: float) -> tuple[Array, Array]:
@@ -54,7 +52,7 @@ def draw() -> Figure:
     for axes, quantity in zip(over_time, ("east (m/s)", "up (m/s)"), strict=True):
         axes.set_ylabel(quantity)
         axes.set_xlim(0.0, _SHOWN_S)
-        axes.grid(**_GRID)
+        axes.grid(**GRID)
     over_time[0].tick_params(labelbottom=False)
     over_time[1].set_xlabel("t (s)")
     for column, (axis, name) in enumerate(((0, "along the wind"), (2, "upwards"))):
@@ -73,7 +71,7 @@ def _spectra(axes: Axes, axis: int, name: str) -> None:
         axes.loglog(hz, _dryden(intensity, axis, hz), "k--", linewidth=1.2, label="MIL-F-8785C")
     axes.set_xlabel("frequency (Hz)")
     axes.set_ylabel(f"{name} (m²/s²/Hz)")
-    axes.grid(**_GRID)
+    axes.grid(**GRID)
 
 
 def _dryden(intensity: Intensity, axis: int, hz: Array) -> Array:

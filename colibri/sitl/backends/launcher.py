@@ -25,11 +25,9 @@ class Running(Protocol):
 
     def code(self) -> int | None:
         """Return its exit code, negative for a signal; None while it runs."""
-        ...
 
     def kill(self) -> None:
         """Kill it, and wait until it is gone."""
-        ...
 
 
 class Launcher(Protocol):
@@ -37,11 +35,9 @@ class Launcher(Protocol):
 
     def start(self, package: str, options: Sequence[str], log: Path) -> Running:
         """Start `python -m colibri.PACKAGE` with `options`; its output goes into file `log`."""
-        ...
 
     def close(self) -> None:
         """End what is left."""
-        ...
 
 
 class LoggedChild:

@@ -37,27 +37,21 @@ class Plant(Protocol):
     @property
     def process(self) -> int | None:
         """The number of its process; None where it has none of its own."""
-        ...
 
     def receive(self, datagram: bytes) -> None:
         """Take in a datagram of an autopilot's, sound or not."""
-        ...
 
     def frame(self) -> list[bytes]:
         """Return what the plant sends up to its next frame, which comes last."""
-        ...
 
     def take(self, answer: bytes) -> None:
         """Take in the answer to that frame, and go on."""
-        ...
 
     def listen(self, timeout_s: float) -> list[bytes]:
         """Return what it sends up to `timeout_s` from now, repeating the frame that waits for an answer."""
-        ...
 
     def clock_s(self) -> float:
         """Return the time that links are late by."""
-        ...
 
 
 class Autopilot(Protocol):
@@ -66,47 +60,36 @@ class Autopilot(Protocol):
     @property
     def process(self) -> int | None:
         """The number of its process; None where it has none of its own."""
-        ...
 
     def call(self) -> bytes:
         """Return how it calls a plant."""
-        ...
 
     def receive_frame(self, frame: bytes, step_message: StepMessage) -> None:
         """Take in a frame of the plant, and what ground stations send at its time."""
-        ...
 
     def expect(self, step_message: StepMessage) -> None:
         """Take in what ground stations send at the time of the next frame."""
-        ...
 
     def receive(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
-        ...
 
     def listen(self) -> list[bytes]:
         """Return what it has sent to the plant."""
-        ...
 
     def answer(self) -> bytes:
         """Return its answer to the frame."""
-        ...
 
     def to_stations(self) -> StepMessage:
         """Return what it sends to ground stations at that frame."""
-        ...
 
     def kill(self) -> None:
         """End it as a power cut does."""
-        ...
 
     def start(self) -> None:
         """Start it again."""
-        ...
 
     def close(self) -> None:
         """End it."""
-        ...
 
 
 class Instant(NamedTuple):

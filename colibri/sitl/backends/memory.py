@@ -10,7 +10,7 @@ from typing import Any
 from colibri.autopilot.__main__ import command_line as autopilot_command_line
 from colibri.autopilot.control.registry import DecisionError
 from colibri.autopilot.core.step import answer
-from colibri.autopilot.process.ground import open_ground
+from colibri.autopilot.process.ground import Ground
 from colibri.autopilot.process.run import loaded
 from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
@@ -128,8 +128,8 @@ class MemoryAutopilot:
         """
         args = self._args
         try:
-            self._registry = _StationRegistry()
-            self._ground = open_ground(args, *loaded(args), _Silence(), self._registry)
+            self._conductor = _MemoryConductor()
+            self._ground = Ground(args, *loaded(args), _Silence(), self._conductor)
         except Error as error:
             raise SettingError(str(error)) from error
         self._copter = self._ground.copter
@@ -153,7 +153,7 @@ class MemoryAutopilot:
 
     def expect(self, step_message: StepMessage) -> None:
         """Take in what ground stations send at the time of the next frame."""
-        self._registry.from_stations = step_message
+        self._conductor.from_stations = step_message
 
     def receive(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
@@ -180,8 +180,8 @@ class MemoryAutopilot:
     def to_stations(self) -> StepMessage:
         """Return what it sends to ground stations at that frame."""
         self._copter = self._ground.serve(perf_counter())
-        assert self._registry.to_stations is not None, "it has served them"
-        return self._registry.to_stations
+        assert self._conductor.to_stations is not None, "it has served them"
+        return self._conductor.to_stations
 
     def kill(self) -> None:
         """End it as a power cut does: nothing is written that was not."""
@@ -191,8 +191,8 @@ class MemoryAutopilot:
         self._ground.close()
 
 
-class _StationRegistry:
-    """The stepped ground stations of an autopilot in this process."""
+class _MemoryConductor:
+    """The conductor of an autopilot in this process."""
 
     def __init__(self) -> None:
         self.from_stations: StepMessage | None = None

@@ -99,9 +99,9 @@ class UdpAutopilot:
         """Start it; `folder` takes its output."""
         self._launcher = launcher
         self._folder = folder
-        self._link, self._registry = opened(_HERE), opened(_HERE)
-        plant, registry = (link.url.replace("udpin", "udpout") for link in (self._link, self._registry))
-        self._options = ["--plant", plant, "--stepped", registry, *options]
+        self._link, self._stations = opened(_HERE), opened(_HERE)
+        plant, stations = (link.url.replace("udpin", "udpout") for link in (self._link, self._stations))
+        self._options = ["--plant", plant, "--stepped", stations, *options]
         self._starts = 0
         self.start()
 
@@ -118,11 +118,11 @@ class UdpAutopilot:
         self._gathering = Gathering()
         self._time_us = 0
         self._address: Address | None = None
-        self._registry_address: Address | None = None
+        self._stations_address: Address | None = None
 
     def call(self) -> bytes:
         """Return how it calls a plant."""
-        _, self._registry_address = received(self._registry, (self._child,), "autopilot")
+        _, self._stations_address = received(self._stations, (self._child,), "autopilot")
         call, self._address = received(self._link, (self._child,), "autopilot")
         return call
 
@@ -135,7 +135,7 @@ class UdpAutopilot:
         """Take in what ground stations send at the time of the next frame."""
         self._time_us = step_message.time_us
         for packet in packets(step_message):
-            self._registry.send(packet, self._registry_address)
+            self._stations.send(packet, self._stations_address)
 
     def receive(self, datagram: bytes) -> None:
         """Give it a datagram of the plant's, sound or not."""
@@ -158,7 +158,7 @@ class UdpAutopilot:
     def to_stations(self) -> StepMessage:
         """Return what it sends to ground stations at that frame."""
         while True:
-            packet, _ = received(self._registry, (self._child,), "autopilot")
+            packet, _ = received(self._stations, (self._child,), "autopilot")
             step_message = self._gathering.take(packet)
             if step_message is not None:
                 return step_message
@@ -166,7 +166,7 @@ class UdpAutopilot:
     def kill(self) -> None:
         """End it as a power cut does, and forget what is still on its way."""
         self._child.kill()
-        for link in (self._link, self._registry):
+        for link in (self._link, self._stations):
             while link.receive_now():
                 pass
 
@@ -174,7 +174,7 @@ class UdpAutopilot:
         """End it."""
         self._child.kill()
         self._link.close()
-        self._registry.close()
+        self._stations.close()
 
 
 def opened(url: str) -> UdpLink:
