@@ -11,11 +11,8 @@ from typing import Any
 def public(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Return the `__getattr__` and the `__dir__` of a package.
 
-    What is public, and so in its `__all__`, is what its `__init__.py` imports under `if TYPE_CHECKING:`, for type
-    checkers. It is read from there when the first name is asked for.
-
-    Args:
-        package: Its `__name__`.
+    What is public, and so in the `__all__` of `package`, is what its `__init__.py` imports under `if TYPE_CHECKING:`,
+    for type checkers. It is read from there when the first name is asked for.
     """
 
     @cache

@@ -93,11 +93,7 @@ def _end(args: argparse.Namespace, frame_interval_us: int) -> AutopilotEnd:
 
 
 def _flier(args: argparse.Namespace, vehicle: Vehicle) -> FlierEnd:
-    """Return what flies a simulator that counts the rotors as PX4 does.
-
-    Raises:
-        VehicleError: PX4 cannot count them.
-    """
+    """Return what flies a simulator that counts the rotors as PX4 does."""
     rotors, order = vehicle.rotors, vehicle.rotors.numbering()
     return FlierEnd(
         system_id=args.system_id,
@@ -111,13 +107,7 @@ def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle) -> Auto
     return Autopilot(profile, vehicle, track(args.track or TRACK), perf_counter, estimator=estimator)
 
 
-def _ground(
-    args: argparse.Namespace,
-    profile: Profile,
-    vehicle: Vehicle,
-    status: Status,
-    stop: Stop,
-) -> "Ground":
+def _ground(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status, stop: Stop) -> "Ground":
     """Load what serves ground stations only where there are any: it is as much as all the rest."""
     from colibri.autopilot.process.ground import Ground
     from colibri.autopilot.process.stepped_links import UdpConductor

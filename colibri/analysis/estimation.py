@@ -49,7 +49,7 @@ class Estimation(NamedTuple):
     def after(self, start_s: float) -> "Estimation":
         """Return what there is from `start_s` on."""
         late, checked = self.t >= start_s, self.checked_s >= start_s
-        return Estimation(
+        return self._replace(
             t=self.t[late],
             position_m=self.position_m[late],
             attitude_rad=self.attitude_rad[late],
@@ -59,7 +59,6 @@ class Estimation(NamedTuple):
             nees=self.nees[checked],
             nis=self.nis[checked],
             accepted=self.accepted[checked],
-            kinds=self.kinds,
         )
 
     def figures(self) -> dict[str, Any]:

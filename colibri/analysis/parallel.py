@@ -23,8 +23,8 @@ def side_by_side(
 
     Args:
         work: Does one job; must be a function at module level.
-        jobs: What to do.
-        title: Title of the progress bar.
+        jobs: Its arguments.
+        title: Of the progress bar.
         quiet: Show no bar.
         worth: How far a job moves the bar.
         keep: Is given each result as soon as it is there.

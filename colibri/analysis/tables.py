@@ -14,11 +14,7 @@ _MAX_WIDTH = 400
 def write_table(path: Path, headings: Row, rows: Sequence[Row], *, names: int) -> list[Path]:
     """Write a table as `path` with the suffixes md and csv; return what was written.
 
-    Args:
-        path: Without suffix.
-        headings: One a column.
-        rows: Their cells.
-        names: How many columns from the left are names, the others being numbers.
+    The first `names` columns are names, the others numbers.
     """
     texts = {"md": markdown(headings, rows, names=names), "csv": comma_separated(headings, rows)}
     paths = [path.with_name(f"{path.name}.{suffix}") for suffix in texts]

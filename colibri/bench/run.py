@@ -4,7 +4,7 @@ import argparse
 import json
 import os
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -37,17 +37,15 @@ def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
         _check_writable(args.out)
     figures: dict[str, Any] = {"settings": _settings(args)}
     with _progress(parts(wanted, args.runs, beside=peer is not None)) as report, TemporaryDirectory() as folder:
-        profile = load_profile(PROFILE)
-        if "stages" in wanted:
-            figures["stages"] = stage_figures(profile, Path(folder), args.duration, report)
-        if "flights" in wanted:
-            figures["flights"] = rate_figures(profile, Path(folder), args.duration, args.runs, report, peer)
-        if "sensors" in wanted:
-            figures["sensors"] = sensing_figures(profile, Path(folder), args.duration, args.runs, report)
-        if "ground" in wanted:
-            figures["ground"] = serving_figures(profile, Path(folder), args.duration, args.runs, report)
-        if "thesis" in wanted:
-            figures["thesis"] = thesis_figures(args.runs, report)
+        flown = (load_profile(PROFILE), Path(folder), args.duration)
+        measures: dict[str, Callable[[], dict[str, Any]]] = {
+            "stages": lambda: stage_figures(*flown, report),
+            "flights": lambda: rate_figures(*flown, args.runs, report, peer),
+            "sensors": lambda: sensing_figures(*flown, args.runs, report),
+            "ground": lambda: serving_figures(*flown, args.runs, report),
+            "thesis": lambda: thesis_figures(args.runs, report),
+        }
+        figures |= {name: measure() for name, measure in measures.items() if name in wanted}
     if args.out:
         _write(figures, args.out)
     _print(figures)

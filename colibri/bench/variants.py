@@ -32,7 +32,7 @@ def plan_of(profile: Profile, folder: Path, duration_s: float, link: str) -> Fli
     """Return the plan of a lemniscate with `profile`, which is written into `folder` for processes to read."""
     file = folder / "profile.toml"
     file.write_text("\n".join(toml_lines(msgspec.to_builtins(profile))) + "\n", encoding="utf-8")
-    return replace(FlightPlan.of_track(TRACK, folder, profile=str(file), link=link), duration_s=duration_s)
+    return replace(FlightPlan.of_options(folder, track=TRACK, profile=str(file), link=link), duration_s=duration_s)
 
 
 def toml_lines(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[str]:

@@ -91,13 +91,9 @@ def _check(args: argparse.Namespace) -> None:
         fail(f"--instance and --count: at least one vehicle, instances from 0 to {MAX_FLEET - 1}")
     if args.count > 1 and any(url.startswith(("udpin:", "tcpin:")) and not url.endswith(":0") for url in args.gcs):
         fail("--gcs: several vehicles cannot wait on one port; let them call, by udpout: or tcp:, or fly one")
-    for instance in range(args.instance, args.instance + args.count):
-        _check_port(_plant_url(args, instance))
-
-
-def _check_port(url: str) -> None:
     try:
-        open_link(url).close()
+        for instance in range(args.instance, args.instance + args.count):
+            open_link(_plant_url(args, instance)).close()
     except LinkError as error:
         fail(str(error))
 

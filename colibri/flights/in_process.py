@@ -76,9 +76,7 @@ def put_together(plan: FlightPlan, clock: Clock) -> tuple[Autopilot, Plant]:
     """Return the autopilot and the plant of a flight as it begins; `clock` only measures.
 
     Raises:
-        ControllerError: The control law cannot be used.
-        ProfileError: The control law's table in the profile is wrong.
-        SolverError: The solver cannot be used.
+        ControllerError, ProfileError, SolverError: As `fly_locally`.
     """
     estimator = estimator_for(plan.feedback, plan.vehicle, DEFAULT_ORIGIN)
     autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, clock, estimator=estimator)

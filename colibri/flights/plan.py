@@ -139,27 +139,11 @@ class FlightPlan(WorldSetting):
         )
 
     @classmethod
-    def of_track(
-        cls, track_name: str, out: Path, *, profile: str, controller: str | None = None, link: str = "direct"
-    ) -> "FlightPlan":
-        """Return the plan of a track flown flat out for 100 s, everything else as the profile has it.
-
-        Raises:
-            ProfileError: The profile cannot be read.
-            VehicleError: Its vehicle cannot be read.
-            TrackError: There is no such track, or its file cannot be flown.
-        """
-        return cls.of_options(out, track=track_name, profile=profile, controller=controller, link=link)
-
-    @classmethod
     def of_options(cls, out: Path, **options: Any) -> "FlightPlan":
         """Return the plan of a flight flat out for 100 s with some options of `colibri fly`, by their names there.
 
         Raises:
-            PlanError: They do not go together.
-            ProfileError: The profile cannot be read.
-            VehicleError: A vehicle cannot be read, or cannot start as the profile says.
-            TrackError: There is no such track, or its file cannot be flown.
+            PlanError, ProfileError, VehicleError, TrackError: As `from_arguments`.
         """
         unset = dict.fromkeys(("controller", "solver", "vehicle", "plant_vehicle", "integrator"))
         usual = {
@@ -167,6 +151,7 @@ class FlightPlan(WorldSetting):
             "signing_key": None,
             "insecure": False,
             "feedback": Feedback.STATE,
+            "link": "direct",
             "speed": inf,
             "duration": DURATION_S,
         }
@@ -185,11 +170,7 @@ class FlightPlan(WorldSetting):
 
 
 def _check_sensors(name: str, vehicle: Vehicle) -> None:
-    """Check that a flight on sensors can begin, at rest.
-
-    Raises:
-        PlanError: It cannot.
-    """
+    """Check that a flight on sensors can begin, at rest."""
     if vehicle.sensors is None:
         raise PlanError(f"--feedback sensors: vehicle {name} has no table sensors")
     if vehicle.ground is None:

@@ -30,12 +30,7 @@ class FlightError(InFlightError):
 def fly_processes(
     plan: FlightPlan, progress: Callable[[float], None] = unseen, say: Callable[[str], None] = unseen
 ) -> Summary:
-    """Fly `plan` as two processes on a free port. Both are gone when this returns or raises.
-
-    Args:
-        plan: What to fly.
-        progress: Called with the simulated time, s.
-        say: Called with a line for each ground link and each ground station that connects.
+    """Fly `plan` as two processes on a free port, as `fly_plan` does. Both are gone when this returns or raises.
 
     Raises:
         FlightError: One of them ended before the flight did.

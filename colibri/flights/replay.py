@@ -154,7 +154,7 @@ def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
         if isinstance(what, ReceivedDatagram):
             inbox.setdefault(what.time_us, []).append(Received(what.datagram, what.link, what.address, what.loopback))
     pilot: Autopilot | Copter | None = None
-    wire = Wire(next(iter(setups.values())).system_id)
+    codec = Codec(next(iter(setups.values())).system_id, dialect.AUTOPILOT_COMPONENT)
     known: StateFrame | None = None
     commands = last_us = 0
     for time_us, datagram, command in recorded:
@@ -173,7 +173,7 @@ def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
             raise ReplayError(f"at t = {frame.time_us * 1e-6:.3f} s: {error}") from error
         known = _known(frame, step, known)
         if command is not None:
-            replayed = wire.carried(step.command)
+            replayed = _carried(codec, step.command)
             if replayed != command:
                 return Replayed(commands, last_us, Difference(command, replayed, _mode(pilot), known))
             commands, last_us = commands + 1, frame.time_us
@@ -182,19 +182,12 @@ def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
     return Replayed(commands, last_us, None)
 
 
-class Wire:
-    """Rounds commands as the link does."""
-
-    def __init__(self, system_id: int) -> None:
-        """Speak as the autopilot of `system_id`."""
-        self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
-
-    def carried(self, command: ActuatorCommand) -> ActuatorCommand:
-        """Return what arrives of a command."""
-        (message,) = self._codec.decode(encode_actuators(self._codec, command))
-        arrived = decode_actuators(message)
-        assert arrived is not None, "what an autopilot commands can be flown"
-        return arrived
+def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
+    """Return what arrives of a command: the link rounds it."""
+    (message,) = codec.decode(encode_actuators(codec, command))
+    arrived = decode_actuators(message)
+    assert arrived is not None, "what an autopilot commands can be flown"
+    return arrived
 
 
 def _begun(setup: Setup) -> Autopilot | Copter:

@@ -33,7 +33,9 @@ class Job(NamedTuple):
         """Return the flight as a plan."""
         profile, _, controller = self.contender.partition(":")
         folder = self.out / "flights" / f"{self.contender.replace(':', '-')}-{folder_name(self.track)}"
-        return FlightPlan.of_track(self.track, folder, profile=profile, controller=controller or None, link=self.link)
+        return FlightPlan.of_options(
+            folder, track=self.track, profile=profile, controller=controller or None, link=self.link
+        )
 
 
 def compare(args: argparse.Namespace) -> int:

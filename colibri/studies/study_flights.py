@@ -86,7 +86,9 @@ class Flight(NamedTuple):
 
     def plan(self, out: Path) -> FlightPlan:
         """Return the flight as a plan that leaves its logs in `out`."""
-        plan = FlightPlan.of_track(self.track, out, profile=self.profile, controller=self.controller, link="memory")
+        plan = FlightPlan.of_options(
+            out, track=self.track, profile=self.profile, controller=self.controller, link="memory"
+        )
         vehicle = _limited(plan.vehicle, self.max_speed)
         return replace(
             plan,

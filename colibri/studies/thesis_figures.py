@@ -103,7 +103,7 @@ def draw(job: Job) -> list[Path]:
     """Fly once and draw the figures of that flight; return what was written."""
     folder = job.out / "flights" / job.flight.name
     prepare(folder)
-    plan = FlightPlan.of_track(job.flight.track, folder, profile="thesis", controller=job.flight.controller)
+    plan = FlightPlan.of_options(folder, track=job.flight.track, profile="thesis", controller=job.flight.controller)
     recording, _ = keep_flight(plan, fly_locally(plan))
     series = flight_series(recording, plan)
     paths = []

@@ -39,16 +39,10 @@ class Case(NamedTuple):
         return FlightPlan.of_options(out, **(options | more))
 
     def fly(self, out: Path, link: str, **more: Any) -> str:
-        """Fly; return the hash of the trajectory.
-
-        Args:
-            out: Folder of the logs.
-            link: `udp` or `memory`.
-            more: Other options of `colibri fly`.
+        """Fly over `link`, `udp` or `memory`, with the logs in `out`; return the hash of the trajectory.
 
         Raises:
-            FlightError: A process ended before the flight did.
-            ControllerError, DecisionError, ProfileError, SolverError, IntegrationError: As `fly_locally`.
+            Error: It cannot begin, or does not end.
         """
         prepare(out)
         if self.waypoints:
@@ -74,17 +68,10 @@ class SitlCase:
     setting: Mapping[str, Any] = field(default_factory=dict)
 
     def fly(self, out: Path, link: str) -> str:
-        """Fly; return the hash of every frame's truth and command.
-
-        Args:
-            out: Folder of the logs.
-            link: `udp` or `memory`.
+        """Fly over `link`, `udp` or `memory`, with the logs in `out`; return the hash of every truth and command.
 
         Raises:
-            SettingError: It cannot begin.
-            SessionError: A process has died, or does not answer.
-            RefusedError: The vehicle refuses an order.
-            NotInTimeError: What was waited for has not come about.
+            SitlError: It cannot begin, or does not end; or an order was refused, or not done in time.
         """
         from colibri.sitl.backends.launcher import launcher
         from colibri.sitl.session import Flights

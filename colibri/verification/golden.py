@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, NamedTuple, NoReturn
+from typing import Annotated, NamedTuple
 
 import msgspec
 
@@ -102,14 +102,10 @@ def read_hashes(path: Path) -> dict[str, str]:
 def _check_names(path: Path, known: Mapping[str, str]) -> None:
     """See that a file names the flights of the set and no others, or end with one line."""
     names = {flight.name for flight in FLIGHTS}
-    for name in sorted(known.keys() - names):
-        _not_of_the_set(path, f"names {name}, which is no golden flight")
-    for name in sorted(names - known.keys()):
-        _not_of_the_set(path, f"has no hash of golden flight {name}")
-
-
-def _not_of_the_set(path: Path, what: str) -> NoReturn:
-    fail(f"{path} {what}: write it anew with --renew")
+    wrong = [f"names {name}, which is no golden flight" for name in sorted(known.keys() - names)]
+    wrong += [f"has no hash of golden flight {name}" for name in sorted(names - known.keys())]
+    if wrong:
+        fail(f"{path} {wrong[0]}: write it anew with --renew")
 
 
 def _renew(args: argparse.Namespace, known: Mapping[str, str], outcomes: Iterable[Outcome]) -> int:

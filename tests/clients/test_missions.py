@@ -7,7 +7,7 @@ import pytest
 
 from tests.clients.support.plan_client import ACCEPTED, Item, PlanClient
 from tests.mavlink.mission.missions import some_item
-from tools.harness.lossy_relay import BadLink
+from tools.harness.relay import BadLink
 from tools.harness.sitl_process import vehicle
 
 SPEED = 10.0

@@ -22,7 +22,7 @@ def test_flies_beside_the_peer_in_every_run(
 ) -> None:
     monkeypatch.setattr(rotorpy_peer, "installed", lambda: True)
     monkeypatch.setattr(rotorpy_peer, "real_time_factor", lambda _frames_hz, _duration_s: 2.0)
-    monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 8.0)
+    monkeypatch.setattr(speed, "real_time_factor", lambda *_: 8.0)
     flights = flights_of(tmp_path / "flights.json")
     assert {int(frames_hz) for frames_hz in flights["rates_hz"]} == set(speed.CONTROL_S)
     for rate in flights["rates_hz"].values():
@@ -35,7 +35,7 @@ def test_a_missing_peer_is_said_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(rotorpy_peer, "installed", lambda: False)
-    monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 1.0)
+    monkeypatch.setattr(speed, "real_time_factor", lambda *_: 1.0)
     flights = flights_of(tmp_path / "flights.json")
     assert all(set(rate) == {"memory", "udp"} for rate in flights["rates_hz"].values())
     assert capsys.readouterr().err == f"colibri: {rotorpy_peer.MISSING}\n"

@@ -42,12 +42,7 @@ def campaign(
 ) -> Outcome:
     """Fly until `quota` datagrams of each kind were sent to each process; compare with an undisturbed flight.
 
-    Args:
-        folder: Takes the logs.
-        quota: Datagrams of each kind, to each process.
-        burst: Datagrams with each good one, half of each kind.
-        seed: Of all chance.
-        progress: Called with which part of the flight is flown.
+    With each good datagram goes a `burst`, half of each kind; `progress` is called with the part of the flight flown.
     """
     duration_s = (10 + ceil(_MARGIN * 2 * quota / burst)) * FRAME_US / 1e6
     logs = folder / "logs"

@@ -17,14 +17,9 @@ _CRC_EXTRA_OF_THE_UNKNOWN = 0
 
 
 def frame(message_id: int, payload: bytes, source: Ids, *, sequence: int = 0, flags: int = 0) -> bytes:
-    """Return a MAVLink 2 frame with a right CRC.
+    """Return a MAVLink 2 frame with a right CRC, of any id and any payload up to 255 bytes.
 
-    Args:
-        message_id: Any, also one that no dialect has.
-        payload: Up to 255 bytes, whatever the message's own length.
-        source: System and component id.
-        sequence: Sequence number.
-        flags: Incompatibility flags; the signature that flag 1 promises is not appended.
+    `flags` are incompatibility flags; the signature that flag 1 promises is not appended.
     """
     header = struct.pack("<BBBBBB", len(payload), flags, 0, sequence, *source) + message_id.to_bytes(3, "little")
     return b"\xfd" + header + payload + _crc(header + payload, message_id)

@@ -42,13 +42,9 @@ class GroundOutcome(NamedTuple):
 def ground_campaign(
     quota: int, *, seed: int, files: Files | None = None, progress: Callable[[float], None] = lambda _part: None
 ) -> GroundOutcome:
-    """Fire `quota` messages, the same number in every situation.
+    """Fire `quota` messages, the same number in every situation; `progress` is called with the part that is sent.
 
-    Args:
-        quota: Of messages.
-        seed: Of all chance.
-        files: What the vehicle writes to; None: its memory.
-        progress: Called with which part of the messages is sent.
+    The vehicle writes to `files`; None: to memory.
     """
     chance = random.Random(seed)
     target = Target(chance, files)

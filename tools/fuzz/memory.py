@@ -42,10 +42,8 @@ class Flight:
     def fly(self, frames: int, burst: int = 0, fuzzers: tuple[Fuzzer, Fuzzer] | None = None) -> list[State]:
         """Fly so many frames; return the states.
 
-        Args:
-            frames: How many.
-            burst: Hostile datagrams before, and as many after, each good one.
-            fuzzers: Who makes those to the plant, and those to the autopilot.
+        `burst` hostile datagrams are before, and as many after, each good one: by the first of `fuzzers` to the plant,
+        by the second to the autopilot.
         """
         states = []
         for _ in range(frames):

@@ -133,13 +133,7 @@ def cpu_flags() -> frozenset[str]:
 
 
 def fly(variation: Variation, out: Path, link: str = "memory", only: Sequence[str] = ()) -> Flown:
-    """Fly golden flights in a process of their own.
-
-    Args:
-        variation: The computer to fly them on.
-        out: Folder of the logs.
-        link: `udp` or `memory`.
-        only: Names of the flights; none for all.
+    """Fly the golden flights, or `only` those of these names, in a process of their own, with their logs in `out`.
 
     Raises:
         VariationError: The process ended before the flights did.

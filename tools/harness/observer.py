@@ -115,16 +115,7 @@ class Observer(OnPort):
         return [sight for sight in self.sights if sight.mode is mode and sight.armed and sight.flying]
 
     def wait(self, condition: Callable[[Sight], bool], what: str, within_s: float = GIVE_UP_AFTER_S) -> Sight:
-        """Return the first sight from now on that meets `condition`.
-
-        Args:
-            condition: To be met.
-            what: It, in words.
-            within_s: Wall-clock bound for what hangs.
-
-        Raises:
-            AssertionError: In vain.
-        """
+        """Return the first sight from now on that meets `condition`, `what` in words; `within_s` bounds what hangs."""
         with self._news:
             seen = len(self._sights) - 1
             give_up_s = monotonic() + within_s
@@ -150,11 +141,7 @@ class Observer(OnPort):
     def request(self, answer: str, name: str, *fields: Any, within_s: float = 5.0) -> Any:
         """Send message `name` to the vehicle; return the fields of the first message `answer` after it.
 
-        Args:
-            answer: Name of the message that answers.
-            name: Of what is sent; its fields begin with the target system and component, which are filled in.
-            *fields: The other fields.
-            within_s: Wall-clock bound for what hangs.
+        `fields` are those behind target system and component, which are filled in; `within_s` bounds what hangs.
         """
         with self._news:
             before = self._counts[answer]

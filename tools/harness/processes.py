@@ -96,10 +96,6 @@ class Process(Child):
         """Wait for its end; return the exit code."""
         return self.process.wait(GIVE_UP_AFTER_S)
 
-    def stop(self) -> None:
-        """End it, however it is."""
-        self.kill()
-
 
 @contextmanager
 def running(*processes: Process) -> Iterator[None]:
@@ -108,7 +104,7 @@ def running(*processes: Process) -> Iterator[None]:
         yield
     finally:
         for process in processes:
-            process.stop()
+            process.kill()
 
 
 def start_plant(folder: Path, out: Path, *options: str) -> tuple[Process, str]:

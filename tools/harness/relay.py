@@ -1,11 +1,15 @@
 """A UDP relay between autopilot and plant, which applies the faults of a test to the datagrams."""
 
+import random
 import socket
 from abc import ABC, abstractmethod
 from select import select
 from threading import Event, Thread
 from types import TracebackType
 from typing import Self
+
+LOSS, DUPLICATION, REORDERING = 0.2, 0.1, 0.1
+"""Parts of the datagrams on a `BadLink`."""
 
 
 class Relay(ABC):
@@ -59,6 +63,38 @@ class Relay(ABC):
                     self.pass_on("plant", datagram)
                 else:
                     self.pass_on("autopilot", datagram)
+
+
+class BadLink(Relay):
+    """A relay as a bad radio link would be, both ways.
+
+    Attributes:
+        counts: What was done to the datagrams.
+    """
+
+    def __init__(self, plant_url: str, seed: int) -> None:
+        """Relay to the plant at `plant_url`, by chance of `seed`."""
+        super().__init__(plant_url)
+        self._chance = random.Random(seed)
+        self._held: dict[str, bytes] = {}
+        self.counts = {"passed": 0, "lost": 0, "duplicated": 0, "reordered": 0}
+
+    def pass_on(self, to: str, datagram: bytes) -> None:
+        """Lose it, hold it back behind the next, or send it on once or twice."""
+        fate = self._chance.random()
+        if fate < LOSS:
+            self.counts["lost"] += 1
+        elif fate < LOSS + REORDERING and to not in self._held:
+            self.counts["reordered"] += 1
+            self._held[to] = datagram
+        else:
+            self.counts["passed"] += 1
+            self.deliver(to, datagram)
+            if fate > 1.0 - DUPLICATION:
+                self.counts["duplicated"] += 1
+                self.deliver(to, datagram)
+            if to in self._held:
+                self.deliver(to, self._held.pop(to))
 
 
 def _bound_socket() -> socket.socket:

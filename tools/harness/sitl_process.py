@@ -70,11 +70,7 @@ class Vehicle:
 def vehicle(folder: Path, *options: str, links: tuple[str, ...] = (WAITING,), speed: float = 1.0) -> Iterator[Vehicle]:
     """Run `colibri sitl` while the block lasts; it stands, ready to be armed, when the block begins.
 
-    Args:
-        folder: For its state and output.
-        options: More of its command line.
-        links: URLs that it serves beside the observer's; by default it waits on any free port.
-        speed: Times real time.
+    Its state and output are in `folder`. It serves `links` beside the observer's; by default it waits on any free port.
     """
     said, state = folder / "sitl.err", folder / "state"
     with Observer() as seen, said.open("wb") as errors:

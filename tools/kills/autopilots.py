@@ -87,7 +87,7 @@ def fly(folder: Path, feedback: Feedback, seed: int, max_kills: int, legs: int =
         between.close()
     finally:
         for process in processes:
-            process.stop()
+            process.kill()
         station.close()
     words = "".join(process.errors() for process in processes)
     truth = rows(folder / "plant.csv")

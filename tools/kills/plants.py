@@ -47,7 +47,7 @@ def fly(folder: Path, feedback: Feedback, seed: int, kills: int) -> tuple[list[K
         between.close()
     finally:
         for process in processes:
-            process.stop()
+            process.kill()
         station.close()
     return done, "".join(process.errors() for process in processes)
 

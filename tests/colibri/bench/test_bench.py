@@ -62,7 +62,7 @@ def test_what_was_timed_is_as_it_was_before(measured: dict[str, Any]) -> None:
 
 
 def test_flights_are_measured_at_every_rate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 1.0)
+    monkeypatch.setattr(speed, "real_time_factor", lambda *_: 1.0)
     flights = figures_of(tmp_path / "flights.json", "--only", "flights")["flights"]
     assert {int(frames_hz) for frames_hz in flights["rates_hz"]} == set(speed.CONTROL_S)
     assert all(set(rate) == {"memory", "udp"} for rate in flights["rates_hz"].values())
@@ -99,7 +99,7 @@ def test_the_estimator_is_timed_and_flights_on_sensors_beside_those_on_the_state
 
 def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[str] = []
-    monkeypatch.setattr(speed, "_real_time_factor", lambda *_: 1.0)
+    monkeypatch.setattr(speed, "real_time_factor", lambda *_: 1.0)
     profile = load_profile(run.PROFILE)
     speed.rate_figures(profile, tmp_path, 0.1, 2, told.append, speed.Peer("rotorpy", lambda *_: 1.0))
     assert len(told) == run.parts(["flights"], 2, beside=True)

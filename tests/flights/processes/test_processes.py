@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tools.harness.lossy_relay import BadLink
 from tools.harness.processes import (
     THESIS_PLANT,
     Process,
@@ -18,6 +17,7 @@ from tools.harness.processes import (
     states,
     wait_for,
 )
+from tools.harness.relay import BadLink
 
 START = ("--duration", "100", "--speed", "50")
 
@@ -49,7 +49,7 @@ def test_a_bad_link_does_not_change_the_flight(tmp_path: Path, logs: Path) -> No
 
 def test_the_autopilot_may_start_first(tmp_path: Path, logs: Path) -> None:
     free, url = start_plant(logs, tmp_path / "unused")
-    free.stop()
+    free.kill()
     autopilot = start_autopilot(logs, url)
     with running(autopilot):
         autopilot.wait_for("calling")
@@ -113,7 +113,7 @@ def test_an_autopilot_at_another_rate_is_told(tmp_path: Path, logs: Path) -> Non
     first = start_autopilot(logs, url)
     with running(plant, first):
         first.wait_for("flying")
-        first.stop()
+        first.kill()
         second = start_autopilot(logs, url, "--profile", str(profile))
         with running(second):
             assert "another frame rate" in second.wait_for("refused")["text"]

@@ -8,8 +8,8 @@ import pytest
 
 from colibri.common.process.lifecycle import nudge_m
 from colibri.mavlink.wire.dialect import Codec
-from tools.harness.lossy_relay import BadLink
 from tools.harness.processes import Process, fly, rows, running, start_autopilot, start_plant, states
+from tools.harness.relay import BadLink
 
 ON_SENSORS = ("spiral", "--feedback", "sensors")
 STAMP_BYTES = 8
