@@ -10,7 +10,7 @@ from colibri.autopilot.core.parts import parts_of
 from colibri.autopilot.core.report import Reporter, Sample
 from colibri.autopilot.core.step import Received, Step, follows, nothing_known
 from colibri.autopilot.core.supervision import Supervision
-from colibri.autopilot.estimation.state_source import Estimator, estimator_for
+from colibri.autopilot.estimation.state_source import NewEstimator, estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
@@ -41,7 +41,7 @@ class Copter:
         *,
         values: dict[str, Value] | None = None,
         first: Track | None = None,
-        estimator: Estimator | None = None,
+        estimator: NewEstimator | None = None,
         history: History | None = None,
     ) -> None:
         """Fly `vehicle` by `profile`; `clock` only measures, it decides nothing.

@@ -14,7 +14,7 @@ from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
 from colibri.autopilot.core.actuation import Actuation
-from colibri.autopilot.estimation.state_source import Estimator, StateSource
+from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
 from colibri.autopilot.ground.battery_monitor import BatteryMonitor
 from colibri.autopilot.ground.snapshots import SnapshotBuilder
 from colibri.autopilot.ground.stations import Stations, StationSettings
@@ -70,7 +70,7 @@ def parts_of(
     clock: Clock,
     values: dict[str, Value] | None,
     first: Track | None,
-    estimator: Estimator | None,
+    estimator: NewEstimator | None,
 ) -> Parts:
     """Return the parts of a vehicle; arguments and errors are those of `colibri.autopilot.core.copter.Copter`."""
     numbers = Numbers(profile, vehicle)

@@ -4,7 +4,7 @@ from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.step import Step, follows, nothing_known
-from colibri.autopilot.estimation.state_source import Estimator, StateSource
+from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
 from colibri.autopilot.guidance.trajectories.planner import plan
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
@@ -21,7 +21,7 @@ class Autopilot:
     """
 
     def __init__(
-        self, profile: Profile, vehicle: Vehicle, track: Track, clock: Clock, *, estimator: Estimator | None = None
+        self, profile: Profile, vehicle: Vehicle, track: Track, clock: Clock, *, estimator: NewEstimator | None = None
     ) -> None:
         """Fly `vehicle` along `track`; `clock` only measures, it decides nothing.
 

@@ -33,6 +33,7 @@ from colibri.autopilot.estimation.sensing.free_fall import Caught
 from colibri.autopilot.estimation.sensing.rejection import Reason
 from colibri.common.earth.atmosphere import METRES_PER_PASCAL
 from colibri.common.elementary import square
+from colibri.common.jit import packed
 from colibri.common.types import Array, Vector
 from colibri.mavlink.hil.sensors import GpsFix
 from colibri.plant.vehicle.sensors import Sensors
@@ -93,6 +94,7 @@ class Filter:
         self._field = np.array(field_enu_gauss)
         self.field_gauss = hypot(*field_enu_gauss)
         self._noise = noise_of(sensors)
+        self._packed_noise = packed(self._noise)
         gps = sensors.gps
         self._horizontal = square(gps.horizontal_noise_m) + square(_PLACE_STEP_M) / 12.0
         self._vertical = square(gps.vertical_noise_m) + square(_HEIGHT_STEP_M) / 12.0
@@ -199,7 +201,7 @@ class Filter:
 
     def predict(self, samples: Array, row: int) -> None:
         """Go on by one sample of many."""
-        predict(self.x, self.P, samples, row, self._noise, self._gravity)
+        predict(self.x, self.P, samples, row, self._packed_noise, self._gravity)
 
     def fuse_fix(self, fix: GpsFix, place_enu_m: Vector, after_s: float, time_us: int) -> Reason | None:
         """Fuse a fix measured `after_s` after the filter's time; return why a part of it was rejected, if one was."""

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from colibri.common.jit import compiled
+from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import cos, exp, sin
 from colibri.common.types import Array
 
@@ -98,9 +98,12 @@ def strap_down(x: Array, samples: Array, row: int, gravity: float) -> tuple[Nine
 
 
 @compiled
-def predict(x: Array, P: Array, samples: Array, row: int, noise: Noise, gravity: float) -> None:
-    """Move state (23,) and covariance (22, 22) on by one sample, in place: P = F P Fᵀ + Q, Solà's (270) and (271)."""
-    dt = samples[row, INTERVAL]
+def predict(x: Array, P: Array, samples: Array, row: int, packed: Packed, gravity: float) -> None:
+    """Move state (23,) and covariance (22, 22) on by one sample, in place: P = F P Fᵀ + Q, Solà's (270) and (271).
+
+    `packed` is the `Noise`.
+    """
+    noise, dt = packed[0], samples[row, INTERVAL]
     sees_force, sees_rate = samples[row, BLIND_FORCE] == 0.0, samples[row, BLIND_RATE] == 0.0
     R, force, turn = strap_down(x, samples, row, gravity)
     decay = exp(-dt / noise.gps_drift_time_s)

@@ -1,12 +1,12 @@
-"""What the estimator knows of the vehicle, how well, and what it trusts."""
+"""The estimate of the vehicle's state, its standard deviations, and the health of what it is made of."""
 
 from collections.abc import Mapping
-from enum import IntFlag
 from typing import NamedTuple, TypeAlias
 
 from colibri.autopilot.estimation.sensing.rejection import Rejections
 from colibri.common.types import Vector
 from colibri.mavlink.hil.state import StateFrame
+from colibri.mavlink.wire.dialect import mav
 
 
 class Test(NamedTuple):
@@ -34,38 +34,22 @@ Tests: TypeAlias = Mapping[str, Test]
 """The last test of each kind of measurement that the vehicle has, by name."""
 
 
-class StatusFlags(IntFlag):
-    """ESTIMATOR_STATUS_FLAGS of MAVLink."""
-
-    ATTITUDE = 1
-    VELOCITY_HORIZ = 2
-    VELOCITY_VERT = 4
-    POS_HORIZ_REL = 8
-    POS_HORIZ_ABS = 16
-    POS_VERT_ABS = 32
-    PRED_POS_HORIZ_REL = 256
-    PRED_POS_HORIZ_ABS = 512
-    GPS_GLITCH = 1024
-    ACCEL_ERROR = 2048
+_HORIZONTAL_VELOCITY = mav.ESTIMATOR_VELOCITY_HORIZ | mav.ESTIMATOR_POS_HORIZ_REL | mav.ESTIMATOR_PRED_POS_HORIZ_REL
+_HORIZONTAL_POSITION = mav.ESTIMATOR_POS_HORIZ_ABS | mav.ESTIMATOR_PRED_POS_HORIZ_ABS
 
 
 class Health(NamedTuple):
     """What may be flown on.
 
     Attributes:
-        attitude: Roll and pitch are known.
-        heading: Yaw is known.
-        horizontal_velocity: Known to 1 m/s.
-        vertical_velocity: Known to 1 m/s.
-        horizontal_position: Known to 5 m on earth.
-        height: Known to 5 m.
+        attitude, heading: Whether roll and pitch, and yaw, are known.
+        horizontal_velocity, vertical_velocity: Known to 1 m/s.
+        horizontal_position, height: Known to 5 m on earth.
         dead_reckoning: GPS holds neither position nor velocity: they drift.
         gps_lost_since_us: When GPS was last accepted, if that is long ago; None while it is.
         gps_glitch: Fixes come, and are rejected.
-        accelerometer: Its values can be used.
-        gyroscope: Its values can be used.
-        accel_bias: The accelerometer's bias was not reset lately.
-        gyro_bias: Nor the gyroscope's.
+        accelerometer, gyroscope: Their values can be used.
+        accel_bias, gyro_bias: Their biases were not reset lately.
         not_accepted: Other sensors whose values are missing or rejected since long.
     """
 
@@ -85,36 +69,18 @@ class Health(NamedTuple):
     not_accepted: tuple[str, ...]
 
     @property
-    def flags(self) -> StatusFlags:
-        """As in ESTIMATOR_STATUS."""
-        value = sum(flag for good, flag in zip(self._goods(), _FLAGS, strict=True) if good)
-        return StatusFlags(value)
-
-    def _goods(self) -> tuple[bool, ...]:
-        return (
-            self.attitude,
-            self.horizontal_velocity,
-            self.vertical_velocity,
-            self.horizontal_position,
-            self.height,
-            self.gps_glitch,
-            not (self.accelerometer and self.accel_bias),
+    def flags(self) -> int:
+        """ESTIMATOR_STATUS_FLAGS of MAVLink."""
+        flags: int = (
+            self.attitude * mav.ESTIMATOR_ATTITUDE
+            | self.horizontal_velocity * _HORIZONTAL_VELOCITY
+            | self.vertical_velocity * mav.ESTIMATOR_VELOCITY_VERT
+            | self.horizontal_position * _HORIZONTAL_POSITION
+            | self.height * mav.ESTIMATOR_POS_VERT_ABS
+            | self.gps_glitch * mav.ESTIMATOR_GPS_GLITCH
+            | (not (self.accelerometer and self.accel_bias)) * mav.ESTIMATOR_ACCEL_ERROR
         )
-
-
-_FLAGS: tuple[int, ...] = tuple(
-    int(flags)
-    for flags in (
-        StatusFlags.ATTITUDE,
-        StatusFlags.VELOCITY_HORIZ | StatusFlags.POS_HORIZ_REL | StatusFlags.PRED_POS_HORIZ_REL,
-        StatusFlags.VELOCITY_VERT,
-        StatusFlags.POS_HORIZ_ABS | StatusFlags.PRED_POS_HORIZ_ABS,
-        StatusFlags.POS_VERT_ABS,
-        StatusFlags.GPS_GLITCH,
-        StatusFlags.ACCEL_ERROR,
-    )
-)
-"""Of each part of `Health._goods`; as plain numbers, which are added in a tenth of the time."""
+        return flags
 
 
 class Check(NamedTuple):
@@ -144,8 +110,7 @@ class Estimate(NamedTuple):
         position_std_m: Standard deviations of the position, east, north, up.
         velocity_std_m_s: Of the velocity, east, north, up.
         attitude_std_rad: Of the attitude, about east, north, up.
-        gyro_bias_rad_s: FLU.
-        accel_bias_m_s2: FLU.
+        gyro_bias_rad_s, accel_bias_m_s2: FLU.
         health: What may be flown on.
         tests: How well the measurements agree with it.
         rejected: How many values were rejected since the start, by sensor and reason.

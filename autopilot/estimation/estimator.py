@@ -23,10 +23,9 @@ from colibri.autopilot.estimation.gyroscope_bias import turned_since
 from colibri.autopilot.estimation.measurements.instrument import Instrument, Value
 from colibri.autopilot.estimation.output_smoothing import OutputSmoothing
 from colibri.autopilot.estimation.sensing.alignment import Aligned, Alignment
-from colibri.autopilot.estimation.sensing.clock_resets import MAX_GAP_US, ClockResets
 from colibri.autopilot.estimation.sensing.free_fall import Caught, Falling
 from colibri.autopilot.estimation.sensing.inertial import Inertial, Reading
-from colibri.autopilot.estimation.sensing.plausibility import GpsWatch
+from colibri.autopilot.estimation.sensing.plausibility import MAX_GAP_US, ClockResets, GpsWatch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
 from colibri.common.earth.atmosphere import altitude_m
 from colibri.common.earth.geodesy import Geodetic, enu_of
@@ -104,21 +103,42 @@ class Estimator:
         self._capacity = ceil(self._delay_us / interval_us) + _SPARE_SAMPLES
         self._now = np.zeros(19)
         self._rejected = Rejected()
-        self._time_us: int | None = None
-        self._at_rest: list[Value | None] = []
-        self._reading = _NOTHING
         self._restart()
         self._warm_up()
         self._rejected = Rejected()
         self._restart()
 
+    def _restart(self) -> None:
+        """Forget everything but what was counted."""
+        sensors = self._sensors
+        self._inertial = Inertial(sensors, self._rejected)
+        self._gps_watch = GpsWatch()
+        self._falling = Falling(self._gravity, self._field, sensors.gps.delay_s)
+        self.caught = False
+        self._alignment = Alignment(sensors, self._gravity, self._field, self._interval_us * 1e-6)
+        self.filter = Filter(sensors, self._gravity, self._field)
+        instruments = self.filter.instruments
+        self._reads = [instrument.read for instrument in instruments]
+        self._groups = reduce(or_, (instrument.group for instrument in instruments))
+        self._at_rest: list[Value | None] = [None] * len(instruments)
+        self._reads_messages = not all(instrument.group for instrument in instruments)
+        self._accelerometer_watch = AccelerometerWatch(sensors, self._gravity)
+        self._output_smoothing = OutputSmoothing()
+        self._clock_resets = ClockResets()
+        self._buffer = DelayBuffer(self._capacity)
+        self.filter_us = 0
+        self._reading = _NOTHING
+        self._time_us: int | None = None
+        self._published_us = 0
+        self._estimate: Estimate | None = None
+        self._tests: Tests | None = None
+        self._resets = 0
+
     def step(self, frame: SensorFrame, *, asked: bool = True) -> Estimate | None:
         """Take a frame; return the estimate at its time, or None as long as the vehicle has not rested with a fix.
 
-        Unless `asked`, the estimate before is returned again, which takes half of the time.
-
-        A frame whose time does not follow is rejected: the last estimate is given again. When such frames go on, the
-        simulator has restarted, and so does the estimator.
+        Unless `asked`, the estimate before is returned again, which takes half of the time; and so it is where the time
+        of a frame does not follow. When such frames go on, the simulator has restarted, and so does the estimator.
         """
         last_us = self._time_us
         if last_us is not None and not 0 < frame.time_us - last_us <= MAX_GAP_US:
@@ -133,7 +153,9 @@ class Estimator:
         rejected = self._rejected
         reads = frame.updated & self._groups or self._reads_messages
         values = [read(frame, rejected) for read in self._reads] if reads else None
-        fix = self._fix_of(frame)
+        fix = frame.gps
+        if fix is not None and not self._gps_watch.accepts(fix, frame.time_us, rejected):
+            fix = None
         if self._estimate is None or last_us is None:
             at_rest = self._field_and_height(values)
             if values is not None:
@@ -146,9 +168,14 @@ class Estimator:
                 self._start_in_air(caught, frame.time_us)
             else:
                 return None
+            self._published_us = self.filter_us = frame.time_us
         else:
-            self._put(before, (frame.time_us - last_us) * 1e-6, Waiting(frame.time_us, values))
-            self._catch_up(frame.time_us)
+            buffer = self._buffer
+            if buffer.is_full():
+                self._take()
+            buffer.put(before, self._reading, (frame.time_us - last_us) * 1e-6, Waiting(frame.time_us, values))
+            while buffer.waiting and frame.time_us - buffer.waiting[0].time_us >= self._delay_us:
+                self._take()
             if fix is not None:
                 self._fuse(fix, frame.time_us)
         if not asked and self._estimate is not None:
@@ -197,31 +224,6 @@ class Estimator:
             self._time_us -= self._interval_us
         return True
 
-    def _restart(self) -> None:
-        """Forget everything but what was counted."""
-        sensors = self._sensors
-        self._inertial = Inertial(sensors, self._rejected)
-        self._gps_watch = GpsWatch()
-        self._falling = Falling(self._gravity, self._field, sensors.gps.delay_s)
-        self.caught = False
-        self._alignment = Alignment(sensors, self._gravity, self._field, self._interval_us * 1e-6)
-        self.filter = Filter(sensors, self._gravity, self._field)
-        instruments = self.filter.instruments
-        self._reads = [instrument.read for instrument in instruments]
-        self._groups = reduce(or_, (instrument.group for instrument in instruments))
-        self._at_rest = [None] * len(instruments)
-        self._reads_messages = not all(instrument.group for instrument in instruments)
-        self._accelerometer_watch = AccelerometerWatch(sensors, self._gravity)
-        self._output_smoothing = OutputSmoothing()
-        self._clock_resets = ClockResets()
-        self._buffer = DelayBuffer(self._capacity)
-        self.filter_us = 0
-        self._reading = _NOTHING
-        self._time_us = None
-        self._published_us = 0
-        self._estimate: Estimate | None = None
-        self._tests: Tests | None = None
-
     def _field_and_height(self, values: list[Value | None] | None) -> tuple[Vector | None, float | None]:
         """Return magnetic field and height of the barometer, by which a vehicle is aligned."""
         if values is None:
@@ -230,43 +232,19 @@ class Estimator:
         height_m = None if pressure is None else altitude_m(pressure[0])
         return None if field is None else (field[0], field[1], field[2]), height_m
 
-    def _fix_of(self, frame: SensorFrame) -> GpsFix | None:
-        if frame.gps is None:
-            return None
-        reason = self._gps_watch.reason(frame.gps, frame.time_us)
-        if reason is not None:
-            self._rejected.add(Source.GPS, reason)
-            return None
-        return frame.gps
-
     def _start(self, aligned: Aligned, time_us: int) -> None:
-        self._published_us = time_us
         self.filter.start(aligned, enu_of(aligned.fix.place, self._origin), time_us)
         for instrument, value in zip(self.filter.instruments, self._at_rest, strict=True):
             if instrument.smoothed and value is not None:
                 instrument.fuse(self.filter.x, self.filter.P, value, time_us)
-        self.filter_us = time_us
 
     def _start_in_air(self, caught: Caught, time_us: int) -> None:
         self.caught = True
-        self._published_us = time_us
         (e, n, u), (de, dn, du) = enu_of(caught.fix.place, self._origin), caught.moved_m
         self.filter.start_in_air(caught, (e + de, n + dn, u + du), time_us)
-        self.filter_us = time_us
-
-    def _put(self, before: Reading, interval_s: float, measured: Waiting) -> None:
-        """Put a sample into the buffer, and what was measured at its end beside it."""
-        if self._buffer.is_full():
-            self._take()
-        self._buffer.put(before, self._reading, interval_s, measured)
-
-    def _catch_up(self, now_us: int) -> None:
-        """Bring the filter to the instant that a fix received now would be of."""
-        while self._buffer.waiting and now_us - self._buffer.waiting[0].time_us >= self._delay_us:
-            self._take()
 
     def _take(self) -> None:
-        """Bring the filter on by one sample."""
+        """Bring the filter on by the oldest sample that waits, and fuse what was measured at its end."""
         filter_ = self.filter
         filter_.predict(self._buffer.samples, self._buffer.first)
         time_us, values = self._buffer.take()
@@ -321,7 +299,8 @@ class Estimator:
         bx, by, bz, ax, ay, az = filter_.x[10:16].tolist()
         p, q, r = self._reading.rate if self._reading.rate_good else (bx, by, bz)
         position, velocity, attitude = sigma[:3], sigma[3:6], sigma[6:9]
-        tests = self._tests = self._tests or filter_.tests
+        if self._tests is None:
+            self._tests, self._resets = filter_.tests, filter_.resets
         self._estimate = Estimate(
             StateFrame(
                 now_us,
@@ -336,9 +315,9 @@ class Estimator:
             (bx, by, bz),
             (ax, ay, az),
             self._health(now_us, sigma),
-            tests,
+            self._tests,
             self._rejected.counts,
-            filter_.resets,
+            self._resets,
             (-de, -dn, -du),
             self._check(now_us, since_us),
         )
@@ -390,7 +369,7 @@ class Estimator:
         self.filter.start(aligned, (0.0, 0.0, 0.0), 0)
         rest = Reading(force, (0.0, 0.0, 0.0), True, True)
         typical: list[Value | None] = [instrument.typical() for instrument in self.filter.instruments]
-        self._put(rest, self._interval_us * 1e-6, Waiting(self._interval_us, typical))
+        self._buffer.put(rest, self._reading, self._interval_us * 1e-6, Waiting(self._interval_us, typical))
         self._take()
         self._fuse(fix, self._interval_us)
         self._publish(self._interval_us)

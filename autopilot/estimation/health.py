@@ -1,4 +1,4 @@
-"""What the estimator's health means to people: lines when it changes, and reasons not to arm."""
+"""The estimator's health for people and telemetry: lines when it changes, reasons not to arm, ESTIMATOR_STATUS."""
 
 from collections.abc import Callable
 from functools import partial
@@ -14,13 +14,7 @@ from colibri.mavlink.wire.dialect import mav
 
 
 class _Matter(NamedTuple):
-    """Something that may be well or not.
-
-    Attributes:
-        well: Whether it is.
-        ceased: The line when it ceases to be.
-        again: The line when it is again.
-    """
+    """A condition of health, and the lines when it ceases to hold and when it holds again."""
 
     well: Callable[[Health], bool]
     ceased: str
@@ -33,11 +27,11 @@ def _is_valid(source: str, health: Health) -> bool:
 
 _MATTERS = (
     _Matter(lambda health: health.accelerometer, "accelerometer failed", "accelerometer is back"),
-    _Matter(lambda health: health.accel_bias, "accelerometer off: bias learned anew", "accelerometer believed again"),
+    _Matter(lambda health: health.accel_bias, "accelerometer off: bias reset", "accelerometer accepted again"),
     _Matter(lambda health: health.gyroscope, "gyroscope failed", "gyroscope is back"),
-    _Matter(lambda health: health.gyro_bias, "gyroscope off: bias learned anew", "gyroscope believed again"),
+    _Matter(lambda health: health.gyro_bias, "gyroscope off: bias reset", "gyroscope accepted again"),
     *(
-        _Matter(partial(_is_valid, row.source), f"{row.source} not believed", f"{row.source} believed again")
+        _Matter(partial(_is_valid, row.source), f"{row.source} not accepted", f"{row.source} accepted again")
         for row in ROWS
     ),
 )
@@ -76,12 +70,12 @@ class HealthWatch:
 
 
 def not_known(health: Health) -> str:
-    """Return what a vehicle that is to fly must know and does not; empty if there is nothing."""
+    """Return the parts of the state that are not known well enough to fly, as text; empty if all are."""
     return ", ".join(reason for known, reason in _UNKNOWN if not known(health))
 
 
-def told(estimate: Estimate) -> EstimatorState:
-    """Return an estimate's worth as telemetry tells it."""
+def estimator_state(estimate: Estimate) -> EstimatorState:
+    """Return flags, test ratios and accuracy of an estimate for telemetry."""
     health = estimate.health
     east, north, up = estimate.position_std_m
     ratios = [0.0] * len(Ratio)
@@ -89,10 +83,10 @@ def told(estimate: Estimate) -> EstimatorState:
         ratio = RATIOS[kind]
         ratios[ratio] = max(ratios[ratio], test.ratio)
     return EstimatorState(
-        flags=int(health.flags),
+        flags=health.flags,
         ratios=tuple(ratios),
         horizontal_accuracy_m=hypot(east, north),
         vertical_accuracy_m=up,
-        sensors=sum(row.bit for row in ROWS if row.kind in estimate.tests),
+        sensors=sum(row.bit for row in ROWS if row.name in estimate.tests),
         failed_sensors=sum(bit for well, bit in _SENSORS if not well(health)),
     )

@@ -1,7 +1,7 @@
 """Where the vehicle's state comes from: the simulator's frames, or the estimate from sensors."""
 
 from collections.abc import Callable
-from typing import Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.common.earth.geodesy import Geodetic
@@ -10,47 +10,28 @@ from colibri.mavlink.hil.sensors import OWN_MESSAGES, FixType, Frame, GpsFix, Se
 from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import Vehicle, VehicleError
 
+if TYPE_CHECKING:
+    from colibri.autopilot.estimation.estimator import Estimator
 
-class Estimating(Protocol):
-    """An estimator of one flight.
-
-    Attributes:
-        caught: Whether it began with a vehicle that fell, not with one that rested.
-    """
-
-    caught: bool
-
-    def step(self, frame: SensorFrame, /, *, asked: bool) -> Estimate | None:
-        """Take in the next frame; return None until the first estimate. Unless `asked`, an older one will do."""
-
-    def record(self) -> bytes:
-        """Return what is needed to go on after a restart; empty before the first estimate."""
-        ...
-
-    def resume(self, record: bytes, time_us: int, /) -> bool:
-        """Go on from a record, the next frame being of `time_us`; return whether that can be."""
-        ...
-
-
-Estimator: TypeAlias = Callable[[int], Estimating]
+NewEstimator: TypeAlias = Callable[[int], "Estimator"]
 """Makes an estimator for frames that are so many µs apart."""
 
 
-def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> Estimator | None:
+def estimator_for(feedback: Feedback, vehicle: Vehicle, origin: Geodetic) -> NewEstimator | None:
     """Return the estimator of `vehicle`, whose ENU frame begins at `origin`; None where the simulator sends the state.
 
     Raises:
-        VehicleError: Sensors are asked for that the vehicle has not.
+        VehicleError: The vehicle has no sensors.
     """
     if feedback is Feedback.STATE:
         return None
     sensors = vehicle.sensors
     if sensors is None:
         raise VehicleError(f"{vehicle.name} has no sensors: fly a vehicle with a table sensors, or --feedback state")
-    from colibri.autopilot.estimation import estimator  # only where there is something to estimate
+    from colibri.autopilot.estimation.estimator import Estimator  # slow to load
 
     gravity_m_s2 = vehicle.gravity_m_s2
-    return lambda interval_us: estimator.Estimator(sensors, gravity_m_s2, origin, interval_us)
+    return lambda interval_us: Estimator(sensors, gravity_m_s2, origin, interval_us)
 
 
 _LATE_US = 1_000_000
@@ -64,10 +45,10 @@ class StateSource:
     Attributes:
         estimate: The last one; None before the first, and where the simulator sends the state.
         sensed: What was measured on board last.
-        latest: The last of each sensor that tells in a message of its own, by the frame's field.
+        latest: The last of each sensor with a message of its own, by the frame's field.
     """
 
-    def __init__(self, estimator: Estimator | None, interval_us: int) -> None:
+    def __init__(self, estimator: NewEstimator | None, interval_us: int) -> None:
         """Estimate by `estimator` from frames `interval_us` apart; without one there are no frames of sensors.
 
         What is compiled is loaded here, not at the first frame.
@@ -108,7 +89,7 @@ class StateSource:
         """
         if isinstance(frame, StateFrame):
             return frame
-        assert self._make is not None, "frames of sensors come to who asks for them"
+        assert self._make is not None, "frames of sensors come only where there is an estimator"
         if self._estimating is None or self._begins_again(frame):
             self._estimating, self.estimate = self._make(self._interval_us), None
         self._time_us = frame.time_us

@@ -15,7 +15,7 @@ from colibri.autopilot.control.interface import (
     PlanColumns,
     VehicleState,
 )
-from colibri.autopilot.estimation.health import told
+from colibri.autopilot.estimation.health import estimator_state
 from colibri.autopilot.estimation.state_source import StateSource
 from colibri.autopilot.ground.forecast import Forecaster
 from colibri.autopilot.ground.stations import Stations
@@ -128,7 +128,7 @@ class SnapshotBuilder:
             sensed=state_source.sensed,
             fix=state_source.fix,
             latest=dict(state_source.latest),
-            estimator=None if state_source.estimate is None else told(state_source.estimate),
+            estimator=None if state_source.estimate is None else estimator_state(state_source.estimate),
         )
 
     def _solver_state(

@@ -108,7 +108,7 @@ class AutopilotLog:
         state = (*frame.position_enu_m, *frame.velocity_enu_m_s, *frame.attitude, *frame.rate_flu_rad_s)
         deviations = (*estimate.position_std_m, *estimate.velocity_std_m_s, *estimate.attitude_std_rad)
         biases = (*estimate.gyro_bias_rad_s, *estimate.accel_bias_m_s2)
-        counts = (int(estimate.health.flags), sum(estimate.rejected.values()), estimate.resets)
+        counts = (estimate.health.flags, sum(estimate.rejected.values()), estimate.resets)
         log.write((frame.time_us / 1e6, *state, *deviations, *biases, *counts))
 
 

@@ -2,7 +2,7 @@
 
 from colibri.autopilot.estimation import eskf_update as update
 from colibri.autopilot.estimation.eskf_predict import BARO_OFFSET
-from colibri.autopilot.estimation.measurements.instrument import Ratio, Row, Value
+from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio, Value
 from colibri.autopilot.estimation.measurements.kind import Kind
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
@@ -21,26 +21,22 @@ _INFLATED_M = 100.0
 _TYPICAL_PA = 95e3
 
 
-class Barometer:
+class Barometer(Instrument):
     """The barometer of one flight.
 
     Attributes:
-        source: Whose rejections are counted.
-        kind: Its tests.
-        group: Of `Updated`.
-        smoothed: Its corrections are not given in with time.
         height_m: Of the last pressure.
     """
 
-    source: str = Source.BAROMETER
+    part, name, numbers = "barometer", "pressure", 1
+    source, bit, ratio = Source.BAROMETER, mav.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, Ratio.HEIGHT
     group = Updated.BAROMETER
-    smoothed = False
 
     def __init__(self, sensors: Sensors, _field_enu_gauss: Vector) -> None:
         """Expect any weather."""
         self._noise_pa = sensors.barometer.noise_pa
-        self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (BARO_OFFSET, 1, _INFLATED_M))
-        self._watch = Watch(_MIN_PA, _MAX_PA, _FROZEN_US)
+        self.kind = Kind(self.name, self.numbers, _PATIENCE_US, (BARO_OFFSET, 1, _INFLATED_M))
+        self._watch = Watch(self.source, _MIN_PA, _MAX_PA, _FROZEN_US)
         self.height_m = 0.0
 
     @property
@@ -53,11 +49,7 @@ class Barometer:
         if frame.updated & self.group != self.group:
             return None
         value = (frame.pressure_pa,)
-        reason = self._watch.reason(value, frame.time_us)
-        if reason is not None:
-            rejected.add(self.source, reason)
-            return None
-        return value if self._watch.is_new else None
+        return value if self._watch.accepts(value, frame.time_us, rejected) and self._watch.is_new else None
 
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
         """Fuse a pressure, Pa."""
@@ -70,14 +62,3 @@ class Barometer:
     def typical(self) -> Value:
         """Return the pressure of a place that is not high."""
         return (_TYPICAL_PA,)
-
-
-ROW = Row(
-    part="barometer",
-    kind="pressure",
-    numbers=1,
-    source=Source.BAROMETER,
-    bit=mav.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE,
-    ratio=Ratio.HEIGHT,
-    fit=Barometer,
-)

@@ -1,8 +1,7 @@
-"""What the estimator asks of a sensor: a value of each frame that can be, and that value fused."""
+"""The interface of a sensor to the estimator: a value read from each frame, and that value fused."""
 
-from collections.abc import Callable
 from enum import IntEnum
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import ClassVar, Protocol, TypeAlias
 
 from colibri.autopilot.estimation.measurements.kind import Kind
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected
@@ -26,19 +25,32 @@ class Ratio(IntEnum):
 
 
 class Instrument(Protocol):
-    """A sensor as the filter fuses it.
+    """A sensor as the filter fuses it: a class for each that may be fitted, an instance for each flight.
 
     Attributes:
+        part: Table of the vehicle file's sensors; a vehicle without it has no such instrument.
+        name: Of its measurement in tests and logs.
+        numbers: How many it measures at once.
         source: Whose rejections are counted.
-        kind: Its tests.
-        group: Of `Updated`; 0 where it tells in a message of its own.
+        bit: MAV_SYS_STATUS_SENSOR.
+        ratio: By which ESTIMATOR_STATUS reports its tests.
+        group: Of `Updated`; 0 where it is measured in a message of its own.
         smoothed: Whether its corrections are given in with time, as those of GPS are.
+        kind: Its tests.
     """
 
-    source: str
+    part: ClassVar[str]
+    name: ClassVar[str]
+    numbers: ClassVar[int]
+    source: ClassVar[str]
+    bit: ClassVar[int]
+    ratio: ClassVar[Ratio]
+    group: ClassVar[int] = 0
+    smoothed: ClassVar[bool] = False
     kind: Kind
-    group: int
-    smoothed: bool
+
+    def __init__(self, sensors: Sensors, field_enu_gauss: Vector) -> None:
+        """Begin a flight with `sensors` where the earth's magnetic field is `field_enu_gauss`."""
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
         """Return what it measured at a frame; None where there is nothing new, or nothing that can be."""
@@ -49,25 +61,3 @@ class Instrument(Protocol):
     def typical(self) -> Value:
         """Return a value of a vehicle that rests at the origin, by which what is compiled is loaded."""
         ...
-
-
-class Row(NamedTuple):
-    """A sensor that may be fitted.
-
-    Attributes:
-        part: Table of the vehicle file's sensors; a vehicle without it has no such instrument.
-        kind: Name of its measurement in tests and logs.
-        numbers: How many it measures at once.
-        source: Whose rejections are counted.
-        bit: MAV_SYS_STATUS_SENSOR.
-        ratio: By which ESTIMATOR_STATUS tells its tests.
-        fit: (sensors, the earth's magnetic field in gauss ENU) -> the instrument of one flight.
-    """
-
-    part: str
-    kind: str
-    numbers: int
-    source: str
-    bit: int
-    ratio: Ratio
-    fit: Callable[[Sensors, Vector], Instrument]

@@ -6,7 +6,7 @@ import numpy as np
 
 from colibri.autopilot.estimation import eskf_update as update
 from colibri.autopilot.estimation.eskf_predict import HARD_IRON
-from colibri.autopilot.estimation.measurements.instrument import Ratio, Row, Value
+from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio, Value
 from colibri.autopilot.estimation.measurements.kind import Kind
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
@@ -25,37 +25,30 @@ _PATIENCE_US = 10_000_000
 _INFLATED_GAUSS = 0.3
 
 
-class Magnetometer:
+class Magnetometer(Instrument):
     """The magnetometer of one flight.
 
     Attributes:
-        source: Whose rejections are counted.
-        kind: Its tests.
-        group: Of `Updated`.
-        smoothed: Its corrections are not given in with time.
         variance: Of a value, gauss².
     """
 
-    source: str = Source.MAGNETOMETER
+    part, name, numbers = "magnetometer", "field", 3
+    source, bit, ratio = Source.MAGNETOMETER, mav.MAV_SYS_STATUS_SENSOR_3D_MAG, Ratio.FIELD
     group = Updated.MAGNETOMETER
-    smoothed = False
 
     def __init__(self, sensors: Sensors, field_enu_gauss: Vector) -> None:
         """Expect the field of the earth."""
         self._field = np.array(field_enu_gauss)
         self.variance = square(max(sensors.magnetometer.noise_gauss, _MIN_NOISE_GAUSS))
-        self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (HARD_IRON, 3, _INFLATED_GAUSS))
-        self._watch = Watch(-_MAX_GAUSS, _MAX_GAUSS, _FROZEN_US)
+        self.kind = Kind(self.name, self.numbers, _PATIENCE_US, (HARD_IRON, 3, _INFLATED_GAUSS))
+        self._watch = Watch(self.source, -_MAX_GAUSS, _MAX_GAUSS, _FROZEN_US)
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
         """Return a field, gauss FLU."""
         if frame.updated & self.group != self.group:
             return None
-        reason = self._watch.reason(frame.magnetic_field_flu_gauss, frame.time_us)
-        if reason is not None:
-            rejected.add(self.source, reason)
-            return None
-        return frame.magnetic_field_flu_gauss if self._watch.is_new else None
+        value = frame.magnetic_field_flu_gauss
+        return value if self._watch.accepts(value, frame.time_us, rejected) and self._watch.is_new else None
 
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
         """Fuse a field, gauss FLU."""
@@ -69,14 +62,3 @@ class Magnetometer:
     def typical(self) -> Value:
         """Return the earth's field of a level vehicle that looks east."""
         return tuple(self._field.tolist())
-
-
-ROW = Row(
-    part="magnetometer",
-    kind="field",
-    numbers=3,
-    source=Source.MAGNETOMETER,
-    bit=mav.MAV_SYS_STATUS_SENSOR_3D_MAG,
-    ratio=Ratio.FIELD,
-    fit=Magnetometer,
-)

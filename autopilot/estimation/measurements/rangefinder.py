@@ -11,7 +11,7 @@ import numpy as np
 
 from colibri.autopilot.estimation.eskf_predict import ATTITUDE, ERRORS, POSITION
 from colibri.autopilot.estimation.eskf_update import fuse_rows
-from colibri.autopilot.estimation.measurements.instrument import Ratio, Row, Value
+from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio, Value
 from colibri.autopilot.estimation.measurements.kind import Kind
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected
@@ -33,19 +33,15 @@ _FROZEN_US = 500_000
 _PATIENCE_US = 7_000_000
 
 
-class RangefinderBelow:
-    """The rangefinder of one flight.
+class RangefinderBelow(Instrument):
+    """The rangefinder of one flight; smoothed, as one that comes near the ground again may be off by decimetres.
 
     Attributes:
-        source: Whose rejections are counted.
-        kind: Its tests.
-        group: It tells in a message of its own.
-        smoothed: Its corrections are given in with time: one that comes near the ground again may be off by decimetres.
         ground_m: Where the ground is, z of ENU, less what the vehicle stands on.
     """
 
-    source = "rangefinder"
-    group = 0
+    part, name, numbers = "rangefinder", "distance", 1
+    source, bit, ratio = "rangefinder", mav.MAV_SYS_STATUS_SENSOR_LASER_POSITION, Ratio.ABOVE_GROUND
     smoothed = True
 
     def __init__(self, sensors: Sensors, _field_enu_gauss: Vector) -> None:
@@ -54,9 +50,9 @@ class RangefinderBelow:
         assert part is not None, "what is fitted is described"
         self._part = part
         self._beam = np.array([cos(0.5 * part.field_of_view_rad), sin(0.5 * part.field_of_view_rad)])
-        self._watch = Watch(part.min_m, part.max_m, _FROZEN_US if part.noise_m > 0.0 else inf)
+        self._watch = Watch(self.source, part.min_m, part.max_m, _FROZEN_US if part.noise_m > 0.0 else inf)
         self._y = np.zeros(1)
-        self.kind = Kind(ROW.kind, ROW.numbers, _PATIENCE_US, (POSITION, 0, 0.0))
+        self.kind = Kind(self.name, self.numbers, _PATIENCE_US, (POSITION, 0, 0.0))
         self.ground_m = 0.0
 
     def read(self, frame: SensorFrame, rejected: Rejected) -> Value | None:
@@ -64,11 +60,7 @@ class RangefinderBelow:
         if frame.distance is None:
             return None
         value = (frame.distance.distance_m,)
-        reason = None if value == (inf,) else self._watch.reason(value, frame.time_us)
-        if reason is not None:
-            rejected.add(self.source, reason)
-            return None
-        return value
+        return value if value == (inf,) or self._watch.accepts(value, frame.time_us, rejected) else None
 
     def fuse(self, x: Array, P: Array, value: Value, time_us: int) -> Reason | None:
         """Fuse a distance, m, where it is that of the ground below."""
@@ -130,14 +122,3 @@ def fuse_distance(
     H[0, ATTITUDE + 1] = -distance / along * slope * up_x
     y[0] = measured - distance
     return fuse_rows(x, P, H, y, variance, gate)
-
-
-ROW = Row(
-    part="rangefinder",
-    kind="distance",
-    numbers=1,
-    source=RangefinderBelow.source,
-    bit=mav.MAV_SYS_STATUS_SENSOR_LASER_POSITION,
-    ratio=Ratio.ABOVE_GROUND,
-    fit=RangefinderBelow,
-)

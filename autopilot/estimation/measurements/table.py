@@ -1,44 +1,39 @@
 """The table of what the filter fuses: a sensor that is added is a row here and a file beside."""
 
-from colibri.autopilot.estimation.measurements import barometer, magnetometer, rangefinder
 from colibri.autopilot.estimation.measurements.barometer import Barometer
-from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio, Row
+from colibri.autopilot.estimation.measurements.instrument import Instrument, Ratio
 from colibri.autopilot.estimation.measurements.magnetometer import Magnetometer
+from colibri.autopilot.estimation.measurements.rangefinder import RangefinderBelow
 from colibri.common.types import Vector
 from colibri.plant.vehicle.sensors import Sensors
 
-ROWS: tuple[Row, ...] = (magnetometer.ROW, barometer.ROW, rangefinder.ROW)
+ROWS: tuple[type[Instrument], ...] = (Magnetometer, Barometer, RangefinderBelow)
 """In the order in which what was measured at one instant is fused. Every vehicle has the first two."""
 
 GPS_KINDS = {"velocity": 3, "position": 2, "height": 1}
 """A fix is three measurements."""
 KINDS: dict[str, int] = {
     **GPS_KINDS,
-    barometer.ROW.kind: barometer.ROW.numbers,
-    **{row.kind: row.numbers for row in ROWS},
+    Barometer.name: Barometer.numbers,
+    **{row.name: row.numbers for row in ROWS},
 }
 """Every kind of measurement and how many numbers it has, in the order of logs and tables."""
 RATIOS: dict[str, Ratio] = {
     "velocity": Ratio.VELOCITY,
     "position": Ratio.POSITION,
     "height": Ratio.HEIGHT,
-    **{row.kind: row.ratio for row in ROWS},
+    **{row.name: row.ratio for row in ROWS},
 }
-
-
-def rows_of(sensors: Sensors) -> list[Row]:
-    """Return what a vehicle has of the table."""
-    return [row for row in ROWS if getattr(sensors, row.part) is not None]
 
 
 def kinds_of(sensors: Sensors) -> list[str]:
     """Return what a vehicle measures, in the order of `KINDS`."""
-    fitted = {row.kind for row in rows_of(sensors)}
-    return [kind for kind in KINDS if kind in GPS_KINDS or kind in fitted]
+    missing = {row.name for row in ROWS if getattr(sensors, row.part) is None}
+    return [kind for kind in KINDS if kind not in missing]
 
 
 def instruments_of(sensors: Sensors, field_enu_gauss: Vector) -> tuple[Magnetometer, Barometer, tuple[Instrument, ...]]:
     """Return the instruments of one flight: the two that every vehicle has, and all of them."""
     field, pressure = Magnetometer(sensors, field_enu_gauss), Barometer(sensors, field_enu_gauss)
-    others = [row.fit(sensors, field_enu_gauss) for row in rows_of(sensors)[2:]]
+    others = [row(sensors, field_enu_gauss) for row in ROWS[2:] if getattr(sensors, row.part) is not None]
     return field, pressure, (field, pressure, *others)

@@ -22,20 +22,18 @@ _BRIDGED_US = 20_000
 class _Axes:
     """One of the two, watched."""
 
-    def __init__(self, source: Source, group: int, maximum: float, noise: float, rejected: Rejected) -> None:
-        self._source, self._group, self._rejected = source, int(group), rejected
-        self._watch = Watch(-maximum, maximum, _PATIENCE_US if noise > 0.0 else inf)
+    def __init__(self, source: Source, group: int, maximum: float, noise: float) -> None:
+        self._group = group
+        maximum *= _BEYOND_RANGE
+        self._watch = Watch(source, -maximum, maximum, _PATIENCE_US if noise > 0.0 else inf)
         self._time_us: int | None = None
         self.value: Vector = (0.0, 0.0, 0.0)
 
-    def read(self, frame: SensorFrame, value: Vector) -> bool:
+    def read(self, frame: SensorFrame, value: Vector, rejected: Rejected) -> bool:
         """Read a value; return whether the one that is held can be used at this frame."""
-        if frame.updated & self._group == self._group:
-            reason = self._watch.reason(value, frame.time_us)
-            if reason is None:
-                self.value, self._time_us = value, frame.time_us
-                return True
-            self._rejected.add(self._source, reason)
+        if frame.updated & self._group == self._group and self._watch.accepts(value, frame.time_us, rejected):
+            self.value, self._time_us = value, frame.time_us
+            return True
         return self._time_us is not None and frame.time_us - self._time_us <= _BRIDGED_US
 
 
@@ -54,25 +52,16 @@ class Inertial:
     def __init__(self, sensors: Sensors, rejected: Rejected) -> None:
         """Read accelerometer and gyroscope of `sensors`, and count what is rejected."""
         accel, gyro = sensors.accelerometer, sensors.gyroscope
+        self._rejected = rejected
         self._force = _Axes(
-            Source.ACCELEROMETER,
-            Updated.ACCELEROMETER,
-            accel.range_m_s2 * _BEYOND_RANGE,
-            accel.noise_density_m_s2_rthz,
-            rejected,
+            Source.ACCELEROMETER, Updated.ACCELEROMETER, accel.range_m_s2, accel.noise_density_m_s2_rthz
         )
-        self._rate = _Axes(
-            Source.GYROSCOPE,
-            Updated.GYROSCOPE,
-            gyro.range_rad_s * _BEYOND_RANGE,
-            gyro.noise_density_rad_s_rthz,
-            rejected,
-        )
+        self._rate = _Axes(Source.GYROSCOPE, Updated.GYROSCOPE, gyro.range_rad_s, gyro.noise_density_rad_s_rthz)
 
     def read(self, frame: SensorFrame) -> Reading:
         """Read one frame."""
-        force_good = self._force.read(frame, frame.specific_force_flu_m_s2)
-        rate_good = self._rate.read(frame, frame.rate_flu_rad_s)
+        force_good = self._force.read(frame, frame.specific_force_flu_m_s2, self._rejected)
+        rate_good = self._rate.read(frame, frame.rate_flu_rad_s, self._rejected)
         return Reading(self._force.value, self._rate.value, force_good, rate_good)
 
 

@@ -1,8 +1,8 @@
-"""Whether a sensor can have measured its value: finite, within its range, and alive."""
+"""Plausibility of what frames hold: values finite, in range and alive; fixes; time that follows."""
 
 from math import inf, isfinite
 
-from colibri.autopilot.estimation.sensing.rejection import Reason
+from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
 from colibri.common.earth.geodesy import is_on_earth
 from colibri.mavlink.hil.sensors import GpsFix
 
@@ -11,7 +11,10 @@ _MIN_HEIGHT_M, _MAX_HEIGHT_M = -1000.0, 30e3
 _MIN_FIX, _BEST_FIX = 3, 6
 _GPS_PATIENCE_US = 2_000_000
 _NOWHERE = (0.0, 0.0)
-"""Latitude and longitude of who does not know them, in the Gulf of Guinea."""
+"""Latitude and longitude that receivers without a fix report, in the Gulf of Guinea."""
+MAX_GAP_US = 1_000_000
+_SETTLED = 25
+"""Stray frames after which the clock counts as reset."""
 
 
 class Watch:
@@ -21,24 +24,26 @@ class Watch:
         is_new: Whether the last value differs from the one before: what a simulator sends twice is measured once.
     """
 
-    def __init__(self, minimum: float, maximum: float, patience_us: float) -> None:
-        """Take values from `minimum` to `maximum`, unless they stay the same to the last bit for `patience_us`."""
-        self._minimum, self._maximum, self._patience_us = minimum, maximum, patience_us
+    def __init__(self, source: str, minimum: float, maximum: float, patience_us: float) -> None:
+        """Accept values from `minimum` to `maximum`, unless they stay the same to the last bit for `patience_us`."""
+        self._source, self._minimum, self._maximum, self._patience_us = source, minimum, maximum, patience_us
         self._last: tuple[float, ...] = ()
         self._changed_us = 0
         self.is_new = False
 
-    def reason(self, values: tuple[float, ...], time_us: int) -> Reason | None:
-        """Return why `values`, measured at `time_us`, must be rejected; None if they need not."""
+    def accepts(self, values: tuple[float, ...], time_us: int, rejected: Rejected) -> bool:
+        """Whether `values`, measured at `time_us`, can be; those that cannot are counted in `rejected`."""
         for value in values:
             if not self._minimum <= value <= self._maximum:
-                return Reason.RANGE if all(map(isfinite, values)) else Reason.NOT_FINITE
+                rejected.add(self._source, _reason(values))
+                return False
         self.is_new = values != self._last
         if self.is_new:
             self._last, self._changed_us = values, time_us
         elif time_us - self._changed_us > self._patience_us:
-            return Reason.FROZEN
-        return None
+            rejected.add(self._source, Reason.FROZEN)
+            return False
+        return True
 
 
 class GpsWatch:
@@ -51,19 +56,45 @@ class GpsWatch:
     def __init__(self) -> None:
         """Begin before the first fix."""
         self.time_us: int | None = None
-        self._alive = Watch(-inf, inf, _GPS_PATIENCE_US)
+        self._alive = Watch(Source.GPS, -inf, inf, _GPS_PATIENCE_US)
 
-    def reason(self, fix: GpsFix, now_us: int) -> Reason | None:
-        """Return why a fix, received by `now_us`, must be rejected; None if it need not."""
-        if not _MIN_FIX <= fix.fix_type <= _BEST_FIX or fix.place[:2] == _NOWHERE:
-            return Reason.NO_FIX
+    def accepts(self, fix: GpsFix, now_us: int, rejected: Rejected) -> bool:
+        """Whether a fix, received by `now_us`, can be; one that cannot is counted in `rejected`."""
         numbers = (*fix.place, *fix.velocity_enu_m_s)
-        if not _possible(*numbers):
-            return Reason.RANGE if all(map(isfinite, numbers)) else Reason.NOT_FINITE
-        if fix.time_us > now_us or (self.time_us is not None and fix.time_us <= self.time_us):
-            return Reason.TIME
-        self.time_us = fix.time_us
-        return self._alive.reason(numbers, fix.time_us)
+        if not _MIN_FIX <= fix.fix_type <= _BEST_FIX or fix.place[:2] == _NOWHERE:
+            rejected.add(Source.GPS, Reason.NO_FIX)
+        elif not _possible(*numbers):
+            rejected.add(Source.GPS, _reason(numbers))
+        elif fix.time_us > now_us or (self.time_us is not None and fix.time_us <= self.time_us):
+            rejected.add(Source.GPS, Reason.TIME)
+        else:
+            self.time_us = fix.time_us
+            return self._alive.accepts(numbers, fix.time_us, rejected)
+        return False
+
+
+class ClockResets:
+    """Counts frames that follow one another and not the clock: a few are strays, many a clock that was reset."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._time_us: int | None = None
+        self._count = 0
+
+    def settle(self, time_us: int) -> bool:
+        """Take the time of a stray frame; return whether enough of them agree on another clock."""
+        follows = self._time_us is not None and 0 < time_us - self._time_us <= MAX_GAP_US
+        self._count = self._count + 1 if follows else 1
+        self._time_us = time_us
+        return self._count >= _SETTLED
+
+    def clear(self) -> None:
+        """Reset: a frame has followed the clock."""
+        self._time_us = None
+
+
+def _reason(values: tuple[float, ...]) -> Reason:
+    return Reason.RANGE if all(map(isfinite, values)) else Reason.NOT_FINITE
 
 
 def _possible(latitude_deg: float, longitude_deg: float, altitude_m: float, ve: float, vn: float, vu: float) -> bool:

@@ -7,10 +7,11 @@ import pytest
 
 from colibri.autopilot.estimation import eskf_update as update
 from colibri.autopilot.estimation.eskf_predict import ERRORS, NOMINAL, SAMPLE, Noise, look_ahead, predict, strap_down
+from colibri.common.jit import packed
 from colibri.common.types import Array
 
 GRAVITY = 9.81
-QUIET = Noise(0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0), 60.0, 0.0, 0.0)
+QUIET = packed(Noise(0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0), 60.0, 0.0, 0.0))
 FIELD = np.array([0.01, 0.21, -0.43])
 
 

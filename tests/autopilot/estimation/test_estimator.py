@@ -8,12 +8,13 @@ from math import hypot, nan
 import numpy as np
 import pytest
 
-from colibri.autopilot.estimation.estimate import Estimate, StatusFlags
+from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.estimator import Estimator
 from colibri.autopilot.estimation.sensing.rejection import Reason, Source
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.common.rotations import earth_from_body
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
+from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.plant.vehicle.sensors import Sensors
 from tests import sensor_source as source
@@ -69,14 +70,14 @@ def test_it_begins_after_a_second_of_rest_with_a_fix() -> None:
     first = next(one for one in estimates(flight.frames) if one is not None)
     assert 1.0 <= first.frame.time_us * 1e-6 <= 1.2
     assert first.health.flags == (
-        StatusFlags.ATTITUDE
-        | StatusFlags.VELOCITY_HORIZ
-        | StatusFlags.VELOCITY_VERT
-        | StatusFlags.POS_HORIZ_REL
-        | StatusFlags.POS_HORIZ_ABS
-        | StatusFlags.POS_VERT_ABS
-        | StatusFlags.PRED_POS_HORIZ_REL
-        | StatusFlags.PRED_POS_HORIZ_ABS
+        mav.ESTIMATOR_ATTITUDE
+        | mav.ESTIMATOR_VELOCITY_HORIZ
+        | mav.ESTIMATOR_VELOCITY_VERT
+        | mav.ESTIMATOR_POS_HORIZ_REL
+        | mav.ESTIMATOR_POS_HORIZ_ABS
+        | mav.ESTIMATOR_POS_VERT_ABS
+        | mav.ESTIMATOR_PRED_POS_HORIZ_REL
+        | mav.ESTIMATOR_PRED_POS_HORIZ_ABS
     )
     assert not first.rejected
 

@@ -15,12 +15,12 @@ def test_nothing_is_said_while_all_is_well() -> None:
 def test_each_change_is_said_once() -> None:
     watch = HealthWatch()
     lost = WELL._replace(not_accepted=(Source.MAGNETOMETER,))
-    assert watch.lines(lost) == [(WARNING, "magnetometer not believed")]
+    assert watch.lines(lost) == [(WARNING, "magnetometer not accepted")]
     assert watch.lines(lost) == []
     assert watch.lines(lost._replace(not_accepted=(Source.MAGNETOMETER, Source.BAROMETER))) == [
-        (WARNING, "barometer not believed")
+        (WARNING, "barometer not accepted")
     ]
-    assert watch.lines(WELL) == [(INFO, "magnetometer believed again"), (INFO, "barometer believed again")]
+    assert watch.lines(WELL) == [(INFO, "magnetometer accepted again"), (INFO, "barometer accepted again")]
 
 
 def test_what_is_not_known_is_named() -> None:

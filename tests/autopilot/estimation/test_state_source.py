@@ -6,6 +6,7 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.estimate import Estimate, Health
+from colibri.autopilot.estimation.estimator import Estimator
 from colibri.autopilot.estimation.state_source import StateSource, estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.tracks import track
@@ -29,7 +30,7 @@ def known(frame: StateFrame) -> Estimate:
     return Estimate(frame, ZERO, ZERO, ZERO, ZERO, ZERO, WELL, {}, {}, 0, ZERO, None)
 
 
-class Standing:
+class Standing(Estimator):
     """Knows after a while that the vehicle stands under the spiral's start."""
 
     made: int = 0
@@ -40,7 +41,7 @@ class Standing:
         Standing.made += 1
         self._began_us: int | None = None
 
-    def step(self, frame: SensorFrame, /, *, asked: bool) -> Estimate | None:
+    def step(self, frame: SensorFrame, *, asked: bool = True) -> Estimate | None:
         del asked
         if self._began_us is None:
             self._began_us = frame.time_us
@@ -51,7 +52,7 @@ class Standing:
     def record(self) -> bytes:
         return b""
 
-    def resume(self, record: bytes, time_us: int, /) -> bool:
+    def resume(self, record: bytes, time_us: int) -> bool:
         del record, time_us
         return False
 

@@ -10,8 +10,8 @@ from colibri.mavlink.hil.faults import ACCELEROMETER, GYROSCOPE, OK, SLOW, WRONG
 from colibri.mavlink.hil.feedback import Feedback
 from tools.harness.copter_flight import ACCEPTED, CopterFlight
 
-OFF, WELL = "accelerometer off: bias learned anew", "accelerometer believed again"
-TURNS = "gyroscope off: bias learned anew"
+OFF, WELL = "accelerometer off: bias reset", "accelerometer accepted again"
+TURNS = "gyroscope off: bias reset"
 
 
 def stays(flight: CopterFlight, seconds: float, max_m: Vector) -> None:

@@ -159,7 +159,7 @@ SCENARIOS = (
             takeoff(10.0),
             inject("sensor_gyro", "wrong", 0, 0.1, 0.0, 0.0),
             moves_less(1.0, 30.0),
-            check(says("gyroscope off: bias learned anew")),
+            check(says("gyroscope off: bias reset")),
         ),
         setting=ON_SENSORS,
     ),
