@@ -21,7 +21,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from colibri.autopilot.estimation.eskf import Filter
+from colibri.autopilot.estimation.measurements.barometer import Barometer
+from colibri.autopilot.estimation.measurements.kind import Kind
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.earth.atmosphere import METRES_PER_PASCAL
 from colibri.common.elementary import square
@@ -46,7 +47,7 @@ _BEFORE_S, _FEWEST_BEFORE = 1.0, 4
 _ONSET_S = 0.05
 _MAX_GAP_S = 0.35
 _ALONG_PART = 0.5
-"""The part of the bias along body z from which on the barometer is asked."""
+"""The part of the bias along body z from which on the barometer must agree."""
 _ALIKE_PART = 0.5
 """Two sensors agree whose figures differ by no more than this part of the larger."""
 _CLEAR = 9.0
@@ -88,12 +89,11 @@ class AccelerometerWatch:
         self._resets = 0
         find_bias(np.zeros((_FEWEST_FIXES, ROW)), 0, 1.0, 1.0, gravity_m_s2, np.zeros((3, 3)))
 
-    def look(self, time_us: int, state: list[float], filter_: Filter) -> Found | None:
-        """Look at a fix of `time_us` which the filter has tested; return what it tells, if it does.
+    def look(self, time_us: int, state: list[float], velocity: Kind, barometer: Barometer) -> Found | None:
+        """Look at a fix of `time_us` after its test; return the bias that it shows, if it does.
 
-        `state` (10,) is the filter's nominal state before that.
+        `state` (10,) is the filter's nominal state before that test.
         """
-        velocity, barometer = filter_.velocity, filter_.barometer
         if velocity.resets != self._resets:
             self._resets = velocity.resets
             self._fixes.clear()

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.estimation import eskf_update as update
+from colibri.autopilot.estimation.accelerometer_bias import Found
 from colibri.autopilot.estimation.eskf_predict import (
     ACCEL_BIAS,
     ATTITUDE,
@@ -223,26 +224,16 @@ class Filter:
             accepted &= self.height.force_accept(x, P, time_us, update.fuse_height, z[:3], after_s, variances[2])
         return None if accepted else Reason.INNOVATION
 
-    def reset_accel_bias(
-        self, change_m_s2: Array, variance: float, velocity_m_s: Array, position_m: Array, time_us: int
-    ) -> None:
-        """Reset the accelerometer's bias, and undo what its change has done since.
-
-        Args:
-            change_m_s2: Of the bias, FLU.
-            variance: Of the change, along each axis, (m/s²)².
-            velocity_m_s: What the velocity lacks by it, ENU.
-            position_m: What the position lacks, ENU.
-            time_us: Now.
-        """
+    def reset_accel_bias(self, found: Found, time_us: int) -> None:
+        """Reset the accelerometer's bias by what was `found`, and undo what its change has done since."""
         x, P = self.x, self.P
-        x[:3] += position_m
-        x[3:6] += velocity_m_s
-        x[13:16] += change_m_s2
-        moved_m = _UNSURE_PART * float(np.abs(position_m).max())
+        x[:3] += found.position_m
+        x[3:6] += found.velocity_m_s
+        x[13:16] += found.bias_m_s2
+        moved_m = _UNSURE_PART * float(np.abs(found.position_m).max())
         update.inflate_covariance(P, POSITION, 3, moved_m * moved_m)
         update.inflate_covariance(P, VELOCITY, 3, self._fix_variances[0])
-        update.inflate_covariance(P, ACCEL_BIAS, 3, _UNSURE_TIMES * variance)
+        update.inflate_covariance(P, ACCEL_BIAS, 3, _UNSURE_TIMES * found.variance)
         self.velocity.resets += 1
         self.velocity.accept(time_us)
         self.accel_bias_us = time_us
@@ -250,10 +241,7 @@ class Filter:
     def reset_gyro_bias(self, turned_rad: float, since_s: float, time_us: int) -> None:
         """Inflate the covariance of what a gyroscope that is off has spoilt: attitude, bias, the velocity contradicted.
 
-        Args:
-            turned_rad: By how much the magnetic field has turned.
-            since_s: For how long it has.
-            time_us: Now.
+        The magnetic field has turned by `turned_rad` within `since_s`.
         """
         P, angle_rad = self.P, _UNSURE_TURN * turned_rad
         update.inflate_covariance(P, ATTITUDE, 3, angle_rad * angle_rad)

@@ -139,17 +139,10 @@ def predict(x: Array, P: Array, samples: Array, row: int, packed: Packed, gravit
 
 @compiled
 def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravity: float, now: Array) -> None:
-    """Write the state that `count` samples after the filter's lead to, and how well it is known.
+    """Write the state that `count` samples after the filter's lead to, and how well it is known, to `now`, (19,).
 
-    Args:
-        x: Nominal state of the filter, (23,).
-        P: Its covariance.
-        samples: A ring of samples, (n, 9).
-        first: The one that follows the filter's state.
-        count: How many.
-        gravity: m/s².
-        now: Position, velocity, attitude (10,); standard deviations of position, of velocity (ENU), and of attitude
-            about east, north and up, rad (9,).
+    That is position, velocity, attitude (10,); standard deviations of position, of velocity (ENU), and of attitude
+    about east, north and up, rad (9,). `samples` is a ring, (n, 9), and row `first` follows the filter's state.
     """
     ahead = x.copy()
     delay, row = 0.0, first

@@ -3,8 +3,8 @@
 J. Solà, Quaternion kinematics for the error-state Kalman filter, arXiv:1711.02508, section 6: gain and update (275),
 Joseph's form of the covariance, the error put into the nominal state (283) and reset (287).
 
-Every `fuse_…` returns NIS = yᵀ S⁻¹ y, and writes the innovation y to its last argument. Where NIS is above the gate, or
-is no number, nothing else changes.
+Every `fuse_…` corrects the nominal state x, (23,), and its covariance P, (22, 22), in place, returns NIS = yᵀ S⁻¹ y,
+and writes the innovation y to its last argument. Where NIS is above the gate, or is no number, nothing else changes.
 """
 
 from math import inf, sqrt
@@ -64,15 +64,8 @@ def fuse_fix(
 ) -> None:
     """Correct by the velocity of a GPS fix, then by its place, then by its height, each if it passes its test.
 
-    Args:
-        x: Nominal state, (23,).
-        P: Covariance, (22, 22).
-        fix: Place, m, and velocity, m/s, ENU, (6,).
-        after_s: How long after the state it was measured.
-        variances: Of velocity, place and height, (3,).
-        gates: Of their NIS, (3,).
-        y: Innovations, in the same order: 3, 2 and 1, (6,).
-        nis: Of the three, (3,).
+    The fix, (6,), is place, m, and velocity, m/s, ENU, measured `after_s` after the state. Variances, gates and NIS are
+    of velocity, place and height, (3,) each, and the innovations y in the same order: 3, 2 and 1, (6,).
     """
     nis[0] = fuse_velocity(x, P, fix[3:], variances[0], gates[0], y[:3])
     nis[1] = fuse_horizontal(x, P, fix[:3], after_s, variances[1], gates[1], y[3:5])

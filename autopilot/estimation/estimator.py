@@ -276,9 +276,9 @@ class Estimator:
         if reason is not None:
             self._rejected.add(Source.GPS, reason)
         self._output_smoothing.absorb(before[:6], self.filter.x[:6].tolist(), (now_us - self.filter_us) * 1e-6)
-        found = self._accelerometer_watch.look(fix.time_us, before, self.filter)
+        found = self._accelerometer_watch.look(fix.time_us, before, self.filter.velocity, self.filter.barometer)
         if found is not None:
-            self.filter.reset_accel_bias(*found, now_us)
+            self.filter.reset_accel_bias(found, now_us)
         turned = turned_since(self.filter, now_us)
         if turned is not None:
             self.filter.reset_gyro_bias(*turned, now_us)

@@ -222,7 +222,7 @@ def _hover_transition(body: Body, interval_s: float) -> Array:
 
 
 def body_of(vehicle: Vehicle) -> Body:
-    """Return what the model knows of `vehicle`: its moments follow like the slower of its rotors' two lags."""
+    """Return the model of `vehicle`: its moments follow like the slower of its rotors' two lags."""
     lag = vehicle.rotors.lag
     lag_1_s = 1.0 / max(lag.time_constant_up_s, lag.time_constant_down_s) if lag else 0.0
     return Body(*vehicle.body.inertia_kg_m2, lag_1_s)

@@ -3,7 +3,16 @@
     z = [Δu at each move, angle slack, rate slack]
     min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
 
-The cost is the thesis's [3.13-3.20], its terminal weight a full matrix on state and input.
+The cost is the thesis's [3.13-3.20], its terminal weight a full matrix on state and input. With b moves, n = 3 b + 2
+variables and m rows, the kernels take and fill:
+
+    responses     of `prediction.respond`, (N + 1, 9, 1 + 3 b)
+    schedule      phi, theta, p, q, r expected at each step, (N, 5)
+    u             moments last commanded, N m, (3,)
+    thrust_n      U1 commanded at each step, N, (N,)
+    H, f, G, h    (n, n), (n,), (m, n), (m,); G with zeros where nothing is written
+    lower, upper  of all variables, (n,)
+    max_squared   largest squared rotor speed that can be had; all squared speeds are in parts of the largest
 """
 
 from math import sqrt
@@ -74,16 +83,7 @@ class Target(NamedTuple):
 
 @compiled
 def quadratic_cost(responses: Array, target: Target, u: Array, problem: Problem, H: Array, f: Array) -> None:
-    """Fill the part of H and f that belongs to the increments.
-
-    Args:
-        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
-        target: What the plan is to reach.
-        u: Moments last commanded, N m, (3,).
-        problem: The weights.
-        H: (n, n), n = 3 b + 2.
-        f: (n,).
-    """
+    """Fill the part of H and f that belongs to the increments."""
     steps = responses.shape[0] - 1
     moved = responses.shape[2] - 1
     H[:moved, :moved] = 0.0
@@ -127,14 +127,7 @@ def _add_terminal(last: Array, terminal: Array, u: Array, S: Array, H: Array, f:
 
 @compiled
 def limit_first_move(u: Array, max_increment: Array, lower: Array, upper: Array) -> None:
-    """Bound the first increments by `max_increment`, but let them take back all of u.
-
-    Args:
-        u: Moments last commanded, N m, (3,).
-        max_increment: Largest increments, N m, (3,).
-        lower: Of all variables, (n,); the first three are filled.
-        upper: The same.
-    """
+    """Bound the first increments, (3,), by `max_increment`, N m, (3,), but let them take back all of u."""
     for i in range(INPUTS):
         lower[i] = min(-max_increment[i], -u[i])
         upper[i] = max(max_increment[i], -u[i])
@@ -142,18 +135,10 @@ def limit_first_move(u: Array, max_increment: Array, lower: Array, upper: Array)
 
 @compiled
 def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float, G: Array, h: Array) -> int:
-    """Fill the rows that keep every rotor within its limits at every step of the horizon; return how many.
+    """Fill the rows that keep every rotor within its limits at every step, from row 0 on; return how many.
 
     Linear in squared speed, and with the thrust known only the moments move it. Between two moves the moments stay, so
-    one row a side holds the tightest step of them. Rows are in parts of the largest squared speed.
-
-    Args:
-        problem: Of it the moves and what belongs to the rotors.
-        thrust_n: U1 commanded at each step, N, (N,).
-        u: Moments last commanded, N m, (3,).
-        max_squared: Largest squared speed that can be had, in parts of the largest.
-        G: Is filled from row 0, (m, n), zeros where nothing is written.
-        h: (m,).
+    one row a side holds the tightest step of them.
     """
     starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
     count = 0
@@ -177,16 +162,11 @@ def limit_rotors(problem: Problem, thrust_n: Array, u: Array, max_squared: float
 
 @compiled
 def tilt_tangent(phi: float, theta: float, max_tilt: float, normal: Array) -> float:
-    """Write the normal of the tangent to the largest tilt, in the direction of a tilt; return its distance.
+    """Write the normal of the tangent to the largest tilt, (2,), in the direction of a tilt; return its distance, rad.
 
     cos(phi) cos(theta) >= cos(max_tilt) is a convex set of (phi, theta). All of it lies on the near side of the
-    tangent, normal . (phi, theta) <= distance, and the tangent touches it where the tilt has the given direction.
-
-    Args:
-        phi: Roll of the tilt that gives the direction, rad.
-        theta: Its pitch, rad.
-        max_tilt: rad, less than a right angle.
-        normal: (2,); is filled, with zeros where there is no tilt and so no direction.
+    tangent, normal . (phi, theta) <= distance, and the tangent touches it where the tilt has the direction of `phi` and
+    `theta`; without any, the normal is zeros. Angles are in rad, `max_tilt` less than a right one.
     """
     x, y = sin(theta) * cos(phi), sin(phi)
     across = sqrt(x * x + y * y)
@@ -205,14 +185,6 @@ def limit_motion(responses: Array, schedule: Array, problem: Problem, first: int
     """Fill the soft rows of tilt, angles and rates from row `first`; return the row after them.
 
     The tilt is limited by a tangent in the direction that it is expected to have.
-
-    Args:
-        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
-        schedule: phi, theta, p, q, r expected at each step, (N, 5).
-        problem: Of it the limits of the motion and the steps at which they are held.
-        first: Row to begin at.
-        G: (m, n).
-        h: (m,).
     """
     states = (ANGLES[0], ANGLES[1], P, Q, R)
     limits = problem.limits
@@ -243,17 +215,11 @@ def limit_motion(responses: Array, schedule: Array, problem: Problem, first: int
 
 @compiled
 def read_plan(responses: Array, packed: Packed, u: Array, z: Array, thrust_n: Array) -> tuple[Array, Array, Array]:
-    """Return what increments lead to.
+    """Return what increments `z`, (n,), lead to.
 
-    That is states predicted, (N + 1, 9), and of each step the moments commanded, N m, (N, 3), and the squared rotor
-    speeds commanded, in parts of the largest, (N, 4).
-
-    Args:
-        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
-        packed: The `Problem`.
-        u: Moments last commanded, N m, (3,).
-        z: The QP's solution, (n,).
-        thrust_n: U1 commanded at each step, N, (N,).
+    Returns:
+        States predicted, (N + 1, 9); of each step the moments commanded, N m, (N, 3), and the squared rotor speeds
+        commanded, (N, 4).
     """
     problem = packed[0]
     starts, from_thrust, from_moments = problem.starts, problem.from_thrust, problem.from_moments
@@ -285,16 +251,9 @@ def read_plan(responses: Array, packed: Packed, u: Array, z: Array, thrust_n: Ar
 def count_active(
     G: Array, h: Array, lower: Array, upper: Array, z: Array, rotor_rows: int, binding: float
 ) -> tuple[int, int, int, int]:
-    """Return how many limits of rotors, increments, angles and rates bind at z.
+    """Return how many limits of rotors, increments, angles and rates have less than `binding` left at z, (n,).
 
-    Args:
-        G: Rows of `limit_rotors`, then of `limit_motion`, (m, n).
-        h: (m,).
-        lower: (n,).
-        upper: (n,).
-        z: (n,).
-        rotor_rows: How many rows are the rotors'.
-        binding: A limit binds where no more is left.
+    The first `rotor_rows` rows of G are those of `limit_rotors`, the others those of `limit_motion`.
     """
     increments = 0
     for k in range(z.shape[0] - SLACKS):
@@ -319,17 +278,7 @@ def count_active(
 def condense(
     responses: Array, schedule: Array, target: Target, u: Array, packed: Packed, max_squared: float, qp: Qp
 ) -> None:
-    """Fill a whole QP in place; slacks keep their part of H and f.
-
-    Args:
-        responses: Of `respond`, (N + 1, 9, 1 + 3 b).
-        schedule: phi, theta, p, q, r expected at each step, (N, 5).
-        target: What the plan is to reach.
-        u: Moments last commanded, N m, (3,).
-        packed: The `Problem`.
-        max_squared: Largest squared rotor speed that can be had, in parts of the largest.
-        qp: Has both bounds, and zeros in G where nothing is written.
-    """
+    """Fill a whole QP in place; slacks keep their part of H, f and the bounds."""
     problem = packed[0]
     limit_first_move(u, problem.max_increment, qp.lower, qp.upper)
     quadratic_cost(responses, target, u, problem, qp.H, qp.f)

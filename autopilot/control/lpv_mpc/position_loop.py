@@ -3,6 +3,11 @@
 Thrust must make F = m (a_ref + k1 e + k2 e' + g - d) plus the drag; its direction gives roll and pitch about the yaw
 that is predicted, so that thrust points right whatever yaw does. The errors ahead are those of the closed loop.
 Source of the flat output to thrust direction: Mellinger and Kumar, ICRA 2011; with drag: Faessler et al., RA-L 2018.
+
+Samples are from now to one past the horizon of N steps, n = N + 2. Each kernel fills its last argument. At each sample:
+forces, N, ENU, (n, 3); angles phi, theta, psi, rad, (n, 3); references of position, velocity and acceleration, m, ENU,
+(n, 3) each, and yaw, rad, (n,). Of the vehicle now: `up`, its z axis, ENU, (3,); disturbances that the model does not
+explain, acceleration, m/s², ENU, (3,), before moment, N m, FLU, (3,).
 """
 
 from math import floor, pi, sqrt
@@ -113,15 +118,7 @@ def error_transition(poles: tuple[float, float], interval_s: float, samples: int
 
 @compiled
 def drag_force(airframe: Airframe, velocity: Array, up: Array, thrust_n: float, out: Array) -> None:
-    """Write the drag, N, ENU, on a vehicle whose z axis is `up` while it makes `thrust_n`.
-
-    Args:
-        airframe: The vehicle.
-        velocity: Through the air, m/s, ENU, (3,).
-        up: Body z axis, ENU, (3,).
-        thrust_n: Thrust, N.
-        out: (3,).
-    """
+    """Write the drag, N, ENU, (3,), on a vehicle that moves at `velocity`, m/s, ENU, while it makes `thrust_n`."""
     along = velocity[0] * up[0] + velocity[1] * up[1] + velocity[2] * up[2]
     across = airframe.drag_xy + airframe.rotor_drag * sqrt(max(thrust_n, 0.0))
     for i in range(3):
@@ -149,16 +146,7 @@ def wanted_forces(
     limits: Limits,
     forces: Array,
 ) -> None:
-    """Fill `forces` with what the thrust must do at each sample of the horizon, N, ENU, (n, 3).
-
-    Args:
-        motion: Now.
-        references: Position, velocity, acceleration, (n, 3) each, and yaw, (n,), at each sample.
-        disturbance_m_s2: Acceleration that the model does not explain, ENU, (3,).
-        loop: What stays the same.
-        limits: Of the forces.
-        forces: Is filled.
-    """
+    """Fill `forces` with what the thrust must do at each sample."""
     airframe = loop.airframe
     e = references[0][0] - motion.position
     near = min(1.0, limits.position_error_m / max(length(e), limits.position_error_m))
@@ -189,14 +177,7 @@ def wanted_forces(
 
 @compiled
 def attitudes(forces: Array, yaw_wanted: Array, yaw_predicted: Array, angles: Array) -> None:
-    """Fill `angles` (n, 3): roll and pitch that point body z along each force, given the yaw there; the yaw wanted.
-
-    Args:
-        forces: N, ENU, (n, 3), upwards.
-        yaw_wanted: rad, (n,).
-        yaw_predicted: rad, (n,).
-        angles: phi, theta, psi, rad; is filled.
-    """
+    """Fill roll and pitch that point body z along each force, by the yaw predicted; and the yaw wanted, rad, (n,)."""
     for n in range(forces.shape[0]):
         c, s = cos(yaw_predicted[n]), sin(yaw_predicted[n])
         x, y, z = forces[n]
@@ -208,17 +189,10 @@ def attitudes(forces: Array, yaw_wanted: Array, yaw_predicted: Array, angles: Ar
 
 @compiled
 def thrust_commands(thrust_n: float, forces: Array, up: Array, follows: float, limits: Limits, commands: Array) -> None:
-    """Fill `commands` (N,): thrusts to command so that the lagging thrust is the wanted one at the end of each step.
+    """Fill `commands`, N, (N,), so that the lagging thrust, now `thrust_n`, is the wanted one at the end of each step.
 
-    The next thrust is the part of the force along the body's z axis; those after it trust in the attitude.
-
-    Args:
-        thrust_n: Now, N.
-        forces: Wanted at each sample from now, N, ENU, (N + 1 or more, 3).
-        up: Body z axis now, ENU, (3,).
-        follows: Part of the way to its command that thrust goes in a step.
-        limits: Of the commands.
-        commands: Is filled.
+    The next thrust is the part of the force along the body's z axis; those after it assume the attitude. `follows` is
+    the part of the way to its command that thrust goes in a step.
     """
     for n in range(commands.shape[0]):
         force = forces[n + 1]
@@ -231,14 +205,9 @@ def thrust_commands(thrust_n: float, forces: Array, up: Array, follows: float, l
 
 @compiled
 def end_of_motion(angles: Array, inertia: Array, disturbance_n_m: Array, interval_s: float, end: Array) -> None:
-    """Fill `end` with the state and the moments that follow the angles at the last but one sample.
+    """Fill `end`, (12,), with the state and the moments that follow the angles at the last but one sample.
 
-    Args:
-        angles: phi, theta, psi at each sample, rad, (n, 3), n >= 3.
-        inertia: Ix, Iy, Iz, kg m², (3,).
-        disturbance_n_m: Moment that acts besides, (3,).
-        interval_s: Between two samples.
-        end: phi, p, theta, q, psi, r, M1, M2, M3, U2, U3, U4; is filled.
+    That is phi, p, theta, q, psi, r, M1, M2, M3, U2, U3, U4, for the inertia Ix, Iy, Iz, kg m², (3,).
     """
     before, here, after = angles[-3], angles[-2], angles[-1]
     rate = (after - before) / (2.0 * interval_s)
@@ -255,15 +224,9 @@ def end_of_motion(angles: Array, inertia: Array, disturbance_n_m: Array, interva
 
 @compiled
 def yaw_ahead(yaw_rad: float, wanted: Array, planned: Array, ahead: Array) -> float:
-    """Fill `ahead` with the yaw expected at each sample; return the full turns between the yaw wanted and this, rad.
+    """Fill `ahead`, (n,), with the yaw expected; return the full turns between the yaw wanted, (n,), and this, rad.
 
-    As planned, and after the plan's end, or without one, turning as the yaw that is wanted does.
-
-    Args:
-        yaw_rad: Now.
-        wanted: At each sample, rad, (n,).
-        planned: By the last plan, from now, rad, (m,), m <= n; (0,) without one.
-        ahead: (n,); is filled.
+    As planned, (m,), and after the plan's end, or without one (m = 0), turning as the yaw that is wanted does.
     """
     ahead[0] = yaw_rad
     for n in range(1, ahead.shape[0]):
@@ -283,16 +246,9 @@ def guide(
     limits: Limits,
     out: Demands,
 ) -> float:
-    """Do all that the outer loop does; return the cosine of the angle from the thrust to where it must point.
+    """Compute all demands of references; return the cosine of the angle from the thrust to where it must point.
 
-    Args:
-        motion: Now.
-        references: Position, velocity, acceleration (N + 2, 3) and yaw (N + 2,) at each sample from now.
-        planned_yaw: See `yaw_ahead`.
-        disturbances: Acceleration, m/s², ENU, and moment, N m, FLU, that the model does not explain, (6,).
-        packed: The `Loop`.
-        limits: Of the forces.
-        out: Is filled.
+    `planned_yaw` is that of `yaw_ahead`, and `packed` the `Loop`.
     """
     loop = packed[0]
     wanted_forces(motion, references, disturbances[:3], loop, limits, out.forces)
@@ -315,15 +271,9 @@ def hold_attitude(
     limits: Limits,
     out: Demands,
 ) -> float:
-    """Do what `guide` does where attitude and thrust are demanded themselves; return the same cosine.
+    """Compute the demands of given angles, (n, 3), and thrust, N, (n,); return the same cosine as `guide`.
 
-    Args:
-        motion: Now.
-        demanded: phi, theta, psi, rad, (N + 2, 3), and thrust, N, (N + 2,), at each sample from now.
-        disturbance_n_m: Moment that the model does not explain, (3,).
-        packed: The `Loop`.
-        limits: Of the thrust.
-        out: Is filled, of the forces only the first; psi in the full turn that the vehicle is in.
+    Of the forces only the first is filled; psi is in the full turn that the vehicle is in. `packed` is the `Loop`.
     """
     loop = packed[0]
     angles, force, up = out.angles, out.forces[0], motion.up

@@ -71,15 +71,7 @@ class InitialState(NamedTuple):
 
 @compiled
 def flow(schedule: Array, momentum: float, body: Body, X: Array, out: Array) -> None:
-    """Write A(schedule) X into `out`, for every column of X.
-
-    Args:
-        schedule: phi, theta, p, q, r, (5,).
-        momentum: h of the rotors along body z, N m s.
-        body: The vehicle.
-        X: States in columns, (9, k).
-        out: (9, k).
-    """
+    """Write A(schedule) X, (9, k), for states in the columns of X, (9, k), and one row of the schedule, (5,)."""
     phi, theta, p, q, r = schedule
     s, c = sin(phi), cos(phi)
     cosine = max(cos(theta), _MIN_COSINE)
@@ -153,12 +145,10 @@ def respond(
 
 @compiled
 def schedule_along(x: Array, ahead: Array, schedule: Array) -> None:
-    """Fill `schedule` (N, 5) with the scheduling states in the middle of each step.
+    """Fill `schedule`, (N, 5), with the scheduling states in the middle of each step.
 
-    Args:
-        x: Present state, (9,).
-        ahead: States that the last plan predicted for the next samples, (N - 1, 9); they are held after its end.
-        schedule: Is filled.
+    They lie between the present state `x`, (9,), and the states `ahead` that the last plan predicted for the next
+    samples, (N - 1, 9), which are held after its end.
     """
     steps = schedule.shape[0]
     for step in range(steps):

@@ -27,13 +27,9 @@ class TurnGains(NamedTuple):
 
 @compiled
 def turning_moment(direction: Array, rate: Array, inertia: Array, gains: TurnGains) -> Array:
-    """Return the moment, N m, FLU, (3,), that turns the body's z axis to `direction`.
+    """Return the moment, N m, FLU, (3,), that turns the body's z axis to a direction, (3,), of length 1, FLU.
 
-    Args:
-        direction: Where the thrust must point, in the body's frame, (3,), of length 1.
-        rate: Body rates, rad/s, (3,).
-        inertia: Ix, Iy, Iz, kg m², (3,).
-        gains: Of the law.
+    `rate` and `inertia` are p, q, r, rad/s, and Ix, Iy, Iz, kg m², (3,) each.
     """
     across = sqrt(direction[0] * direction[0] + direction[1] * direction[1])
     wanted = np.zeros(3)
@@ -62,13 +58,8 @@ def mix_with_priority(
 ) -> Array:
     """Return squared rotor speeds (4,) within their limits: tilting moments first, then thrust, then yaw.
 
-    Args:
-        thrust_n: Wanted, N.
-        moment_n_m: U2, U3, U4 wanted, N m, (3,).
-        rotors_from_thrust: Squared speeds from U1, in parts of the largest, (4,).
-        rotors_from_moments: The same from U2, U3, U4, (4, 3).
-        min_squared: Least squared speed, in the same parts.
-        max_squared: Largest squared speed.
+    Wanted are U1, N, and U2, U3, U4, N m, (3,); squared speeds, parts of the largest, of them are `rotors_from_thrust`,
+    (4,), times the first and `rotors_from_moments`, (4, 3), times the others.
     """
     tilt = rotors_from_moments[:, 0] * moment_n_m[0] + rotors_from_moments[:, 1] * moment_n_m[1]
     yaw = rotors_from_moments[:, 2] * moment_n_m[2]

@@ -165,17 +165,11 @@ def _evidence(
     last: Array,
     noise: Array,
 ) -> Array:
-    """Return how much more likely it is of each rotor that it makes nothing than that it is weak, as logarithms.
+    """Return how much more likely it is of each rotor that it makes nothing than that it is weak, as logarithms, (4,).
 
-    Args:
-        before: Velocity (m/s, ENU), rates (rad/s, FLU), body z axis (ENU) a sample ago, (9,).
-        now: The same now.
-        speeds_before: Rotor speeds then, parts of the largest, (4,).
-        speeds: The same now.
-        interval_s: Between the two.
-        signature: Of the vehicle.
-        last: Residual of the sample before, (4,); that of this one afterwards.
-        noise: Variances of what changes in it from sample to sample, (4,); carried on in place.
+    Of a sample ago and of now are velocity (m/s, ENU), rates (rad/s, FLU), body z axis (ENU), (9,), and rotor speeds,
+    parts of the largest, (4,). `last` is the residual of the sample before, (4,), and `noise` the variances of what
+    changes in it from sample to sample, (4,); both are carried on in place.
     """
     thrust_n = np.empty(4)
     h, h_rate = 0.0, 0.0

@@ -1,7 +1,6 @@
-"""Landing on three rotors: place and height above the reduced attitude, and how the rotors share what is asked for."""
+"""Landing on three rotors: place and height above the reduced attitude, and how the rotors share what is demanded."""
 
 from math import hypot, radians
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,58 +25,22 @@ _SPIN_UP_THRUST = 1.3
 _MIN_UPRIGHT = 0.5
 _AT_LIMIT = 1e-9
 
-
-class Descent(NamedTuple):
-    """How it is flown.
-
-    Attributes:
-        place_rad_s: Frequency of the position loop, critically damped.
-        climb_1_s: Gain on the vertical speed.
-        lift_m_s2: Largest vertical acceleration asked for.
-        tilt_deg: Largest tilt of the mean thrust for the sake of place.
-        max_tilt_deg: The same for place and wind together; the cone comes on top.
-        farther_deg_m: More of it for each metre that the vehicle is too far from its place.
-        far_m: How far that is.
-        wind_tilt_deg: Largest tilt of the mean thrust at all.
-        wind_rad_s: Frequency at which what the model does not explain is observed: wind, most of all.
-        max_wind_m_s2: Largest of that estimated.
-        settle_s: So long it stays at its height.
-        sink_m_s: Then it sinks.
-        land_m_s: At this speed close to the ground.
-        land_above_m: How close that is.
-    """
-
-    place_rad_s: float = 1.0
-    climb_1_s: float = 3.0
-    lift_m_s2: float = 4.0
-    tilt_deg: float = 6.0
-    max_tilt_deg: float = 8.0
-    farther_deg_m: float = 2.0
-    far_m: float = 1.5
-    wind_tilt_deg: float = 16.0
-    wind_rad_s: float = 1.5
-    max_wind_m_s2: float = 2.0
-    settle_s: float = 1.5
-    sink_m_s: float = 1.0
-    land_m_s: float = 0.6
-    land_above_m: float = 2.0
-
-
-class Contact(NamedTuple):
-    """When the ground holds a vehicle commanded to sink: it knocks, or the vehicle stays. Rates do not count.
-
-    Attributes:
-        knock: Upward acceleration of one sample that nothing else makes, in parts of gravity, where the ground is near.
-        slower_m_s: Speed of a vehicle that stays.
-        for_s: For so long.
-    """
-
-    knock: float = 0.5
-    slower_m_s: float = 0.2
-    for_s: float = 1.5
-
-
-DESCENT, CONTACT, WEIGHTS = Descent(), Contact(), Weights()
+_PLACE_RAD_S = 1.0
+"""Frequency of the position loop, critically damped."""
+_CLIMB_1_S, _LIFT_M_S2 = 3.0, 4.0
+"""Gain on the vertical speed, and the largest vertical acceleration demanded."""
+_TILT_DEG, _MAX_TILT_DEG = 6.0, 8.0
+"""Largest tilt of the mean thrust for the sake of place, and for place and wind together; the cone comes on top."""
+_FARTHER_DEG_M, _FAR_M, _WIND_TILT_DEG = 2.0, 1.5, 16.0
+"""More tilt for each metre that the vehicle is farther than this from its place; and the largest tilt at all."""
+_WIND_RAD_S, _MAX_WIND_M_S2 = 1.5, 2.0
+"""Frequency at which what the model does not explain, mostly wind, is observed, and the largest of it estimated."""
+_SETTLE_S, _SINK_M_S, _LAND_M_S, _LAND_ABOVE_M = 1.5, 1.0, 0.6, 2.0
+"""So long it stays at its height; then it sinks, and slower where the ground is this close."""
+_KNOCK = 0.5
+"""Upward acceleration of one sample that nothing but the ground makes, where it is near, in parts of gravity."""
+_STAYS_M_S, _STAYS_S = 0.2, 1.5
+"""A vehicle commanded to sink that is so slow for so long is held by the ground; rates do not count."""
 
 
 class ThreeRotors:
@@ -92,16 +55,7 @@ class ThreeRotors:
     """
 
     def __init__(
-        self,
-        vehicle: Vehicle,
-        lost: int,
-        interval_s: float,
-        speeds: Array,
-        state: VehicleState,
-        ground_m: float,
-        descent: Descent = DESCENT,
-        contact: Contact = CONTACT,
-        weights: Weights = WEIGHTS,
+        self, vehicle: Vehicle, lost: int, interval_s: float, speeds: Array, state: VehicleState, ground_m: float
     ) -> None:
         """Take over in flight.
 
@@ -112,25 +66,22 @@ class ThreeRotors:
             speeds: Of the rotors now, parts of the largest, (4,).
             state: The vehicle now. It lands where it can stop.
             ground_m: Height of the ground, z of ENU, as far as it is known.
-            descent: How it is flown.
-            contact: How the ground is detected.
-            weights: Of the attitude.
         """
-        self._vehicle, self._interval_s, self._descent, self._contact = vehicle, interval_s, descent, contact
+        self._vehicle, self._interval_s = vehicle, interval_s
         self._lag = rotor_lag(vehicle, interval_s)
         measured = vehicle.sensors.gyroscope.range_rad_s * _SPIN_PART if vehicle.sensors else _MAX_SPIN_RAD_S
         spin_rad_s = min(_MAX_SPIN_RAD_S, measured)
-        self.law = ReducedAttitude(vehicle, lost, interval_s, self._lag.planned, spin_rad_s, weights)
+        self.law = ReducedAttitude(vehicle, lost, interval_s, self._lag.planned, spin_rad_s, Weights())
         self._battery = BatteryModel(vehicle)
         self._full_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
         self._gravity = vehicle.gravity_m_s2
         self._weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
         self._speeds = speeds.copy()
         self._speeds[lost] = 0.0
-        self._tilt_m_s2 = self._gravity * tan(radians(descent.tilt_deg))
+        self._tilt_m_s2 = self._gravity * tan(radians(_TILT_DEG))
         self._ground_m = ground_m
         self._place = stopping_place(state, 0.5 * self._tilt_m_s2)
-        self._gains = disturbance_observer.gains(descent.wind_rad_s, interval_s)
+        self._gains = disturbance_observer.gains(_WIND_RAD_S, interval_s)
         self._velocity, self._wind = np.array(state.velocity_enu_m_s), np.zeros(3)
         self._explained = np.zeros(3)
         self._elapsed_s = self._held_s = self._knock_m_s = 0.0
@@ -191,44 +142,40 @@ class ThreeRotors:
         missed = np.array(state.velocity_enu_m_s) - expected
         self._knock_m_s = state.velocity_enu_m_s[2] - self._climbed_m_s - self._interval_s * float(self._explained[2])
         self._climbed_m_s = state.velocity_enu_m_s[2]
-        maximum = self._descent.max_wind_m_s2
         self._velocity = expected + self._gains[0] * missed
-        self._wind = np.clip(self._wind + self._gains[1] * missed, -maximum, maximum)
+        self._wind = np.clip(self._wind + self._gains[1] * missed, -_MAX_WIND_M_S2, _MAX_WIND_M_S2)
 
     def _acceleration(self, state: VehicleState) -> Array:
-        """Return the acceleration to ask for, m/s², ENU, (3,)."""
-        how, w = self._descent, self._descent.place_rad_s
+        """Return the acceleration demanded, m/s², ENU, (3,)."""
+        w = _PLACE_RAD_S
         velocity = np.array(state.velocity_enu_m_s)
         error = self._place - np.array(state.position_enu_m)
         wanted: Array = w * w * error - 2.0 * w * velocity
         _limit(wanted, self._tilt_m_s2)
-        wanted[2] = how.climb_1_s * (self._climb_m_s(state) - velocity[2])
+        wanted[2] = _CLIMB_1_S * (self._climb_m_s(state) - velocity[2])
         wanted -= self._wind
         _limit(wanted, self._max_tilt_m_s2(hypot(error[0], error[1])))
-        wanted[2] = min(max(wanted[2], -how.lift_m_s2), how.lift_m_s2)
+        wanted[2] = min(max(wanted[2], -_LIFT_M_S2), _LIFT_M_S2)
         return wanted
 
     def _max_tilt_m_s2(self, off_m: float) -> float:
         """Return the largest horizontal acceleration so far from the place: upright first, unless it is blown away."""
-        how = self._descent
-        tilt_deg = how.max_tilt_deg + how.farther_deg_m * max(off_m - how.far_m, 0.0)
-        return self._gravity * tan(radians(min(tilt_deg, how.wind_tilt_deg)))
+        tilt_deg = _MAX_TILT_DEG + _FARTHER_DEG_M * max(off_m - _FAR_M, 0.0)
+        return self._gravity * tan(radians(min(tilt_deg, _WIND_TILT_DEG)))
 
     def _climb_m_s(self, state: VehicleState) -> float:
-        how = self._descent
-        if self._elapsed_s < how.settle_s:
+        if self._elapsed_s < _SETTLE_S:
             return 0.0
-        return -how.sink_m_s if state.position_enu_m[2] - self._ground_m > how.land_above_m else -how.land_m_s
+        return -_SINK_M_S if state.position_enu_m[2] - self._ground_m > _LAND_ABOVE_M else -_LAND_M_S
 
     def _watch_ground(self, state: VehicleState) -> None:
         """Land where the ground knocks at a vehicle that is low, or holds one that is commanded to sink."""
-        how = self._contact
         sinks = self._climb_m_s(state) < 0.0
-        slow = hypot(*state.velocity_enu_m_s) < how.slower_m_s
+        slow = hypot(*state.velocity_enu_m_s) < _STAYS_M_S
         self._held_s = self._held_s + self._interval_s if sinks and slow else 0.0
-        low = state.position_enu_m[2] - self._ground_m < self._descent.land_above_m
-        knocked = low and sinks and self._knock_m_s > how.knock * self._gravity * self._interval_s
-        self.landed = self.landed or knocked or self._held_s >= how.for_s
+        low = state.position_enu_m[2] - self._ground_m < _LAND_ABOVE_M
+        knocked = low and sinks and self._knock_m_s > _KNOCK * self._gravity * self._interval_s
+        self.landed = self.landed or knocked or self._held_s >= _STAYS_S
 
 
 def shared(
@@ -236,13 +183,8 @@ def shared(
 ) -> Array:
     """Return squared rotor speeds, parts of the largest, (4,): what turns the thrust axis first, then thrust.
 
-    Args:
-        trio: The rotors that are left.
-        thrust_n: Of all together, N.
-        d: Of b less that of a, N.
-        f_o: Of o, N.
-        full_n: Of each rotor at its largest speed, N, (4,).
-        squared_limits: Least and largest squared speed, parts of the largest.
+    Demanded are the thrust of all together, that of b less that of a, `d`, and that of o, N; each rotor's at its
+    largest speed is `full_n`, N, (4,). `squared_limits` are the least and largest squared speed, parts of the largest.
     """
     minimum, maximum = squared_limits
     min_n = minimum * max(full_n[trio.a], full_n[trio.b])

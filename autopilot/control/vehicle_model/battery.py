@@ -19,13 +19,7 @@ _APART = 0.02
 
 
 def estimated(model_ah: float, reported_ah: float, vehicle: Vehicle) -> float:
-    """Return the charge taken, Ah, estimated from a model and from what the battery itself reports.
-
-    Args:
-        model_ah: What the model has integrated.
-        reported_ah: What the battery reports.
-        vehicle: Whose battery it is.
-    """
+    """Return the charge taken, Ah, estimated from a model's integral and from what the battery itself reports."""
     if vehicle.battery is None:
         return model_ah
     return reported_ah if abs(reported_ah - model_ah) > _APART * vehicle.battery.capacity_ah else model_ah
@@ -61,12 +55,7 @@ class BatteryModel:
         return voltage_v, power_w / voltage_v
 
     def max_speed_now(self, charge_ah: float, speeds: Array) -> float:
-        """Return the speed that a rotor can reach while all take the power that they take now, in parts of the largest.
-
-        Args:
-            charge_ah: Charge taken.
-            speeds: Rotor speeds now, parts of the largest, (4,).
-        """
+        """Return the speed that a rotor can reach while all keep the power of `speeds`, (4,); parts of the largest."""
         if self._battery is None:
             return 1.0
         power_w = self._full_power_w * dot(speeds * speeds, speeds)

@@ -67,16 +67,10 @@ def observe(
     drag_n: Array,
     packed: Packed,
 ) -> Array:
-    """Return the estimate (12,) now, from that of the sample before.
+    """Return the estimate (12,) now, from that of the sample before and what was measured then and now, (9,) each.
 
-    Args:
-        estimate: Then, (12,).
-        before: Measured then, (9,).
-        now: Measured now, (9,).
-        wrench: Mean U1 (N), U2, U3, U4 (N m) over the interval, (4,).
-        momentum: h of the rotors along body z, N m s.
-        drag_n: Its mean over the interval, ENU, (3,).
-        packed: The `Observer`.
+    Over the interval, `wrench` is the mean U1 (N), U2, U3, U4 (N m), (4,), `momentum` h of the rotors along body z,
+    N m s, and `drag_n` the mean drag, ENU, (3,). `packed` is the `Observer`.
     """
     observer = packed[0]
     airframe, inertia, interval_s = observer.airframe, observer.inertia, observer.interval_s

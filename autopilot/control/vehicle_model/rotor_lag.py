@@ -2,7 +2,8 @@
 
 The control law plans with forces that follow their commands as one linear lag, the slower of the rotors' two. Each
 rotor is then commanded so that its squared speed, which makes the force, is at the next sample where the plan has it:
-two time constants and the root between speed and force so cost nothing. Speeds are parts of the largest.
+two time constants and the root between speed and force so cost nothing. Speeds now, (4,), squared speeds that the
+plan commands, (4,), and limits are in parts of the largest speed.
 """
 
 from math import sqrt
@@ -52,14 +53,7 @@ def follow(speeds: Array, commands: Array, lag: RotorLag) -> Array:
 
 @compiled
 def lead(speeds: Array, squared_commands: Array, lag: RotorLag, max_speed: float) -> Array:
-    """Return the commands (4,) that bring squared speed where the plan has it after one control sample.
-
-    Args:
-        speeds: Now, (4,).
-        squared_commands: Squared speeds that the plan commands, (4,).
-        lag: Of the rotors.
-        max_speed: Largest speed that can be had.
-    """
+    """Return the commands (4,), up to `max_speed`, that bring squared speed where the plan has it a sample later."""
     commands = np.empty_like(speeds)
     for i in range(speeds.shape[0]):
         squared = speeds[i] * speeds[i]
@@ -76,12 +70,7 @@ def actuate(
 ) -> tuple[Array, Array, Array, Array]:
     """Return commands as `lead` does, speeds and wrench a sample later, and the mean wrench until then, (4,) each.
 
-    Args:
-        speeds: Now, (4,).
-        squared_commands: Squared speeds that the plan commands, (4,).
-        lag: Of the rotors.
-        max_speed: Largest speed that can be had.
-        allocation: From squared speeds to U1 (N), U2, U3, U4 (N m), (4, 4).
+    `allocation` is from squared speeds to U1 (N), U2, U3, U4 (N m), (4, 4).
     """
     commands = lead(speeds, squared_commands, lag, max_speed)
     after = follow(speeds, commands, lag)

@@ -94,19 +94,10 @@ def is_upright(x: Array) -> bool:
 def fuse_distance(
     x: Array, P: Array, measured: float, height: float, beam: Array, variance: float, gate: float, y: Array
 ) -> float:
-    """Correct by the distance to flat ground along -z of the body; return NIS.
+    """Correct by the distance to flat ground along -z of the body, m; return NIS.
 
-    d = h / cos(ϑ - β), with the tilt ϑ and half the beam β; of a tilt within the beam, d = h.
-
-    Args:
-        x: Nominal state, (23,).
-        P: Covariance, (22, 22).
-        measured: m.
-        height: Of the sensor above the ground by the state, m.
-        beam: Cosine and sine of β, (2,).
-        variance: m².
-        gate: Of NIS.
-        y: Innovation, m, (1,).
+    d = h / cos(ϑ - β), with the tilt ϑ and half the beam β, whose cosine and sine are `beam`; of a tilt within the
+    beam, d = h. `height` is that of the sensor above the ground by the state, m.
     """
     w, a, b, c = x[6:10]
     up_x, up_y, up_z = 2.0 * (a * c - w * b), 2.0 * (b * c + w * a), 1.0 - 2.0 * (a * a + b * b)
