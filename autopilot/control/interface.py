@@ -30,14 +30,11 @@ class Preview(NamedTuple):
 
 
 class Horizon(NamedTuple):
-    """References from now on, as far apart as the preview asks.
+    """References from now on, at the preview's interval.
 
     Attributes:
-        position_enu_m: (n, 3), m, ENU.
-        velocity_enu_m_s: (n, 3), m/s, ENU.
-        acceleration_enu_m_s2: (n, 3), m/s², ENU; zero where planned by differences.
-        jerk_enu_m_s3: (n, 3), m/s³, ENU; zero where planned by differences.
-        snap_enu_m_s4: (n, 3), m/s⁴, ENU; zero where planned by differences.
+        position_enu_m, velocity_enu_m_s: (n, 3) each, ENU.
+        acceleration_enu_m_s2, jerk_enu_m_s3, snap_enu_m_s4: (n, 3) each, ENU; zero where planned by differences.
         yaw_rad: (n,), rad, counter-clockwise from east, unwrapped.
         yaw_rate_rad_s: (n,), rad/s; zero where planned by differences, or where yaw is held for want of a direction.
         yaw_acceleration_rad_s2: (n,), rad/s²; zero where planned by differences, or where yaw is held.
@@ -54,7 +51,7 @@ class Horizon(NamedTuple):
 
 
 class AttitudeDemand(NamedTuple):
-    """An attitude to hold and a thrust to make, from now on, as far apart as the preview asks.
+    """An attitude to hold and a thrust to make, from now on, at the preview's interval.
 
     Attributes:
         angles: phi, theta, psi, rad, psi unwrapped, (n, 3).
@@ -68,11 +65,10 @@ class AttitudeDemand(NamedTuple):
 
 
 class VehicleState(NamedTuple):
-    """What a control law knows of the vehicle.
+    """The vehicle's state as a control law takes it.
 
     Attributes:
-        position_enu_m: Position, m, ENU.
-        velocity_enu_m_s: Velocity, m/s, ENU.
+        position_enu_m, velocity_enu_m_s: m and m/s, ENU.
         attitude: Unit quaternion wxyz, FLU body to ENU earth.
         euler: phi, theta, psi in rad, psi unwrapped.
         rate_flu_rad_s: Body rates p, q, r, rad/s, FLU.
@@ -114,9 +110,7 @@ class PlanColumns(NamedTuple):
     """Where the predicted outputs of a control law hold the attitude.
 
     Attributes:
-        phi: Column of roll, rad.
-        theta: Column of pitch, rad.
-        psi: Column of yaw, rad, unwrapped.
+        phi, theta, psi: Columns of roll, pitch and yaw (unwrapped), rad.
         yaw_rate: Column of the body rate r, rad/s.
     """
 
@@ -178,7 +172,6 @@ class Controller(Protocol[Memory]):
 
     def initial(self, rotor_speed: float) -> Memory:
         """Return what the law remembers before its first sample, every rotor at `rotor_speed` (vehicle's unit)."""
-        ...
 
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample.
@@ -187,9 +180,8 @@ class Controller(Protocol[Memory]):
             memory: What the step before returned.
             time_us: Simulated time, µs, a multiple of the control interval.
             state: The vehicle now.
-            references: The references that `preview` asks for.
+            references: The references of `preview`.
         """
-        ...
 
 
 @runtime_checkable
@@ -202,15 +194,7 @@ class AttitudeController(Controller[Memory], Protocol[Memory]):
     def step_attitude(
         self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
     ) -> tuple[Memory, Decision]:
-        """Decide the rotor speeds to hold until the next control sample.
-
-        Args:
-            memory: What the step before returned, of either kind.
-            time_us: Simulated time, µs, a multiple of the control interval.
-            state: The vehicle now.
-            demand: At the samples that `preview` asks for.
-        """
-        ...
+        """Decide as `step` does, for a demand at the samples of `preview`; `memory` is of a step of either kind."""
 
 
 @runtime_checkable
@@ -218,16 +202,14 @@ class ChargeController(Controller[Memory], Protocol[Memory]):
     """A control law that counts what its battery gives; optional.
 
     A law that has this goes on with the charge that is left where it restarts in mid-flight, and with what the
-    battery itself tells, where it does.
+    battery itself reports, where it does.
     """
 
     def charge_ah(self, memory: Memory) -> float:
         """Return the charge that the law remembers as taken from its battery, Ah."""
-        ...
 
     def with_charge(self, memory: Memory, charge_ah: float) -> Memory:
         """Return the memory with another charge taken from the battery, Ah."""
-        ...
 
 
 @runtime_checkable
@@ -253,4 +235,3 @@ class CompiledController(Controller[Memory], Protocol[Memory]):
 
     def warm_up(self) -> None:
         """Load what is compiled."""
-        ...

@@ -1,4 +1,4 @@
-"""The control loop: what the state frames tell, one control law, and the rotor command between its samples."""
+"""The control loop: the state from frames, one control law, and the rotor command between its samples."""
 
 from typing import Any, NamedTuple
 
@@ -94,7 +94,7 @@ class ControlLoop:
         self._command(np.full(4, rotor_speed))
 
     def know_charge(self, used_ah: float) -> None:
-        """Take in the charge that the battery itself tells, Ah: a law that remembers another goes on with this."""
+        """Take in the charge that the battery itself reports, Ah: a law that remembers another goes on with this."""
         self._reported_ah = used_ah
         if self._charged is not None and self._memory is not None:
             charge_ah = estimated(self._charged.charge_ah(self._memory), used_ah, self.vehicle)
@@ -148,7 +148,7 @@ class ControlLoop:
         Raises:
             DecisionError: The control law gave what no rotor can follow.
         """
-        assert isinstance(self._controller, AttitudeController), "asked for only where attitudes are taken"
+        assert isinstance(self._controller, AttitudeController), "decided only where attitudes are taken"
         self._memory, decision = self._controller.step_attitude(self._memory, time_us, state, demand)
         self._command(decision.rotor_speeds)
         return decision
@@ -170,7 +170,7 @@ def _charged(controller: Controller[Any]) -> ChargeController[Any] | None:
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
-    """Return the longest interval of whole milliseconds that divides the control interval, as short as asked for."""
+    """Return the longest interval of whole milliseconds that divides the control interval, at most the one demanded."""
     wanted_s = profile.simulation.frame_interval_s
     if wanted_s is None:
         return control_interval_us

@@ -117,13 +117,13 @@ class Filter:
     def start(self, aligned: Aligned, place_enu_m: Vector, time_us: int) -> None:
         """Begin at rest: each mean is fused as a measurement, so that the covariance holds their correlations.
 
-        The attitude is found by iteration. A tilt seen by the accelerometer may be its bias, and the magnetic field
-        knows better: a covariance linearised where the first guess was would later be taken for knowledge.
+        The attitude is found by iteration. A tilt seen by the accelerometer may be its bias, which the magnetic field
+        shows: a covariance linearised at the first guess would later count as information.
         """
         x, P = self.x, self.P
         attitude = aligned.attitude
         for _ in range(_ITERATIONS):
-            self._know_nothing(place_enu_m)
+            self._reset(place_enu_m)
             x[6:10] = attitude
             self._rest(aligned)
             attitude = tuple(x[6:10].tolist())
@@ -142,7 +142,7 @@ class Filter:
     def start_in_air(self, caught: Caught, place_enu_m: Vector, time_us: int) -> None:
         """Begin with a vehicle that falls, at a place."""
         x, P = self.x, self.P
-        self._know_nothing(place_enu_m)
+        self._reset(place_enu_m)
         x[3:6], x[6:10] = caught.velocity_enu_m_s, caught.attitude
         for first, sigma in ((POSITION, _CAUGHT_M), (VELOCITY, _CAUGHT_M_S), (ATTITUDE, _CAUGHT_RAD)):
             for i in range(first, first + 3):
@@ -152,8 +152,8 @@ class Filter:
         for kind in self.kinds:
             kind.accept(time_us)
 
-    def _know_nothing(self, place_enu_m: Vector) -> None:
-        """Know of a vehicle at a place what can be known before anything is measured."""
+    def _reset(self, place_enu_m: Vector) -> None:
+        """Reset state and covariance to what is known of a vehicle at a place before anything is measured."""
         sensors, P = self._sensors, self.P
         self.x[:], P[:] = 0.0, 0.0
         self.x[:3] = place_enu_m

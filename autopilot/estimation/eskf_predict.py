@@ -42,10 +42,8 @@ class Noise(NamedTuple):
     """What drives the errors: spectral densities of white noise.
 
     Attributes:
-        force: Of the specific force, (m/s²)²/Hz.
-        rate: Of the rates, (rad/s)²/Hz.
-        gyro_bias: Of the walk of the gyroscope's bias, (rad/s²)²/Hz.
-        accel_bias: Of the walk of the accelerometer's bias, (m/s³)²/Hz.
+        force, rate: Of specific force and rates, (m/s²)²/Hz and (rad/s)²/Hz.
+        gyro_bias, accel_bias: Of the walks of the biases, (rad/s²)²/Hz and (m/s³)²/Hz.
         gps_drift: Variances of the Gauss-Markov drift of GPS, m², east, north, up.
         gps_drift_time_s: Its correlation time.
         baro_offset: Of the walk of the barometer's offset, m²/s.

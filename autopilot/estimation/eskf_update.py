@@ -74,7 +74,7 @@ def fuse_fix(
 
 @compiled
 def fuse_pressure_height(x: Array, P: Array, height: float, variance: float, gate: float, y: Array) -> float:
-    """Correct by a height that a barometer tells, m, up to its offset."""
+    """Correct by the height of a barometer, m, up to its offset."""
     H = np.zeros((1, ERRORS))
     H[0, POSITION + 2], H[0, BARO_OFFSET] = 1.0, 1.0
     y[0] = height - (x[2] + x[19])

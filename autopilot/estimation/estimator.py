@@ -57,8 +57,7 @@ class EstimatorRecord(NamedTuple):
     """What an estimator needs to go on after a restart, as plain data.
 
     Attributes:
-        time_us: Of the last frame.
-        filter_us: The filter's time.
+        time_us, filter_us: Of the last frame, and of the filter.
         filter: The filter.
         samples: The ring, whose first sample that waits is row `first`.
         waiting: What was measured at the ends of the samples that wait.

@@ -8,7 +8,6 @@ filter finds both by itself. PX4's EKF2 likewise resets its yaw where field and 
 """
 
 from math import hypot
-from typing import NamedTuple
 
 from colibri.autopilot.estimation.eskf import Filter
 
@@ -18,19 +17,12 @@ _MAX_TURN_RAD = 0.3
 """Beyond that the field is not plausible either."""
 
 
-class Turned(NamedTuple):
-    """By what angle the field is off, rad, and for how long it has been, s."""
-
-    angle_rad: float
-    since_s: float
-
-
-def turned_since(filter_: Filter, now_us: int) -> Turned | None:
-    """Look at a filter after it has tested a fix; return what a gyroscope that is off has done, if it has."""
+def turned_since(filter_: Filter, now_us: int) -> tuple[float, float] | None:
+    """Return by what angle the field is off, rad, and for how long, s, if a gyroscope is; after the test of a fix."""
     velocity, field = filter_.velocity, filter_.magnetometer.kind
     if velocity.rejected_us is None or now_us - velocity.rejected_us < _REJECTED_US:
         return None
     if field.rejected_us is None or field.test.time_us <= field.rejected_us:
         return None
     angle_rad = hypot(*field.test.innovation) / filter_.field_gauss
-    return Turned(angle_rad, (field.test.time_us - field.rejected_us) * 1e-6) if angle_rad <= _MAX_TURN_RAD else None
+    return (angle_rad, (field.test.time_us - field.rejected_us) * 1e-6) if angle_rad <= _MAX_TURN_RAD else None

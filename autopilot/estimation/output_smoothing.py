@@ -3,7 +3,7 @@
 Each correction of the position is taken back from what is published, and given in with a time constant: a control loop
 that follows each of them is shaken by them, as PX4's is spared by the time constants of its output predictor. Where GPS
 comes back and corrects by metres, it is given in at a speed that the vehicle follows without haste. Of velocity only
-what exceeds the usual is kept back: there the controller must know at once.
+what exceeds the usual is kept back: that the controller needs at once.
 """
 
 from math import sqrt

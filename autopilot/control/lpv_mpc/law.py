@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from math import radians
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from colibri.autopilot.control.interface import (
@@ -18,18 +19,17 @@ from colibri.autopilot.control.interface import (
     VehicleState,
 )
 from colibri.autopilot.control.lpv_mpc import position_loop, prediction, recovery
-from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc, Plan
+from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc, AttitudeSettings, Plan
 from colibri.autopilot.control.lpv_mpc.condensing import Target
-from colibri.autopilot.control.lpv_mpc.outer_loop import OuterLoop, Setpoint
+from colibri.autopilot.control.lpv_mpc.outer_loop import GuidanceSettings, OuterLoop, Setpoint
 from colibri.autopilot.control.lpv_mpc.position_loop import Motion
 from colibri.autopilot.control.lpv_mpc.prediction import InitialState
-from colibri.autopilot.control.lpv_mpc.settings import LpvMpcSettings, ObserverSettings
 from colibri.autopilot.control.qp import QpSolver
-from colibri.autopilot.control.settings import interval_us
+from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
 from colibri.autopilot.control.vehicle_model import disturbance_observer, rotor_lag
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
-from colibri.common.config import read_settings
+from colibri.common.config import Count, Positive, Table, read_settings
 from colibri.common.elementary import square
 from colibri.common.jit import packed
 from colibri.common.kernels import cos
@@ -44,14 +44,44 @@ _NO_YAW = np.empty(0)
 _NOWHERE = (0.0, 0.0, 0.0)
 
 
+class ObserverSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The disturbance observers."""
+
+    acceleration_rad_s: Positive
+    moment_rad_s: Positive
+    max_acceleration_m_s2: Positive
+    max_moment_n_m: Positive
+
+
+class FallbackSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What flies when no plan can be had."""
+
+    shifted_samples: Count
+    lqr_samples: Count
+    descent_thrust: Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
+    turn_1_s: Positive
+    rate_1_s: Positive
+    max_rate_rad_s: Positive
+
+
+class LpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The control law."""
+
+    control_interval_s: ControlInterval
+    guidance: GuidanceSettings
+    observer: ObserverSettings
+    attitude: AttitudeSettings
+    fallback: FallbackSettings
+    qp: QpSettings
+
+
 class Memory(NamedTuple):
     """What the law carries from one control sample to the next.
 
     Attributes:
         speeds: Rotor speeds now, as the lag has them, parts of the largest, (4,).
         moments: U2..U4 last commanded, N m, (3,).
-        wrench: U1..U4 now, (4,).
-        mean_wrench: The same over the interval that ends now, (4,).
+        wrench, mean_wrench: U1..U4 now, and over the interval that ends now, (4,) each.
         measured: What the observer measured a sample ago, (9,); None before the first.
         estimate: Of the observer a sample ago, (12,).
         charge_ah: Charge taken from the battery.
@@ -75,10 +105,8 @@ class LawInputs(NamedTuple):
 
     Attributes:
         rotation: Body to earth, (3, 3).
-        measured: By the observer, (9,).
-        estimate: Of the observer, (12,).
-        now: For the attitude's plan.
-        motion: For the outer loop.
+        measured, estimate: Of the observer, (9,) and (12,).
+        now, motion: For the attitude's plan, and for the outer loop.
     """
 
     rotation: Array
@@ -236,7 +264,7 @@ class LpvMpc:
         ahead = memory.plan.states[memory.age + 1 :] if memory.plan else None
         plan, diagnostics = self._attitude.plan(now, target, ahead)
         if plan is not None:
-            assert diagnostics.planned_squared is not None, "a plan says what it commands"
+            assert diagnostics.planned_squared is not None, "a plan has its commands"
             return Choice(diagnostics.planned_squared[0], plan.moments[0], plan, 1, diagnostics)
         age = memory.age + 1
         if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._attitude.horizon - 1):

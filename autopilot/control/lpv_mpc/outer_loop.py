@@ -1,22 +1,32 @@
 """The outer loop of one vehicle: what `position_loop` computes, with the limits that the battery leaves."""
 
 from math import radians
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
+import msgspec
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon
 from colibri.autopilot.control.lpv_mpc import position_loop, prediction
 from colibri.autopilot.control.lpv_mpc.condensing import Target
 from colibri.autopilot.control.lpv_mpc.position_loop import Demands, Limits, Loop, Motion
-from colibri.autopilot.control.lpv_mpc.settings import GuidanceSettings
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag
+from colibri.common.config import Degrees, Negative, Positive, Table
 from colibri.common.elementary import square
 from colibri.common.jit import packed
 from colibri.common.kernels import tan
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
+
+
+class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The position loop."""
+
+    poles: tuple[Negative, Negative]
+    approach_speed_m_s: Positive
+    max_tilt_deg: Degrees
+    thrust_margin: Annotated[float, msgspec.Meta(ge=0.0, lt=0.5)]
 
 
 class Setpoint(NamedTuple):

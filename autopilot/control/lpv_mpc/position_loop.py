@@ -30,8 +30,7 @@ class Limits(NamedTuple):
 
     Attributes:
         tilt_tangent: Tangent of the largest tilt.
-        min_thrust_n: Least thrust, N.
-        max_thrust_n: Largest thrust, N.
+        min_thrust_n, max_thrust_n: Least and largest thrust, N.
         position_error_m: A larger error counts as this one, which limits the speed of an approach; velocity and
             acceleration of a reference that far away are followed in the same proportion, which keeps one that no
             vehicle can follow from leading this one astray.
@@ -47,8 +46,7 @@ class Loop(NamedTuple):
     """What stays the same in the outer loop, over a horizon of N steps.
 
     Attributes:
-        k1_s2: Gain on the position error, 1/s².
-        k2_s: Gain on its rate, 1/s.
+        k1_s2, k2_s: Gains on the position error, 1/s², and on its rate, 1/s.
         errors_ahead: Of `error_transition`, (N + 2, 2, 2).
         airframe: The vehicle.
         inertia: Ix, Iy, Iz, kg m², (3,).
@@ -69,8 +67,7 @@ class Motion(NamedTuple):
     """The vehicle's motion now.
 
     Attributes:
-        position: m, ENU, (3,).
-        velocity: m/s, ENU, (3,).
+        position, velocity: m and m/s, ENU, (3,) each.
         up: Body z axis, ENU, (3,).
         yaw_rad: psi, unwrapped.
         thrust_n: U1, N.

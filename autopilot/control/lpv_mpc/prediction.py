@@ -39,9 +39,7 @@ class Body(NamedTuple):
     """The vehicle's numbers in the model.
 
     Attributes:
-        ix: Ix, kg m².
-        iy: Iy, kg m².
-        iz: Iz, kg m².
+        ix, iy, iz: Moments of inertia, kg m².
         lag_1_s: Rate at which moments follow their commands, 1/s; 0 where they follow at once.
     """
 

@@ -28,7 +28,7 @@ ALARM = 20.0
 MAX_EVIDENCE = 10.0
 """Of one sample: an alarm takes two."""
 _WEAK = 0.25
-"""Part of its thrust that a weak rotor lacks. Half way from here to all of it lies what is told apart."""
+"""Part of its thrust that a weak rotor lacks. Half way from here to all of it lies what is distinguished."""
 _INERT, _AGILE = -0.4, 1.0
 """A vehicle may turn by so much less or more than it is expected to: moments of inertia that are 1.67 or 0.5 times."""
 _NOISE_PART = 1.0 / 64.0
@@ -47,8 +47,7 @@ class Signature(NamedTuple):
         momentum: Angular momentum of each rotor at the largest speed, N m s, (4,).
         inertia: Ix, Iy, Iz, kg m², (3,).
         variances: Of the residual, N² and N² m², (4,).
-        mass_kg: Mass.
-        gravity_m_s2: Gravity.
+        mass_kg, gravity_m_s2: Of the vehicle.
     """
 
     full_thrust_n: Array
@@ -102,14 +101,6 @@ class RotorWatch:
         still = np.zeros(9)
         _evidence(still, still, self.speeds, self.speeds, interval_s, self._signature, self._residual, self._noise)
         self.begin((0.0, 0.0, 0.0, 0.0))
-
-    def resume(self, lost: int, speeds: Array) -> None:
-        """Go on after a restart without a rotor that was lost before, the others turning at `speeds`."""
-        self.lost, self.speeds = lost, speeds
-
-    def forget(self) -> None:
-        """Take all rotors for whole again."""
-        self.lost = None
 
     def adopt(self, vehicle: Vehicle) -> None:
         """Go on with other numbers of the vehicle."""

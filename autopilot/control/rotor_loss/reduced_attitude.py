@@ -54,8 +54,7 @@ class Trio(NamedTuple):
 
     Attributes:
         lost: The one that is not.
-        a: One beside it.
-        b: The other beside it.
+        a, b: Those beside it.
         o: The opposite one, of the same hand.
         sign: +1 where their torque spins the vehicle counter-clockwise seen from above, -1 otherwise.
     """

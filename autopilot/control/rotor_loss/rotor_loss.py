@@ -1,4 +1,4 @@
-"""A rotor is lost: noticed, and flown down on the other three, whatever control law flew before."""
+"""The loss of a rotor: detected, and the vehicle landed on the other three, whatever control law flew before."""
 
 from typing import Protocol
 
@@ -27,7 +27,7 @@ class RotorLoss:
     """Watches the rotors of one vehicle, and flies it once one is lost.
 
     Attributes:
-        watch: Tells which is lost.
+        watch: Detects which is lost.
         enabled: Whether anything is done, or noticed.
     """
 
@@ -71,13 +71,13 @@ class RotorLoss:
 
     def resume(self, lost: int, speeds: Array, state: VehicleState, ground_m: float, *, flying: bool) -> None:
         """Go on after a restart without a rotor that was lost before, the others turning at `speeds`."""
-        self.watch.resume(lost, speeds)
+        self.watch.lost, self.watch.speeds = lost, speeds
         if flying and self._possible:
             self._three = ThreeRotors(self._vehicle, lost, self._interval_s, speeds, state, ground_m)
 
     def forget(self) -> None:
         """Take all rotors for whole again."""
-        self.watch.forget()
+        self.watch.lost = None
         self._three = None
 
     def look(
@@ -92,9 +92,7 @@ class RotorLoss:
             airborne: Whether the vehicle flies, and feels how.
             ground_m: Height of the ground, z of ENU, as far as it is known.
         """
-        if not (self.enabled and self._possible):
-            return False
-        if self.watch.lost is not None:
+        if not (self.enabled and self._possible) or self.watch.lost is not None:
             return False
         clear = airborne and state.position_enu_m[2] - ground_m > _CLEAR_M
         lost = self.watch.step(state, controls, charge_ah, airborne=clear)
@@ -105,7 +103,7 @@ class RotorLoss:
 
     def decide(self, state: VehicleState, charge_ah: float) -> tuple[FourRotors, Decision]:
         """Return the controls to hold until the next control sample, and the decision that they are."""
-        assert self._three is not None, "asked for only while three rotors fly"
+        assert self._three is not None, "decided only while three rotors fly"
         decision = self._three.step(state, charge_ah)
         return self._three.controls, decision
 

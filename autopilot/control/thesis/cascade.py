@@ -30,7 +30,7 @@ class CascadeMemory(NamedTuple):
 
     Attributes:
         rotor_speeds: The last ones commanded, in the vehicle's unit, (4,).
-        demand: What the outer loop asked for, held along the outer sample; None before its first.
+        demand: What the outer loop demanded, held along the outer sample; None before its first.
     """
 
     rotor_speeds: Array

@@ -21,7 +21,7 @@ class PositionSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class AttitudeAndThrust(NamedTuple):
-    """What the outer loop asks of the inner one: roll and pitch in rad, U1 in N."""
+    """The demand of the outer loop on the inner one: roll and pitch in rad, U1 in N."""
 
     phi: float
     theta: float

@@ -6,13 +6,10 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class Airframe(NamedTuple):
-    """What the outer loop knows of the vehicle.
+    """Mass, gravity and drag of a vehicle.
 
     Attributes:
-        mass_kg: Mass.
-        gravity_m_s2: Gravitational acceleration.
-        drag_xy: Drag of the airframe along body x and y, N s/m.
-        drag_z: Along body z, N s/m.
+        drag_xy, drag_z: Drag of the airframe along body x and y, and along z, N s/m.
         rotor_drag: Of all rotors in their plane, N s/m, at a thrust of 1 N: it grows with the root of the thrust.
     """
 
@@ -24,7 +21,7 @@ class Airframe(NamedTuple):
 
 
 def airframe_of(vehicle: Vehicle) -> Airframe:
-    """Return what the outer loop knows of `vehicle`."""
+    """Return the numbers of `vehicle`."""
     mass_kg, gravity = vehicle.body.mass_kg, vehicle.gravity_m_s2
     if vehicle.drag is None:
         return Airframe(mass_kg, gravity, 0.0, 0.0, 0.0)

@@ -1,6 +1,6 @@
 """The battery as the vehicle file has it: the charge that the rotors took, and how fast they can turn on the rest.
 
-No frame tells the voltage, so it is followed as the rotors are: V = V0 - R I, V0 falling linearly with the
+No frame has the voltage, so it is followed as the rotors are: V = V0 - R I, V0 falling linearly with the
 charge taken, and the rotors' top speed in proportion to V.
 """
 
@@ -40,10 +40,7 @@ class BatteryModel:
 
     def charge_after(self, charge_ah: float, speeds: Array, duration_s: float) -> float:
         """Return the charge taken, Ah, after `duration_s` at rotor speeds (4,), parts of the largest."""
-        if self._battery is None:
-            return charge_ah
-        power_w = self._full_power_w * dot(speeds * speeds, speeds)
-        current_a = power_w / _voltage_v(self._battery, charge_ah, power_w)
+        _, current_a = self.terminal(charge_ah, speeds)
         return charge_ah + current_a * duration_s / _SECONDS_PER_HOUR
 
     def terminal(self, charge_ah: float, speeds: Array) -> tuple[float, float]:
@@ -58,8 +55,7 @@ class BatteryModel:
         """Return the speed that a rotor can reach while all keep the power of `speeds`, (4,); parts of the largest."""
         if self._battery is None:
             return 1.0
-        power_w = self._full_power_w * dot(speeds * speeds, speeds)
-        return _voltage_v(self._battery, charge_ah, power_w) / self._battery.full_voltage_v
+        return self.terminal(charge_ah, speeds)[0] / self._battery.full_voltage_v
 
     def max_common_speed(self, charge_ah: float) -> float:
         """Return the speed that all rotors can keep up together once `charge_ah` is taken, in parts of the largest."""
@@ -72,7 +68,7 @@ class BatteryModel:
         return before + part * (after - before)
 
     def _balanced(self, battery: Battery, point: int) -> float:
-        """Return the balance at so many steps of charge; found when first asked for, so that it is quick to begin."""
+        """Return the balance at so many steps of charge; found when first needed, so that it is quick to begin."""
         if point not in self._max_speeds:
             self._max_speeds[point] = self._balance(battery, self._step_ah * point)
         return self._max_speeds[point]

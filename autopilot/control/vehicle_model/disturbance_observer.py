@@ -28,8 +28,7 @@ class Observer(NamedTuple):
         acceleration: Disturbance for each m/s of innovation, 1/s.
         rate: Part of the rate's innovation that is corrected at once.
         angular_acceleration: Disturbance for each rad/s of innovation, 1/s.
-        max_acceleration_m_s2: Largest acceleration estimated.
-        max_moment_n_m: Largest moment estimated.
+        max_acceleration_m_s2, max_moment_n_m: Largest disturbances estimated.
         airframe: Mass and gravity are of it.
         inertia: Ix, Iy, Iz, kg m², (3,).
         interval_s: Between two samples.

@@ -38,7 +38,7 @@ def exact_inverse(allocation: Array) -> Array:
     """Invert an allocation (4, 4) so that a symmetrical airframe stays symmetrical to the last bit.
 
     The rows of a symmetrical allocation are orthogonal, and A⁻¹ = Aᵀ (A Aᵀ)⁻¹ then only divides; elimination would
-    leave a moment of 1e-17 N m where none was asked for, enough to drift in open loop.
+    leave a moment of 1e-17 N m where none was demanded, enough to drift in open loop.
     """
     scale = np.sqrt((allocation * allocation).sum(axis=1))
     unit = allocation / scale[:, None]

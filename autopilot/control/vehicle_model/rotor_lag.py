@@ -1,4 +1,4 @@
-"""What the rotors do, as far as the autopilot can know: their lag followed, and inverted, as compiled kernels.
+"""The rotors as the autopilot models them: their lag followed, and inverted, as compiled kernels.
 
 The control law plans with forces that follow their commands as one linear lag, the slower of the rotors' two. Each
 rotor is then commanded so that its squared speed, which makes the force, is at the next sample where the plan has it:
@@ -21,8 +21,7 @@ class RotorLag(NamedTuple):
     """How far towards its command a rotor goes in one control sample, and where it must stay.
 
     Attributes:
-        up: Part of the way while it speeds up.
-        down: Part of the way while it slows down.
+        up, down: Part of the way while it speeds up, and while it slows down.
         planned: Part of the way that the plan has force go.
         min_speed: Least speed.
     """

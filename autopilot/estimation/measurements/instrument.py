@@ -60,4 +60,3 @@ class Instrument(Protocol):
 
     def typical(self) -> Value:
         """Return a value of a vehicle that rests at the origin, by which what is compiled is loaded."""
-        ...

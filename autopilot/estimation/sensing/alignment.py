@@ -31,12 +31,9 @@ class Aligned(NamedTuple):
 
     Attributes:
         duration_s: Over how long.
-        force: Specific force, m/s² FLU.
-        rate: rad/s FLU.
-        field: Magnetic field, gauss FLU.
-        fields: Of how many.
-        pressure_height_m: Of the barometer; None without one.
-        heights: Of how many.
+        force, rate: Specific force, m/s² FLU, and rad/s FLU.
+        field, fields: Magnetic field, gauss FLU; of how many.
+        pressure_height_m, heights: Of the barometer; None without one; of how many.
         fix: The last fix.
         attitude: That the force and the field show.
     """
