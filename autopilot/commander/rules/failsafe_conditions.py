@@ -1,7 +1,4 @@
-"""Since when each condition of the failsafes holds: all that the vehicle may lose is looked at here, and nowhere else.
-
-Only simulated time counts, and nothing that a clock measures: in lockstep the same flight loses the same things.
-"""
+"""Since when each condition of the failsafes holds; the only place where they are judged, by simulated time alone."""
 
 from collections.abc import Callable, Container, Mapping
 from math import hypot, radians, sqrt
@@ -18,13 +15,13 @@ from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, OffboardSetpoi
 from colibri.mavlink.telemetry.snapshot import BatteryState
 
 NEVER_US = -(10**12)
-"""Since when everybody could be heard who is there, where nothing was restarted."""
+"""Since when clients could be received, where nothing was restarted."""
 PLACELESS = (Mode.STABILIZED, Mode.ALTITUDE)
 """Modes that need no position."""
 _FROZEN_M, _FROZEN_RAD = 0.05, 0.05
-"""So far a vehicle must have come by its own account, for its rest to be a lie and not the rounding of a frame."""
+"""How far a vehicle must have come by its own rates before an unchanged state is a fault, not rounding of a frame."""
 _PLANLESS = (Fallback.SHIFTED_PLAN, Fallback.LQR, Fallback.DESCENT)
-"""What decides where no QP is solved; recovery is no failure, but how a vehicle turns upright."""
+"""Fallbacks without a solved QP; recovery is none of them: it is how a vehicle turns upright."""
 
 
 class FailsafeInputs(NamedTuple):
@@ -32,21 +29,21 @@ class FailsafeInputs(NamedTuple):
 
     Attributes:
         now_us: Simulated time.
-        missed_us: When the frame came that was the last before frames were missed; None if none were.
-        state: The vehicle, as it is told or estimated.
+        missed_us: When the last frame came before frames were missed; None if none were.
+        state: The vehicle, reported by the plant or estimated.
         mode: The flight mode.
         standing: Whether it stands on the ground.
-        estimate: What the state is worth; None where it is told.
+        estimate: Accuracy of the state; None where the plant reports it.
         setpoint: The companion's last, however old; None if it has ended its stream.
-        sticks_us: When the pilot's sticks were last heard; None if they were released.
-        listening_us: Since when anybody could be heard: since a restart in flight.
-        station_us: When a ground station was last heard; None if there never was one.
+        sticks_us: When sticks were last received; None if they were released.
+        listening_us: Since when clients could be received: since a restart in flight.
+        station_us: When a ground station was last received; None if there never was one.
         battery: None without one.
-        fence: Says how far a place is inside of every fence, m; None without any.
-        decided: How the last decision of the control law came about; None while it decides nothing.
+        fence: Returns how far a place is inside of every fence, m; None without any.
+        decided: Diagnostics of the last decision of the control law; None while it decides nothing.
         late: Whether the declared solve time is longer than a control sample.
         rotor_lost: A rotor that makes no thrust, counted from 0; None if all do.
-        pace: How fast the vehicle may brake.
+        pace: Limits by which the vehicle may brake.
     """
 
     now_us: int
@@ -68,40 +65,43 @@ class FailsafeInputs(NamedTuple):
 
 
 class Conditions:
-    """Looks at one vehicle, sample after sample."""
+    """Judges the conditions of one vehicle, sample after sample."""
 
     def __init__(self) -> None:
         """Begin with nothing lost."""
         self._since_us: dict[Condition, int] = {}
-        self._told: tuple[Vector, object] | None = None
-        self._told_us = 0
+        self._pose: tuple[Vector, object] | None = None
+        self._pose_us = 0
 
     def look(self, inputs: FailsafeInputs, limits: Limits, held: Container[Condition]) -> Mapping[Condition, int]:
-        """Return since when each condition holds; those that do not are not in it. `held` are lost already."""
+        """Return since when each condition holds; those that do not are not in it. `held` are lost already.
+
+        Every condition has a rule in one of the two tables: this fails at the first sample where one has none.
+        """
         before, self._since_us = self._since_us, {}
-        for condition, is_so in _LOOKS:
-            if is_so(inputs, limits):
-                self._since_us[condition] = before.get(condition, inputs.now_us)
-        found = dict(self._since_us)
+        found: dict[Condition, int] = {}
+        for condition in Condition:
+            if condition in SILENT_SINCE:
+                since_us = SILENT_SINCE[condition](inputs, condition in held)
+                if since_us is not None:
+                    found[condition] = since_us
+            elif HOLDS[condition](inputs, limits):
+                found[condition] = self._since_us[condition] = before.get(condition, inputs.now_us)
         frozen_us = self._frozen_since(inputs)
         if frozen_us is not None:
             found[Condition.ATTITUDE_LOST] = frozen_us
-        for condition, since in _AGES:
-            since_us = since(inputs, condition in held)
-            if since_us is not None:
-                found[condition] = since_us
         return found
 
     def _frozen_since(self, inputs: FailsafeInputs) -> int | None:
-        """Return since when what is told stays the same though it says that it moves; None if it does not."""
-        told = (inputs.state.position_enu_m, inputs.state.attitude)
-        if told != self._told or inputs.standing:
-            self._told, self._told_us = told, inputs.now_us
+        """Return since when position and attitude stay the same though the rates are not zero; None if they do not."""
+        pose = (inputs.state.position_enu_m, inputs.state.attitude)
+        if pose != self._pose or inputs.standing:
+            self._pose, self._pose_us = pose, inputs.now_us
             return None
-        for_s = (inputs.now_us - self._told_us) * 1e-6
+        for_s = (inputs.now_us - self._pose_us) * 1e-6
         moved = hypot(*inputs.state.velocity_enu_m_s) * for_s > _FROZEN_M
         turned = hypot(*inputs.state.rate_flu_rad_s) * for_s > _FROZEN_RAD
-        return self._told_us if moved or turned else None
+        return self._pose_us if moved or turned else None
 
 
 def battery_below(battery: BatteryState | None, charge: float, voltage_v: float) -> bool:
@@ -115,7 +115,7 @@ def needs_position(mode: Mode, setpoint: OffboardSetpoint | None) -> bool:
 
 
 def knows_position(estimate: Estimate | None, limits: Limits) -> bool:
-    """Whether position and velocity are known within their limits; a state that is told is."""
+    """Whether position and velocity are within their accuracy limits; without an estimate they are."""
     if estimate is None:
         return True
     position_m, velocity_m_s = max(estimate.position_std_m[:2]), max(estimate.velocity_std_m_s[:2])
@@ -141,25 +141,6 @@ def stopping_m(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> 
     return speed_m_s * sqrt(speed_m_s / jerk_m_s3)
 
 
-def _attitude_lost(inputs: FailsafeInputs, limits: Limits) -> bool:
-    del limits
-    return inputs.estimate is not None and not inputs.estimate.health.attitude
-
-
-def _tilted(inputs: FailsafeInputs, limits: Limits) -> bool:
-    roll, pitch, _ = map(abs, inputs.state.euler)
-    return roll > radians(limits["FD_FAIL_R"]) or pitch > radians(limits["FD_FAIL_P"])
-
-
-def _rotor_failed(inputs: FailsafeInputs, limits: Limits) -> bool:
-    del limits
-    return inputs.rotor_lost is not None
-
-
-def _position_lost(inputs: FailsafeInputs, limits: Limits) -> bool:
-    return needs_position(inputs.mode, inputs.setpoint) and not knows_position(inputs.estimate, limits)
-
-
 def _estimate_invalid(inputs: FailsafeInputs, limits: Limits) -> bool:
     del limits
     if inputs.estimate is None:
@@ -168,8 +149,9 @@ def _estimate_invalid(inputs: FailsafeInputs, limits: Limits) -> bool:
     return not (health.heading and health.height and health.vertical_velocity)
 
 
-def _battery(charge: str, voltage: str) -> Callable[[FailsafeInputs, Limits], bool]:
-    return lambda inputs, limits: battery_below(inputs.battery, limits[charge], limits[voltage])
+def _tilted(inputs: FailsafeInputs, limits: Limits) -> bool:
+    roll, pitch, _ = map(abs, inputs.state.euler)
+    return roll > radians(limits["FD_FAIL_R"]) or pitch > radians(limits["FD_FAIL_P"])
 
 
 def _fence_breached(inputs: FailsafeInputs, limits: Limits) -> bool:
@@ -181,45 +163,26 @@ def _fence_breached(inputs: FailsafeInputs, limits: Limits) -> bool:
     return limits["GF_PREDICT"] != 0 and inputs.fence(resting_place(inputs.state, inputs.pace)) < margin_m
 
 
-def _plan_failed(inputs: FailsafeInputs, limits: Limits) -> bool:
-    del limits
-    return inputs.decided is not None and inputs.decided.fallback in _PLANLESS
+def _battery(charge: str, voltage: str) -> Callable[[FailsafeInputs, Limits], bool]:
+    return lambda inputs, limits: battery_below(inputs.battery, limits[charge], limits[voltage])
 
 
-def _late(inputs: FailsafeInputs, limits: Limits) -> bool:
-    del limits
-    return inputs.late
-
-
-_LOOKS: tuple[tuple[Condition, Callable[[FailsafeInputs, Limits], bool]], ...] = (
-    (Condition.ATTITUDE_LOST, _attitude_lost),
-    (Condition.TILTED, _tilted),
-    (Condition.ROTOR_FAILED, _rotor_failed),
-    (Condition.POSITION_LOST, _position_lost),
-    (Condition.ESTIMATE_INVALID, _estimate_invalid),
-    (Condition.BATTERY_EMERGENCY, _battery("BAT_EMERGEN_THR", "BAT_EMERGEN_VOLT")),
-    (Condition.BATTERY_CRITICAL, _battery("BAT_CRIT_THR", "BAT_CRIT_VOLT")),
-    (Condition.BATTERY_LOW, _battery("BAT_LOW_THR", "BAT_LOW_VOLT")),
-    (Condition.FENCE_BREACHED, _fence_breached),
-    (Condition.PLAN_FAILED, _plan_failed),
-    (Condition.DEADLINE_MISSED, _late),
-)
-"""What holds since the first sample that says so."""
-
-
-def _missed_since(inputs: FailsafeInputs, held: bool) -> int | None:
-    del held
-    return inputs.missed_us
-
-
-def _gps_lost_since(inputs: FailsafeInputs, held: bool) -> int | None:
-    del held
-    return None if inputs.estimate is None else inputs.estimate.health.gps_lost_since_us
-
-
-def _station_silent_since(inputs: FailsafeInputs, held: bool) -> int | None:
-    del held
-    return inputs.station_us
+HOLDS: Mapping[Condition, Callable[[FailsafeInputs, Limits], bool]] = {
+    Condition.ATTITUDE_LOST: lambda inputs, _: inputs.estimate is not None and not inputs.estimate.health.attitude,
+    Condition.TILTED: _tilted,
+    Condition.ROTOR_FAILED: lambda inputs, _: inputs.rotor_lost is not None,
+    Condition.POSITION_LOST: lambda inputs, limits: (
+        needs_position(inputs.mode, inputs.setpoint) and not knows_position(inputs.estimate, limits)
+    ),
+    Condition.ESTIMATE_INVALID: _estimate_invalid,
+    Condition.BATTERY_EMERGENCY: _battery("BAT_EMERGEN_THR", "BAT_EMERGEN_VOLT"),
+    Condition.BATTERY_CRITICAL: _battery("BAT_CRIT_THR", "BAT_CRIT_VOLT"),
+    Condition.BATTERY_LOW: _battery("BAT_LOW_THR", "BAT_LOW_VOLT"),
+    Condition.FENCE_BREACHED: _fence_breached,
+    Condition.PLAN_FAILED: lambda inputs, _: inputs.decided is not None and inputs.decided.fallback in _PLANLESS,
+    Condition.DEADLINE_MISSED: lambda inputs, _: inputs.late,
+}
+"""Whether a condition holds at a sample: it has held since the first of them."""
 
 
 def _sticks_silent_since(inputs: FailsafeInputs, held: bool) -> int | None:
@@ -234,14 +197,12 @@ def _setpoints_silent_since(inputs: FailsafeInputs, held: bool) -> int | None:
     return inputs.listening_us if inputs.setpoint is None else inputs.setpoint.time_us
 
 
-_AGES: tuple[tuple[Condition, Callable[[FailsafeInputs, bool], int | None]], ...] = (
-    (Condition.TELEMETRY_MISSED, _missed_since),
-    (Condition.GPS_LOST, _gps_lost_since),
-    (Condition.STATION_LOST, _station_silent_since),
-    (Condition.STICKS_LOST, _sticks_silent_since),
-    (Condition.SETPOINTS_LOST, _setpoints_silent_since),
-)
-"""What holds since a moment that is known: a source has been silent since then. They take whether it is lost already.
-
-A stream that is not asked for any more stays lost until it is heard again.
-"""
+SILENT_SINCE: Mapping[Condition, Callable[[FailsafeInputs, bool], int | None]] = {
+    Condition.TELEMETRY_MISSED: lambda inputs, _: inputs.missed_us,
+    Condition.GPS_LOST: lambda inputs, _: inputs.estimate and inputs.estimate.health.gps_lost_since_us,
+    Condition.STATION_LOST: lambda inputs, _: inputs.station_us,
+    Condition.STICKS_LOST: _sticks_silent_since,
+    Condition.SETPOINTS_LOST: _setpoints_silent_since,
+}
+"""Since when a source is silent, given whether it is lost already: a stream that no mode needs stays lost until it is
+received again."""

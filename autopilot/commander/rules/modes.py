@@ -66,128 +66,86 @@ class ModeRow(NamedTuple):
         mode: Which.
         main: PX4's main mode.
         sub: PX4's sub mode.
-        standard: MAV_STANDARD_MODE, 0 where it is none.
         needs: What it needs to be entered in flight.
+        meaning: What it does.
+        standard: MAV_STANDARD_MODE, 0 where it is none.
         to_arm: Whether the rotors may be armed in it.
         selectable: Whether a ground station may choose it.
-        meaning: What it does.
     """
 
     mode: Mode
     main: int
     sub: int
-    standard: int
     needs: tuple[Need, ...]
-    to_arm: bool
-    selectable: bool
     meaning: str
+    standard: int = 0
+    to_arm: bool = True
+    selectable: bool = True
 
 
 AUTO = 4
 
 MODES: tuple[ModeRow, ...] = (
-    ModeRow(
-        Mode.STABILIZED,
-        7,
-        0,
-        0,
-        (Need.ATTITUDE_CONTROL, Need.STICKS),
-        True,
-        True,
-        "sticks to tilt, yaw rate and thrust",
-    ),
+    ModeRow(Mode.STABILIZED, 7, 0, (Need.ATTITUDE_CONTROL, Need.STICKS), "sticks to tilt, yaw rate and thrust"),
     ModeRow(
         Mode.ALTITUDE,
         2,
         0,
-        mav.MAV_STANDARD_MODE_ALTITUDE_HOLD,
         (Need.ATTITUDE_CONTROL, Need.STICKS),
-        True,
-        True,
         "sticks to tilt, yaw rate and climb; height is held",
+        mav.MAV_STANDARD_MODE_ALTITUDE_HOLD,
     ),
     ModeRow(
         Mode.POSITION,
         3,
         0,
-        mav.MAV_STANDARD_MODE_POSITION_HOLD,
         (Need.STICKS, Need.POSITION),
-        True,
-        True,
         "sticks to velocity; place and height are held",
+        mav.MAV_STANDARD_MODE_POSITION_HOLD,
     ),
-    ModeRow(
-        Mode.HOLD,
-        AUTO,
-        3,
-        0,
-        (Need.POSITION,),
-        True,
-        True,
-        "stops and stays; flies where a reposition command says",
-    ),
-    ModeRow(
-        Mode.TAKEOFF,
-        AUTO,
-        2,
-        mav.MAV_STANDARD_MODE_TAKEOFF,
-        (Need.POSITION,),
-        True,
-        True,
-        "climbs to the take-off height",
-    ),
+    ModeRow(Mode.HOLD, AUTO, 3, (Need.POSITION,), "stops and stays; flies where a reposition command says"),
+    ModeRow(Mode.TAKEOFF, AUTO, 2, (Need.POSITION,), "climbs to the take-off height", mav.MAV_STANDARD_MODE_TAKEOFF),
     ModeRow(
         Mode.LAND,
         AUTO,
         6,
-        mav.MAV_STANDARD_MODE_LAND,
         (),
-        False,
-        True,
         "sinks here, then disarms; level, where the position is not known",
+        mav.MAV_STANDARD_MODE_LAND,
+        to_arm=False,
     ),
     ModeRow(
         Mode.RETURN,
         AUTO,
         5,
-        mav.MAV_STANDARD_MODE_SAFE_RECOVERY,
         (Need.POSITION,),
-        False,
-        True,
         "climbs, flies home and lands",
+        mav.MAV_STANDARD_MODE_SAFE_RECOVERY,
+        to_arm=False,
     ),
     ModeRow(
         Mode.MISSION,
         AUTO,
         4,
-        mav.MAV_STANDARD_MODE_MISSION,
         (Need.MISSION, Need.INSIDE_FENCE, Need.POSITION),
-        True,
-        True,
         "flies the uploaded mission",
+        mav.MAV_STANDARD_MODE_MISSION,
     ),
-    ModeRow(Mode.OFFBOARD, 6, 0, 0, (Need.SETPOINTS,), True, True, "follows the setpoints of a companion"),
+    ModeRow(Mode.OFFBOARD, 6, 0, (Need.SETPOINTS,), "follows the setpoints of a companion"),
     ModeRow(
         Mode.ORBIT,
         3,
         1,
-        mav.MAV_STANDARD_MODE_ORBIT,
         (Need.FLYING, Need.CIRCLE, Need.POSITION),
-        False,
-        False,
         "flies around a centre",
+        mav.MAV_STANDARD_MODE_ORBIT,
+        to_arm=False,
+        selectable=False,
     ),
     ModeRow(
-        Mode.FOLLOW,
-        AUTO,
-        8,
-        0,
-        (Need.FLYING, Need.POSITION),
-        False,
-        True,
-        "follows the target that FOLLOW_TARGET tells",
+        Mode.FOLLOW, AUTO, 8, (Need.FLYING, Need.POSITION), "follows the target that FOLLOW_TARGET tells", to_arm=False
     ),
-    ModeRow(Mode.TRACK, AUTO, 11, 0, (Need.POSITION,), True, True, "flies the track that parameter TRACK picks"),
+    ModeRow(Mode.TRACK, AUTO, 11, (Need.POSITION,), "flies the track that parameter TRACK picks"),
 )
 ROWS = {row.mode: row for row in MODES}
 
@@ -294,8 +252,3 @@ def mode_of(main: int, sub: int) -> Mode | None:
 def mode_of_custom(number: int) -> Mode | None:
     """Return the mode of a HEARTBEAT's number."""
     return mode_of(number >> 16 & 0xFF, number >> 24 & 0xFF) if number & 0xFFFF == 0 else None
-
-
-def mode_of_standard(standard: int) -> Mode | None:
-    """Return the mode of a MAV_STANDARD_MODE; None if this vehicle has none such."""
-    return next((row.mode for row in MODES if row.standard == standard and standard), None)

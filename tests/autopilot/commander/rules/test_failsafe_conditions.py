@@ -8,6 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colibri.autopilot.commander.rules.failsafe_conditions import (
+    HOLDS,
+    SILENT_SINCE,
     Conditions,
     FailsafeInputs,
     battery_below,
@@ -38,6 +40,11 @@ def at_speed(velocity: Vector, position: Vector = (0.0, 0.0, 5.0)) -> VehicleSta
 
 def inside_of_10_m(place: Vector) -> float:
     return 10.0 - abs(place[0])
+
+
+def test_every_condition_has_one_rule() -> None:
+    assert HOLDS.keys() | SILENT_SINCE.keys() == set(Condition)
+    assert not HOLDS.keys() & SILENT_SINCE.keys()
 
 
 def test_of_a_vehicle_that_is_well_nothing_is_lost() -> None:

@@ -20,7 +20,6 @@ from colibri.autopilot.commander.rules.modes import (
     custom_mode,
     mode_of,
     mode_of_custom,
-    mode_of_standard,
     next_state,
 )
 from colibri.mavlink.wire.refusal import Refusal
@@ -53,8 +52,6 @@ def test_a_number_is_a_mode_of_the_table_or_none(number: int) -> None:
 def test_standard_modes_name_one_mode_each() -> None:
     standards = [row.standard for row in MODES if row.standard]
     assert len(standards) == len(set(standards)) == 7
-    assert all(mode_of_standard(row.standard) is row.mode for row in MODES if row.standard)
-    assert mode_of_standard(0) is None
 
 
 @pytest.mark.parametrize("row", TRANSITIONS, ids=lambda row: f"{'-'.join(row.sources) or 'any'}: {row.event}")
