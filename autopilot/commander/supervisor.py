@@ -17,7 +17,7 @@ _CHARGE_STATES: tuple[tuple[Condition, int], ...] = (
 
 
 class Supervisor:
-    """Supervises one flight.
+    """The supervisor of one vehicle.
 
     Attributes:
         limits: Limits and delays, from the parameters.
@@ -47,8 +47,8 @@ class Supervisor:
     def step(self, inputs: FailsafeInputs, flight: Flight) -> Action:
         """Return what is to begin at this control sample, before the pilot's step; NONE to go on as before."""
         since_us = self._conditions.look(inputs, self.limits, self.memory.held_us)
-        self.memory, action, said = following(self.memory, inputs.now_us, since_us, self._settings, flight)
-        for severity, text in said:
+        self.memory, action, lines = following(self.memory, inputs.now_us, since_us, self._settings, flight)
+        for severity, text in lines:
             self._lines.say(severity, text)
         return action
 

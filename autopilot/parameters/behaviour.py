@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
-from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
+from colibri.mavlink.parameters.store import Kind, Parameter, Parameters, Value
 
 TRACKS = (*THESIS_TRACKS, "lemniscate", "circle")
 """What the numbers of TRACK stand for."""
@@ -17,20 +17,7 @@ _YES_OR_NO = ((0, "Disabled"), (1, "Enabled"))
 
 
 class Row(NamedTuple):
-    """A parameter that is a field of `Behaviour` or of its limits.
-
-    Attributes:
-        name: Of the parameter.
-        field: Of the structure.
-        unit: Of the parameter.
-        minimum: Of the parameter.
-        maximum: Of the parameter.
-        description: In a few words.
-        details: The rest.
-        scale: The field is so many times the parameter.
-        decimals: To be shown.
-        values: What an integer may be.
-    """
+    """A parameter that is a `field` of `Behaviour` or of its limits, `scale` times the parameter's value."""
 
     name: str
     field: str
@@ -138,25 +125,16 @@ ROWS = (
 )
 """One for each number of `Behaviour` and `Limits`."""
 
-_ANSWERS = "Only answers ground stations that ask for it: changes nothing."
-ANSWERS = (
-    ("SYS_AUTOSTART", 4001, "Airframe", True, ()),
-    ("SYS_AUTOCONFIG", 0, "Reset of the airframe", False, ()),
-    ("CAL_GYRO0_ID", 1, "Gyroscope that is calibrated", True, ()),
-    ("CAL_ACC0_ID", 1, "Accelerometer that is calibrated", True, ()),
-    ("CAL_MAG0_ID", 1, "Magnetometer that is calibrated", True, ()),
-    ("COM_RC_IN_MODE", 1, "Source of the sticks", False, ((1, "Joystick"),)),
-)
-"""Integers that PX4's setup pages ask for: name, default, description, whether read-only, what it may be."""
+_ANSWERS = "Only answers ground stations that request it: changes nothing."
 
 
 def behaviour_parameters(system_id: int) -> list[Parameter]:
     """Return the parameters of behaviour, and those that ground stations expect of a PX4."""
-    return [*(row.parameter() for row in ROWS), *_answers(), *_follow_answers(), _system(system_id)]
+    return [*(row.parameter() for row in ROWS), *_answers(system_id)]
 
 
 def behaviour(parameters: Parameters) -> Behaviour:
-    """Return the behaviour that the parameters say; numbers that nobody changed keep their 64 bits."""
+    """Return the behaviour by the parameters' values; numbers that nobody changed keep their 64 bits."""
     changed: dict[str, Any] = {}
     for row in ROWS:
         value = parameters[row.name]
@@ -173,53 +151,28 @@ def behaviour(parameters: Parameters) -> Behaviour:
     return Behaviour(**{**whole, **changed, "limits": _BEHAVIOUR.limits._replace(**limits)})
 
 
-def _answers() -> list[Parameter]:
+def _answers(system_id: int) -> list[Parameter]:
+    """Return parameters that ground stations for PX4 read or set, and that change nothing here."""
     return [
-        Parameter(
-            name=name,
-            kind=Kind.INT,
-            default=default,
-            description=description,
-            details=_ANSWERS,
-            group=_group(name),
-            read_only=read_only,
-            values=values,
-        )
-        for name, default, description, read_only, values in ANSWERS
+        _answer("SYS_AUTOSTART", 4001, "Airframe", read_only=True),
+        _answer("SYS_AUTOCONFIG", 0, "Reset of the airframe"),
+        _answer("CAL_GYRO0_ID", 1, "Gyroscope that is calibrated", read_only=True),
+        _answer("CAL_ACC0_ID", 1, "Accelerometer that is calibrated", read_only=True),
+        _answer("CAL_MAG0_ID", 1, "Magnetometer that is calibrated", read_only=True),
+        _answer("COM_RC_IN_MODE", 1, "Source of the sticks", values=((1, "Joystick"),)),
+        # MAVSDK sets these two before it follows; the chain of the reference has limits of its own.
+        _answer("FLW_TGT_RS", 0.1, "Follow: filter", minimum=0.0, maximum=1.0, unit="norm"),
+        _answer("FLW_TGT_MAX_VEL", 5.0, "Follow: speed", minimum=0.0, maximum=20.0, unit="m/s"),
+        _answer(
+            *("MAV_SYS_ID", system_id, "System id", "The instance chooses it."), minimum=1, maximum=255, read_only=True
+        ),
     ]
 
 
-def _follow_answers() -> list[Parameter]:
-    """Return what MAVSDK sets before it follows, and the reference chain has limits of its own in place of."""
-    what = (("FLW_TGT_RS", 0.1, 1.0, "norm", "Follow: filter"), ("FLW_TGT_MAX_VEL", 5.0, 20.0, "m/s", "Follow: speed"))
-    return [
-        Parameter(
-            name=name,
-            kind=Kind.REAL,
-            default=default,
-            minimum=0.0,
-            maximum=maximum,
-            unit=unit,
-            description=description,
-            details=_ANSWERS,
-            group=_group(name),
-        )
-        for name, default, maximum, unit, description in what
-    ]
-
-
-def _system(system_id: int) -> Parameter:
-    return Parameter(
-        name="MAV_SYS_ID",
-        kind=Kind.INT,
-        default=system_id,
-        minimum=1,
-        maximum=255,
-        description="System id",
-        details="The instance chooses it.",
-        group=_group("MAV_SYS_ID"),
-        read_only=True,
-    )
+def _answer(name: str, default: Value, description: str, details: str = _ANSWERS, **others: Any) -> Parameter:
+    kind = Kind.REAL if isinstance(default, float) else Kind.INT
+    fields = {"description": description, "details": details, "group": _group(name), **others}
+    return Parameter(name=name, kind=kind, default=default, **fields)
 
 
 def _field(name: str) -> Any:

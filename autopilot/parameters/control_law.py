@@ -43,11 +43,9 @@ LPV_MPC = [
     Number("LPV_OBS_ACC", ("observer", "acceleration_rad_s"), "rad/s", 0.1, 60.0, "Poles of the force observer"),
     Number("LPV_OBS_MOM", ("observer", "moment_rad_s"), "rad/s", 0.1, 60.0, "Poles of the moment observer"),
     Number(
-        "LPV_OBS_ACC_MAX", ("observer", "max_acceleration_m_s2"), "m/s^2", 0.01, 20.0, "Largest disturbance believed"
+        "LPV_OBS_ACC_MAX", ("observer", "max_acceleration_m_s2"), "m/s^2", 0.01, 20.0, "Largest disturbance assumed"
     ),
-    Number(
-        "LPV_OBS_MOM_MAX", ("observer", "max_moment_n_m"), "N m", 0.001, 10.0, "Largest disturbance moment believed"
-    ),
+    Number("LPV_OBS_MOM_MAX", ("observer", "max_moment_n_m"), "N m", 0.001, 10.0, "Largest disturbance moment assumed"),
     *_axes("LPV_Q_PHI LPV_Q_THETA LPV_Q_PSI", ("attitude", "output_weight"), "", 1e-3, 1e3, "Weight on {} error"),
     *_axes("LPV_R_U2 LPV_R_U3 LPV_R_U4", ("attitude", "increment_weight"), "", 1e-3, 1e4, "Weight on {} changes"),
     *_axes(

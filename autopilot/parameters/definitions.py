@@ -15,7 +15,7 @@ from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
 from colibri.mavlink.parameters.store import Parameter, Value
 from colibri.plant.vehicle.description import Vehicle
 
-__all__ = ["ImpossibleError", "Numbers", "applied", "behaviour", "definitions"]
+__all__ = ["ImpossibleError", "Numbers", "behaviour", "definitions"]
 
 
 class ImpossibleError(AutopilotError):
@@ -38,7 +38,16 @@ class Numbers:
         self._tree: dict[str, Any] = msgspec.to_builtins(vehicle)
         self._law = law_numbers(profile.controller, self._table)
         self._model = vehicle_numbers(self._tree)
-        self.definitions = [*self._law_definitions(), *self._model_definitions()]
+        name, keys = profile.controller, f"controllers.{profile.controller}"
+        self.definitions = [
+            number.parameter(self._table, f"Control law {name}", f"{keys}.{described(number.path)} of the profile.")
+            for number in self._law
+        ] + [
+            number.parameter(
+                self._tree, "Vehicle model", f"{described(number.path)} of the vehicle, as the autopilot assumes it."
+            )
+            for number in self._model
+        ]
         self.defaults = {parameter.name: parameter.default for parameter in self.definitions}
 
     def applied(self, values: Mapping[str, Value]) -> tuple[Profile, Vehicle]:
@@ -57,36 +66,10 @@ class Numbers:
         tree = changed(self._tree, self._model, values, self.defaults)
         return profile, vehicle if tree is self._tree else _vehicle(tree)
 
-    def _law_definitions(self) -> list[Parameter]:
-        name = self._profile.controller
-        return [
-            number.parameter(
-                self._table, f"Control law {name}", f"controllers.{name}.{described(number.path)} of the profile."
-            )
-            for number in self._law
-        ]
-
-    def _model_definitions(self) -> list[Parameter]:
-        return [
-            number.parameter(
-                self._tree, "Vehicle model", f"{described(number.path)} of the vehicle, as the autopilot believes it."
-            )
-            for number in self._model
-        ]
-
 
 def definitions(profile: Profile, vehicle: Vehicle, system_id: int = 1) -> list[Parameter]:
     """Return all parameters of an autopilot that flies `vehicle` by `profile`: their defaults are the files'."""
     return [*Numbers(profile, vehicle).definitions, *behaviour_parameters(system_id), *failsafe_parameters()]
-
-
-def applied(profile: Profile, vehicle: Vehicle, values: Mapping[str, Value]) -> tuple[Profile, Vehicle]:
-    """Return profile and vehicle, as their files have them, with the values of the parameters in.
-
-    Raises:
-        ImpossibleError: There is no such vehicle.
-    """
-    return Numbers(profile, vehicle).applied(values)
 
 
 def _vehicle(tree: dict[str, Any]) -> Vehicle:

@@ -30,18 +30,7 @@ _MAX_WORD_CHARS = 8
 
 
 class Number(NamedTuple):
-    """A number that is a parameter.
-
-    Attributes:
-        name: Of the parameter.
-        path: Where the number lies.
-        unit: Of the parameter.
-        minimum: Of the parameter.
-        maximum: Of the parameter.
-        description: In a few words.
-        scale: The number is so many times the parameter.
-        decimals: To be shown of the parameter.
-    """
+    """A number at a `path` of a tree, `scale` times a parameter; the other fields are the parameter's."""
 
     name: str
     path: Path

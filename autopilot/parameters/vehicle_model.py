@@ -1,4 +1,4 @@
-"""The numbers of the vehicle model that are parameters: what the autopilot believes, not what the plant flies."""
+"""The numbers of the vehicle model that are parameters: what the autopilot assumes, not what the plant flies."""
 
 from collections.abc import Mapping
 from typing import Any

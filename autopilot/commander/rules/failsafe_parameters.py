@@ -15,17 +15,7 @@ _US = 1e6
 
 
 class Number(NamedTuple):
-    """A limit or a delay.
-
-    Attributes:
-        name: Of the parameter.
-        default: Of its value; a whole number makes one of whole numbers.
-        minimum: Least value.
-        maximum: Largest value.
-        unit: Of the value.
-        description: In a few words.
-        details: The rest.
-    """
+    """A limit or a delay: the fields of its parameter. A whole number as `default` makes it a switch."""
 
     name: str
     default: float

@@ -1,8 +1,7 @@
-"""Failsafes: the rule that says what the vehicle does when something is lost, and which loss wins.
+"""The rule of the failsafes: which action begins, given since when each condition holds.
 
-Pure: since when each condition of `failsafe_table` holds goes in (`conditions` gathers that), an action and the lines
-to say come out. The actions are ranked; what is flown gives way to a higher one alone, until the pilot chooses a mode
-or the rotors stop.
+The actions are ranked; what is flown gives way to a higher one alone, until the pilot chooses a mode or the rotors
+stop.
 """
 
 from collections.abc import Mapping
@@ -13,7 +12,7 @@ from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.services.statustext import CRITICAL, EMERGENCY, NOTICE, WARNING
 
 CLEAR_AFTER_US = 1_000_000
-"""So long a condition must not hold before it is over: a link that comes and goes is lost once."""
+"""How long a condition must not hold before it is over: a link that comes and goes is lost once."""
 
 _SEVERITIES: Mapping[Action, int] = {
     Action.WARN: WARNING,
@@ -27,26 +26,14 @@ _RANKS: Mapping[Mode, Action] = {Mode.RETURN: Action.RETURN, Mode.LAND: Action.L
 
 
 class Setting(NamedTuple):
-    """What the parameters make of a row.
-
-    Attributes:
-        delay_us: How long its condition must hold.
-        action: What is then done.
-    """
+    """What the parameters make of a row: how long its condition must hold, and what is then done."""
 
     delay_us: int
     action: Action
 
 
 class Flight(NamedTuple):
-    """What the table decides about.
-
-    Attributes:
-        armed: Whether the rotors may turn.
-        standing: Whether the vehicle stands on the ground.
-        mode: The flight mode.
-        saving: The failsafe that is flown; NONE if none is.
-    """
+    """State of the flight that the rule decides about; `saving` is the failsafe that is flown, NONE if none is."""
 
     armed: bool
     standing: bool
@@ -60,7 +47,7 @@ class Flight(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What is remembered from one control sample to the next.
+    """Memory from one control sample to the next.
 
     Attributes:
         held_us: When each condition that goes on, beyond its delay, last held.
@@ -72,17 +59,17 @@ class Memory(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What the table decides.
+    """Decision of the rule.
 
     Attributes:
         memory: For the next control sample.
         action: To begin now; NONE to go on as before.
-        said: Severities and lines.
+        lines: MAV_SEVERITY and text of each line to report.
     """
 
     memory: Memory
     action: Action
-    said: tuple[tuple[int, str], ...]
+    lines: tuple[tuple[int, str], ...]
 
 
 def following(
@@ -95,18 +82,16 @@ def following(
     """Return what begins and what is over.
 
     An action begins with its condition: a pilot who then chooses another mode is obeyed until another condition
-    begins. At each arming all that holds begins anew.
-
-    Args:
-        memory: What the sample before returned.
-        now_us: Simulated time.
-        since_us: Since when each condition holds; those that do not are not in it.
-        settings: What the parameters say.
-        flight: What is decided about.
+    begins. At each arming all that holds begins again. `since_us` has no entry for a condition that does not hold.
     """
-    held_us = {} if flight.armed and not memory.armed else _watched(memory.held_us, flight.armed)
+    newly_armed = flight.armed and not memory.armed
+    held_us: dict[Condition, int] = {
+        condition: at_us
+        for condition, at_us in memory.held_us.items()
+        if not newly_armed and (flight.armed or ROWS[condition].grounded)
+    }
     begun: list[Row] = []
-    said: list[tuple[int, str]] = []
+    cleared: list[tuple[int, str]] = []
     for row in TABLE:
         condition, setting = row.condition, settings[row.condition]
         began_us = since_us.get(condition)
@@ -117,30 +102,25 @@ def following(
             held_us[condition] = now_us
         elif now_us - held_us.get(condition, now_us) >= CLEAR_AFTER_US and not (row.kept and flight.armed):
             del held_us[condition]
-            said.append((NOTICE, f"{condition}: cleared"))
+            cleared.append((NOTICE, f"{condition}: cleared"))
     action, lines = _begin([(row, settings[row.condition].action) for row in begun], flight)
-    return Verdict(Memory(held_us, flight.armed), action, (*lines, *said))
-
-
-def _watched(held_us: Mapping[Condition, int], armed: bool) -> dict[Condition, int]:
-    """Return what is remembered; with the flight ends what is watched in flight alone."""
-    return {condition: at_us for condition, at_us in held_us.items() if armed or ROWS[condition].grounded}
+    return Verdict(Memory(held_us, flight.armed), action, (*lines, *cleared))
 
 
 def _begin(begun: list[tuple[Row, Action]], flight: Flight) -> tuple[Action, list[tuple[int, str]]]:
-    """Return the highest action that goes beyond what is flown, and what to say of each condition."""
-    begins, said = Action.NONE, []
+    """Return the highest action that goes beyond what is flown, and the line to report of each condition."""
+    begins, lines = Action.NONE, []
     for row, wanted in sorted(begun, key=lambda each: -each[1]):
         action = _fitting(wanted, flight)
         if action is Action.WARN:
-            said.append((WARNING, f"{row.condition}: {row.warns}" if row.warns else str(row.condition)))
+            lines.append((WARNING, f"{row.condition}: {row.warns}" if row.warns else str(row.condition)))
         elif action > max(begins, flight.rank):
             begins = action
-            if row.said:
-                said.append((_SEVERITIES[action], f"{row.condition}: {NAMES[action]}"))
-        elif row.said:
-            said.append((WARNING, f"{row.condition}: {NAMES[max(begins, flight.rank)]} goes on"))
-    return begins, said
+            if row.reported:
+                lines.append((_SEVERITIES[action], f"{row.condition}: {NAMES[action]}"))
+        elif row.reported:
+            lines.append((WARNING, f"{row.condition}: {NAMES[max(begins, flight.rank)]} goes on"))
+    return begins, lines
 
 
 def _fitting(action: Action, flight: Flight) -> Action:

@@ -1,7 +1,4 @@
-"""The failsafes as data: what may be lost, how that is known, and what the vehicle does then.
-
-`docs/failsafes.md` is written from this table; `failsafes` is the rule that reads it in flight.
-"""
+"""The failsafes as data: each condition, and what the vehicle does then; `docs/failsafes.md` is written from it."""
 
 from collections.abc import Mapping
 from enum import IntEnum, StrEnum
@@ -9,7 +6,7 @@ from typing import NamedTuple
 
 
 class Action(IntEnum):
-    """What is done; the higher the number, the higher its rank."""
+    """Action of a failsafe; the higher the number, the higher its rank."""
 
     NONE = 0
     WARN = 1
@@ -30,8 +27,8 @@ NAMES: Mapping[Action, str] = {
     Action.TERMINATE: "rotors stop",
 }
 MEANINGS: Mapping[Action, str] = {
-    Action.NONE: "nothing is done, nor said",
-    Action.WARN: "it is said",
+    Action.NONE: "nothing is done, nor reported",
+    Action.WARN: "it is reported",
     Action.HOLD: "mode hold: stop and stay",
     Action.RETURN: "mode return: climb, fly home, land",
     Action.LAND: "mode land: sink here, disarm",
@@ -41,7 +38,7 @@ MEANINGS: Mapping[Action, str] = {
 
 
 class Condition(StrEnum):
-    """What may be lost, as it is said."""
+    """What may be lost; the value is its text for ground stations."""
 
     ATTITUDE_LOST = "attitude lost"
     TILTED = "tilted too far"
@@ -66,17 +63,17 @@ class Row(NamedTuple):
 
     Attributes:
         condition: What it watches for.
-        holds: When that holds.
+        holds: When that holds, in words.
         limits: Parameters of its limits.
         delay: Parameter of how long it must hold; empty where that is no parameter.
         parameter: Parameter of the action.
-        choices: What that may be.
-        default: What it is until somebody changes it.
-        clears: When it is over.
+        choices: Values of that parameter.
+        default: Of that parameter.
+        clears: When it is over, in words.
         grounded: Whether it is watched with the rotors standing, too.
         kept: Whether it holds, once it does, until the rotors stop.
-        warns: What a mere warning adds.
-        said: Whether it is said here; not where who notices it says more.
+        warns: Text that a mere warning adds.
+        reported: Whether the supervisor reports it; not where its detector does, in more words.
     """
 
     condition: Condition
@@ -90,7 +87,7 @@ class Row(NamedTuple):
     grounded: bool = False
     kept: bool = False
     warns: str = ""
-    said: bool = True
+    reported: bool = True
 
 
 _NOTHING, _WARN = (0, Action.NONE), (0, Action.WARN)
@@ -104,8 +101,8 @@ _FULL_AGAIN = "never in flight"
 TABLE: tuple[Row, ...] = (
     Row(
         Condition.ATTITUDE_LOST,
-        "on sensors: the gyroscope fails, or roll and pitch are known no better than to 10°; state told: it stays the "
-        "same to the last bit though it says that it moves",
+        "on sensors: the gyroscope fails, or roll and pitch are known no better than to 10°; on states: they stay the "
+        "same to the last bit though their rates are not zero",
         (),
         "COM_ATT_LOSS_T",
         "COM_ATT_LOSS_ACT",
@@ -133,7 +130,7 @@ TABLE: tuple[Row, ...] = (
         1,
         _FULL_AGAIN,
         kept=True,
-        said=False,
+        reported=False,
     ),
     Row(
         Condition.POSITION_LOST,
@@ -211,13 +208,13 @@ TABLE: tuple[Row, ...] = (
     ),
     Row(
         Condition.STATION_LOST,
-        "no HEARTBEAT of a ground station (MAV_TYPE_GCS), where one was ever heard",
+        "no HEARTBEAT of a ground station (MAV_TYPE_GCS), where there ever was one",
         (),
         "COM_DL_LOSS_T",
         "NAV_DLL_ACT",
         (_NOTHING, *_CLIMBING),
         0,
-        "any ground station is heard",
+        "a HEARTBEAT of any is received",
     ),
     Row(
         Condition.FENCE_BREACHED,
@@ -239,13 +236,13 @@ TABLE: tuple[Row, ...] = (
     ),
     Row(
         Condition.GPS_LOST,
-        "on sensors: no fix is believed",
+        "on sensors: no fix is accepted",
         (),
         "COM_GNSSLOSS_T",
         "COM_GNSSLOSS_ACT",
         (_WARN, _HOLD, _LAND, _DESCEND, _TERMINATE),
         0,
-        "fixes are believed again",
+        "fixes are accepted again",
         grounded=True,
         warns="position by dead reckoning",
     ),
@@ -257,7 +254,7 @@ TABLE: tuple[Row, ...] = (
         "NAV_RCL_ACT",
         _CLIMBING,
         1,
-        "sticks are heard",
+        "sticks are received",
     ),
     Row(
         Condition.SETPOINTS_LOST,
@@ -267,7 +264,7 @@ TABLE: tuple[Row, ...] = (
         "COM_OBL_RC_ACT",
         ((3, Action.RETURN), (4, Action.LAND), (5, Action.HOLD), (6, Action.TERMINATE)),
         5,
-        "setpoints are heard",
+        "setpoints are received",
     ),
     Row(
         Condition.BATTERY_LOW,

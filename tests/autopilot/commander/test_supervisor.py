@@ -70,7 +70,7 @@ def test_what_is_lost_begins_what_its_parameter_says(row: Row, value: int, actio
         assert action not in begun
     else:
         assert action in begun
-        assert not row.said or any(text.startswith(f"{row.condition}: ") for text in texts)
+        assert not row.reported or any(text.startswith(f"{row.condition}: ") for text in texts)
     assert saves.holds(row.condition) is (action is not Action.NONE)
 
 

@@ -15,7 +15,7 @@ from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.autopilot.parameters.behaviour import ROWS, TRACKS
 from colibri.autopilot.parameters.control_law import STRUCTURE, law_numbers
-from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, applied, behaviour, definitions
+from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, behaviour, definitions
 from colibri.autopilot.parameters.number_paths import described, named, paths, read
 from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
 from colibri.mavlink.parameters.store import Kind, ParamError, Parameters, float32
@@ -67,7 +67,7 @@ def test_a_vehicle_has_no_parameters_for_what_it_does_not_model() -> None:
 
 def test_defaults_leave_everything_as_it_is() -> None:
     """64 bits and all: a flight with parameters that nobody touched is the flight without."""
-    profile, vehicle = applied(FLIGHT, HUMMINGBIRD, parameters_of().values)
+    profile, vehicle = Numbers(FLIGHT, HUMMINGBIRD).applied(parameters_of().values)
     assert profile is FLIGHT
     assert vehicle is HUMMINGBIRD
 
@@ -78,7 +78,7 @@ def test_each_parameter_of_the_law_changes_its_own_number() -> None:
         parameters = parameters_of()
         value = int(number.maximum) if isinstance(parameters[number.name], int) else number.maximum
         assert parameters.set(number.name, value) is None
-        profile, vehicle = applied(FLIGHT, HUMMINGBIRD, parameters.values)
+        profile, vehicle = Numbers(FLIGHT, HUMMINGBIRD).applied(parameters.values)
         assert vehicle is HUMMINGBIRD
         assert differences(table, profile.table("lpv-mpc")) == {described(number.path)}
         assert read(profile.table("lpv-mpc"), number.path) == pytest.approx(number.maximum, rel=1e-6)
@@ -92,7 +92,7 @@ def test_each_parameter_of_the_vehicle_changes_its_own_number() -> None:
         before = read(tree, number.path)
         assert parameters[number.name] * number.scale == pytest.approx(before, rel=1e-6)
         assert parameters.set(number.name, 0.9 * parameters[number.name] + 1e-3) is None
-        _, vehicle = applied(FLIGHT, HUMMINGBIRD, parameters.values)
+        _, vehicle = Numbers(FLIGHT, HUMMINGBIRD).applied(parameters.values)
         after = msgspec.to_builtins(vehicle)
         assert differences(tree, after) == {described(number.path)}
         assert read(after, number.path) == pytest.approx(0.9 * before + 1e-3 * number.scale, rel=1e-6)
@@ -109,7 +109,7 @@ def test_units_of_the_vehicle() -> None:
 @pytest.mark.parametrize(("name", "value"), [("VEH_MASS", 50.0), ("VEH_ROT_MAX", 100.0), ("VEH_IZZ", 50.0)])
 def test_a_vehicle_that_cannot_be_is_refused(name: str, value: float) -> None:
     with pytest.raises(ImpossibleError):
-        applied(FLIGHT, HUMMINGBIRD, {**parameters_of().values, name: value})
+        Numbers(FLIGHT, HUMMINGBIRD).applied({**parameters_of().values, name: value})
 
 
 def test_a_vehicle_outside_our_bounds_has_parameters() -> None:

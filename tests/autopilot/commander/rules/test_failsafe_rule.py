@@ -78,7 +78,7 @@ def test_what_begins_is_done_and_said(action: Action) -> None:
     assert said == ((severity, f"ground station lost: {NAMES[action]}"),)
     again = following(memory, NOW_US + 8000, {Condition.STATION_LOST: 0}, everything(action), IN_FLIGHT)
     assert again.action is Action.NONE
-    assert again.said == ()
+    assert again.lines == ()
 
 
 @given(st.dictionaries(CONDITIONS, ACTIONS))
@@ -86,7 +86,7 @@ def test_of_all_that_begin_the_highest_is_done_and_each_is_said(wanted: dict[Con
     _, done, said = begun(wanted)
     highest = max(wanted.values(), default=Action.NONE)
     assert done is (highest if highest > Action.WARN else Action.NONE)
-    heard = [each for each, action in wanted.items() if action is Action.WARN or (action and ROWS[each].said)]
+    heard = [each for each, action in wanted.items() if action is Action.WARN or (action and ROWS[each].reported)]
     assert sorted(text.partition(":")[0] for _, text in said) == sorted(heard)
 
 
@@ -166,7 +166,7 @@ def test_a_pilot_who_chooses_is_obeyed_until_something_else_is_lost() -> None:
 def test_on_the_ground_the_rotors_stop(condition: Condition, action: Action) -> None:
     _, done, said = begun({condition: action}, IN_FLIGHT._replace(standing=True, mode=Mode.HOLD))
     assert done is Action.TERMINATE
-    assert said == (((EMERGENCY, f"{condition}: rotors stop"),) if ROWS[condition].said else ())
+    assert said == (((EMERGENCY, f"{condition}: rotors stop"),) if ROWS[condition].reported else ())
 
 
 @pytest.mark.parametrize("row", TABLE, ids=lambda row: row.condition)
@@ -191,7 +191,7 @@ def test_the_flight_takes_with_it_what_is_watched_in_flight_alone() -> None:
     lying = Flight(armed=False, standing=True, mode=Mode.HOLD, saving=Action.NONE)
     after = following(memory, NOW_US + 8000, dict.fromkeys(Condition, 0), everything(Action.LAND), lying)
     assert set(after.memory.held_us) == {row.condition for row in TABLE if row.grounded}
-    assert not any("cleared" in text for _, text in after.said)
+    assert not any("cleared" in text for _, text in after.lines)
 
 
 def test_what_somebody_else_says_is_done_without_a_word() -> None:
@@ -200,9 +200,9 @@ def test_what_somebody_else_says_is_done_without_a_word() -> None:
 
 
 def test_rows_say_what_they_add_to_a_warning() -> None:
-    assert begun({Condition.GPS_LOST: Action.WARN}).said == ((WARNING, "GPS lost: position by dead reckoning"),)
+    assert begun({Condition.GPS_LOST: Action.WARN}).lines == ((WARNING, "GPS lost: position by dead reckoning"),)
     assert ROWS[Condition.BATTERY_LOW].warns == ""
-    assert begun({Condition.BATTERY_LOW: Action.WARN}).said == ((WARNING, "battery low"),)
+    assert begun({Condition.BATTERY_LOW: Action.WARN}).lines == ((WARNING, "battery low"),)
 
 
 def test_the_page_is_current() -> None:
