@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from math import isfinite, isnan
 
-from colibri.autopilot.commander.motion_commands import Limit, MotionCommands, Needs, denied
+from colibri.autopilot.commander.fence import Fence
+from colibri.autopilot.commander.motion_commands import MotionCommands, Needs, denied
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Mode, mode_of, mode_of_custom
 from colibri.common.earth.geodesy import Geodetic, enu_of, is_on_earth
@@ -28,13 +29,13 @@ _CUSTOM = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 
 class Commands:
-    """Obeys what a ground station commands: a method a command.
+    """Handlers of a ground station's commands: a method a command.
 
     Attributes:
-        motion: Obeys the commands to move.
+        motion: Handlers of the commands to move.
     """
 
-    def __init__(self, pilot: Pilot, fence: Limit, needs: Needs) -> None:
+    def __init__(self, pilot: Pilot, fence: Fence, needs: Needs) -> None:
         """Hand commands to `pilot`, as far as `fence` and the needs of modes let it fly."""
         self._pilot = pilot
         self._needs = needs
@@ -60,13 +61,12 @@ class Commands:
 
     def select(self, mode: Mode | None) -> Refusal | None:
         """Change the mode, None being one that this vehicle does not have; return why not."""
-        return Refusal("this vehicle has no such mode", UNSUPPORTED) if mode is None else self._choose(mode)
-
-    def _choose(self, mode: Mode) -> Refusal | None:
+        if mode is None:
+            return Refusal("this vehicle has no such mode", UNSUPPORTED)
         return self._pilot.select(mode, self._needs.missing())
 
     def _select(self, mode: Mode) -> Outcome:
-        return outcome_of(self._choose(mode))
+        return outcome_of(self.select(mode))
 
     def _arm_disarm(self, command: Command) -> Outcome:
         force = command.p2 == FORCE_MAGIC
@@ -86,7 +86,7 @@ class Commands:
         return outcome_of(self.select(mode_of(main, sub)))
 
     def set_custom_mode(self, base_mode: int, custom_mode: int) -> Refusal | None:
-        """Obey a SET_MODE message; return why not."""
+        """Change the mode by a SET_MODE message; return why not."""
         return self.select(mode_of_custom(custom_mode) if base_mode & _CUSTOM else None)
 
     def _pause_or_go_on(self, command: Command) -> Outcome:
@@ -121,7 +121,7 @@ class Commands:
         return outcome_of(self.move_home(Geodetic(command.x, command.y, command.z)))
 
     def move_home(self, place: Geodetic) -> Refusal | None:
-        """Have home at a place on earth; return why not."""
+        """Set home to a place on earth; return why not."""
         home = enu_of(place, self._home.origin)
         refusal = self.motion.unreachable(home)
         if refusal is not None:

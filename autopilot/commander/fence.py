@@ -25,16 +25,16 @@ class Fence:
         self._breach_due_us = 0
 
     def adopt(self, behaviour: Behaviour) -> None:
-        """Go by other numbers from now on."""
+        """Adopt other numbers."""
         self._behaviour = behaviour
 
     def load(self, items: Sequence[MissionItem]) -> None:
-        """Take another geofence of valid items; none where there are none."""
+        """Replace the geofence by one of valid items; none where there are none."""
         self._items = tuple(items)
-        self.measure_anew()
+        self.rebuild()
 
-    def measure_anew(self) -> None:
-        """Place the geofence from the origin as it is now."""
+    def rebuild(self) -> None:
+        """Build the geofence about the origin as it is now."""
         self._geofence = Geofence(self._items, self._home.origin)
         self._breach, self._breach_due_us = None, 0
 

@@ -22,14 +22,14 @@ from colibri.mavlink.wire.refusal import Refusal
 
 
 class Missions:
-    """The mission of one vehicle, and the fence that it must keep to: a method for each order about them.
+    """The mission of one vehicle, and the fence that it must keep to.
 
     Attributes:
         changes: How often a plan was replaced.
     """
 
     def __init__(self, home: Home, fence: Fence, lines: StatusQueue, behaviour: Behaviour) -> None:
-        """Begin without plans; what a ground station is to know of them goes to `lines`."""
+        """Begin without plans; changes are reported to `lines`."""
         self._home = home
         self._fence = fence
         self._lines = lines
@@ -50,7 +50,7 @@ class Missions:
         return bool(self._outside)
 
     def adopt(self, behaviour: Behaviour) -> None:
-        """Go by other numbers from now on."""
+        """Adopt other numbers."""
         self._behaviour = behaviour
         self._fence.adopt(behaviour)
 
@@ -59,7 +59,7 @@ class Missions:
         return self._executor.progress
 
     def load(self, plan_type: int, plan: Plan) -> None:
-        """Take another plan of valid items."""
+        """Replace a plan by one of valid items."""
         self.changes += 1
         items: Sequence[MissionItem] = plan.items
         if plan_type == MISSION:
@@ -71,12 +71,12 @@ class Missions:
         self._check_mission()
 
     def set_current(self, seq: int, reset: bool) -> Refusal | None:
-        """Go to an item, -1 for the current one; `reset` counts jumps anew. Return why not."""
+        """Go to an item, -1 for the current one; `reset` resets the counts of jumps. Return why not."""
         return self._executor.set_current(seq, reset)
 
     def moved_origin(self) -> None:
         """Measure the fence and the mission from the origin as it is now."""
-        self._fence.measure_anew()
+        self._fence.rebuild()
         self._check_mission()
 
     def task(self) -> "MissionTask":
@@ -102,7 +102,7 @@ class Missions:
         return self._executor.record()
 
     def resume(self, plans: Mapping[int, Plan], record: MissionRecord | None) -> None:
-        """Have the plans that were kept, and go on where the mission stood; without a record from its first item."""
+        """Restore the plans, and the progress of the mission; without a record it begins with its first item."""
         self._fence.load(plans[FENCE].items)
         self._executor.load(plans[MISSION].items)
         if record is not None:
@@ -116,19 +116,19 @@ class Missions:
                     self._reached.append(event.seq)
 
     def flown(self, event: Reached | SetHome, state: VehicleState) -> None:
-        """Take note of what the mission did."""
+        """Adopt an event of the mission."""
         if isinstance(event, Reached):
             self._reached.append(event.seq)
         else:
             self._home.move(event.position_enu_m or state.position_enu_m, state.euler[2])
 
     def take_reached(self) -> list[int]:
-        """Return the items that were reached since this was last asked."""
+        """Return the items that were reached since the last call."""
         reached, self._reached = self._reached, []
         return reached
 
     def mission_context(self, context: TaskContext, *, arrived: bool, turns: float) -> MissionContext:
-        """Return what the mission sees."""
+        """Return the inputs of the mission."""
         state = context.state
         return MissionContext(
             state.position_enu_m,
@@ -142,7 +142,7 @@ class Missions:
         )
 
     def _check_mission(self) -> None:
-        """Look for an item that leads outside the fence; the way between two items is not looked at."""
+        """Look for an item that leads outside the fence; the way between two items is not checked."""
         home, before = self._home, self._outside
         found = places(self._executor.items, home.position_enu_m, home.origin) if self._fence.exists else ()
         outside = [(seq, refusal.reason) for seq, place in found if (refusal := self._fence.refusal(place))]
@@ -152,10 +152,10 @@ class Missions:
 
 
 class MissionTask:
-    """Flies what the executor orders, one task after another.
+    """Flies the executor's orders, one task after another.
 
     Attributes:
-        says_return: Whether the mission leaves the rest of the flight to mode return.
+        returns: Whether the mission leaves the rest of the flight to mode return.
     """
 
     def __init__(
@@ -168,10 +168,10 @@ class MissionTask:
         self._turns_before, self._legs_left = turns, legs
         self._task: FlightTask = HoldTask()
         self._done = False
-        self.says_return = False
+        self.returns = False
 
     def update(self, context: TaskContext) -> TaskOutput:
-        """Return what the order of now asks for."""
+        """Return the output of the current order's task."""
         arrived = self._task.arrived(context)
         mission_context = self._missions.mission_context(context, arrived=arrived, turns=self.turns)
         step = self._executor.step(mission_context, context.now_us)
@@ -188,12 +188,12 @@ class MissionTask:
         self._done = not step.flying
         if self._done and isinstance(self._task, OrbitTask):
             self._task = HoldTask()
-        self.says_return = isinstance(step.order, Return) and step.flying
+        self.returns = isinstance(step.order, Return) and step.flying
         return self._task.update(context)
 
     @property
     def turns(self) -> float:
-        """How often it went around the centre of the order that is flown."""
+        """How often the circle of the order was flown around."""
         return self._turns_before + (self._task.turns if isinstance(self._task, OrbitTask) else 0.0)
 
     @property

@@ -1,11 +1,10 @@
 """How each mode begins to be flown, and how it goes on after the autopilot was killed in it."""
 
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
-from colibri.autopilot.commander.missions import Missions
+from colibri.autopilot.commander.missions import Missions, MissionTask
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.commander.task_record import TaskRecord
 from colibri.autopilot.control.interface import Preview
 from colibri.autopilot.control.profile import References
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference
@@ -15,7 +14,7 @@ from colibri.autopilot.guidance.tasks.attitude import AltitudeTask, DescentTask,
 from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
 from colibri.autopilot.guidance.tasks.offboard import OffboardTask
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
-from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Land, TakeOff, order_of
+from colibri.autopilot.guidance.tasks.orders import Circle, GoTo, Land, OrderRecord, TakeOff, order_of, record_of
 from colibri.autopilot.guidance.tasks.position import (
     GoToTask,
     HoldTask,
@@ -28,7 +27,7 @@ from colibri.autopilot.guidance.tasks.position import (
 )
 from colibri.autopilot.guidance.tasks.sticks import PositionTask
 from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext
-from colibri.autopilot.guidance.trajectories.planner import Planner, plan, start_yaw
+from colibri.autopilot.guidance.trajectories.planner import Planner, start_yaw
 from colibri.autopilot.guidance.trajectories.tracks import Track, track
 from colibri.plant.vehicle.description import Vehicle
 
@@ -36,8 +35,37 @@ TaskFactory: TypeAlias = Callable[[TaskContext], FlightTask]
 """Returns the task with which a mode begins."""
 
 
+class TaskRecord(NamedTuple):
+    """State of a flight task as plain data, for the checkpoint.
+
+    Attributes:
+        order: With which the task begins again; None if the mode alone determines it.
+        began_us: When the track that is flown began; None where none is.
+        turns: How often the mission's circle was flown around.
+        legs: How many legs are left of a sequence.
+    """
+
+    order: OrderRecord | None = None
+    began_us: int | None = None
+    turns: float = 0.0
+    legs: tuple[int, ...] = ()
+
+
+def task_record(task: FlightTask) -> TaskRecord:
+    """Return the state of a task."""
+    if isinstance(task, MissionTask):
+        return TaskRecord(turns=task.turns, legs=task.legs)
+    if isinstance(task, TaskSequence):
+        return task_record(task.task) if isinstance(task.task, TrackTask) else TaskRecord(legs=task.left)
+    if isinstance(task, TrackTask):
+        return TaskRecord(began_us=task.began_us)
+    if isinstance(task, GoToTask | OrbitTask | TakeoffTask | HoldTask):
+        return TaskRecord(record_of(task.order))
+    return TaskRecord()
+
+
 class ModeTasks:
-    """Makes the tasks of one vehicle: a table of modes, and what each begins with."""
+    """Factory of one vehicle's flight tasks: a table of modes, and what each begins with."""
 
     def __init__(
         self,
@@ -55,10 +83,10 @@ class ModeTasks:
             missions: Have the task of a mission.
             attitude: Leads attitude and thrust; None for a law that takes neither.
             vehicle: As the control law assumes it.
-            preview: The references that the law wants.
+            preview: The references that the law takes.
             instants: At which references are planned.
             references: How a track is planned, from the profile.
-            first: A track that is flown from time 0 on, until it is begun; None for none.
+            first: A track that is flown from time 0 on; None for none.
         """
         self._missions = missions
         self._attitude = attitude
@@ -77,8 +105,8 @@ class ModeTasks:
             Mode.FOLLOW: lambda _: FollowTargetTask(),
             Mode.POSITION: lambda _: PositionTask(),
             Mode.TRACK: self._on_track,
-            Mode.STABILIZED: lambda _: HoldTask() if attitude is None else StabilizedTask(attitude),
-            Mode.ALTITUDE: self._altitude,
+            Mode.STABILIZED: lambda _: StabilizedTask(attitude) if attitude else HoldTask(),
+            Mode.ALTITUDE: lambda _: AltitudeTask(attitude, self._gravity_m_s2) if attitude else HoldTask(),
         }
 
     @property
@@ -113,12 +141,8 @@ class ModeTasks:
         task = _ordered(mode, record, context) or self.begin(mode, context)
         return task.skip(record.legs) if isinstance(task, TaskSequence) else task
 
-    def _altitude(self, context: TaskContext) -> FlightTask:
-        del context
-        return HoldTask() if self._attitude is None else AltitudeTask(self._attitude, self._gravity_m_s2)
-
     def _down(self, context: TaskContext) -> FlightTask:
-        """Return how to land: level, where nobody knows the place; a law that takes no attitude sinks where it is."""
+        """Return how to land: level without a position, or where it is if the law takes no attitude."""
         if context.blind and self._attitude is not None:
             return DescentTask(self._attitude, self._gravity_m_s2)
         return landing(Land())
@@ -127,13 +151,13 @@ class ModeTasks:
         if self._first is not None:
             first, self._first = self._first, None
             planner = self._plan(first)
-            for_law = None if self._instants.rows is None else plan(first, self._references, self._preview)
+            for_law = None if self._instants.rows is None else Planner(first, self._references, self._preview)
             return TrackTask(planner, first.duration_s, 0, for_law, start=_at_start(planner, context.now_us))
         chosen = track(context.behaviour.track)
         return to_track(self._plan(chosen), chosen.duration_s)
 
     def _plan(self, chosen: Track) -> Planner:
-        return plan(chosen, self._references, self._instants.preview)
+        return Planner(chosen, self._references, self._instants.preview)
 
 
 def climb(context: TaskContext) -> FlightTask:
@@ -143,7 +167,7 @@ def climb(context: TaskContext) -> FlightTask:
 
 
 def _ordered(mode: Mode, record: TaskRecord, context: TaskContext) -> FlightTask | None:
-    """Return the task of an order that was flown in a mode; None where the mode itself says how it begins."""
+    """Return the task of an order that was flown in a mode; None where the mode alone determines the task."""
     order = None if record.order is None else order_of(record.order)
     if mode is Mode.HOLD and isinstance(order, GoTo):
         return GoToTask(order, context)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from math import hypot, isfinite, isnan, nan, pi, radians
 from typing import Protocol
 
+from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.rules.modes import Mode, Need
 from colibri.autopilot.guidance.tasks.orbit import OrbitTask
@@ -37,14 +38,6 @@ _POINTS = 72
 _RELATIVE = (mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 
 
-class Limit(Protocol):
-    """What holds the vehicle back from places."""
-
-    def refusal(self, place: Vector) -> Refusal | None:
-        """Return why the vehicle may not fly to a place; None if it may."""
-        ...
-
-
 class Needs(Protocol):
     """Judges which needs of modes are met."""
 
@@ -54,9 +47,9 @@ class Needs(Protocol):
 
 
 class MotionCommands:
-    """Obeys commands to move: a method a command."""
+    """Handlers of the commands to move: a method a command."""
 
-    def __init__(self, pilot: Pilot, fence: Limit, needs: Needs) -> None:
+    def __init__(self, pilot: Pilot, fence: Fence, needs: Needs) -> None:
         """Hand commands to `pilot`, as far as `fence` and the needs of modes let it fly."""
         self._pilot = pilot
         self._fence = fence

@@ -62,18 +62,7 @@ class Sensed(NamedTuple):
 
 
 class PilotRecord(NamedTuple):
-    """State of a pilot for a restart, but for the task, as plain data.
-
-    Attributes:
-        state: Mode, and whether the rotors may turn.
-        ground: Contact with the ground.
-        home_enu_m: Home, m.
-        home_yaw_rad: Heading there.
-        home_is_chosen: Whether a take-off leaves home where it is.
-        speed_m_s: Cruise speed requested for this flight; None for the parameters'.
-        saving: The failsafe that is flown.
-        reference: State of the reference.
-    """
+    """State of a pilot for a restart, but for the task, as plain data: attributes of `Pilot` and its parts."""
 
     state: State
     ground: GroundRecord
@@ -135,7 +124,7 @@ class Pilot:
     def begin(self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None, rests: bool = False) -> None:
         """Take in the first state of a flight: the vehicle stands, or it is picked up in flight, in `mode` or in hold.
 
-        One that is known to rest (`rests`) stands at any height: an estimate of height is not exact.
+        One that is estimated at rest (`rests`) stands at any height: an estimate of height is not exact.
         """
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
         standing = mode is None and (rests or stands_at_first(vehicle, 0.0))
@@ -189,7 +178,7 @@ class Pilot:
         self._task_is_chosen = not came_down
 
     def adopt(self, behaviour: Behaviour) -> None:
-        """Fly by other numbers from now on; without landing on three rotors, none counts as failed."""
+        """Adopt other numbers; without landing on three rotors, none counts as failed."""
         self.behaviour = behaviour
         if not behaviour.land_on_three:
             self.readiness.trust_rotors()
@@ -269,10 +258,7 @@ class Pilot:
         return refusal
 
     def fly(self, mode: Mode, task: FlightTask, missing: Collection[Need]) -> Refusal | None:
-        """Change to `mode` and fly `task` in it, now or once the rotors are armed; or return why not.
-
-        `missing` are the needs of modes that nothing meets now; a circle comes with the task.
-        """
+        """Change to `mode` and fly `task`, a circle among them, now or once the rotors are armed; or return why not."""
         refusal = self._follow(Event.SELECT, "", mode, [need for need in missing if need is not Need.CIRCLE])
         if refusal is None:
             self.saving = Action.NONE
@@ -313,7 +299,7 @@ class Pilot:
             return self._rest()
         context = self.context()
         wanted = self.task.update(context)
-        if isinstance(self.task, MissionTask) and self.task.says_return:
+        if isinstance(self.task, MissionTask) and self.task.returns:
             self.happened(Event.RETURN_ITEM)
         if self.ground.standing:
             if not (wanted.lifts if isinstance(wanted, AttitudeMotion) else lifts(wanted.target, context.state)):

@@ -1,32 +1,18 @@
 """Status texts of the commander's parts for ground stations, queued until they are sent."""
 
-from typing import NamedTuple
-
-
-class Said(NamedTuple):
-    """A status text.
-
-    Attributes:
-        severity: MAV_SEVERITY.
-        text: One line.
-    """
-
-    severity: int
-    text: str
-
 
 class StatusQueue:
-    """Status texts in order."""
+    """MAV_SEVERITY and text of each line, in order."""
 
     def __init__(self) -> None:
         """Begin empty."""
-        self._said: list[Said] = []
+        self._lines: list[tuple[int, str]] = []
 
     def say(self, severity: int, text: str) -> None:
         """Add a line."""
-        self._said.append(Said(severity, text))
+        self._lines.append((severity, text))
 
-    def take(self) -> list[Said]:
+    def take(self) -> list[tuple[int, str]]:
         """Return the lines, and empty the queue."""
-        said, self._said = self._said, []
-        return said
+        lines, self._lines = self._lines, []
+        return lines

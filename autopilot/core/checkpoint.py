@@ -12,10 +12,10 @@ from zlib import crc32
 
 import msgspec
 
+from colibri.autopilot.commander.mode_tasks import TaskRecord, task_record
 from colibri.autopilot.commander.pilot import PilotRecord
 from colibri.autopilot.commander.rules.failsafe_rule import Memory
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.commander.task_record import TaskRecord, task_record
 from colibri.autopilot.control.loop import LoopRecord
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.parts import Parts

@@ -5,7 +5,7 @@ from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.step import Step, follows, nothing_known
 from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
-from colibri.autopilot.guidance.trajectories.planner import plan
+from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
@@ -38,7 +38,7 @@ class Autopilot:
             SolverError: Its solver cannot be used.
         """
         self._loop = ControlLoop(profile, vehicle, clock)
-        self._planner = plan(track, profile.references, self._loop.preview)
+        self._planner = Planner(track, profile.references, self._loop.preview)
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock
         self._time_us: int | None = None

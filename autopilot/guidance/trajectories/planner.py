@@ -59,14 +59,9 @@ class Planner:
         return Horizon(*(column[lead:] for column in by(self._track, interval_s * samples, interval_s)))
 
 
-def plan(track: Track, references: References, preview: Preview) -> Planner:
-    """Return the planner of a track, which samples it as often as `preview` asks, by its formula or by differences."""
-    return Planner(track, references, preview)
-
-
 def start_yaw(track: Track, references: References) -> float:
     """Return the first yaw reference, rad: with it a flight starts."""
-    return float(plan(track, references, _START).horizon(0).yaw_rad[0])
+    return float(Planner(track, references, _START).horizon(0).yaw_rad[0])
 
 
 def _rest(track: Track, interval_us: int) -> int | None:

@@ -16,7 +16,7 @@ import pytest
 from colibri.analysis.recording import STATE
 from colibri.autopilot.control.interface import Preview
 from colibri.autopilot.control.qp import IN_SOLVERS_EXTRA
-from colibri.autopilot.guidance.trajectories.planner import plan
+from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, position, track
 from colibri.cli.main import main
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
@@ -57,7 +57,7 @@ def test_the_outer_loop_decides_as_the_thesis_says(name: str) -> None:
     """At each outer sample, [3.24-3.33] by hand from the flown state: thrust, and the references held for 0.4 s."""
     flown = flown_directly(name)[1]
     mass_kg, gravity_m_s2 = 0.698, 9.81
-    table = plan(track(name), "by-differences", Preview(OUTER_US, 1)).table
+    table = Planner(track(name), "by-differences", Preview(OUTER_US, 1)).table
     point = np.stack([flown["x"], flown["y"], flown["z"]], axis=1)[0:1000:4]
     speed = earth_velocity(flown)[0:1000:4]
     wanted = 2.0 * (table.position_enu_m[1:251] - point) + 3.0 * (table.velocity_enu_m_s[1:251] - speed)

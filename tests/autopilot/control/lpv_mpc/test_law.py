@@ -11,7 +11,7 @@ from colibri.autopilot.control.lpv_mpc.law import LpvMpc, Memory
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
 from colibri.autopilot.control.vehicle_model.rotor_lag import lead, rotor_lag
-from colibri.autopilot.guidance.trajectories.planner import Planner, plan
+from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
@@ -25,7 +25,7 @@ ON_SPIRAL = VehicleState(START, (0.0, 0.314, 0.03), quaternion_from_euler(0, 0, 
 def build(vehicle: Vehicle = VEHICLE, attitude: dict[str, Any] | None = None) -> tuple[LpvMpc, Planner]:
     table = {**TABLE, "attitude": {**TABLE["attitude"], **(attitude or {})}}
     controller = LpvMpc(table, vehicle, lambda: 0.0)
-    return controller, plan(track("spiral"), "by-formula", controller.preview)
+    return controller, Planner(track("spiral"), "by-formula", controller.preview)
 
 
 def steps(controller: LpvMpc, planner: Planner, state: VehicleState, count: int) -> list[Decision]:
@@ -171,7 +171,7 @@ def test_an_excess_that_can_be_avoided_is_avoided_at_any_cost() -> None:
 def test_thrust_gives_way_where_it_leaves_too_little_to_stop_a_tilt() -> None:
     """Turning fast towards the limit under full thrust: the rotors make half of it, and moments with the rest."""
     controller, _ = build()
-    planner = plan(track("hover:height=30"), "by-formula", controller.preview)  # far above: all thrust there is
+    planner = Planner(track("hover:height=30"), "by-formula", controller.preview)  # far above: all thrust there is
     thrusts = []
     for rate in (0.0, 9.0):
         decision = steps(controller, planner, turned(30, -30, (rate, -rate, 0.0)), 1)[0]

@@ -8,7 +8,7 @@ import pytest
 
 from colibri.autopilot.control.interface import Horizon, Preview
 from colibri.autopilot.control.profile import References
-from colibri.autopilot.guidance.trajectories.planner import plan, start_yaw
+from colibri.autopilot.guidance.trajectories.planner import Planner, start_yaw
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, OPTIONS, THESIS_TRACKS, position, track
 from colibri.common.types import Array
 
@@ -32,7 +32,7 @@ def waypoint_file(folder: Path, text: str = WAYPOINTS) -> str:
 
 
 def horizon_from(name: str, time_us: int, samples: int, kind: References = "by-differences") -> Horizon:
-    return plan(track(name), kind, Preview(round(INTERVAL_S * 1e6), samples)).horizon(time_us)
+    return Planner(track(name), kind, Preview(round(INTERVAL_S * 1e6), samples)).horizon(time_us)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def differences(values: Array) -> Array:
 def test_by_formula_each_quantity_is_the_derivative_of_the_one_before(tmp_path: Path, name: str, begin_us: int) -> None:
     """Between the samples where a path leaves its first point and comes to its last, and its yaw is held."""
     flown = track(waypoint_file(tmp_path)) if name == "waypoints" else track(name)
-    horizon = plan(flown, "by-formula", Preview(round(FINE_S * 1e6), 2000)).horizon(begin_us)
+    horizon = Planner(flown, "by-formula", Preview(round(FINE_S * 1e6), 2000)).horizon(begin_us)
     for lower, higher in ((0, 1), (1, 2), (2, 3), (3, 4), (5, 6), (6, 7)):
         given = horizon[higher][4:-4]
         away = np.convolve(np.hypot(*horizon.velocity_enu_m_s[:, :2].T) < 0.02, np.ones(9), "valid") > 0
@@ -84,9 +84,9 @@ def test_by_formula_each_quantity_is_the_derivative_of_the_one_before(tmp_path: 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_track_without_end_goes_on(name: str, kind: References) -> None:
     """Whatever was asked for before, and across the blocks that the table is made of."""
-    planner, flown = plan(track(name), kind, PREVIEW), track(name)
+    planner, flown = Planner(track(name), kind, PREVIEW), track(name)
     for time_us in (3_600_000_000, 0, 4_088_000, 4_096_000, 4_090_123, 99_000_000, 100_008_000):
-        horizon, fresh = planner.horizon(time_us), plan(track(name), kind, PREVIEW).horizon(time_us)
+        horizon, fresh = planner.horizon(time_us), Planner(track(name), kind, PREVIEW).horizon(time_us)
         t: Array = 8e-3 * np.arange(time_us // 8_000, time_us // 8_000 + 21, dtype=np.float64)
         assert all((one == other).all() for one, other in zip(horizon, fresh, strict=True))
         assert horizon.position_enu_m == pytest.approx(position(flown, t), abs=1e-9)
@@ -100,7 +100,7 @@ def test_a_track_without_end_goes_on(name: str, kind: References) -> None:
 @pytest.mark.parametrize("name", ENDLESS)
 def test_yaw_of_a_track_without_end(name: str) -> None:
     """Along the path and without jumps, or where it was told to look; the same by differences."""
-    by_formula, by_differences = (plan(track(name), kind, Preview(8_000, 2_000)).horizon(0) for kind in KINDS[::-1])
+    by_formula, by_differences = (Planner(track(name), kind, Preview(8_000, 2_000)).horizon(0) for kind in KINDS[::-1])
     assert (by_formula.yaw_rad == by_differences.yaw_rad).all()
     assert not by_differences.yaw_rate_rad_s.any()
     wanted = {"hover": 0.0, "hover:x=1,y=2,height=3,yaw=90": np.pi / 2.0}.get(name, 0.0)
@@ -115,7 +115,7 @@ def test_yaw_of_a_track_without_end(name: str) -> None:
 @pytest.mark.parametrize("interval_us", [8_000, 30_000, 400_000])
 def test_after_waypoints_it_rests_at_the_last(tmp_path: Path, interval_us: int, kind: References) -> None:
     """Also where the end lies between two samples; yaw is that of the last sample that moved."""
-    planner = plan(track(waypoint_file(tmp_path)), kind, Preview(interval_us, 21))
+    planner = Planner(track(waypoint_file(tmp_path)), kind, Preview(interval_us, 21))
     for time_us in (7_000_001 + interval_us, 100_000_000, 3_600_000_000):
         horizon = planner.horizon(time_us)
         assert horizon.position_enu_m == pytest.approx(np.tile([0.0, -1.0, 1.0], (21, 1)), abs=1e-12)
@@ -128,7 +128,7 @@ def test_after_waypoints_it_rests_at_the_last(tmp_path: Path, interval_us: int, 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_reference_of_an_instant_is_what_the_planner_hands_out(tmp_path: Path, name: str, kind: References) -> None:
     flown = track(waypoint_file(tmp_path)) if name == "waypoints" else track(name)
-    planner = plan(flown, kind, Preview(100_000, 1))
+    planner = Planner(flown, kind, Preview(100_000, 1))
     times_us = range(0, 130_000_000, 700_000)
     handed = np.concatenate([planner.horizon(time_us).position_enu_m for time_us in times_us])
     assert handed == pytest.approx(position(flown, np.array(times_us) / 1e6), abs=1e-9)
@@ -137,7 +137,7 @@ def test_the_reference_of_an_instant_is_what_the_planner_hands_out(tmp_path: Pat
 def test_yaw_at_rest_is_that_of_the_departure(tmp_path: Path) -> None:
     """Snap is the first derivative that a track from rest has; what looks along it does not turn as it sets off."""
     flown = track(waypoint_file(tmp_path))
-    horizon = plan(flown, "by-formula", Preview(1_000, 200)).horizon(0)
+    horizon = Planner(flown, "by-formula", Preview(1_000, 200)).horizon(0)
     sx, sy, _ = horizon.snap_enu_m_s4[0]
     assert horizon.yaw_rad[0] == pytest.approx(np.arctan2(sy, sx) % (2.0 * np.pi))
     assert start_yaw(flown, "by-formula") == horizon.yaw_rad[0]
@@ -150,14 +150,14 @@ def test_yaw_at_rest_is_that_of_the_departure(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_straight_up_yaw_is_held(tmp_path: Path, kind: References) -> None:
-    horizon = plan(track(waypoint_file(tmp_path, "1,1,0\n1,1,5\n")), kind, Preview(100_000, 60)).horizon(0)
+    horizon = Planner(track(waypoint_file(tmp_path, "1,1,0\n1,1,5\n")), kind, Preview(100_000, 60)).horizon(0)
     wanted = 0.0 if kind == "by-formula" else np.pi / 4.0 + np.pi / 2.0
     assert horizon.yaw_rad == pytest.approx(np.full(60, wanted))
 
 
 def test_there_and_back_yaw_turns_by_half_a_turn_at_once(tmp_path: Path) -> None:
     back = track(waypoint_file(tmp_path, "0,0,2\n4,0,2\n0,0,2\n"))
-    steps = np.abs(np.diff(plan(back, "by-formula", Preview(8_000, 1_500)).horizon(0).yaw_rad))
+    steps = np.abs(np.diff(Planner(back, "by-formula", Preview(8_000, 1_500)).horizon(0).yaw_rad))
     assert steps.max() == pytest.approx(np.pi)
     assert np.count_nonzero(steps > 1e-6) == 1
 
@@ -166,8 +166,8 @@ def test_there_and_back_yaw_turns_by_half_a_turn_at_once(tmp_path: Path) -> None
 def test_every_kind_of_track_is_planned_in_time(tmp_path: Path, name: str) -> None:
     """Tabulating 100 s takes some 10 ms, a horizon some 3 µs; ten times that would be a mistake."""
     flown = track(waypoint_file(tmp_path) if name == "waypoints" else name)
-    planner = plan(flown, "by-formula", PREVIEW)
-    assert min(timeit.repeat(lambda: plan(flown, "by-formula", PREVIEW), number=1, repeat=3)) < 0.1
+    planner = Planner(flown, "by-formula", PREVIEW)
+    assert min(timeit.repeat(lambda: Planner(flown, "by-formula", PREVIEW), number=1, repeat=3)) < 0.1
     assert min(timeit.repeat(lambda: planner.horizon(0), number=100, repeat=3)) < 100 * 50e-6
 
 
