@@ -1,9 +1,9 @@
 """From sticks, or a client's attitude or body rates, to a smooth attitude demand over the control law's preview.
 
-Each angle is slewed like a critically damped second-order system, its rate and acceleration bounded: what is demanded
-can be followed, and the MPC sees it coming. An attitude is reached first where its thrust points: roll and pitch are
-those about the yaw that has been reached. Body rates are integrated by THESIS [2.7], the tilt limited. Nothing runs
-away from the vehicle: the yaw demanded stays near its own.
+Each angle is slewed like a critically damped second-order system, its rate and acceleration bounded, so that the
+vehicle can follow and the MPC previews it. The direction of thrust is reached first: roll and pitch are those about the
+yaw that has been reached. Body rates are integrated by THESIS [2.7], the tilt limited. The demanded yaw stays near the
+vehicle's.
 """
 
 from math import isnan, nan, radians
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Preview, VehicleState
-from colibri.autopilot.guidance.attitude_slew import ATTITUDE, RATE, TILT, Aim, Slew, limit_tilt, slew_on
+from colibri.autopilot.guidance.attitude_slew import ATTITUDE, RATE, TILT, AttitudeCommand, Slew, limit_tilt, slew_on
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.elementary import square
@@ -26,14 +26,7 @@ _NOWHERE: Vector = (0.0, 0.0, 0.0)
 
 
 class AttitudeLimits(NamedTuple):
-    """How far an attitude may be asked for; how fast, says `slew`.
-
-    Attributes:
-        stick_tilt_rad: Of roll and pitch at a full stick.
-        stick_yaw_rate_rad_s: At a full stick.
-        yaw_ahead_rad: Furthest that the yaw demanded gets from the vehicle's.
-        slew: Of the angles and the thrust.
-    """
+    """Limits of attitude commands: of full sticks, of the demanded yaw ahead of the vehicle's, and of the slew."""
 
     stick_tilt_rad: float = radians(35.0)
     stick_yaw_rate_rad_s: float = radians(100.0)
@@ -54,7 +47,7 @@ DEFAULT_LIMITS = AttitudeLimits()
 
 
 def attitude_limits(behaviour: Behaviour) -> AttitudeLimits:
-    """Return the limits that the parameters say."""
+    """Return the limits by the parameters."""
     yaw_rate_rad_s = behaviour.stick_yaw_rate_rad_s
     slew = DEFAULT_LIMITS.slew
     return DEFAULT_LIMITS._replace(
@@ -64,26 +57,8 @@ def attitude_limits(behaviour: Behaviour) -> AttitudeLimits:
     )
 
 
-class AttitudeCommand(NamedTuple):
-    """What is asked for: made by `tilt_command`, `attitude_command` and `rate_command`.
-
-    Attributes:
-        kind: TILT, ATTITUDE or RATE.
-        vector: TILT: phi, theta, rad, and 0. ATTITUDE: where the thrust is to point, ENU. RATE: p, q, r, rad/s.
-        yaw_rad: ATTITUDE: to reach.
-        yaw_rate_rad_s: TILT: to turn at. ATTITUDE: feed-forward.
-        thrust_n: nan for what carries the weight, whatever the tilt.
-    """
-
-    kind: int
-    vector: Vector
-    yaw_rad: float
-    yaw_rate_rad_s: float
-    thrust_n: float
-
-
 class ReferenceMemory(NamedTuple):
-    """What the generator carries from one control sample to the next.
+    """Memory of the generator from one control sample to the next.
 
     Attributes:
         angles: phi, theta, psi demanded now, rad, (3,).
@@ -97,16 +72,16 @@ class ReferenceMemory(NamedTuple):
 
 
 class AttitudeReference:
-    """The generator for one vehicle and one control law's preview.
+    """Generator of attitude demands for one vehicle and one control law's preview.
 
     Attributes:
         weight_n: Of the vehicle.
-        limits: How far.
+        limits: Of the commands.
         max_thrust_n: Of all rotors at their top speed.
     """
 
     def __init__(self, vehicle: Vehicle, preview: Preview, limits: AttitudeLimits = DEFAULT_LIMITS) -> None:
-        """Demand what `limits` allow at the samples of `preview`; what is compiled is loaded here."""
+        """Plan at the samples of `preview`; what is compiled is loaded here."""
         self.adopt(vehicle)
         self._interval_s = preview.interval_us * 1e-6
         self._samples = preview.samples
@@ -115,11 +90,11 @@ class AttitudeReference:
         self.step(self.initial(level), level, tilt_command(0.0, 0.0, 0.0, self.weight_n))
 
     def obey(self, behaviour: Behaviour) -> None:
-        """Keep to other limits from now on."""
+        """Adopt other limits."""
         self.limits = attitude_limits(behaviour)
 
     def adopt(self, vehicle: Vehicle) -> None:
-        """Go on for a vehicle of other numbers."""
+        """Adopt other numbers of the vehicle."""
         self.weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
         self.max_thrust_n = float(vehicle.allocation()[0].sum()) * square(vehicle.rotors.max_speed)
 
@@ -137,19 +112,18 @@ class AttitudeReference:
         thrusts = np.empty(self._samples + 1)
         angles[0], rates[0], thrusts[0] = memory.angles, memory.rates, memory.thrust_n
         angles[0, 2] = self._near(memory.angles[2].item(), state.euler[2])
-        aim = Aim(command.kind, np.array(command.vector), *command[2:], self.weight_n)
-        slew_on(aim, self.limits.slew, self._interval_s, angles, rates, thrusts)
+        slew_on(command, self.weight_n, self.limits.slew, self._interval_s, angles, rates, thrusts)
         after = ReferenceMemory(angles[1].copy(), rates[1].copy(), thrusts[1].item())
         return after, AttitudeDemand(angles[:-1], rates[:-1], thrusts[:-1])
 
     def from_sticks(self, sticks: Sticks) -> AttitudeCommand:
-        """Return what stabilized flight makes of sticks."""
+        """Return the command of sticks in stabilized flight."""
         tilt = self.limits.stick_tilt_rad
         yaw_rate = -self.limits.stick_yaw_rate_rad_s * sticks.yaw
         return tilt_command(tilt * sticks.roll, tilt * sticks.pitch, yaw_rate, self.thrust_for_stick(sticks.thrust))
 
     def from_setpoint(self, setpoint: AttitudeSetpoint) -> AttitudeCommand:
-        """Return what a client's setpoint asks for, its thrust as a stick's: half of it hovers.
+        """Return the command of a client's setpoint, its thrust as a stick's: half of it hovers.
 
         An attitude goes before body rates, of which yaw's alone is then fed forward. A rate that is not given beside
         others is zero.

@@ -1,7 +1,7 @@
-"""How an attitude demand goes on from sample to sample towards what is asked for, as compiled kernels.
+"""Kernels that slew an attitude demand from sample to sample towards a command.
 
 An angle x with rate v goes by v' = w² (target - x) + 2 w (target' - v), bounded in acceleration and rate; one of which
-only the rate is asked for by v' = 2 w (target' - v). A largest acceleration of w times the largest rate or more leaves
+only the rate is commanded by v' = 2 w (target' - v). A largest acceleration of w times the largest rate or more leaves
 the braking to the first of them, so that nothing overshoots.
 """
 
@@ -12,25 +12,14 @@ import numpy as np
 
 from colibri.common.jit import compiled
 from colibri.common.kernels import atan2, cos, sin
-from colibri.common.types import Array
+from colibri.common.types import Array, Vector
 
 TILT, ATTITUDE, RATE = 0, 1, 2
 _NO_DIRECTION = 1e-9
 
 
 class Slew(NamedTuple):
-    """How far and how fast a demand goes.
-
-    Attributes:
-        max_tilt_rad: Of the thrust axis, whoever asks.
-        tilt_frequency_rad_s: w of roll and pitch.
-        tilt_rate_rad_s: Their largest rate.
-        tilt_acceleration_rad_s2: Their largest acceleration.
-        yaw_frequency_rad_s: w of yaw.
-        yaw_rate_rad_s: Its largest rate.
-        yaw_acceleration_rad_s2: Its largest acceleration.
-        thrust_rate_n_s: Fastest change of thrust.
-    """
+    """Limits of a demand: the largest tilt of the thrust axis, rates and accelerations; w as frequencies."""
 
     max_tilt_rad: float
     tilt_frequency_rad_s: float
@@ -42,39 +31,46 @@ class Slew(NamedTuple):
     thrust_rate_n_s: float
 
 
-class Aim(NamedTuple):
-    """What the demand goes towards.
+class AttitudeCommand(NamedTuple):
+    """The attitude or body rates that a demand goes towards.
 
     Attributes:
         kind: TILT, ATTITUDE or RATE.
-        vector: TILT: phi, theta, rad. ATTITUDE: where the thrust is to point, ENU. RATE: p, q, r, rad/s. (3,).
+        vector: TILT: phi, theta, rad, and 0. ATTITUDE: where the thrust is to point, ENU. RATE: p, q, r, rad/s.
         yaw_rad: ATTITUDE: to reach.
         yaw_rate_rad_s: TILT: to turn at. ATTITUDE: feed-forward.
-        thrust_n: To reach, N; nan for what carries the weight.
-        weight_n: N.
+        thrust_n: To reach; nan for what carries the weight, whatever the tilt.
     """
 
     kind: int
-    vector: Array
+    vector: Vector
     yaw_rad: float
     yaw_rate_rad_s: float
     thrust_n: float
-    weight_n: float
 
 
 @compiled
-def slew_on(aim: Aim, slew: Slew, interval_s: float, angles: Array, rates: Array, thrusts: Array) -> None:
+def slew_on(
+    command: AttitudeCommand,
+    weight_n: float,
+    slew: Slew,
+    interval_s: float,
+    angles: Array,
+    rates: Array,
+    thrusts: Array,
+) -> None:
     """Fill angles, rates and thrusts from their first rows on.
 
     Args:
-        aim: What they go towards.
-        slew: How far and how fast.
+        command: What they go towards.
+        weight_n: Of the vehicle.
+        slew: Limits.
         interval_s: Between two rows.
         angles: phi, theta, psi, rad, (n, 3).
         rates: Their derivatives, rad/s, (n, 3).
         thrusts: N, (n,).
     """
-    kind, vector, yaw_rad = aim.kind, aim.vector, aim.yaw_rad
+    kind, vector, yaw_rad = command.kind, command.vector, command.yaw_rad
     wanted, wanted_rate = np.zeros(3), np.zeros(3)
     for n in range(angles.shape[0] - 1):
         here, there = angles[n], angles[n + 1]
@@ -83,22 +79,13 @@ def slew_on(aim: Aim, slew: Slew, interval_s: float, angles: Array, rates: Array
         if kind == RATE:
             _euler_rates(here, vector, wanted_rate)
         else:
-            wanted_rate[2] = aim.yaw_rate_rad_s
+            wanted_rate[2] = command.yaw_rate_rad_s
         towards = here[2] if kind != ATTITUDE else yaw_rad - 2.0 * pi * floor((yaw_rad - here[2]) / (2.0 * pi) + 0.5)
         w, max_rate, max_acceleration = slew.yaw_frequency_rad_s, slew.yaw_rate_rad_s, slew.yaw_acceleration_rad_s2
-        _move(
-            2,
-            w * w * (towards - here[2]),
-            wanted_rate[2],
-            w,
-            max_rate,
-            max_acceleration,
-            interval_s,
-            there,
-            rates[n + 1],
-        )
+        pull = w * w * (towards - here[2])
+        _move(2, pull, wanted_rate[2], w, max_rate, max_acceleration, interval_s, there, rates[n + 1])
         if kind == TILT:
-            wanted[:2] = vector[:2]
+            wanted[0], wanted[1] = vector[0], vector[1]
         elif kind == ATTITUDE:
             _point(vector, there[2], slew.max_tilt_rad, wanted)
             after = wanted[:2].copy()
@@ -109,7 +96,7 @@ def slew_on(aim: Aim, slew: Slew, interval_s: float, angles: Array, rates: Array
             pull = 0.0 if kind == RATE else w * w * (wanted[i] - here[i])
             _move(i, pull, wanted_rate[i], w, max_rate, max_acceleration, interval_s, there, rates[n + 1])
         limit_tilt(there, rates[n + 1], slew.max_tilt_rad)
-        thrust = aim.weight_n / (cos(there[0]) * cos(there[1])) if isnan(aim.thrust_n) else aim.thrust_n
+        thrust = weight_n / (cos(there[0]) * cos(there[1])) if isnan(command.thrust_n) else command.thrust_n
         maximum = slew.thrust_rate_n_s * interval_s
         thrusts[n + 1] = thrusts[n] + min(max(thrust - thrusts[n], -maximum), maximum)
 
@@ -134,7 +121,7 @@ def _move(
 
 
 @compiled
-def _euler_rates(angles: Array, rate: Array, out: Array) -> None:
+def _euler_rates(angles: Array, rate: Vector, out: Array) -> None:
     """Write T(phi, theta) [p q r], THESIS [2.7]."""
     s, c = sin(angles[0]), cos(angles[0])
     swing = s * rate[1] + c * rate[2]
@@ -144,8 +131,8 @@ def _euler_rates(angles: Array, rate: Array, out: Array) -> None:
 
 
 @compiled
-def _point(direction: Array, psi: float, max_tilt_rad: float, angles: Array) -> None:
-    """Write roll and pitch, rad, that point body z along `direction`, ENU, (3,), at yaw `psi`; less where too steep."""
+def _point(direction: Vector, psi: float, max_tilt_rad: float, angles: Array) -> None:
+    """Write roll and pitch, rad, that point body z along `direction`, ENU, at yaw `psi`; less where too steep."""
     x, y, z = direction[0], direction[1], direction[2]
     horizontal = sqrt(x * x + y * y)
     if horizontal < _NO_DIRECTION:

@@ -1,4 +1,4 @@
-"""Whether the vehicle stands: detected by a reference that sinks on while the vehicle does not."""
+"""Landing detection: the vehicle stands if its reference sinks on while it does not."""
 
 from typing import NamedTuple
 
@@ -11,19 +11,14 @@ _LEVEL_RAD_S = 0.5
 _FOR_US = 400_000
 _DRIFTING_FOR_US = 600_000
 CARRIED = 0.5
-"""Thrust in parts of the weight, below which a vehicle whose velocity nobody knows must be falling, or stand."""
+"""Thrust in parts of the weight, below which a vehicle of unknown velocity must be falling, or stand."""
 
 STANDING_BELOW_M = 0.5
 STANDING_SLOWER_M_S = 0.3
 
 
 class Landing(NamedTuple):
-    """What the detector remembers.
-
-    Attributes:
-        since_us: Since when all signs have said that the vehicle stands; None if they do not.
-        climb_m_s: Its climb then.
-    """
+    """Memory of the detector: since when the vehicle has been still, None if it moves; and its climb then."""
 
     since_us: int | None = None
     climb_m_s: float = 0.0
@@ -32,13 +27,13 @@ class Landing(NamedTuple):
 def watch(
     landing: Landing, now_us: int, state: VehicleState, sinks: bool, *, drifts: bool = False
 ) -> tuple[Landing, bool]:
-    """Return what to remember, and whether the vehicle stands: its signs have lasted.
+    """Return the memory, and whether the vehicle stands: it has been still for long enough.
 
     Only the ground can hold a vehicle that `sinks`: one commanded to, or whose rotors do not turn, and yet still.
 
-    Where the estimate of the velocity `drifts`, as without GPS, it says nothing, and less after the blow of the ground;
-    but it still follows the accelerometer. Such a vehicle sinks where its thrust carries half of it, and would fall
-    faster and faster: the ground holds one whose climb does not change.
+    Where the estimate of the velocity `drifts`, as without GPS, only its changes count, which the accelerometer gives.
+    Such a vehicle sinks where its thrust carries half of it, and would fall faster and faster: the ground holds one
+    whose climb does not change.
     """
     climb_m_s = state.velocity_enu_m_s[2]
     if drifts:

@@ -1,8 +1,7 @@
-"""The reference that leads the vehicle from wherever it is to whatever it shall do: smooth, within limits.
+"""The reference that the vehicle follows: it moves towards a target smoothly, within limits.
 
 The chain of integrators of `integrator_chain` follows a target that may itself move; once on it, the target itself is
-the reference, to the last bit, until it jumps. An axis may have no target position, or neither position nor velocity:
-then the chain begins where the target does.
+the reference, to the last bit, until it jumps. An axis may have no target position, or neither position nor velocity.
 """
 
 from collections.abc import Sequence
@@ -19,7 +18,7 @@ from colibri.common.rotations import nearest_turn
 from colibri.common.types import Array
 
 _REACHED = 1e-5
-"""Nobody feels a step so small; the chain, whose snap changes once a sample, stays no further off a moving target."""
+"""How far off a moving target the chain, whose snap changes once a sample, stays at most."""
 _IN_ITS_SCALE = np.array([[1.0], [1.0], [1.0], [1e-2]])
 """Jerk is the last of the chain to settle, and the largest number of it."""
 
@@ -36,7 +35,7 @@ ALL_BOUND = (Kind.POSITION, Kind.POSITION, Kind.POSITION)
 
 
 class Reference(NamedTuple):
-    """Where the chain of integrators stands.
+    """State of the chain of integrators.
 
     Attributes:
         motion: Position, velocity, acceleration, jerk, ENU, (4, 3).
@@ -48,7 +47,7 @@ class Reference(NamedTuple):
 
 
 class Target(NamedTuple):
-    """What the reference shall become, at every instant of the preview.
+    """Target of the reference at every instant of the preview.
 
     Attributes:
         motion: Position, velocity, acceleration, jerk, snap, ENU, (n, 5, 3).
@@ -94,14 +93,7 @@ def target_of(horizon: Horizon) -> Target:
 
 
 def lead(reference: Reference, target: Target, limits: Limits, interval_s: float) -> tuple[Horizon, Reference]:
-    """Return the references from now on, and where the chain stands at the second of them.
-
-    Args:
-        reference: Where it stands now.
-        target: From now on, as many instants as there shall be references.
-        limits: Of the approach.
-        interval_s: Between two instants.
-    """
+    """Return the references from now on, one for each instant of the target, and the chain's state at the second."""
     if target.turns and target.kinds == ALL_BOUND and _is_at(reference, target.motion[0, :4], target.heading[0]):
         return _on_target(reference, target)
     followed = integrator_chain.Target(
@@ -123,7 +115,7 @@ def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference
 
 
 def lead_along(reference: Reference, plan: Horizon, limits: Limits, interval_s: float) -> tuple[Horizon, Reference]:
-    """Do the same for a plan, without the arrays of a target once it is reached: tracks are in a hurry every sample."""
+    """Do the same for a plan; once it is reached, without the arrays of a target, which take time every sample."""
     if not _is_at(reference, _motion_at(plan, 0), (plan.yaw_rad[0], plan.yaw_rate_rad_s[0])):
         return lead(reference, target_of(plan), limits, interval_s)
     turns = round(float(reference.heading[0] - plan.yaw_rad[0]) / (2.0 * pi))
@@ -147,6 +139,6 @@ def _is_at(reference: Reference, motion: Array, heading: Sequence[float] | Array
     yaw = nearest_turn(float(heading[0]), float(reference.heading[0]))
     if max(abs(float(reference.heading[0]) - yaw), abs(float(reference.heading[1]) - heading[1])) >= _REACHED:
         return False
-    if reference.motion.tobytes() == motion.tobytes():  # as it is every time but the first, and quickly told
+    if reference.motion.tobytes() == motion.tobytes():  # as at every sample but the first, and quickly compared
         return True
     return bool((np.abs(reference.motion - motion) * _IN_ITS_SCALE).max() < _REACHED)

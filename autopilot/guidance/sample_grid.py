@@ -1,4 +1,4 @@
-"""The instants at which references are planned: every control sample, whatever the control law previews of them."""
+"""The instants at which references are planned: every control sample, whichever the control law previews."""
 
 from collections.abc import Sequence
 from math import ceil

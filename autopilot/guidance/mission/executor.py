@@ -1,6 +1,6 @@
-"""Flies a mission: which item is current, what it asks for now, what was reached.
+"""The mission executor, a state machine: the state of the flight and the time in, an order and events out.
 
-A state machine: the situation and the time in, an order and events out. States are those of MISSION_STATE
+States are those of MISSION_STATE
 (https://mavlink.io/en/messages/common.html#MISSION_STATE). Items follow each other whatever their autocontinue says, as
 on ArduPilot: DroneKit tells its users to leave that 0.
 """
@@ -24,30 +24,22 @@ PAUSED: int = mav.MISSION_STATE_PAUSED
 COMPLETE: int = mav.MISSION_STATE_COMPLETE
 
 MAX_ITEMS_A_STEP = 16
-"""A step looks at no more items than this; the next one goes on."""
+"""Items begun in one step at most; the next one goes on."""
 REST_US = 1_000_000
-"""A mission that jumps again without having flown in between goes in a circle: it does so once in this time."""
+"""Time between jumps of a mission that jumps again without having flown in between."""
 _HOLD = Hold()
 _DEFAULTS = Defaults()
 _FLYING, _SUSPENDED = 1, 2
 
 
 class Reached(NamedTuple):
-    """An item is reached; one that takes no time is done.
-
-    Attributes:
-        seq: Which.
-    """
+    """The item of this sequence number is reached; one that takes no time is done."""
 
     seq: int
 
 
 class SetHome(NamedTuple):
-    """The mission sets home.
-
-    Attributes:
-        position_enu_m: Where, m; None: here.
-    """
+    """The mission sets home; None: here."""
 
     position_enu_m: Vector | None
 
@@ -56,7 +48,7 @@ MissionEvent: TypeAlias = Reached | SetHome
 
 
 class Step(NamedTuple):
-    """What the mission asks for.
+    """Output of the mission.
 
     Attributes:
         order: To fly; the same object while it is the same order.
@@ -70,22 +62,19 @@ class Step(NamedTuple):
 
 
 class MissionRecord(NamedTuple):
-    """Where a mission stands, as plain data: what the executor needs to go on after a restart.
+    """Progress of a mission as plain data, for a restart.
 
     Attributes:
         seq: The current item.
         state: MISSION_STATE.
-        order: What it asks for now.
-        speed_m_s: That the mission asked for; None for the cruise speed.
+        order: Of the phase that is flown.
+        speed_m_s: Set by the mission; None for the cruise speed.
         jumps: How often each jump is still to be made.
-        mission_context: When the current item began; None where it has not.
-        defaults: Of then.
-        order_before: Of then.
+        mission_context: As the current item began, like `defaults` and `order_before`; None where it has not.
         phases: How many of the item's are left.
-        since_us: When the phase began.
-        fresh: Whether it has just begun.
+        since_us: When the phase began; `fresh` if that was in the last step.
         jumped: Whether nothing was flown since the last jump.
-        rest_until_us: When a mission that goes in a circle goes on.
+        rest_until_us: When a mission that only jumps goes on.
     """
 
     seq: int
@@ -104,11 +93,11 @@ class MissionRecord(NamedTuple):
 
 
 class MissionExecutor:
-    """Flies one plan: a method for each order about the mission, and for each thing that an item may do to it.
+    """Executor of one plan: a method for each event, and for each effect of an item.
 
     Attributes:
         progress: State, current item; a new object whenever that changes.
-        defaults: Where items do not say.
+        defaults: Where items give no number.
     """
 
     def __init__(self, items: Sequence[MissionItem] = (), defaults: Defaults = _DEFAULTS) -> None:
@@ -138,14 +127,14 @@ class MissionExecutor:
         return self.progress.state == ACTIVE
 
     def load(self, items: Sequence[MissionItem]) -> None:
-        """Take another plan of valid items; one that is being flown goes on with its first item."""
+        """Replace the plan by one of valid items; if it is being flown, from its first item."""
         flying = self.active
         self._items = tuple(items)
         self._reset()
         self._show(0, NO_MISSION if not items else ACTIVE if flying else NOT_STARTED)
 
     def adopt(self, defaults: Defaults) -> None:
-        """Take other defaults, from the next item on."""
+        """Adopt other defaults, from the next item on."""
         self.defaults = defaults
 
     def start(self) -> Refusal | None:
@@ -176,7 +165,7 @@ class MissionExecutor:
         return (Reached(seq),)
 
     def set_current(self, seq: int, reset: bool = False) -> Refusal | None:
-        """Go to an item, -1 for the current one; `reset` counts jumps anew. Return why not."""
+        """Go to an item, -1 for the current one; `reset` resets the counts of jumps. Return why not."""
         if not self._items:
             return Refusal("mission: there is none")
         seq = self.progress.seq if seq == -1 else seq
@@ -199,7 +188,7 @@ class MissionExecutor:
         return Step(self._order, tuple(events), self.active)
 
     def record(self) -> MissionRecord:
-        """Return where the mission stands."""
+        """Return the progress for a restart."""
         context = self._context if self._phases else None
         return MissionRecord(
             self.progress.seq,
@@ -218,7 +207,7 @@ class MissionExecutor:
         )
 
     def resume(self, record: MissionRecord) -> None:
-        """Go on where a mission of the same items stood."""
+        """Restore the progress of a mission of the same items."""
         if not 0 <= record.seq < len(self._items):
             return
         self._order, self._speed_m_s, self._jumps = order_of(record.order), record.speed_m_s, dict(record.jumps)
@@ -258,7 +247,7 @@ class MissionExecutor:
         return True
 
     def _begin(self, now_us: int) -> None:
-        """Begin the next phase: what the situation says of an order is of the one before."""
+        """Begin the next phase; `arrived` and `turns` of this step are still those of the one before."""
         self._since_us = now_us
         if self._phases and self._phases[0].order is not None:
             self._order = self._phases[0].order
@@ -280,7 +269,7 @@ class MissionExecutor:
         self._advance()
 
     def _jump(self, item: MissionItem, now_us: int) -> bool:
-        """Jump if the item says so once more; a count of -1 says so for ever."""
+        """Jump while the count of the item lasts, -1 for ever; return whether it did."""
         seq = self.progress.seq
         left = self._jumps.get(seq, int(item.p2))
         if left == 0:

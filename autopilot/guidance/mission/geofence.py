@@ -48,7 +48,7 @@ def check_fence_item(item: MissionItem) -> int:
 
 
 def check_fence(items: Sequence[MissionItem]) -> int:
-    """Return the MAV_MISSION_RESULT of valid items together: each polygon must be whole, and of one mind."""
+    """Return the MAV_MISSION_RESULT of valid items together: each polygon must be whole, of one kind and group."""
     at = 0
     while at < len(items):
         first = items[at]
@@ -74,13 +74,7 @@ class Zone(Protocol):
 
 
 class Disc(NamedTuple):
-    """A circle's inside.
-
-    Attributes:
-        east_m: Of its centre.
-        north_m: Of its centre.
-        radius_m: m.
-    """
+    """A circle's inside: its centre, and its radius."""
 
     east_m: float
     north_m: float
@@ -125,7 +119,7 @@ class Geofence:
     """
 
     def __init__(self, items: Sequence[MissionItem], origin: Geodetic, *, max_height_m: float = inf) -> None:
-        """Build the fence of valid items; without any it holds nothing back."""
+        """Build the fence of valid items; without any, every place is inside."""
         self.max_height_m = max_height_m
         self.return_point_enu_m: tuple[float, float] | None = None
         self._groups: dict[float, list[Zone]] = {}

@@ -1,4 +1,4 @@
-"""Which mission items this vehicle flies, which it skips, and what their parameters may be.
+"""The mission items that this vehicle flies or skips, and the values that their parameters may have.
 
 Parameters: https://mavlink.io/en/messages/common.html#mav_commands; answers: MAV_MISSION_RESULT of the same page.
 A parameter that is nan means the default; a value that the command has no use for is refused, never guessed.
@@ -23,7 +23,7 @@ _ABOVE_SEA = (mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT)
 
 SKIPPED: frozenset[int] = frozenset(
     getattr(mav, f"MAV_CMD_{name}")
-    for name in (
+    for name in [
         "NAV_ROI",
         "CONDITION_DISTANCE",
         "DO_SET_RELAY",
@@ -68,20 +68,15 @@ SKIPPED: frozenset[int] = frozenset(
         "VIDEO_START_STREAMING",
         "VIDEO_STOP_STREAMING",
         "PANORAMA_CREATE",
-    )
+    ]
 )
-"""For cameras, gimbals and other payload that this vehicle does not carry: accepted, whatever they say, and passed."""
+"""For cameras, gimbals and other payload that this vehicle does not carry: accepted with any parameters, and passed."""
 
 _Check: TypeAlias = Callable[[float], bool]
 
 
-def _anything(value: float) -> bool:
-    del value
+def _anything(_: float) -> bool:
     return True
-
-
-def _finite(value: float) -> bool:
-    return isfinite(value)
 
 
 def _not_infinite(value: float) -> bool:
@@ -110,7 +105,7 @@ def _a_speed(value: float) -> bool:
 
 
 class _Allowed(NamedTuple):
-    """What an item of one command may say.
+    """The rules of one command's items.
 
     Attributes:
         place: Whether x and y must be a latitude and a longitude.
@@ -139,7 +134,7 @@ _ALLOWED: Mapping[int, _Allowed] = {
     mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: _Allowed(),
     mav.MAV_CMD_NAV_DELAY: _Allowed(p1=_not_negative),
     mav.MAV_CMD_CONDITION_DELAY: _Allowed(p1=_not_negative),
-    mav.MAV_CMD_CONDITION_YAW: _Allowed(p1=_finite, p3=_one_of(-1.0, 0.0, 1.0), p4=_one_of(0.0, 1.0)),
+    mav.MAV_CMD_CONDITION_YAW: _Allowed(p1=isfinite, p3=_one_of(-1.0, 0.0, 1.0), p4=_one_of(0.0, 1.0)),
     mav.MAV_CMD_DO_JUMP: _Allowed(p1=_whole(0, 0xFFFF), p2=_whole(-1, 0xFFFF)),
     mav.MAV_CMD_DO_CHANGE_SPEED: _Allowed(p1=_one_of(0.0, 1.0, 2.0, 3.0), p2=_a_speed),
     mav.MAV_CMD_DO_SET_HOME: _Allowed(p1=_one_of(0.0, 1.0)),

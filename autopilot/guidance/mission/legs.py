@@ -18,16 +18,16 @@ _TURN_WITHIN_S = 30.0
 
 
 class MissionContext(NamedTuple):
-    """What the mission sees of the flight.
+    """State of the flight that a mission depends on.
 
     Attributes:
-        position_enu_m: m.
-        velocity_enu_m_s: m/s.
+        position_enu_m: Of the vehicle.
+        velocity_enu_m_s: Of the vehicle.
         yaw_rad: Counter-clockwise from east.
         landed: Whether the vehicle stands on the ground.
         arrived: Whether the order of the step before is fulfilled.
-        turns: How often the vehicle went around, of the Circle of the step before.
-        home_enu_m: m.
+        turns: How often the circle of the step before was flown around.
+        home_enu_m: Home.
         origin: Of the ENU frame.
     """
 
@@ -42,7 +42,7 @@ class MissionContext(NamedTuple):
 
 
 class Defaults(NamedTuple):
-    """What holds where an item does not say.
+    """Numbers that hold where an item gives none.
 
     Attributes:
         acceptance_m: Closer to a place than this it is reached.
@@ -56,19 +56,23 @@ class Defaults(NamedTuple):
 
 
 class ItemContext(NamedTuple):
-    """What an item begins with.
+    """State of the mission as an item begins.
 
     Attributes:
-        mission_context: Now.
-        defaults: Where it does not say.
+        mission_context: Then.
+        defaults: Where the item gives no number.
         order: The last one.
-        speed_m_s: That the mission asked for; None for the cruise speed.
+        speed_m_s: Set by the mission; None for the cruise speed.
     """
 
     mission_context: MissionContext
     defaults: Defaults
     order: Order
     speed_m_s: float | None
+
+    def place(self, item: MissionItem) -> Vector:
+        """Return the place of an item, m, ENU."""
+        return place_of(item, self.mission_context.home_enu_m, self.mission_context.origin)
 
 
 class Phase(NamedTuple):
@@ -99,23 +103,13 @@ def _waypoint(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     return _there(item, context, radius, _or_zero(item.p1))
 
 
-def _loiter_forever(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    return _there(item, context, context.defaults.acceptance_m, inf)
-
-
-def _loiter_time(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    return _there(item, context, context.defaults.acceptance_m, _or_zero(item.p1))
-
-
-def _loiter_to_height(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    """A multicopter climbs on the way: it is at the height when it is there."""
-    return _there(item._replace(p4=nan), context, context.defaults.acceptance_m, 0.0)
+def _loiter(item: MissionItem, context: ItemContext, stay_s: float) -> tuple[Phase, ...]:
+    return _there(item, context, context.defaults.acceptance_m, stay_s)
 
 
 def _there(item: MissionItem, context: ItemContext, radius_m: float, stay_s: float) -> tuple[Phase, ...]:
     """Fly to a place, heading as p4 says, and stay; stay_s 0 flies through."""
-    mission_context = context.mission_context
-    place = place_of(item, mission_context.home_enu_m, mission_context.origin)
+    place = context.place(item)
     go = GoTo(place, _yaw(item.p4), context.speed_m_s)
     climb = _off_the_ground(place[2], context)
     stay = (Phase(None, _after(stay_s)),) if stay_s > 0.0 else ()
@@ -123,8 +117,7 @@ def _there(item: MissionItem, context: ItemContext, radius_m: float, stay_s: flo
 
 
 def _circle(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    mission_context = context.mission_context
-    center = place_of(item, mission_context.home_enu_m, mission_context.origin)
+    center = context.place(item)
     radius = item.p3 if abs(item.p3) > 0.0 else context.defaults.orbit_radius_m
     radius = max(radius, MIN_RADIUS_M) if radius > 0.0 else min(radius, -MIN_RADIUS_M)
     turns = 1.0 if isnan(item.p1) else item.p1
@@ -142,20 +135,14 @@ def _take_off(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
     up = () if high else (Phase(TakeOff(height, yaw), _above(height - defaults.acceptance_m)),)
     if is_here(item):
         return (*up[:-1], *(phase._replace(reaches=True) for phase in up[-1:]))
-    place = place_of(item, mission_context.home_enu_m, mission_context.origin)
+    place = context.place(item)
     go = GoTo(place, yaw, context.speed_m_s)
     return (*up, Phase(go, _within(place, defaults.acceptance_m), reaches=True))
 
 
 def _land(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    mission_context = context.mission_context
-    place = None if is_here(item) else place_of(item, mission_context.home_enu_m, mission_context.origin)
+    place = None if is_here(item) else context.place(item)
     return (Phase(Land(place, _yaw(item.p4)), _landed, reaches=True),)
-
-
-def _return(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
-    del item, context
-    return (Phase(Return(), _landed, reaches=True),)
 
 
 def _delay(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
@@ -182,13 +169,14 @@ def _turn(item: MissionItem, context: ItemContext) -> tuple[Phase, ...]:
 
 _LEGS: Mapping[int, Leg] = {
     mav.MAV_CMD_NAV_WAYPOINT: _waypoint,
-    mav.MAV_CMD_NAV_LOITER_UNLIM: _loiter_forever,
-    mav.MAV_CMD_NAV_LOITER_TIME: _loiter_time,
+    mav.MAV_CMD_NAV_LOITER_UNLIM: lambda item, context: _loiter(item, context, inf),
+    mav.MAV_CMD_NAV_LOITER_TIME: lambda item, context: _loiter(item, context, _or_zero(item.p1)),
     mav.MAV_CMD_NAV_LOITER_TURNS: _circle,
-    mav.MAV_CMD_NAV_LOITER_TO_ALT: _loiter_to_height,
+    # A multicopter climbs on the way: it is at the height when it is there.
+    mav.MAV_CMD_NAV_LOITER_TO_ALT: lambda item, context: _loiter(item._replace(p4=nan), context, 0.0),
     mav.MAV_CMD_NAV_TAKEOFF: _take_off,
     mav.MAV_CMD_NAV_LAND: _land,
-    mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: _return,
+    mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda *_: (Phase(Return(), _landed, reaches=True),),
     mav.MAV_CMD_NAV_DELAY: _delay,
     mav.MAV_CMD_CONDITION_DELAY: _delay,
     mav.MAV_CMD_CONDITION_YAW: _turn,

@@ -1,13 +1,13 @@
-"""Flight tasks by attitude and thrust: what sticks or setpoints ask for, made smooth; height held under sticks."""
+"""Flight tasks by attitude and thrust, from sticks or setpoints; and the descent without a position."""
 
 import numpy as np
 
 from colibri.autopilot.guidance.attitude_reference import (
-    AttitudeCommand,
     AttitudeReference,
     ReferenceMemory,
     tilt_command,
 )
+from colibri.autopilot.guidance.attitude_slew import AttitudeCommand
 from colibri.autopilot.guidance.landing_detector import CARRIED, is_below
 from colibri.autopilot.guidance.reference import Kind, Reference, Target, lead, moving_with, still_target
 from colibri.autopilot.guidance.tasks.position import HoldTask, sinking_m_s
@@ -26,7 +26,7 @@ _RESTS_M_S = 0.025
 
 
 class TiltLoop:
-    """Attitude and thrust, smoothly, as a generator of demands makes them."""
+    """Attitude and thrust as a generator of demands slews them."""
 
     def __init__(self, generator: AttitudeReference) -> None:
         """Begin with the attitude that the vehicle has at the first demand."""
@@ -38,15 +38,15 @@ class TiltLoop:
         self._memory = None
 
     def by_setpoint(self, setpoint: AttitudeSetpoint, context: TaskContext) -> AttitudeMotion:
-        """Return what a companion's setpoint asks for."""
+        """Return the motion by a companion's setpoint."""
         return self.by_command(self._generator.from_setpoint(setpoint), context)
 
     def by_command(self, command: AttitudeCommand, context: TaskContext) -> AttitudeMotion:
-        """Return what is asked for, as smoothly as the vehicle can follow."""
+        """Return the motion by a command."""
         if self._memory is None:
             self._memory = self._generator.initial(context.state)
         self._memory, demand = self._generator.step(self._memory, context.state, command)
-        # nan asks for no thrust of its own: a vehicle that stands stays, one that flies does not sink
+        # of a thrust of nan both are False: a vehicle that stands stays, one that flies does not sink
         share = command.thrust_n / self._generator.weight_n
         return AttitudeMotion(demand, moving_with(context.state), lifts=share > _LIFTING, sinks=share < _SINKING)
 
@@ -56,16 +56,16 @@ class StabilizedTask(EndlessTask):
 
     def __init__(self, generator: AttitudeReference) -> None:
         """Begin with the attitude that the vehicle has."""
-        self._leaning = TiltLoop(generator)
+        self._tilt = TiltLoop(generator)
         self._generator = generator
         self._stop = HoldTask()
 
     def update(self, context: TaskContext) -> Motion | AttitudeMotion:
-        """Return what the sticks ask for; without sticks, stop."""
+        """Return the motion by the sticks; without them, stop."""
         sticks = context.steered.sticks
         if sticks is None:
             return self._stop.update(context)
-        return self._leaning.by_command(self._generator.from_sticks(without_play(sticks)), context)
+        return self._tilt.by_command(self._generator.from_sticks(without_play(sticks)), context)
 
 
 class AltitudeTask(EndlessTask):
@@ -73,14 +73,14 @@ class AltitudeTask(EndlessTask):
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
         """Begin with the attitude and height that the vehicle has."""
-        self._leaning = TiltLoop(generator)
+        self._tilt = TiltLoop(generator)
         self._generator = generator
         self._stop = HoldTask()
         self._loop = HeightLoop(generator.weight_n, gravity_m_s2)
         self._height_m: float | None = None
 
     def update(self, context: TaskContext) -> Motion | AttitudeMotion:
-        """Return what the sticks ask for; without sticks, stop."""
+        """Return the motion by the sticks; without them, stop."""
         sticks = context.steered.sticks
         if sticks is None:
             return self._stop.update(context)
@@ -88,8 +88,8 @@ class AltitudeTask(EndlessTask):
         command = self._generator.from_sticks(without_play(sticks))._replace(
             thrust_n=self._loop.thrust_n(reference, context)
         )
-        leaning = self._leaning.by_command(command, context)
-        return leaning._replace(reference=reference, lifts=lifting, sinks=is_below(reference, context.state))
+        motion = self._tilt.by_command(command, context)
+        return motion._replace(reference=reference, lifts=lifting, sinks=is_below(reference, context.state))
 
     def _climb(self, sticks: Sticks, context: TaskContext) -> tuple[Reference, bool]:
         """Return the height's reference, where the vehicle is otherwise, and whether it is to leave the ground."""
@@ -103,11 +103,11 @@ class AltitudeTask(EndlessTask):
 
 
 class DescentTask(EndlessTask):
-    """Level, and down at the speed of landings: for a vehicle that does not know where it is, or which way it looks."""
+    """Level, and down at the speed of landings: for a vehicle of unknown position or heading."""
 
     def __init__(self, generator: AttitudeReference, gravity_m_s2: float) -> None:
         """Begin with the attitude and climb that the vehicle has."""
-        self._leaning = TiltLoop(generator)
+        self._tilt = TiltLoop(generator)
         self._weight_n = generator.weight_n
         self._loop = HeightLoop(self._weight_n, gravity_m_s2)
 
@@ -115,16 +115,16 @@ class DescentTask(EndlessTask):
         """Return a level attitude, and the thrust that sinks."""
         reference, _ = vertically(context, -sinking_m_s(context), None)
         thrust_n = self._loop.thrust_n(reference, context)
-        leaning = self._leaning.by_command(tilt_command(0.0, 0.0, 0.0, thrust_n), context)
+        motion = self._tilt.by_command(tilt_command(0.0, 0.0, 0.0, thrust_n), context)
         sinks = thrust_n < CARRIED * self._weight_n
-        return leaning._replace(reference=reference, lifts=False, sinks=sinks, drifts=True)
+        return motion._replace(reference=reference, lifts=False, sinks=sinks, drifts=True)
 
 
 class HeightLoop:
-    """The thrust that follows the height of a reference, whatever the vehicle leans."""
+    """The height loop: the thrust that follows the height of a reference, whatever the tilt."""
 
     def __init__(self, weight_n: float, gravity_m_s2: float) -> None:
-        """Begin with nothing to make up for."""
+        """Begin without an offset."""
         self._weight_n, self._gravity_m_s2 = weight_n, gravity_m_s2
         self._offset_m_s2 = 0.0
 

@@ -1,4 +1,4 @@
-"""The flight task behind a target: where FOLLOW_TARGET says that it is, at a distance, seen from a chosen side."""
+"""The flight task that follows the target of FOLLOW_TARGET, at a distance, on a chosen side."""
 
 from math import hypot, pi, radians
 
@@ -12,7 +12,7 @@ from colibri.common.kernels import atan2, cos, sin
 
 _STANDS_M_S = 0.3
 MIN_HEIGHT_M = 1.0
-"""Above home, however low the target is thought to be: as PX4's MINIMUM_SAFETY_ALTITUDE has it."""
+"""Above home, whatever the target's height: PX4's MINIMUM_SAFETY_ALTITUDE."""
 ABOVE_TARGET = 2
 """Of `Behaviour.follow_altitude_mode`; the ground that the others count from is flat."""
 
@@ -21,7 +21,7 @@ class FollowTargetTask(EndlessTask):
     """A place relative to the target; without one, stop."""
 
     def __init__(self) -> None:
-        """Follow nobody yet."""
+        """Begin without a target."""
         self._stop = HoldTask()
         self._ahead_rad: float | None = None
 

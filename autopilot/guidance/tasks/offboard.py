@@ -1,4 +1,4 @@
-"""The flight task of offboard mode: setpoints from moment to moment, no faster than anything else flies."""
+"""The flight task of offboard mode: setpoints of a companion, within the limits of speed and acceleration."""
 
 from math import hypot, isnan
 
@@ -22,20 +22,20 @@ class OffboardTask(EndlessTask):
 
     def __init__(self, attitude: AttitudeReference | None) -> None:
         """Follow setpoints; of attitude if there is a generator of demands for it."""
-        self._leaning = TiltLoop(attitude) if attitude else None
+        self._tilt = TiltLoop(attitude) if attitude else None
         self._hold = HoldTask()
 
     def update(self, context: TaskContext) -> Motion | AttitudeMotion:
-        """Return what the latest setpoint asks for."""
+        """Return the motion by the latest setpoint."""
         setpoint = context.steered.setpoint
         if isinstance(setpoint, PositionSetpoint):
-            if self._leaning:
-                self._leaning.forget()
+            if self._tilt:
+                self._tilt.forget()
             self._hold = HoldTask()
             return Motion(position_target(setpoint.in_enu(context.state.euler[2]), context), context.behaviour.limits)
-        if isinstance(setpoint, AttitudeSetpoint) and self._leaning:
+        if isinstance(setpoint, AttitudeSetpoint) and self._tilt:
             self._hold = HoldTask()
-            return self._leaning.by_setpoint(setpoint, context)
+            return self._tilt.by_setpoint(setpoint, context)
         return self._hold.update(context)
 
 

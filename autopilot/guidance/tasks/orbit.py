@@ -23,7 +23,7 @@ class OrbitTask(EndlessTask):
     """Around a centre: to the nearest point of the circle, then along it. On the circle already, it goes on at once.
 
     Attributes:
-        order: What it flies: by this it can begin again.
+        order: The order that begins the task again.
         turns: How often it went around.
     """
 
@@ -65,7 +65,7 @@ class OrbitTask(EndlessTask):
         return (vy * cos(angle) - vx * sin(angle)) / self._radius_m
 
     def _towards(self, wanted: float, context: TaskContext) -> float:
-        """Return the rate of now, rad/s: no sooner the one that is wanted than the vehicle can gain that speed."""
+        """Return the rate of now, rad/s: the wanted one, as soon as the vehicle can gain that speed."""
         maximum = _SHARE * context.behaviour.limits.acceleration_m_s2 * context.interval_s / self._radius_m
         return min(max(wanted, self._rate - maximum), self._rate + maximum)
 
@@ -79,8 +79,8 @@ class OrbitTask(EndlessTask):
         return abs(vx * east + vy * north) < _ON_IT_M_S * away and abs(vz) < _ON_IT_M_S
 
     def _speed_m_s(self, context: TaskContext) -> float:
-        behaviour, asked = context.behaviour, self.order.speed_m_s
-        wanted = behaviour.limits.speed_m_s if asked is None else asked
+        behaviour, ordered = context.behaviour, self.order.speed_m_s
+        wanted = behaviour.limits.speed_m_s if ordered is None else ordered
         return min(wanted, behaviour.max_speed_m_s, sqrt(_SHARE * behaviour.limits.acceleration_m_s2 * self._radius_m))
 
     def _motion(self, angles: Array, rate: float) -> Array:

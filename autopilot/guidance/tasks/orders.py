@@ -1,4 +1,4 @@
-"""What the vehicle can be told to do next: by a mission's item, a command, or a mode."""
+"""Orders: the next thing to fly, by a mission's item, a command, or a mode."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeAlias
@@ -75,12 +75,7 @@ _KINDS: Mapping[str, type[Order]] = {kind.__name__: kind for kind in (GoTo, Circ
 
 
 class OrderRecord(NamedTuple):
-    """An order as plain data.
-
-    Attributes:
-        kind: Name of its class.
-        fields: Its fields.
-    """
+    """An order as plain data: the name of its class, and its fields."""
 
     kind: str
     fields: tuple[Any, ...]
@@ -92,7 +87,7 @@ def record_of(order: Order) -> OrderRecord:
 
 
 def order_of(record: OrderRecord) -> Order:
-    """Return the order of which this is the record; Hold where there is none such."""
+    """Return the order of this record; Hold where there is none such."""
     try:
         return msgspec.convert(record.fields, _KINDS[record.kind])
     except (KeyError, msgspec.ValidationError):

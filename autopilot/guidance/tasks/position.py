@@ -1,4 +1,4 @@
-"""Flight tasks by place: how each order is flown, as a target for the reference to follow, sample after sample."""
+"""Flight tasks by position: how each order is flown, as a target of the reference."""
 
 from collections.abc import Callable
 from math import dist, hypot
@@ -19,7 +19,7 @@ from colibri.common.kernels import atan2
 from colibri.common.types import Vector
 
 Leg: TypeAlias = Callable[[TaskContext], FlightTask]
-"""Begins a task where the context says."""
+"""Begins a task, given the context."""
 
 _ALONG_BEYOND_M = 1.0
 """A way shorter than this does not turn the vehicle."""
@@ -44,7 +44,7 @@ class GoToTask:
 
     @property
     def order(self) -> GoTo:
-        """What it flies: by this it can begin again."""
+        """The order that begins the task again."""
         return GoTo(self._place, self._yaw_rad, self._speed_m_s)
 
     def update(self, context: TaskContext) -> Motion:
@@ -69,7 +69,7 @@ class HoldTask:
 
     @property
     def order(self) -> Order:
-        """What it flies: by this it can begin again."""
+        """The order that begins the task again."""
         return Hold() if self._place is None else GoTo(self._place, self._yaw_rad)
 
     def update(self, context: TaskContext) -> Motion:
@@ -94,7 +94,7 @@ class TakeoffTask:
     def __init__(
         self, height_enu_m: float, yaw_rad: float | None, context: TaskContext, speed_m_s: float | None = None
     ) -> None:
-        """Begin where the reference is; climb at `speed_m_s`, or as fast as the parameters say."""
+        """Begin where the reference is; climb at `speed_m_s`, or at the parameter's speed."""
         self._height_m = max(height_enu_m, context.place[2])
         self._yaw_rad = context.yaw_rad if yaw_rad is None else yaw_rad
         self._speed_m_s = speed_m_s
@@ -102,7 +102,7 @@ class TakeoffTask:
 
     @property
     def order(self) -> TakeOff:
-        """What it flies: by this it can begin again."""
+        """The order that begins the task again."""
         return TakeOff(self._height_m, self._yaw_rad)
 
     def update(self, context: TaskContext) -> Motion:
@@ -148,7 +148,7 @@ def sinking_m_s(context: TaskContext) -> float:
 
 
 class TaskSequence:
-    """Courses one after another, each from where the one before has led.
+    """Tasks one after another, each from where the one before has led.
 
     Attributes:
         task: The one that is flown; None before the first sample.
@@ -174,7 +174,7 @@ class TaskSequence:
         return self
 
     def update(self, context: TaskContext) -> TaskOutput:
-        """Return what the leg that is flown now asks for."""
+        """Return the output of the leg that is flown."""
         if self.task is None or (self._ahead and self.task.arrived(context)):
             self.task = self._ahead.pop(0)(context)
             if isinstance(self.task, TaskSequence):

@@ -1,4 +1,4 @@
-"""Sticks to velocity, for a pilot who flies by place."""
+"""The flight task of position mode: sticks to velocity."""
 
 from math import hypot
 
@@ -12,7 +12,7 @@ _MIDDLE = Sticks(0.0, 0.0, 0.5, 0.0)
 
 
 class PositionTask(EndlessTask):
-    """Sticks to velocity; what is not asked to move is held where it came to rest."""
+    """Sticks to velocity; an axis whose stick is in the middle is held where it came to rest."""
 
     def __init__(self) -> None:
         """Hold nothing yet."""
@@ -63,7 +63,7 @@ class PositionTask(EndlessTask):
 
 
 def stick_velocity(sticks: Sticks, context: TaskContext) -> tuple[float, float]:
-    """Return the velocity east and north, m/s, that sticks ask for: of full sticks, in any direction, the largest."""
+    """Return the velocity east and north, m/s, by sticks: of full sticks, in any direction, the largest."""
     ahead, left = dead(sticks.pitch), -dead(sticks.roll)
     behaviour = context.behaviour
     speed = min(behaviour.stick_speed_m_s, behaviour.max_speed_m_s) / max(1.0, hypot(ahead, left))
@@ -72,13 +72,13 @@ def stick_velocity(sticks: Sticks, context: TaskContext) -> tuple[float, float]:
 
 
 def stick_climb(sticks: Sticks, context: TaskContext) -> float:
-    """Return the speed upwards, m/s, that sticks ask for."""
+    """Return the speed upwards, m/s, by sticks."""
     up = dead(2.0 * sticks.thrust - 1.0)
     return up * (context.behaviour.limits.climb_m_s if up > 0.0 else context.behaviour.limits.sink_m_s)
 
 
 def stick_yaw_rate(sticks: Sticks, context: TaskContext) -> float:
-    """Return the yaw rate, rad/s, that sticks ask for."""
+    """Return the yaw rate, rad/s, by sticks."""
     return -dead(sticks.yaw) * context.behaviour.stick_yaw_rate_rad_s
 
 

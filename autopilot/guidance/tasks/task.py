@@ -1,4 +1,4 @@
-"""What a flight task is: given the context once a control sample, it returns a motion, or an attitude and a thrust."""
+"""The interface of flight tasks: given the context once a control sample, a task returns a motion."""
 
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -13,13 +13,7 @@ _LIFT_M, _LIFT_M_S = 0.15, 0.05
 
 
 class Steered(NamedTuple):
-    """What clients ask for from moment to moment; None where nobody does.
-
-    Attributes:
-        sticks: Of a pilot.
-        setpoint: Of an offboard companion, in ENU.
-        followed: What is to be followed.
-    """
+    """Latest input of clients: a pilot's sticks, a companion's setpoint, the target to follow; None without."""
 
     sticks: Sticks | None = None
     setpoint: OffboardSetpoint | None = None
@@ -30,17 +24,17 @@ NOT_STEERED = Steered()
 
 
 class TaskContext(NamedTuple):
-    """What a task sees.
+    """Inputs of a task.
 
     Attributes:
         now_us: Simulated time.
         state: The vehicle.
-        reference: Where the reference stands.
-        home_enu_m: Where the vehicle took off.
-        behaviour: The numbers that it flies by.
+        reference: State of the reference.
+        home_enu_m: Home.
+        behaviour: The numbers that the vehicle flies by.
         interval_s: Between two instants of a target.
         samples: How many instants a target has.
-        steered: What clients ask for from moment to moment.
+        steered: Latest input of clients.
         standing: Whether the vehicle stands on the ground.
         ground_m: Height of where it last stood, z of ENU.
         blind: Whether the position is not to be flown by: a landing is level then.
@@ -77,24 +71,17 @@ class TaskContext(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion by position and yaw.
-
-    Attributes:
-        target: What the reference is to become.
-        limits: How fast.
-    """
+    """Motion by position and yaw: the target of the reference, and the limits on the way there."""
 
     target: Target
     limits: Limits
 
 
 class PlannedMotion(NamedTuple):
-    """Motion along a plan.
+    """Motion along a plan: the horizon that the reference is to reach, and the limits on the way there.
 
     Attributes:
-        horizon: What the reference is to become.
-        limits: How fast, until it is that.
-        for_law: The same as the control law previews it, where that is something else.
+        for_law: The horizon at the control law's instants, where those differ.
     """
 
     horizon: Horizon
@@ -115,7 +102,7 @@ class AttitudeMotion(NamedTuple):
         reference: Where the reference stands meanwhile.
         lifts: Whether a vehicle that stands must leave the ground for it.
         sinks: Whether a vehicle in the air must sink.
-        drifts: Whether the velocity is unreliable: see `landing.watch`.
+        drifts: Whether the velocity is unreliable: see `landing_detector.watch`.
     """
 
     demand: AttitudeDemand

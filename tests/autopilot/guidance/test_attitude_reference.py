@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from colibri.autopilot.control.interface import AttitudeDemand, Preview, VehicleState
 from colibri.autopilot.guidance.attitude_reference import (
-    AttitudeCommand,
     AttitudeLimits,
     AttitudeReference,
     ReferenceMemory,
@@ -18,6 +17,7 @@ from colibri.autopilot.guidance.attitude_reference import (
     rate_command,
     tilt_command,
 )
+from colibri.autopilot.guidance.attitude_slew import AttitudeCommand
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Quaternion
 from colibri.mavlink.setpoints.setpoints import AttitudeSetpoint, Sticks

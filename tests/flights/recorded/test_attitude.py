@@ -14,12 +14,12 @@ from colibri.autopilot.control.interface import AttitudeController, VehicleState
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.guidance.attitude_reference import (
-    AttitudeCommand,
     AttitudeReference,
     attitude_command,
     rate_command,
     tilt_command,
 )
+from colibri.autopilot.guidance.attitude_slew import AttitudeCommand
 from colibri.common.rotations import euler_from_quaternion, nearest_turn, quaternion_from_euler
 from colibri.common.types import Array
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_state, encode_state
