@@ -171,7 +171,7 @@ def _ordered(mode: Mode, record: TaskRecord, context: TaskContext) -> FlightTask
     order = None if record.order is None else order_of(record.order)
     if mode is Mode.HOLD and isinstance(order, GoTo):
         return GoToTask(order, context)
-    if mode is Mode.TAKEOFF and isinstance(order, TakeOff):
+    if mode in (Mode.TAKEOFF, Mode.HOLD) and isinstance(order, TakeOff):  # one that has arrived settles in hold
         return TakeoffTask(order.height_enu_m, order.yaw_rad, context, context.behaviour.takeoff_speed_m_s)
     if mode is Mode.ORBIT and isinstance(order, Circle):
         return OrbitTask(order, context)
