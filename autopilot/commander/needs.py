@@ -54,7 +54,7 @@ class ModeNeeds:
             Need.INSIDE_FENCE: not self._missions.leaves_fence,
             Need.CIRCLE: False,
             Need.FLYING: not self._pilot.ground.standing,
-            Need.POSITION: self._pilot.sensed.knows_position,
+            Need.POSITION: self._pilot.sensed.position_known,
         }
         return tuple(need for need, there in met.items() if not there)
 

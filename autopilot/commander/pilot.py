@@ -52,13 +52,13 @@ class Sensed(NamedTuple):
         now_us: Simulated time.
         vehicle: The vehicle; None before the first state.
         steered: Setpoints of clients.
-        knows_position: Whether the position is known well enough to fly to places.
+        position_known: Whether the position is known well enough to fly to places.
     """
 
     now_us: int = 0
     vehicle: VehicleState | None = None
     steered: Steered = NOT_STEERED
-    knows_position: bool = True
+    position_known: bool = True
 
 
 class PilotRecord(NamedTuple):
@@ -184,14 +184,14 @@ class Pilot:
             self.readiness.trust_rotors()
 
     def sense(
-        self, now_us: int, vehicle: VehicleState, steered: Steered = NOT_STEERED, *, knows_position: bool = True
+        self, now_us: int, vehicle: VehicleState, steered: Steered = NOT_STEERED, *, position_known: bool = True
     ) -> None:
         """Take in the inputs of a control sample; the arguments are the fields of `Sensed`."""
-        self.sensed = Sensed(now_us, vehicle, steered, knows_position)
+        self.sensed = Sensed(now_us, vehicle, steered, position_known)
 
     def context(self) -> TaskContext:
         """Return the inputs of a task now."""
-        now_us, vehicle, steered, knows_position = self.sensed
+        now_us, vehicle, steered, position_known = self.sensed
         reference, behaviour = self.generator.reference, self.behaviour
         assert vehicle is not None, "the vehicle has been seen"
         assert reference is not None, "the vehicle has been seen"
@@ -210,7 +210,7 @@ class Pilot:
             steered,
             self.ground.standing,
             self.ground.height_m,
-            blind=self.saving is Action.DESCEND or not knows_position,
+            blind=self.saving is Action.DESCEND or not position_known,
         )
 
     @property

@@ -1,6 +1,6 @@
 """The supervisor: decides on failsafes by their table, and reports them to ground stations."""
 
-from colibri.autopilot.commander.rules.failsafe_conditions import Conditions, FailsafeInputs, knows_position
+from colibri.autopilot.commander.rules.failsafe_conditions import Conditions, FailsafeInputs, position_known
 from colibri.autopilot.commander.rules.failsafe_parameters import Limits, limits, settings
 from colibri.autopilot.commander.rules.failsafe_rule import Flight, Memory, following
 from colibri.autopilot.commander.rules.failsafe_table import Action, Condition
@@ -40,9 +40,9 @@ class Supervisor:
         """Restore the memory after a restart in flight."""
         self.memory = memory
 
-    def knows_position(self, estimate: Estimate | None) -> bool:
+    def position_known(self, estimate: Estimate | None) -> bool:
         """Whether the position is known well enough to fly to places; without an `estimate`, from states, it is."""
-        return knows_position(estimate, self.limits)
+        return position_known(estimate, self.limits)
 
     def step(self, inputs: FailsafeInputs, flight: Flight) -> Action:
         """Return what is to begin at this control sample, before the pilot's step; NONE to go on as before."""

@@ -4,9 +4,47 @@ from colibri.autopilot.commander.flight.reference_generator import RESTS, Guidan
 from colibri.autopilot.control.interface import Decision, VehicleState
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
-from colibri.autopilot.core.solve_time import SolveTime
 from colibri.autopilot.core.step import STILL
 from colibri.common.types import FourRotors
+
+
+class SolveTime:
+    """A slow control law, simulated: a decision takes effect a declared time after its sample.
+
+    While it solves, the command before is held, and samples that fall due meanwhile are skipped, as a real overrun
+    would skip them. Nothing here is measured: the same declared time gives the same flight.
+
+    Attributes:
+        missed: How many decisions took longer than a control interval.
+    """
+
+    def __init__(self, interval_us: int) -> None:
+        """Begin idle; a decision is due every `interval_us`."""
+        self._interval_us = interval_us
+        self._ready_us: int | None = None
+        self._next = self._now = STILL
+        self.missed = 0
+
+    def busy(self, now_us: int) -> bool:
+        """Whether a decision of an earlier sample is still being made."""
+        self.controls(now_us)
+        return self._ready_us is not None
+
+    def decided(self, controls: FourRotors, now_us: int, solve_us: int) -> None:
+        """Set the command of the sample at `now_us`, in effect after `solve_us`."""
+        if solve_us > self._interval_us:
+            self.missed += 1
+        self._next, self._ready_us = controls, now_us + solve_us
+
+    def at_once(self, controls: FourRotors) -> None:
+        """Set a command that needs no solving; a decision that is being made is dropped."""
+        self._now, self._ready_us = controls, None
+
+    def controls(self, now_us: int) -> FourRotors:
+        """Return the command that holds now."""
+        if self._ready_us is not None and now_us >= self._ready_us:
+            self._now, self._ready_us = self._next, None
+        return self._now
 
 
 class Actuation:
@@ -54,12 +92,7 @@ class Actuation:
     ) -> Decision | None:
         """Decide at a control sample; return None while the rotors stand or idle, or an earlier sample is being solved.
 
-        Args:
-            now_us: Simulated time.
-            state: The vehicle.
-            guidance: References.
-            charge_ah: Charge taken from the battery.
-            solve_time_s: Declared solve time of the control law.
+        `charge_ah` was taken from the battery; `solve_time_s` is the declared solve time of the control law.
 
         Raises:
             DecisionError: The control law gave what no rotor can follow.

@@ -1,9 +1,8 @@
 """Checkpoint: the state of a flight as plain data, from which it goes on after the autopilot was killed.
 
-One is recorded at each control sample, and given to the vehicle of the next process. It is of the same flight if the
-time of the first frame follows its own. Within `CLOSE_US` everything is restored: references, the control law's memory,
-the estimator. Later, mode and task are restored, and go on from where the vehicle is. Open transactions of ground
-stations are not recorded.
+One is recorded at each control sample. It is of the same flight if the time of the first frame follows its own. Within
+`CLOSE_US` everything is restored: references, the control law's memory, the estimator. Later, mode and task are
+restored, and go on from where the vehicle is. Open transactions of ground stations are not recorded.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -40,20 +39,13 @@ class Checkpoint(NamedTuple):
     """A flight at one control sample.
 
     Attributes:
-        fingerprint: Of profile and vehicle: what another law remembers is of no use.
-        time_us: Simulated time.
+        fingerprint: Of profile and vehicle: the memory of another law is of no use.
         origin: Of the ENU frame.
         plan_ids: Opaque ids of mission, geofence and rally points, which are kept by themselves.
-        mission: Progress of the mission.
-        pilot: Mode, home, references.
-        task: The flight task.
-        loop: The control law.
-        charge_ah: Taken from the battery.
-        energy_wh: The same as energy.
+        charge_ah: Taken from the battery, like the energy.
         state_source: Of the estimator; empty where frames are states.
         rotor_lost: 0..3; None while all turn.
-        rotor_speeds: As their lag has them, parts of the largest, (4,).
-        failsafes: Memory of the supervisor.
+        rotor_speeds: By the model of their lag, parts of the largest, (4,).
         had_station: Whether a ground station was ever connected: its loss counts from the restart.
     """
 
@@ -83,12 +75,7 @@ class Checkpoint(NamedTuple):
 
 
 class History(NamedTuple):
-    """A recorded flight.
-
-    Attributes:
-        checkpoint: Its last control sample.
-        plans: Uploaded by ground stations.
-    """
+    """A recorded flight: its last control sample, and the plans uploaded by ground stations."""
 
     checkpoint: Checkpoint
     plans: Plans

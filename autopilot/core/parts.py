@@ -1,6 +1,8 @@
 """The parts of a vehicle that ground stations fly, put together around one profile."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.home import Home
@@ -9,7 +11,7 @@ from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.commander.supervisor import Supervisor
-from colibri.autopilot.control.interface import Clock
+from colibri.autopilot.control.interface import Clock, Controller
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
@@ -19,34 +21,50 @@ from colibri.autopilot.ground.battery_monitor import BatteryMonitor
 from colibri.autopilot.ground.snapshots import SnapshotBuilder
 from colibri.autopilot.ground.stations import Stations, StationSettings
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference, attitude_limits
+from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
-from colibri.autopilot.parameters.retuning import Tuning, builder
-from colibri.autopilot.parameters.subscription import Subscribers
+from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
 from colibri.mavlink.parameters.store import Parameters, Value
 from colibri.plant.vehicle.description import Vehicle
 
 
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """Parts of one vehicle: as many attributes as it has parts.
+class Subscribers(NamedTuple):
+    """Callbacks that adopt a change, by what they take.
 
     Attributes:
-        parameters: All numbers that can be changed.
-        subscribers: Adopt changes of the parameters.
-        loop: The control law.
-        state_source: Turns frames into states.
-        actuation: Commands the rotors.
-        rotor_loss: Detects a lost rotor, and lands on the others.
-        battery: Charge and voltage.
-        tasks: The tasks of the modes.
-        pilot: Decides what is flown.
-        supervisor: Decides on failsafes.
-        stations: Serves ground stations.
-        snapshots: For telemetry.
-        lines: Status texts of the parts.
+        parameters: Take all parameters.
+        behaviour: Take the numbers of the behaviour.
+        law: Take the control law and its vehicle; called only if one of their numbers has changed.
+        vehicle: Take the vehicle; likewise.
     """
+
+    parameters: tuple[Callable[[Parameters], None], ...]
+    behaviour: tuple[Callable[[Behaviour], None], ...]
+    law: tuple[Callable[[Controller[Any], Vehicle], None], ...]
+    vehicle: tuple[Callable[[Vehicle], None], ...]
+
+    def adopt(self, parameters: Parameters) -> None:
+        """Call back with the changes since the last call, if there are any."""
+        changes = parameters.take_changes()
+        if changes is None:
+            return
+        for adopt_parameters in self.parameters:
+            adopt_parameters(parameters)
+        flies_by = behaviour(parameters)
+        for adopt_behaviour in self.behaviour:
+            adopt_behaviour(flies_by)
+        if isinstance(changes.made, Tuned):
+            for adopt_law in self.law:
+                adopt_law(changes.made.controller, changes.made.vehicle)
+            for adopt_vehicle in self.vehicle:
+                adopt_vehicle(changes.made.vehicle)
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Parts of one vehicle: as many attributes as it has parts, each described by its class."""
 
     parameters: Parameters
     subscribers: Subscribers
@@ -72,7 +90,7 @@ def parts_of(
     first: Track | None,
     estimator: NewEstimator | None,
 ) -> Parts:
-    """Return the parts of a vehicle; arguments and errors are those of `colibri.autopilot.core.copter.Copter`."""
+    """Return the parts of a vehicle; arguments and errors are those of `Copter`."""
     numbers = Numbers(profile, vehicle)
     parameters = Parameters(definitions(profile, vehicle, settings.system_id))
     parameters.load(values or {})

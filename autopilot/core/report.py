@@ -12,15 +12,7 @@ from colibri.autopilot.estimation.health import HealthWatch, not_known
 
 
 class Sample(NamedTuple):
-    """A control sample.
-
-    Attributes:
-        now_us: Simulated time.
-        state: The vehicle.
-        guidance: References for the control law.
-        decision: The decision that is flown; None while the rotors stand or idle.
-        duration_s: Computation time.
-    """
+    """A control sample; no decision while the rotors stand or idle, and the duration of the computation."""
 
     now_us: int
     state: VehicleState

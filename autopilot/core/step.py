@@ -1,4 +1,4 @@
-"""What a step of any autopilot takes and returns, and how it answers a datagram of the plant."""
+"""The step of any autopilot: what it takes and returns, and the answer to a datagram of the plant."""
 
 from typing import NamedTuple, Protocol
 
@@ -16,7 +16,7 @@ STILL = (0.0, 0.0, 0.0, 0.0)
 
 
 MISSED_US = 100_000
-"""Frames of so long a time may be missing: what is known of the rotors still holds, more or less."""
+"""How long frames may be missing while the model of the rotors still holds, more or less."""
 
 
 def follows(time_us: int, before_us: int | None, interval_us: int) -> bool:
@@ -68,14 +68,7 @@ def answer(end: AutopilotEnd | FlierEnd, autopilot: Steps, datagram: bytes, now_
 
 
 class Received(NamedTuple):
-    """What came from a ground station.
-
-    Attributes:
-        datagram: The bytes.
-        link: Number of the link.
-        address: Where from.
-        loopback: Whether from this computer.
-    """
+    """A datagram of a ground station: on which link, from which address, and whether from this computer."""
 
     datagram: bytes
     link: int

@@ -30,9 +30,9 @@ class Supervision:
         """Take in a control sample, before the pilot's step, and have the pilot execute the failsafe that is due."""
         parts = self._parts
         self._watch_rotors(state)
-        knows_position = parts.supervisor.knows_position(parts.state_source.estimate)
+        position_known = parts.supervisor.position_known(parts.state_source.estimate)
         steered = parts.stations.needs.steered(now_us)
-        parts.pilot.sense(now_us, state, steered, knows_position=knows_position)
+        parts.pilot.sense(now_us, state, steered, position_known=position_known)
         action = parts.supervisor.step(self._inputs(now_us, state), parts.pilot.flight)
         if action is not Action.NONE:
             parts.pilot.save(action)

@@ -48,10 +48,9 @@ class Autopilot:
     def step(self, frame: Frame, plant_status: PlantStatus = NOTHING) -> Step:
         """Answer a frame and the plant status beside it.
 
-        Frames follow one another at the frame interval; a plant that runs freely may lose a few. One that comes much
-        later, or earlier, begins a new flight: with the profile's rotor speed at time 0, and with hover in mid-flight,
-        where nothing is known of the rotors. On sensors a flight
-        begins with the first estimate, of a vehicle that stands, or falls; until then it is not armed.
+        A plant that runs freely may lose a few frames. One that comes much later, or earlier, begins a new flight:
+        with the profile's rotor speed at time 0, and with hover in mid-flight. On sensors a flight begins with the
+        first estimate, of a vehicle that stands, or falls; until then it is not armed.
 
         Raises:
             DecisionError: The control law gave what no rotor can follow.

@@ -114,7 +114,7 @@ def needs_position(mode: Mode, setpoint: OffboardSetpoint | None) -> bool:
     return mode not in PLACELESS and not (mode is Mode.OFFBOARD and isinstance(setpoint, AttitudeSetpoint))
 
 
-def knows_position(estimate: Estimate | None, limits: Limits) -> bool:
+def position_known(estimate: Estimate | None, limits: Limits) -> bool:
     """Whether position and velocity are within their accuracy limits; without an estimate they are."""
     if estimate is None:
         return True
@@ -172,7 +172,7 @@ HOLDS: Mapping[Condition, Callable[[FailsafeInputs, Limits], bool]] = {
     Condition.TILTED: _tilted,
     Condition.ROTOR_FAILED: lambda inputs, _: inputs.rotor_lost is not None,
     Condition.POSITION_LOST: lambda inputs, limits: (
-        needs_position(inputs.mode, inputs.setpoint) and not knows_position(inputs.estimate, limits)
+        needs_position(inputs.mode, inputs.setpoint) and not position_known(inputs.estimate, limits)
     ),
     Condition.ESTIMATE_INVALID: _estimate_invalid,
     Condition.BATTERY_EMERGENCY: _battery("BAT_EMERGEN_THR", "BAT_EMERGEN_VOLT"),

@@ -98,6 +98,14 @@ _CLIMBING = (_HOLD, _RETURN, _LAND, _TERMINATE)
 FLIGHT_TERMINATION_OFF = 121212
 _FULL_AGAIN = "never in flight"
 
+
+def _battery(condition: Condition, holds: str, limits: tuple[str, ...], actions: tuple[Action, ...]) -> Row:
+    choices = tuple(enumerate(actions))
+    return Row(
+        *(condition, holds, limits, "BAT_LOW_T", "COM_LOW_BAT_ACT", choices, 0, _FULL_AGAIN), grounded=True, kept=True
+    )
+
+
 TABLE: tuple[Row, ...] = (
     Row(
         Condition.ATTITUDE_LOST,
@@ -152,29 +160,17 @@ TABLE: tuple[Row, ...] = (
         4,
         "all are known again",
     ),
-    Row(
+    _battery(
         Condition.BATTERY_EMERGENCY,
         "charge, or terminal voltage where its limit is not 0, below the limit",
         ("BAT_EMERGEN_THR", "BAT_EMERGEN_VOLT"),
-        "BAT_LOW_T",
-        "COM_LOW_BAT_ACT",
-        ((0, Action.WARN), (1, Action.LAND), (2, Action.LAND), (3, Action.LAND)),
-        0,
-        _FULL_AGAIN,
-        grounded=True,
-        kept=True,
+        (Action.WARN, Action.LAND, Action.LAND, Action.LAND),
     ),
-    Row(
+    _battery(
         Condition.BATTERY_CRITICAL,
         "the same",
         ("BAT_CRIT_THR", "BAT_CRIT_VOLT"),
-        "BAT_LOW_T",
-        "COM_LOW_BAT_ACT",
-        ((0, Action.WARN), (1, Action.LAND), (2, Action.LAND), (3, Action.RETURN)),
-        0,
-        _FULL_AGAIN,
-        grounded=True,
-        kept=True,
+        (Action.WARN, Action.LAND, Action.LAND, Action.RETURN),
     ),
     Row(
         Condition.PLAN_FAILED,
@@ -266,17 +262,11 @@ TABLE: tuple[Row, ...] = (
         5,
         "setpoints are received",
     ),
-    Row(
+    _battery(
         Condition.BATTERY_LOW,
         "charge or voltage below the limit",
         ("BAT_LOW_THR", "BAT_LOW_VOLT"),
-        "BAT_LOW_T",
-        "COM_LOW_BAT_ACT",
-        ((0, Action.WARN), (1, Action.RETURN), (2, Action.WARN), (3, Action.WARN)),
-        0,
-        _FULL_AGAIN,
-        grounded=True,
-        kept=True,
+        (Action.WARN, Action.RETURN, Action.WARN, Action.WARN),
     ),
 )
 ROWS: Mapping[Condition, Row] = {row.condition: row for row in TABLE}

@@ -104,11 +104,11 @@ class Cockpit:
         """Return the needs that nothing meets."""
         return self.unmet
 
-    def step(self, samples: int = 1, *, knows_position: bool = True) -> Guidance:
+    def step(self, samples: int = 1, *, position_known: bool = True) -> Guidance:
         """Fly on; return the last guidance."""
         for _ in range(samples):
             self.now_us += PREVIEW.interval_us
-            self.pilot.sense(self.now_us, self.state, self.steered, knows_position=knows_position)
+            self.pilot.sense(self.now_us, self.state, self.steered, position_known=position_known)
             self.guidance = self.pilot.step()
             if self.guidance is not RESTS and self.pilot.generator.reference is not None:
                 motion, heading = self.pilot.generator.reference

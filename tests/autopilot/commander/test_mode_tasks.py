@@ -46,7 +46,7 @@ def test_a_law_that_takes_no_attitude_stops_instead(mode: Mode) -> None:
 @pytest.mark.parametrize("takes_attitude", [False, True])
 def test_who_does_not_know_the_place_sinks_level_where_the_law_can(takes_attitude: bool) -> None:
     cockpit = Cockpit(FLYING, takes_attitude=takes_attitude)
-    cockpit.step(knows_position=False)
+    cockpit.step(position_known=False)
     assert cockpit.pilot.context().blind
     assert isinstance(
         cockpit.tasks.begin(Mode.LAND, cockpit.pilot.context()), DescentTask if takes_attitude else TaskSequence
@@ -118,5 +118,5 @@ def test_needs_are_met_one_by_one() -> None:
     assert Need.MISSION not in needs.missing()
     cockpit.load(FENCE, item("NAV_FENCE_CIRCLE_INCLUSION", 8.0, place=(0.0, 0.0, 0.0)))
     assert Need.INSIDE_FENCE in needs.missing()
-    cockpit.step(knows_position=False)
+    cockpit.step(position_known=False)
     assert Need.POSITION in needs.missing()

@@ -54,7 +54,7 @@ def test_of_a_flight_that_is_well_nothing_begins_and_nothing_is_said() -> None:
     well, lines = supervisor()
     assert look(well, WELL) == []
     assert lines.take() == []
-    assert well.knows_position(None)
+    assert well.position_known(None)
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ import pytest
 
 from colibri.autopilot.control.interface import Decision, Horizon, Preview, VehicleState
 from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.core.parts import Subscribers
 from colibri.autopilot.parameters.definitions import Numbers, definitions
 from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
-from colibri.autopilot.parameters.subscription import Subscribers
 from colibri.common.config import SettingsError
 from colibri.mavlink.parameters.store import ParamError, Parameters, Prepared, Value
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
