@@ -143,7 +143,7 @@ class MotionCommands:
         return self._pilot.state.armed and not self._pilot.ground.standing
 
     def _orbit(self, command: Command) -> Outcome:
-        """Fly around; z is above sea level whatever the frame says, as MAVSDK and PX4 take it."""
+        """Fly around; z is above sea level whatever the frame, as MAVSDK and PX4 take it."""
         pilot = self._pilot
         if not self._flies:
             return denied("orbit", "the vehicle is not flying")

@@ -33,7 +33,7 @@ class ModeNeeds:
         *,
         takes_attitude: bool,
     ) -> None:
-        """Judge by these parts; `takes_attitude` says whether the control law takes attitude setpoints."""
+        """Judge by these parts; `takes_attitude`: whether the control law takes attitude setpoints."""
         self._pilot, self._missions = pilot, missions
         self._manual, self._offboard, self._follow = manual, offboard, follow
         self._takes_attitude = takes_attitude

@@ -1,6 +1,6 @@
 """The chain of integrators that leads the reference to its target, as compiled kernels.
 
-With e = reference - target, each step of the cascade asks the next for
+With e = reference - target, each step of the cascade demands of the next
 
     velocity      v_t - approach(e)         as fast as it can still stop: sqrt(2 a d) far away, k d close by
     acceleration  a_t + d/dt of that + k_v (wanted velocity - v)

@@ -184,7 +184,7 @@ def _number(value: Any) -> int:
 
 
 def _group(name: str) -> str:
-    """Return a group that says what the prefix stands for."""
+    """Return the group of a name's prefix."""
     return _GROUPS[name.partition("_")[0]]
 
 

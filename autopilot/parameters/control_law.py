@@ -25,7 +25,7 @@ def law_numbers(controller: str, table: Mapping[str, Any]) -> list[Number]:
 def _axes(
     names: str, key: Path, unit: str, minimum: float, maximum: float, what: str, decimals: int = 3
 ) -> list[Number]:
-    """Return three numbers, of roll, pitch and yaw; `what` says of what."""
+    """Return three numbers, of roll, pitch and yaw; described by `what`."""
     return [
         Number(name, (*key, place), unit, minimum, maximum, what.format(_MOMENTS[place]), decimals=decimals)
         for place, name in enumerate(names.split())
@@ -38,7 +38,7 @@ LPV_MPC = [
         for place, turn in enumerate(_TURN)
     ),
     Number("LPV_APPROACH", ("guidance", "approach_speed_m_s"), "m/s", 0.1, 30.0, "Speed towards a far reference"),
-    Number("LPV_TILT_MAX", ("guidance", "max_tilt_deg"), "deg", 5.0, 80.0, "Largest tilt asked for", decimals=1),
+    Number("LPV_TILT_MAX", ("guidance", "max_tilt_deg"), "deg", 5.0, 80.0, "Largest tilt demanded", decimals=1),
     Number("LPV_THR_MARGIN", ("guidance", "thrust_margin"), "norm", 0.0, 0.45, "Thrust range kept for moments"),
     Number("LPV_OBS_ACC", ("observer", "acceleration_rad_s"), "rad/s", 0.1, 60.0, "Poles of the force observer"),
     Number("LPV_OBS_MOM", ("observer", "moment_rad_s"), "rad/s", 0.1, 60.0, "Poles of the moment observer"),

@@ -1,4 +1,4 @@
-"""The reference generator: leads the reference to what a task asks for, and previews it for the control law."""
+"""The reference generator: moves the reference towards a task's target, and previews it for the control law."""
 
 from typing import NamedTuple
 

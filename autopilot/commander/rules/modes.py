@@ -1,7 +1,7 @@
 """Flight modes: what each needs, how one follows another, and the numbers they have on the wire.
 
 One table of modes and one of transitions decide; `docs/modes.md` is drawn from them. The layout of custom modes is
-PX4's (main mode << 16 | sub mode << 24), which every ground station knows.
+PX4's (main mode << 16 | sub mode << 24), which every ground station reads.
 """
 
 from collections.abc import Collection
@@ -30,7 +30,7 @@ class Mode(StrEnum):
 
 
 class Need(Enum):
-    """What a mode cannot do without; the value says what is missing."""
+    """A need of a mode; the value is the reason of a refusal without it."""
 
     ATTITUDE_CONTROL = "the control law takes no attitude setpoints"
     STICKS = "no MANUAL_CONTROL is heard"
@@ -142,9 +142,7 @@ MODES: tuple[ModeRow, ...] = (
         to_arm=False,
         selectable=False,
     ),
-    ModeRow(
-        Mode.FOLLOW, AUTO, 8, (Need.FLYING, Need.POSITION), "follows the target that FOLLOW_TARGET tells", to_arm=False
-    ),
+    ModeRow(Mode.FOLLOW, AUTO, 8, (Need.FLYING, Need.POSITION), "follows the target of FOLLOW_TARGET", to_arm=False),
     ModeRow(Mode.TRACK, AUTO, 11, (Need.POSITION,), "flies the track that parameter TRACK picks"),
 )
 ROWS = {row.mode: row for row in MODES}

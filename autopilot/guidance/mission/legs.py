@@ -108,7 +108,7 @@ def _loiter(item: MissionItem, context: ItemContext, stay_s: float) -> tuple[Pha
 
 
 def _there(item: MissionItem, context: ItemContext, radius_m: float, stay_s: float) -> tuple[Phase, ...]:
-    """Fly to a place, heading as p4 says, and stay; stay_s 0 flies through."""
+    """Fly to a place, heading by p4, and stay; stay_s 0 flies through."""
     place = context.place(item)
     go = GoTo(place, _yaw(item.p4), context.speed_m_s)
     climb = _off_the_ground(place[2], context)

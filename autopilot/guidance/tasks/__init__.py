@@ -1,1 +1,1 @@
-"""Flight tasks: each way to fly (PX4's word), asked once a sample for a motion or an attitude."""
+"""Flight tasks: each way to fly (PX4's word), updated once a sample to a motion or an attitude."""

@@ -23,8 +23,8 @@ _START = Preview(interval_us=100_000, samples=1)
 class Planner:
     """References at equal intervals along a track; after its end the last point is held.
 
-    A track that ends is tabulated once. One that does not is tabulated block by block when a horizon asks for it: what
-    is handed out depends on the time alone, not on what was asked before.
+    A track that ends is tabulated once. One that does not is tabulated block by block when a horizon needs it: a
+    horizon depends on the time alone, not on those before.
 
     Attributes:
         preview: What a horizon is made of.
@@ -32,7 +32,7 @@ class Planner:
     """
 
     def __init__(self, track: Track, references: References, preview: Preview) -> None:
-        """Tabulate `track` as often as `preview` asks, by its formula or by differences."""
+        """Tabulate `track` at the interval of `preview`, by its formula or by differences."""
         self.preview = preview
         self._track = track
         self._references = references
@@ -118,7 +118,7 @@ def _by_differences(track: Track, t: Array, interval_s: float) -> Horizon:
 
     Velocity is the backward difference (the first sample's the forward one); yaw points along the horizontal one, but
     for the first sample's, which is the tangent of a circle about the origin. There are no higher derivatives. A track
-    that says its yaw has that one.
+    with a formula of its yaw has that one.
     """
     points = position(track, t)
     backward = np.diff(points, axis=0) / interval_s

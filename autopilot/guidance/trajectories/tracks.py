@@ -39,7 +39,7 @@ _INSTANT_S = 1e-9
 
 
 class TrackError(AutopilotError):
-    """There is no such track, or it cannot be flown; one line says what there is."""
+    """There is no such track, or it cannot be flown; the message lists those there are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +286,7 @@ def _options(name: str, text: str | None) -> Options:
 
 
 def _pairs(name: str, kind: type[Options], text: str | None) -> dict[str, str]:
-    """Take options apart; the first may be a value alone, if the track says what for."""
+    """Take options apart; the first may be a value alone, if the track has a lone option."""
     given: dict[str, str] = {}
     for number, item in enumerate([] if text is None else text.split(",")):
         key, equals, value = item.partition("=")
