@@ -49,9 +49,7 @@ class Sensed(NamedTuple):
     """Inputs of a control sample.
 
     Attributes:
-        now_us: Simulated time.
-        vehicle: The vehicle; None before the first state.
-        steered: Setpoints of clients.
+        vehicle: None before the first state.
         position_known: Whether the position is known well enough to fly to places.
     """
 

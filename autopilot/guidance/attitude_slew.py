@@ -59,17 +59,7 @@ def slew_on(
     rates: Array,
     thrusts: Array,
 ) -> None:
-    """Fill angles, rates and thrusts from their first rows on.
-
-    Args:
-        command: What they go towards.
-        weight_n: Of the vehicle.
-        slew: Limits.
-        interval_s: Between two rows.
-        angles: phi, theta, psi, rad, (n, 3).
-        rates: Their derivatives, rad/s, (n, 3).
-        thrusts: N, (n,).
-    """
+    """Fill angles phi, theta, psi, rad, (n, 3), their rates, (n, 3), and thrusts, N, (n,), from their first rows on."""
     kind, vector, yaw_rad = command.kind, command.vector, command.yaw_rad
     wanted, wanted_rate = np.zeros(3), np.zeros(3)
     for n in range(angles.shape[0] - 1):
@@ -147,12 +137,9 @@ def _point(direction: Vector, psi: float, max_tilt_rad: float, angles: Array) ->
 
 @compiled
 def limit_tilt(angles: Array, rates: Array, max_tilt_rad: float) -> None:
-    """Bring the thrust axis back to the largest tilt, in place, and take from the rates what leads beyond.
+    """Bring the thrust axis back to the largest tilt, and remove the rates that lead beyond.
 
-    Args:
-        angles: phi, theta, psi, rad, (3,).
-        rates: Their derivatives, rad/s, (3,).
-        max_tilt_rad: Of the thrust axis.
+    In place: angles are phi, theta, psi, rad, (3,), rates their derivatives.
     """
     s, c, st, ct = sin(angles[0]), cos(angles[0]), sin(angles[1]), cos(angles[1])
     if c * ct >= cos(max_tilt_rad):

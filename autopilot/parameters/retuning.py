@@ -21,12 +21,7 @@ Build: TypeAlias = Callable[[Profile, Vehicle], Controller[Any]]
 
 
 class Rhythm(Protocol):
-    """What a control law cannot change in flight.
-
-    Attributes:
-        control_interval_us: Its sample.
-        preview: The references that it wants.
-    """
+    """What a control law cannot change in flight: its sample, and the references that it takes."""
 
     control_interval_us: int
     preview: Preview
@@ -53,11 +48,7 @@ class Tuning:
     def prepare(self, name: str, values: Mapping[str, Value]) -> Prepared | ParamError:
         """Return the control law for a change as a `Tuned`, or why a parameter cannot change so; nothing is kept.
 
-        For `colibri.mavlink.parameters.store.Parameters.prepare`.
-
-        Args:
-            name: The parameter that is to change.
-            values: Of all of them, the new one in.
+        For `colibri.mavlink.parameters.store.Parameters.prepare`; `values` are of all parameters, the new one in.
         """
         if name not in self._numbers.defaults:
             return Prepared()
@@ -101,7 +92,7 @@ def _in_words(error: Exception) -> str:
 
 
 def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
-    """Return what cannot change in flight."""
+    """Return its rhythm as values to compare."""
     return controller.control_interval_us, controller.preview
 
 

@@ -11,14 +11,7 @@ from colibri.mavlink.services.statustext import INFO, NOTICE
 
 
 class FlightTimes(NamedTuple):
-    """Times of the last flight, µs of simulated time; 0 before.
-
-    Attributes:
-        armed_us: When the rotors were last armed.
-        takeoff_us: When the vehicle last left the ground.
-        landing_us: When it last stood again.
-        flights: How often the rotors were armed.
-    """
+    """Times of the last arming, take-off and landing, simulated time, 0 before; and how often the rotors were armed."""
 
     armed_us: int = 0
     takeoff_us: int = 0

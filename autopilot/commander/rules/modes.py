@@ -63,11 +63,9 @@ class ModeRow(NamedTuple):
     """A mode of the table.
 
     Attributes:
-        mode: Which.
         main: PX4's main mode.
         sub: PX4's sub mode.
         needs: What it needs to be entered in flight.
-        meaning: What it does.
         standard: MAV_STANDARD_MODE, 0 where it is none.
         to_arm: Whether the rotors may be armed in it.
         selectable: Whether a ground station may choose it.
@@ -185,12 +183,7 @@ TRANSITIONS: tuple[Transition, ...] = (
 
 
 class State(NamedTuple):
-    """What the tables decide about.
-
-    Attributes:
-        mode: The flight mode.
-        armed: Whether the rotors may turn.
-    """
+    """The flight mode, and whether the rotors may turn."""
 
     mode: Mode
     armed: bool
@@ -200,14 +193,7 @@ FIRST = State(Mode.HOLD, armed=False)
 
 
 def next_state(state: State, event: Event, selected: Mode | None, missing: Collection[Need]) -> State | Refusal:
-    """Return the state after an event, or why there is none.
-
-    Args:
-        state: Before.
-        event: What happened.
-        selected: The mode that is selected, of SELECT.
-        missing: Needs that nothing meets now.
-    """
+    """Return the state after an event, or why there is none; `selected` is the mode of SELECT."""
     for row in TRANSITIONS:
         if row.event is event and (not row.sources or state.mode in row.sources) and (state.armed or not row.armed):
             break

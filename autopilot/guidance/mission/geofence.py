@@ -166,13 +166,7 @@ class Geofence:
 
 
 class AroundHome(NamedTuple):
-    """The fence that needs no upload: a circle around home, and a height above it.
-
-    Attributes:
-        home_enu_m: Where home is, m.
-        max_distance_m: Radius of the circle; 0: none.
-        max_height_m: Above home; 0: no limit.
-    """
+    """The fence that needs no upload: a circle around home, and a height above it; 0 is no limit."""
 
     home_enu_m: Vector
     max_distance_m: float

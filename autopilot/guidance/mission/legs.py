@@ -21,13 +21,10 @@ class MissionContext(NamedTuple):
     """State of the flight that a mission depends on.
 
     Attributes:
-        position_enu_m: Of the vehicle.
-        velocity_enu_m_s: Of the vehicle.
         yaw_rad: Counter-clockwise from east.
         landed: Whether the vehicle stands on the ground.
         arrived: Whether the order of the step before is fulfilled.
         turns: How often the circle of the step before was flown around.
-        home_enu_m: Home.
         origin: Of the ENU frame.
     """
 
@@ -56,14 +53,7 @@ class Defaults(NamedTuple):
 
 
 class ItemContext(NamedTuple):
-    """State of the mission as an item begins.
-
-    Attributes:
-        mission_context: Then.
-        defaults: Where the item gives no number.
-        order: The last one.
-        speed_m_s: Set by the mission; None for the cruise speed.
-    """
+    """State of the mission as an item begins, with the last order; the speed is None for the cruise speed."""
 
     mission_context: MissionContext
     defaults: Defaults
