@@ -1,17 +1,28 @@
 """Numerical kernels: how they are compiled, and when their machine code on disk is renewed."""
 
+import os
+import sys
 from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
+from stat import S_ISDIR
+from tempfile import gettempdir
 from types import FunctionType
 from typing import Any, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
-from numba import njit
+from numba import config, njit
+from numba.core.event import Event, Listener, register
 from numpy.typing import NDArray
 
 Packed: TypeAlias = NDArray[np.void]
+
+_SAID = "COLIBRI_SAID_UNCACHED"
+_NOWHERE = (
+    "colibri: machine code can be kept nowhere, so each start compiles for half a minute and more; "
+    "NUMBA_CACHE_DIR=FOLDER names a folder for it\n"
+)
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -72,11 +83,55 @@ def files_of(function: Callable[..., Any]) -> set[str]:
     return files
 
 
+def report_compiling(report: Callable[[int], None]) -> None:
+    """Call `report` with how many functions this process has compiled so far, as it begins each; none from disk."""
+    register("numba:compile", _Compiling(report))  # type: ignore[no-untyped-call]
+
+
+class _Compiling(Listener):
+    def __init__(self, report: Callable[[int], None]) -> None:
+        self._report = report
+        self._begun = 0
+
+    def on_start(self, _event: Event) -> None:
+        self._begun += 1
+        self._report(self._begun)
+
+    def on_end(self, _event: Event) -> None:
+        pass
+
+
 def _kernel(function: Callable[..., Any]) -> Any:
     """Return the kernel of a function; numba by itself renews it with its own file only."""
-    kernel: Any = njit(cache=True, error_model="numpy")(function)
+    try:
+        kernel: Any = njit(cache=True, error_model="numpy")(function)
+    except RuntimeError:  # neither this file's folder nor the home can be written to
+        if not _use_private_cache():
+            return njit(error_model="numpy")(function)
+        kernel = njit(cache=True, error_model="numpy")(function)
     kernel._cache._cache_file._source_stamp = tuple(sorted(map(_hash, files_of(function))))  # noqa: SLF001
     return kernel
+
+
+@cache
+def _use_private_cache() -> bool:
+    """Have this process and its children keep machine code in a temporary folder of this user's; return if they can.
+
+    Machine code is run: nobody else may own the folder or write to it.
+    """
+    try:
+        folder = Path(gettempdir()) / f"colibri-{os.getuid()}"
+        folder.mkdir(0o700, exist_ok=True)
+        status = folder.lstat()
+        private = S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o077
+    except OSError:
+        private = False
+    if private:
+        config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = str(folder)  # type: ignore[attr-defined]
+    elif not os.environ.get(_SAID):
+        os.environ[_SAID] = "1"
+        sys.stderr.write(_NOWHERE)
+    return private
 
 
 @cache

@@ -7,6 +7,7 @@ from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.common.process.lifecycle import Stop
+from colibri.common.process.log_files import LogError
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.px4_autopilot import FlierEnd
@@ -56,7 +57,12 @@ class Client:
         self._unknown_since_us: int | None = None
 
     def fly(self, autopilot: "Autopilot | Copter") -> None:
-        """Answer every frame until it is stopped."""
+        """Answer every frame until it is stopped.
+
+        Raises:
+            DecisionError: The control law gave what no rotor can follow.
+            LogError: A log cannot be written, and nobody needs the flight without it.
+        """
         self._status.say("calling", "waiting for the plant at " + self._link.url.partition(":")[2])
         due_s = 0.0
         while not self._stop:
@@ -66,13 +72,26 @@ class Client:
             for datagram in self._end.take_outbox():
                 self._link.send(datagram)
             if step and self._log:
-                self._log.write(step)  # while the plant integrates
+                self._write(self._log, step)  # while the plant integrates
             if step and self._ground:
                 autopilot = self._ground.serve(perf_counter())
                 if self._ground.shut_down:
                     break
             self._report_changes()
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
+
+    def _write(self, log: AutopilotLog, step: Step) -> None:
+        """Log a step; whoever flies for ground stations flies on without a log that cannot be written.
+
+        Raises:
+            LogError: There are no ground stations, and it cannot be written.
+        """
+        try:
+            log.write(step)
+        except LogError as error:
+            if self._ground is None:
+                raise
+            self._status.say("said", f"{error}; flying on")
 
     def _answer(self, autopilot: "Autopilot | Copter", datagram: bytes) -> Step | None:
         step = answer(self._end, autopilot, datagram, perf_counter())

@@ -17,6 +17,7 @@ from colibri.autopilot.parameters.definitions import ImpossibleError
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
 from colibri.autopilot.process.state_folder import GroundError, StateFolder
 from colibri.autopilot.process.stepped_links import Conductor, SteppedLinks
+from colibri.common.process.log_files import LogError
 from colibri.common.process.status import Status
 from colibri.common.serialization import to_bytes
 from colibri.mavlink.links.link import LinkError
@@ -102,7 +103,11 @@ class Ground:
         received: Iterable[Received] = self._links.receive(stations)
         if self._log:
             received = self._log.recorded(received)
-        outbox = self.copter.serve(received)
+        try:
+            outbox = self.copter.serve(received)
+        except LogError as error:
+            outbox = []
+            self._status.say("said", f"{error}; flying on")
         if stations.system.restart:
             self._restart(stations.system.restart)
         if now_s >= self._reported_s + _REPORT_EVERY_S and self.copter.pilot.sensed.vehicle is not None:

@@ -11,7 +11,7 @@ from colibri.autopilot.core.step import Step
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.measurements.table import kinds_of
 from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup, line
-from colibri.common.process.log_files import CsvLog, open_for_writing
+from colibri.common.process.log_files import CsvLog, LogError, LogFile
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
 from colibri.plant.vehicle.description import load_vehicle
@@ -54,7 +54,7 @@ class AutopilotLog:
         self._setup = setup
         self._begins = True
         self._time_us = 0
-        self._inputs = open_for_writing(folder / "inputs.jsonl", "ab")
+        self._inputs = LogFile(folder / "inputs.jsonl", "ab")
         self._decisions = CsvLog(folder / "autopilot.csv", DECISION_COLUMNS)
         self._estimates = self._checks = None
         if setup.feedback is Feedback.SENSORS:
@@ -66,7 +66,7 @@ class AutopilotLog:
         self._time_us = step.command.time_us
         if self._begins:
             self._begins = False
-            self._inputs.write(line(msgspec.structs.replace(self._setup, first_us=self._time_us)))
+            self._inputs.append(line(msgspec.structs.replace(self._setup, first_us=self._time_us)))
         if self._checks is not None and step.estimate is not None and step.estimate.check is not None:
             check = step.estimate.check
             self._checks.write((check.time_us / 1e6, *check.state, *check.covariance, *check.nis, *check.accepted))
@@ -88,14 +88,24 @@ class AutopilotLog:
         self._begins = True
 
     def recorded(self, datagrams: Iterable["Received"]) -> Iterator["Received"]:
-        """Yield what ground stations sent, and record it."""
+        """Yield what ground stations sent, and record it.
+
+        Raises:
+            LogError: Once all is yielded, if something could not be recorded.
+        """
+        failed: LogError | None = None
         for received in datagrams:
             datagram, link, address, loopback = received
             entry = ReceivedDatagram(
                 time_us=self._time_us, link=link, address=address, loopback=loopback, datagram=datagram
             )
-            self._inputs.write(line(entry))
+            try:
+                self._inputs.append(line(entry))
+            except LogError as error:
+                failed = error
             yield received
+        if failed:
+            raise failed
 
     def close(self) -> None:
         """Close the files."""

@@ -5,13 +5,22 @@ import sys
 import threading
 from argparse import Namespace
 from collections.abc import Sequence
+from errno import EDQUOT, EFBIG, ENOSPC
 from importlib import import_module
 from typing import Protocol, cast
 
 from colibri.cli.shared.processes import PROCESSES, run_process
 from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, end_quickly, fail, use_one_thread
+from colibri.common.process.lifecycle import (
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    end_quickly,
+    escape_what_no_stream_encodes,
+    fail,
+    use_one_thread,
+    use_safe_path,
+)
 
 SUBCOMMANDS = {
     "fly": "fly a track and report how well it went",
@@ -24,6 +33,7 @@ SUBCOMMANDS = {
     "verify": "fly a fixed set of flights: is every bit the same, twice, or as it once was?",
 }
 """What each does, by its name, which is also that of its file beside this one."""
+_NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 
 
 class Subcommand(Protocol):
@@ -39,9 +49,11 @@ class Subcommand(Protocol):
 def main(argv: list[str] | None = None) -> int:
     """Run a subcommand; return the exit code."""
     given = sys.argv[1:] if argv is None else argv
+    escape_what_no_stream_encodes()
     if given and given[0] in PROCESSES:
         return run_process(given[0], given[1:])
     use_one_thread()
+    use_safe_path()
     end_quickly()
     args = _parser(given).parse_args(given)
     if threading.current_thread() is threading.main_thread():
@@ -50,6 +62,10 @@ def main(argv: list[str] | None = None) -> int:
         return _subcommand(args.command).run(args)
     except Error as error:
         fail(str(error), EXIT_FAILED)
+    except OSError as error:
+        if error.errno not in _NO_ROOM:
+            raise
+        fail(f"cannot write {error.filename or 'to disk'}: {error.strerror}", EXIT_FAILED)
     except KeyboardInterrupt:
         fail("interrupted", EXIT_INTERRUPTED)
 

@@ -35,8 +35,11 @@ class Child:
         stdout: int | IO[bytes] = subprocess.PIPE,
         stderr: IO[bytes] | None = None,
     ) -> None:
-        """Start `python -m colibri.NAME` with `options`; it ends when this process does."""
-        command = [sys.executable, "-m", f"colibri.{name}", "--parent", str(os.getpid()), *options]
+        """Start `python -P -m colibri.NAME` with `options`; it ends when this process does.
+
+        With -P modules of the working directory, which may have any name, shadow none of Python's.
+        """
+        command = [sys.executable, "-P", "-m", f"colibri.{name}", "--parent", str(os.getpid()), *options]
         self.name = name
         self.process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=stdout, stderr=stderr, process_group=0

@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import TextIOWrapper
 from types import FrameType
 from typing import NoReturn
 
@@ -22,6 +23,18 @@ def use_one_thread() -> None:
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
+def use_safe_path() -> None:
+    """Keep the working directory off the path of processes to come: its files, of whatever names, shadow no module."""
+    os.environ["PYTHONSAFEPATH"] = "1"
+
+
+def escape_what_no_stream_encodes() -> None:
+    """Have standard output and error escape characters that their encodings lack, in place of an exception."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def nudge_m() -> float:

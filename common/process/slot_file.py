@@ -24,14 +24,20 @@ class Slots:
     def __init__(self, path: Path) -> None:
         """Open the file, made where it is missing or of another size.
 
+        All of it is written once: a page for which the disk has no room would end the process by SIGBUS.
+
         Raises:
             OSError: It cannot be made, read or written.
         """
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("r+b" if path.exists() else "w+b") as file:
-            if path.stat().st_size != 2 * SLOT:
+            content = file.read()
+            if len(content) != 2 * SLOT:
+                content = bytes(2 * SLOT)
                 file.truncate(0)
-                file.truncate(2 * SLOT)
+            file.seek(0)
+            file.write(content)
+            file.flush()
             self._map = mmap(file.fileno(), 2 * SLOT)
         self._number = max((number for number, _ in self._whole()), default=0)
 

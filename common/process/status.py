@@ -1,8 +1,9 @@
 """Status lines: in words for a user, as JSON for whoever started the process."""
 
 import json
+import os
 import sys
-from typing import Any
+from typing import Any, TextIO
 
 
 class Status:
@@ -16,11 +17,18 @@ class Status:
     def say(self, event: str, text: str, **facts: Any) -> None:
         """Report `event`: `text` for a person, `facts` for a program."""
         if self.as_json:
-            sys.stdout.write(json.dumps({"event": event, "text": text, **facts}) + "\n")
-            sys.stdout.flush()
+            _print(sys.stdout, json.dumps({"event": event, "text": text, **facts}))
         else:
-            sys.stderr.write(f"{self._name}: {text}\n")
-            sys.stderr.flush()
+            _print(sys.stderr, f"{self._name}: {text}")
+
+
+def _print(stream: TextIO, line: str) -> None:
+    """Print a line; where nobody reads any more, for good into the void: `Stop` sees whose end that was."""
+    try:
+        stream.write(line + "\n")
+        stream.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 class Progress:

@@ -5,7 +5,7 @@ import gc
 from collections.abc import Callable
 from typing import TypeVar
 
-from colibri.common.process.lifecycle import Stop, end_quickly, fail, use_one_thread
+from colibri.common.process.lifecycle import Stop, end_quickly, escape_what_no_stream_encodes, fail, use_one_thread
 from colibri.common.process.status import Status
 from colibri.mavlink.links.link import LinkError
 
@@ -17,6 +17,7 @@ def begin(name: str, url: str, args: argparse.Namespace, opened: Callable[[str],
 
     To be called before numpy is loaded.
     """
+    escape_what_no_stream_encodes()
     use_one_thread()
     end_quickly()
     gc.disable()  # until all is loaded, see `gc_frozen`: what is loaded stays

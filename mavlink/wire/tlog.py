@@ -2,10 +2,9 @@
 
 import struct
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import NamedTuple
 
-from colibri.common.process.log_files import open_for_writing
+from colibri.common.process.log_files import LogFile
 from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.wire.framing import frame_length
 
@@ -41,18 +40,14 @@ def decode(log: bytes) -> Iterator[Logged]:
         at = begin + length
 
 
-class TlogWriter:
+class TlogWriter(LogFile):
     """A telemetry log that is written frame by frame."""
 
-    def __init__(self, path: Path) -> None:
-        """Create the file."""
-        self._file = open_for_writing(path)
-
     def write(self, time_us: int, frames: Iterable[bytes]) -> None:
-        """Append frames, all of simulated time `time_us`."""
-        stamp = STAMP.pack(time_us)
-        self._file.write(b"".join([stamp + frame for frame in frames]))
+        """Append frames, all of simulated time `time_us`.
 
-    def close(self) -> None:
-        """Close."""
-        self._file.close()
+        Raises:
+            LogError: They cannot be written.
+        """
+        stamp = STAMP.pack(time_us)
+        self.append(b"".join([stamp + frame for frame in frames]))

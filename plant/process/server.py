@@ -1,9 +1,11 @@
 """The plant on a link: in lockstep, or as hardware would be: following the wall clock, waiting for no answer."""
 
+from math import isfinite
 from time import perf_counter, sleep
 from typing import Any
 
 from colibri.common.process.lifecycle import Stop
+from colibri.common.process.log_files import LogError
 from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
@@ -59,6 +61,7 @@ class Server:
         self._streams_truth = streams_truth
         self._time_us = 0
         self._logged: World | None = None
+        self._ends = True
 
     def wait(self) -> bool:
         """Wait for an autopilot; return False if a signal came first."""
@@ -67,7 +70,13 @@ class Server:
         return self._end.peer is not None
 
     def fly(self, plant: Plant, *, duration_s: float, speed: float) -> None:
-        """Fly for `duration_s` at `speed` times real time, or until a signal ends the process."""
+        """Fly for `duration_s` at `speed` times real time, or until a signal ends the process.
+
+        Raises:
+            IntegrationError: The state cannot be integrated any further.
+            LogError: A log cannot be written, and the flight would have had an end.
+        """
+        self._ends = isfinite(duration_s)
         began_s = perf_counter()
         pace, progress = Pace(speed, began_s), Progress(self._status)
         frames = 0
@@ -124,8 +133,17 @@ class Server:
 
     def _log(self, world: World) -> None:
         if self._logs and world is not self._logged:
-            self._logs.write_world(world)
+            try:
+                self._logs.write_world(world)
+            except LogError as error:
+                self._fly_on_without(error)
         self._logged = world
+
+    def _fly_on_without(self, error: LogError) -> None:
+        """Report a log that cannot be written, and fly on if the flight has no end."""
+        if self._ends:
+            raise error
+        self._status.say("said", f"{error}; flying on")
 
     def _receive(self, timeout_s: float) -> ActuatorCommand | None:
         received = self._link.receive(timeout_s)
@@ -140,7 +158,10 @@ class Server:
         for outgoing in sent:
             self._link.send(outgoing.datagram, outgoing.address)
         if self._logs:
-            self._logs.write_traffic(self._time_us, self._end.received, sent)
+            try:
+                self._logs.write_traffic(self._time_us, self._end.received, sent)
+            except LogError as error:
+                self._fly_on_without(error)
         self._end.received.clear()
 
     def _wait_until(self, due_s: float) -> None:

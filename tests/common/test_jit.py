@@ -69,13 +69,43 @@ def test_the_files_of_a_kernel_are_those_of_all_that_it_calls() -> None:
     assert names == {"integrators.py", "equations.py", "rotations.py"}
 
 
-def test_machine_code_is_renewed_with_a_kernel_that_it_calls(tmp_path: Path) -> None:
-    def run(factor: float) -> str:
-        (tmp_path / "callee.py").write_text(CALLEE.format(factor=factor))
-        path = os.pathsep.join([str(tmp_path), str(Path(common.__path__[0]).parents[1])])
-        environment = {**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": ""}
-        command = [sys.executable, str(tmp_path / "caller.py")]
-        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip()
+def _run(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run the caller, as a process of its own."""
+    path = os.pathsep.join([str(folder), str(Path(common.__path__[0]).parents[1])])
+    usual = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": ""}
+    command = [sys.executable, str(folder / "caller.py")]
+    done = {**os.environ, **usual, **environment}
+    return subprocess.run(command, env=done, capture_output=True, text=True, check=True)
 
-    (tmp_path / "caller.py").write_text(CALLER)
-    assert [run(2.0), run(2.0), run(3.0)] == ["4.0 0", "4.0 1", "9.0 0"]
+
+def _write(folder: Path, factor: float) -> None:
+    (folder / "callee.py").write_text(CALLEE.format(factor=factor))
+    (folder / "caller.py").write_text(CALLER)
+
+
+def test_machine_code_is_renewed_with_a_kernel_that_it_calls(tmp_path: Path) -> None:
+    said = []
+    for factor in (2.0, 2.0, 3.0):
+        _write(tmp_path, factor)
+        said.append(_run(tmp_path).stdout.strip())
+    assert said == ["4.0 0", "4.0 1", "9.0 0"]
+
+
+@pytest.mark.parametrize("trusted", [True, False], ids=["private", "open to others"])
+def test_where_neither_package_nor_home_can_be_written_to_machine_code_is_kept_privately_or_not_at_all(
+    tmp_path: Path, *, trusted: bool
+) -> None:
+    _write(tmp_path, 2.0)
+    (tmp_path / "__pycache__").touch()  # no folder can be made of this name, by root neither
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    private = temporary / f"colibri-{os.getuid()}"
+    if not trusted:
+        private.mkdir()
+        private.chmod(0o777)
+    nowhere = {"HOME": os.devnull, "XDG_CACHE_HOME": os.devnull, "TMPDIR": str(temporary)}
+    first, second = (_run(tmp_path, **nowhere) for _ in range(2))
+    assert [first.stdout, second.stdout] == (["4.0 0\n", "4.0 1\n"] if trusted else ["4.0 0\n"] * 2)
+    assert private.stat().st_mode & 0o777 == (0o700 if trusted else 0o777)
+    assert ("NUMBA_CACHE_DIR" in first.stderr) is not trusted
+    assert len(first.stderr.splitlines()) == (0 if trusted else 1)

@@ -96,7 +96,7 @@ class Forked:
 
     def __init__(self) -> None:
         """Start the fork server; it loads while this process goes on."""
-        command = [sys.executable, "-m", "colibri.sitl.backends.fork_server"]
+        command = [sys.executable, "-P", "-m", "colibri.sitl.backends.fork_server"]
         self._fork_server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0)
 
     def start(self, package: str, options: Sequence[str], log: Path) -> Running:

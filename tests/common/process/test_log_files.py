@@ -1,5 +1,8 @@
 """Log files: rows that lose no bit, and are there whatever end the process has."""
 
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import inf, nan
 from pathlib import Path
 
@@ -8,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.common.process.log_files import CsvLog
+from colibri.common.process.log_files import CsvLog, LogError
 
 
 @given(row=st.lists(st.floats() | st.integers(-9, 9), min_size=1, max_size=5))
@@ -27,3 +30,26 @@ def test_what_is_no_number_has_its_word_and_numpy_its_digits(tmp_path: Path) -> 
     log.write((np.float64(0.1), 2, 1e-5, -0.0))
     assert (tmp_path / "log.csv").read_text(encoding="utf-8") == "a,b,c,d\nnan,inf,-inf,0.5\n0.1,2,0.00001,-0.0\n"
     log.close()
+
+
+@contextmanager
+def no_file_beyond(size: int) -> Iterator[None]:
+    """Let the system refuse to write beyond `size` bytes of any file, as it does on a disk that is full."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_on_a_full_disk_the_rows_before_stay_whole_and_it_is_said_once(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    log = CsvLog(path, ("a", "b"))
+    with no_file_beyond(15):
+        log.write((1.25, 2.5))
+        with pytest.raises(LogError, match=r"cannot go on writing .*log\.csv: File too large"):
+            log.write((3.75, 4.5))
+    log.write((5.0, 6.0))
+    log.close()
+    assert path.read_text(encoding="utf-8") == "a,b\n1.25,2.5\n"

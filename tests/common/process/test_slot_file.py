@@ -1,5 +1,6 @@
 """The file of two slots: what was written last and whole is what it holds, whatever happened meanwhile."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -73,3 +74,15 @@ def test_arrays_are_plain_and_other_things_are_not() -> None:
     for strange in (object(), np.arange(3)):
         with pytest.raises(TypeError):
             to_bytes(strange)
+
+
+def test_the_disk_has_room_for_all_of_it_from_the_start(tmp_path: Path) -> None:
+    """A page without any would be a SIGBUS in flight."""
+    path = tmp_path / "slots"
+    path.write_bytes(b"")
+    os.truncate(path, 2 * SLOT)  # all of it a hole
+    for slots in (Slots(path), Slots(tmp_path / "new")):
+        slots.close()
+    for each in (path, tmp_path / "new"):
+        with each.open("rb") as file:
+            assert os.lseek(file.fileno(), 0, os.SEEK_HOLE) == 2 * SLOT
