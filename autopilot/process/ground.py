@@ -146,6 +146,10 @@ class Ground:
         self._links.close()
         self._state.close()
 
+    def abandon(self) -> None:
+        """Let go of the files as a power cut does: nothing is written that was not."""
+        self._state.close()
+
     def _restart(self, kind: float) -> None:
         if kind == SHUT_DOWN:
             self.shut_down = True

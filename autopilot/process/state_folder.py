@@ -7,6 +7,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.checkpoint import Checkpoint, History
 from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.parameters.definitions import definitions
+from colibri.common.process.folder_lock import FolderLock
 from colibri.common.process.slot_file import Slots
 from colibri.common.serialization import of_bytes, to_bytes
 from colibri.mavlink.files.folder import Folder
@@ -52,6 +53,7 @@ class StateFolder:
         """Read the key, of the file `signing_key` if there is one, and open what is kept.
 
         Raises:
+            FolderInUseError: Another vehicle keeps its state there.
             GroundError: Something of it cannot be used.
         """
         self._path = path
@@ -60,6 +62,7 @@ class StateFolder:
         self._system_id = system_id
         self.signing = Signing(self._read_key(signing_key), max(self._read_timestamp(), tick))
         try:
+            self._lock = FolderLock(path, "--state") if path else None
             self.files = Folder(path / FILES) if path else None
             self.logs = Folder(path / LOGS, LOG_QUOTA) if path else None
             self._flight = Slots(path / FLIGHT) if path else None
@@ -132,7 +135,7 @@ class StateFolder:
 
     def close(self) -> None:
         """Let go of everything."""
-        for kept in (self.files, self.logs, self._flight):
+        for kept in (self.files, self.logs, self._flight, self._lock):
             if kept:
                 kept.close()
 

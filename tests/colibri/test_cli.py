@@ -275,7 +275,7 @@ def test_a_process_that_dies_ends_the_flight_in_words(tmp_path: Path, name: str)
     flight = fly_slowly(tmp_path)
     wait_for(lambda: has_flown(tmp_path), "the flight to begin")
     children = psutil.Process(flight.pid).children(recursive=True)
-    (victim,) = (child for child in children if name in child.cmdline()[2])
+    (victim,) = (child for child in children if name in child.cmdline()[3])
     victim.send_signal(signal.SIGKILL)
     _, said = flight.communicate(timeout=60.0)
     assert flight.returncode == 1
@@ -323,3 +323,32 @@ def test_a_flight_leaves_what_the_readme_names(tmp_path: Path) -> None:
     assert len(report["trajectory_sha256"]) == 64
     assert {"flight.csv", "flight.tlog"} <= {path.name for path in tmp_path.iterdir()}
     assert len(list(tmp_path.glob("*.png"))) == 6
+
+
+@pytest.mark.parametrize(
+    "options", [("fly", "hover", "--link", "udp"), ("compare", "--track", "hover")], ids=["fly", "compare"]
+)
+def test_files_of_the_working_directory_shadow_no_module(tmp_path: Path, options: tuple[str, ...]) -> None:
+    for name in ("plant", "autopilot", "mavlink", "numpy", "signal", "json"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('of the working directory')")
+    command = [
+        str(Path(sys.executable).parent / "colibri"),
+        *options,
+        "--profile",
+        "flight",
+        "--duration",
+        "0.1",
+        "--quiet",
+    ]
+    done = subprocess.run([*command, "--out", "out"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "of the working directory" not in done.stdout + done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_what_a_stream_cannot_encode_is_escaped(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "colibri", "fly", "wäypoint", "--out", str(tmp_path)]
+    ascii_only = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(command, env=ascii_only, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "w\\xe4ypoint" in done.stderr
+    assert len(done.stderr.splitlines()) == 1

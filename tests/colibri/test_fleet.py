@@ -138,7 +138,7 @@ def test_ctrl_c_in_a_terminal_while_it_starts(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["plant", pytest.param("autopilot", marks=pytest.mark.long)])
 def test_a_process_that_dies_ends_it_in_words(tmp_path: Path, name: str) -> None:
     with standing(tmp_path) as (flown, children):
-        (victim,) = (child for child in children if name in child.cmdline()[2])
+        (victim,) = (child for child in children if name in child.cmdline()[3])
         victim.send_signal(signal.SIGKILL)
         assert flown.process.wait(10.0) == 1
         assert_gone(children)

@@ -78,7 +78,7 @@ def soak(duration_s: float) -> tuple[dict[str, Any], list[str]]:
         links = tuple(stack.enter_context(OnPort(client)).url for client in clients)
         tireless = ("--vehicle", str(without_battery(folder)))
         flown = stack.enter_context(vehicle(folder, *tireless, links=links))
-        processes = {child.cmdline()[2]: child for child in psutil.Process(flown.process.pid).children()}
+        processes = {child.cmdline()[3]: child for child in psutil.Process(flown.process.pid).children()}
         looks: list[Look] = []
         began_s = monotonic()
         while monotonic() < began_s + duration_s and flown.process.poll() is None:

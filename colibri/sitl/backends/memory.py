@@ -185,6 +185,7 @@ class MemoryAutopilot:
 
     def kill(self) -> None:
         """End it as a power cut does: nothing is written that was not."""
+        self._ground.abandon()
 
     def close(self) -> None:
         """End it."""
