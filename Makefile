@@ -49,7 +49,7 @@ test-clients: setup .venv-clients/.ready
 	@touch $@
 
 fuzz: setup
-	$(BIN)/python -m tools.fuzz
+	$(BIN)/python -m tools.fuzz $(FUZZ)
 
 # Every scenario of tests/scenarios/, over UDP: SITL_LINK=memory flies them in one process each.
 SITL_LINK ?= udp

@@ -1,7 +1,6 @@
 """One flight of two real processes under fire, and what must hold after it."""
 
 import signal
-from collections.abc import Callable
 from hashlib import sha256
 from math import ceil
 from pathlib import Path
@@ -37,12 +36,10 @@ class Outcome(NamedTuple):
     failures: list[str]
 
 
-def campaign(
-    folder: Path, quota: int, *, burst: int, seed: int, progress: Callable[[float], None] = lambda _part: None
-) -> Outcome:
+def campaign(folder: Path, quota: int, *, burst: int, seed: int) -> Outcome:
     """Fly until `quota` datagrams of each kind were sent to each process; compare with an undisturbed flight.
 
-    With each good datagram goes a `burst`, half of each kind; `progress` is called with the part of the flight flown.
+    With each good datagram goes a `burst`, half of each kind.
     """
     duration_s = (10 + ceil(_MARGIN * 2 * quota / burst)) * FRAME_US / 1e6
     logs = folder / "logs"
@@ -52,9 +49,9 @@ def campaign(
         autopilot = start_autopilot(logs, relay.url)
         processes = {"plant": plant, "autopilot": autopilot}
         with running(*processes.values()):
-            failures = _fly_to(0.1 * duration_s, duration_s, processes, progress)
+            failures = _fly_to(0.1 * duration_s, processes)
             before = _memory_mib(processes)
-            failures = failures or _fly_to(0.98 * duration_s, duration_s, processes, progress)
+            failures = failures or _fly_to(0.98 * duration_s, processes)
             after = _memory_mib(processes)
             lost = _kernel_drops(processes)
             failures += _end(processes) if not failures else []
@@ -68,9 +65,7 @@ def campaign(
     return Outcome(relay.sent, lost, memory, failures)
 
 
-def _fly_to(
-    time_s: float, duration_s: float, processes: dict[str, Process], progress: Callable[[float], None]
-) -> list[str]:
+def _fly_to(time_s: float, processes: dict[str, Process]) -> list[str]:
     """Wait until so much is flown; return why it never will be, if so."""
     flown_s, moved_at_s = -1.0, monotonic()
     while flown_s < time_s:
@@ -78,7 +73,6 @@ def _fly_to(
         now_s = _flown_s(processes["plant"])
         if now_s > flown_s:
             flown_s, moved_at_s = now_s, monotonic()
-            progress(flown_s / duration_s)
         codes = {name: process.process.poll() for name, process in processes.items()}
         if flown_s < time_s and any(code is not None for code in codes.values()):
             return [f"ended in mid-flight: exit codes {codes}"]
