@@ -30,6 +30,7 @@ def command_line() -> ArgumentParser:
         help="fly a simulator that speaks PX4's interface instead, jMAVSim say: tcp:127.0.0.1:4560; on its sensors",
     )
     add("--track", metavar="TRACK", help="what to fly, as in `colibri fly` (default spiral; with --gcs: what is asked)")
+    add("--floor", type=float, metavar="M", help="height below which no track may lead, m (default: the ground, 0)")
     add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
     add("--controller", metavar="NAME", help="control law (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml to control (default: the profile's)")

@@ -12,7 +12,7 @@ from colibri.autopilot.core.copter import Copter
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.ground.system_commands import REBOOT, SHUT_DOWN
-from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.parameters.definitions import ImpossibleError
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
 from colibri.autopilot.process.state_folder import GroundError, StateFolder
@@ -68,7 +68,11 @@ class Ground:
             signing_key=args.signing_key,
             tick=tick_at(time()),
         )
-        self._first = track(args.track) if args.track else None
+        self._first = None
+        if args.track:
+            self._first, note = load_track(args.track, vehicle, profile, args.floor)
+            if note:
+                status.say("track", note)
         self._log: AutopilotLog | None = None
         self.copter = self._new_copter(self._state.history())
         self._kept_samples = self._kept_plans = 0

@@ -29,6 +29,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         vehicle: That it controls, name or file.
         feedback: Kind of the frames, states or sensors.
         track: What it flew from the start; None where ground stations say what to fly.
+        floor_m: Below which no track might lead; None for the ground of the vehicle.
         origin: Of the ENU frame.
         system_id: MAVLink system.
         identity: Towards ground stations.
@@ -44,6 +45,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     vehicle: str
     feedback: Feedback
     track: str | None
+    floor_m: float | None = None
     origin: Geodetic
     system_id: int
     identity: str

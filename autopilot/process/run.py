@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
-from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.process.client import Client
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.autopilot.process.recorded_inputs import Setup
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace, link: UdpLink | BlockingReceiver, status: Stat
         profile, vehicle = loaded(args)
         served = args.gcs or args.stepped
         ground = _ground(args, profile, vehicle, status, stop) if served else None
-        autopilot = ground.copter if ground else _alone(args, profile, vehicle)
+        autopilot = ground.copter if ground else _alone(args, profile, vehicle, status)
         end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
     except Error as error:
         fail(str(error))
@@ -79,6 +79,7 @@ def _setup(args: argparse.Namespace, profile: Profile) -> Setup:
         vehicle=args.vehicle or profile.simulation.vehicle,
         feedback=args.feedback,
         track=args.track if served else args.track or TRACK,
+        floor_m=args.floor,
         origin=args.home.origin,
         system_id=args.system_id,
         identity=args.identity,
@@ -102,9 +103,12 @@ def _flier(args: argparse.Namespace, vehicle: Vehicle) -> FlierEnd:
     )
 
 
-def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle) -> Autopilot:
+def _alone(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status) -> Autopilot:
+    flown, note = load_track(args.track or TRACK, vehicle, profile, args.floor)
+    if note:
+        status.say("track", note)
     estimator = estimator_for(args.feedback, vehicle, args.home.origin)
-    return Autopilot(profile, vehicle, track(args.track or TRACK), perf_counter, estimator=estimator)
+    return Autopilot(profile, vehicle, flown, perf_counter, estimator=estimator)
 
 
 def _ground(args: argparse.Namespace, profile: Profile, vehicle: Vehicle, status: Status, stop: Stop) -> "Ground":

@@ -31,6 +31,7 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
     settled = error[t >= SETTLED_AFTER_S]
     return {
         "track": plan.track_name,
+        "track_note": plan.track_note,
         "profile": plan.profile.name,
         "controller": plan.profile.controller,
         "link": plan.link,

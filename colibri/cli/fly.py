@@ -3,13 +3,13 @@
 from argparse import Namespace
 
 from colibri.cli.shared.options import add_feedback, add_out, add_signing
-from colibri.common.process.arguments import ArgumentParser, natural, positive, speed
+from colibri.common.process.arguments import ArgumentParser, natural, number, positive, speed
 from colibri.plant.process.options import add_world_arguments
 
 TRACK_HELP = (
     "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
     "hover[:x=0,y=0,height=2,yaw=0], lemniscate[:size=4,height=3,lap=6,yaw=path|fixed], "
-    "circle[:radius=2,speed=2,height=2,yaw=path|fixed], waypoints:FILE[,speed=2]; m, s, degrees"
+    "circle[:radius=2,speed=2,height=2,yaw=path|fixed], waypoints:FILE[,speed=2], samples:FILE; m, s, degrees"
 )
 
 
@@ -44,6 +44,7 @@ def add_options(parser: ArgumentParser) -> None:
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
+    add("--floor", type=number, metavar="M", help="no track may lead below this height, m (default: the ground, 0)")
     add("--integrator", choices=("rk4", "adaptive"), help="of the plant (default: the profile's)")
     add_world_arguments(
         parser, start="the profile's, and the track's first yaw", of_whom=" of the plant; the autopilot keeps its own"

@@ -94,6 +94,7 @@ def _setup(plan: FlightPlan) -> Setup:
         vehicle=plan.vehicle_name,
         feedback=plan.feedback,
         track=plan.track_name,
+        floor_m=plan.floor_m,
         origin=DEFAULT_ORIGIN,
         system_id=SYSTEM_ID,
         identity=DEFAULT_IDENTITY,

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.guidance.trajectories.planner import start_yaw
-from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, track
+from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track
 from colibri.common.errors import Error
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.open import check_reach
@@ -67,7 +68,9 @@ class FlightPlan(WorldSetting):
         out: Folder for all that the flight leaves.
         solver: QP solver by option; None for the profile's.
         ground: Who may watch and command.
-        track: The track to fly.
+        floor_m: Below which no track may lead, z of ENU; -inf for anywhere.
+        track: The track to fly, changed where the vehicle could not fly it.
+        track_note: What was changed, or which limit the track exceeds; empty for nothing.
         profile: The profile, with controller and solver of the options.
         vehicle: The vehicle that the autopilot controls.
         plant_vehicle: The vehicle that the plant flies, its parts left out.
@@ -86,7 +89,9 @@ class FlightPlan(WorldSetting):
     out: Path
     solver: str | None
     ground: GroundAccess
+    floor_m: float
     track: Track
+    track_note: str
     profile: Profile
     vehicle: Vehicle
     plant_vehicle: Vehicle
@@ -101,13 +106,12 @@ class FlightPlan(WorldSetting):
             LinkError: What invites a ground station names no link, or would let anybody on the network fly the vehicle.
             ProfileError: The profile cannot be read.
             VehicleError: A vehicle cannot be read, or cannot start as the profile says.
-            TrackError: There is no such track, or its file cannot be flown.
+            TrackError: There is no such track, it leads below the floor, or its file cannot be flown.
         """
         ground = GroundAccess(tuple(args.gcs), args.signing_key, args.insecure)
         if ground.links and args.link != "udp":
             raise PlanError(f"--gcs needs --link udp: over {args.link} there is no autopilot to connect to")
         check_reach(ground.links, signed=ground.signing_key is not None, insecure=ground.insecure)
-        to_fly = track(args.track)
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle_name = args.vehicle or profile.simulation.vehicle
         plant_vehicle_name = args.plant_vehicle or vehicle_name
@@ -116,6 +120,8 @@ class FlightPlan(WorldSetting):
         if args.feedback is Feedback.SENSORS:
             _check_sensors(vehicle_name, vehicle)
             _check_sensors(plant_vehicle_name, plant_vehicle)
+        floor_m = args.floor if args.floor is not None else -inf if plant_vehicle.ground is None else 0.0
+        to_fly, note = load_track(args.track, vehicle, profile, floor_m)
         start = _start_of(profile, to_fly, args.feedback)._replace(**args.start)
         check_start(start, plant_vehicle)
         return cls(
@@ -132,7 +138,9 @@ class FlightPlan(WorldSetting):
             out=args.out,
             solver=args.solver,
             ground=ground,
+            floor_m=floor_m,
             track=to_fly,
+            track_note=note,
             profile=profile,
             vehicle=vehicle,
             plant_vehicle=plant_vehicle,
@@ -145,7 +153,7 @@ class FlightPlan(WorldSetting):
         Raises:
             PlanError, ProfileError, VehicleError, TrackError: As `from_arguments`.
         """
-        unset = dict.fromkeys(("controller", "solver", "vehicle", "plant_vehicle", "integrator"))
+        unset = dict.fromkeys(("controller", "solver", "vehicle", "plant_vehicle", "integrator", "floor"))
         usual = {
             "gcs": (),
             "signing_key": None,

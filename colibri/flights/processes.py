@@ -75,6 +75,7 @@ def _autopilot_options(plan: FlightPlan, plant_url: str) -> list[str]:
         json=True,
         plant=plant_url.replace("udpin", "udpout"),
         track=plan.track_name,
+        floor=plan.floor_m,
         profile=plan.profile_name,
         vehicle=plan.vehicle_name,
         controller=plan.profile.controller,

@@ -14,7 +14,7 @@ from colibri.autopilot.core.step import Received, Step
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
-from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.process.recorded_inputs import Input, InputsError, ReceivedDatagram, Setup, read
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
@@ -194,7 +194,7 @@ def _begun(setup: Setup) -> Autopilot | Copter:
     """Return an autopilot that begins as it did then."""
     profile = load_profile(setup.profile).with_choices(setup.controller, setup.solver)
     vehicle = load_vehicle(setup.vehicle)
-    flown = track(setup.track) if setup.track else None
+    flown = load_track(setup.track, vehicle, profile, setup.floor_m).track if setup.track else None
     if not setup.ground:
         assert flown is not None, "without ground stations a track is flown"
         estimator = estimator_for(setup.feedback, vehicle, setup.origin)

@@ -54,17 +54,28 @@ def minimise(order: int, times_s: Array, points: Array) -> PiecewisePolynomial:
         times_s: When it passes the points, s, strictly increasing, (n,), n >= 2.
         points: What it passes, (n, axes).
     """
-    durations = np.diff(times_s)
     from_ends = inverse(_ends(order))
-    elements = _elements(durations, matmul(matmul(from_ends.T, _cost(order)), from_ends))
+    elements = _elements(np.diff(times_s), matmul(matmul(from_ends.T, _cost(order)), from_ends))
     knots = np.zeros((len(times_s), order, points.shape[1]))
     knots[:, 0] = points
     if len(times_s) > 2:
         knots[1:-1, 1:] = _free_derivatives(elements, points)
+    return interpolate(times_s, knots)
+
+
+def interpolate(times_s: Array, knots: Array) -> PiecewisePolynomial:
+    """Return the polynomials of least degree that have these derivatives at these times: Hermite's interpolation.
+
+    Args:
+        times_s: s, strictly increasing, (n,), n >= 2.
+        knots: Derivatives there, that of order 0 first, (n, order, axes).
+    """
+    _, order, axes = knots.shape
+    durations = np.diff(times_s)
     both = np.concatenate([knots[:-1], knots[1:]], axis=1)
     in_own_time = both * np.tile(_powers(durations, order), 2)[:, :, None]
-    coefficients = matmul(from_ends, np.moveaxis(in_own_time, 0, 1).reshape(2 * order, -1))
-    return PiecewisePolynomial(times_s, np.moveaxis(coefficients.reshape(2 * order, *points[1:].shape), 1, 0))
+    coefficients = matmul(inverse(_ends(order)), np.moveaxis(in_own_time, 0, 1).reshape(2 * order, -1))
+    return PiecewisePolynomial(times_s, np.moveaxis(coefficients.reshape(2 * order, len(durations), axes), 1, 0))
 
 
 def _ends(order: int) -> Array:

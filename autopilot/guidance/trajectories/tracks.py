@@ -1,10 +1,11 @@
 """The tracks: position and yaw as formulas of time, from which every derivative follows; found by name and options.
 
-A name may carry options: `NAME[:KEY=VALUE[,KEY=VALUE…]]`. Those of the thesis take none.
+A name may carry options: `NAME[:KEY=VALUE[,KEY=VALUE…]]`. Those of the thesis take none. Other packages may bring more.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from math import inf, pi, radians
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeAlias, get_args
@@ -14,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.autopilot.errors import AutopilotError
+from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
+from colibri.autopilot.guidance.trajectories.samples_file import Samples, read_samples
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, sin
-from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, WaypointsError, read_waypoints
+from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
 from colibri.common.config import Table
 from colibri.common.types import Array
 
@@ -28,6 +31,8 @@ Lap: TypeAlias = Annotated[float, msgspec.Meta(ge=0.1, le=3600.0)]
 Angle: TypeAlias = Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
 YawChoice: TypeAlias = Literal["path", "fixed"]
 
+GROUP = "colibri.tracks"
+"""Entry points of other packages' tracks: subclasses of `TrackOptions`."""
 DURATION_S = 100.0
 
 _RADIUS_M = 2.0
@@ -51,11 +56,13 @@ class Track:
         yaw: Time in s -> yaw in rad, counter-clockwise from east, unwrapped; None to look along the horizontal
             velocity. A track without end must have it, so that its yaw at any time follows from that time alone.
         duration_s: Afterwards it rests at its last point; infinite for a track without end.
+        waypoints: That it leads through, if it may be changed between them.
     """
 
     position: Callable[[TaylorSeries], Place]
     yaw: Callable[[TaylorSeries], TaylorSeries] | None = None
     duration_s: float = DURATION_S
+    waypoints: Waypoints | None = None
 
     def __post_init__(self) -> None:
         """Check that its yaw is known at any time."""
@@ -112,7 +119,7 @@ THESIS_TRACKS: dict[str, Track] = {
 }
 
 
-class Options(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class TrackOptions(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The options of a track, each a field with its range and default; lengths in m, times in s, angles in degrees.
 
     Attributes:
@@ -125,12 +132,12 @@ class Options(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
         """Return the track with these options.
 
         Raises:
-            WaypointsError: Its file cannot be flown.
+            TrackFileError: Its file cannot be flown.
         """
         raise NotImplementedError
 
 
-class Hover(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Hover(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Stay at one point."""
 
     x: Coordinate = 0.0
@@ -146,7 +153,7 @@ class Hover(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return _held(t, radians(self.yaw))
 
 
-class Lemniscate(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Fly a figure of eight around the origin: Gerono's lemniscate, x = size sin ωt, y = size sin ωt cos ωt."""
 
     size: Length = 4.0
@@ -172,7 +179,7 @@ class Lemniscate(Options, frozen=True, forbid_unknown_fields=True, kw_only=True)
         return 2.0 * pi / self.lap * t
 
 
-class Circle(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Fly round the origin, counter-clockwise from the east."""
 
     radius: Length = 2.0
@@ -195,7 +202,7 @@ class Circle(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
         return self.speed / self.radius * t
 
 
-class WaypointFile(Options, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class WaypointFile(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Fly through the points of a CSV file with the least snap."""
 
     lone: ClassVar[str | None] = "file"
@@ -208,16 +215,34 @@ class WaypointFile(Options, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return through(read_waypoints(Path(self.file), self.speed))
 
 
-OPTIONS: dict[str, type[Options]] = {
+class SamplesFile(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Fly what a CSV file has samples of, as it is."""
+
+    lone: ClassVar[str | None] = "file"
+
+    file: str
+
+    def track(self) -> Track:
+        """Return the track."""
+        return sampled(read_samples(Path(self.file)))
+
+
+OPTIONS: dict[str, type[TrackOptions]] = {
     "hover": Hover,
     "lemniscate": Lemniscate,
     "circle": Circle,
     "waypoints": WaypointFile,
+    "samples": SamplesFile,
 }
 
 
-def through(waypoints: Waypoints) -> Track:
-    """Return the track through waypoints with the least snap, and the least yaw acceleration if they say which yaw."""
+def through(waypoints: Waypoints, heights: Array | None = None) -> Track:
+    """Return the track through waypoints with the least snap, and the least yaw acceleration if they say which yaw.
+
+    Args:
+        waypoints: What it passes, and when.
+        heights: Times, s, and heights, m, that its height passes besides, (n, 2), n >= 1; None for no others.
+    """
     from colibri.autopilot.guidance.trajectories.minimum_snap import (
         ACCELERATION,
         SNAP,
@@ -226,14 +251,36 @@ def through(waypoints: Waypoints) -> Track:
 
     times_s = waypoints.times_s
     places = minimise(SNAP, times_s, waypoints.points_enu_m)
+    height = None
+    if heights is not None:
+        passed = np.concatenate([np.stack([times_s, waypoints.points_enu_m[:, 2]], axis=1), heights])
+        passed = passed[np.argsort(passed[:, 0], kind="stable")]
+        height = minimise(SNAP, passed[:, 0], passed[:, 1:])
+
+    def position(t: TaylorSeries) -> Place:
+        x, y, z = places(t)
+        return x, y, z if height is None else height(t)[0]
+
+    if waypoints.yaw_rad is None:
+        return Track(position, None, float(times_s[-1]), waypoints)
+    looks = minimise(ACCELERATION, times_s, waypoints.yaw_rad[:, None])
+    return Track(position, lambda t: looks(t)[0], float(times_s[-1]), waypoints)
+
+
+def sampled(samples: Samples) -> Track:
+    """Return the track through samples, of the fifth degree in between: its acceleration is continuous."""
+    from colibri.autopilot.guidance.trajectories.minimum_snap import ACCELERATION, interpolate, minimise
+
+    times_s = samples.times_s
+    places = interpolate(times_s, samples.motion_enu)
 
     def position(t: TaylorSeries) -> Place:
         x, y, z = places(t)
         return x, y, z
 
-    if waypoints.yaw_rad is None:
+    if samples.yaw_rad is None:
         return Track(position, None, float(times_s[-1]))
-    looks = minimise(ACCELERATION, times_s, waypoints.yaw_rad[:, None])
+    looks = minimise(ACCELERATION, times_s, samples.yaw_rad[:, None])
     return Track(position, lambda t: looks(t)[0], float(times_s[-1]))
 
 
@@ -248,12 +295,20 @@ def track(name: str) -> Track:
         return THESIS_TRACKS[base]
     if base in THESIS_TRACKS:
         raise TrackError(f"track {base} takes no options, but these do: {', '.join(OPTIONS)}")
-    if base not in OPTIONS:
-        raise TrackError(f"unknown track {base}: choose {', '.join([*THESIS_TRACKS, *OPTIONS])}")
+    kind = OPTIONS.get(base) or _installed(base)
     try:
-        return _options(base, text if colon else None).track()
-    except WaypointsError as error:
+        found = _options(base, kind, text if colon else None).track()
+    except TrackFileError as error:
         raise TrackError(str(error)) from error
+    if not isinstance(found, Track):
+        raise TrackError(f"track {base}: track() of {kind.__name__} gave {type(found).__name__}, not a colibri.Track")
+    return found
+
+
+def track_names() -> list[str]:
+    """Return the names of the tracks that are installed: Colibri's own, and those of other packages."""
+    own = (*THESIS_TRACKS, *OPTIONS)
+    return [*own, *sorted({entry.name for entry in entry_points(group=GROUP)}.difference(own))]
 
 
 def position(track: Track, t: Array, derivative: int = 0) -> Array:
@@ -268,9 +323,21 @@ def position(track: Track, t: Array, derivative: int = 0) -> Array:
     return np.stack([axis.derivative(derivative) for axis in track.position(time)], axis=-1)
 
 
-def _options(name: str, text: str | None) -> Options:
+def _installed(name: str) -> type[TrackOptions]:
+    """Return the options of another package's track."""
+    for entry in entry_points(group=GROUP, name=name):
+        try:
+            kind = entry.load()
+        except (ImportError, AttributeError) as error:
+            raise TrackError(f"track {name} ({entry.value}) cannot be loaded: {error}") from error
+        if not (isinstance(kind, type) and issubclass(kind, TrackOptions)):
+            raise TrackError(f"track {name} ({entry.value}) is no subclass of colibri.TrackOptions")
+        return kind
+    raise TrackError(f"unknown track {name}: choose {', '.join(track_names())}")
+
+
+def _options(name: str, kind: type[TrackOptions], text: str | None) -> TrackOptions:
     """Read the options of a track strictly."""
-    kind = OPTIONS[name]
     fields = {field.name: field for field in msgspec.structs.fields(kind)}
     given = _pairs(name, kind, text)
     for key in given:
@@ -285,7 +352,7 @@ def _options(name: str, text: str | None) -> Options:
         raise TrackError(f"track {name}: {_explained(str(reason), fields, given)}") from reason
 
 
-def _pairs(name: str, kind: type[Options], text: str | None) -> dict[str, str]:
+def _pairs(name: str, kind: type[TrackOptions], text: str | None) -> dict[str, str]:
     """Take options apart; the first may be a value alone, if the track has a lone option."""
     given: dict[str, str] = {}
     for number, item in enumerate([] if text is None else text.split(",")):
@@ -300,7 +367,7 @@ def _pairs(name: str, kind: type[Options], text: str | None) -> dict[str, str]:
     return given
 
 
-def _keys(kind: type[Options]) -> str:
+def _keys(kind: type[TrackOptions]) -> str:
     return f"choose {', '.join(kind.__struct_fields__)}"
 
 

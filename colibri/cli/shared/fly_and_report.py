@@ -22,6 +22,8 @@ def fly(args: argparse.Namespace) -> int:
     prepare(plan.out)
     try:
         with _progress(plan, quiet=args.quiet) as (progress, say):
+            if plan.track_note:
+                say(plan.track_note)
             summary = fly_plan(plan, progress, say)
     except FlightError as error:
         _keep_what_there_is(plan)

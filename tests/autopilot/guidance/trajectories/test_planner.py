@@ -165,7 +165,9 @@ def test_there_and_back_yaw_turns_by_half_a_turn_at_once(tmp_path: Path) -> None
 @pytest.mark.parametrize("name", OPTIONS)
 def test_every_kind_of_track_is_planned_in_time(tmp_path: Path, name: str) -> None:
     """Tabulating 100 s takes some 10 ms, a horizon some 3 µs; ten times that would be a mistake."""
-    flown = track(waypoint_file(tmp_path) if name == "waypoints" else name)
+    (tmp_path / "samples.csv").write_text("t,x,y,z,vx,vy,vz,ax,ay,az\n0,0,0,1,1,0,0,0,0,0\n2,2,0,1,1,0,0,0,0,0\n")
+    files = {"waypoints": waypoint_file(tmp_path), "samples": f"samples:{tmp_path / 'samples.csv'}"}
+    flown = track(files.get(name, name))
     planner = Planner(flown, "by-formula", PREVIEW)
     assert min(timeit.repeat(lambda: Planner(flown, "by-formula", PREVIEW), number=1, repeat=3)) < 0.1
     assert min(timeit.repeat(lambda: planner.horizon(0), number=100, repeat=3)) < 100 * 50e-6

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
 from colibri.autopilot.guidance.trajectories.tracks import TrackError, position, track
-from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, WaypointsError, read_waypoints
+from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
 
 
 def write(folder: Path, text: str) -> Path:
@@ -43,7 +44,7 @@ def test_times_from_the_speed_the_first_and_last_leg_at_half_of_it(
         ("x,y\n", "line 1, column z: missing"),
         ("x,y,z,w\n", "line 1, column w: unknown: choose x, y, z, t, yaw"),
         ("x,y,z,x\n", "line 1, column x: twice: choose x, y, z, t, yaw"),
-        ("x,y,z\n1,2,3\n", "line 2: the file ends, and a track needs two waypoints"),
+        ("x,y,z\n1,2,3\n", "line 2: the file ends, and a track needs two rows"),
         ("x,y,z\n1,2,3\n1,up,3\n", "line 3, column y: expected a number from -10000 to 10000, not 'up'"),
         ("x,y,z\n1,2,nan\n1,2,3\n", "line 2, column z: expected a number from -10000 to 10000, not 'nan'"),
         ("x,y,z\n1,2,3\n1,2,1e5\n", "line 3, column z: expected a number from -10000 to 10000, not '1e5'"),
@@ -58,7 +59,7 @@ def test_times_from_the_speed_the_first_and_last_leg_at_half_of_it(
     ],
 )
 def test_what_cannot_be_flown_is_one_line(tmp_path: Path, text: str, line: str) -> None:
-    with pytest.raises(WaypointsError) as refused:
+    with pytest.raises(TrackFileError) as refused:
         read(tmp_path, text)
     assert str(refused.value) == f"{tmp_path / 'points.csv'}: {line}"
     with pytest.raises(TrackError, match=r"points\.csv: line"):
@@ -66,13 +67,13 @@ def test_what_cannot_be_flown_is_one_line(tmp_path: Path, text: str, line: str) 
 
 
 def test_a_speed_beside_times_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(WaypointsError, match="line 1, column t: says when to be where, so leave speed out"):
+    with pytest.raises(TrackFileError, match="line 1, column t: says when to be where, so leave speed out"):
         read(tmp_path, "x,y,z,t\n1,2,3,0\n1,2,4,2\n", 2.0)
 
 
 def test_what_is_no_text_is_refused(tmp_path: Path) -> None:
     (tmp_path / "points.csv").write_bytes(b"x,y,z\n\xff\xfe")
-    with pytest.raises(WaypointsError, match=r"points\.csv: 'utf-8' codec can't decode"):
+    with pytest.raises(TrackFileError, match=r"points\.csv: 'utf-8' codec can't decode"):
         read_waypoints(tmp_path / "points.csv", None)
 
 

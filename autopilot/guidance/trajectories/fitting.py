@@ -1,0 +1,184 @@
+"""A path through waypoints made such that a vehicle can fly it: held above the floor, and as slow as it must be.
+
+Where the least snap dips below the floor, the height passes a point above it there, and is as smooth at that as at any
+waypoint. Where it asks for more than the vehicle has, the legs concerned are stretched in time. What was fine is left
+as it is, bit for bit.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from colibri.autopilot.guidance.trajectories.csv_table import MAX_DURATION_S
+from colibri.autopilot.guidance.trajectories.reach import (
+    INTERVAL_S,
+    MARGIN,
+    Demand,
+    Reach,
+    exact_motion,
+    mean_motion,
+    times,
+)
+from colibri.autopilot.guidance.trajectories.tracks import Track, position, through
+from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
+from colibri.common.types import Array
+
+ROUNDING_M = 1e-3
+"""What is so little below the floor is on it."""
+
+_CLEARANCE_M = 0.25
+"""Above the floor at which a dip is held, where both ends of its leg are at least twice as high."""
+_HOLDS = 20
+_STRETCHES = 80
+_STRETCH = (1.02, 1.25)
+"""By which a leg is stretched in one pass."""
+_WIDENING = 4
+"""Passes after which twice as many neighbours are stretched along: in the end all alike, which leads to a hover."""
+_LISTED = 3
+
+
+class Dip(NamedTuple):
+    """The lowest point of a path where it is below the floor.
+
+    Attributes:
+        leg: Number of the leg, from 0 on.
+        time_s: When.
+        height_m: How high.
+    """
+
+    leg: int
+    time_s: float
+    height_m: float
+
+
+def fit(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]:
+    """Return the track through waypoints that a vehicle can fly, and in words what was changed for it, if anything.
+
+    Raises:
+        TrackFileError: A waypoint is below the floor, or there is no such track; or the file says when to be where, and
+            the track would have to be changed.
+    """
+    for row in np.flatnonzero(waypoints.points_enu_m[:, 2] < floor_m - ROUNDING_M)[:1]:
+        height_m = waypoints.points_enu_m[row, 2]
+        raise waypoints.error(f"waypoint {row + 1} is at {height_m:g} m, below the floor of {floor_m:g} m")
+    if waypoints.timed:
+        return _as_timed(waypoints, reach, floor_m), ""
+    stretch, slowed, limiting = np.ones(len(waypoints.times_s) - 1), waypoints, ""
+    for count in range(_STRETCHES):
+        track, dips = _held(slowed, floor_m)
+        excess, worst = _excess(reach.demands(exact_motion(track), track.duration_s), slowed, MARGIN)
+        if excess.max() <= 1.0:
+            changes = (_held_in_words(dips, floor_m), _stretched_in_words(stretch, limiting))
+            return track, "; ".join(filter(None, changes))
+        limiting = limiting or worst.name
+        excess = _widened(excess, 2 ** (count // _WIDENING) - 1)
+        stretch *= np.where(excess > 1.0, np.clip(np.sqrt(excess), *_STRETCH), 1.0)
+        slowed = waypoints.stretched(stretch)
+        if slowed.times_s[-1] > MAX_DURATION_S:
+            break
+    raise waypoints.error(f"not to be flown within {MAX_DURATION_S:g} s: it asks for a {worst}")
+
+
+def dips_of(track: Track, floor_m: float) -> Iterator[tuple[float, float]]:
+    """Yield time, s, and height, m, of the lowest point of a track each time that it is below the floor."""
+    t = times(track)
+    z = position(track, t)[:, 2]
+    below = np.concatenate([[0], z < floor_m - ROUNDING_M, [0]]).astype(np.int8)
+    for begin, end in np.flatnonzero(np.diff(below)).reshape(-1, 2):
+        lowest = begin + int(np.argmin(z[begin:end]))
+        yield float(t[lowest]), float(z[lowest])
+
+
+def _as_timed(waypoints: Waypoints, reach: Reach, floor_m: float) -> Track:
+    """Return the track through waypoints at their times.
+
+    Raises:
+        TrackFileError: The vehicle cannot fly it.
+    """
+    track = through(waypoints)
+    for dip in _dips(track, waypoints, floor_m):
+        what = f"{_legs([dip.leg])} dips to {dip.height_m:.2f} m, below the floor of {floor_m:g} m"
+        raise waypoints.error(f"{what}: add a waypoint there, or leave column t out")
+    excess, worst = _excess(reach.demands(mean_motion(track), track.duration_s), waypoints, 0.0)
+    if excess.max() > 1.0:
+        what = f"{_legs([int(excess.argmax())])} asks for a {worst}"
+        raise waypoints.error(f"{what}: give it more time, or leave column t out")
+    return track
+
+
+def _excess(demands: Sequence[Demand], waypoints: Waypoints, margin: float) -> tuple[Array, Demand]:
+    """Return how many times too much each leg asks for, (n - 1,), and the demand that is the furthest beyond."""
+    excess = np.array([demand.excess(margin) for demand in demands])
+    worst = demands[int(excess.max(axis=1).argmax())]
+    begins = np.ceil(waypoints.times_s[:-1] / INTERVAL_S).astype(np.intp)
+    return np.maximum.reduceat(excess.max(axis=0), begins), worst
+
+
+def _widened(excess: Array, neighbours: int) -> Array:
+    """Return the largest excess of each leg and as many neighbours on either side, (n,)."""
+    neighbours = min(neighbours, len(excess))
+    widened: Array = sliding_window_view(np.pad(excess, neighbours), 2 * neighbours + 1).max(axis=1)
+    return widened
+
+
+def _held(waypoints: Waypoints, floor_m: float) -> tuple[Track, list[Dip]]:
+    """Return the track through waypoints held above the floor, and where it would have been below it.
+
+    Raises:
+        TrackFileError: None is found.
+    """
+    track = through(waypoints)
+    dips = found = _dips(track, waypoints, floor_m)
+    heights = np.empty((0, 2))
+    for _ in range(_HOLDS):
+        if not found:
+            return track, dips
+        heights = np.concatenate([heights, [(dip.time_s, _height_over(waypoints, dip.leg, floor_m)) for dip in found]])
+        track = through(waypoints, heights)
+        found = _dips(track, waypoints, floor_m)
+    what = f"{_legs([found[0].leg])} cannot be held above the floor of {floor_m:g} m"
+    raise waypoints.error(f"{what}: add a waypoint there")
+
+
+def _height_over(waypoints: Waypoints, leg: int, floor_m: float) -> float:
+    """Return the height at which a dip of a leg is held."""
+    ends = waypoints.points_enu_m[leg : leg + 2, 2]
+    return floor_m + min(_CLEARANCE_M, 0.5 * max(float(ends.min()) - floor_m, 0.0))
+
+
+def _dips(track: Track, waypoints: Waypoints, floor_m: float) -> list[Dip]:
+    return [Dip(waypoints.leg_at(time_s), time_s, height_m) for time_s, height_m in dips_of(track, floor_m)]
+
+
+def _held_in_words(dips: Sequence[Dip], floor_m: float) -> str:
+    lowest: dict[int, float] = {}
+    for dip in dips:
+        lowest[dip.leg] = min(dip.height_m, lowest.get(dip.leg, dip.height_m))
+    if not lowest:
+        return ""
+    verb = "dips" if len(lowest) == 1 else "dip"
+    return f"{_legs(list(lowest))} {verb} to {_figures(list(lowest.values()))} m: held above {floor_m:g} m"
+
+
+def _stretched_in_words(stretch: Array, limiting: str) -> str:
+    legs = np.flatnonzero(stretch > 1.0)
+    return f"{_legs(legs.tolist())} stretched by {_figures(stretch[legs].tolist())}: {limiting}" if len(legs) else ""
+
+
+def _legs(legs: Sequence[int]) -> str:
+    """Return the numbers of legs for a user, who counts waypoints from 1 on."""
+    if len(legs) > _LISTED:
+        return f"{len(legs)} legs"
+    return f"leg{'s' if len(legs) > 1 else ''} {_listed([f'{leg + 1} to {leg + 2}' for leg in legs])}"
+
+
+def _figures(figures: Sequence[float]) -> str:
+    if len(figures) > _LISTED:
+        return f"{min(figures):.2f} to {max(figures):.2f}"
+    return _listed([f"{figure:.2f}" for figure in figures])
+
+
+def _listed(words: list[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

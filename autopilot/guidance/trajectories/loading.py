@@ -1,0 +1,53 @@
+"""A track by its name as one vehicle will fly it: checked, and where it may be, changed, before anything flies."""
+
+from math import inf
+from typing import NamedTuple
+
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
+from colibri.autopilot.guidance.trajectories.fitting import dips_of, fit
+from colibri.autopilot.guidance.trajectories.reach import Reach, exact_motion
+from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, TrackError, track
+from colibri.plant.vehicle.description import Vehicle
+
+
+class LoadedTrack(NamedTuple):
+    """A track to fly.
+
+    Attributes:
+        track: The track.
+        note: What a user should know of it: what was changed, or which limit it exceeds; empty for nothing.
+    """
+
+    track: Track
+    note: str
+
+
+def load_track(name: str, vehicle: Vehicle, profile: Profile, floor_m: float | None = None) -> LoadedTrack:
+    """Return the track of that name as `vehicle` will fly it under `profile`.
+
+    One through waypoints is held above the floor and slowed down to what the vehicle can fly. Any other is flown as it
+    is, also beyond the limits.
+
+    Args:
+        name: `NAME[:KEY=VALUE[,KEY=VALUE…]]`.
+        vehicle: That is to fly it.
+        profile: Whose law flies it.
+        floor_m: Below which no track may lead, m, ENU; None for the ground, if the vehicle has any.
+
+    Raises:
+        TrackError: There is no such track, its file cannot be flown, or it leads below the floor.
+    """
+    found, reach = track(name), Reach(vehicle, profile)
+    floor = (-inf if vehicle.ground is None else 0.0) if floor_m is None else floor_m
+    if found.waypoints is not None:
+        try:
+            fitted, changed = fit(found.waypoints, reach, floor)
+        except TrackFileError as error:
+            raise TrackError(str(error)) from error
+        return LoadedTrack(fitted, f"{found.waypoints.path}: {changed}" if changed else "")
+    for time_s, height_m in dips_of(found, floor):
+        raise TrackError(f"track {name} is at {height_m:.2f} m after {time_s:.2f} s, below the floor of {floor:g} m")
+    demands = reach.demands(exact_motion(found), min(found.duration_s, DURATION_S))
+    beyond = [str(demand) for demand in demands if demand.excess(0.0).max() > 1.0]
+    return LoadedTrack(found, f"track {name} asks for more than there is: {'; '.join(beyond)}" if beyond else "")
