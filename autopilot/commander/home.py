@@ -2,8 +2,11 @@
 
 from colibri.common.earth.geodesy import Geodetic
 from colibri.common.types import Vector
+from colibri.mavlink.wire.refusal import Refusal
 
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
+_UNCERTAIN_M = 0.5
+"""By which heights above sea level, and those that are estimated, may differ."""
 
 
 class Home:
@@ -31,6 +34,11 @@ class Home:
         """Set home to where the vehicle stands, unless somebody chose another place."""
         if not self.chosen:
             self.position_enu_m, self.yaw_rad = position_enu_m, yaw_rad
+
+    def refusal(self, height_m: float) -> Refusal | None:
+        """Return why no vehicle may fly to a height, m, ENU: it is below the origin, and home; None if it may."""
+        below_m = min(0.0, self.position_enu_m[2]) - height_m
+        return Refusal(f"{below_m:.1f} m below the ground") if below_m > _UNCERTAIN_M else None
 
     def move_origin(self, place: Geodetic) -> None:
         """Set the origin of the ENU frame; positions in it stay the same numbers."""

@@ -18,6 +18,7 @@ from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext, TaskO
 from colibri.mavlink.mission.items import FENCE, MISSION, MissionItem, Plan
 from colibri.mavlink.mission.service import Progress
 from colibri.mavlink.services.statustext import INFO, WARNING
+from colibri.mavlink.wire.dialect import mav
 from colibri.mavlink.wire.refusal import Refusal
 
 
@@ -35,7 +36,7 @@ class Missions:
         self._lines = lines
         self._behaviour = behaviour
         self._executor = MissionExecutor()
-        self._outside = ""
+        self._outside = self._below = ""
         self._reached: list[int] = []
         self.changes = 0
 
@@ -48,6 +49,11 @@ class Missions:
     def leaves_fence(self) -> bool:
         """Whether the mission goes to a place where the geofence does not let the vehicle be."""
         return bool(self._outside)
+
+    @property
+    def leads_below_ground(self) -> bool:
+        """Whether the mission goes to a place below the ground."""
+        return bool(self._below)
 
     def adopt(self, behaviour: Behaviour) -> None:
         """Adopt other numbers."""
@@ -142,13 +148,19 @@ class Missions:
         )
 
     def _check_mission(self) -> None:
-        """Look for an item that leads outside the fence; the way between two items is not checked."""
-        home, before = self._home, self._outside
-        found = places(self._executor.items, home.position_enu_m, home.origin) if self._fence.exists else ()
-        outside = [(seq, refusal.reason) for seq, place in found if (refusal := self._fence.refusal(place))]
-        self._outside = f"item {outside[0][0]} of the mission: {outside[0][1]}" if outside else ""
-        if self._outside and self._outside != before:
-            self._lines.say(WARNING, self._outside)
+        """Look for items that lead outside the fence or below the ground; the way between two is not checked."""
+        home, items, said = self._home, self._executor.items, (self._outside, self._below)
+        found = list(places(items, home.position_enu_m, home.origin))
+        outside = ((seq, refusal.reason) for seq, place in found if (refusal := self._fence.refusal(place)))
+        flown = ((seq, place) for seq, place in found if items[seq].command != mav.MAV_CMD_NAV_LAND)
+        below = ((seq, refusal.reason) for seq, place in flown if (refusal := home.refusal(place[2])))
+        self._outside, self._below = (
+            f"item {seq} of the mission: {reason}" if reason else ""
+            for seq, reason in (next(outside, (0, "")), next(below, (0, "")))
+        )
+        for text in (self._outside, self._below):
+            if text and text not in said:
+                self._lines.say(WARNING, text)
 
 
 class MissionTask:

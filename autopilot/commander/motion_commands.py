@@ -132,7 +132,7 @@ class MotionCommands:
         if not isnan(z):
             height_m = self._home.position_enu_m[2] + z if frame in _RELATIVE else z - self._home.origin.altitude_m
             place = (place[0], place[1], height_m)
-        refusal = self.unreachable(place)
+        refusal = self.unreachable(place) or self._home.refusal(place[2])
         if refusal is not None:
             return Refusal(f"reposition refused: {refusal.reason}")
         yaw = 0.5 * pi - yaw_ned if not isnan(yaw_ned) else context.yaw_rad if only_height else None
@@ -175,7 +175,7 @@ class MotionCommands:
             return Refusal("no such yaw behaviour")
         angles = (2.0 * pi * point / _POINTS for point in range(_POINTS))
         around = ((x + radius * cos(angle), y + radius * sin(angle), z) for angle in angles)
-        return next(filter(None, map(self.unreachable, around)), None)
+        return self._home.refusal(z) or next(filter(None, map(self.unreachable, around)), None)
 
     def _turn(self, command: Command) -> Outcome:
         """Turn on the spot; the angle counts clockwise from north, or from the heading now where p4 is 1."""

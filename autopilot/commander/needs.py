@@ -52,6 +52,7 @@ class ModeNeeds:
             Need.SETPOINTS: setpoint is not None,
             Need.MISSION: self._missions.has_mission,
             Need.INSIDE_FENCE: not self._missions.leaves_fence,
+            Need.ABOVE_GROUND: not self._missions.leads_below_ground,
             Need.CIRCLE: False,
             Need.FLYING: not self._pilot.ground.standing,
             Need.POSITION: self._pilot.sensed.position_known,

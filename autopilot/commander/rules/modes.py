@@ -37,6 +37,7 @@ class Need(Enum):
     SETPOINTS = "no offboard setpoints are heard: send them before the mode"
     MISSION = "there is no mission"
     INSIDE_FENCE = "the mission leads outside the geofence"
+    ABOVE_GROUND = "the mission leads below the ground"
     CIRCLE = "command DO_ORBIT says where"
     POSITION = "the position is not known"
     FLYING = "the vehicle is not flying"
@@ -125,7 +126,7 @@ MODES: tuple[ModeRow, ...] = (
         Mode.MISSION,
         AUTO,
         4,
-        (Need.MISSION, Need.INSIDE_FENCE, Need.POSITION),
+        (Need.MISSION, Need.INSIDE_FENCE, Need.ABOVE_GROUND, Need.POSITION),
         "flies the uploaded mission",
         mav.MAV_STANDARD_MODE_MISSION,
     ),

@@ -230,6 +230,14 @@ def test_home_here_there_and_too_far_away(flying: Cockpit) -> None:
     assert flying.commands.move_home(far) == Refusal("home refused: too far away")
 
 
+@pytest.mark.parametrize("command", ["DO_REPOSITION", "DO_ORBIT"])
+def test_no_command_leads_below_the_ground(flying: Cockpit, command: str) -> None:
+    sea_m = flying.home.origin.altitude_m
+    outcome = flying.do(command, z=sea_m - 3.0)
+    assert (outcome.result, "3.0 m below the ground" in outcome.reason) == (DENIED, True)
+    assert flying.do(command, z=sea_m).result == ACCEPTED
+
+
 def test_no_command_leads_over_the_fence() -> None:
     cockpit = Cockpit(FLYING, behaviour=Behaviour(max_distance_m=15.0))
     cockpit.step()

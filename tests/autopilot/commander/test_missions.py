@@ -91,6 +91,19 @@ def test_an_item_outside_the_fence_is_told_once_and_holds_the_mission_back() -> 
     assert not cockpit.missions.leaves_fence
 
 
+def test_an_item_below_the_ground_is_told_by_its_number_and_holds_the_mission_back() -> None:
+    cockpit = Cockpit(FLYING)
+    low, high = item("NAV_WAYPOINT", place=(9.0, 0.0, -4.0)), item("NAV_WAYPOINT", place=(9.0, 0.0, 0.0))
+    cockpit.load(MISSION, PLAN[0], high, low)
+    assert cockpit.missions.leads_below_ground
+    assert cockpit.said("item 2 of the mission: 4.0 m below the ground")
+    cockpit.load(MISSION, PLAN[0], high, item("NAV_LAND", place=(9.0, 0.0, -4.0)))
+    assert not cockpit.missions.leads_below_ground
+    cockpit.home.move((0.0, 0.0, -4.0), 0.0)
+    cockpit.load(MISSION, high)
+    assert not cockpit.missions.leads_below_ground, "as low as home"
+
+
 def test_the_fence_around_home_moves_with_home_and_with_its_parameters() -> None:
     cockpit = Cockpit()
     assert not cockpit.fence.exists
