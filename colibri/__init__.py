@@ -20,12 +20,15 @@ if TYPE_CHECKING:
     from colibri.autopilot import Preview as Preview
     from colibri.autopilot import Profile as Profile
     from colibri.autopilot import QpStatus as QpStatus
+    from colibri.autopilot import TaylorSeries as TaylorSeries
     from colibri.autopilot import Track as Track
+    from colibri.autopilot import TrackOptions as TrackOptions
     from colibri.autopilot import VehicleState as VehicleState
     from colibri.autopilot import controller_names as controller_names
     from colibri.autopilot import load_controller as load_controller
     from colibri.autopilot import load_profile as load_profile
     from colibri.autopilot import track as track
+    from colibri.autopilot import track_names as track_names
     from colibri.common import Error as Error
     from colibri.common import InFlightError as InFlightError
     from colibri.common import Table as Table

@@ -68,6 +68,26 @@ class TaylorSeries:
         """Subtract a series or a constant, one for all times or one for each."""
         return self + -1.0 * other
 
+    def __rsub__(self, other: "Array | float") -> "TaylorSeries":
+        """Subtract from a constant."""
+        return -1.0 * self + other
+
+    def __neg__(self) -> "TaylorSeries":
+        """Return the opposite."""
+        return -1.0 * self
+
+    def __truediv__(self, divisor: float) -> "TaylorSeries":
+        """Divide by a constant."""
+        return self * (1.0 / divisor)
+
+    def sin(self) -> "TaylorSeries":
+        """Return the sine of a series in rad."""
+        return sin(self)
+
+    def cos(self) -> "TaylorSeries":
+        """Return the cosine of a series in rad."""
+        return cos(self)
+
     __radd__ = __add__
     __rmul__ = __mul__
 

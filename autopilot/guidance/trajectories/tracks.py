@@ -5,8 +5,7 @@ A name may carry options: `NAME[:KEY=VALUE[,KEY=VALUE…]]`. Those of the thesis
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import entry_points
-from math import inf, pi, radians
+from math import inf, isfinite, pi, radians
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeAlias, get_args
 
@@ -14,12 +13,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.autopilot.errors import AutopilotError
 from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
+from colibri.autopilot.guidance.trajectories.registry import TrackError as TrackError
+from colibri.autopilot.guidance.trajectories.registry import installed_names, load_installed
 from colibri.autopilot.guidance.trajectories.samples_file import Samples, read_samples
 from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, sin
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
 from colibri.common.config import Table
+from colibri.common.errors import Error
 from colibri.common.types import Array
 
 Place: TypeAlias = tuple[TaylorSeries, TaylorSeries, TaylorSeries]
@@ -31,8 +32,6 @@ Lap: TypeAlias = Annotated[float, msgspec.Meta(ge=0.1, le=3600.0)]
 Angle: TypeAlias = Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
 YawChoice: TypeAlias = Literal["path", "fixed"]
 
-GROUP = "colibri.tracks"
-"""Entry points of other packages' tracks: subclasses of `TrackOptions`."""
 DURATION_S = 100.0
 
 _RADIUS_M = 2.0
@@ -41,10 +40,6 @@ _CLIMB_M_S = 0.03
 _START_HEIGHT_M = 2.0
 _INSTANT_S = 1e-9
 """Times are whole microseconds: what differs by less than this is rounding."""
-
-
-class TrackError(AutopilotError):
-    """There is no such track, or it cannot be flown; the message lists those there are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,20 +290,23 @@ def track(name: str) -> Track:
         return THESIS_TRACKS[base]
     if base in THESIS_TRACKS:
         raise TrackError(f"track {base} takes no options, but these do: {', '.join(OPTIONS)}")
-    kind = OPTIONS.get(base) or _installed(base)
-    try:
-        found = _options(base, kind, text if colon else None).track()
-    except TrackFileError as error:
-        raise TrackError(str(error)) from error
-    if not isinstance(found, Track):
-        raise TrackError(f"track {base}: track() of {kind.__name__} gave {type(found).__name__}, not a colibri.Track")
-    return found
+    if base in OPTIONS:
+        try:
+            return _options(base, OPTIONS[base], text if colon else None).track()
+        except TrackFileError as error:
+            raise TrackError(str(error)) from error
+    kind = load_installed(base)
+    if kind is None:
+        raise TrackError(f"unknown track {base}: choose {', '.join(track_names())}")
+    if not (isinstance(kind, type) and issubclass(kind, TrackOptions)):
+        raise TrackError(f"track {base}: {kind} is no subclass of colibri.TrackOptions")
+    return _tried(base, _options(base, kind, text if colon else None))
 
 
 def track_names() -> list[str]:
-    """Return the names of the tracks that are installed: Colibri's own, and those of other packages."""
-    own = (*THESIS_TRACKS, *OPTIONS)
-    return [*own, *sorted({entry.name for entry in entry_points(group=GROUP)}.difference(own))]
+    """Return the names of all tracks: Colibri's own, then those of other packages."""
+    own = [*THESIS_TRACKS, *OPTIONS]
+    return own + [name for name in installed_names() if name not in own]
 
 
 def position(track: Track, t: Array, derivative: int = 0) -> Array:
@@ -323,17 +321,22 @@ def position(track: Track, t: Array, derivative: int = 0) -> Array:
     return np.stack([axis.derivative(derivative) for axis in track.position(time)], axis=-1)
 
 
-def _installed(name: str) -> type[TrackOptions]:
-    """Return the options of another package's track."""
-    for entry in entry_points(group=GROUP, name=name):
-        try:
-            kind = entry.load()
-        except (ImportError, AttributeError) as error:
-            raise TrackError(f"track {name} ({entry.value}) cannot be loaded: {error}") from error
-        if not (isinstance(kind, type) and issubclass(kind, TrackOptions)):
-            raise TrackError(f"track {name} ({entry.value}) is no subclass of colibri.TrackOptions")
-        return kind
-    raise TrackError(f"unknown track {name}: choose {', '.join(track_names())}")
+def _tried(name: str, options: TrackOptions) -> Track:
+    """Return the track of another package, if it gives three coordinates at the start.
+
+    Raises:
+        TrackError: It does not.
+    """
+    try:
+        found = options.track()
+        starts = [axis.derivative(0).item() for axis in found.position(found.clock(np.zeros(1), 1))]
+    except Error:
+        raise
+    except Exception as error:
+        raise TrackError(f"track {name}: {type(options).__name__}: {type(error).__name__}: {error}") from error
+    if not (isinstance(found, Track) and len(starts) == 3 and all(map(isfinite, starts))):
+        raise TrackError(f"track {name}: {type(options).__name__} gives no colibri.Track of three finite coordinates")
+    return found
 
 
 def _options(name: str, kind: type[TrackOptions], text: str | None) -> TrackOptions:

@@ -14,18 +14,8 @@ from colibri.autopilot.guidance.trajectories.tracks import Track, position, thro
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
+from tests.autopilot.guidance.trajectories.paths import DIPS
 
-DIPS = """x,y,z
-0.000,-1.000,2.000
--12.778,-12.242,2.395
--11.766,-8.213,7.787
--14.837,13.611,9.323
--0.132,-2.753,2.596
-9.651,4.154,10.789
--7.096,-13.277,5.887
-0.266,11.491,1.447
-"""
-"""All a metre high or more, and the least snap leads 1.03 m below the ground."""
 UP_AND_DOWN = "x,y,z,t\n0,0,51,0\n0,0,70,2\n0,0,51,4\n0,0,70,6\n0,0,70,10\n"
 
 

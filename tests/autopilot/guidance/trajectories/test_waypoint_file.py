@@ -66,6 +66,12 @@ def test_what_cannot_be_flown_is_one_line(tmp_path: Path, text: str, line: str) 
         track(f"waypoints:{tmp_path / 'points.csv'}")
 
 
+def test_times_at_twenty_hertz_are_not_refused_for_their_rounding(tmp_path: Path) -> None:
+    """0.15 - 0.1 is a little less than 0.05."""
+    rows = [f"{0.05 * k:.2f},{0.001 * k},0,1\n" for k in range(100)]
+    assert len(read(tmp_path, "t,x,y,z\n" + "".join(rows)).times_s) == 100
+
+
 def test_a_speed_beside_times_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TrackFileError, match="line 1, column t: says when to be where, so leave speed out"):
         read(tmp_path, "x,y,z,t\n1,2,3,0\n1,2,4,2\n", 2.0)

@@ -1,0 +1,173 @@
+"""Tracks as a vehicle will fly them, and those of other packages and of files of samples."""
+
+import os
+import re
+import subprocess
+import sys
+from math import inf, pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.guidance.trajectories.loading import LoadedTrack, load_track
+from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, TrackError, position, track
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import load_vehicle
+
+DOCS = Path(__file__).parents[4] / "docs"
+
+
+def loaded(name: str, floor_m: float | None = None, vehicle: str = "hummingbird") -> LoadedTrack:
+    return load_track(name, load_vehicle(vehicle), load_profile("flight"), floor_m)
+
+
+def samples(step_s: float, *, yaw: bool = False) -> tuple[list[str], Array]:
+    """Return header and rows of a lemniscate, 8 m wide in 6 s, and its positions."""
+    t = np.arange(0.0, 6.0, step_s)
+    flown = track("lemniscate")
+    motion = np.concatenate([t[:, None], *(position(flown, t, order) for order in range(3))], axis=1)
+    if yaw:
+        motion = np.concatenate([motion, np.full((len(t), 1), 90.0)], axis=1)
+    header = "t,x,y,z,vx,vy,vz,ax,ay,az" + (",yaw" if yaw else "")
+    return [header, *(",".join(f"{value:.6f}" for value in row) for row in motion)], motion[:, 1:4]
+
+
+def write(folder: Path, lines: list[str]) -> str:
+    path = folder / "track.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return f"samples:{path}"
+
+
+@pytest.mark.parametrize("name", [*THESIS_TRACKS, "hover", "lemniscate", "circle", "circle:radius=3,speed=4"])
+def test_what_the_vehicle_can_fly_needs_no_word(name: str) -> None:
+    assert loaded(name).note == ""
+
+
+def test_a_formula_beyond_the_limits_is_flown_as_it_is_and_said() -> None:
+    fast = loaded("lemniscate:lap=3")
+    t = np.linspace(0.0, 3.0, 50)
+    assert (position(fast.track, t) == position(track("lemniscate:lap=3"), t)).all()
+    assert fast.note == (
+        "track lemniscate:lap=3 asks for more than there is: thrust of 6.87 N a rotor, where 3.5 is the most; "
+        "tilt of 75.4 degrees, where 66 is the most; body rate of 15.3 rad/s, where 10 is the most"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "floor_m", "why"),
+    [
+        ("hover:height=-1", None, "track hover:height=-1 is at -1.00 m after 0.00 s, below the floor of 0 m"),
+        ("crown", 1.0, "track crown is at 0.50 m after 4.71 s, below the floor of 1 m"),
+    ],
+)
+def test_a_track_below_the_floor_is_refused(name: str, floor_m: float | None, why: str) -> None:
+    with pytest.raises(TrackError) as refused:
+        loaded(name, floor_m)
+    assert str(refused.value) == why
+
+
+@pytest.mark.parametrize(
+    ("floor_m", "vehicle"), [(-2.0, "hummingbird"), (-inf, "hummingbird"), (None, "hummingbird-thesis")]
+)
+def test_the_floor_may_be_lower_and_there_may_be_none(floor_m: float | None, vehicle: str) -> None:
+    assert loaded("hover:height=-1", floor_m, vehicle).note == ""
+
+
+@pytest.mark.parametrize("step_s", [0.02, 0.05, 0.1])
+def test_samples_are_flown_as_they_are(tmp_path: Path, step_s: float) -> None:
+    lines, places = samples(step_s)
+    flown = loaded(write(tmp_path, lines)).track
+    times_s = step_s * np.arange(len(places))
+    assert position(flown, times_s) == pytest.approx(places, abs=1e-6)
+    between = np.arange(0.0, times_s[-1], 0.001)
+    for order, off in ((0, 1e-4), (1, 5e-3), (2, 0.2)):
+        assert position(flown, between, order) == pytest.approx(position(track("lemniscate"), between, order), abs=off)
+    edges = times_s[1:-1]
+    for order in range(3):
+        before, after = (position(flown, edges + shift, order) for shift in (-1e-9, 1e-9))
+        assert before == pytest.approx(after, abs=1e-5), "continuous to the acceleration"
+
+
+def test_samples_may_say_which_way_to_look(tmp_path: Path) -> None:
+    lines, _ = samples(0.05, yaw=True)
+    flown = loaded(write(tmp_path, lines)).track
+    assert flown.yaw is not None
+    assert flown.yaw(flown.clock(np.array([1.234]), 0)).derivative(0) == pytest.approx([pi / 2.0])
+
+
+@pytest.mark.parametrize(
+    ("line", "column", "value", "why"),
+    [
+        (5, 5, "0", "line 6, column y: goes by 0.195 m from the line before, and vy by 0.0996: the columns contradict, "
+         "or rows are far apart"),
+        (5, 7, "9", "line 6, column vx: goes by -0.04 m/s from the line before, and ax by 0.208: the columns "
+         "contradict, or rows are far apart"),
+        (3, 0, "0.05", "line 4, column t: must be at least 0.001 s after the line before"),
+        (3, 3, "", "line 4, column z: expected a number from -10000 to 10000, not ''"),
+    ],
+)  # fmt: skip
+def test_samples_that_contradict_are_refused(tmp_path: Path, line: int, column: int, value: str, why: str) -> None:
+    lines, _ = samples(0.05)
+    cells = lines[line].split(",")
+    cells[column] = value
+    lines[line] = ",".join(cells)
+    with pytest.raises(TrackError) as refused:
+        track(write(tmp_path, lines))
+    assert str(refused.value) == f"{tmp_path / 'track.csv'}: {why}"
+
+
+def test_samples_below_the_ground_are_refused(tmp_path: Path) -> None:
+    lines = [line.replace(",3.000000,", ",-3.000000,") for line in samples(0.05)[0]]
+    with pytest.raises(TrackError, match=r"is at -3\.00 m after 0\.00 s, below the floor of 0 m"):
+        loaded(write(tmp_path, lines))
+
+
+def theirs(folder: Path, source: str, *command: str) -> "subprocess.CompletedProcess[str]":
+    """Run `colibri` where another package has registered the class Helix of `source`."""
+    (folder / "their_track.py").write_text(source, encoding="utf-8")
+    information = folder / "their_track-1.0.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: their-track\nVersion: 1.0\n", encoding="utf-8")
+    (information / "entry_points.txt").write_text("[colibri.tracks]\nhelix = their_track:Helix\n", encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}
+    return subprocess.run(
+        [sys.executable, "-m", "colibri", *command, "--quiet", "--no-figures", "--out", str(folder / "out")],
+        env=environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def example() -> str:
+    (code,) = re.findall(r"```python\n(.*?)```", (DOCS / "tracks.md").read_text(encoding="utf-8"), re.DOTALL)
+    return str(code)
+
+
+def test_the_example_of_the_docs_flies(tmp_path: Path) -> None:
+    done = theirs(tmp_path, example(), "fly", "helix:radius=3,climb=0.2", "--duration", "4")
+    assert (done.returncode, done.stderr) == (0, "")
+    rows = np.genfromtxt(tmp_path / "out" / "flight.csv", delimiter=",", names=True)
+    assert np.hypot(rows["x_ref"], rows["y_ref"]) == pytest.approx(3.0)
+    assert rows["z_ref"] == pytest.approx(1.0 + 0.2 * rows["t"])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "options", "why"),
+    [
+        (("class Helix", "class Other"), "", "track helix (their_track:Helix) cannot be loaded: "),
+        (("class Helix(TrackOptions)", "class Helix"), "", "track helix: <class 'their_track.Helix'> is no subclass of "
+         "colibri.TrackOptions"),
+        (("angle.cos()", "np.cos(angle)"), "", "track helix: Helix: NameError: name 'np' is not defined"),
+        (("return Track(position, duration_s=60.0)", "return 3"), "", "track helix: Helix: AttributeError: "),
+        (("self.climb * t", "self.climb / 0.0 * t"), "", "track helix: Helix: ZeroDivisionError: "),
+        (("", ""), ":width=3", "track helix has no option width: choose radius, climb"),
+        (("", ""), ":radius=x", "track helix: radius=x: Expected `float`, got `str`"),
+        (("", ""), ":climb=-1", "track helix:climb=-1 is at -58.99 m after 59.99 s, below the floor of 0 m"),
+    ],
+)  # fmt: skip
+def test_a_foreign_track_that_cannot_be_flown_is_one_line(
+    tmp_path: Path, wrong: tuple[str, str], options: str, why: str
+) -> None:
+    done = theirs(tmp_path, example().replace(*wrong) if wrong[0] else example(), "fly", f"helix{options}")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert done.stderr.startswith(f"colibri: error: {why}")
