@@ -54,7 +54,14 @@ def fly(out: Path, duration_s: float) -> Flight:
         "duration": duration_s,
         "out": out,
     }
-    files = {"controller": None, "solver": None, "vehicle": None, "plant_vehicle": None, "integrator": "rk4"}
+    files = {
+        "controller": None,
+        "solver": None,
+        "vehicle": None,
+        "plant_vehicle": None,
+        "integrator": "rk4",
+        "floor": None,
+    }
     world: dict[str, Any] = {"wind": NO_WIND, "gusts": (), "turbulence": None, "without": (), "start": {}}
     ground: dict[str, Any] = {"gcs": (), "signing_key": None, "insecure": False}
     plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files, **world, **ground))
