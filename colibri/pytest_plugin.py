@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from colibri.sitl.backends.setting import SettingError, setting_of
+from colibri.sitl.backends.setting import setting_of
 from colibri.sitl.errors import SitlError
 from colibri.sitl.summary import FLOWN, Summary
 
@@ -36,6 +36,7 @@ MARKS = {
 _FLIGHTS = pytest.StashKey["Flights"]()
 _LAUNCHER = pytest.StashKey["Launcher"]()
 _SUMMARY = pytest.StashKey[Summary]()
+_UNWRITTEN = pytest.StashKey[str]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -77,30 +78,34 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Make one test for each seed of mark `seeds`."""
     mark = metafunc.definition.get_closest_marker("seeds")
-    if mark is not None and "sitl_seed" in metafunc.fixturenames:
-        first, last = mark.args
-        metafunc.parametrize("sitl_seed", range(first, last + 1), indirect=True, ids=lambda seed: f"seed{seed}")
+    if mark is None or "sitl_seed" not in metafunc.fixturenames:
+        return
+    values = _values(mark)
+    first, last = values["first"], values["last"]
+    if not (isinstance(first, int) and isinstance(last, int) and first <= last):
+        pytest.fail(f"{_written(mark)}: give the first and the last seed, whole numbers", pytrace=False)
+    metafunc.parametrize("sitl_seed", range(first, last + 1), indirect=True, ids=lambda seed: f"seed{seed}")
 
 
 @pytest.fixture
 def sitl_seed(request: pytest.FixtureRequest) -> int | None:
     """Return the seed of the flight of mark `seeds` or `seed`, if there is one."""
     mark = request.node.get_closest_marker("seed")
-    seed: int | None = getattr(request, "param", None if mark is None else mark.args[0])
+    seed: int | None = getattr(request, "param", None if mark is None else _values(mark)["number"])
     return seed
 
 
 @pytest.fixture
 def sitl_fleet(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Callable[..., Fleet]]:
-    """Return what begins any number of flights: each with the marks of the test and a system id of its own."""
-    from colibri.sitl.fleet import Fleet
+    """Return what begins fleets: each vehicle with the marks of the test and a system id of its own."""
+    from colibri.sitl.fleet import begin_fleet
 
     with ExitStack() as stack:
         flights = _flights(request, sitl_seed, stack)
 
         def begin(count: int, **changes: Any) -> Fleet:
-            begun = len(flights.flown)
-            return Fleet(_begun(flights, **{"system": begun + number + 1, **changes}) for number in range(count))
+            with _in_one_line():
+                return begin_fleet(flights, count, **changes)
 
         yield begin
 
@@ -109,7 +114,10 @@ def sitl_fleet(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterato
 def sitl(request: pytest.FixtureRequest, sitl_seed: int | None) -> Iterator[Sitl]:
     """Return a vehicle that waits for orders, as the marks of the test describe it."""
     with ExitStack() as stack:
-        yield _begun(_flights(request, sitl_seed, stack))
+        flights = _flights(request, sitl_seed, stack)
+        with _in_one_line():
+            begun = flights.begin()
+        yield begun
 
 
 @pytest.hookimpl(wrapper=True)
@@ -124,17 +132,31 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
         return report
     if report.when == "setup" and report.passed:
         return report
-    setattr(report, FLOWN, flights.summary())
+    flown = flights.summary()
+    setattr(report, FLOWN, flown)
+    properties = [("sitl_simulated_s", round(flown["simulated_s"], 6))]
     if report.failed:
-        folder = Path(item.config.getoption("--sitl-keep")) / _file_name(item.nodeid)
-        places = flights.keep(folder)
-        link, ground = item.config.getoption("--sitl-link"), item.config.getoption("--sitl-ground")
-        lines = [f"flight kept in {place}" for place in places]
-        lines.append(
-            f"replay: pytest '{item.nodeid}' --sitl-link {link}" + (f" --sitl-ground {ground}" if ground else "")
-        )
-        report.sections.append(("sitl", "\n".join(lines)))
+        places, said = _kept(item, report, flights)
+        properties += [("sitl_kept", place.as_posix()) for place in places]
+        report.sections.append(("sitl", said))
+    report.user_properties += properties
+    item.user_properties += properties  # JUnit XML has those of the report on the teardown
     return report
+
+
+def _kept(item: pytest.Item, report: pytest.TestReport, flights: Flights) -> tuple[list[Path], str]:
+    """Keep the flights of a test that has failed; return where each is, and what to say of it."""
+    link, ground = item.config.getoption("--sitl-link"), item.config.getoption("--sitl-ground")
+    again = f"replay: pytest '{item.nodeid}' --sitl-link {link}" + (f" --sitl-ground {ground}" if ground else "")
+    folder, crash = _folder(item), getattr(report.longrepr, "reprcrash", None)
+    reason = (report.longreprtext if crash is None else crash.message).partition("\n")[0]
+    reason = re.sub(r"^[\w.]+\.(?=\w+:)", "", reason)  # the error's name alone, without its module's
+    try:
+        places = flights.keep(folder, title=item.nodeid, reason=reason)
+    except (Exception, SystemExit) as error:  # whatever it is, the test's own failure must be reported
+        return [], f"could not keep {folder}: {error}\n{again}"
+    shown = [_as_given(item.config, place) for place in places]
+    return shown, "\n".join([*(f"flight kept in {place}" for place in shown), again])
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
@@ -144,9 +166,16 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Write the hashes, if an option names a file for them."""
-    path = session.config.getoption("--sitl-hashes")
-    if path and not hasattr(session.config, "workerinput"):
-        Path(path).write_text("".join(line + "\n" for line in session.config.stash[_SUMMARY].lines()), encoding="utf-8")
+    config = session.config
+    path = config.getoption("--sitl-hashes")
+    if not path or hasattr(config, "workerinput"):
+        return
+    try:
+        lines = (line + "\n" for line in config.stash[_SUMMARY].lines())
+        (config.invocation_params.dir / path).write_text("".join(lines), encoding="utf-8")
+    except OSError as error:
+        config.stash[_UNWRITTEN] = f"sitl: could not write {path}: {error.strerror}"
+        session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
@@ -160,6 +189,8 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     summary = config.stash[_SUMMARY]
     if summary.flights:
         terminalreporter.write_line(summary.line(perf_counter()))
+    if _UNWRITTEN in config.stash:
+        terminalreporter.write_line(config.stash[_UNWRITTEN], red=True)
 
 
 class _Collector:
@@ -180,22 +211,22 @@ def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack)
     known: Flights | None = request.node.stash.get(_FLIGHTS, None)
     if known is not None:
         return known
-    try:
-        ground = request.config.getoption("--sitl-ground")
+    _forget(_folder(request.node))
+    ground = request.config.getoption("--sitl-ground")
+    with _in_one_line():
         setting = setting_of([*([{"ground": ground}] if ground else []), *_said(request.node, seed)])
-    except SettingError as error:
-        pytest.fail(str(error), pytrace=False)
     flights = stack.enter_context(Flights(setting, _launcher(request.config)))
     request.node.stash[_FLIGHTS] = flights
     return flights
 
 
-def _begun(flights: Flights, **changes: Any) -> Sitl:
-    """Begin a flight, or fail in one line."""
+@contextmanager
+def _in_one_line() -> Iterator[None]:
+    """Have a flight that cannot begin fail its test in one line."""
     try:
-        return flights.begin(**changes)
+        yield
     except SitlError as error:
-        pytest.fail(str(error), pytrace=False)
+        raise pytest.fail.Exception(str(error), pytrace=False) from None
 
 
 def _launcher(config: pytest.Config) -> Launcher | None:
@@ -211,18 +242,59 @@ def _launcher(config: pytest.Config) -> Launcher | None:
 
 def _said(node: pytest.Item, seed: int | None) -> list[Mapping[str, Any]]:
     """Return the keywords of the marks of a test, the closest last."""
-    said: list[Mapping[str, Any]] = [mark.kwargs for mark in reversed(list(node.iter_markers("sitl")))]
-    for name in ("vehicle", "feedback"):
+    said: list[Mapping[str, Any]] = [_values(mark) for mark in reversed(list(node.iter_markers("sitl")))]
+    for name, key in (("vehicle", "name"), ("feedback", "kind")):
         mark = node.get_closest_marker(name)
         if mark is not None:
-            said.append({name: mark.args[0]})
+            said.append({name: _values(mark)[key]})
     mark = node.get_closest_marker("wind")
     if mark is not None:
-        said.append({**dict(zip(("wind", "turbulence"), mark.args, strict=False)), **mark.kwargs})
+        said.append(_values(mark))
     if seed is not None:
         said.append({"seed": seed})
     return said
 
 
-def _file_name(nodeid: str) -> str:
-    return re.sub(r"[^\w.\-\[\]]+", "-", nodeid.replace("::", "-"))[-120:]
+def _values(mark: pytest.Mark) -> dict[str, Any]:
+    """Return the values of a mark by their names, or fail in one line where it has not what `MARKS` says."""
+    names = [name.strip() for name in MARKS[mark.name].partition("(")[2].partition(")")[0].split(",")]
+    if mark.name == "sitl":
+        needed, names = set(), []
+    else:
+        needed = {name for name in names if "=" not in name}
+        names = [name.partition("=")[0] for name in names]
+    values = {**dict(zip(names, mark.args, strict=False)), **mark.kwargs}
+    wrong = len(mark.args) > len(names) or not needed <= set(values) or (names and not set(values) <= set(names))
+    if wrong:
+        pytest.fail(f"mark is {MARKS[mark.name]}; not {_written(mark)}", pytrace=False)
+    return values
+
+
+def _written(mark: pytest.Mark) -> str:
+    """Return a mark as it is written."""
+    return f"{mark.name}({', '.join([*map(repr, mark.args), *(f'{k}={v!r}' for k, v in mark.kwargs.items())])})"
+
+
+def _folder(item: pytest.Item) -> Path:
+    """Return where the flights of a test are kept."""
+    name = re.sub(r"[^\w.\-\[\]]+", "-", item.nodeid.replace("::", "-"))[-120:]
+    keep: str = item.config.getoption("--sitl-keep")
+    return item.config.invocation_params.dir / keep / name
+
+
+def _as_given(config: pytest.Config, place: Path) -> Path:
+    """Return a place below the folder of option `--sitl-keep` as that has it."""
+    keep = Path(config.getoption("--sitl-keep"))
+    return keep / place.relative_to(config.invocation_params.dir / keep)
+
+
+def _forget(folder: Path) -> None:
+    """Remove the flights that an earlier run of a test has left, and folders that are empty then."""
+    from colibri.sitl.flight_record import KEPT
+
+    with suppress(OSError):
+        for place in (*folder.glob("flight-*/"), folder):
+            for name in KEPT:
+                (place / name).unlink(missing_ok=True)
+            place.rmdir()
+        folder.parent.rmdir()

@@ -1,5 +1,6 @@
 """Record of a flight: every frame with its command, every message; in memory, and in files only on request."""
 
+import csv
 from hashlib import sha256
 from pathlib import Path
 from struct import Struct
@@ -8,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.autopilot.commander.rules.modes import mode_of_custom
-from colibri.common.process.log_files import CsvLog
 from colibri.mavlink.files.flight_log import SUFFIX
 from colibri.mavlink.wire.framing import Framer
 from colibri.mavlink.wire.tlog import TlogWriter
@@ -19,7 +19,11 @@ COLUMNS = (
     *("control1", "control2", "control3", "control4", "armed", "custom_mode"),
 )
 """Truth in SI, ENU and FLU; controls are parts of the largest rotor speed; the mode is HEARTBEAT's number."""
-PLANT_LOG, GROUND_LOG, TABLE, FIGURE = f"plant{SUFFIX}", f"ground{SUFFIX}", "flight.csv", "flight.png"
+PLANT_LOG, GROUND_LOG, TABLE, FIGURE, FACTS = KEPT = (
+    *(f"plant{SUFFIX}", f"ground{SUFFIX}"),
+    *("flight.csv", "flight.png", "flight.json"),
+)
+"""The files that are kept of a flight."""
 
 _ROW = Struct(f"<{len(COLUMNS)}d")
 _FLOWN = Struct("<Q13d4d?")
@@ -66,41 +70,24 @@ class Record:
         table = np.frombuffer(bytes(self._rows), dtype="<f8").reshape(-1, len(COLUMNS))
         return dict(zip(COLUMNS, table[table[:, 0] >= since_s - 1e-9].T, strict=True))
 
-    def keep(self, folder: Path, *, figure: bool = True) -> None:
-        """Write the table, both logs and, if asked for, the figure into `folder`."""
+    def keep(self, folder: Path) -> None:
+        """Write the table and both logs into `folder`."""
         folder.mkdir(parents=True, exist_ok=True)
-        table = CsvLog(folder / TABLE, COLUMNS)
-        for row in _ROW.iter_unpack(bytes(self._rows)):
-            table.write(row)
-        table.close()
+        with (folder / TABLE).open("w", encoding="utf-8", newline="") as file:
+            table = csv.writer(file, lineterminator="\n")
+            table.writerow((*COLUMNS[:-1], "mode"))
+            table.writerows((*row, mode_name(number)) for *row, number in _ROW.iter_unpack(bytes(self._rows)))
         for name, passed in ((PLANT_LOG, self._plant), (GROUND_LOG, self._ground)):
             framer = Framer()
             log = TlogWriter(folder / name)
             for time_us, datagram in passed:
                 log.write(time_us, framer.take(datagram))
             log.close()
-        if figure and self.frames:
-            self._draw(folder / FIGURE)
 
-    def _draw(self, path: Path) -> None:
-        from matplotlib.figure import Figure
 
-        flown = self.columns()
-        figure = Figure(figsize=(9.0, 8.0), layout="constrained")
-        places, tilts, modes = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 1))
-        for name, label in (("x", "east"), ("y", "north"), ("z", "up")):
-            places.plot(flown["t"], flown[name], label=label)
-        places.set_ylabel("position, m")
-        places.legend()
-        tilts.plot(flown["t"], tilt_deg(flown))
-        tilts.set_ylabel("tilt, degrees")
-        numbers, which = np.unique(flown["custom_mode"], return_inverse=True)
-        modes.step(flown["t"], which, where="post")
-        modes.fill_between(flown["t"], -0.5, len(numbers) - 0.5, where=flown["armed"] > 0.0, alpha=0.15, label="armed")
-        modes.set_yticks(range(len(numbers)), [str(mode_of_custom(int(number)) or number) for number in numbers])
-        modes.legend()
-        modes.set_xlabel("simulated time, s")
-        figure.savefig(path, dpi=110)
+def mode_name(number: float) -> str:
+    """Return the mode of HEARTBEAT's number by its name; what has none stays a number."""
+    return str(mode_of_custom(int(number)) or int(number))
 
 
 def tilt_deg(flown: Columns) -> NDArray[np.float64]:

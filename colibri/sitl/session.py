@@ -4,6 +4,7 @@ import json
 from argparse import ArgumentTypeError
 from collections.abc import Mapping
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Self
@@ -18,8 +19,10 @@ from colibri.plant.vehicle.description import VehicleError, load_vehicle
 from colibri.sitl.backends.launcher import Launcher
 from colibri.sitl.backends.lockstep import Autopilot, LockstepSession, Plant
 from colibri.sitl.backends.memory import MemoryAutopilot, MemoryPlant
-from colibri.sitl.backends.setting import Setting, SettingError
+from colibri.sitl.backends.setting import Setting, SettingError, setting_of
 from colibri.sitl.backends.udp import UdpAutopilot, UdpPlant
+from colibri.sitl.flight_figure import draw
+from colibri.sitl.flight_record import FACTS, FIGURE
 from colibri.sitl.vehicle import Sitl
 
 
@@ -27,25 +30,25 @@ class Flights:
     """All that a test flies.
 
     Attributes:
+        setting: What each begins with, but for changes.
         flown: The flights, in the order in which they were begun.
     """
 
     def __init__(self, setting: Setting, launcher: Launcher | None) -> None:
         """Fly by `setting`, in processes of a `launcher`, or in this one."""
-        self._setting = setting
+        self.setting = setting
         self._launcher = launcher
         self._ends = ExitStack()
         self._folder = Path(self._ends.enter_context(TemporaryDirectory(prefix="sitl-")))
         self.flown: list[Sitl] = []
 
     def begin(self, **changes: Any) -> Sitl:
-        """Begin a flight that differs from the test's setting by `changes`.
+        """Begin a flight that differs from the test's setting by `changes`; their `params` add up.
 
         Raises:
             SettingError: It cannot begin so.
         """
-        values = {name: getattr(self._setting, name) for name in Setting.__dataclass_fields__}
-        setting = Setting(**(values | changes))
+        setting = setting_of([asdict(self.setting), changes])
         state = self._folder / f"vehicle-{len(self.flown)}"
         sitl = Sitl(setting, self._lockstep(setting, state), origin_of(setting))
         self.flown.append(sitl)
@@ -66,14 +69,32 @@ class Flights:
         self._ends.callback(autopilot.close)
         return LockstepSession(plant, autopilot, setting.system, setting.seed)
 
-    def keep(self, folder: Path, *, figures: bool = True) -> list[Path]:
-        """Write all that is known of the flights below `folder`, with or without figures; return where each is."""
+    def keep(self, folder: Path, *, figures: bool = True, title: str = "", reason: str = "") -> list[Path]:
+        """Write all that is known of the flights below `folder`; return where each is.
+
+        Args:
+            folder: Made where it is missing.
+            figures: Whether to draw them, too.
+            title: Of the figures: what was flown.
+            reason: Why it ended, said beside the mark at the end.
+        """
         places = []
         for number, sitl in enumerate(self.flown):
             place = folder / f"flight-{number}" if len(self.flown) > 1 else folder
-            sitl.record.keep(place, figure=figures)
-            facts = {"setting": str(sitl.setting), "sha256": sitl.sha256, "ended": str(sitl), "texts": sitl.texts}
-            (place / "flight.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
+            sitl.record.keep(place)
+            if figures and sitl.record.frames:
+                heading = f"{title}, vehicle {sitl.system}" if len(self.flown) > 1 else title
+                draw(sitl.record.columns(), sitl.timed_texts, place / FIGURE, title=heading, reason=reason)
+            facts = {
+                "test": title,
+                "reason": reason,
+                "setting": asdict(sitl.setting),
+                "sha256": sitl.sha256,
+                "simulated_s": sitl.time_s,
+                "ended": str(sitl),
+                "texts": sitl.texts,
+            }
+            (place / FACTS).write_text(json.dumps(facts, indent=1, default=str) + "\n", encoding="utf-8")
             places.append(place)
         return places
 

@@ -1,6 +1,6 @@
 """Fixture `sitl`: a vehicle in flight, with commands that wait for their acknowledgement."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import dist, nan, pi
 from typing import Any, NamedTuple
@@ -29,6 +29,8 @@ FORCE = 21196.0
 READY_WITHIN_S = 40.0
 STICKS_EVERY_US = 40_000
 """25 times a second, as QGroundControl sends those of a joystick."""
+_FIRST_STICKS_S = 0.2
+"""How long sticks are sent over a bad link until some have come through."""
 
 
 class Links(NamedTuple):
@@ -42,6 +44,14 @@ class Links(NamedTuple):
 
     ground: Trouble
     plant: Trouble
+
+    def __getattr__(self, name: str) -> Any:
+        """Refuse what is no link.
+
+        Raises:
+            AttributeError: Always.
+        """
+        raise AttributeError(f"there is no link {name}: choose {', '.join(self._fields)}")
 
 
 class Sitl(View, Stepped, Steered):
@@ -57,6 +67,7 @@ class Sitl(View, Stepped, Steered):
         NotInTime: Raised where a condition is not met in time, an AssertionError.
         gcs: The first ground station; what `Sitl` does itself it does through it.
         link: Faults of the links, which may be changed at any time.
+        fleet: The vehicles that share its simulated time, itself among them; empty where it flies alone.
     """
 
     items = items
@@ -77,6 +88,7 @@ class Sitl(View, Stepped, Steered):
         self._stations: list[Station] = []
         self.gcs = self.client(255, 190)
         self._texts = StatusTexts()
+        self.fleet: Sequence[Sitl] = ()
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
 
     def begin(self) -> None:
@@ -87,11 +99,21 @@ class Sitl(View, Stepped, Steered):
     # Time.
 
     def step(self) -> None:
-        """Fly one frame."""
+        """Fly one frame; whoever shares its time flies as long."""
+        self.fly_frame()
+        self.have_others_catch_up()
+
+    def have_others_catch_up(self) -> None:
+        """Fly each vehicle of the fleet that is behind this one until it is not."""
+        for other in self.fleet:
+            while other.time_us < self.time_us:
+                other.fly_frame()
+
+    def fly_frame(self) -> None:
+        """Fly one frame of this vehicle alone."""
         now_us = self.time_us
         if self._sticks is not None and now_us >= self._sticks_at_us:
-            self._sticks_at_us = now_us + STICKS_EVERY_US
-            self.stick(**self._sticks)
+            self._send_sticks()
         parcels = []
         for station in self._stations:
             for datagram in station.departing(now_us):
@@ -104,7 +126,7 @@ class Sitl(View, Stepped, Steered):
         for number, datagram in instant.to_stations.parcels:
             self.record.note(now_us, datagram)
             if number == self.gcs.number:
-                self._texts.add_datagram(datagram)
+                self._texts.add_datagram(datagram, now_us)
             self._stations[number - 1].arriving(datagram, now_us)
         for station in self._stations:
             station.listen(self.time_us)
@@ -119,20 +141,22 @@ class Sitl(View, Stepped, Steered):
         """Stop the rotors; in the air only by force."""
         self.gcs.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE if force else 0.0, what="disarming")
 
-    def takeoff(self, height_m: float = 2.5, *, wait: bool = True, within: float | None = None) -> None:
-        """Arm, climb so high above home, and stay.
+    def takeoff(self, height_m: float | None = None, *, wait: bool = True, within: float | None = None) -> None:
+        """Arm, climb so high above home, by default as high as MIS_TAKEOFF_ALT says, and stay there: see `is_at`.
 
         Raises:
-            NotInTimeError: It is not up there `within` s; if None, 5 s and 2 s a metre.
+            NotInTimeError: It is not up there `within` s; if None, 8 s and 2 s a metre.
         """
-        params = (0.0, 0.0, 0.0, nan, nan, nan, height_m)
-        high_m = self.position[2] + 0.9 * height_m
-        self.gcs.command(mav.MAV_CMD_NAV_TAKEOFF, *params, what="take-off")
+        height_m = self.get_param("MIS_TAKEOFF_ALT") if height_m is None else height_m
+        east, north, from_m = self.position
+        if self.home is not None and (self.armed or abs(self.home[2] - from_m) > self.near_m):
+            from_m = self.home[2]  # home is where it is armed, unless it was set elsewhere
+        self.gcs.command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, height_m, what="take-off")
         if not self.armed:
             self.arm()
         if wait:
-            max_s = 5.0 + 2.0 * height_m if within is None else within
-            up = lambda: self.mode is Mode.HOLD and self.position[2] > high_m  # noqa: E731
+            high_m, max_s = from_m + height_m, 8.0 + 2.0 * height_m if within is None else within
+            up = lambda: self.mode is Mode.HOLD and self.is_at((east, north, high_m))  # noqa: E731
             self.wait_until(up, within=max_s, what="the climb")
 
     def land(self, *, wait: bool = True, within: float | None = None) -> None:
@@ -191,14 +215,14 @@ class Sitl(View, Stepped, Steered):
 
     def fly_track(self, name: str) -> None:
         """Fly a track of parameter TRACK: arm if need be, and go there first."""
-        self.set_param("TRACK", TRACKS.index(name))
+        self.set_param("TRACK", TRACKS.index(_chosen("track", name, TRACKS)))
         self.select(Mode.TRACK)
         if not self.armed:
             self.arm()
 
     def select(self, mode: Mode | str) -> None:
         """Choose a mode."""
-        number = custom_mode(Mode(mode))
+        number = custom_mode(Mode(_chosen("mode", mode, tuple(Mode))))
         params = (1.0, number >> 16 & 0xFF, number >> 24 & 0xFF)
         self.gcs.command(mav.MAV_CMD_DO_SET_MODE, *params, what=f"mode {mode}")
 
@@ -235,11 +259,18 @@ class Sitl(View, Stepped, Steered):
     @contextmanager
     def sticks_held(self, **axes: float) -> Iterator[None]:
         """Hold the sticks so, see `stick`, whatever else is done meanwhile: they are sent 25 times a second."""
-        before, self._sticks, self._sticks_at_us = self._sticks, axes, self.time_us
+        before, self._sticks = self._sticks, axes
+        self._send_sticks()  # now, so that they are heard before whatever else is sent
+        if before is None and self.link.ground.any:
+            self.run(_FIRST_STICKS_S + self.link.ground.delay_s + self.link.ground.jitter_s)
         try:
             yield
         finally:
             self._sticks = before
+
+    def _send_sticks(self) -> None:
+        self._sticks_at_us = self.time_us + STICKS_EVERY_US
+        self.stick(**(self._sticks or {}))
 
     # Messages that are not answered.
 
@@ -286,11 +317,20 @@ class Sitl(View, Stepped, Steered):
         return station
 
 
+def _chosen(what: str, name: str, names: Sequence[str]) -> str:
+    if name not in names:
+        raise ValueError(f"there is no {what} {name}: choose {', '.join(names)}")
+    return name
+
+
 def _number(kind: str, of: str | int) -> int:
     if isinstance(of, int):
         return of
-    for part in ("", "SYSTEM_", "SENSOR_"):
-        number = getattr(mav, f"{kind}_{part}{of.upper()}", None)
-        if number is not None:
-            return int(number)
-    raise ValueError(f"MAVLink has no {kind}_{of.upper()}")
+    of = _without_kind(of)
+    numbers = {_without_kind(each.name.removeprefix(f"{kind}_")): number for number, each in mav.enums[kind].items()}
+    return int(numbers[_chosen(kind, of, sorted(numbers.keys() - {"enum_end"}))])
+
+
+def _without_kind(unit: str) -> str:
+    """Return the name of a unit without what says of which kind it is: system_motor is motor, sensor_gps is gps."""
+    return unit.lower().removeprefix("system_").removeprefix("sensor_")

@@ -19,7 +19,6 @@ from colibri.sitl.ground_station import Station
 from colibri.sitl.inbox import StatusTexts
 
 _NEAR_M = {"state": 0.3, "sensors": 2.0}
-"""Closer than this it is there: an estimate is as far from the truth as GPS is."""
 _SLOW_M_S = 0.3
 
 
@@ -45,6 +44,11 @@ class View:
     def time_us(self) -> int:
         """Simulated time, µs."""
         return self._lockstep.truth.time_us
+
+    @property
+    def near_m(self) -> float:
+        """Closer than this it is there, m: an estimate is as far from the truth as GPS is."""
+        return _NEAR_M[self.setting.feedback]
 
     @property
     def system(self) -> int:
@@ -104,6 +108,11 @@ class View:
         """Every STATUSTEXT that the vehicle has sent to the first ground station, whatever the links do."""
         return self._texts.texts
 
+    @property
+    def timed_texts(self) -> list[tuple[float, str]]:
+        """Each of `texts` with the simulated time when it was sent, s."""
+        return [(time_us * 1e-6, text) for time_us, text in zip(self._texts.times_us, self.texts, strict=True)]
+
     def said(self, part: str) -> bool:
         """Whether a STATUSTEXT with `part` in it was sent, whatever the links do; those received are in `gcs.texts`."""
         return self._texts.said(part)
@@ -114,7 +123,7 @@ class View:
 
     def is_at(self, place: Sequence[float], near_m: float | None = None, slow_m_s: float = _SLOW_M_S) -> bool:
         """Whether it is near a place, ENU, and hardly moves; near is 0.3 m, or 2 m on sensors."""
-        near_m = _NEAR_M[self.setting.feedback] if near_m is None else near_m
+        near_m = self.near_m if near_m is None else near_m
         return dist(place, self.position) < near_m and self.speed_m_s < slow_m_s
 
     def flown(self, since_s: float = 0.0) -> Columns:

@@ -48,7 +48,8 @@ def _rotor_lost(sitl: "Sitl") -> None:
 
 def _rotor_lost_on_sensors(sitl: "Sitl") -> None:
     """Lose a rotor soon after the take-off, and land on three."""
-    sitl.takeoff(6.0)
+    sitl.takeoff(6.0, wait=False)
+    sitl.wait_until(lambda: sitl.mode is Mode.HOLD and sitl.position[2] > 5.4, within=17.0, what="the climb")
     sitl.inject("motor", "off", 4)
     sitl.wait_until(lambda: not sitl.armed, within=30.0, what="the landing")
 

@@ -2,15 +2,20 @@
 
 from dataclasses import dataclass
 from heapq import heappop, heappush
+from math import inf
 from random import Random
 
 _HELD_BACK_S = 0.05
 """For so long, at most, a datagram is held back so that others overtake it."""
 
 
+_MAX = {"loss": 1.0, "delay_s": inf, "jitter_s": inf, "duplicate": 1.0, "reorder": 1.0, "corrupt": 1.0, "down": True}
+"""What a link does, and the largest value of each; the smallest is 0."""
+
+
 @dataclass(slots=True)
 class Trouble:
-    """What a link does, to each datagram by itself. May be changed at any time.
+    """What a link does, to each datagram by itself. May be changed at any time, to what it can be.
 
     Attributes:
         loss: Part of the datagrams that never arrive.
@@ -29,6 +34,20 @@ class Trouble:
     reorder: float = 0.0
     corrupt: float = 0.0
     down: bool = False
+
+    def __setattr__(self, name: str, value: float) -> None:
+        """Change what the link does.
+
+        Raises:
+            AttributeError: A link has no such attribute.
+            ValueError: It cannot have that value.
+        """
+        if name not in _MAX:
+            raise AttributeError(f"a link has no {name}: choose {', '.join(sorted(_MAX))}")
+        if not isinstance(value, int | float) or not 0.0 <= value <= _MAX[name] or value == inf:
+            limits = "from 0 on, in s" if _MAX[name] == inf else f"from 0 to {_MAX[name]:g}"
+            raise ValueError(f"{name} of a link must be {limits}, not {value!r}")
+        object.__setattr__(self, name, value)
 
     @property
     def any(self) -> bool:

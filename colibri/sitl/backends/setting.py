@@ -5,8 +5,10 @@ Nothing here loads plant or autopilot: pytest imports it in every run.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
+
+import msgspec
 
 from colibri.flights.command_lines import options_of, plant_options
 from colibri.plant.simulation.setting import WorldSetting
@@ -51,7 +53,7 @@ class Setting(WorldSetting):
     controller: str | None = None
     feedback: str = "state"
     airborne: float | None = None
-    params: Mapping[str, float] = field(default_factory=dict)
+    params: Mapping[str, int | float] = field(default_factory=dict)
     track: str | None = None
     home: str | None = None
     ground: Mapping[str, float] = field(default_factory=dict)
@@ -84,6 +86,8 @@ class Setting(WorldSetting):
 
 KEYS = frozenset(each.name for each in fields(Setting))
 DOES = frozenset(each.name for each in fields(Trouble)) - {"down"}
+_NUMBERS = ("start", "ground")
+"""What is read from KEY=VALUE,... where it is text."""
 
 
 def setting_of(marks: Iterable[Mapping[str, Any]]) -> Setting:
@@ -92,28 +96,54 @@ def setting_of(marks: Iterable[Mapping[str, Any]]) -> Setting:
     Raises:
         SettingError: One has a key that no setting has, or a wrong value.
     """
-    values: dict[str, Any] = {}
-    params: dict[str, float] = {}
+    values: dict[str, Any] = {"params": {}}
     for mark in marks:
         unknown = sorted(set(mark) - KEYS)
         if unknown:
             raise SettingError(f"a flight has no {unknown[0]}: choose {', '.join(sorted(KEYS))}")
-        values |= mark
-        params |= mark.get("params", {})
+        params = _numbers("params", mark.get("params", {}))
+        values |= {**mark, "params": values["params"] | params}
     for name in ("gusts", "without"):
         if isinstance(values.get(name), str):
             values[name] = (values[name],)
-    for name in ("start", "ground"):
-        if isinstance(values.get(name), str):
-            values[name] = _numbers(name, values[name])
+    values |= {name: _numbers(name, values[name]) for name in _NUMBERS if name in values}
     unknown = sorted(set(values.get("ground", ())) - DOES)
     if unknown:
-        raise SettingError(f"a link does no {unknown[0]}: choose {', '.join(sorted(DOES))}")
-    return Setting(**{**values, "params": params})
-
-
-def _numbers(name: str, text: str) -> dict[str, float]:
+        raise SettingError(f"a link has no {unknown[0]} to begin with: choose {', '.join(sorted(DOES))}")
     try:
-        return {key: float(value) for key, value in (pair.split("=", 1) for pair in text.split(","))}
-    except ValueError:
-        raise SettingError(f"{name} is KEY=VALUE,..., not {text!r}") from None
+        Trouble(**values.get("ground", {}))
+        setting = msgspec.convert({name: _plain(value) for name, value in values.items()}, Setting)
+    except msgspec.ValidationError as error:
+        wrong, _, where = str(error).partition(" - at `$.")
+        raise SettingError(f"{where.rstrip('`')}: {wrong.replace('`', '').replace('null', 'None')}") from None
+    except ValueError as error:
+        raise SettingError(str(error)) from None
+    if setting.airborne is not None and setting.feedback == "sensors":
+        raise SettingError('airborne is for feedback "state": an estimator begins at rest, so stand, and take off')
+    return setting
+
+
+def _numbers(name: str, given: object) -> Mapping[str, int | float]:
+    """Return numbers by name, given so or as KEY=VALUE,...; whole ones stay whole.
+
+    Raises:
+        SettingError: They are not.
+    """
+    try:
+        pairs = [pair.split("=", 1) for pair in given.split(",")] if isinstance(given, str) else given
+        return {str(key): _number(value) for key, value in dict(pairs).items()}  # type: ignore[call-overload]
+    except (ValueError, TypeError):
+        raise SettingError(f"{name} is KEY=VALUE,... in numbers, not {given!r}") from None
+
+
+def _number(value: Any) -> int | float:
+    if isinstance(value, str) and value.strip().lstrip("+-").isdigit():
+        return int(value)
+    return value if isinstance(value, int) else float(value)
+
+
+def _plain(value: Any) -> Any:
+    """Return a path as text, and a number of numpy's as Python's."""
+    if isinstance(value, PurePath):
+        return str(value)
+    return value.item() if hasattr(value, "item") else value

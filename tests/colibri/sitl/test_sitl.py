@@ -1,11 +1,13 @@
 """The pytest plugin as a stranger's test file meets it: marks, failures, the sum at the end, workers, the docs."""
 
+import json
 import os
 import re
 import subprocess
 import sys
 from importlib.metadata import entry_points
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -102,6 +104,7 @@ def test_a_failed_test_keeps_its_flight_and_says_how_to_fly_it_again(pytester: p
         def test_up(sitl):
             sitl.wait_until(lambda: sitl.position[2] > 4.0, within=0.3, what="the climb")
         """,
+        "--junitxml=junit.xml",
     )
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(
@@ -116,6 +119,69 @@ def test_a_failed_test_keeps_its_flight_and_says_how_to_fly_it_again(pytester: p
         *("flight.csv", "flight.json", "flight.png", "ground.tlog", "plant.tlog")
     }
     assert all(path.stat().st_size > 100 for path in folder.iterdir())
+    assert (folder / "flight.csv").read_text(encoding="utf-8").splitlines()[-1].endswith(",1.0,hold")
+    facts = json.loads((folder / "flight.json").read_text(encoding="utf-8"))
+    assert facts["test"].endswith("::test_up")
+    assert facts["reason"].startswith("NotInTimeError: the climb took longer")
+    assert (facts["setting"]["airborne"], facts["simulated_s"]) == (3.0, pytest.approx(0.3, abs=0.01))
+    properties = {each.get("name"): each.get("value") for each in ElementTree.parse("junit.xml").iter("property")}
+    assert properties == {"sitl_simulated_s": f"{facts['simulated_s']:g}", "sitl_kept": f"sitl-failures/{folder.name}"}
+
+
+def test_only_flights_of_tests_that_fail_now_are_kept(pytester: pytest.Pytester) -> None:
+    source = """
+        import pytest
+
+        @pytest.mark.sitl(airborne=3.0)
+        @pytest.mark.parametrize("bad", {bad})
+        def test_one(sitl, bad):
+            assert not bad
+
+        @pytest.mark.sitl(airborne=3.0)
+        def test_two(sitl_fleet):
+            sitl_fleet(2)
+            assert {two}
+    """
+    kept = pytester.path / "sitl-failures"
+    run(pytester, source.format(bad=[False, True], two=False)).assert_outcomes(passed=1, failed=2)
+    assert len(list(kept.iterdir())) == 2
+    (kept / "mine").touch()
+    run(pytester, source.format(bad=[False], two=True)).assert_outcomes(passed=2)
+    run(pytester, source.format(bad=[True, False], two=True), "-k", "one").assert_outcomes(
+        passed=1, failed=1, deselected=1
+    )
+    assert {path.name.rpartition("test_")[2] for path in kept.iterdir()} == {"mine", "one[True]"}
+
+
+@pytest.mark.parametrize("hashes", [(), ("--sitl-hashes", "sitl-failures/hashes")])
+def test_what_cannot_be_kept_is_said_and_the_failure_still_reported(
+    pytester: pytest.Pytester, hashes: tuple[str, ...]
+) -> None:
+    (pytester.path / "sitl-failures").touch()  # as good as a folder that cannot be written
+    result = run(pytester, "def test_up(sitl):\n    assert sitl.position[2] > 1.0\n", *hashes)
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["*assert * > 1.0", "could not keep *sitl-failures*test_up: *", "replay: pytest *"])
+    result.stdout.no_fnmatch_line("*INTERNALERROR*")
+    if hashes:
+        result.stdout.fnmatch_lines(["sitl: could not write sitl-failures/hashes: Not a directory"])
+
+
+@pytest.mark.parametrize(
+    ("mark", "line"),
+    [
+        ("seeds(3)", "mark is seeds(first, last): one flight for each seed; not seeds(3)"),
+        ("seeds(3, 1)", "seeds(3, 1): give the first and the last seed, whole numbers"),
+        ("seed()", "mark is seed(number): of everything random; not seed()"),
+        ("vehicle(model='iris')", "mark is vehicle(name): what is flown; not vehicle(model='iris')"),
+        ("wind('5@270', 'light', 3)", "mark is wind(wind, turbulence=None): *; not wind('5@270', 'light', 3)"),
+        ("sitl('iris')", "mark is sitl(*): what the flight begins with; not sitl('iris')"),
+    ],
+)
+def test_a_mark_that_is_not_written_so_is_refused_in_one_line(pytester: pytest.Pytester, mark: str, line: str) -> None:
+    result = run(pytester, f"import pytest\n\n@pytest.mark.{mark}\ndef test(sitl): pass\n")
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines([line.replace("[", "[[]")])
+    result.stdout.no_fnmatch_line("*Error*")
 
 
 def test_what_a_mark_says_wrongly_is_said_in_one_line(pytester: pytest.Pytester) -> None:
@@ -150,6 +216,7 @@ def test_what_a_mark_says_wrongly_is_said_in_one_line(pytester: pytest.Pytester)
             "*no-such*",
         ]
     )
+    result.stdout.no_fnmatch_line("During handling of the above exception*")
 
 
 def test_a_ground_link_is_bad_where_the_command_line_or_a_mark_says_so(pytester: pytest.Pytester) -> None:
@@ -167,7 +234,7 @@ def test_a_ground_link_is_bad_where_the_command_line_or_a_mark_says_so(pytester:
     run(pytester, source, "--sitl-ground", "loss=0.3,jitter_s=0.05").assert_outcomes(passed=2)
     result = run(pytester, source, "--sitl-ground", "lost=0.3")
     result.assert_outcomes(errors=1, passed=1)
-    result.stdout.fnmatch_lines(["a link does no lost: choose corrupt, delay_s, *"])
+    result.stdout.fnmatch_lines(["a link has no lost to begin with: choose corrupt, delay_s, *"])
 
 
 def test_who_does_not_fly_does_not_load_what_flies(pytester: pytest.Pytester) -> None:

@@ -1,0 +1,78 @@
+"""Orders of the fixture: when they are done, and what is no order."""
+
+from typing import Any
+
+import pytest
+
+from colibri.sitl.backends.setting import Setting, SettingError, setting_of
+from colibri.sitl.session import Flights
+
+
+def test_a_takeoff_is_done_when_it_is_there() -> None:
+    with Flights(Setting(), None) as flights:
+        sitl = flights.begin()
+        sitl.takeoff(5.0)
+        assert sitl.is_at((0.0, 0.0, 5.0))
+
+
+def test_a_takeoff_without_a_height_is_as_high_as_the_parameter_says() -> None:
+    with Flights(Setting(params={"MIS_TAKEOFF_ALT": 1.5}), None) as flights:
+        sitl = flights.begin(start={"x": 2.0})
+        sitl.takeoff()
+        assert sitl.is_at((2.0, 0.0, 1.5))
+        sitl.takeoff(2.0)
+        assert sitl.is_at((2.0, 0.0, 2.0))
+
+
+@pytest.mark.parametrize("ground", [{}, {"loss": 0.3, "jitter_s": 0.05}])
+def test_sticks_are_heard_as_soon_as_they_are_held(ground: dict[str, float]) -> None:
+    with Flights(Setting(airborne=3.0, ground=ground), None) as flights:
+        sitl = flights.begin()
+        with sitl.sticks_held(pitch=1.0):
+            sitl.select("position")
+        assert sitl.mode == "position"
+
+
+def test_what_there_is_not_is_refused_with_what_there_is() -> None:
+    with Flights(Setting(airborne=3.0), None) as flights:
+        sitl = flights.begin()
+        with pytest.raises(ValueError, match=r"^there is no mode holdd: choose stabilized, .*hold, "):
+            sitl.select("holdd")
+        with pytest.raises(ValueError, match=r"^there is no track wavy: choose spiral, .*wave, "):
+            sitl.fly_track("wavy")
+        with pytest.raises(ValueError, match=r"^there is no FAILURE_UNIT motorr: choose accel, .*motor, "):
+            sitl.inject("motorr", "off")
+        with pytest.raises(AttributeError, match="there is no link grund: choose ground, plant"):
+            sitl.link.grund.loss = 0.1
+        with pytest.raises(AttributeError, match="a link has no lost: choose corrupt, delay_s, down, "):
+            sitl.link.ground.lost = 0.1
+        for name, value in {"loss": 3, "delay_s": -1.0, "jitter_s": "1"}.items():
+            with pytest.raises(ValueError, match=f"^{name} of a link must be from 0 .*, not {value!r}"):
+                setattr(sitl.link.ground, name, value)
+
+
+@pytest.mark.parametrize(
+    ("mark", "line"),
+    [
+        ({"airborne": 5, "feedback": "sensors"}, 'airborne is for feedback "state": an estimator begins at rest'),
+        ({"airborne": "five"}, "airborne: Expected float | None, got str"),
+        ({"vehicle": 3}, "vehicle: Expected str, got int"),
+        ({"params": 3}, "params is KEY=VALUE,... in numbers, not 3"),
+        ({"start": "q"}, "start is KEY=VALUE,... in numbers, not 'q'"),
+        ({"ground": {"loss": 7}}, "loss of a link must be from 0 to 1, not 7"),
+        ({"ground": "down=1"}, "a link has no down to begin with: choose corrupt, "),
+    ],
+)
+def test_what_no_flight_begins_with(mark: dict[str, Any], line: str) -> None:
+    with pytest.raises(SettingError) as refused:
+        setting_of([mark])
+    assert str(refused.value).startswith(line)
+
+
+def test_what_differs_for_one_flight_is_read_as_a_mark() -> None:
+    with Flights(Setting(params={"MIS_TAKEOFF_ALT": 1.5}), None) as flights:
+        sitl = flights.begin(start="x=3", params={"RTL_RETURN_ALT": 7.0})
+        assert sitl.position[0] == 3.0
+        assert [sitl.get_param(name) for name in ("MIS_TAKEOFF_ALT", "RTL_RETURN_ALT")] == [1.5, 7.0]
+        with pytest.raises(SettingError, match="a flight has no place"):
+            flights.begin(place=3)
