@@ -227,6 +227,10 @@ class Stations:
         """Send a status text to everybody."""
         self.hub.send(self._text.say(severity, text))
 
+    def take_texts(self) -> list[str]:
+        """Return the status texts since the last time, for whoever watches the process."""
+        return self._text.take()
+
     def _provide(self, modes: StandardModes, metadata: Metadata) -> None:
         """Have the streams answer requests for messages that are not streamed."""
         provide, version = self._streams.provide, self.system.version

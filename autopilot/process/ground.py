@@ -84,14 +84,14 @@ class Ground:
         self._links: GroundLinks | SteppedLinks = GroundLinks(links, perf_counter, thread_time)
         if conductor is not None:
             self._links = SteppedLinks(conductor, lambda: self.copter.pilot.state)
-        self.shut_down = self._full_reported = self._resumed_reported = False
+        self.shut_down = self._full_reported = False
         self._revision = self.copter.parameters.revision
         self._reported_s = self._saved_s = perf_counter()
         self._reported_us = 0
-        self._sources: set[str] = set()
+        self._sources: set[tuple[str, str]] = set()
         self._mode: tuple[str, bool] | None = None
-        for link in links:
-            self._status.say("ground", _invitation(link.url), url=link.url)
+        for number, link in enumerate(links):
+            self._status.say("ground", _invitation(link.url), url=link.url, link=number)
 
     def record(self, log: "AutopilotLog") -> None:
         """Record in `log` what the vehicle begins with, and what it receives."""
@@ -119,9 +119,6 @@ class Ground:
         if self.copter.parameters.revision != self._revision:
             self._revision = self.copter.parameters.revision
             self._state.save_parameters(self.copter.parameters)
-        if self.copter.resumed and not self._resumed_reported:
-            self._resumed_reported = True
-            self._status.say("said", self.copter.resumed)
         if self._state.keeps_flights:
             self._keep()
         self._links.send(outbox)
@@ -145,6 +142,7 @@ class Ground:
 
     def close(self) -> None:
         """Write what is left to write, and let go of everything."""
+        self._report_texts()
         self.copter.stations.log.close()
         self._state.save_signing()
         self._links.close()
@@ -199,18 +197,24 @@ class Ground:
 
     def _report(self, now_s: float) -> None:
         pilot = self.copter.pilot
+        self._report_texts()
         facts = self._links.facts(self.copter.stations, now_s - self._reported_s)
         if self._status.as_json:
             self._status.say("status", "", **self._facts(now_s), links=facts)
         self._reported_s, self._reported_us = now_s, pilot.context().now_us
-        for link in facts:
-            for who in link["heard"]:
-                if f"{link['url']} {who}" not in self._sources:
-                    self._sources.add(f"{link['url']} {who}")
-                    self._status.say("heard", f"system {who} is heard on {link['url']}")
+        heard = {(link["url"], who) for link in facts for who in link["heard"]}
+        for url, who in sorted(heard - self._sources):
+            self._status.say("heard", f"system {who} is heard on {url}")
+        for url, who in sorted(self._sources - heard):
+            self._status.say("heard", f"system {who} is heard no more on {url}")
+        self._sources = heard
         if self._state.signing.key_changed or now_s >= self._saved_s + _SAVE_EVERY_S:
             self._saved_s = now_s
             self._state.save_signing()
+
+    def _report_texts(self) -> None:
+        for text in self.copter.stations.take_texts():
+            self._status.say("said", text)
 
     def _facts(self, now_s: float) -> dict[str, Any]:
         pilot = self.copter.pilot

@@ -11,7 +11,9 @@ from colibri.autopilot.ground.stations import Stations
 from colibri.common.types import Address
 from colibri.mavlink.links.link import GroundLink, LinkError
 from colibri.mavlink.links.open import beyond_loopback, check_reach, open_ground_link
+from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.hub import Outgoing
+from colibri.mavlink.node.router import Source
 from colibri.mavlink.streaming.rates import GCS, SDK
 
 SDK_PORTS = range(14540, 14550)
@@ -19,6 +21,8 @@ SDK_PORTS = range(14540, 14550)
 SHARE = 0.25
 """Part of all time that receiving may take: at real time a frame leaves more than half of its time to that."""
 MAX_SAVED_S = 0.005
+_GONE_AFTER_S = 3.5
+"""By the wall clock; a ground station sends a HEARTBEAT a second."""
 
 
 def open_links(urls: Sequence[str], *, signed: bool, insecure: bool) -> list[GroundLink]:
@@ -81,6 +85,8 @@ class GroundLinks:
         self._loopback = [not beyond_loopback(link.url) for link in links]
         self._opened: list[tuple[int, Address]] = []
         self._counts: dict[int, tuple[int, int]] = {}
+        self._clock = clock
+        self._last: dict[tuple[int, Source], tuple[int, float]] = {}
 
     def introduce(self, stations: Stations) -> None:
         """Open a channel to everybody that is connected already."""
@@ -146,13 +152,26 @@ class GroundLinks:
             facts.append(
                 {
                     "url": link.url,
-                    "heard": [f"{system}/{component}" for channel in channels for system, component in channel.sources],
+                    "heard": [
+                        f"{system}/{component}" for channel in channels for system, component in self._there(channel)
+                    ],
                     "received_hz": max(received - before[0], 0) / interval_s,
                     "sent_hz": max(sent - before[1], 0) / interval_s,
                     "lost": sum(channel.lost for channel in channels),
                 }
             )
         return facts
+
+    def _there(self, channel: Channel) -> Iterator[Source]:
+        """Yield the sources of a channel that have sent something lately."""
+        now_s = self._clock()
+        for source, received_us in channel.sources_us.items():
+            before_us, since_s = self._last.get((channel.number, source), (-1, now_s))
+            if received_us != before_us:
+                since_s = now_s
+                self._last[channel.number, source] = received_us, now_s
+            if now_s < since_s + _GONE_AFTER_S:
+                yield source
 
     def close(self) -> None:
         """Close every link."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from colibri.cli.shared.options import add_feedback, add_signing
 from colibri.common.earth.home import DEFAULT_HOME, home
-from colibri.common.process.arguments import ArgumentParser, natural, positive, speed
+from colibri.common.process.arguments import ArgumentParser, natural, not_negative, positive, speed
 from colibri.plant.process.options import add_world_arguments
 
 
@@ -23,6 +23,13 @@ def add_options(parser: ArgumentParser) -> None:
         default=DEFAULT_HOME,
         metavar="LAT,LON,ALT,YAW",
         help="where they stand, degrees and m, yaw clockwise from north (default Zurich: %(default)s)",
+    )
+    add(
+        "--spacing",
+        type=not_negative,
+        default=3.0,
+        metavar="M",
+        help="how far each vehicle of a fleet stands east of the one before (default %(default)g)",
     )
     add("--identity", default="px4", choices=("px4", "generic"), help="what they say they are (default %(default)s)")
     add(

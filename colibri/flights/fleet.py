@@ -4,15 +4,18 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isfinite
+from pathlib import Path
 from time import perf_counter
 
 from colibri.autopilot.control.profile import load_profile
+from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.earth.home import HomePlace
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
 from colibri.flights.children import Child, end_children, events_of, how_it_ended
 from colibri.flights.command_lines import options_of, plant_options
 from colibri.flights.fleet_status import StatusLines
+from colibri.flights.fly import LOGS, prepare
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import check_reach, open_link
@@ -24,21 +27,31 @@ PLANT_PORT = 14560
 GROUND_PORT = 14550
 SDK_PORT = 14540
 MAX_FLEET = 100
+_MAX_DEATHS, _LOOP_S = 3, 60.0
+"""A vehicle whose processes die more often than that in that time is not started again."""
+_OF_AUTOPILOT = ("autopilot.csv", "estimate.csv", "filter.csv")
+"""What an autopilot writes anew; `inputs.jsonl` goes on where the one before has died."""
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Member:
     """One vehicle of the fleet.
 
     Attributes:
         instance: Its number; its ports and system id follow from it.
-        links: The URLs that its autopilot serves.
+        east_m: How far it stands east of `--home`.
+        links: The URLs that its autopilot serves; once it has opened them, with the ports that it has got.
         children: Its processes, as far as they are started.
+        plant_url: Where its plant listens.
+        deaths_s: When a process of it has died, by the wall clock.
     """
 
     instance: int
+    east_m: float
     links: list[str]
     children: list[Child] = field(default_factory=list)
+    plant_url: str = ""
+    deaths_s: list[float] = field(default_factory=list)
 
     @property
     def system_id(self) -> int:
@@ -57,11 +70,12 @@ def sitl(args: argparse.Namespace) -> int:
     """Fly as the command line says, until interrupted; return the exit code."""
     _check(args)
     if args.out:
-        from colibri.flights.fly import prepare
-
         for instance in range(args.instance, args.instance + args.count):
             prepare(args.out / str(instance))
-    fleet = [Member(i, ground_links(args, i)) for i in range(args.instance, args.instance + args.count)]
+    fleet = [
+        Member(instance, number * args.spacing, ground_links(args, instance))
+        for number, instance in enumerate(range(args.instance, args.instance + args.count))
+    ]
     stop = Stop()
     lines = StatusLines(quiet=args.quiet)
     try:
@@ -105,8 +119,16 @@ def _plant_url(args: argparse.Namespace, instance: int) -> str:
     return f"udpin:127.0.0.1:{port}"
 
 
-def _start_plant(member: Member, args: argparse.Namespace) -> None:
+def place_of(member: Member, args: argparse.Namespace) -> HomePlace:
+    """Return where a vehicle stands: in a row to the east, each with an origin of its own."""
     home: HomePlace = args.home
+    if not member.east_m:
+        return home
+    return HomePlace(*geodetic_of((member.east_m, 0.0, 0.0), home.origin)._replace(altitude_m=home.altitude_m), home[3])
+
+
+def _start_plant(member: Member, args: argparse.Namespace) -> None:
+    home = place_of(member, args)
     start = Start(psi=home.yaw_enu_deg)._replace(**args.start)
     vehicle = args.plant_vehicle or args.vehicle or load_profile(args.profile).simulation.vehicle
     world = WorldSetting(**(world_values(args) | {"start": start, "seed": args.seed + member.instance}))
@@ -124,16 +146,16 @@ def _start_plant(member: Member, args: argparse.Namespace) -> None:
     member.children.append(Child("plant", options))
 
 
-def _start_autopilot(member: Member, args: argparse.Namespace, plant_url: str) -> None:
+def _start_autopilot(member: Member, args: argparse.Namespace) -> None:
     options = options_of(
         json=True,
-        plant=plant_url.replace("udpin", "udpout"),
+        plant=member.plant_url.replace("udpin", "udpout"),
         gcs=member.links,
         profile=args.profile,
         vehicle=args.vehicle,
         controller=args.controller,
         feedback=args.feedback,
-        home=args.home,
+        home=place_of(member, args),
         identity=args.identity,
         state=args.state / str(member.instance),
         signing_key=args.signing_key,
@@ -148,13 +170,16 @@ def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines:
     """Show the events of the processes until the last vehicle ends or the user interrupts."""
     flying = list(fleet)
     while flying and not stop:
-        over = [member for member in flying if _has_ended(member)]
+        codes = {member: [child.code() for child in member.children] for member in flying}
         _hear(flying, args, lines)
         lines.show(perf_counter())
-        for member in over:
-            _finish(member)
-            lines.forget(member.instance)
-            flying.remove(member)
+        for member, of_children in codes.items():
+            if 0 in of_children:  # its time is over, or a ground station has shut it down
+                end_children(reversed(member.children))
+                lines.forget(member.instance)
+                flying.remove(member)
+            elif any(of_children):
+                start_again(member, args, lines)
     return 0
 
 
@@ -163,24 +188,49 @@ def _hear(fleet: Sequence[Member], args: argparse.Namespace, lines: StatusLines)
     members = {child: member for member in fleet for child in member.children}
     for child, event in events_of(members):
         member = members[child]
-        if child.name == "plant" and event["event"] == "listening":
-            _start_autopilot(member, args, event["url"])
+        match event["event"]:
+            case "listening" if child.name == "plant":
+                member.plant_url = event["url"]
+                _start_autopilot(member, args)
+            case "ground":
+                member.links[event["link"]] = event["url"]
+            case "status":
+                event["position_enu_m"][0] += member.east_m
         lines.add(member.instance, child.name, event)
 
 
-def _has_ended(member: Member) -> bool:
-    return any(child.code() is not None for child in member.children)
+def start_again(member: Member, args: argparse.Namespace, lines: StatusLines) -> None:
+    """Start again what has died of a vehicle: the autopilot, which goes on; or the plant, and with it both.
 
-
-def _finish(member: Member) -> None:
-    """End what is left of a vehicle whose time is over, or that a ground station has shut down.
-
-    Where a process came to another end, everything ends, with its exit code.
+    Where a process cannot begin, or dies again and again, everything ends.
     """
-    for child in reversed(member.children):
-        code = child.code()
-        if code in (EXIT_FAILED, EXIT_BAD_INPUT):  # of these it has said why
-            raise SystemExit(code)
-        if code:
-            fail(f"the {child.name} of instance {member.instance} {how_it_ended(code)}", EXIT_FAILED)
-    end_children(member.children)
+    child, code = next((child, code) for child in member.children if (code := child.code()))
+    if code == EXIT_BAD_INPUT:  # it has said why
+        raise SystemExit(code)
+    now_s = perf_counter()
+    member.deaths_s = [*(death_s for death_s in member.deaths_s if death_s > now_s - _LOOP_S), now_s]
+    if len(member.deaths_s) > _MAX_DEATHS:
+        how = f"{how_it_ended(code)}, the {len(member.deaths_s)}th death within {_LOOP_S:.0f} s"
+        fail(f"the {child.name} of instance {member.instance} {how}", EXIT_FAILED)
+    lines.died(member.instance, child.name, f"{how_it_ended(code)}; started again")
+    if child.name == "plant":
+        end_children(reversed(member.children))
+        _set_aside(member, args, LOGS)
+        member.children.clear()
+        _start_plant(member, args)
+    else:
+        end_children([child])
+        _set_aside(member, args, _OF_AUTOPILOT)
+        member.children.remove(child)
+        _start_autopilot(member, args)
+
+
+def _set_aside(member: Member, args: argparse.Namespace, names: Sequence[str]) -> None:
+    """Give logs of processes that have died names of their own: autopilot.csv becomes autopilot-1.csv."""
+    for name in names if args.out else ():
+        path: Path = args.out / str(member.instance) / name
+        number = 1
+        while (aside := path.with_stem(f"{path.stem}-{number}")).exists():
+            number += 1
+        if path.exists():
+            path.rename(aside)

@@ -23,6 +23,10 @@ _COLUMNS: tuple[tuple[str, int, Literal["left", "right"]], ...] = (
     ("solver", 6, "right"),
 )
 """Heading, least width, and where the text stands; as wide as what is common needs, so that columns stay in place."""
+_FIRST = ("id", "mode", "up", "rotors", "time", "speed", "east", "north", "real", "solver")
+"""What a narrow terminal shows of it: as many of these as there is room for."""
+_LINKS_WIDTH = 66
+"""Narrower than this, links are shown without their scheme and rates."""
 _LINK_SIDES: tuple[Literal["left", "right"], ...] = ("right", "left", "left", "right", "right")
 
 
@@ -44,6 +48,10 @@ class StatusLines:
         elif event["event"] in _SHOWN and not self._quiet:
             self._console.print(f"{instance + 1:3d} {name}: {event['text']}", markup=False)
 
+    def died(self, instance: int, name: str, how: str) -> None:
+        """Say that a process of vehicle `instance` has died, also where nothing else is said."""
+        self._console.print(f"{instance + 1:3d} {name} {how}", markup=False)
+
     def show(self, now_s: float) -> None:
         """Draw the live lines, if it is time to and there is a terminal."""
         if self._quiet or not self._console.is_terminal or not self._facts or now_s < self._drawn_s + _REDRAW_EVERY_S:
@@ -52,7 +60,7 @@ class StatusLines:
         if self._live is None:
             self._live = Live(console=self._console, auto_refresh=False, transient=False)
             self._live.start()
-        self._live.update(status_table(self._facts), refresh=True)
+        self._live.update(status_table(self._facts, self._console.width), refresh=True)
 
     def forget(self, instance: int) -> None:
         """Show vehicle `instance` no more."""
@@ -65,24 +73,38 @@ class StatusLines:
         sys.stderr.flush()
 
 
-def status_table(facts: dict[int, dict[str, Any]]) -> Group:
+def status_table(facts: dict[int, dict[str, Any]], width: int = 80) -> Group:
     """Return a row for each vehicle: what it does, where it is, how long its QP takes; and one for each of its links.
 
-    Of a fleet, links without a ground station are left out. It fits 80 columns.
+    Of a fleet, links without a ground station are left out. It fits 80 columns; where there are fewer, less is shown.
     """
+    shown = _shown(width)
     vehicles = Table(box=None, padding=(0, 1, 0, 0), header_style="dim")
-    for heading, width, side in _COLUMNS:
-        vehicles.add_column(heading, no_wrap=True, min_width=width, justify=side)
+    for heading, least, side in _COLUMNS:
+        if heading in shown:
+            vehicles.add_column(heading, no_wrap=True, min_width=least, justify=side)
     links = Table(box=None, padding=(0, 2, 0, 0), show_header=False, style="dim")
     for side in _LINK_SIDES:
         links.add_column(no_wrap=True, justify=side)
     for instance, fact in sorted(facts.items()):
         system = str(instance + 1)
-        vehicles.add_row(system, *_vehicle_texts(fact))
+        texts = (system, *_vehicle_texts(fact))
+        vehicles.add_row(*(text for (heading, *_), text in zip(_COLUMNS, texts, strict=True) if heading in shown))
         for link in fact["links"]:
             if link["heard"] or len(facts) == 1:
-                links.add_row(f"{system:>3}", *_link_texts(link))
+                links.add_row(f"{system:>3}", *_link_texts(link, width))
     return Group(vehicles, links)
+
+
+def _shown(width: int) -> set[str]:
+    """Return the columns that fit; the first always."""
+    least = {heading: width for heading, width, _ in _COLUMNS}
+    shown: list[str] = []
+    for heading in _FIRST:
+        if shown and sum(least[each] + 1 for each in (*shown, heading)) > width:
+            break
+        shown.append(heading)
+    return set(shown)
 
 
 def _vehicle_texts(fact: dict[str, Any]) -> tuple[str, ...]:
@@ -99,7 +121,9 @@ def _vehicle_texts(fact: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _link_texts(link: dict[str, Any]) -> tuple[str, ...]:
+def _link_texts(link: dict[str, Any], width: int) -> tuple[str, ...]:
     """Return the columns of a link: its URL, the ground stations on it, messages a second in and out."""
-    who = " ".join(link["heard"]) or "nobody yet"
+    who = " ".join(link["heard"]) or "nobody"
+    if width < _LINKS_WIDTH:
+        return (link["url"].partition(":")[2], f"hears {who}")
     return (link["url"], f"hears {who}", f"{link['received_hz']:.0f}/s in", f"{link['sent_hz']:.0f}/s out")

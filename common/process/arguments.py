@@ -41,6 +41,14 @@ def positive(text: str) -> float:
     return value
 
 
+def not_negative(text: str) -> float:
+    """Read a number from 0 on of the command line."""
+    value = number(text)
+    if value < 0.0:
+        raise ArgumentTypeError(f"must not be below zero, not {text}")
+    return value
+
+
 def natural(text: str) -> int:
     """Read a whole number from 0 on of the command line."""
     value = int(text)

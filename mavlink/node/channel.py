@@ -18,6 +18,7 @@ class Channel:
         received: How many messages were received.
         sent: How many were sent, forwarded ones too.
         lost: How many never came, by the gaps in their numbers.
+        sources_us: Simulated time of the last message of each of `sources`, µs.
         active_us: Simulated time when it was opened or a message received last, µs.
     """
 
@@ -33,12 +34,14 @@ class Channel:
         self.sent = 0
         self.lost = 0
         self._sequences: dict[Source, int] = {}
+        self.sources_us: dict[Source, int] = {}
         self._pending: list[bytes] = []
 
     def receive(self, message: Message, now_us: int) -> None:
         """Count a received message, and the lost ones before it."""
         self.active_us = now_us
         self.received += 1
+        self.sources_us[message.source] = now_us
         sequence = sequence_of(message.frame)
         last = self._sequences.get(message.source)
         if last is not None:
@@ -47,7 +50,8 @@ class Channel:
                 return  # one that was overtaken, or came twice
             self.lost += gap
         elif len(self._sequences) == SOURCES:
-            del self._sequences[next(iter(self._sequences))]
+            oldest = next(iter(self._sequences))
+            del self._sequences[oldest], self.sources_us[oldest]
         self._sequences[message.source] = sequence
 
     def say(self, frame: bytes) -> None:

@@ -4,11 +4,14 @@ Specification: mavlink.io, message STATUSTEXT (253): text beyond 50 bytes goes o
 that is not zero, counted by chunk_seq; a chunk that is not full ends it.
 """
 
+from collections import deque
+
 from colibri.mavlink.node.service import Send, to_all
 from colibri.mavlink.wire.dialect import mav
 
 CHUNK_BYTES = 50
 MAX_TEXT_BYTES = 254
+_REMEMBERED = 20
 
 EMERGENCY: int = mav.MAV_SEVERITY_EMERGENCY
 ERROR: int = mav.MAV_SEVERITY_ERROR
@@ -18,15 +21,21 @@ NOTICE: int = mav.MAV_SEVERITY_NOTICE
 INFO: int = mav.MAV_SEVERITY_INFO
 
 
+_WORDS = ("emergency", "alert", "critical", "error", "warning")
+"""Of severities from 0 on; those behind them are no cause for alarm."""
+
+
 class StatusText:
-    """Numbers the texts that need more than one message."""
+    """Numbers the texts that need more than one message, and remembers the last until they are taken."""
 
     def __init__(self) -> None:
         """Begin with id 1: 0 means a text of one chunk."""
         self._next = 1
+        self._said: deque[str] = deque(maxlen=_REMEMBERED)
 
     def say(self, severity: int, text: str) -> list[Send]:
         """Return the STATUSTEXT messages of `text`, to all channels."""
+        self._said.append(text if severity > WARNING else f"{_WORDS[severity]}: {text}")
         data = text.encode()[:MAX_TEXT_BYTES]
         if len(data) <= CHUNK_BYTES:
             return [to_all("STATUSTEXT", severity, data, 0, 0)]
@@ -36,3 +45,9 @@ class StatusText:
             to_all("STATUSTEXT", severity, data[start : start + CHUNK_BYTES], number, chunk)
             for chunk, start in enumerate(starts)
         ]
+
+    def take(self) -> list[str]:
+        """Return all texts since the last time, those of a warning or worse with a word that says so."""
+        said = list(self._said)
+        self._said.clear()
+        return said

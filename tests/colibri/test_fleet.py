@@ -14,13 +14,16 @@ import pytest
 from rich.console import Console
 
 from colibri.cli.main import main
-from colibri.flights.fleet import ground_links
-from colibri.flights.fleet_status import status_table
+from colibri.common.earth.geodesy import enu_of
+from colibri.common.earth.home import DEFAULT_HOME
+from colibri.flights.children import Child, end_children
+from colibri.flights.fleet import Member, ground_links, place_of, start_again
+from colibri.flights.fleet_status import StatusLines, status_table
 from colibri.mavlink.links.open import open_link
 from colibri.mavlink.wire.dialect import mav
 from tests.clients.support.ground_station import GroundStation
 from tools.harness.processes import wait_for
-from tools.harness.sitl_process import Vehicle, vehicle
+from tools.harness.sitl_process import WAITING, Vehicle, vehicle
 
 SHUT_DOWN, ACCEPTED = mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, mav.MAV_RESULT_ACCEPTED
 NOT_BEYOND = "reaches beyond this computer: give --signing-key FILE, or --insecure to let anybody fly the vehicle"
@@ -135,15 +138,65 @@ def test_ctrl_c_in_a_terminal_while_it_starts(tmp_path: Path) -> None:
     assert errors.read_text(encoding="utf-8") == ""
 
 
-@pytest.mark.parametrize("name", ["plant", pytest.param("autopilot", marks=pytest.mark.long)])
-def test_a_process_that_dies_ends_it_in_words(tmp_path: Path, name: str) -> None:
-    with standing(tmp_path) as (flown, children):
+@pytest.mark.parametrize("name", ["autopilot", pytest.param("plant", marks=pytest.mark.long)])
+def test_a_process_that_dies_is_started_again(tmp_path: Path, name: str) -> None:
+    with standing(tmp_path, WAITING) as (flown, children):
         (victim,) = (child for child in children if name in child.cmdline()[3])
         victim.send_signal(signal.SIGKILL)
-        assert flown.process.wait(10.0) == 1
-        assert_gone(children)
-        assert flown.said.splitlines()[-1] == f"colibri: error: the {name} of instance 0 was killed by SIGKILL"
-        assert flown.said.count("error") == 1
+        wait_for(lambda: flown.said.count("the plant sends frames") == 2, "the next one")
+        died, *after = flown.said.partition("started again")[0::2]
+        assert died.endswith(f"  1 {name} was killed by SIGKILL; ")
+        assert "error" not in after[0]
+        assert len(set(flown.ports)) == 1
+        assert flown.end() == 0
+
+
+def dead(name: str, code: int) -> Child:
+    """Return a process that has ended."""
+    child = Child(name, ("--no-such-option",), stdout=subprocess.PIPE)
+    child.process.kill()
+    child.process.wait()
+    child.process.returncode = code
+    return child
+
+
+def test_what_dies_again_and_again_ends_it_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    logs = tmp_path / "0"
+    logs.mkdir()
+    member, args = Member(0, 0.0, []), Namespace(out=tmp_path)
+    monkeypatch.setattr("colibri.flights.fleet._start_autopilot", lambda *_: (logs / "autopilot.csv").touch())
+    lines = StatusLines(quiet=True)
+    for _ in range(3):
+        member.children = [dead("autopilot", -9)]
+        start_again(member, args, lines)
+        assert member.children == []
+    member.children = [dead("autopilot", 1)]
+    with pytest.raises(SystemExit) as ended:
+        start_again(member, args, lines)
+    end_children(member.children)
+    assert ended.value.code == 1
+    *again, last = capfd.readouterr().err.splitlines()
+    assert again == ["  1 autopilot was killed by SIGKILL; started again"] * 3
+    assert last == "colibri: error: the autopilot of instance 0 ended with exit code 1, the 4th death within 60 s"
+    assert {path.name for path in logs.iterdir()} == {"autopilot.csv", "autopilot-1.csv", "autopilot-2.csv"}
+
+
+def test_what_cannot_begin_is_not_started_again() -> None:
+    member = Member(0, 0.0, [], [dead("autopilot", 2)])
+    with pytest.raises(SystemExit) as ended:
+        start_again(member, Namespace(out=None), StatusLines(quiet=True))
+    end_children(member.children)
+    assert ended.value.code == 2
+
+
+def test_a_fleet_stands_in_a_row() -> None:
+    args = Namespace(home=DEFAULT_HOME)
+    assert place_of(Member(4, 0.0, []), args) == DEFAULT_HOME
+    place = place_of(Member(5, 6.0, []), args)
+    assert enu_of(place.origin, DEFAULT_HOME.origin) == pytest.approx((6.0, 0.0, 0.0), abs=1e-3)
+    assert place[2:] == DEFAULT_HOME[2:]
 
 
 @pytest.mark.long
@@ -159,6 +212,11 @@ def test_nothing_outlives_it(tmp_path: Path) -> None:
 def test_a_ground_station_shuts_it_down(tmp_path: Path) -> None:
     with GroundStation() as station, standing(tmp_path, station.url) as (flown, children):
         station.wait("HEARTBEAT")
+        assert station.command(mav.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, -5.0) != ACCEPTED
+        wait_for(
+            lambda: "  1 autopilot: warning: take-off refused: not a height above the ground\n" in flown.said,
+            "a STATUSTEXT",
+        )
         assert station.command(SHUT_DOWN, 2.0, 0, 0, 0, 0, 0, 0) == ACCEPTED
         assert flown.process.wait(10.0) == 0
         assert_gone(children)
@@ -185,10 +243,10 @@ FACT = {
 }
 
 
-def drawn(*instances: int) -> list[str]:
-    console = Console(width=80, force_terminal=False, color_system=None)
+def drawn(*instances: int, width: int = 80) -> list[str]:
+    console = Console(width=width, force_terminal=False, color_system=None)
     with console.capture() as capture:
-        console.print(status_table({instance: FACT for instance in instances}))
+        console.print(status_table({instance: FACT for instance in instances}, width))
     return [line.rstrip() for line in capture.get().splitlines()]
 
 
@@ -196,9 +254,19 @@ def test_the_status_line_fits_a_terminal() -> None:
     assert drawn(0) == [
         " id    time   real mode       rotors     east  north      up    speed solver",
         "  1 12346 s x 1.00 stabilized disarmed    0.0 -123.5  78.9 m 12.3 m/s 123 µs",
-        "  1  udpout:127.0.0.1:14550  hears 255/190     2/s in  61/s out",
-        "  1  udpout:127.0.0.1:14540  hears nobody yet  0/s in   0/s out",
+        "  1  udpout:127.0.0.1:14550  hears 255/190  2/s in  61/s out",
+        "  1  udpout:127.0.0.1:14540  hears nobody   0/s in   0/s out",
     ]
+
+
+def test_a_narrow_terminal_shows_what_matters_most() -> None:
+    assert drawn(0, width=40) == [
+        " id    time mode       rotors        up",
+        "  1 12346 s stabilized disarmed  78.9 m",
+        "  1  127.0.0.1:14550  hears 255/190",
+        "  1  127.0.0.1:14540  hears nobody",
+    ]
+    assert drawn(0, width=20)[0].split() == ["id", "mode"]
 
 
 def test_the_status_lines_of_a_fleet_leave_out_who_is_not_heard() -> None:

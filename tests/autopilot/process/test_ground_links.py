@@ -136,3 +136,23 @@ def test_a_busy_computer_makes_nobody_deaf(stations: Stations) -> None:
             processor_clock.now_s += 1e-4
         assert heard == 1
         clock.now_s += FRAME_S
+
+
+def test_who_is_silent_is_heard_no_more(stations: Stations) -> None:
+    clock, link = Clock(), FakeLink(0, 1)
+    links = GroundLinks([link], clock, clock)
+
+    def there() -> list[str]:
+        for datagram, number, address, loopback in links.receive(stations):
+            stations.hub.receive(datagram, number, address, round(clock.now_s * 1e6), loopback=loopback)
+        (fact,) = links.facts(stations, 0.5)
+        heard: list[str] = fact["heard"]
+        return heard
+
+    assert there() == ["255/190"]
+    clock.now_s = 3.0
+    assert there() == ["255/190"]
+    clock.now_s = 4.0
+    assert there() == []
+    link.waiting = 1
+    assert there() == ["255/190"]
