@@ -1,5 +1,6 @@
 """Fixture `sitl`: a vehicle in flight, with commands that wait for their acknowledgement."""
 
+from argparse import ArgumentTypeError
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import dist, nan, pi
@@ -10,9 +11,11 @@ from colibri.autopilot.parameters.behaviour import TRACKS
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.mavlink.hil.conductor import Parcel, StepMessage
 from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.hil.world_changes import MAX_PAYLOAD_KG, PayloadChange, WindChange
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY, MissionItem
 from colibri.mavlink.parameters.store import Value
 from colibri.mavlink.wire.dialect import mav
+from colibri.plant.process.options import constant_wind
 from colibri.sitl import mission_items as items
 from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.backends.lockstep import LockstepSession
@@ -27,6 +30,7 @@ from colibri.sitl.view import View
 FORCE = 21196.0
 """What a command to arm or disarm needs to pass over every check."""
 READY_WITHIN_S = 40.0
+CALM = "0@0"
 STICKS_EVERY_US = 40_000
 """25 times a second, as QGroundControl sends those of a joystick."""
 _FIRST_STICKS_S = 0.2
@@ -83,6 +87,7 @@ class Sitl(View, Stepped, Steered):
         self._lockstep = lockstep
         self._to_stations = StepMessage(0, ())
         self._injected = b""
+        self._wind, self._payload_kg = str(setting.wind or CALM), 0.0
         self._sticks: dict[str, float] | None = None
         self._sticks_at_us = 0
         self._stations: list[Station] = []
@@ -301,6 +306,32 @@ class Sitl(View, Stepped, Steered):
         if results != [mav.MAV_RESULT_ACCEPTED]:
             result = results[0] if results else mav.MAV_RESULT_FAILED
             raise RefusedError(f"failure {unit} {kind}", result, "this plant cannot fail so")
+
+    @property
+    def wind(self) -> str:
+        """The mean wind, as mark `wind` has it; it may be changed, from the next frame on, to a constant one."""
+        return self._wind
+
+    @wind.setter
+    def wind(self, wind: str | None) -> None:
+        try:
+            constant = constant_wind(str(wind or CALM))
+        except ArgumentTypeError as error:
+            raise ValueError(f"wind {error}") from None
+        self._wind = str(constant)
+        self._injected += self._lockstep.change_of_world(WindChange(*constant))
+
+    @property
+    def payload_kg(self) -> float:
+        """What the vehicle carries beside its own mass, kg; it may be changed, from the next frame on."""
+        return self._payload_kg
+
+    @payload_kg.setter
+    def payload_kg(self, mass_kg: float) -> None:
+        if not 0.0 <= mass_kg <= MAX_PAYLOAD_KG:
+            raise ValueError(f"payload_kg must be from 0 to {MAX_PAYLOAD_KG:g}, not {mass_kg!r}")
+        self._payload_kg = mass_kg
+        self._injected += self._lockstep.change_of_world(PayloadChange(mass_kg))
 
     def kill_autopilot(self) -> None:
         """Kill the autopilot as `kill -9` does, and start it again at once, with the files that it has written."""

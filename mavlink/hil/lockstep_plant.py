@@ -33,8 +33,11 @@ from colibri.mavlink.hil.state import (
     decode_actuators,
     encode_state,
 )
+from colibri.mavlink.hil.world_changes import PAYLOAD, WIND, WorldChange, decode_change
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message
+
+_WITH_THE_ANSWER = frozenset({INJECT_FAILURE, WIND, PAYLOAD})
 
 
 class Outgoing(NamedTuple):
@@ -91,7 +94,7 @@ class PlantEnd:
         self._awaited_us: int | None = None
         self._answered_us: int | None = None
         self._battery: PlantBattery | None = None
-        self._faults: list[Fault] = []
+        self._faults: list[Fault | WorldChange] = []
         self._resend_at_s = 0.0
         self._outbox: list[Outgoing] = []
 
@@ -130,7 +133,7 @@ class PlantEnd:
                 continue
             if message.name == "HEARTBEAT":
                 self._receive_heartbeat(sender, now_s)
-            elif message.name == "COMMAND_LONG" and message.fields.command == INJECT_FAILURE:
+            elif message.name == "COMMAND_LONG" and message.fields.command in _WITH_THE_ANSWER:
                 asked.append(message)
             elif message.name == "COMMAND_LONG":
                 self._obey(message, sender)
@@ -146,8 +149,11 @@ class PlantEnd:
             self._receive_fault(message, answered=command is not None)
         return command
 
-    def take_faults(self) -> list[Fault]:
-        """Return the faults that came with the last answer, and forget them; nobody has judged them yet."""
+    def take_faults(self) -> list[Fault | WorldChange]:
+        """Return the faults and changes of the world that came with the last answer, and forget them.
+
+        Nobody has judged the faults yet.
+        """
         faults, self._faults = self._faults, []
         return faults
 
@@ -196,10 +202,10 @@ class PlantEnd:
             self.dropped["foreign"] += 1
         elif not answered:
             self.dropped["repeated"] += 1
-        elif (fault := decode_fault(fields)) is None:
+        elif (asked := (decode_fault if fields.command == INJECT_FAILURE else decode_change)(fields)) is None:
             self.dropped["invalid"] += 1
         else:
-            self._faults.append(fault)
+            self._faults.append(asked)
 
     def _obey(self, message: Message, sender: Address) -> None:
         fields = message.fields

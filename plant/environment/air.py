@@ -4,7 +4,7 @@ from math import hypot
 
 from colibri.common.types import Vector
 from colibri.plant.environment.turbulence import Eddies, Scales, Turbulence, eddy_velocity, scales
-from colibri.plant.environment.weather import Weather
+from colibri.plant.environment.weather import RecordedWind, Weather, Wind
 
 CALM: Vector = (0.0, 0.0, 0.0)
 
@@ -18,13 +18,17 @@ class Air:
 
     def __init__(self, weather: Weather) -> None:
         """Begin with the mean wind, gusts and turbulence of `weather`."""
-        self._wind = weather.wind
         self._gusts = weather.gusts
         self._intensity = weather.turbulence
         self._turbulence = Turbulence(weather.seed)
-        self._mean = weather.wind.velocity_at(0.0) if weather.wind.constant else None
-        changes = weather.gusts or weather.turbulence
-        self.steady: Vector | None = None if changes else self._mean
+        self.steady: Vector | None = None
+        self.blow(weather.wind)
+
+    def blow(self, wind: Wind | RecordedWind) -> None:
+        """Have another mean wind from now on; gusts and turbulence stay."""
+        self._wind = wind
+        self._mean = wind.velocity_at(0.0) if wind.constant else None
+        self.steady = None if self._gusts or self._intensity else self._mean
 
     def begin(self, height_m: float) -> tuple[Vector, Eddies | None]:
         """Return the air's velocity at time 0, ENU, m/s, and its eddies."""

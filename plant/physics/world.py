@@ -12,7 +12,7 @@ from colibri.mavlink.hil.plant_status import PlantBattery
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.air import CALM, Air
 from colibri.plant.environment.turbulence import Eddies
-from colibri.plant.environment.weather import NO_WEATHER, Weather
+from colibri.plant.environment.weather import NO_WEATHER, Weather, Wind
 from colibri.plant.physics.equations import CHARGE, ROTORS, attitude_of, specific_force
 from colibri.plant.physics.integrators import Integrator, solver
 from colibri.plant.physics.parameters import parameters_of
@@ -133,6 +133,16 @@ class Physics:
     def resist(self, times: float) -> None:
         """Have the battery resist so many times as much as it was built to."""
         self._parameters["resistance_ohm"] = times * self._as_built["resistance_ohm"]
+
+    def blow(self, wind: Wind) -> None:
+        """Have another mean wind from now on; with gusts or turbulence on it, from the next step on."""
+        self._air.blow(wind)
+        if self._air.steady is not None:
+            self._wind[:] = self._air.steady
+
+    def carry(self, mass_kg: float) -> None:
+        """Have a payload at the centre of mass: it adds to the mass, and to no moment of inertia."""
+        self._parameters["mass_kg"] = self._as_built["mass_kg"] + mass_kg
 
     def _feel_wind(self, world: World) -> None:
         if self._air.steady is None:

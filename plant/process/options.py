@@ -79,13 +79,13 @@ _GUST = "SPEED@FROM:start=S,duration=S"
 
 def wind(text: str) -> Wind | RecordedWind:
     """Read a wind of the command line: `SPEED@FROM`, or a file if it ends in `.csv`."""
-    return recorded_wind(Path(text)) if text.endswith(".csv") else _constant(text)
+    return recorded_wind(Path(text)) if text.endswith(".csv") else constant_wind(text)
 
 
 def gust(text: str) -> Gust:
     """Read a gust of the command line, `SPEED@FROM:start=S,duration=S`."""
     blows, _, times = text.partition(":")
-    peak = _constant(blows)
+    peak = constant_wind(blows)
     values = dict(pair.split("=", 1) for pair in times.split(",") if "=" in pair)
     try:
         start_s, duration_s = number(values.pop("start")), number(values.pop("duration"))
@@ -131,7 +131,12 @@ def _row(path: Path, line: int, text: str) -> tuple[int, tuple[float, float, flo
     return line, (t, east, north, up)
 
 
-def _constant(text: str) -> Wind:
+def constant_wind(text: str) -> Wind:
+    """Read a wind that is always the same, `SPEED@FROM`.
+
+    Raises:
+        ArgumentTypeError: It is none.
+    """
     speed, _, direction = text.partition("@")
     try:
         value = Wind(number(speed), number(direction))

@@ -10,6 +10,7 @@ from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.mavlink.links.udp import UdpLink
 from colibri.plant.physics.world import World, state_frame
 from colibri.plant.process.logs import PlantLogs
@@ -198,7 +199,7 @@ class FreeServer(Server):
         """Send a frame, and go on with the commands that come until the next one is due."""
         begin_us = plant.world.time_us
         due_s = pace.due_s(begin_us + plant.interval_us, self._offer(plant))
-        faults: list[Fault] = []
+        faults: list[Fault | WorldChange] = []
         while (command := self._next_command(due_s)) is not None:
             since_us = round((perf_counter() - due_s) * 1e6 * pace.speed) + plant.interval_us
             now_us = begin_us + max(0, min(since_us, plant.interval_us))

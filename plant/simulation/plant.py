@@ -9,7 +9,8 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import FaultResult, PlantStatus, ReceivedFrame
 from colibri.mavlink.hil.sensors import Frame
 from colibri.mavlink.hil.state import ActuatorCommand
-from colibri.plant.environment.weather import weather_of
+from colibri.mavlink.hil.world_changes import PayloadChange, WindChange, WorldChange
+from colibri.plant.environment.weather import Wind, weather_of
 from colibri.plant.physics.integrators import Integrator
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
@@ -77,14 +78,20 @@ class Plant:
         """Return the frame of the world as it is now, and what goes beside it."""
         return ReceivedFrame(self._measure(self.world), PlantStatus(self._physics.battery(self.world), self._results))
 
-    def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
+    def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
         """Go on to the next frame, with the answer to this one and with faults that happen now."""
         self.inject(faults)
         self.arrive(self.world.time_us, command)
         self.go_on()
 
-    def inject(self, faults: Sequence[Fault]) -> None:
-        """Have faults happen now; their results go with the next frame."""
+    def inject(self, asked: Sequence[Fault | WorldChange]) -> None:
+        """Have faults happen and the world change now; the results of faults go with the next frame."""
+        for each in asked:
+            if isinstance(each, WindChange):
+                self._physics.blow(Wind(each.speed_m_s, each.from_deg))
+            elif isinstance(each, PayloadChange):
+                self._physics.carry(each.mass_kg)
+        faults = [each for each in asked if isinstance(each, Fault)]
         self.world, self._results = self.faults.inject_all(faults, self.world)
 
     def arrive(self, sent_us: int, command: ActuatorCommand) -> None:

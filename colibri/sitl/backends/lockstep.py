@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 
 from colibri.mavlink.hil.conductor import Parcel, StepMessage
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_actuators, decode_state
+from colibri.mavlink.hil.world_changes import WorldChange, encode_change
 from colibri.mavlink.wire.dialect import (
     AUTOPILOT_COMPONENT,
     CMD_SET_MESSAGE_INTERVAL,
@@ -192,6 +193,10 @@ class LockstepSession:
         """Return a COMMAND_LONG as the autopilot would send it to the plant."""
         values = (*params, *(0.0,) * (7 - len(params)))
         return self._codec.encode("COMMAND_LONG", self._codec.source[0], PLANT_COMPONENT, number, 0, *values)
+
+    def change_of_world(self, change: WorldChange) -> bytes:
+        """Return a change of the plant's world as the autopilot would send it."""
+        return encode_change(self._codec, change, (self._codec.source[0], PLANT_COMPONENT))
 
     def processes(self) -> dict[str, int]:
         """Return the number of each process that flies."""

@@ -123,6 +123,40 @@ def test_what_the_vehicle_says_is_known_though_the_link_loses_it() -> None:
         assert not sitl.gcs.said("rotor 2 failed")
 
 
+def blown_and_laden(sitl: Sitl) -> None:
+    sitl.run(0.2)
+    sitl.wind = "12@270"
+    sitl.run(0.3)
+    sitl.payload_kg = 0.3
+    sitl.run(0.3)
+    sitl.wind, sitl.payload_kg = None, 0.0
+    sitl.run(0.2)
+
+
+def test_wind_and_payload_change_in_flight() -> None:
+    with Flights(Setting(airborne=3.0), None) as flights:
+        sitl = flights.begin()
+        blown_and_laden(sitl)
+        t, east, up = (sitl.flown()[name] for name in ("t", "vx", "vz"))
+        assert east[t < 0.2].max() < 0.1 < east.max()
+        assert up[t < 0.5].min() - 0.1 > up.min()
+        assert (sitl.wind, sitl.payload_kg) == ("0.0@0.0", 0.0)
+
+
+def test_the_world_changes_over_udp_as_in_memory(forked: Launcher) -> None:
+    setting = {"airborne": 3.0, **IN_WIND}
+    assert flown(forked, blown_and_laden, **setting) == flown(None, blown_and_laden, **setting)
+
+
+def test_a_world_that_there_is_not_is_refused() -> None:
+    with Flights(Setting(airborne=3.0), None) as flights:
+        sitl = flights.begin()
+        with pytest.raises(ValueError, match="wind must be SPEED@FROM in m/s and degrees, 5@270 say, not west"):
+            sitl.wind = "west"
+        with pytest.raises(ValueError, match="payload_kg must be from 0 to 100, not -1"):
+            sitl.payload_kg = -1
+
+
 @pytest.mark.parametrize("package", ["plant", "autopilot"])
 def test_a_process_that_dies_is_named(forked: Launcher, package: str) -> None:
     with Flights(Setting(airborne=3.0), forked) as flights:

@@ -1,10 +1,13 @@
 """What travels beside the frames of a lockstep conversation: faults, their results, the battery; and running freely."""
 
+from math import inf, nan
+
 from colibri.mavlink.hil.faults import MOTOR, OFF, WRONG, Fault, encode_fault
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.plant_status import NOTHING, FaultResult, PlantBattery, PlantStatus, ReceivedFrame
 from colibri.mavlink.hil.state import encode_actuators
+from colibri.mavlink.hil.world_changes import PayloadChange, WindChange, encode_change
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 from tests.mavlink.hil.lockstep_ends import ADDRESS, INTERVAL_US, STRANGER, call, command_at, frame_at
@@ -37,6 +40,20 @@ def test_a_fault_without_an_answer_is_dropped(plant: PlantEnd, autopilot: Autopi
     plant.receive(encode_fault(codec, LOST, (1, dialect.PLANT_COMPONENT)), ADDRESS, 0.0)
     assert plant.take_faults() == []
     assert plant.dropped["repeated"] == 1
+
+
+def test_the_world_changes_with_the_answer_where_it_can_be_so(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    codec, to_plant = Codec(1, dialect.AUTOPILOT_COMPONENT), (1, dialect.PLANT_COMPONENT)
+    changes = (WindChange(5.0, 270.0), PayloadChange(0.5))
+    impossible = (WindChange(-1.0, 0.0), WindChange(1.0, 361.0), WindChange(nan, 0.0), PayloadChange(inf))
+    call(autopilot, plant)
+    offered(plant, 0)
+    datagram = b"".join(encode_change(codec, change, to_plant) for change in (*changes, *impossible))
+    assert plant.receive(datagram, ADDRESS, 0.0) is None
+    assert plant.take_faults() == []
+    plant.receive(encode_actuators(codec, command_at(0)) + datagram, ADDRESS, 0.0)
+    assert plant.take_faults() == list(changes)
+    assert plant.dropped["invalid"] == len(impossible)
 
 
 def test_what_became_of_it_comes_with_the_next_frame_however_often(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
