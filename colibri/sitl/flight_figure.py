@@ -17,13 +17,16 @@ _MAX_TEXTS = 18
 _END_COLOUR = "tab:red"
 
 
-def draw(flown: Columns, texts: Sequence[tuple[float, str]], path: Path, *, title: str, reason: str) -> None:
+def draw(
+    flown: Columns, texts: Sequence[tuple[float, str]], path: Path, *, failed_s: float, title: str, reason: str
+) -> None:
     """Draw a flight that failed at its end into file `path`.
 
     Args:
         flown: Its record.
         texts: What the vehicle said, each with its time, s.
         path: Of the PNG.
+        failed_s: When it ended, s.
         title: What was flown.
         reason: Why it failed.
     """
@@ -37,7 +40,7 @@ def draw(flown: Columns, texts: Sequence[tuple[float, str]], path: Path, *, titl
     for name in ("place", "tilt"):
         axes[name].sharex(axes["mode"])
         axes[name].tick_params(labelbottom=False)
-    _draw_place(axes["place"], flown)
+    _draw_place(axes["place"], flown, failed_s)
     axes["tilt"].plot(flown["t"], tilt_deg(flown))
     axes["tilt"].set_ylabel("tilt, degrees")
     _draw_modes(axes["mode"], flown)
@@ -46,25 +49,22 @@ def draw(flown: Columns, texts: Sequence[tuple[float, str]], path: Path, *, titl
     for name in ("place", "tilt", "mode"):
         for _, (time_s, _text) in numbered:
             axes[name].axvline(time_s, color="0.7", linewidth=0.8, linestyle=":")
-        axes[name].axvline(flown["t"][-1], color=_END_COLOUR)
+        axes[name].axvline(failed_s, color=_END_COLOUR)
     _write_texts(axes["texts"], axes["place"], numbered)
     figure.savefig(path, dpi=100)
 
 
-def _draw_place(axes: "Axes", flown: Columns) -> None:
+def _draw_place(axes: "Axes", flown: Columns, failed_s: float) -> None:
     for name, label in (("x", "east"), ("y", "north"), ("z", "up")):
         axes.plot(flown["t"], flown[name], label=label)
     axes.set_ylabel("position, m")
     axes.legend(loc="upper left")
-    axes.annotate(
-        f"failed at {flown['t'][-1]:.3f} s",
-        (flown["t"][-1], 0.0),
-        xycoords=("data", "axes fraction"),
-        xytext=(-4, 4),
-        textcoords="offset points",
+    axes.text(
+        *(failed_s, 1.06, f"failed at {failed_s:.3f} s"),
+        transform=axes.get_xaxis_transform(),
         ha="right",
+        va="bottom",
         color=_END_COLOUR,
-        backgroundcolor="w",
     )
 
 

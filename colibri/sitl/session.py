@@ -83,8 +83,9 @@ class Flights:
             place = folder / f"flight-{number}" if len(self.flown) > 1 else folder
             sitl.record.keep(place)
             if figures and sitl.record.frames:
-                heading = f"{title}, vehicle {sitl.system}" if len(self.flown) > 1 else title
-                draw(sitl.record.columns(), sitl.timed_texts, place / FIGURE, title=heading, reason=reason)
+                heading = f"vehicle {sitl.system}: {title}" if len(self.flown) > 1 else title
+                flown, texts = sitl.record.columns(), sitl.timed_texts
+                draw(flown, texts, place / FIGURE, failed_s=sitl.time_s, title=heading, reason=reason)
             facts = {
                 "test": title,
                 "reason": reason,
