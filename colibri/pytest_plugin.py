@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,8 @@ MARKS = {
     "seed": "seed(number): of everything random",
     "seeds": "seeds(first, last): one flight for each seed",
 }
+_MAX_NAME = 120
+"""Characters of a folder's name; of a longer one the end, and a hash that tells it from others with that end."""
 _FLIGHTS = pytest.StashKey["Flights"]()
 _LAUNCHER = pytest.StashKey["Launcher"]()
 _SUMMARY = pytest.StashKey[Summary]()
@@ -277,7 +280,9 @@ def _written(mark: pytest.Mark) -> str:
 
 def _folder(item: pytest.Item) -> Path:
     """Return where the flights of a test are kept."""
-    name = re.sub(r"[^\w.\-\[\]]+", "-", item.nodeid.replace("::", "-"))[-120:]
+    name = re.sub(r"[^\w.\-\[\]]+", "-", item.nodeid.replace("::", "-"))
+    if len(name) > _MAX_NAME:
+        name = f"{name[9 - _MAX_NAME :]}-{sha256(item.nodeid.encode()).hexdigest()[:8]}"
     keep: str = item.config.getoption("--sitl-keep")
     return item.config.invocation_params.dir / keep / name
 
