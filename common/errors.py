@@ -9,5 +9,9 @@ class Error(Exception):
     """
 
 
+class ForeignError(Error):
+    """Code of another package raised what is its `__cause__`, whose traceback the author of that package needs."""
+
+
 class InFlightError(Error):
     """A flight that was begun and came to no end, in whichever package; what was logged is there."""

@@ -17,10 +17,19 @@ from colibri.autopilot.control.interface import (
     VehicleState,
 )
 from colibri.autopilot.control.profile import Profile, ProfileError
-from colibri.autopilot.control.registry import check_controller, check_rotor_speeds, load_controller
+from colibri.autopilot.control.registry import (
+    BuildError,
+    DecisionError,
+    LawError,
+    check_controller,
+    check_rotor_speeds,
+    in_words,
+    load_controller,
+)
 from colibri.autopilot.control.vehicle_model.battery import estimated
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.config import SettingsError
+from colibri.common.errors import Error
 from colibri.common.rotations import nearest_turn
 from colibri.common.serialization import of_bytes, to_bytes
 from colibri.common.types import Array
@@ -136,30 +145,45 @@ class ControlLoop:
         """Decide the rotor speeds to hold until the next control sample.
 
         Raises:
-            DecisionError: The control law gave what no rotor can follow.
+            DecisionError: The control law raised, or gave what no rotor can follow.
         """
-        self._memory, decision = self._controller.step(self._memory, time_us, state, references)
-        self._command(decision.rotor_speeds)
-        return decision
+        try:
+            return self._take(time_us, *self._controller.step(self._memory, time_us, state, references))
+        except DecisionError:
+            raise
+        except Exception as error:
+            raise self._raised(time_us, error) from error
 
     def decide_attitude(self, time_us: int, state: VehicleState, demand: AttitudeDemand) -> Decision:
         """Decide the rotor speeds by which a law that takes attitudes follows `demand`.
 
         Raises:
-            DecisionError: The control law gave what no rotor can follow.
+            DecisionError: The control law raised, or gave what no rotor can follow.
         """
         assert isinstance(self._controller, AttitudeController), "decided only where attitudes are taken"
-        self._memory, decision = self._controller.step_attitude(self._memory, time_us, state, demand)
-        self._command(decision.rotor_speeds)
-        return decision
+        try:
+            return self._take(time_us, *self._controller.step_attitude(self._memory, time_us, state, demand))
+        except DecisionError:
+            raise
+        except Exception as error:
+            raise self._raised(time_us, error) from error
 
     def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
         """Go on with a law of the same kind and rhythm, built from other numbers; it takes over what is remembered."""
         self._controller, self._charged = controller, _charged(controller)
         self.vehicle = vehicle
 
-    def _command(self, rotor_speeds: Array) -> None:
-        check_rotor_speeds(self._name, rotor_speeds, self.vehicle.rotors.max_speed)
+    def _take(self, time_us: int, memory: Any, decision: Decision) -> Decision:
+        """Remember and command what the law has decided."""
+        self._memory = memory
+        self._command(decision.rotor_speeds, time_us)
+        return decision
+
+    def _raised(self, time_us: int, error: Exception) -> LawError:
+        return LawError(f"controller {self._name} raised at t = {time_us / 1e6:.3f} s: {in_words(error)}")
+
+    def _command(self, rotor_speeds: Array, time_us: int | None = None) -> None:
+        check_rotor_speeds(self._name, rotor_speeds, self.vehicle.rotors.max_speed, time_us)
         c1, c2, c3, c4 = (rotor_speeds / self.vehicle.rotors.max_speed).tolist()
         self.controls = (c1, c2, c3, c4)
 
@@ -186,9 +210,13 @@ def _build(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:
         if profile.controller not in profile.controllers:
             known = ", ".join(profile.controllers)
             raise ProfileError(
-                f"profile {profile.name} has no numbers for controller {profile.controller}, only for {known}: "
+                f"{profile.where} has no numbers for controller {profile.controller}, only for {known}: "
                 f"choose another profile, or add a table controllers.{profile.controller} to a copy of it"
             ) from error
-        raise ProfileError(f"profile {profile.name}: controllers.{profile.controller}: {error}") from error
+        raise ProfileError(f"{profile.where}: controllers.{profile.controller}: {error}") from error
+    except Error:
+        raise
+    except Exception as error:
+        raise BuildError(f"controller {profile.controller} cannot be built: {in_words(error)}") from error
     check_controller(profile.controller, controller)
     return controller

@@ -7,7 +7,7 @@ import msgspec
 
 from colibri.autopilot.control.settings import ControlInterval
 from colibri.autopilot.errors import AutopilotError
-from colibri.common.config import Table, read_named
+from colibri.common.config import Table, read_named, toml_names
 
 _FOLDER = Path(__file__).parents[1] / "profiles"
 
@@ -30,10 +30,10 @@ class SimulationSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only
     """Between two frames of the plant at most: they divide the control interval. Without it, that interval."""
 
 
-class Profile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A profile."""
+class ProfileTables(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What is in the file of a profile."""
 
-    name: str
+    name: str = ""
     controller: str
     """The control law that flies, by the name it is registered under."""
     references: References
@@ -41,6 +41,22 @@ class Profile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     controllers: dict[str, dict[str, Any]]
     """The numbers of each control law that the profile knows; each law reads its own table strictly."""
     simulation: SimulationSettings
+
+
+class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A profile.
+
+    A file's name is that which it says of itself, or that of the file; one that Colibri's own profiles have it cannot
+    have, so that a copy is told from what it was copied from.
+    """
+
+    file: str = ""
+    """Where it was read; empty for one of Colibri's own."""
+
+    @property
+    def where(self) -> str:
+        """What errors call it."""
+        return self.file or f"profile {self.name}"
 
     def table(self, controller: str) -> dict[str, Any]:
         """Return the numbers of a control law; none for one that the profile does not know."""
@@ -68,4 +84,36 @@ def load_profile(name_or_path: str) -> Profile:
     Raises:
         ProfileError: There is no such profile, or the file has a missing, unknown or impossible key.
     """
-    return read_named("profile", _FOLDER, name_or_path, Profile, ProfileError)
+    tables = read_named("profile", _FOLDER, name_or_path, ProfileTables, ProfileError)
+    values = {key: getattr(tables, key) for key in tables.__struct_fields__}
+    if name_or_path.endswith(".toml"):
+        path, taken = Path(name_or_path), {"", *profile_names()}
+        name = next((name for name in (tables.name, path.stem) if name not in taken), path.name)
+        values |= {"name": name, "file": name_or_path}
+    profile = Profile(**values)
+    _check_frames(profile)
+    return profile
+
+
+def profile_names() -> list[str]:
+    """Return the names of the profiles that come with Colibri."""
+    return toml_names(_FOLDER)
+
+
+def _check_frames(profile: Profile) -> None:
+    """Check that frames divide the control interval of the profile's own law; any other is given what divides its own.
+
+    Raises:
+        ProfileError: They do not.
+    """
+    frame_s = profile.simulation.frame_interval_s
+    control_s = profile.table(profile.controller).get("control_interval_s")
+    if frame_s is None or not isinstance(control_s, float):
+        return
+    frame_us, control_us = round(frame_s * 1e6), round(control_s * 1e6)
+    if frame_us % 1000 or control_us % frame_us:
+        fitting = [f"{ms / 1000:g}" for ms in range(1, control_us // 1000 + 1) if control_us % (1000 * ms) == 0]
+        raise ProfileError(
+            f"{profile.where}: simulation.frame_interval_s: {frame_s:g} does not divide the control interval of "
+            f"{control_s:g} s: choose {', '.join(fitting)}"
+        )

@@ -1,14 +1,18 @@
 """Control laws by name: found as entry points, made, and what they return checked."""
 
 from collections.abc import Callable, Mapping
+from functools import cache
+from hashlib import sha256
 from importlib.metadata import entry_points
-from typing import Any, TypeAlias
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from colibri.autopilot.control.interface import Clock, Controller
 from colibri.autopilot.errors import AutopilotError
-from colibri.common.errors import InFlightError
+from colibri.common.errors import Error, ForeignError, InFlightError
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -22,6 +26,14 @@ class ControllerError(AutopilotError):
 
 class DecisionError(AutopilotError, InFlightError):
     """A control law decided in flight what no rotor can follow."""
+
+
+class LawError(DecisionError, ForeignError):
+    """A control law raised in flight."""
+
+
+class BuildError(ControllerError, ForeignError):
+    """A control law raised while it was built."""
 
 
 Factory: TypeAlias = Callable[[Mapping[str, Any], Vehicle, Clock], Controller[Any]]
@@ -48,6 +60,35 @@ def load_controller(name: str) -> Factory:
     raise ControllerError(f"unknown controller {name}: installed are {', '.join(controller_names())}")
 
 
+class Origin(NamedTuple):
+    """Where a control law comes from.
+
+    Attributes:
+        entry: Module and name.
+        package: With its version.
+        sha256: Of the module's file; empty where it is none.
+    """
+
+    entry: str
+    package: str
+    sha256: str
+
+
+@cache
+def origin_of(name: str) -> Origin:
+    """Return where the control law registered as `name` comes from.
+
+    Raises:
+        ControllerError: There is none.
+    """
+    for entry in entry_points(group=GROUP, name=name):
+        package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else ""
+        spec = find_spec(entry.module)
+        file = Path(spec.origin) if spec and spec.origin else None
+        return Origin(entry.value, package, sha256(file.read_bytes()).hexdigest() if file and file.is_file() else "")
+    raise ControllerError(f"unknown controller {name}: installed are {', '.join(controller_names())}")
+
+
 def check_controller(name: str, controller: object) -> None:
     """Check what a control law promises before anything flies.
 
@@ -61,14 +102,23 @@ def check_controller(name: str, controller: object) -> None:
         raise ControllerError(f"controller {name}: control_interval_us must be whole milliseconds up to a second")
 
 
-def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float) -> None:
-    """Check that rotors can follow a decision.
+def in_words(error: Exception) -> str:
+    """Return an exception as one line: a refusal in its own words, of anything else its type, too."""
+    words = " ".join(str(error).split())
+    if words and isinstance(error, Error):
+        return words
+    return f"{type(error).__name__}: {words}" if words else type(error).__name__
+
+
+def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float, time_us: int | None = None) -> None:
+    """Check that rotors can follow a decision, of the simulated time `time_us` if it is of a flight.
 
     Raises:
         DecisionError: They cannot.
     """
     speeds = np.asarray(rotor_speeds).tolist()
     if not isinstance(speeds, list) or len(speeds) != 4 or not all(0.0 <= speed <= max_speed for speed in speeds):
+        when = "" if time_us is None else f" at t = {time_us / 1e6:.3f} s"
         raise DecisionError(
-            f"controller {name} gave rotor speeds {rotor_speeds}: expected four from 0 to {max_speed:g}"
+            f"controller {name} gave rotor speeds {rotor_speeds}{when}: expected four from 0 to {max_speed:g}"
         )

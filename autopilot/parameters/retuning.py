@@ -10,10 +10,10 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import (
     check_controller,
     check_rotor_speeds,
+    in_words,
     load_controller,
 )
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers
-from colibri.common.errors import Error
 from colibri.mavlink.parameters.store import ParamError, Prepared, Value
 from colibri.plant.vehicle.description import Vehicle
 
@@ -60,7 +60,7 @@ class Tuning:
             controller = self._build(profile, vehicle)
             _try(profile.controller, controller, vehicle)
         except Exception as error:  # whatever somebody else's law raises, the flight goes on with the old one
-            self._say(f"{name} not changed: {_in_words(error)}")
+            self._say(f"{name} not changed: {in_words(error)}")
             return ParamError.VALUE_OUT_OF_RANGE
         if _rhythm(controller) != self._rhythm:
             return ParamError.PERMISSION_DENIED
@@ -81,14 +81,6 @@ def builder(controller: str, clock: Clock) -> Build:
         return law
 
     return build
-
-
-def _in_words(error: Exception) -> str:
-    """Return one line: a refusal is its own words, of anything else the words may not say what it is."""
-    words = " ".join(str(error).split())
-    if words and isinstance(error, Error):
-        return words
-    return f"{type(error).__name__}: {words}" if words else type(error).__name__
 
 
 def _rhythm(controller: Rhythm) -> tuple[int, Preview]:

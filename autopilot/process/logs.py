@@ -14,7 +14,6 @@ from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup, l
 from colibri.common.process.log_files import CsvLog, LogError, LogFile
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
-from colibri.plant.vehicle.description import load_vehicle
 
 if TYPE_CHECKING:
     from colibri.autopilot.core.step import Received
@@ -59,7 +58,9 @@ class AutopilotLog:
         self._estimates = self._checks = None
         if setup.feedback is Feedback.SENSORS:
             self._estimates = CsvLog(folder / "estimate.csv", ESTIMATE_COLUMNS)
-            self._checks = CsvLog(folder / "filter.csv", check_columns(_kinds_of(setup.vehicle)))
+            vehicle = setup.vehicle_tables
+            kinds = kinds_of(vehicle.sensors) if vehicle and vehicle.sensors else []
+            self._checks = CsvLog(folder / "filter.csv", check_columns(kinds))
 
     def write(self, step: Step) -> None:
         """Append a control sample; of a frame between two of them, only the check of the filter."""
@@ -120,8 +121,3 @@ class AutopilotLog:
         biases = (*estimate.gyro_bias_rad_s, *estimate.accel_bias_m_s2)
         counts = (estimate.health.flags, sum(estimate.rejected.values()), estimate.resets)
         log.write((frame.time_us / 1e6, *state, *deviations, *biases, *counts))
-
-
-def _kinds_of(vehicle: str) -> list[str]:
-    sensors = load_vehicle(vehicle).sensors
-    return [] if sensors is None else kinds_of(sensors)

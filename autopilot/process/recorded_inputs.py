@@ -9,10 +9,12 @@ from typing import TypeAlias
 
 import msgspec
 
+from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
+from colibri.plant.vehicle.description import Vehicle
 
 
 class InputsError(AutopilotError):
@@ -37,6 +39,9 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         values: Of parameters that were changed before.
         history: What had been kept of the same flight, where it was killed in it; else empty.
         first_us: The first frame that it answered.
+        profile_tables: What was in the profile; None in logs of before it was kept.
+        vehicle_tables: What was in the vehicle's file; None as well.
+        track_file: What was in the file that the track names, if it names one.
     """
 
     profile: str
@@ -53,6 +58,9 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     values: dict[str, Value] = {}
     history: bytes = b""
     first_us: int = 0
+    profile_tables: Profile | None = None
+    vehicle_tables: Vehicle | None = None
+    track_file: str | None = None
 
 
 class ReceivedDatagram(

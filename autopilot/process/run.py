@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
-from colibri.autopilot.guidance.trajectories.loading import load_track
+from colibri.autopilot.guidance.trajectories.loading import file_text, load_track
 from colibri.autopilot.process.client import Client
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.common.errors import Error
+from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, Stop, fail, gc_frozen
 from colibri.common.process.status import Status
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
@@ -50,8 +51,8 @@ def run(args: argparse.Namespace, link: UdpLink | BlockingReceiver, status: Stat
         autopilot = ground.copter if ground else _alone(args, profile, vehicle, status)
         end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
     except Error as error:
-        fail(str(error))
-    log = AutopilotLog(args.out, _setup(args, profile)) if args.out else None
+        fail(keep_failure(error, args.out))
+    log = AutopilotLog(args.out, _setup(args, profile, vehicle)) if args.out else None
     if ground and log:
         ground.record(log)
     if args.stepped and isinstance(link, UdpLink):  # several flights share the cores: who waits gives way at once
@@ -60,7 +61,7 @@ def run(args: argparse.Namespace, link: UdpLink | BlockingReceiver, status: Stat
         with gc_frozen():
             Client(link, end, status, stop, log, ground).fly(autopilot)
     except Error as error:
-        fail(str(error), EXIT_FAILED)
+        fail(keep_failure(error, args.out), EXIT_FAILED)
     finally:
         link.close()
         if ground:
@@ -70,20 +71,24 @@ def run(args: argparse.Namespace, link: UdpLink | BlockingReceiver, status: Stat
     return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
 
 
-def _setup(args: argparse.Namespace, profile: Profile) -> Setup:
+def _setup(args: argparse.Namespace, profile: Profile, vehicle: Vehicle) -> Setup:
     served = bool(args.gcs or args.stepped)
+    flown = args.track if served else args.track or TRACK
     return Setup(
         profile=args.profile,
         controller=profile.controller,
         solver=args.solver,
         vehicle=args.vehicle or profile.simulation.vehicle,
         feedback=args.feedback,
-        track=args.track if served else args.track or TRACK,
+        track=flown,
         floor_m=args.floor,
         origin=args.home.origin,
         system_id=args.system_id,
         identity=args.identity,
         ground=served,
+        profile_tables=profile,
+        vehicle_tables=vehicle,
+        track_file=flown and file_text(flown),
     )
 
 

@@ -9,8 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from colibri.analysis.recording import ATTITUDE_REFERENCE, COLUMNS, INPUT, POSITION_REFERENCE, ROTORS, Recording
-from colibri.analysis.report import SETTLED_AFTER_S
+from colibri.analysis.recording import (
+    ATTITUDE_REFERENCE,
+    COLUMNS,
+    INPUT,
+    POSITION_REFERENCE,
+    ROTORS,
+    SETTLED_AFTER_S,
+    Recording,
+)
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan

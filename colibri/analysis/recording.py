@@ -18,6 +18,8 @@ INPUT = ("U1", "U2", "U3", "U4")
 ATTITUDE_REFERENCE = ("phi_ref", "theta_ref", "psi_ref")
 ROTORS = ("omega1", "omega2", "omega3", "omega4")
 POSITION_REFERENCE = ("x_ref", "y_ref", "z_ref")
+SETTLED_AFTER_S = 20.0
+"""From then on the start of a flight no longer counts."""
 COLUMNS = ("t", *STATE, *INPUT, *ATTITUDE_REFERENCE, *ROTORS, *POSITION_REFERENCE)
 
 _PLANT_STATE = slice(1, 14)

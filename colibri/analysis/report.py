@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from colibri.analysis.estimation import FIGURES, read_estimation, rms
-from colibri.analysis.recording import INPUT, Recording
+from colibri.analysis.lost import Lost, ground_contact_s
+from colibri.analysis.recording import INPUT, SETTLED_AFTER_S, Recording
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Active, Fallback
 from colibri.autopilot.control.qp import QpStatus
 from colibri.common.types import Array
@@ -17,15 +18,15 @@ from colibri.mavlink.hil.feedback import Feedback
 
 Report: TypeAlias = dict[str, Any]
 
-SETTLED_AFTER_S = 20.0
 _SMALL_M = 0.01
 
 
-def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
-    """Return the figures of a flight.
+def report(plan: FlightPlan, summary: Summary | None, recording: Recording, lost: Lost | None) -> Report:
+    """Return the figures of a flight; one that came to an early end has no summary.
 
     Errors are distances to the reference of the same instant; effort is the RMS of the moment U2..U4, N m.
     """
+    wall_time_s, frames, resent = summary or (None, None, None)
     error, t = recording.position_error_m, recording["t"]
     sim_time_s = float(t[-1])
     settled = error[t >= SETTLED_AFTER_S]
@@ -47,8 +48,11 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
         "without": list(plan.without),
         "start": plan.start._asdict(),
         "sim_time_s": sim_time_s,
-        "wall_time_s": summary.wall_time_s,
-        "real_time_factor": sim_time_s / summary.wall_time_s,
+        "lost": None if lost is None else lost.why,
+        "lost_at_s": None if lost is None else lost.at_s,
+        "ground_contact_s": ground_contact_s(plan.plant_vehicle, recording),
+        "wall_time_s": wall_time_s,
+        "real_time_factor": sim_time_s / wall_time_s if wall_time_s else None,
         "rmse_m": rms(error),
         "max_error_m": float(error.max()),
         "rmse_after_20s_m": rms(settled) if len(settled) else None,
@@ -57,8 +61,8 @@ def report(plan: FlightPlan, summary: Summary, recording: Recording) -> Report:
         "effort_n_m": rms(np.linalg.norm(recording.columns(INPUT[1:]), axis=1)),
         "solve_time_us": _quantiles(recording.solve_time_us),
         "control_step_us": _quantiles(recording.control_step_us),
-        "frames": summary.frames,
-        "resent": summary.resent,
+        "frames": frames,
+        "resent": resent,
         "qp_failures": int(np.count_nonzero(recording.qp_status > STATUS_CODES[QpStatus.SOLVED])),
         "qp_status": _counts(recording.qp_status, {str(status): STATUS_CODES[status] for status in QpStatus}),
         "fallbacks": _counts(recording.fallback, {str(fallback): FALLBACK_CODES[fallback] for fallback in Fallback}),
@@ -95,7 +99,8 @@ def print_report(figures: Report, out: Path) -> None:
     fallbacks = [f"{count} {name}" for name, count in figures["fallbacks"].items() if count]
     title = escape(f"{figures['track']}, profile {figures['profile']}")
     table = Table(title=title, show_header=False, title_justify="left")
-    rows = {
+    lost = {} if figures["lost"] is None else {f"lost at t = {figures['lost_at_s']:.2f} s": figures["lost"]}
+    rows = lost | {
         "position error, RMS": length(figures["rmse_m"]),
         f"position error, RMS after {SETTLED_AFTER_S:.0f} s": "-" if settled is None else length(settled),
         **_estimation_rows(figures),

@@ -2,20 +2,8 @@
 
 from argparse import ArgumentTypeError, Namespace
 
-from colibri.cli.shared.options import add_feedback, add_out
-from colibri.common.process.arguments import ArgumentParser, positive
-from colibri.mavlink.hil.feedback import Feedback
-from colibri.plant.environment.weather import NO_WIND
-from colibri.plant.process.options import add_weather_arguments
-
-COMPARED_S = 100.0
-
-
-def in_another_world(args: Namespace) -> bool:
-    """Whether the comparison leaves the thesis's world: chance, sensors, weather, another vehicle, two processes."""
-    weather = args.wind is not NO_WIND or args.gusts or args.turbulence
-    chance = args.seeds or args.feedback is Feedback.SENSORS
-    return bool(args.resume or chance or weather or args.vehicle or args.link == "udp" or args.duration != COMPARED_S)
+from colibri.cli.shared.options import add_flight_options, add_out
+from colibri.common.process.arguments import ArgumentParser
 
 
 def seeds(text: str) -> range:
@@ -47,18 +35,26 @@ def add_options(parser: ArgumentParser) -> None:
         choices=("memory", "direct", "udp"),
         help="one process, with or without the codec; or two (default %(default)s)",
     )
-    add("--seeds", type=seeds, metavar="FIRST-LAST", help="fly each by all of these seeds, and show how errors spread")
-    add("--resume", action="store_true", help="with --seeds: do not fly again what --out has already")
-    add_feedback(add)
-    add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
-    add("--duration", type=positive, default=COMPARED_S, metavar="S", help="simulated time (default %(default)s)")
-    add_weather_arguments(parser)
+    add(
+        "--controller",
+        action="append",
+        metavar="NAME",
+        help="fly every profile that names none with this controller; may be repeated (default: its own)",
+    )
+    add(
+        "--seeds",
+        type=seeds,
+        metavar="FIRST-LAST",
+        help="fly each by all of these in place of --seed, and show how errors spread",
+    )
+    add("--resume", action="store_true", help="do not fly again what --out has already by the same contents")
+    add_flight_options(parser)
     add_out(add, "out/compare", "the tables")
 
 
 def run(args: Namespace) -> int:
     """Compare as the command line says; return the exit code."""
-    if in_another_world(args):
+    if args.seeds:
         from colibri.studies.seeds import compare_seeds
 
         return compare_seeds(args)

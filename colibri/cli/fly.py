@@ -2,9 +2,9 @@
 
 from argparse import Namespace
 
-from colibri.cli.shared.options import add_feedback, add_out, add_signing
-from colibri.common.process.arguments import ArgumentParser, natural, number, positive, speed
-from colibri.plant.process.options import add_world_arguments
+from colibri.analysis.limits import limit
+from colibri.cli.shared.options import add_flight_options, add_out, add_signing
+from colibri.common.process.arguments import ArgumentParser, speed
 
 TRACK_HELP = (
     "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
@@ -39,18 +39,17 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="N",
         help="times real time, or max (default: max; 1 where a ground station is invited by --gcs)",
     )
-    add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
-    add_feedback(add)
-    add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
-    add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
-    add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
-    add("--floor", type=number, metavar="M", help="no track may lead below this height, m (default: the ground, 0)")
-    add("--integrator", choices=("rk4", "adaptive"), help="of the plant (default: the profile's)")
-    add_world_arguments(
-        parser, start="the profile's, and the track's first yaw", of_whom=" of the plant; the autopilot keeps its own"
-    )
-    add("--duration", type=positive, default=100.0, metavar="S", help="simulated time (default %(default)s)")
+    add_flight_options(parser)
     add_out(add, "out", "logs and figures")
+    add(
+        "--fail-above",
+        type=limit,
+        action="append",
+        default=[],
+        metavar="[KEY=]VALUE",
+        help="exit with 1 if a number of report.json is larger: of rmse_after_20s_m (m), or another by its KEY, "
+        "ground_contact_s=0 say; may be repeated",
+    )
     add("--no-figures", action="store_true", help="draw no PNG figures")
 
 

@@ -4,13 +4,16 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryFile
 
-from colibri.common.process.lifecycle import fail
+from colibri.common.errors import InFlightError
+from colibri.common.process.failure_file import FAILURE, keep_failure
+from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.flights.plan import FlightPlan, Summary, unseen
-from colibri.flights.processes import fly_processes
+from colibri.flights.processes import FlightError, fly_processes
+from colibri.flights.provenance import PROVENANCE, write_provenance
 
 LOGS = (
     *("flight.csv", "flight.tlog", "plant.csv", "autopilot.csv", "inputs.jsonl", "estimate.csv", "filter.csv"),
-    "report.json",
+    *("report.json", FAILURE, PROVENANCE),
 )
 FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "rotors.png", "error.png")
 
@@ -18,16 +21,23 @@ FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "roto
 def fly_plan(
     plan: FlightPlan, progress: Callable[[float], None] = unseen, say: Callable[[str], None] = unseen
 ) -> Summary:
-    """Fly a plan over its link; return what was measured meanwhile.
+    """Fly a plan over its link, and note in its folder what it is made of; return what was measured meanwhile.
 
     `progress` is called with the simulated time, s; `say` with a line for each ground link and each ground station that
     connects.
+
+    Raises:
+        FlightError: It came to an early end; why is also in `FAILURE`, with the traceback where foreign code raised.
     """
+    write_provenance(plan)
     if plan.link == "udp":
         return fly_processes(plan, progress, say)
     from colibri.flights.in_process import fly_locally
 
-    return fly_locally(plan, progress)
+    try:
+        return fly_locally(plan, progress)
+    except InFlightError as error:
+        raise FlightError(keep_failure(error, plan.out), EXIT_FAILED, said=False) from error
 
 
 def prepare(out: Path) -> None:

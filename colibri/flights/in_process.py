@@ -9,6 +9,7 @@ from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.core.step import Step, answer
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
+from colibri.autopilot.guidance.trajectories.loading import file_text
 from colibri.autopilot.process.logs import AutopilotLog
 from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
@@ -99,6 +100,9 @@ def _setup(plan: FlightPlan) -> Setup:
         system_id=SYSTEM_ID,
         identity=DEFAULT_IDENTITY,
         ground=False,
+        profile_tables=plan.profile,
+        vehicle_tables=plan.vehicle,
+        track_file=file_text(plan.track_name),
     )
 
 

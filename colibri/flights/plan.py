@@ -1,7 +1,7 @@
 """What to fly: the command line of `colibri fly`, resolved and checked before anything starts."""
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import degrees, inf
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,6 +17,12 @@ from colibri.plant.environment.weather import Weather, weather_of
 from colibri.plant.physics.start import Start, check_start
 from colibri.plant.simulation.setting import WorldSetting, world_values
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
+
+OPTIONS = (
+    *(each.name for each in fields(WorldSetting)),
+    *("solver", "vehicle", "plant_vehicle", "integrator", "feedback", "duration"),
+)
+"""Names of the options that every command has that flies; track, profile, controller, link and folder are its own."""
 
 
 def unseen(_what: object) -> None:
@@ -108,20 +114,32 @@ class FlightPlan(WorldSetting):
             VehicleError: A vehicle cannot be read, or cannot start as the profile says.
             TrackError: There is no such track, it leads below the floor, or its file cannot be flown.
         """
-        ground = GroundAccess(tuple(args.gcs), args.signing_key, args.insecure)
-        if ground.links and args.link != "udp":
+        if args.gcs and args.link != "udp":
             raise PlanError(f"--gcs needs --link udp: over {args.link} there is no autopilot to connect to")
-        check_reach(ground.links, signed=ground.signing_key is not None, insecure=ground.insecure)
+        check_reach(args.gcs, signed=args.signing_key is not None, insecure=args.insecure)
         profile = load_profile(args.profile).with_choices(args.controller, args.solver)
         vehicle_name = args.vehicle or profile.simulation.vehicle
+        plant_vehicle = load_vehicle(args.plant_vehicle or vehicle_name).without(args.without)
+        return cls.of_contents(args, args.track, profile, load_vehicle(vehicle_name), plant_vehicle)
+
+    @classmethod
+    def of_contents(
+        cls, args: argparse.Namespace, track_name: str, profile: Profile, vehicle: Vehicle, plant_vehicle: Vehicle
+    ) -> "FlightPlan":
+        """Resolve a command line whose profile and vehicles were read already, its track being read by `track_name`.
+
+        Raises:
+            PlanError: Sensors are to be flown by that the vehicle has not, or without ground to stand on.
+            VehicleError: A vehicle cannot start as the profile says.
+            TrackError: There is no such track, it leads below the floor, or its file cannot be flown.
+        """
+        vehicle_name = args.vehicle or profile.simulation.vehicle
         plant_vehicle_name = args.plant_vehicle or vehicle_name
-        plant_vehicle = load_vehicle(plant_vehicle_name).without(args.without)
-        vehicle = load_vehicle(vehicle_name)
         if args.feedback is Feedback.SENSORS:
             _check_sensors(vehicle_name, vehicle)
             _check_sensors(plant_vehicle_name, plant_vehicle)
         floor_m = args.floor if args.floor is not None else -inf if plant_vehicle.ground is None else 0.0
-        to_fly, note = load_track(args.track, vehicle, profile, floor_m)
+        to_fly, note = load_track(track_name, vehicle, profile, floor_m)
         start = _start_of(profile, to_fly, args.feedback)._replace(**args.start)
         check_start(start, plant_vehicle)
         return cls(
@@ -132,12 +150,12 @@ class FlightPlan(WorldSetting):
             plant_vehicle_name=plant_vehicle_name,
             integrator=args.integrator or profile.simulation.integrator,
             link=args.link,
-            speed=args.speed or (1.0 if ground.links else inf),
+            speed=args.speed or (1.0 if args.gcs else inf),
             feedback=args.feedback,
             duration_s=args.duration,
             out=args.out,
             solver=args.solver,
-            ground=ground,
+            ground=GroundAccess(tuple(args.gcs), args.signing_key, args.insecure),
             floor_m=floor_m,
             track=to_fly,
             track_note=note,

@@ -4,6 +4,7 @@ import subprocess
 from collections.abc import Callable, Iterable
 
 from colibri.common.errors import InFlightError
+from colibri.common.process.failure_file import kept_failure
 from colibri.flights.children import Child, end_children, events_of, how_it_ended
 from colibri.flights.command_lines import options_of, plant_options
 from colibri.flights.plan import FlightPlan, Summary, unseen
@@ -52,7 +53,7 @@ def fly_processes(
                     progress(event["sim_time_s"])
                 elif event["event"] == "ended":
                     return Summary(event["wall_time_s"], event["frames"], event["resent"])
-        raise _failure(children.values())
+        raise _failure(children.values(), plan)
     finally:
         end_children(children.values())
 
@@ -88,10 +89,11 @@ def _autopilot_options(plan: FlightPlan, plant_url: str) -> list[str]:
     )
 
 
-def _failure(children: Iterable[Child]) -> FlightError:
+def _failure(children: Iterable[Child], plan: FlightPlan) -> FlightError:
     """Return what is wrong with children of whom one has ended."""
     for child in children:
         code = child.code()
         if code:
-            return FlightError(f"the {child.name} {how_it_ended(code)}", max(code, 1), said=code > 0)
+            why = kept_failure(plan.out) or f"the {child.name} {how_it_ended(code)}"
+            return FlightError(why, max(code, 1), said=code > 0)
     return FlightError("a process ended before the flight did", 1, said=False)

@@ -4,9 +4,10 @@ import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from math import degrees
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.control.registry import DecisionError
 from colibri.autopilot.core.checkpoint import History
 from colibri.autopilot.core.copter import Copter
@@ -14,7 +15,8 @@ from colibri.autopilot.core.step import Received, Step
 from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.ground.stations import StationSettings
-from colibri.autopilot.guidance.trajectories.loading import load_track
+from colibri.autopilot.guidance.trajectories.loading import load_track, with_file
+from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.process.recorded_inputs import Input, InputsError, ReceivedDatagram, Setup, read
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
@@ -26,9 +28,11 @@ from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_actuat
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec
 from colibri.mavlink.wire.tlog import Logged, TlogError, decode
-from colibri.plant.vehicle.description import load_vehicle
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 INPUTS = "inputs.jsonl"
+_CUT_OFF_US = 1_000_000
+"""Processes that are killed leave logs that end less apart than this."""
 _NO_CLOCK_S = 0.0
 """What is decided must not depend on it."""
 
@@ -96,6 +100,7 @@ def replay(args: argparse.Namespace) -> int:
     """Replay as the command line says; return the exit code."""
     try:
         outcome = replay_flight(args.tlog)
+        ended_us = _logged_us(args.tlog)
     except ReplayError as error:
         fail(str(error))
     if outcome.difference is not None:
@@ -103,19 +108,25 @@ def replay(args: argparse.Namespace) -> int:
         fail(f"{args.tlog}: the autopilot does not answer as it did, after {outcome.commands} commands", EXIT_FAILED)
     if not args.quiet:
         print(f"{outcome.commands} commands up to t = {outcome.last_us * 1e-6:.3f} s, all identical")  # noqa: T201
+    if ended_us - outcome.last_us > _CUT_OFF_US:
+        cut = f"ends at t = {outcome.last_us * 1e-6:.3f} s, and the flight went on to t = {ended_us * 1e-6:.3f} s"
+        fail(f"{args.tlog} {cut}: it was cut off", EXIT_FAILED)
     return 0
 
 
 def replay_flight(tlog: Path) -> Replayed:
     """Replay a flight from its telemetry log and the autopilot's log of inputs beside it.
 
+    Profile, vehicle and waypoints are those of the log, whatever their files are by now.
+
     Raises:
         ReplayError: They cannot be replayed.
     """
+    log = _bytes(tlog)
     inputs = _inputs(tlog.parent / INPUTS, tlog)
     setups = [what for what in inputs if isinstance(what, Setup)]
     try:
-        recorded = list(recorded_frames(decode(_bytes(tlog)), setups[0]))
+        recorded = list(recorded_frames(decode(log), setups[0]))
     except TlogError as error:
         raise ReplayError(f"{tlog}: {error}: expected the flight.tlog of a flight") from error
     if not any(each.command for each in recorded):
@@ -190,11 +201,21 @@ def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
     return arrived
 
 
+def _logged_us(tlog: Path) -> int:
+    """Return until when the plant has logged the flight of a telemetry log; 0 where its own log is not beside it."""
+    try:
+        *_, last, _ = (tlog.parent / "plant.csv").read_text(encoding="utf-8").split("\n")
+        return round(float(last.partition(",")[0]) * 1e6)
+    except (OSError, ValueError):
+        return 0
+
+
 def _begun(setup: Setup) -> Autopilot | Copter:
     """Return an autopilot that begins as it did then."""
-    profile = load_profile(setup.profile).with_choices(setup.controller, setup.solver)
-    vehicle = load_vehicle(setup.vehicle)
-    flown = load_track(setup.track, vehicle, profile, setup.floor_m).track if setup.track else None
+    tables = setup.profile_tables or load_profile(setup.profile)
+    profile = tables.with_choices(setup.controller, setup.solver)
+    vehicle = setup.vehicle_tables or load_vehicle(setup.vehicle)
+    flown = _track(setup, vehicle, profile)
     if not setup.ground:
         assert flown is not None, "without ground stations a track is flown"
         estimator = estimator_for(setup.feedback, vehicle, setup.origin)
@@ -204,6 +225,18 @@ def _begun(setup: Setup) -> Autopilot | Copter:
     )
     history = of_bytes(History, setup.history) if setup.history else None
     return Copter(profile, vehicle, settings, _clock, values=setup.values, first=flown, history=history)
+
+
+def _track(setup: Setup, vehicle: Vehicle, profile: Profile) -> Track | None:
+    """Return the track that was flown, through the points that its file had then."""
+    if setup.track is None:
+        return None
+    if setup.track_file is None:
+        return load_track(setup.track, vehicle, profile, setup.floor_m).track
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "waypoints.csv"
+        path.write_text(setup.track_file, encoding="utf-8")
+        return load_track(with_file(setup.track, path), vehicle, profile, setup.floor_m).track
 
 
 def _end(setup: Setup, pilot: Autopilot | Copter) -> AutopilotEnd:

@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from colibri.analysis.consistency import NAVIGATION, bounds
 from colibri.analysis.estimation import MEASURED
 from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_title, shortened, write_figure
-from colibri.analysis.report import SETTLED_AFTER_S
+from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, Flown
 
 _LABEL_IN = 0.8

@@ -31,6 +31,7 @@ class Flown(NamedTuple):
         values: `QUANTITIES` after 20 s; nan where it was lost.
         innovations: How many innovations of each of `MEASURED` are in them.
         sha256: Of its trajectory.
+        contents: Hash of all that it was made of, as in its provenance.
     """
 
     contender: str
@@ -40,10 +41,11 @@ class Flown(NamedTuple):
     values: tuple[float, ...]
     innovations: tuple[int, ...]
     sha256: str
+    contents: str
 
 
 _COUNTS = tuple(f"innovations {kind}" for kind in MEASURED)
-COLUMNS = ("profile", "track", "seed", "lost", *QUANTITIES, *_COUNTS, "trajectory_sha256")
+COLUMNS = ("profile", "track", "seed", "lost", *QUANTITIES, *_COUNTS, "trajectory_sha256", "contents_sha256")
 
 
 class FlightsLog:
@@ -61,7 +63,7 @@ class FlightsLog:
     def add(self, flown: Flown) -> None:
         """Append a flight."""
         values = map(repr, map(float, flown.values))
-        self._table.writerow((*flown[:4], *values, *flown.innovations, flown.sha256))
+        self._table.writerow((*flown[:4], *values, *flown.innovations, flown.sha256, flown.contents))
         self._file.flush()
 
     def __enter__(self) -> Self:
@@ -96,6 +98,7 @@ def kept_flights(folder: Path, settings: str) -> dict[tuple[str, str, int], Flow
 
 
 def _flown(row: list[str]) -> Flown:
-    contender, track, seed, lost, *numbers, sha256 = row
+    contender, track, seed, lost, *numbers, sha256, contents = row
     values = tuple(map(float, numbers[: len(QUANTITIES)]))
-    return Flown(contender, track, int(seed), lost, values, tuple(map(int, numbers[len(QUANTITIES) :])), sha256)
+    innovations = tuple(map(int, numbers[len(QUANTITIES) :]))
+    return Flown(contender, track, int(seed), lost, values, innovations, sha256, contents)

@@ -2,29 +2,28 @@
 
 import argparse
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from colibri.analysis.estimation import MEASURED, rms
-from colibri.analysis.outcome import keep_flight
+from colibri.analysis.outcome import fly_to_its_end
 from colibri.analysis.parallel import side_by_side
-from colibri.analysis.report import SETTLED_AFTER_S
+from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.tables import print_table, write_table
-from colibri.autopilot.control.registry import load_controller
-from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
-from colibri.common.errors import Error, InFlightError
+from colibri.common.errors import Error
+from colibri.common.process.failure_file import FAILURE
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.common.types import Array
-from colibri.flights.fly import fly_plan, make_folder
-from colibri.flights.plan import FlightPlan
-from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, FlightsLog, Flown, KeptError, kept_flights
+from colibri.flights.fly import make_folder
+from colibri.flights.plan import OPTIONS
+from colibri.flights.provenance import provenance_of
+from colibri.studies.contenders import Job, jobs_of
+from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, FlightsLog, Flown, kept_flights
 
-DEFAULT_PROFILE = "flight"
-LOST_M = 5.0
-"""A vehicle further off its reference once settled is lost."""
 HEADINGS = (
     *("profile", "track", "flights", "lost"),
     *("control (m)", "true (m)", "est. horizontal (m)", "est. vertical (m)", "roll (°)", "pitch (°)", "yaw (°)"),
@@ -32,63 +31,30 @@ HEADINGS = (
 )
 
 
-class Job(NamedTuple):
-    """One flight.
-
-    Attributes:
-        contender: Profile, or profile:controller.
-        track: What it flies.
-        seed: Of everything random.
-        args: The command line.
-    """
-
-    contender: str
-    track: str
-    seed: int
-    args: argparse.Namespace
-
-    def plan(self, out: Path) -> FlightPlan:
-        """Return the flight as a plan."""
-        profile, _, controller = self.contender.partition(":")
-        chosen = {"profile": profile, "controller": controller or None, "track": self.track, "seed": self.seed}
-        options = {name: getattr(self.args, name) for name in (*_COMMON, *_WEATHER)}
-        return FlightPlan.of_options(out, **chosen, **options)
-
-
-_COMMON = ("vehicle", "feedback", "link", "duration")
-_WEATHER = ("wind", "gusts", "turbulence")
-_KEPT_AS = {"gusts": "gust"}
 _NO_INNOVATIONS = (0,) * len(MEASURED)
 
 
 def compare_seeds(args: argparse.Namespace) -> int:
     """Fly every contender along every track by every seed; return 1 if one was lost."""
-    contenders, tracks = args.profile or [DEFAULT_PROFILE], args.track or list(THESIS_TRACKS)
-    jobs = [
-        Job(contender, track, seed, args) for contender in contenders for track in tracks for seed in args.seeds or (0,)
-    ]
     try:
-        for job in jobs:
-            load_controller(job.plan(args.out).profile.controller)
+        jobs = jobs_of(args)
+        contents = {_key(job): provenance_of(job.plan(args.out)).sha256["all"] for job in jobs}
+        make_folder(args.out)
+        flown = kept_flights(args.out, _settings(args)) if args.resume else {}
     except Error as error:
         fail(str(error))
-    make_folder(args.out)
-    try:
-        flown = kept_flights(args.out, _settings(args)) if args.resume else {}
-    except KeptError as error:
-        fail(str(error))
-    left = [job for job in jobs if (job.contender, job.track, job.seed) not in flown]
-    with FlightsLog(args.out, _settings(args), flown.values()) as log:
+    same = {key: each for key, each in flown.items() if contents.get(key, each.contents) == each.contents}
+    if len(same) < len(flown) and not args.quiet:
+        print(f"--resume: {len(flown) - len(same)} of {len(flown)} flights are flown again, by contents that changed")  # noqa: T201
+    left = [job for job in jobs if _key(job) not in same]
+    with FlightsLog(args.out, _settings(args), same.values()) as log:
         for each in side_by_side(fly_once, left, "flights", quiet=args.quiet, worth=lambda _job: 1, keep=log.add):
-            flown[each.contender, each.track, each.seed] = each
-    flights = [flown[job.contender, job.track, job.seed] for job in jobs]
+            same[each.contender, each.track, each.seed] = each
+    flights = [same[_key(job)] for job in jobs]
     with FlightsLog(args.out, _settings(args), flights):
         pass  # once more, in their order
-    rows = [
-        _row([flown for flown in flights if (flown.contender, flown.track) == (contender, track)])
-        for contender in contenders
-        for track in tracks
-    ]
+    cases = dict.fromkeys((flown.contender, flown.track) for flown in flights)
+    rows = [_row([flown for flown in flights if (flown.contender, flown.track) == case]) for case in cases]
     write_table(args.out / "seeds", HEADINGS, rows, names=2)
     from colibri.studies.seed_figures import draw_seeds
 
@@ -96,24 +62,39 @@ def compare_seeds(args: argparse.Namespace) -> int:
     if not args.quiet:
         over = f"after {SETTLED_AFTER_S:.0f} s, root mean squares over all flights (largest of one)"
         print_table(f"{over}; written to {args.out}", HEADINGS, rows, names=2)
+        for each in flights:
+            if each.lost:
+                print(f"{each.contender}, {each.track}, seed {each.seed}: lost: {each.lost}")  # noqa: T201
     return EXIT_FAILED if any(flown.lost for flown in flights) else 0
 
 
 def fly_once(job: Job) -> Flown:
-    """Fly a job, keep its figures and forget its logs."""
+    """Fly a job, keep its figures and forget its logs; of a flight that came to an early end keep why."""
     with TemporaryDirectory() as folder:
         plan = job.plan(Path(folder))
-        try:
-            _, figures = keep_flight(plan, fly_plan(plan))
-        except InFlightError as error:
-            return Flown(
-                job.contender, job.track, job.seed, str(error), (np.nan,) * len(QUANTITIES), _NO_INNOVATIONS, ""
-            )
-    values, sha256 = _values(figures), figures["trajectory_sha256"]
-    lost = f"{values[1]:.1f} m off" if values[1] > LOST_M or figures["max_error_after_20s_m"] > LOST_M else ""
+        contents = provenance_of(plan).sha256["all"]
+        outcome = fly_to_its_end(plan)
+        if outcome.failure or outcome.report is None:
+            lost = outcome.failure.replace(str(plan.out), str(_keep_failure(job, plan.out)))
+            return Flown(*_key(job), lost, (np.nan,) * len(QUANTITIES), _NO_INNOVATIONS, "", contents)
+    figures = outcome.report
     nis = figures["nis_mean"]
     innovations = _NO_INNOVATIONS if nis is None else _of_each(nis, "innovations", 0)
-    return Flown(job.contender, job.track, job.seed, lost, values, innovations, sha256)
+    return Flown(*_key(job), outcome.lost, _values(figures), innovations, figures["trajectory_sha256"], contents)
+
+
+def _key(job: Job) -> tuple[str, str, int]:
+    return job.contender.name, job.track, job.seed
+
+
+def _keep_failure(job: Job, folder: Path) -> Path:
+    """Keep the traceback of a flight, if there is one; return the folder that it is in then."""
+    kept = job.folder.with_name(f"{job.folder.name}-{job.seed}")
+    with suppress(OSError):
+        text = (folder / FAILURE).read_text(encoding="utf-8")
+        kept.mkdir(parents=True, exist_ok=True)
+        (kept / FAILURE).write_text(text.replace(str(folder), str(kept)), encoding="utf-8")
+    return kept
 
 
 def _values(figures: dict[str, Any]) -> tuple[float, ...]:
@@ -147,4 +128,4 @@ def _cell(column: Array, middle: Callable[[Array], Any]) -> str:
 
 def _settings(args: argparse.Namespace) -> str:
     """Return what every flight of a comparison has in common."""
-    return " ".join(f"{_KEPT_AS.get(name, name)}={getattr(args, name)}" for name in (*_COMMON, *_WEATHER))
+    return " ".join(f"{name}={getattr(args, name)}" for name in ("link", *OPTIONS) if name != "seed")

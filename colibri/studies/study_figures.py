@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from colibri.analysis.figures import GRID, LIMIT, TOP_IN, Style, axes_grid, line_style, put_head, round_ticks
-from colibri.analysis.recording import ROTORS
-from colibri.analysis.report import SETTLED_AFTER_S
+from colibri.analysis.recording import ROTORS, SETTLED_AFTER_S
 from colibri.autopilot.control.interface import Active, Fallback
 from colibri.common.types import Array
 from colibri.studies.study_flights import Flown

@@ -10,8 +10,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.analysis.recording import Recording, read_recording
-from colibri.analysis.report import SETTLED_AFTER_S
+from colibri.analysis.lost import LOST_M
+from colibri.analysis.recording import SETTLED_AFTER_S, Recording, read_recording
 from colibri.autopilot.control.interface import FALLBACK_CODES, Fallback
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S
@@ -22,9 +22,6 @@ from colibri.flights.plan import FlightPlan
 from colibri.plant.environment.weather import NO_WEATHER, Weather
 from colibri.plant.process.logs import TRUTH_COLUMNS
 from colibri.plant.vehicle.description import Vehicle
-
-LOST_M = 5.0
-"""A vehicle further off its reference once settled is lost."""
 
 _GROUNDED_M = 0.1
 """No study flies so low; a vehicle on its back lies as high as one on its feet, or a little lower."""

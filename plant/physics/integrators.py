@@ -10,7 +10,6 @@ from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import power
 from colibri.common.types import Array, FourRotors
 from colibri.plant.physics.equations import close, held, write_derivative
-from colibri.plant.physics.start import IntegrationError
 
 Solver: TypeAlias = Callable[[Array, FourRotors, Packed, float], tuple[Array, float]]
 """(x, commanded rotor speeds, parameters, duration in s) -> x after it, the battery's voltage; see `equations`."""
@@ -48,14 +47,10 @@ def fixed_step(x: Array, target: FourRotors, parameters: Packed, duration_s: flo
 
 
 def adaptive_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:
-    """Integrate by the embedded pair of Dormand and Prince, held to a tight tolerance.
-
-    Raises:
-        IntegrationError: No step is small enough.
-    """
+    """Integrate by the embedded pair of Dormand and Prince, to a tight tolerance; nan if no step is small enough."""
     end, voltage_v, done = dormand_prince(x, target, parameters, duration_s)
     if not done:
-        raise IntegrationError("the state has left what the model describes: no step is small enough")
+        end[:] = np.nan
     return end, voltage_v
 
 

@@ -88,7 +88,8 @@ class Physics:
         x, voltage_v = self._integrate(_vector(world), self._target(command), self._parameters, duration_us * 1e-6)
         end = x.tolist()
         if not all(map(isfinite, end)):
-            raise IntegrationError("the state has left what the model describes: it is no longer finite")
+            when = f"at t = {world.time_us / 1e6:.3f} s"
+            raise IntegrationError(f"the state has left what the model describes {when}: it is no longer finite")
         state = (*end[:9], *normalized(attitude_of(end)))
         voltage_v = nan if self._battery is None else voltage_v
         time_us = world.time_us + duration_us

@@ -98,14 +98,14 @@ def gust(text: str) -> Gust:
     return Gust(peak, start_s, duration_s)
 
 
-def recorded_wind(path: Path) -> RecordedWind:
-    """Read a wind from a CSV file with a header of t,east,north,up: s and m/s.
+def recorded_wind(path: Path, text: str | None = None) -> RecordedWind:
+    """Read a wind from a CSV file with a header of t,east,north,up: s and m/s; or from `text` that was in it.
 
     Raises:
         ArgumentTypeError: The file cannot be read, or is none; the message names file, line and what is wrong.
     """
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = (path.read_text(encoding="utf-8-sig") if text is None else text).splitlines()
     except OSError as reason:
         raise ArgumentTypeError(f"{path}: {reason.strerror}") from reason
     except ValueError as reason:

@@ -2,10 +2,12 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol
 
 from colibri.common.errors import Error
+from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, gc_frozen
 from colibri.common.process.status import Status
 
@@ -23,13 +25,16 @@ class Closable(Protocol):
 
 
 @contextmanager
-def closing(*opened: Closable | None) -> Iterator[None]:
-    """Fly within: garbage stays uncollected, an error ends the process with one line, and `opened` is closed after."""
+def closing(*opened: Closable | None, out: Path | None = None) -> Iterator[None]:
+    """Fly within: garbage stays uncollected, an error ends the process with one line, and `opened` is closed after.
+
+    What was the error is also in `out`, if there is such a folder.
+    """
     try:
         with gc_frozen():
             yield
     except Error as error:
-        fail(str(error), EXIT_FAILED)
+        fail(keep_failure(error, out), EXIT_FAILED)
     finally:
         for each in opened:
             if each:

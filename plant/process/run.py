@@ -46,7 +46,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     server = Server(link, end, status, stop, logs, streams_truth=args.truth)
     if args.realtime:
         server = FreeServer(link, end, status, stop, logs, cut_after_s=args.cut_after)
-    with closing(link, logs):
+    with closing(link, logs, out=args.out):
         if server.wait():
             plant = builder.build(end.feedback, end.frame_interval_us)
             server.fly(plant, duration_s=args.duration, speed=args.speed)

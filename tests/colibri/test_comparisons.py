@@ -1,16 +1,26 @@
 """`colibri figures` and `colibri compare`."""
 
 import csv
+import json
 import struct
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from colibri.autopilot.control import loop
+from colibri.autopilot.control.interface import Decision, Preview
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS
 from colibri.cli.main import main
-from colibri.studies.compare import COLUMNS, folder_name
+from colibri.plant.vehicle.description import Vehicle
+from colibri.studies import compare
+from colibri.studies.compare import COLUMNS
+from colibri.studies.contenders import contenders_of, folder_name
 from colibri.studies.thesis_figures import FIGURES
 
+PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "flight.toml"
 INSTALLED = "cascade, geometric-se3, global-lpv-mpc, lpv-mpc"
 
 
@@ -69,7 +79,7 @@ def test_an_unknown_figure_is_one_line(tmp_path: Path, capsys: pytest.CaptureFix
 
 def test_controllers_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     contenders = ["--profile", "thesis", "--profile", "thesis:global-lpv-mpc"]
-    assert main(["compare", *contenders, "--track", "line", "--track", "spiral", "--out", str(tmp_path)]) == 0
+    assert main(["compare", *contenders, "--track", "line", "--track", "spiral", "--out", str(tmp_path)]) == 1
     lines = (tmp_path / "compare.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == ",".join(COLUMNS)
     assert [line.split(",")[:2] for line in lines[1:]] == [
@@ -83,7 +93,89 @@ def test_controllers_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[
     table = (tmp_path / "compare.md").read_text(encoding="utf-8").splitlines()
     assert len(table) == 6
     assert table[2].startswith("| thesis | line | 0.05783 | ")
-    assert "global-lpv-mpc" in capsys.readouterr().out
+    assert [line.split(",")[7] != "" for line in lines[1:]] == [False, False, True, True], "the times of the lost ones"
+    said = capsys.readouterr().out
+    assert "thesis:global-lpv-mpc, spiral: lost at t = " in said
+
+
+def written(folder: Path, name: str, old: str = "", new: str = "") -> str:
+    """Return a copy of profile `flight` in a folder."""
+    folder.mkdir(exist_ok=True)
+    path = folder / name
+    text = PROFILE.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return str(path)
+
+
+def test_a_copied_profile_has_a_name_of_its_own(tmp_path: Path) -> None:
+    copies = (written(tmp_path, "t2.toml"), written(tmp_path, "flight.toml"))
+    assert [load_profile(copy).name for copy in copies] == ["t2", "flight.toml"]
+    named = written(tmp_path, "t3.toml", 'name = "flight"', 'name = "mine"')
+    assert [
+        each.name for each in contenders_of(["flight", *copies, named, f"{copies[0]}:geometric-se3", copies[0]])
+    ] == [*("flight", "t2", "flight.toml", "mine", "t2:geometric-se3")]
+    twin = written(tmp_path / "b", "t2.toml")
+    assert [each.name for each in contenders_of([copies[0], twin, named])] == [copies[0], twin, "mine"]
+    assert [each.name for each in contenders_of(["se3", "thesis:cascade"], ["lpv-mpc", "geometric-se3"])] == [
+        *("se3:lpv-mpc", "se3:geometric-se3", "thesis:cascade")
+    ]
+
+
+def test_a_profile_by_its_path_flies_within_out_and_is_called_by_its_name(tmp_path: Path) -> None:
+    """By options of `colibri fly` that change neither the table nor its columns; again only what has changed."""
+    copy, out = written(tmp_path / "p", "t2.toml"), tmp_path / "out"
+    options = ["--track", "hover", "--duration", "0.5", "--wind", "2@270", "--without", "drag", "--start", "z=3"]
+    command = ["compare", "--profile", copy, *options, "--quiet", "--out", str(out)]
+    assert main(command) == 0
+    assert [path.name for path in (tmp_path / "p").iterdir()] == ["t2.toml"]
+    folder = out / "flights" / "t2-hover"
+    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    assert (report["profile"], report["without"], report["start"]["z"]) == ("t2", ["drag"], 3.0)
+    (row,) = csv.DictReader((out / "compare.csv").read_text(encoding="utf-8").splitlines())
+    assert tuple(row) == COLUMNS
+    assert (row["controller"], row["RMS (m)"], row["why"]) == ("t2", "-", "")
+    flown = (folder / "plant.csv").stat().st_mtime_ns
+    assert main([*command, "--resume"]) == 0
+    assert (folder / "plant.csv").stat().st_mtime_ns == flown
+    written(tmp_path / "p", "t2.toml", "poles = [-5.0, -6.0]", "poles = [-1.0, -1.1]")
+    assert main([*command, "--resume"]) == 0
+    assert (folder / "plant.csv").stat().st_mtime_ns > flown
+    assert json.loads((folder / "provenance.json").read_text(encoding="utf-8"))["profile"]["name"] == "t2"
+
+
+class Raises:
+    """A law that hovers, and raises after a moment."""
+
+    control_interval_us = 10_000
+    preview = Preview(10_000, 1)
+
+    def __init__(self, _settings: object, vehicle: Vehicle, _clock: object) -> None:
+        self.speeds = np.full(4, vehicle.hover_speed)
+
+    def initial(self, _rotor_speed: float) -> None:
+        pass
+
+    def step(self, _memory: None, time_us: int, *_: object) -> tuple[None, Decision]:
+        if time_us == 200_000:
+            raise KeyError("gain")
+        return None, Decision(self.speeds, (0.0, 0.0, 0.0))
+
+
+def test_a_comparison_goes_on_after_a_lost_flight_and_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(compare, "side_by_side", lambda work, jobs, *_, **__: [work(job) for job in jobs])
+    laws = {"geometric-se3": Raises, "lpv-mpc": load_controller("lpv-mpc")}
+    monkeypatch.setattr(loop, "load_controller", laws.__getitem__)
+    options = ["--profile", "flight:geometric-se3", "--profile", "flight", "--track", "hover", "--duration", "0.5"]
+    assert main(["compare", *options, "--out", str(tmp_path)]) == 1
+    lost, fine = csv.DictReader((tmp_path / "compare.csv").read_text(encoding="utf-8").splitlines())
+    why = "controller geometric-se3 raised at t = 0.200 s: KeyError: 'gain'; its traceback is in "
+    assert lost["why"].startswith(why)
+    assert "in step" in Path(lost["why"].removeprefix(why)).read_text(encoding="utf-8")
+    assert fine["why"] == ""
+    assert f"flight:geometric-se3, hover: lost at t = 0.20 s: {why}" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

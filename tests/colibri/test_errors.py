@@ -14,6 +14,7 @@ from colibri.autopilot.control.registry import DecisionError
 from colibri.autopilot.errors import AutopilotError
 from colibri.cli.main import main
 from colibri.common.errors import Error, InFlightError
+from colibri.flights.processes import FlightError
 from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.links.link import LinkError
 from colibri.plant.errors import PlantError
@@ -150,7 +151,7 @@ def test_a_process_that_cannot_begin_says_one_line_and_exits_with_2() -> None:
 @pytest.mark.parametrize(
     ("error", "code", "line"),
     [
-        (DecisionError("nan"), 1, "colibri: error: nan; what was logged is in {out}\n"),
+        (FlightError("nan", 1, said=False), 1, "colibri: error: nan; what was logged is in {out}\n"),
         (LinkError("no way"), 2, "colibri: error: no way\n"),
     ],
 )

@@ -8,6 +8,8 @@ import pytest
 from colibri.analysis.estimation import MEASURED
 from colibri.autopilot.estimation.measurements.table import kinds_of
 from colibri.cli.main import main
+from colibri.flights.plan import FlightPlan
+from colibri.flights.provenance import provenance_of
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import seeds
 from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, Flown, kept_flights
@@ -19,6 +21,8 @@ MEASURED_HERE = kinds_of(_SENSORS)
 
 def test_flights_by_seeds_become_a_table_and_a_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     options = (
+        "--profile",
+        "flight",
         "--feedback",
         "sensors",
         "--seeds",
@@ -54,9 +58,29 @@ def test_a_vehicle_has_some_of_the_kinds_in_their_order() -> None:
 def test_what_is_there_is_not_flown_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    def contents(seed: int) -> str:
+        options = {"track": "hover", "profile": "flight", "seed": seed, "link": "memory", "duration": 22.0}
+        return provenance_of(FlightPlan.of_options(tmp_path, **options)).sha256["all"]
+
     values = tuple(0.1 * number for number in range(len(QUANTITIES)))
-    kept = [Flown("flight", "hover", seed, "", values, tuple(range(len(MEASURED))), f"hash {seed}") for seed in (1, 2)]
-    options = ["compare", "--quiet", "--track", "hover", "--seeds", "1-2", "--duration", "22", "--out", str(tmp_path)]
+    kept = [
+        Flown("flight", "hover", seed, "", values, tuple(range(len(MEASURED))), f"hash {seed}", contents(seed))
+        for seed in (1, 2)
+    ]
+    options = [
+        "compare",
+        "--quiet",
+        "--profile",
+        "flight",
+        "--track",
+        "hover",
+        "--seeds",
+        "1-2",
+        "--duration",
+        "22",
+        "--out",
+        str(tmp_path),
+    ]
 
     def fly_none(_work: object, jobs: list[object], *_: object, **__: object) -> list[object]:
         assert not jobs

@@ -28,16 +28,20 @@ THESIS_PLANT = (
 """What `colibri plant` needs to begin as profile `thesis` does."""
 
 
-def fly(out: Path, *options: str) -> dict[str, Any]:
-    """Fly through the command line, without figures; return the report."""
-    assert main(["fly", *options, "--quiet", "--no-figures", "--out", str(out)]) == 0
+def fly(out: Path, *options: str, lost: bool = False) -> dict[str, Any]:
+    """Fly through the command line, without figures; return the report, also where the vehicle is to be lost."""
+    try:
+        code: int | str | None = main(["fly", *options, "--quiet", "--no-figures", "--out", str(out)])
+    except SystemExit as ended:
+        code = ended.code
+    assert code == int(lost)
     figures: dict[str, Any] = json.loads((out / "report.json").read_text(encoding="utf-8"))
     return figures
 
 
-def fly_thesis(out: Path, *options: str) -> dict[str, Any]:
+def fly_thesis(out: Path, *options: str, lost: bool = False) -> dict[str, Any]:
     """Fly with profile `thesis`."""
-    return fly(out, *options, "--profile", "thesis")
+    return fly(out, *options, "--profile", "thesis", lost=lost)
 
 
 def rows(path: Path) -> dict[str, Array]:

@@ -1,13 +1,23 @@
 """A track by its name as one vehicle will fly it: checked, and where it may be, changed, before anything flies."""
 
 from math import inf
+from pathlib import Path
 from typing import NamedTuple
 
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
 from colibri.autopilot.guidance.trajectories.fitting import dips_of, fit
 from colibri.autopilot.guidance.trajectories.reach import Reach, exact_motion
-from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track, TrackError, track
+from colibri.autopilot.guidance.trajectories.tracks import (
+    DURATION_S,
+    OPTIONS,
+    SamplesFile,
+    Track,
+    TrackError,
+    WaypointFile,
+    read_options,
+    track,
+)
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -51,3 +61,30 @@ def load_track(name: str, vehicle: Vehicle, profile: Profile, floor_m: float | N
     demands = reach.demands(exact_motion(found), min(found.duration_s, DURATION_S))
     beyond = [str(demand) for demand in demands if demand.excess(0.0).max() > 1.0]
     return LoadedTrack(found, f"track {name} asks for more than there is: {'; '.join(beyond)}" if beyond else "")
+
+
+def file_text(name: str) -> str | None:
+    """Return what is in the file that the track of a name goes through; None if it goes through none.
+
+    Raises:
+        TrackError: The file cannot be read.
+    """
+    path = _file(name)
+    if path is None:
+        return None
+    try:
+        return Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise TrackError(f"{path}: {error}") from error
+
+
+def with_file(name: str, path: Path) -> str:
+    """Return the name of the same track through another file."""
+    given = _file(name)
+    return name if given is None else name.replace(given, str(path), 1)
+
+
+def _file(name: str) -> str | None:
+    base, colon, text = name.partition(":")
+    options = read_options(base, OPTIONS[base], text) if colon and base in OPTIONS else None
+    return options.file if isinstance(options, WaypointFile | SamplesFile) else None

@@ -292,7 +292,7 @@ def track(name: str) -> Track:
         raise TrackError(f"track {base} takes no options, but these do: {', '.join(OPTIONS)}")
     if base in OPTIONS:
         try:
-            return _options(base, OPTIONS[base], text if colon else None).track()
+            return read_options(base, OPTIONS[base], text if colon else None).track()
         except TrackFileError as error:
             raise TrackError(str(error)) from error
     kind = load_installed(base)
@@ -300,7 +300,7 @@ def track(name: str) -> Track:
         raise TrackError(f"unknown track {base}: choose {', '.join(track_names())}")
     if not (isinstance(kind, type) and issubclass(kind, TrackOptions)):
         raise TrackError(f"track {base}: {kind} is no subclass of colibri.TrackOptions")
-    return _tried(base, _options(base, kind, text if colon else None))
+    return _tried(base, read_options(base, kind, text if colon else None))
 
 
 def track_names() -> list[str]:
@@ -339,7 +339,7 @@ def _tried(name: str, options: TrackOptions) -> Track:
     return found
 
 
-def _options(name: str, kind: type[TrackOptions], text: str | None) -> TrackOptions:
+def read_options(name: str, kind: type[TrackOptions], text: str | None) -> TrackOptions:
     """Read the options of a track strictly."""
     fields = {field.name: field for field in msgspec.structs.fields(kind)}
     given = _pairs(name, kind, text)

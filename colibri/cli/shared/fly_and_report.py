@@ -3,12 +3,18 @@
 import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
-from colibri.common.errors import Error, InFlightError
+from colibri.analysis.limits import exceeded
+from colibri.common.errors import Error
+from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
 from colibri.flights.fly import fly_plan, prepare
 from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.flights.processes import FlightError
+
+if TYPE_CHECKING:
+    from colibri.analysis.report import Report
 
 _UPDATES = 500
 
@@ -26,32 +32,34 @@ def fly(args: argparse.Namespace) -> int:
                 say(plan.track_note)
             summary = fly_plan(plan, progress, say)
     except FlightError as error:
-        _keep_what_there_is(plan)
+        _keep_what_there_is(plan, str(error))
         if error.said:
             return error.code
         fail(f"{error}; what was logged is in {plan.out}", error.code)
-    except InFlightError as error:
-        _keep_what_there_is(plan)
-        fail(f"{error}; what was logged is in {plan.out}", EXIT_FAILED)
     except Error as error:
-        fail(str(error))
+        fail(keep_failure(error, plan.out))
     except KeyboardInterrupt:
         _keep_what_there_is(plan)
         fail(f"interrupted; what was logged is in {plan.out}", EXIT_INTERRUPTED)
-    _report(plan, summary, figures=not args.no_figures, quiet=args.quiet)
+    found = _report(plan, summary, figures=not args.no_figures, quiet=args.quiet)
+    if found["lost"] is not None:
+        fail(f"lost at t = {found['lost_at_s']:.2f} s: {found['lost']}; the logs are in {plan.out}", EXIT_FAILED)
+    above = exceeded(args.fail_above, found)
+    if above:
+        fail(f"--fail-above: {'; '.join(above)}; the logs are in {plan.out}", EXIT_FAILED)
     return 0
 
 
-def _keep_what_there_is(plan: FlightPlan) -> None:
+def _keep_what_there_is(plan: FlightPlan, why: str | None = None) -> None:
     """Write what there is of a flight that did not end well; that of one that never began is nothing."""
     if not (plan.out / "autopilot.csv").exists():
         return
     from colibri.analysis.outcome import keep_what_there_is
 
-    keep_what_there_is(plan)
+    keep_what_there_is(plan, why)
 
 
-def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -> None:
+def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -> "Report":
     """Keep what was flown and say how well it went; what does that is loaded only now, when something has flown."""
     from colibri.analysis.outcome import keep_flight
     from colibri.analysis.report import print_report
@@ -63,6 +71,7 @@ def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -
         draw_flight(recording, plan)
     if not quiet:
         print_report(found, plan.out)
+    return found
 
 
 @contextmanager

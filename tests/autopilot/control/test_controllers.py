@@ -140,7 +140,7 @@ def test_a_symmetrical_airframe_stays_symmetrical() -> None:
 
 @pytest.mark.parametrize("link", ["direct", "memory"])
 def test_the_first_strategy_fails_as_the_thesis_says(tmp_path: Path, link: str) -> None:
-    fly_thesis(tmp_path, "spiral", "--controller", "global-lpv-mpc", "--link", link)
+    fly_thesis(tmp_path, "spiral", "--controller", "global-lpv-mpc", "--link", link, lost=True)
     flown = rows(tmp_path / "flight.csv")
     assert np.ptp(flown["x"]) < 1e-9
     assert np.ptp(flown["y"]) < 1e-9
@@ -225,5 +225,33 @@ def test_a_foreign_law_that_goes_wild_ends_in_words(tmp_path: Path, link: str) -
     wild = example().replace("rotor_speeds=", "rotor_speeds=float('nan') * ")
     done = fly_theirs(tmp_path, foreign_package(tmp_path, wild), "--controller", "their-name", "--link", link)
     assert done.returncode == 1
-    assert "colibri: error: controller their-name gave rotor speeds [nan nan nan nan]: expected four" in done.stderr
+    said = "colibri: error: controller their-name gave rotor speeds [nan nan nan nan] at t = 0.000 s: expected four"
+    assert said in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("link", ["memory", pytest.param("udp", marks=pytest.mark.long)])
+def test_a_foreign_law_that_raises_is_a_lost_flight_whose_traceback_is_kept(tmp_path: Path, link: str) -> None:
+    raises = example().replace("        error =", "        time_us < 500_000 or {}['gain']\n        error =")
+    done = fly_theirs(tmp_path, foreign_package(tmp_path, raises), "--controller", "their-name", "--link", link)
+    out = tmp_path / "out"
+    why = "controller their-name raised at t = 0.500 s: KeyError: 'gain'"
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"colibri: error: {why}; its traceback is in {out / 'failure.txt'}")
+    assert done.stderr.count("\n") == 1
+    kept = (out / "failure.txt").read_text(encoding="utf-8")
+    assert "their_law.py" in kept
+    assert "{}['gain']" in kept
+    assert len((out / "flight.csv").read_text(encoding="utf-8").splitlines()) == 1 + 51
+    report = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    assert report["lost"].startswith(why)
+    assert report["lost_at_s"] == 0.5
+
+
+def test_a_foreign_law_that_raises_while_it_is_built_is_one_line(tmp_path: Path) -> None:
+    raises = example().replace("self.mixer = ", "self.mixer = 1 / 0 * ")
+    done = fly_theirs(tmp_path, foreign_package(tmp_path, raises), "--controller", "their-name", "--link", "memory")
+    said = "colibri: error: controller their-name cannot be built: ZeroDivisionError: division by zero; its traceback"
+    assert done.returncode == 2
+    assert done.stderr.startswith(said)
+    assert "their_law.py" in (tmp_path / "out" / "failure.txt").read_text(encoding="utf-8")

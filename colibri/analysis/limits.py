@@ -1,0 +1,51 @@
+"""`--fail-above`: limits on numbers of a flight's report, for those who fly in continuous integration."""
+
+from argparse import ArgumentTypeError
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from colibri.common.process.arguments import number
+
+RMSE = "rmse_after_20s_m"
+KEYS = (
+    *(RMSE, "max_error_after_20s_m", "rmse_m", "max_error_m", "control_rmse_m"),
+    *("estimation_rmse_m.horizontal", "estimation_rmse_m.vertical"),
+    *("attitude_rmse_deg.roll", "attitude_rmse_deg.pitch", "attitude_rmse_deg.yaw", "nees_mean"),
+    *("ground_contact_s", "effort_n_m", "max_slack", "qp_failures", "fallbacks", "resent"),
+    *("solve_time_us.p50", "solve_time_us.p99", "control_step_us.p50", "control_step_us.p99"),
+)
+"""Numbers of `report.json` that may have a limit, a table before the dot; `fallbacks` is the sum of them."""
+
+
+class Limit(NamedTuple):
+    """The largest value that a number of the report may have."""
+
+    key: str
+    value: float
+
+
+def limit(text: str) -> Limit:
+    """Read a limit of the command line, `[KEY=]VALUE`."""
+    key, equals, value = text.rpartition("=")
+    if equals and key not in KEYS:
+        raise ArgumentTypeError(f"unknown key {key}: choose {', '.join(KEYS)}")
+    try:
+        return Limit(key or RMSE, number(value))
+    except ValueError:
+        raise ArgumentTypeError(f"must be [KEY=]VALUE, 0.1 or qp_failures=0 say, not {text}") from None
+
+
+def exceeded(limits: Iterable[Limit], report: Mapping[str, Any]) -> list[str]:
+    """Return in words each limit that a report exceeds, or of which it knows nothing."""
+    found = []
+    for key, value in limits:
+        flown: Any = report
+        for part in key.split("."):
+            flown = None if flown is None else flown[part]
+        if isinstance(flown, dict):
+            flown = sum(flown.values())
+        if flown is None:
+            found.append(f"{key} is not known of this flight, and shall not be above {value:g}")
+        elif not flown <= value:
+            found.append(f"{key} is {flown:.4g}, above {value:g}")
+    return found

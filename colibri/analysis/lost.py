@@ -1,0 +1,123 @@
+"""Whether a vehicle was lost, why and when: by where it truly was."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.analysis.recording import SETTLED_AFTER_S, Recording
+from colibri.common.types import Array
+from colibri.flights.plan import FlightPlan
+from colibri.plant.vehicle.description import Vehicle
+
+LOST_M = 5.0
+"""A vehicle further off its reference once settled is lost."""
+_ABOVE_GROUND_M = 0.1
+"""A reference that is higher does not mean the vehicle to touch the ground."""
+_TOUCHED_S = 1.0
+"""Touching the ground for so long below its reference it is lost, though it may leave it again."""
+_INSTANT_S = 1e-6
+
+
+class Lost(NamedTuple):
+    """A vehicle that was lost.
+
+    Attributes:
+        at_s: Simulated time at which that began.
+        why: Where it was then and how, or what ended its flight.
+    """
+
+    at_s: float
+    why: str
+
+
+def lost(plan: FlightPlan, recording: Recording) -> Lost | None:
+    """Return why a vehicle was lost that flew until the end of its flight; None if it was not.
+
+    It is if it lies or drags along the ground below its reference, if it ends upside down, or if it is further than
+    `LOST_M` off its reference once settled; in a flight too short for that, if it ends that much further off than it
+    began. Where ground stations command, the track is not what it shall fly, and it is never lost.
+    """
+    if plan.ground.links:
+        return None
+    began = [at for at in (_grounded(plan, recording), _upside_down(recording), _far_off(recording)) if at is not None]
+    if not began:
+        return None
+    at = min(began)
+    off_m = recording.position_error_m
+    t, touches = recording["t"], _touches(plan.plant_vehicle, recording)
+    how = f"{off_m[at]:.1f} m off its track, tilted {tilt_deg(recording)[at]:.0f}°"
+    later = f"; later up to {off_m[at:].max():.1f} m off"
+    if touches[at]:
+        return Lost(float(t[at]), f"on the ground, {how}{later}")
+    down = np.flatnonzero(touches[at:])
+    crash = f", on the ground at t = {t[at + down[0]]:.2f} s" if len(down) else ""
+    return Lost(float(t[at]), f"in the air, {how}{later}{crash}")
+
+
+def ground_contact_s(vehicle: Vehicle, recording: Recording) -> float | None:
+    """Return how long a vehicle touched the ground, s, after it had first left it; None where there is no ground."""
+    return None if vehicle.ground is None else _lasted_s(_touches_again(vehicle, recording), recording)
+
+
+def tilt_deg(recording: Recording) -> Array:
+    """Return the angle between the body's z axis and the vertical, degrees, (n,)."""
+    angle: Array = np.degrees(np.arccos(np.clip(_up(recording)[:, 2], -1.0, 1.0)))
+    return angle
+
+
+def _up(recording: Recording) -> Array:
+    """Return the vertical in the body's frame, (n, 3)."""
+    phi, theta = recording["phi"], recording["theta"]
+    return np.stack([-np.sin(theta), np.sin(phi) * np.cos(theta), np.cos(phi) * np.cos(theta)], axis=1)
+
+
+def _touches(vehicle: Vehicle, recording: Recording) -> NDArray[np.bool_]:
+    """Return at which samples a foot or a rotor touches the ground, (n,)."""
+    if vehicle.ground is None:
+        return np.zeros(len(recording.table), dtype=np.bool_)
+    heights = recording["z"][:, None] + _up(recording) @ vehicle.ground.contacts_m(vehicle.rotors).T
+    touches: NDArray[np.bool_] = heights.min(axis=1) <= vehicle.ground_height_m
+    return touches
+
+
+def _touches_again(vehicle: Vehicle, recording: Recording) -> NDArray[np.bool_]:
+    """Return at which samples it touches the ground that it had left, (n,)."""
+    touches = _touches(vehicle, recording)
+    again: NDArray[np.bool_] = touches & np.logical_or.accumulate(~touches)
+    return again
+
+
+def _lasted_s(holds: NDArray[np.bool_], recording: Recording) -> float:
+    t = recording["t"]
+    return float(np.diff(t, prepend=t[0])[holds].sum())
+
+
+def _grounded(plan: FlightPlan, recording: Recording) -> int | None:
+    """Return the sample at which a vehicle came down that should be higher; the first if it never took off."""
+    touches = _touches(plan.plant_vehicle, recording)
+    high = recording["z_ref"] > _ABOVE_GROUND_M
+    if touches.all():
+        return 0 if high[-1] else None
+    down = _touches_again(plan.plant_vehicle, recording) & high
+    stays = bool(down[-1]) or _lasted_s(down, recording) > _TOUCHED_S or recording.position_error_m[-1] > LOST_M
+    return int(np.argmax(down)) if down.any() and stays else None
+
+
+def _upside_down(recording: Recording) -> int | None:
+    """Return the sample since which a vehicle that was upright is upside down; None if it ends upright."""
+    upright = np.flatnonzero(_up(recording)[:, 2] >= 0.0)
+    last = len(recording.table) - 1
+    return int(upright[-1]) + 1 if len(upright) and upright[-1] < last else None
+
+
+def _far_off(recording: Recording) -> int | None:
+    """Return the sample since which a vehicle is too far off its reference when that counts; None if it never is."""
+    off_m = recording.position_error_m
+    settled = recording["t"] >= SETTLED_AFTER_S - _INSTANT_S
+    far = off_m > (LOST_M if settled.any() else off_m[0] + LOST_M)
+    judged = np.flatnonzero(far & settled) if settled.any() else np.flatnonzero(far[-1:]) + len(far) - 1
+    if not len(judged):
+        return None
+    near = np.flatnonzero(~far[: judged[0]])
+    return int(near[-1]) + 1 if len(near) else 0

@@ -1,0 +1,143 @@
+"""Flights that are lost, and those whose numbers exceed a limit: said why and when, and not a success."""
+
+import json
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from colibri.analysis.limits import KEYS, Limit, exceeded
+from colibri.analysis.lost import ground_contact_s, lost
+from colibri.analysis.recording import COLUMNS, Recording
+from colibri.cli.main import main
+from colibri.flights.plan import FlightPlan, GroundAccess
+from tools.harness.processes import fly
+
+VEHICLE = Path(__file__).parents[2] / "plant" / "vehicle" / "models" / "hummingbird.toml"
+T = np.arange(0.0, 30.0, 0.01)
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> FlightPlan:
+    return FlightPlan.of_options(tmp_path, track="hover", profile="flight", link="memory")
+
+
+def flown(until_s: float = 30.0, **columns: Any) -> Recording:
+    """Return a hover at 2 m in which some columns are others."""
+    t = T[until_s > T]
+    table = np.zeros((len(t), len(COLUMNS)))
+    for name, values in {"t": t, "z": 2.0, "z_ref": 2.0, **columns}.items():
+        table[:, COLUMNS.index(name)] = values(t) if callable(values) else values
+    nothing = np.zeros(0)
+    codes = nothing.astype(np.int64)
+    return Recording(table, codes, codes, nothing, nothing, nothing, codes.reshape(0, 4), "")
+
+
+def test_one_that_stays_at_its_reference_is_not_lost(plan: FlightPlan) -> None:
+    assert lost(plan, flown()) is None
+    assert ground_contact_s(plan.plant_vehicle, flown()) == 0.0
+
+
+def test_one_that_comes_down_is_lost_when_it_does(plan: FlightPlan) -> None:
+    recording = flown(z=lambda t: np.maximum(0.0, 2.0 - 0.2 * np.maximum(0.0, t - 5.0)))
+    found = lost(plan, recording)
+    assert found is not None
+    assert found.at_s == pytest.approx(15.0, abs=0.02)
+    assert found.why == "on the ground, 2.0 m off its track, tilted 0°; later up to 2.0 m off"
+    assert ground_contact_s(plan.plant_vehicle, recording) == pytest.approx(15.0, abs=0.02)
+
+
+def test_one_that_touches_the_ground_for_a_moment_and_flies_on_is_not_lost(plan: FlightPlan) -> None:
+    recording = flown(z=lambda t: np.where(abs(t - 5.0) < 0.3, 0.0, 2.0))
+    assert lost(plan, recording) is None
+    assert ground_contact_s(plan.plant_vehicle, recording) == pytest.approx(0.59, abs=0.02)
+
+
+def test_one_that_shall_land_may_touch_the_ground(plan: FlightPlan) -> None:
+    assert lost(plan, flown(z=lambda t: np.maximum(0.0, 2.0 - t), z_ref=lambda t: np.maximum(0.0, 2.0 - t))) is None
+
+
+def test_one_that_never_takes_off_is_lost_from_the_start(plan: FlightPlan) -> None:
+    found = lost(plan, flown(z=0.0))
+    assert found is not None
+    assert found.at_s == 0.0
+    assert ground_contact_s(plan.plant_vehicle, flown(z=0.0)) == 0.0
+
+
+def test_one_that_ends_upside_down_is_lost_unless_it_never_was_upright(plan: FlightPlan) -> None:
+    found = lost(plan, flown(phi=lambda t: np.where(t < 7.0, 0.0, pi)))
+    assert found is not None
+    assert found.at_s == pytest.approx(7.0)
+    assert "in the air, 0.0 m off its track, tilted 180°" in found.why
+    assert lost(plan, flown(0.3, phi=pi)) is None
+
+
+def test_one_that_drifts_away_is_lost_since_it_is_too_far(plan: FlightPlan) -> None:
+    found = lost(plan, flown(x=lambda t: 0.4 * t))
+    assert found is not None
+    assert found.at_s == pytest.approx(12.5, abs=0.02)
+    assert "later up to 12.0 m off" in found.why
+
+
+@pytest.mark.parametrize(("speed_m_s", "is_lost"), [(-1.0, False), (0.2, False), (1.0, True)])
+def test_one_too_short_to_settle_is_lost_where_it_gets_further_away(
+    plan: FlightPlan, speed_m_s: float, is_lost: bool
+) -> None:
+    recording = flown(10.0, x=lambda t: 30.0 + speed_m_s * t)
+    assert (lost(plan, recording) is not None) is is_lost
+
+
+def test_one_that_ground_stations_command_does_not_follow_its_track(plan: FlightPlan) -> None:
+    served = replace(plan, ground=GroundAccess(("udpout:127.0.0.1:1",)))
+    assert lost(served, flown(z=0.0)) is None
+
+
+def test_a_vehicle_that_cannot_be_flown_is_no_success(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A thousand times the moment of inertia that the autopilot knows."""
+    heavy = tmp_path / "heavy.toml"
+    text = VEHICLE.read_text(encoding="utf-8")
+    heavy.write_text(text.replace("[0.0034, 0.0034, 0.006]", "[3.4, 3.4, 0.006]"), encoding="utf-8")
+    options = ("--plant-vehicle", str(heavy), "--link", "memory", "--duration", "10", "--no-figures", "--quiet")
+    with pytest.raises(SystemExit) as end:
+        main(["fly", "spiral", *options, "--out", str(tmp_path)])
+    assert end.value.code == 1
+    said = capsys.readouterr().err
+    assert said.startswith("colibri: error: lost at t = ")
+    assert ", on the ground at t = " in said
+    assert said.endswith(f"; the logs are in {tmp_path}\n")
+    report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert report["lost"] in said
+    assert 1.0 < report["lost_at_s"] < 6.0
+    assert report["ground_contact_s"] > 0.1
+
+
+def test_numbers_of_the_report_have_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report = fly(tmp_path, "hover", "--link", "memory", "--duration", "1", "--fail-above", "qp_failures=0")
+    assert report["lost"] is None
+    assert report["ground_contact_s"] == 0.0
+    limits = ("--fail-above", "0.1", "--fail-above", "max_error_m=0.5", "--fail-above", "fallbacks=0")
+    with pytest.raises(SystemExit) as end:
+        main(["fly", "hover", "--link", "memory", "--duration", "1", "--quiet", *limits, "--out", str(tmp_path)])
+    assert end.value.code == 1
+    assert capsys.readouterr().err == (
+        "colibri: error: --fail-above: rmse_after_20s_m is not known of this flight, and shall not be above 0.1; "
+        f"max_error_m is 1, above 0.5; the logs are in {tmp_path}\n"
+    )
+
+
+def test_every_number_that_may_have_a_limit_is_in_the_report(tmp_path: Path) -> None:
+    options = ("--link", "memory", "--duration", "21", "--feedback", "sensors")
+    report = fly(tmp_path, "hover", *options)
+    assert exceeded([Limit(key, 1e9) for key in KEYS], report) == []
+    assert len(exceeded([Limit(key, -1.0) for key in KEYS], report)) == len(KEYS)
+
+
+@pytest.mark.parametrize("limit", ["speed=3", "rmse_m=low", "", "nan"])
+def test_a_limit_that_is_none_is_one_line(limit: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["fly", "hover", f"--fail-above={limit}"])
+    assert end.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
