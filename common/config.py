@@ -27,10 +27,23 @@ def read_named(what: str, folder: Path, name_or_path: str, kind: type[T], error:
     """
     if name_or_path.endswith(".toml"):
         return read_toml(Path(name_or_path), kind, error)
+    return read_toml(_named(what, folder, name_or_path, error), kind, error)
+
+
+def named_text(what: str, folder: Path, name: str, error: type[Error]) -> str:
+    """Return the TOML file of that name in `folder`.
+
+    Raises:
+        error: There is no such name.
+    """
+    return _named(what, folder, name, error).read_text(encoding="utf-8")
+
+
+def _named(what: str, folder: Path, name: str, error: type[Error]) -> Path:
     known = toml_names(folder)
-    if name_or_path not in known:
-        raise error(f"unknown {what} {name_or_path}: choose {', '.join(known)} or a .toml file")
-    return read_toml(folder / f"{name_or_path}.toml", kind, error)
+    if name not in known:
+        raise error(f"unknown {what} {name}: choose {', '.join(known)} or a .toml file")
+    return folder / f"{name}.toml"
 
 
 def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:

@@ -7,7 +7,7 @@ import msgspec
 
 from colibri.autopilot.control.settings import ControlInterval
 from colibri.autopilot.errors import AutopilotError
-from colibri.common.config import Table, read_named, toml_names
+from colibri.common.config import Table, named_text, read_named, toml_names
 
 _FOLDER = Path(__file__).parents[1] / "profiles"
 
@@ -93,6 +93,15 @@ def load_profile(name_or_path: str) -> Profile:
     profile = Profile(**values)
     _check_frames(profile)
     return profile
+
+
+def profile_text(name: str) -> str:
+    """Return the file of a profile that comes with Colibri.
+
+    Raises:
+        ProfileError: There is none of that name.
+    """
+    return named_text("profile", _FOLDER, name, ProfileError)
 
 
 def profile_names() -> list[str]:

@@ -18,6 +18,7 @@ from colibri.analysis.recording import (
     SETTLED_AFTER_S,
     Recording,
 )
+from colibri.analysis.report import length as in_metres
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
@@ -40,6 +41,8 @@ _TITLE_IN, _LABEL_IN = 0.45, 0.6
 _TIME_MARGIN = 0.015
 _FLATTEST = 0.4
 _NOTHING = 1e-12
+_PLAIN = (-2, 4)
+"""Powers of ten of numbers that are written without one."""
 _MAX_NAME_CHARS = 36
 _ROOM_FOR_TALL = 0.8
 
@@ -106,7 +109,7 @@ def flight_series(recording: Recording, plan: FlightPlan) -> Series:
     """Return all that the figures show: the columns of the recording, angles in degrees, and what follows from them.
 
     `vx` to `vz` are earth velocities, ENU, m/s, and `vx_ref` to `vz_ref` those of the reference; `ex` to `ez` are
-    errors, m, and `distance` their norm; `rms` is its RMS once settled, not a number before; `stopped` and `fastest`
+    errors, m, and `distance` their norm; `rms` is its RMS once settled, not a number before; `idle` and `fastest`
     are the limits of the rotors.
     """
     series = {name: recording[name] for name in COLUMNS}
@@ -123,7 +126,7 @@ def flight_series(recording: Recording, plan: FlightPlan) -> Series:
     return series | {
         "distance": distance,
         "rms": np.where(settled, rms, np.nan),
-        "stopped": np.zeros_like(t),
+        "idle": np.full_like(t, plan.plant_vehicle.rotors.idle_speed),
         "fastest": fastest,
     }
 
@@ -205,7 +208,7 @@ def _earth_velocity(recording: Recording) -> Array:
 
 
 def _rotor_panels(plan: FlightPlan) -> list[Panel]:
-    limits = (Curve("stopped", "limits", LIMIT), Curve("fastest", "limits", LIMIT))
+    limits = (Curve("idle", "limits", LIMIT), Curve("fastest", "limits", LIMIT))
     unit = plan.plant_vehicle.rotors.speed_unit
     return [
         Panel(f"Ω{number} ({unit})", (*limits, Curve(name, "rotor speed", held=True)))
@@ -215,7 +218,8 @@ def _rotor_panels(plan: FlightPlan) -> list[Panel]:
 
 def _error_panels(series: Series) -> list[Panel]:
     rms = series["rms"][-1]
-    settled = (Curve("rms", f"RMS after {SETTLED_AFTER_S:.0f} s: {rms:.4f} m", REFERENCE),) if np.isfinite(rms) else ()
+    label = f"RMS after {SETTLED_AFTER_S:.0f} s: {in_metres(rms)}"
+    settled = (Curve("rms", label, REFERENCE),) if np.isfinite(rms) else ()
     axes = tuple(Curve(f"e{axis}", f"error in {axis}", style) for axis, style in zip(POSITION, AXES, strict=True))
     distance = (*settled, Curve("distance", ""))
     return [Panel("distance (m)", distance, from_zero=True), Panel("error (m)", axes)]
@@ -256,6 +260,7 @@ def _draw_panel(axes: Axes, series: Series, panel: Panel) -> None:
     axes.yaxis.set_label_coords(-_LABEL_IN / _width_in(axes), 0.5)
     axes.grid(**GRID)
     axes.yaxis.set_major_locator(round_ticks(6))
+    axes.ticklabel_format(axis="y", scilimits=_PLAIN, useMathText=True)  # longer labels would reach that of the axis
     if np.ptp(axes.dataLim.intervaly) < _NOTHING:
         axes.set_ylim(-1.0, 1.0)  # otherwise rounding errors fill the panel
     if panel.from_zero:

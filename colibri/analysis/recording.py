@@ -85,7 +85,7 @@ def read_recording(plan: FlightPlan) -> Recording:
     samples = _at_samples(plant, decisions[:, 0])
     decisions = decisions[: max(len(samples) - 1, 0)]
     if not len(decisions):
-        raise RecordingError("the flight ended before its first control sample")
+        raise RecordingError("the flight ended before its first control sample: give it a longer --duration")
     return Recording(
         table=_join(plan, samples, decisions),
         qp_status=decisions[:, 4].astype(np.int64),

@@ -3,11 +3,11 @@
 import signal
 import sys
 import threading
-from argparse import Namespace
+from argparse import Action, Namespace
 from collections.abc import Sequence
 from errno import EDQUOT, EFBIG, ENOSPC
 from importlib import import_module
-from typing import Protocol, cast
+from typing import NoReturn, Protocol, cast
 
 from colibri.cli.shared.processes import PROCESSES, run_process
 from colibri.common.errors import Error
@@ -29,6 +29,8 @@ SUBCOMMANDS = {
     "compare": "fly several controllers on several tracks, side by side",
     "study": "fly what shows how far profile flight reaches, and draw it",
     "bench": "measure how fast it flies",
+    "plot": "draw the figures of a flight, however it ended",
+    "show": "print the file of a profile or vehicle, to copy and change",
     "replay": "feed a recorded flight to the autopilot: are its answers the same?",
     "verify": "fly a fixed set of flights: is every bit the same, twice, or as it once was?",
 }
@@ -44,6 +46,17 @@ class Subcommand(Protocol):
 
     def run(self, args: Namespace) -> int:
         """Do it; return the exit code."""
+
+
+class Version(Action):
+    """Prints the version that is installed, and ends."""
+
+    def __call__(self, *_: object) -> NoReturn:
+        """Look it up only now: that takes a while."""
+        from importlib.metadata import version
+
+        print(f"colibri {version('colibri-sitl')}")  # noqa: T201
+        raise SystemExit(0)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -73,6 +86,7 @@ def main(argv: list[str] | None = None) -> int:
 def _parser(given: Sequence[str]) -> ArgumentParser:
     """Return the parser of the whole command, with the options of the subcommand that is given alone."""
     parser = ArgumentParser(prog="colibri", description="A quadrotor autopilot in pure Python, flown over MAVLink.")
+    parser.add_argument("--version", action=Version, nargs=0, help="print the version")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     asked = next((word for word in given if word in SUBCOMMANDS), None)
     for name, what in SUBCOMMANDS.items():

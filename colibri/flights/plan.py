@@ -14,9 +14,10 @@ from colibri.common.errors import Error
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.open import check_reach
 from colibri.plant.environment.weather import Weather, weather_of
+from colibri.plant.physics.contact import check_contact
 from colibri.plant.physics.start import Start, check_start
 from colibri.plant.simulation.setting import WorldSetting, world_values
-from colibri.plant.vehicle.description import Vehicle, load_vehicle
+from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicle
 
 OPTIONS = (
     *(each.name for each in fields(WorldSetting)),
@@ -141,6 +142,10 @@ class FlightPlan(WorldSetting):
         floor_m = args.floor if args.floor is not None else -inf if plant_vehicle.ground is None else 0.0
         to_fly, note = load_track(track_name, vehicle, profile, floor_m)
         start = _start_of(profile, to_fly, args.feedback)._replace(**args.start)
+        try:
+            check_contact(plant_vehicle)
+        except VehicleError as error:
+            raise VehicleError(f"{plant_vehicle_name}: {error}") from error
         check_start(start, plant_vehicle)
         return cls(
             **(world_values(args) | {"start": start}),

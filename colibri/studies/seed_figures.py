@@ -15,6 +15,7 @@ from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, Flown
 
 _LABEL_IN = 0.8
+_MAX_DECADES = 12
 _NIS_COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9")
 _PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
     ("RMS (m)", {"control": ("#000000", "reference from estimate"), "true": ("#D55E00", "reference from truth")}),
@@ -22,26 +23,32 @@ _PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
     ("RMS (°)", {"roll": ("#009E73", "roll"), "pitch": ("#56B4E9", "pitch"), "yaw": ("#CC79A7", "yaw")}),
 )
 
+_BY_TRUTH = ("RMS (m)", {"true": ("#000000", "off its reference")})
+"""Where the autopilot is told the truth, there is no other."""
+_CHARACTER_IN = 0.085
+"""Of a row's name, at most."""
+
 
 def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
     """Draw `seeds.png`: a dot a flight, a bar at the median; the mean NEES, and that of an honest filter."""
     cases = list(dict.fromkeys((flown.contender, flown.track) for flown in flights))
     estimated = not all(np.isnan(flown.values[2]) for flown in flights)
-    panels = _PANELS if estimated else _PANELS[:1]
+    panels = _PANELS if estimated else (_BY_TRUTH,)
     rows = len(panels) + 2 * estimated
     row_in = 0.35 + 0.42 * len(cases)
     figure, grid = axes_grid(rows, 1, TOP_IN, row_in=row_in + _LABEL_IN, share=False)
-    figure.subplots_adjust(left=0.2, hspace=_LABEL_IN / row_in)
     several = len({contender for contender, _ in cases}) > 1
     names = [shortened(f"{track}, {contender}" if several else track) for contender, track in cases]
+    left_in = 0.3 + _CHARACTER_IN * max(map(len, names))
+    figure.subplots_adjust(left=left_in / figure.get_figwidth(), hspace=_LABEL_IN / row_in)
     for (axes,), (label, quantities) in zip(grid, panels, strict=False):
         for number, (quantity, (color, called)) in enumerate(quantities.items()):
             _strips(axes, flights, cases, quantity, color, called, _shift(number, len(quantities)))
         axes.set_xscale("log")
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=_MAX_DECADES))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.set_xlabel(label)
+        axes.set_xlabel(label, loc="right")
     if estimated:
         _draw_nees(grid[-2][0], flights, cases)
         _draw_nis(grid[-1][0], flights, cases)
@@ -68,7 +75,7 @@ def _draw_nees(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, 
     within = bounds(NAVIGATION, max(1, len(flights) // len(cases)))
     axes.axvspan(*within, color="#D55E00", alpha=0.15, linewidth=0)
     axes.axvline(NAVIGATION, color="#D55E00", linewidth=1.2, label="right; shaded: 95 % of the means over flights")
-    axes.set_xlabel("NEES of position, velocity and attitude, mean of a flight; bar: mean of all")
+    axes.set_xlabel("NEES of position, velocity and attitude, mean of a flight; bar: mean of all", loc="right")
 
 
 def _draw_nis(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, str]]) -> None:
@@ -84,7 +91,9 @@ def _draw_nis(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, s
                     at = [bound / (numbers * innovations)] * 2
                     axes.plot(at, [-place - shift - 0.08, -place - shift + 0.08], color="#000000", linewidth=1.0)
     axes.axvline(1.0, color="#D55E00", linewidth=1.2)
-    axes.set_xlabel("NIS in parts of its degrees of freedom, mean of a flight; black: bounds of 95 % of flights")
+    axes.set_xlabel(
+        "NIS in parts of its degrees of freedom, mean of a flight; black: bounds of 95 % of flights", loc="right"
+    )
 
 
 def _strips(

@@ -10,6 +10,7 @@ from colibri.common.rotations import earth_from_body, quaternion_from_euler, rot
 from colibri.common.types import Quaternion, Vector
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.errors import PlantError
+from colibri.plant.physics.contact import check_contact
 from colibri.plant.vehicle.description import Vehicle, VehicleError
 
 _MAX_START_DEPTH_M = 0.01
@@ -64,8 +65,9 @@ def check_start(start: Start, vehicle: Vehicle) -> None:
     """Check that a vehicle can start like that.
 
     Raises:
-        VehicleError: Its rotors do not turn so fast, or it would start in the ground.
+        VehicleError: Its rotors do not turn so fast, it would start in the ground, or its ground is too hard.
     """
+    check_contact(vehicle)
     if not 0.0 <= vehicle.speed_from_rpm(start.rotors) <= vehicle.rotors.max_speed:
         raise VehicleError(f"the rotors of {vehicle.name} cannot start at {start.rotors:g} rpm")
     if vehicle.ground is None:

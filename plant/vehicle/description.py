@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 import msgspec
 import numpy as np
 
-from colibri.common.config import NotNegative, Positive, Table, read_named, toml_names
+from colibri.common.config import NotNegative, Positive, Table, named_text, read_named, toml_names
 from colibri.common.elementary import square
 from colibri.common.types import Array, FourRotors
 from colibri.plant.errors import PlantError
@@ -23,8 +23,6 @@ PointInPlane: TypeAlias = tuple[float, float]
 
 _FOLDER = Path(__file__).parent / "models"
 _RAD_S_PER_UNIT = {"rad/s": 1.0, "rpm": 2.0 * pi / 60.0}
-_MAX_CONTACT_FREQUENCY_RAD_S = 2500.0
-"""Runge-Kutta 4 in steps of 1 ms is stable up to 2785."""
 
 
 class VehicleError(PlantError):
@@ -187,8 +185,6 @@ class Vehicle(Table, frozen=True, kw_only=True):
         super().__post_init__()
         if self.hover_speed >= self.rotors.max_speed:
             raise ValueError(f"rotors.max_speed: hover needs {self.hover_speed:.0f} {self.rotors.speed_unit}")
-        if self.ground is not None and _max_contact_frequency_rad_s(self, self.ground) > _MAX_CONTACT_FREQUENCY_RAD_S:
-            raise ValueError("ground: stiffness or damping too large for the plant's integration step of 1 ms")
 
     def without(self, parts: Iterable[str]) -> "Vehicle":
         """Return the vehicle with `parts` not modelled: of `rotor-lag`, `drag`, `ground`, `battery`.
@@ -250,6 +246,15 @@ def vehicle_names() -> list[str]:
     return toml_names(_FOLDER)
 
 
+def vehicle_text(name: str) -> str:
+    """Return the file of a vehicle that comes with Colibri.
+
+    Raises:
+        VehicleError: There is none of that name.
+    """
+    return named_text("vehicle", _FOLDER, name, VehicleError)
+
+
 def load_vehicle(name_or_path: str) -> Vehicle:
     """Read a vehicle by its name, or from a file if the argument ends in `.toml`.
 
@@ -269,29 +274,6 @@ def _allocation(rotors: Rotors) -> Array:
 def _spin(rotors: Rotors) -> Array:
     """Return +1 for a rotor that turns counter-clockwise seen from above, -1 for the others."""
     return np.array([1.0 if direction == "ccw" else -1.0 for direction in rotors.direction])
-
-
-def _max_contact_frequency_rad_s(vehicle: Vehicle, ground: Ground) -> float:
-    """Return a bound on the poles of the level vehicle on its feet, and of the one that lies on its rotors, rad/s."""
-    inertia = np.diag([vehicle.body.mass_kg] * 3 + [*vehicle.body.inertia_kg_m2])
-    points_m = ground.contacts_m(vehicle.rotors)
-    slip = ground.slip_damping_n_s_m
-    max_rate = 0.0
-    for contacts_m in (points_m[:4], points_m[4:]):
-        damping = np.linalg.solve(inertia, _contact_matrix(contacts_m, (slip, slip, ground.damping_n_s_m)))
-        stiffness = np.linalg.solve(inertia, _contact_matrix(contacts_m, (0.0, 0.0, ground.stiffness_n_m)))
-        rates = (np.abs(np.linalg.eigvals(damping)).max(), np.sqrt(np.abs(np.linalg.eigvals(stiffness)).max()))
-        max_rate = max(max_rate, *map(float, rates))
-    return max_rate
-
-
-def _contact_matrix(contacts_m: Array, along_axes: tuple[float, float, float]) -> Array:
-    """Return the 6 x 6 matrix that maps a small motion (m, rad) of the body to force and moment against it."""
-    matrix, weights = np.zeros((6, 6)), np.array(along_axes)[:, None, None]
-    for x, y, z in contacts_m:
-        motion = np.array([[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]])
-        matrix += (weights * motion[:, :, None] * motion[:, None, :]).sum(axis=0)
-    return matrix
 
 
 _WITHOUT: dict[str, Callable[[Vehicle], dict[str, Any]]] = {

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 
 import psutil
@@ -19,6 +20,7 @@ from colibri.mavlink.links.open import open_link
 from tools.harness.processes import wait_for
 
 VEHICLE = Path(__file__).parents[2] / "plant" / "vehicle" / "models" / "hummingbird.toml"
+FIGURES = ("trajectory", "position", "attitude", "inputs", "rotors", "error")
 MAX_HELP_S = 0.2
 """Of a core, startup of Python included."""
 HELP = """
@@ -31,6 +33,7 @@ finally:
     print(*sys.modules, file=sys.stderr)
 """
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "thesis.toml"
+FLIGHT = PROFILE.with_name("flight.toml")
 
 
 def edited(source: Path, old: str, new: str) -> Callable[[Path], str]:
@@ -83,7 +86,19 @@ BAD_INPUT = {
     ),
     "profile key": (
         (plain("spiral"), plain("--profile"), edited(PROFILE, "horizon = 4   ", "horizon = 0   ")),
-        "profile thesis: controllers.cascade: attitude.horizon: Expected `int` >= 1",
+        "thesis.toml: controllers.cascade: attitude.horizon: Expected `int` >= 1",
+    ),
+    "no moves": (
+        (plain("spiral"), plain("--profile"), edited(FLIGHT, "moves = [1, 1, 2, 4, 5, 7]", "moves = []")),
+        "flight.toml: controllers.lpv-mpc: attitude.moves: Expected `array` of length >= 1",
+    ),
+    "frames that divide nothing": (
+        (plain("spiral"), plain("--profile"), edited(FLIGHT, "frame_interval_s = 0.004", "frame_interval_s = 0.003")),
+        "flight.toml: simulation.frame_interval_s: 0.003 does not divide the control interval of 0.008 s: choose ",
+    ),
+    "hard ground": (
+        (plain("spiral"), plain("--vehicle"), edited(VEHICLE, "damping_n_s_m = 100.0", "damping_n_s_m = 1e4")),
+        "hummingbird.toml: ground.damping_n_s_m 10000 is too large, at most ",
     ),
     "profile file": (
         (plain("spiral"), plain("--profile"), edited(PROFILE, "rotor_speed_rpm = 3000.0", "rotor_speed_rpm = -1.0")),
@@ -139,7 +154,7 @@ BAD_INPUT = {
     "command": ((), "the following arguments are required: TRACK"),
 }
 
-SEEN_BY_THE_AUTOPILOT = ("extra", "profile key", "solver")
+SEEN_BY_THE_AUTOPILOT = ("extra", "no moves", "profile key", "solver")
 """Over UDP its process has to be started for it; `controller` shows the same of such a one in seconds."""
 
 
@@ -237,6 +252,45 @@ def test_a_taken_port() -> None:
     assert done.returncode == 2
     assert done.stderr.startswith(f"colibri: error: {taken.url}: Address already in use; ")
     assert done.stderr.count("\n") == 1
+
+
+def test_a_flight_shorter_than_a_control_sample_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code(["fly", "hover", "--duration", "0.001", "--link", "memory", "--out", str(tmp_path)]) == 1
+    said = "colibri: error: the flight ended before its first control sample: give it a longer --duration\n"
+    assert capsys.readouterr().err == said
+
+
+def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code(["--version"]) == 0
+    assert capsys.readouterr().out == f"colibri {version('colibri-sitl')}\n"
+
+
+@pytest.mark.parametrize(("what", "file"), [("profile", FLIGHT), ("vehicle", VEHICLE)])
+def test_a_file_of_colibris_own_is_shown_to_be_copied(
+    what: str, file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert exit_code(["show", what, file.stem]) == 0
+    assert capsys.readouterr().out == file.read_text(encoding="utf-8")
+    assert exit_code(["show", what, "nobody"]) == 2
+    assert capsys.readouterr().err.startswith(f"colibri: error: unknown {what} nobody: choose ")
+
+
+def test_figures_are_drawn_of_what_a_flight_left(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By what is in its folder alone: neither its profile nor its waypoints are there any more."""
+    profile, points = edited(FLIGHT, 'name = "flight"', 'name = "mine"')(tmp_path), tmp_path / "points.csv"
+    points.write_text("x,y,z\n0,0,1\n2,0,2\n", encoding="utf-8")
+    out = tmp_path / "out"
+    options = ("--profile", profile, "--link", "memory", "--duration", "0.5", "--wind", "2@270", "--no-figures")
+    assert exit_code(["fly", f"waypoints:{points}", *options, "--quiet", "--out", str(out)]) == 0
+    Path(profile).unlink()
+    points.unlink()
+    (out / "report.json").unlink()
+    assert exit_code(["plot", str(out)]) == 0
+    drawn = capsys.readouterr().out.split()
+    assert drawn == [str(out / f"{name}.png") for name in FIGURES]
+    assert all(Path(path).stat().st_size > 10_000 for path in drawn)
+    assert exit_code(["plot", str(tmp_path)]) == 2
+    assert "provenance.json is missing" in capsys.readouterr().err
 
 
 def fly_slowly(out: Path) -> "subprocess.Popen[str]":

@@ -16,6 +16,7 @@ from colibri.mavlink.wire.tlog import STAMP, decode
 from tools.harness.observer import Observer
 from tools.harness.processes import Process, fly, running
 
+ROOT = Path(__file__).parents[2]
 CHANGED_US = 1_000_000
 
 
@@ -34,6 +35,35 @@ def copy(flight: Path, tmp_path: Path) -> Path:
 def test_a_flight_is_replayed(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(flight / "flight.tlog")]) == 0
     assert capsys.readouterr().out == "500 commands up to t = 1.996 s, all identical\n"
+
+
+def test_a_flight_is_replayed_by_what_it_was_wherever_it_lies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Profile, vehicle and waypoints are relative, and are others by then."""
+    monkeypatch.chdir(tmp_path)
+    for folder, name in (("autopilot/profiles", "flight"), ("plant/vehicle/models", "hummingbird")):
+        shutil.copy(ROOT / folder / f"{name}.toml", f"my-{name}.toml")
+    Path("points.csv").write_text("x,y,z\n0,0,1\n2,0,2\n", encoding="utf-8")
+    files = ("--profile", "my-flight.toml", "--vehicle", "./my-hummingbird.toml")
+    fly(Path("out"), "waypoints:./points.csv", *files, "--link", "memory", "--duration", "1")
+    Path("points.csv").unlink()
+    Path("my-flight.toml").write_text("", encoding="utf-8")
+    Path("my-hummingbird.toml").unlink()
+    monkeypatch.chdir("/")
+    assert main(["replay", str(tmp_path / "out" / "flight.tlog")]) == 0
+    assert capsys.readouterr().out == "250 commands up to t = 0.996 s, all identical\n"
+
+
+def test_a_log_that_was_cut_short_is_not_the_flight(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tlog = copy / "flight.tlog"
+    tlog.write_bytes(tlog.read_bytes()[:5000])
+    with pytest.raises(SystemExit) as end:
+        main(["replay", str(tlog)])
+    assert end.value.code == 1
+    said = capsys.readouterr()
+    assert said.out.endswith(" s, all identical\n")
+    assert said.err.endswith(" s, and the flight went on to t = 2.000 s: it was cut off\n")
 
 
 def test_a_flight_on_sensors_is_replayed(tmp_path: Path) -> None:

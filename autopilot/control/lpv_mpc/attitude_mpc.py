@@ -1,8 +1,9 @@
 """The attitude LPV-MPC: predicts, condenses, solves and reads the plan."""
 
 from math import radians
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Annotated, Literal, NamedTuple, TypeAlias
 
+import msgspec
 import numpy as np
 
 from colibri.autopilot.control.interface import Active, Clock, Diagnostics
@@ -32,7 +33,7 @@ _KEPT = 1e-3
 class AttitudeSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The attitude LPV-MPC."""
 
-    moves: tuple[Count, ...]
+    moves: Annotated[tuple[Count, ...], msgspec.Meta(min_length=1)]
     """Steps that each planned moment is held for; the horizon is their sum."""
     scheduling: Literal["frozen", "along-plan"]
     """At the present state, or along the last plan."""

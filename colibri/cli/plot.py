@@ -1,0 +1,33 @@
+"""`colibri plot`: its options, and its call."""
+
+from argparse import Namespace
+from pathlib import Path
+
+from colibri.common.process.arguments import ArgumentParser
+from colibri.common.process.lifecycle import fail
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options of `colibri plot`."""
+    add = parser.add_argument
+    add("folder", type=Path, metavar="DIR", help="as `colibri fly` leaves it, however the flight ended")
+    add("--quiet", action="store_true", help="say nothing but errors")
+
+
+def run(args: Namespace) -> int:
+    """Draw the figures of a flight from what is in its folder; return the exit code."""
+    from colibri.analysis.figures import draw_flight
+    from colibri.analysis.recording import read_recording
+    from colibri.common.errors import Error
+    from colibri.flights.provenance import plan_of
+
+    try:
+        plan = plan_of(args.folder)
+        paths = draw_flight(read_recording(plan), plan)
+    except Error as error:
+        fail(f"{args.folder}: {error}" if str(args.folder) not in str(error) else str(error))
+    except OSError as error:
+        fail(f"{error.filename}: {error.strerror}")
+    if not args.quiet:
+        print(*paths, sep="\n")  # noqa: T201
+    return 0

@@ -1,0 +1,27 @@
+"""`colibri show`: its options, and its call."""
+
+import sys
+from argparse import Namespace
+
+from colibri.common.errors import Error
+from colibri.common.process.arguments import ArgumentParser
+from colibri.common.process.lifecycle import fail
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options of `colibri show`."""
+    add = parser.add_argument
+    add("what", choices=("profile", "vehicle"), help="what to show")
+    add("name", metavar="NAME", help="of those that come with Colibri; any other for a list of them")
+
+
+def run(args: Namespace) -> int:
+    """Print the file of a profile or vehicle, to be copied and changed; return the exit code."""
+    from colibri.autopilot.control.profile import profile_text
+    from colibri.plant.vehicle.description import vehicle_text
+
+    try:
+        sys.stdout.write(profile_text(args.name) if args.what == "profile" else vehicle_text(args.name))
+    except Error as error:
+        fail(str(error))
+    return 0
