@@ -98,12 +98,13 @@ def _keep_failure(job: Job, folder: Path) -> Path:
 
 
 def _values(figures: dict[str, Any]) -> tuple[float, ...]:
+    """Return `QUANTITIES` of a flight; nan of what a report does not have, that of a flight that never settled say."""
     off, turned = figures["estimation_rmse_m"], figures["attitude_rmse_deg"]
-    estimated = (np.nan,) * 5 if off is None else (*off.values(), *turned.values())
+    estimated = (None,) * 5 if off is None else (*off.values(), *turned.values())
     nees, nis = figures["nees_mean"], figures["nis_mean"]
     means = (None,) * len(MEASURED) if nis is None else _of_each(nis, "mean", None)
-    normalised = (np.nan if value is None else value for value in (nees, *means))
-    return (figures["control_rmse_m"], figures["rmse_after_20s_m"], *estimated, *normalised)
+    values = (figures["control_rmse_m"], figures["rmse_after_20s_m"], *estimated, nees, *means)
+    return tuple(np.nan if value is None else value for value in values)
 
 
 def _of_each(nis: dict[str, dict[str, Any]], figure: str, without: Any) -> tuple[Any, ...]:

@@ -1,6 +1,7 @@
 """The figures of a flight: the files, and that what they draw is what was flown."""
 
 from argparse import Namespace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,6 +30,7 @@ from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import NO_WIND
+from colibri.plant.vehicle.description import load_vehicle
 
 PNG = b"\x89PNG\r\n\x1a\n"
 SVG = b"<?xml"
@@ -151,10 +153,28 @@ def test_an_attitude_reference_is_held_up_to_its_row(short: Flight) -> None:
         assert line(axes, "flown").get_drawstyle() == "default"
 
 
-def test_rotor_limits(short: Flight) -> None:
-    for axes in short.figures["rotors"].axes:
+@pytest.mark.parametrize("vehicle", ["hummingbird-thesis", "hummingbird"])
+def test_rotor_limits(short: Flight, vehicle: str) -> None:
+    rotors = load_vehicle(vehicle).rotors
+    plan = replace(short.plan, plant_vehicle=load_vehicle(vehicle))
+    series = flight_series(short.recording, plan)
+    (figure,) = (figure for figure in flight_figures(series, plan) if figure.name == "rotors")
+    for axes in draw_times(series, figure, "rotors").axes:
         limits = [set(drawn(line)[1]) for line in axes.lines if line.get_label() == "limits"]
-        assert limits == [{0.0}, {short.plan.plant_vehicle.rotors.max_speed}]
+        assert limits == [{rotors.idle_speed}, {rotors.max_speed}]
+
+
+@pytest.mark.parametrize("size", [1e-7, 1e-3, 0.02, 1.0, 500.0, 1e5])
+def test_no_label_of_an_axis_reaches_those_of_its_ticks(short: Flight, size: float) -> None:
+    """Of numbers of whatever size."""
+    t = short.series["t"]
+    values = {"t": t, "x": size * np.sin(t)}
+    panel = Panel("error (m)", (Curve("x", "flown"),))
+    figure = draw_times(values, TimeFigure("own", "own", ((panel, panel),) * 2), "a title")
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        ticks = [tick.label1.get_window_extent().x0 for tick in axes.yaxis.get_major_ticks()]
+        assert axes.yaxis.label.get_window_extent().x1 < min(ticks)
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])

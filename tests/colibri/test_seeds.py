@@ -2,8 +2,10 @@
 
 import csv
 from pathlib import Path
+from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
 
 from colibri.analysis.estimation import MEASURED
 from colibri.autopilot.estimation.measurements.table import kinds_of
@@ -11,7 +13,7 @@ from colibri.cli.main import main
 from colibri.flights.plan import FlightPlan
 from colibri.flights.provenance import provenance_of
 from colibri.plant.vehicle.description import load_vehicle
-from colibri.studies import seeds
+from colibri.studies import seed_figures, seeds
 from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, Flown, kept_flights
 
 _SENSORS = load_vehicle("hummingbird").sensors
@@ -125,3 +127,57 @@ def test_bad_seeds_are_one_line(seeds: str, capsys: pytest.CaptureFixture[str]) 
     said = capsys.readouterr().err
     assert f"argument --seeds: expected FIRST-LAST, 1-50 say, not {seeds}" in said
     assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("estimated", [True, False])
+def test_the_figure_has_room_for_its_rows_and_a_dot_for_each_flight(
+    estimated: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Figure] = []
+    monkeypatch.setattr(seed_figures, "write_figure", lambda figure, _path: drawn.append(figure))
+    values = tuple(0.1 + number if estimated or number < 2 else float("nan") for number in range(len(QUANTITIES)))
+    counts = tuple(range(len(MEASURED)))
+    names = ("my-longest-profile.toml:geometric-se3", "flight")
+    seed_figures.draw_seeds(
+        [Flown(name, "circle:radius=3,speed=4", seed, "", values, counts, "", "") for name in names for seed in (1, 2)],
+        Path(),
+    )
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    assert min(text.get_window_extent().x0 for axes in figure.axes for text in axes.get_yticklabels()) > 0.0
+    assert max(axes.xaxis.label.get_window_extent().x1 for axes in figure.axes) < figure.bbox.width
+    dots = sum(line.get_marker() == "o" for line in figure.axes[0].lines)
+    assert dots == len(names) * (2 if estimated else 1)
+
+
+def test_what_changed_since_is_flown_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A profile's contents count, not its name; the options are the same."""
+
+    def one_by_one(work: Any, jobs: list[Any], *_: object, keep: Any, **__: object) -> list[Flown]:
+        flown = [work(job) for job in jobs]
+        for each in flown:
+            keep(each)
+        return flown
+
+    monkeypatch.setattr(seeds, "side_by_side", one_by_one)
+    profile, out = tmp_path / "mine.toml", tmp_path / "out"
+    assert main(["show", "profile", "flight"]) == 0
+    text = capsys.readouterr().out
+    profile.write_text(text, encoding="utf-8")
+    command = ["compare", "--profile", str(profile), "--track", "hover", "--seeds", "1-2", "--duration", "0.5"]
+
+    def hashes(*options: str) -> list[str]:
+        assert main([*command, "--out", str(out), *options]) == 0
+        with (out / "seeds-flights.csv").open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        assert {row["profile"] for row in rows} == {"mine"}
+        return [row["trajectory_sha256"] for row in rows]
+
+    first = hashes()
+    assert hashes("--resume") == first
+    assert "again" not in capsys.readouterr().out
+    profile.write_text("# a remark\n" + text.replace("poles = [-5.0, -6.0]", "poles = [-4.0, -6.0]"), encoding="utf-8")
+    assert set(hashes("--resume")).isdisjoint(first)
+    assert "--resume: 2 of 2 flights are flown again, by contents that changed\n" in capsys.readouterr().out
