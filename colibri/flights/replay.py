@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from math import degrees
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -108,6 +109,8 @@ def replay(args: argparse.Namespace) -> int:
         fail(f"{args.tlog}: the autopilot does not answer as it did, after {outcome.commands} commands", EXIT_FAILED)
     if not args.quiet:
         print(f"{outcome.commands} commands up to t = {outcome.last_us * 1e-6:.3f} s, all identical")  # noqa: T201
+        for name in _changed(_inputs(args.tlog.parent / INPUTS, args.tlog)):
+            print(f"{name} is another by now: replayed as it flew")  # noqa: T201
     if ended_us - outcome.last_us > _CUT_OFF_US:
         cut = f"ends at t = {outcome.last_us * 1e-6:.3f} s, and the flight went on to t = {ended_us * 1e-6:.3f} s"
         fail(f"{args.tlog} {cut}: it was cut off", EXIT_FAILED)
@@ -199,6 +202,20 @@ def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:
     arrived = decode_actuators(message)
     assert arrived is not None, "what an autopilot commands can be flown"
     return arrived
+
+
+def _changed(inputs: Iterable[Input]) -> list[str]:
+    """Return the profiles and vehicles of a log that are others under their names by now; none that is gone."""
+    changed = []
+    for setup in (what for what in inputs if isinstance(what, Setup)):
+        with suppress(Error):
+            now = load_profile(setup.profile).with_choices(setup.controller, setup.solver)
+            if setup.profile_tables not in (None, now):
+                changed.append(f"profile {setup.profile}")
+        with suppress(Error):
+            if setup.vehicle_tables not in (None, load_vehicle(setup.vehicle)):
+                changed.append(f"vehicle {setup.vehicle}")
+    return list(dict.fromkeys(changed))
 
 
 def _logged_us(tlog: Path) -> int:

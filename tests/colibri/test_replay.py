@@ -50,9 +50,15 @@ def test_a_flight_is_replayed_by_what_it_was_wherever_it_lies(
     Path("points.csv").unlink()
     Path("my-flight.toml").write_text("", encoding="utf-8")
     Path("my-hummingbird.toml").unlink()
+    identical = "250 commands up to t = 0.996 s, all identical\n"
+    flight = str(tmp_path / "out" / "flight.tlog")
     monkeypatch.chdir("/")
-    assert main(["replay", str(tmp_path / "out" / "flight.tlog")]) == 0
-    assert capsys.readouterr().out == "250 commands up to t = 0.996 s, all identical\n"
+    assert main(["replay", flight]) == 0
+    assert capsys.readouterr().out == identical
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(ROOT / "autopilot/profiles/se3.toml", "my-flight.toml")
+    assert main(["replay", flight]) == 0
+    assert capsys.readouterr().out == f"{identical}profile my-flight.toml is another by now: replayed as it flew\n"
 
 
 def test_a_log_that_was_cut_short_is_not_the_flight(copy: Path, capsys: pytest.CaptureFixture[str]) -> None:
