@@ -16,6 +16,8 @@ _ABOVE_GROUND_M = 0.1
 """A reference that is higher does not mean the vehicle to touch the ground."""
 _TOUCHED_S = 1.0
 """Touching the ground for so long below its reference it is lost, though it may leave it again."""
+_TURNING_S = 1.0
+"""One that begins upside down may be so again for a moment while it recovers."""
 _INSTANT_S = 1e-6
 
 
@@ -105,10 +107,12 @@ def _grounded(plan: FlightPlan, recording: Recording) -> int | None:
 
 
 def _upside_down(recording: Recording) -> int | None:
-    """Return the sample since which a vehicle that was upright is upside down; None if it ends upright."""
-    upright = np.flatnonzero(_up(recording)[:, 2] >= 0.0)
-    last = len(recording.table) - 1
-    return int(upright[-1]) + 1 if len(upright) and upright[-1] < last else None
+    """Return the sample since which a vehicle is upside down that began upright; one that did not may take a second."""
+    t, upright = recording["t"], _up(recording)[:, 2] >= 0.0
+    if upright[-1] or not upright.any():
+        return None
+    since = int(np.flatnonzero(upright)[-1]) + 1
+    return since if upright[0] or t[-1] - t[since] > _TURNING_S else None
 
 
 def _far_off(recording: Recording) -> int | None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.profile import Profile, ProfileTables
 from colibri.flights.plan import FlightPlan
 
 CONTROLLER = "lpv-mpc"
@@ -31,7 +31,8 @@ def with_intervals(profile: Profile, *, frame_s: float, control_s: float) -> Pro
 def plan_of(profile: Profile, folder: Path, duration_s: float, link: str) -> FlightPlan:
     """Return the plan of a lemniscate with `profile`, which is written into `folder` for processes to read."""
     file = folder / "profile.toml"
-    file.write_text("\n".join(toml_lines(msgspec.to_builtins(profile))) + "\n", encoding="utf-8")
+    tables = {key: msgspec.to_builtins(getattr(profile, key)) for key in ProfileTables.__struct_fields__}
+    file.write_text("\n".join(toml_lines(tables)) + "\n", encoding="utf-8")
     return replace(FlightPlan.of_options(folder, track=TRACK, profile=str(file), link=link), duration_s=duration_s)
 
 

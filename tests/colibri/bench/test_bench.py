@@ -127,7 +127,9 @@ def test_bad_input_is_one_line(options: tuple[str, ...], capsys: pytest.CaptureF
 
 def test_a_profile_written_is_the_profile_read(tmp_path: Path) -> None:
     profile = with_intervals(with_moves(load_profile("flight"), (1, 2)), frame_s=0.002, control_s=0.008)
-    assert plan_of(profile, tmp_path, 1.0, "memory").profile == profile
+    read = plan_of(profile, tmp_path, 1.0, "memory").profile
+    assert (read.name, read.file) == ("profile", str(tmp_path / "profile.toml"))
+    assert msgspec.structs.replace(read, name=profile.name, file=profile.file) == profile
 
 
 def test_toml_leaves_out_what_is_not_given() -> None:

@@ -19,7 +19,7 @@ TUMBLING = "x=1,y=2,z=20,phi=170,theta=-10,psi=123.4,vx=3,vy=-2,vz=1,p=10,q=-1,r
 @pytest.mark.long
 def test_udp_and_memory_are_in_the_same_world(tmp_path: Path) -> None:
     options = (*REALISTIC, "4", "--wind", "3.3@123.4", "--without", "drag", "--without", "battery", "--start", TUMBLING)
-    udp, memory = (fly(tmp_path / link, *options, "--link", link) for link in ("udp", "memory"))
+    udp, memory = (fly(tmp_path / link, *options, "--link", link, lost=True) for link in ("udp", "memory"))
     assert udp["trajectory_sha256"] == memory["trajectory_sha256"]
     assert (tmp_path / "udp" / "plant.csv").read_bytes() == (tmp_path / "memory" / "plant.csv").read_bytes()
 
@@ -46,7 +46,7 @@ def test_the_start_is_the_profiles_where_it_is_not_told(tmp_path: Path) -> None:
 
 
 def test_a_velocity_is_in_the_earth_frame(tmp_path: Path) -> None:
-    fly(tmp_path, *REALISTIC, "1", "--link", "direct", "--start", "z=9,psi=90,vx=2,rotors=4740")
+    fly(tmp_path, *REALISTIC, "1", "--link", "direct", "--start", "z=9,psi=90,vx=2,rotors=4740", lost=True)
     flown = rows(tmp_path / "flight.csv")
     assert (flown["u"][0], flown["v"][0], flown["w"][0]) == pytest.approx((0.0, -2.0, 0.0), abs=1e-12)
 
