@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out/spiral
 
-.PHONY: setup fly test test-long lint test-clients fuzz scenarios scenarios-rough soak soak-clients kills \
+.PHONY: setup fly test test-long lint test-clients fuzz chaos scenarios scenarios-rough soak soak-clients kills \
   golden verify-pythons bench lock clean
 
 setup: .venv/.ready
@@ -50,6 +50,10 @@ test-clients: setup .venv-clients/.ready
 
 fuzz: setup
 	$(BIN)/python -m tools.fuzz $(FUZZ)
+
+# Exceptions thrown into every part of a flight, at 20 instants of each situation: hours. CHAOS="--instants 1", say.
+chaos: setup
+	$(BIN)/python -m tools.chaos $(CHAOS)
 
 # Every scenario of tests/scenarios/, over UDP: SITL_LINK=memory flies them in one process each.
 SITL_LINK ?= udp

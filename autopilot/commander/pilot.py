@@ -220,7 +220,7 @@ class Pilot:
         """Arm the rotors, or return why not; `missing` are the needs of modes that nothing meets now."""
         if self.state.armed:
             return None
-        forced = force and self.sensed.vehicle is not None and not self.readiness.rotor_failed
+        forced = force and self.sensed.vehicle is not None and not self.readiness.only_lands
         reasons = [] if forced else self.readiness.refusals()
         if reasons:
             return Refusal("not armed: " + "; ".join(reasons))
@@ -363,9 +363,9 @@ class Pilot:
         self, event: Event, text: str, selected: Mode | None = None, missing: Collection[Need] = ()
     ) -> Refusal | None:
         """Change the state by an event, and report `text` if that changes anything; or return why not."""
-        rotor_failed = self.readiness.rotor_failed
-        if event is Event.SELECT and self.state.armed and rotor_failed:
-            return Refusal(f"{selected} refused: {rotor_failed}")
+        only_lands = self.readiness.only_lands
+        if event is Event.SELECT and self.state.armed and only_lands:
+            return Refusal(f"{selected} refused: {only_lands}")
         after = next_state(self.state, event, selected, missing)
         if isinstance(after, Refusal):
             return after

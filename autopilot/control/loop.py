@@ -173,6 +173,11 @@ class ControlLoop:
         self._controller, self._charged = controller, _charged(controller)
         self.vehicle = vehicle
 
+    @property
+    def controller(self) -> Controller[Any]:
+        """The law itself."""
+        return self._controller
+
     def _take(self, time_us: int, memory: Any, decision: Decision) -> Decision:
         """Remember and command what the law has decided."""
         self._memory = memory

@@ -3,9 +3,13 @@
 from colibri.autopilot.commander.flight.reference_generator import RESTS, Guidance
 from colibri.autopilot.control.interface import Decision, VehicleState
 from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.control.registry import check_rotor_speeds
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
+from colibri.autopilot.core.defence.descent import Descent
+from colibri.autopilot.core.defence.plain_law import PlainLaw
 from colibri.autopilot.core.step import STILL
 from colibri.common.types import FourRotors
+from colibri.plant.vehicle.description import Vehicle
 
 
 class SolveTime:
@@ -54,11 +58,17 @@ class Actuation:
         sent: The last command, parts of the largest speed.
         decision: The decision that is flown; None while the rotors stand or idle.
         solve_time_s: Of the last QP.
+        plain: The plain law.
+        by_plain_law: Whether that flies, in place of the control law.
+        descent: The last resort; None as long as it is not needed.
     """
 
     def __init__(self, loop: ControlLoop, rotor_loss: RotorLoss) -> None:
         """Command by the control law of `loop`, and by `rotor_loss` once a rotor is lost."""
         self._loop, self._rotor_loss = loop, rotor_loss
+        self.adopt(loop.vehicle)
+        self.by_plain_law = False
+        self.descent: Descent | None = None
         self._solving = SolveTime(loop.control_interval_us)
         self.sent = STILL
         self.decision: Decision | None = None
@@ -68,6 +78,10 @@ class Actuation:
     def missed(self) -> int:
         """How many decisions took longer than a control interval."""
         return self._solving.missed
+
+    def adopt(self, vehicle: Vehicle) -> None:
+        """Have a plain law for other numbers of the vehicle."""
+        self.plain = PlainLaw(vehicle, self._loop.control_interval_us * 1e-6)
 
     def begin(self, controls: FourRotors) -> None:
         """Begin with the rotors turning at `controls`."""
@@ -102,6 +116,20 @@ class Actuation:
             self.decision = decision
         return decision
 
+    def decide_plainly(self, now_us: int, state: VehicleState, guidance: Guidance) -> Decision | None:
+        """Decide a control sample by the plain law, or by the descent, which needs no `guidance`."""
+        if self.descent is not None:
+            self.decision = self.descent.step(self.plain, now_us, state)
+        elif guidance.horizon is not None:
+            self.decision = self.plain.step(state, guidance.horizon)
+        elif guidance.attitude is not None:
+            self.decision = self.plain.step_attitude(state, guidance.attitude)
+        else:
+            self.decision = None
+        vehicle = self._loop.vehicle
+        self._solving.at_once(STILL if self.decision is None else controls_of(self.decision, vehicle.rotors.max_speed))
+        return self.decision
+
     def _decide(
         self, now_us: int, state: VehicleState, guidance: Guidance, charge_ah: float, solve_time_s: float
     ) -> Decision | None:
@@ -124,3 +152,14 @@ class Actuation:
         self._solving.decided(loop.controls, now_us, round(solve_time_s * 1e6))
         self.solve_time_s = decision.diagnostics.solve_time_s
         return decision
+
+
+def controls_of(decision: Decision, max_speed: float) -> FourRotors:
+    """Return the command of a decision of the plain law, parts of the largest speed.
+
+    Raises:
+        DecisionError: No rotor can follow it.
+    """
+    check_rotor_speeds("plain law", decision.rotor_speeds, max_speed)
+    c1, c2, c3, c4 = (decision.rotor_speeds / max_speed).tolist()
+    return c1, c2, c3, c4

@@ -5,7 +5,10 @@ from collections.abc import Iterable
 from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.checkpoint import Checkpoint, Checkpointer, History, fingerprint_of
+from colibri.autopilot.core.defence import errors
+from colibri.autopilot.core.defence.state_estimates import StateEstimates
 from colibri.autopilot.core.flight_start import FlightStart
+from colibri.autopilot.core.flying import Flying
 from colibri.autopilot.core.parts import parts_of
 from colibri.autopilot.core.report import Reporter, Sample
 from colibri.autopilot.core.step import Received, Step, follows, nothing_known
@@ -13,16 +16,17 @@ from colibri.autopilot.core.supervision import Supervision
 from colibri.autopilot.estimation.state_source import NewEstimator, estimator_for
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.guidance.trajectories.tracks import Track
-from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
+from colibri.mavlink.hil.faults import Fault
+from colibri.mavlink.hil.plant_status import NOTHING, PlantBattery, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
-from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.parameters.store import Value
 from colibri.plant.vehicle.description import Vehicle
 
 
 class Copter:
-    """A vehicle that ground stations fly.
+    """A vehicle that ground stations fly, whatever raises: see `colibri.autopilot.core.defence`.
 
     Attributes:
         frame_interval_us: How often it wants a frame.
@@ -30,6 +34,7 @@ class Copter:
         pilot: Decides what is flown.
         parameters: All numbers that can be changed.
         stations: Serves ground stations.
+        defence: Catches exceptions in flight.
     """
 
     def __init__(
@@ -43,6 +48,7 @@ class Copter:
         first: Track | None = None,
         estimator: NewEstimator | None = None,
         history: History | None = None,
+        strict: bool = False,
     ) -> None:
         """Fly `vehicle` by `profile`; `clock` only measures, it decides nothing.
 
@@ -56,6 +62,7 @@ class Copter:
                 up in hold.
             estimator: Makes what turns frames of sensors into states; None: the one for the settings' feedback.
             history: Of a flight in which an autopilot was killed; it goes on if the first frame is of the same flight.
+            strict: Whether what a part of it raises in flight is raised, rather than replaced.
 
         Raises:
             ControllerError: The profile's control law cannot be used.
@@ -65,12 +72,16 @@ class Copter:
             VehicleError: The feedback is of sensors that the vehicle has not.
         """
         estimator = estimator or estimator_for(settings.feedback, vehicle, settings.origin)
-        self.parts = parts = parts_of(profile, vehicle, settings, clock, values, first, estimator)
+        self.parts = parts = parts_of(profile, vehicle, settings, clock, values, first, estimator, strict)
         self.pilot, self.parameters, self.stations = parts.pilot, parts.parameters, parts.stations
         self.frame_interval_us = parts.loop.frame_interval_us
         self._clock = clock
         self._checkpointer = Checkpointer(fingerprint_of(profile, vehicle), parts)
-        self._supervision = Supervision(parts)
+        self.defence = parts.defence
+        self.defence.keep(lambda: None if self._time_us is None else self._checkpointer.record(self._time_us))
+        self._estimates = StateEstimates(parts.state_source, self.defence, vehicle.gravity_m_s2)
+        self._supervision = Supervision(parts, self.defence)
+        self._flying = Flying(parts, self._supervision, self.defence)
         start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._start = FlightStart(parts, self._supervision, self._checkpointer, history, start_speed)
         self._reporter = Reporter(parts)
@@ -95,67 +106,132 @@ class Copter:
         On sensors the rotors stand, and commands are denied, before the first estimate.
 
         Raises:
-            DecisionError: The control law gave what no rotor can follow.
+            Exception: What a part raises, if strict.
         """
         started_s = self._clock()
         parts, now_us = self.parts, frame.time_us
-        self._plant_status = plant_status
+        self._plant_status, self.defence.frame = plant_status, frame
         if plant_status.battery is not None:
-            parts.loop.know_charge(plant_status.battery.used_ah)
-            parts.battery.receive(plant_status.battery)
-        self._start.wake(now_us)
+            self._know_charge(plant_status.battery)
+        self._wake(now_us)
         due = parts.loop.is_due(now_us)
         goes_on = follows(now_us, self._time_us, self.frame_interval_us)
-        known = parts.state_source.state(frame, asked=due or not goes_on)
+        known = self._estimates.state(frame, asked=due or not goes_on)
         if known is None:
             self._waiting_us = now_us
             if self._time_us is not None:  # another flight, of which nothing is known yet
                 parts.stations.system.reboot()
             return nothing_known(now_us, self._clock() - started_s)
         if not goes_on:
-            self._start.begin(known, self._time_us)
+            self._begin(known)
         self._time_us = now_us
         decision = estimate = guidance = None
         if due:
-            state = parts.loop.state(known)
-            self._supervision.step(now_us, state)
-            guidance = self.pilot.step()
-            solve_time_s = self.pilot.behaviour.solve_time_s
-            decision = parts.actuation.decide(now_us, state, guidance, parts.battery.charge_ah, solve_time_s)
-            if parts.rotor_loss.landed and self.pilot.state.armed:
-                self.pilot.touch_down()
+            try:
+                state = parts.loop.state(known)
+                guidance, decision = self._flying.step(now_us, state, blind=self._estimates.blind)
+            except Exception as error:
+                self.defence.caught(errors.STEP, error)
+                decision = self._flying.rescue(now_us, known)
             estimate = parts.state_source.estimate
-        command = ActuatorCommand(now_us, parts.actuation.send(now_us), armed=self.pilot.state.armed)
+        command = ActuatorCommand(now_us, parts.actuation.send(now_us), armed=self._flying.armed)
         duration_s = self._clock() - started_s
         if guidance is not None:
             self._sample = Sample(now_us, state, guidance, parts.actuation.decision, duration_s)
-        return Step(command, decision, duration_s, estimate, parts.stations.failures.take())
+        return Step(command, decision, duration_s, estimate, self._faults())
+
+    def _know_charge(self, battery: PlantBattery) -> None:
+        if errors.BATTERY in self.defence.off:
+            return
+        try:
+            self.parts.loop.know_charge(battery.used_ah)
+            self.parts.battery.receive(battery)
+        except Exception as error:
+            self.defence.caught(errors.BATTERY, error)
+
+    def _wake(self, now_us: int) -> None:
+        try:
+            self._start.wake(now_us)
+        except Exception as error:
+            self.defence.caught(errors.RESTART, error)
+
+    def _begin(self, known: StateFrame) -> None:
+        """Start a flight; where the start raises, once more without the past, and then by the last resort."""
+        for part in (errors.RESTART, errors.START):
+            try:
+                self._start.begin(known, self._time_us)
+                return
+            except Exception as error:
+                self.defence.caught(part, error)
+        self._flying.descend(known.time_us)
+
+    def _faults(self) -> tuple[Fault, ...]:
+        try:
+            return self.parts.stations.failures.take()
+        except Exception as error:
+            self.defence.caught(errors.FAULTS, error)
+            return ()
 
     def serve(self, inbox: Iterable[Received]) -> list[Outgoing]:
         """Serve ground stations, and return what to send them; after each `step`, while the plant integrates."""
         now_us = self._time_us
         if now_us is None:
             return self._put_off(inbox)
-        if self._sample is not None:
-            self._reporter.report(self._sample)
-            self._sample = None
-        self.stations.receive_status(self._plant_status, now_us)
+        self._report()
+        try:
+            self.stations.receive_status(self._plant_status, now_us)
+        except Exception as error:
+            self.defence.caught(errors.STATIONS, error)
         self._plant_status = NOTHING
-        for datagram, link, address, loopback in inbox:
-            self.stations.hub.receive(datagram, link, address, now_us, loopback=loopback)
-        self.parts.subscribers.adopt(self.parameters)
+        self._hear(inbox, now_us)
+        try:
+            self.parts.subscribers.adopt(self.parameters)
+        except Exception as error:
+            self.defence.caught(errors.PARAMETERS, error)
+            self.parts.subscribers.keep(self.parameters)
         return self.stations.poll(now_us)
+
+    def _report(self) -> None:
+        """Report a control sample; where that raises, ground stations read the mode, and old values beside it."""
+        sample, self._sample = self._sample, None
+        if sample is None:
+            return
+        if errors.TELEMETRY not in self.defence.off:
+            try:
+                self._reporter.report(sample)
+                return
+            except Exception as error:
+                self.defence.caught(errors.TELEMETRY, error)
+        self.stations.go_on()
+
+    def _hear(self, inbox: Iterable[Received], now_us: int) -> None:
+        """Give the hub what came; a datagram that it cannot bear is dropped."""
+        arriving = iter(inbox)
+        while True:
+            try:
+                received = next(arriving, None)
+                if received is None:
+                    return
+                datagram, link, address, loopback = received
+                self.stations.hub.receive(datagram, link, address, now_us, loopback=loopback)
+            except Exception as error:
+                self.defence.caught(errors.DATAGRAM, error)
 
     def _put_off(self, inbox: Iterable[Received]) -> list[Outgoing]:
         """Deny commands while nothing is known of the vehicle yet."""
         if self._waiting_us is None:
             return []
         self.stations.refuse_commands("not ready: attitude and position are not known yet")
-        for datagram, link, address, loopback in inbox:
-            self.stations.hub.receive(datagram, link, address, self._waiting_us, loopback=loopback)
+        self._hear(inbox, self._waiting_us)
         self.stations.refuse_commands("")
         return self.stations.take_outbox()
 
     def record(self) -> Checkpoint | None:
-        """Return the checkpoint for a restart; None as long as nothing is known of the vehicle."""
-        return None if self._time_us is None else self._checkpointer.record(self._time_us)
+        """Return the checkpoint for a restart; None as long as nothing is known of the vehicle, or where it raises."""
+        if self._time_us is None or errors.CHECKPOINT in self.defence.off:
+            return None
+        try:
+            return self._checkpointer.record(self._time_us)
+        except Exception as error:
+            self.defence.caught(errors.CHECKPOINT, error)
+            return None

@@ -1,8 +1,6 @@
 """The parts of a vehicle that ground stations fly, put together around one profile."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 from colibri.autopilot.commander.fence import Fence
 from colibri.autopilot.commander.home import Home
@@ -11,55 +9,26 @@ from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.commander.supervisor import Supervisor
-from colibri.autopilot.control.interface import Clock, Controller
+from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
 from colibri.autopilot.core.actuation import Actuation
+from colibri.autopilot.core.defence.errors import Defence
+from colibri.autopilot.core.subscription import Flown, Subscribers
+from colibri.autopilot.core.trial import Trial
 from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
 from colibri.autopilot.ground.battery_monitor import BatteryMonitor
 from colibri.autopilot.ground.snapshots import SnapshotBuilder
 from colibri.autopilot.ground.stations import Stations, StationSettings
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference, attitude_limits
-from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
 from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
 from colibri.mavlink.parameters.store import Parameters, Value
+from colibri.mavlink.services.statustext import WARNING
 from colibri.plant.vehicle.description import Vehicle
-
-
-class Subscribers(NamedTuple):
-    """Callbacks that adopt a change, by what they take.
-
-    Attributes:
-        parameters: Take all parameters.
-        behaviour: Take the numbers of the behaviour.
-        law: Take the control law and its vehicle; called only if one of their numbers has changed.
-        vehicle: Take the vehicle; likewise.
-    """
-
-    parameters: tuple[Callable[[Parameters], None], ...]
-    behaviour: tuple[Callable[[Behaviour], None], ...]
-    law: tuple[Callable[[Controller[Any], Vehicle], None], ...]
-    vehicle: tuple[Callable[[Vehicle], None], ...]
-
-    def adopt(self, parameters: Parameters) -> None:
-        """Call back with the changes since the last call, if there are any."""
-        changes = parameters.take_changes()
-        if changes is None:
-            return
-        for adopt_parameters in self.parameters:
-            adopt_parameters(parameters)
-        flies_by = behaviour(parameters)
-        for adopt_behaviour in self.behaviour:
-            adopt_behaviour(flies_by)
-        if isinstance(changes.made, Tuned):
-            for adopt_law in self.law:
-                adopt_law(changes.made.controller, changes.made.vehicle)
-            for adopt_vehicle in self.vehicle:
-                adopt_vehicle(changes.made.vehicle)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +48,7 @@ class Parts:
     stations: Stations
     snapshots: SnapshotBuilder
     lines: StatusQueue
+    defence: Defence
 
 
 def parts_of(
@@ -89,6 +59,7 @@ def parts_of(
     values: dict[str, Value] | None,
     first: Track | None,
     estimator: NewEstimator | None,
+    strict: bool,
 ) -> Parts:
     """Return the parts of a vehicle; arguments and errors are those of `Copter`."""
     numbers = Numbers(profile, vehicle)
@@ -104,25 +75,38 @@ def parts_of(
     missions = Missions(home, fence, lines, flies_by)
     tasks = ModeTasks(missions, attitude, assumed, loop.preview, planned_at, profile.references, first)
     pilot = Pilot(planned_at, flies_by, tasks.begin, home, lines)
-    stations = Stations(settings, pilot, missions, fence, lines, parameters, takes_attitude=attitude is not None)
-    parameters.ask(Tuning(numbers, builder(profile.controller, clock), loop, stations.warn).prepare)
+    defence = Defence(pilot, lines.say, strict=strict)
+    stations = Stations(
+        *(settings, pilot, missions, fence, lines, parameters),
+        takes_attitude=attitude is not None,
+        caught=None if strict else defence.caught,
+    )
     supervisor = Supervisor(parameters, lines)
     rotor_loss = RotorLoss(assumed, loop.control_interval_us)
     rotor_loss.obey(flies_by)
+    if rotor_loss.impossible:
+        lines.say(WARNING, f"no landing on three rotors: {rotor_loss.impossible}")
+    actuation = Actuation(loop, rotor_loss)
+    trial = Trial(loop, rotor_loss, planned_at)
+    tuning = Tuning(numbers, builder(profile.controller, clock), loop, stations.warn, parameters, trial)
+    if values:
+        tuning.try_all(parameters.values)
+    parameters.ask(tuning.prepare)
     snapshots = SnapshotBuilder(assumed, loop.control_interval_us * 1e-6, loop.plan_columns)
     leads = () if attitude is None else (attitude,)
     subscribers = Subscribers(
         parameters=(supervisor.adopt,),
         behaviour=(pilot.adopt, missions.adopt, rotor_loss.obey, *(part.obey for part in leads)),
         law=(loop.adopt,),
-        vehicle=(tasks.adopt, rotor_loss.adopt, snapshots.adopt, *(part.adopt for part in leads)),
+        vehicle=(tasks.adopt, rotor_loss.adopt, actuation.adopt, snapshots.adopt, *(part.adopt for part in leads)),
+        flown=Flown(parameters.values, Tuned(flown, assumed, loop.controller)),
     )
     return Parts(
         parameters,
         subscribers,
         loop,
         StateSource(estimator, loop.frame_interval_us),
-        Actuation(loop, rotor_loss),
+        actuation,
         rotor_loss,
         BatteryMonitor(assumed),
         tasks,
@@ -131,4 +115,5 @@ def parts_of(
         stations,
         snapshots,
         lines,
+        defence,
     )

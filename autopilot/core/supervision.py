@@ -3,7 +3,10 @@
 from colibri.autopilot.commander.rules.failsafe_conditions import NEVER_US, FailsafeInputs
 from colibri.autopilot.commander.rules.failsafe_table import Action
 from colibri.autopilot.control.interface import VehicleState
+from colibri.autopilot.core.defence import errors
+from colibri.autopilot.core.defence.errors import Defence
 from colibri.autopilot.core.parts import Parts
+from colibri.autopilot.guidance.tasks.task import NOT_STEERED, Steered
 
 _EVER_US = 10**15
 
@@ -11,9 +14,9 @@ _EVER_US = 10**15
 class Supervision:
     """Supervises one vehicle."""
 
-    def __init__(self, parts: Parts) -> None:
-        """Supervise a vehicle of these parts."""
-        self._parts = parts
+    def __init__(self, parts: Parts, defence: Defence) -> None:
+        """Supervise a vehicle of these parts; what raises is left to `defence`."""
+        self._parts, self._defence = parts, defence
         self._missed_us: int | None = None
         self._listening_us = NEVER_US
 
@@ -28,15 +31,31 @@ class Supervision:
 
     def step(self, now_us: int, state: VehicleState) -> None:
         """Take in a control sample, before the pilot's step, and have the pilot execute the failsafe that is due."""
-        parts = self._parts
-        self._watch_rotors(state)
-        position_known = parts.supervisor.position_known(parts.state_source.estimate)
-        steered = parts.stations.needs.steered(now_us)
+        parts, defence = self._parts, self._defence
+        if errors.ROTOR_WATCH not in defence.off:
+            try:
+                self._watch_rotors(state)
+            except Exception as error:
+                defence.caught(errors.ROTOR_WATCH, error)
+        steered, position_known = self._sensed(now_us)
         parts.pilot.sense(now_us, state, steered, position_known=position_known)
-        action = parts.supervisor.step(self._inputs(now_us, state), parts.pilot.flight)
-        if action is not Action.NONE:
-            parts.pilot.save(action)
+        if errors.FAILSAFES not in defence.off:
+            try:
+                action = parts.supervisor.step(self._inputs(now_us, state), parts.pilot.flight)
+                if action is not Action.NONE:
+                    parts.pilot.save(action)
+            except Exception as error:
+                defence.caught(errors.FAILSAFES, error)
         self._missed_us = None
+
+    def _sensed(self, now_us: int) -> tuple[Steered, bool]:
+        """Return the setpoints of clients, and whether the position is known."""
+        parts = self._parts
+        try:
+            return parts.stations.needs.steered(now_us), parts.supervisor.position_known(parts.state_source.estimate)
+        except Exception as error:
+            self._defence.caught(errors.SETPOINTS, error)
+            return NOT_STEERED, True
 
     def _watch_rotors(self, state: VehicleState) -> None:
         """Detect a lost rotor, after which there is but one way to fly."""

@@ -25,7 +25,7 @@ from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.hil.plant_status import PlantStatus
 from colibri.mavlink.mission.items import FENCE, MISSION, RALLY
 from colibri.mavlink.mission.service import MissionService, Vehicle
-from colibri.mavlink.node.hub import Hub, Outgoing
+from colibri.mavlink.node.hub import Caught, Hub, Outgoing
 from colibri.mavlink.node.service import to
 from colibri.mavlink.parameters.metadata import Metadata, metadata_json
 from colibri.mavlink.parameters.pack import packed
@@ -112,6 +112,7 @@ class Stations:
         parameters: Parameters,
         *,
         takes_attitude: bool,
+        caught: Caught | None = None,
     ) -> None:
         """Serve for `pilot` and the `missions` that it flies.
 
@@ -123,9 +124,10 @@ class Stations:
             lines: Status texts of these parts.
             parameters: All numbers that can be changed.
             takes_attitude: Whether the control law takes attitude setpoints.
+            caught: Is told of exceptions of a service; None: they are raised.
         """
         identity = IDENTITIES[settings.identity]
-        self._lines, self._pilot = lines, pilot
+        self._lines, self._pilot, self._caught = lines, pilot, caught
         self._text = StatusText()
         self.failures = Failures(settings.feedback, relays=settings.relays_faults)
         self.setpoints = sources = SetpointSources(Offboard(), Manual(settings.system_id), Follow())
@@ -167,7 +169,12 @@ class Stations:
             Shell(self.system.shell()),
         )
         self.hub = Hub(
-            settings.system_id, AUTOPILOT_COMPONENT, services, signing=settings.signing, observers=(self._streams,)
+            settings.system_id,
+            AUTOPILOT_COMPONENT,
+            services,
+            signing=settings.signing,
+            observers=(self._streams,),
+            caught=caught,
         )
         self.log = LogLink(self.hub, self._streams, files)
 
@@ -191,6 +198,11 @@ class Stations:
         self.setpoints.update(snapshot, self._pilot.context().state.euler[2])
         self.log.update(armed=snapshot.armed)
 
+    def go_on(self) -> None:
+        """Send the mode at least, where the vehicle's state could not be taken in."""
+        mode, armed = self._pilot.state
+        self._heartbeat.go_on(custom_mode(mode), armed=armed)
+
     def receive_status(self, plant_status: PlantStatus, now_us: int) -> None:
         """Take in the plant's results of requested faults, and the time of the messages that follow."""
         self.needs.at(now_us)
@@ -201,14 +213,34 @@ class Stations:
 
     def poll(self, now_us: int) -> list[Outgoing]:
         """Do what is due; return what to send. Called once a frame."""
+        try:
+            self._tell(now_us)
+        except Exception as error:
+            self._left_out("progress", error, "not reported")
+        try:
+            for severity, text in self._lines.take():
+                self.say(severity, text)
+            self.hub.poll(now_us)
+        except Exception as error:
+            self._left_out("hub", error, "not polled in this frame")
+        outbox = self.hub.take_outbox()
+        try:
+            return self.log.record(outbox, now_us, armed=self._pilot.state.armed)
+        except Exception as error:
+            self._left_out("flight log", error, "not recorded")
+            return without_log(outbox)
+
+    def _tell(self, now_us: int) -> None:
+        """Report the progress of the mission, and of commands to the system."""
         for seq in self.missions.take_reached():
             self.plans.reached(seq)
-        for severity, text in self._lines.take():
-            self.say(severity, text)
         for text in self.system.poll(now_us):
             self.say(INFO, text)
-        self.hub.poll(now_us)
-        return self.log.record(self.hub.take_outbox(), now_us, armed=self._pilot.state.armed)
+
+    def _left_out(self, part: str, error: Exception, instead: str) -> None:
+        if self._caught is None:
+            raise error
+        self._caught(part, error, instead)
 
     def refuse_commands(self, reason: str) -> None:
         """Deny every command for a reason, and drop all other messages; with an empty reason, serve again."""

@@ -1,11 +1,20 @@
 """Retuning in flight: the control law is rebuilt, and checked, before one of its parameters changes."""
 
 from collections.abc import Callable, Mapping
+from math import pi
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
-from colibri.autopilot.control.interface import Clock, Controller, Horizon, Preview, VehicleState
+from colibri.autopilot.control.interface import (
+    AttitudeController,
+    AttitudeDemand,
+    Clock,
+    Controller,
+    Horizon,
+    Preview,
+    VehicleState,
+)
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import (
     check_controller,
@@ -14,10 +23,18 @@ from colibri.autopilot.control.registry import (
     load_controller,
 )
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers
-from colibri.mavlink.parameters.store import ParamError, Prepared, Value
+from colibri.mavlink.parameters.store import ParamError, Parameters, Prepared, Value
 from colibri.plant.vehicle.description import Vehicle
 
 Build: TypeAlias = Callable[[Profile, Vehicle], Controller[Any]]
+_NOTHING, _LEVEL = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+_TRIED = (
+    VehicleState(_NOTHING, _NOTHING, _LEVEL, _NOTHING, _NOTHING),
+    VehicleState((1.0, 1.0, 1.0), _NOTHING, _LEVEL, _NOTHING, _NOTHING),
+    VehicleState(_NOTHING, (12.0, 0.0, -3.0), _LEVEL, _NOTHING, (1.0, -1.0, 1.0)),
+    VehicleState(_NOTHING, _NOTHING, (0.0, 1.0, 0.0, 0.0), (pi, 0.0, 0.0), _NOTHING),
+)
+"""Hover, a metre away, fast, upside down."""
 
 
 class Rhythm(Protocol):
@@ -25,6 +42,18 @@ class Rhythm(Protocol):
 
     control_interval_us: int
     preview: Preview
+
+
+class Trial(Protocol):
+    """Whatever else is built from the parameters; either method raises what it cannot be built by."""
+
+    def try_vehicle(self, vehicle: Vehicle) -> None:
+        """Build all that is built from a vehicle's numbers, and try it."""
+        ...
+
+    def try_values(self, parameters: Parameters) -> None:
+        """Build all that is built from the other parameters, and try it."""
+        ...
 
 
 class Tuned(NamedTuple):
@@ -38,33 +67,79 @@ class Tuned(NamedTuple):
 class Tuning:
     """Checks each change before it is made: one by which no control law can be built, or fly, is refused."""
 
-    def __init__(self, numbers: Numbers, build: Build, running: Rhythm, say: Callable[[str], None]) -> None:
-        """Tune `numbers` while a law flies in the rhythm of `running`; `say` reports why a law refused them."""
+    def __init__(
+        self,
+        numbers: Numbers,
+        build: Build,
+        running: Rhythm,
+        say: Callable[[str], None],
+        parameters: Parameters | None = None,
+        trial: Trial | None = None,
+    ) -> None:
+        """Tune `numbers` while a law flies in the rhythm of `running`.
+
+        Args:
+            numbers: Of law and vehicle.
+            build: Builds the law.
+            running: The law that flies.
+            say: Reports why a change was refused.
+            parameters: All of them; None: those of law and vehicle alone are tried.
+            trial: Tries what else is built from them; None: nothing is.
+        """
         self._numbers = numbers
         self._build = build
         self._say = say
         self._rhythm = _rhythm(running)
+        self._parameters, self._trial = parameters, trial
+        self._tried: Vehicle | None = None
 
     def prepare(self, name: str, values: Mapping[str, Value]) -> Prepared | ParamError:
         """Return the control law for a change as a `Tuned`, or why a parameter cannot change so; nothing is kept.
 
         For `colibri.mavlink.parameters.store.Parameters.prepare`; `values` are of all parameters, the new one in.
         """
-        if name not in self._numbers.defaults:
-            return Prepared()
         try:
-            profile, vehicle = self._numbers.applied(values)
-        except ImpossibleError:
-            return ParamError.VALUE_OUT_OF_RANGE
-        try:
-            controller = self._build(profile, vehicle)
-            _try(profile.controller, controller, vehicle)
+            if name not in self._numbers.defaults:
+                self._try_values(values)
+                return Prepared()
+            tuned = self.tuned(values)
         except Exception as error:  # whatever somebody else's law raises, the flight goes on with the old one
             self._say(f"{name} not changed: {in_words(error)}")
             return ParamError.VALUE_OUT_OF_RANGE
-        if _rhythm(controller) != self._rhythm:
+        if _rhythm(tuned.controller) != self._rhythm:
+            self._say(f"{name} not changed: the law's sample and preview stay in flight")
             return ParamError.PERMISSION_DENIED
-        return Prepared(Tuned(profile, vehicle, controller))
+        return Prepared(tuned)
+
+    def tuned(self, values: Mapping[str, Value]) -> Tuned:
+        """Return law and vehicle for these values, all that is built from them tried.
+
+        Raises:
+            Exception: What anything of it raises.
+        """
+        profile, vehicle = self._numbers.applied(values)
+        controller = self._build(profile, vehicle)
+        _try(profile.controller, controller, vehicle)
+        if self._trial is not None and vehicle != self._tried:
+            self._trial.try_vehicle(vehicle)
+            self._tried = vehicle
+        return Tuned(profile, vehicle, controller)
+
+    def try_all(self, values: Mapping[str, Value]) -> None:
+        """Try all that is built from these values, as the first that are flown.
+
+        Raises:
+            ImpossibleError: It cannot be built, or flown.
+        """
+        try:
+            self._try_values(values)
+            self.tuned(values)
+        except Exception as error:
+            raise ImpossibleError(in_words(error)) from error
+
+    def _try_values(self, values: Mapping[str, Value]) -> None:
+        if self._trial is not None and self._parameters is not None:
+            self._trial.try_values(self._parameters.trial(values))
 
 
 def builder(controller: str, clock: Clock) -> Build:
@@ -89,16 +164,19 @@ def _rhythm(controller: Rhythm) -> tuple[int, Preview]:
 
 
 def _try(name: str, controller: Controller[Any], vehicle: Vehicle) -> None:
-    """Hover for two control samples, the second one a metre away from the reference.
+    """Fly two control samples of hover, the second one a metre away from the reference, and two far from hover.
 
     Raises:
         DecisionError: No rotor can follow what the law decides.
     """
-    nothing = (0.0, 0.0, 0.0)
     still, straight = np.zeros((controller.preview.samples, 3)), np.zeros(controller.preview.samples)
     references = Horizon(still, still, still, still, still, straight, straight, straight)
     memory = controller.initial(vehicle.hover_speed)
-    for sample, place in enumerate((nothing, (1.0, 1.0, 1.0))):
-        state = VehicleState(place, nothing, (1.0, 0.0, 0.0, 0.0), nothing, nothing)
+    for sample, state in enumerate(_TRIED):
         memory, decision = controller.step(memory, sample * controller.control_interval_us, state, references)
+        check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)
+    if isinstance(controller, AttitudeController):
+        thrust_n = np.full(controller.preview.samples, vehicle.body.mass_kg * vehicle.gravity_m_s2)
+        time_us = len(_TRIED) * controller.control_interval_us
+        _, decision = controller.step_attitude(memory, time_us, _TRIED[0], AttitudeDemand(still, still, thrust_n))
         check_rotor_speeds(name, decision.rotor_speeds, vehicle.rotors.max_speed)

@@ -1,7 +1,7 @@
 """Ground stations as the process sees them: links, key, parameter file, logs, and what is reported on the terminal."""
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from math import hypot
 from time import perf_counter, thread_time, time
 from typing import TYPE_CHECKING, Any
@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.checkpoint import History
 from colibri.autopilot.core.copter import Copter
+from colibri.autopilot.core.defence import errors
 from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import StationSettings
 from colibri.autopilot.ground.system_commands import REBOOT, SHUT_DOWN
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.parameters.definitions import ImpossibleError
+from colibri.autopilot.process.error_log import ErrorLog
 from colibri.autopilot.process.ground_links import GroundLinks, open_links
 from colibri.autopilot.process.state_folder import GroundError, StateFolder
 from colibri.autopilot.process.stepped_links import Conductor, SteppedLinks
@@ -40,6 +42,7 @@ class Ground:
 
     Attributes:
         copter: The vehicle; another one after a restart.
+        errors: What was caught in flight.
         shut_down: Whether a ground station has requested the end.
     """
 
@@ -73,6 +76,7 @@ class Ground:
             self._first, note = load_track(args.track, vehicle, profile, args.floor)
             if note:
                 status.say("track", note)
+        self.errors = ErrorLog(args.out or args.state, status)
         self._log: AutopilotLog | None = None
         self.copter = self._new_copter(self._state.history())
         self._kept_samples = self._kept_plans = 0
@@ -106,14 +110,29 @@ class Ground:
         stations = self.copter.stations
         received: Iterable[Received] = self._links.receive(stations)
         if self._log:
-            received = self._log.recorded(received)
-        try:
-            outbox = self.copter.serve(received)
-        except LogError as error:
-            outbox = []
-            self._status.say("said", f"{error}; flying on")
+            received = self._recorded(self._log, received)
+        outbox = self.copter.serve(received)
         if stations.system.restart:
             self._restart(stations.system.restart)
+        try:
+            self._look_after(now_s)
+        except Exception as error:
+            self.copter.defence.caught(errors.PROCESS, error)
+        self._links.send(outbox)
+        records = self.copter.defence.take()
+        if records:
+            self.errors.write(records)
+        return self.copter
+
+    def _recorded(self, log: "AutopilotLog", received: Iterable[Received]) -> Iterator[Received]:
+        """Yield what was received; the flight goes on where it cannot be recorded."""
+        try:
+            yield from log.recorded(received)
+        except LogError as error:
+            self._status.say("said", f"{error}; flying on")
+
+    def _look_after(self, now_s: float) -> None:
+        """Tell the terminal, and keep what changes."""
         if now_s >= self._reported_s + _REPORT_EVERY_S and self.copter.pilot.sensed.vehicle is not None:
             self._report(now_s)
         if self.copter.parameters.revision != self._revision:
@@ -121,8 +140,6 @@ class Ground:
             self._state.save_parameters(self.copter.parameters)
         if self._state.keeps_flights:
             self._keep()
-        self._links.send(outbox)
-        return self.copter
 
     def _keep(self) -> None:
         """Save what the flight needs to go on, should this process be killed."""
@@ -157,8 +174,15 @@ class Ground:
             self.shut_down = True
             self._status.say("said", "shut down by a ground station")
         elif kind == REBOOT:
+            try:
+                copter = self._new_copter(None)
+            except Exception as error:
+                self.copter.stations.system.restart = 0.0
+                self.copter.defence.caught(errors.RESTART, error, "the autopilot goes on as it is")
+                return
             self.copter.stations.log.close()
-            self.copter = self._new_copter(None)
+            self.errors.write(self.copter.defence.take())
+            self.copter = copter
             self._kept_samples = self._kept_plans = 0
             self._links.introduce(self.copter.stations)
             if self._log:
@@ -190,6 +214,7 @@ class Ground:
                 values=self._values,
                 first=self._first,
                 history=history,
+                strict=args.strict,
             )
         except ImpossibleError as error:
             raise GroundError(f"{self._state.parameter_path()}: {error}") from error

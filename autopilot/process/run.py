@@ -68,6 +68,8 @@ def run(args: argparse.Namespace, link: UdpLink | BlockingReceiver, status: Stat
             ground.close()
         if log:
             log.close()
+    if ground and ground.errors.failed:
+        return EXIT_FAILED
     return 0 if ground and ground.shut_down else EXIT_INTERRUPTED
 
 

@@ -64,6 +64,7 @@ def add_options(parser: ArgumentParser) -> None:
     add("--seed", type=natural, default=0, metavar="N", help="of everything random; each vehicle adds its number")
     add("--speed", type=speed, default=1.0, metavar="N", help="times real time, or max (default 1)")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")
+    add("--strict", action="store_true", help="end by what a part raises in flight; default: it is replaced, flown on")
     add("--quiet", action="store_true", help="say nothing but errors")
 
 

@@ -81,10 +81,11 @@ def sitl(args: argparse.Namespace) -> int:
     try:
         for member in fleet:
             _start_plant(member, args)
-        return _watch(fleet, args, stop, lines)
+        _watch(fleet, args, stop, lines)
     finally:
         end_children(child for member in fleet for child in member.children)
         lines.close()
+    return EXIT_FAILED if any(child.code() == EXIT_FAILED for member in fleet for child in member.children) else 0
 
 
 def _check(args: argparse.Namespace) -> None:
@@ -160,13 +161,14 @@ def _start_autopilot(member: Member, args: argparse.Namespace) -> None:
         state=args.state / str(member.instance),
         signing_key=args.signing_key,
         insecure=args.insecure,
+        strict=args.strict,
         system_id=member.system_id,
         out=args.out and args.out / str(member.instance),
     )
     member.children.append(Child("autopilot", options))
 
 
-def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines: StatusLines) -> int:
+def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines: StatusLines) -> None:
     """Show the events of the processes until the last vehicle ends or the user interrupts."""
     flying = list(fleet)
     while flying and not stop:
@@ -180,7 +182,6 @@ def _watch(fleet: Sequence[Member], args: argparse.Namespace, stop: Stop, lines:
                 flying.remove(member)
             elif any(of_children):
                 start_again(member, args, lines)
-    return 0
 
 
 def _hear(fleet: Sequence[Member], args: argparse.Namespace, lines: StatusLines) -> None:

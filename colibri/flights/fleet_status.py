@@ -8,7 +8,7 @@ from rich.live import Live
 from rich.table import Table
 
 _REDRAW_EVERY_S = 0.5
-_SHOWN = ("ground", "said", "heard", "silence", "answered", "refused", "flying")
+_SHOWN = ("ground", "said", "heard", "silence", "answered", "refused", "flying", "error")
 """Events that get a line of their own."""
 _COLUMNS: tuple[tuple[str, int, Literal["left", "right"]], ...] = (
     ("id", 3, "right"),

@@ -1,8 +1,8 @@
 """Where all links meet: checks and routes messages, dispatches them to the services, sends their answers."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple, Protocol, TypeAlias
 
 from colibri.common.types import Address
 from colibri.mavlink.node.channel import Channel
@@ -18,6 +18,12 @@ FORGET_AFTER_US = 300_000_000
 _TIDY_EVERY_US = 1_000_000
 _OPENS_NOTHING = frozenset({UNKNOWN, "RADIO_STATUS"})
 """Nobody can have checked, or signed, these."""
+
+
+_TRIES = 3
+"""A service that raises so often when it is polled is not polled again."""
+Caught: TypeAlias = Callable[[str, Exception, str], None]
+"""Is told of an exception: the service that raised it, the exception, and what comes of it."""
 
 
 class Outgoing(NamedTuple):
@@ -56,8 +62,12 @@ class Hub:
         *,
         signing: Signing | None = None,
         observers: Sequence[ChannelObserver] = (),
+        caught: Caught | None = None,
     ) -> None:
-        """Be component `component_id` of system `system_id`; without `signing` nobody can switch that on."""
+        """Be component `component_id` of system `system_id`; without `signing` nobody can switch that on.
+
+        What a service raises goes to `caught`, the others go on; without it, it is raised.
+        """
         self._own = (system_id, component_id)
         self._services = tuple(services)
         names = frozenset[str]().union(*(service.handles for service in services))
@@ -73,6 +83,8 @@ class Hub:
         self._now_us = 0
         self._tidy_at_us = 0
         self._dropped_before: Counter[str] = Counter()
+        self._caught = caught
+        self._raised: Counter[Service] = Counter()
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -127,9 +139,12 @@ class Hub:
         """Have every service do what is due at `now_us`."""
         self._now_us = now_us
         for service in self._services:
-            sends = service.poll(now_us)
-            if sends:
-                self.send(sends)
+            try:
+                sends = service.poll(now_us)
+                if sends:
+                    self.send(sends)
+            except Exception as error:
+                self._drop(service, error)
         if now_us >= self._tidy_at_us:
             self._tidy_at_us = now_us + _TIDY_EVERY_US
             self._forget_silent()
@@ -175,7 +190,22 @@ class Hub:
         if self._router.concerns_us(target) and (self.accepts_only is None or message.name in self.accepts_only):
             peer = Peer(channel.number, *message.source)
             for service in self._receivers.get(message.name, ()):
-                self.send(service.receive(message, peer, self._now_us))
+                try:
+                    self.send(service.receive(message, peer, self._now_us))
+                except Exception as error:
+                    self._tell(service, error, f"{message.name} dropped")
+
+    def _drop(self, service: Service, error: Exception) -> None:
+        """Poll a service no more that has raised too often."""
+        self._raised[service] += 1
+        self._tell(service, error, "it may go off")
+        if self._raised[service] >= _TRIES:
+            self._services = tuple(each for each in self._services if each is not service)
+
+    def _tell(self, service: Service, error: Exception, instead: str) -> None:
+        if self._caught is None:
+            raise error
+        self._caught(type(service).__name__, error, instead)
 
     def _forward(self, message: Message, target: tuple[int, int], channel: Channel) -> None:
         """Forward byte for byte, with the signature of whoever signed it: all share the key."""

@@ -125,6 +125,12 @@ class Parameters:
         self.prepare = prepare
         self.revision = 0
 
+    def trial(self, values: Mapping[str, Value]) -> "Parameters":
+        """Return the same parameters at other values, to try these; nobody is asked."""
+        trial = Parameters(self._definitions)
+        trial.load(values)
+        return trial
+
     def ask(self, prepare: Prepare) -> None:
         """Have `prepare` asked before a value changes from now on."""
         self.prepare = prepare

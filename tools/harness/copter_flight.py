@@ -88,11 +88,13 @@ class CopterFlight(Stepped, Steered):
         feedback: Feedback = Feedback.STATE,
         seed: int = 0,
         latency_us: int = 0,
+        strict: bool = True,
     ) -> None:
         """Begin at `start`, with parameters `values`; `vehicle` is the plant's, where it is not the autopilot's.
 
-        On sensors it stands until there is an estimate.
+        On sensors it stands until there is an estimate. Unless `strict`, what raises in flight is replaced.
         """
+        self._strict = strict
         self._profile = profile or FLIGHT
         self._assumed = load_vehicle(self._profile.simulation.vehicle)
         self._settings = StationSettings(
@@ -129,6 +131,7 @@ class CopterFlight(Stepped, Steered):
             values=values,
             first=first,
             history=history,
+            strict=self._strict,
         )
 
     def add(self, client: Client) -> Client:

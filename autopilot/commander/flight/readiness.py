@@ -10,13 +10,16 @@ class Readiness:
 
     Attributes:
         rotor_failed: The failed rotor in words; empty if none has failed.
+        error: The part that has raised an exception in flight, in words; empty if none has.
+        descends: Whether the last resort is flown: nothing but its landing is possible.
     """
 
     def __init__(self, lines: StatusQueue) -> None:
         """Begin before the first arming inputs; a failed rotor is reported to `lines`."""
         self._lines = lines
         self._inputs = ArmingInputs(None, standing=True, charge=1.0, thrust_stick=None)
-        self.rotor_failed = ""
+        self.rotor_failed = self.error = ""
+        self.descends = False
 
     def update(self, inputs: ArmingInputs) -> None:
         """Set the inputs of the arming checks."""
@@ -24,7 +27,16 @@ class Readiness:
 
     def refusals(self) -> list[str]:
         """Return why the rotors may not be armed; empty if they may."""
-        return refusals(self._inputs) + ([self.rotor_failed] if self.rotor_failed else [])
+        return refusals(self._inputs) + [failed for failed in (self.rotor_failed, self.error) if failed]
+
+    @property
+    def only_lands(self) -> str:
+        """Why nothing but a landing is possible any more; empty if more is."""
+        return self.rotor_failed or (self.error if self.descends else "")
+
+    def fail(self, error: str) -> None:
+        """Mark a part as failed: the rotors are not armed again."""
+        self.error = self.error or error
 
     def lose_rotor(self, rotor: int) -> None:
         """Mark rotor 0..3 as failed: no mode can be selected any more, and its failsafe lands."""

@@ -12,12 +12,13 @@ Of the rotors that are left, a and b stand beside the lost one and o opposite. T
 the thrust as the body sees it (x, y), the rates p and q, and two forces that follow their commands: d = f_b - f_a, f_o.
 """
 
-from math import hypot, inf, sqrt
+from math import copysign, hypot, inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from colibri.autopilot.control.riccati import lqr
+from colibri.autopilot.errors import AutopilotError
 from colibri.common.kernels import atan, exp, log, tan
 from colibri.common.matrices import dot, expm, matvec
 from colibri.common.types import Array
@@ -33,6 +34,12 @@ _SCARCE = 0.03
 _TIGHTEST = 1e-3
 _BISECTIONS = 50
 _SAME_SAMPLE = 1e-9
+_LEAST_MOMENTUM = 1e-12
+"""N m s: where the gyroscopic moments of body and rotors cancel, the steady rates have a pole."""
+
+
+class ThreeRotorsError(AutopilotError):
+    """A vehicle that no law can land on three rotors; the message says why."""
 
 
 class Weights(NamedTuple):
@@ -100,6 +107,9 @@ class ReducedAttitude:
             follows: Part of the way to its command that a force goes in one of them.
             spin_rad_s: The final spin, positive.
             weights: Of the cost.
+
+        Raises:
+            ThreeRotorsError: There is no such law.
         """
         self.trio = trio_without(vehicle, lost)
         allocation = vehicle.allocation()
@@ -112,6 +122,8 @@ class ReducedAttitude:
         rate = self._steady_rate(spin_rad_s * self.trio.sign) * opposite_n
         self.cone_rad = min(atan(hypot(rate[0], rate[1]) / spin_rad_s), _MAX_CONE_RAD)
         self._gains = self._designed(interval_s, follows, weights)
+        if not np.isfinite(self._gains).all():
+            raise ThreeRotorsError(f"no law turns it without rotor {lost + 1}")
 
     def command(self, direction: Array, rate: Array, forces: Array) -> tuple[float, float]:
         """Return the commands of d and f_o, N, before any limit.
@@ -139,7 +151,10 @@ class ReducedAttitude:
         tangent = tan(min(opened, 1.0) * self.cone_rad)
         r = spin * self.trio.sign
         per_newton = self._steady_rate(r)
-        opposite_n = tangent * spin / hypot(per_newton[0], per_newton[1])
+        length = hypot(per_newton[0], per_newton[1])
+        if length == 0.0:  # an opposite rotor without an arm opens no cone
+            return Solution(np.zeros(2), np.zeros(2), 0.0)
+        opposite_n = tangent * spin / length
         rate = per_newton * opposite_n
         return Solution(rate / r / sqrt(1.0 + tangent * tangent), rate, opposite_n)
 
@@ -147,7 +162,8 @@ class ReducedAttitude:
         """Return p and q for each newton of the opposite rotor, (2,), at which p' = q' = 0 while r stays."""
         ix, iy, iz = self._inertia
         x, y = self._per_opposite
-        return np.array([-y / (r * (iz - ix) + self._momentum), x / (r * (iz - iy) + self._momentum)])
+        about_x, about_y = (_off_zero(r * (iz - i) + self._momentum) for i in (ix, iy))
+        return np.array([-y / about_x, x / about_y])
 
     def _gain(self, spin: float) -> Array:
         place = min(max(spin - _SPINS_RAD_S[0], 0.0), len(_SPINS_RAD_S) - 1.0 - _SAME_SAMPLE)
@@ -189,10 +205,18 @@ class ReducedAttitude:
 
 
 def trio_without(vehicle: Vehicle, lost: int) -> Trio:
-    """Return what is left without rotor `lost`: the one of its hand is opposite to it."""
+    """Return what is left without rotor `lost`: the one of its hand is opposite to it.
+
+    Raises:
+        ThreeRotorsError: The rotors do not turn in two pairs.
+    """
     torque = vehicle.allocation()[3]
-    o = next(i for i in range(4) if i != lost and torque[i] * torque[lost] > 0.0)
-    a, b = (i for i in range(4) if i not in (lost, o))
+    same = [i for i in range(4) if torque[i] * torque[lost] > 0.0]
+    others = [i for i in range(4) if i not in same]
+    if len(same) != len(others):
+        raise ThreeRotorsError("its rotors do not turn in two pairs")
+    (o,) = (i for i in same if i != lost)
+    a, b = others
     return Trio(lost, a, b, o, 1.0 if torque[a] > 0.0 else -1.0)
 
 
@@ -203,31 +227,33 @@ def balancing_thrust(vehicle: Vehicle, trio: Trio, spin_rad_s: float) -> float:
     """
     weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
     low, high = 0.0, 0.5 * weight_n
+    left = list(trio[1:4])
+    thrust, torque = vehicle.allocation()[:, left][[0, 3]].copy()
+    hubs_m = np.array(vehicle.rotors.position_m)[left]
+    drag = (hubs_m * hubs_m).sum(axis=1)
+    coefficient = 0.0 if vehicle.drag is None else vehicle.drag.rotor_coefficient
     for _ in range(_BISECTIONS):
         opposite_n = 0.5 * (low + high)
-        speeds = _speeds(vehicle, trio, opposite_n)
-        torque = trio.sign * dot(vehicle.allocation()[3, list(trio[1:4])], speeds**2)
-        if torque > _spin_drag(vehicle, trio, speeds) * spin_rad_s:
+        speeds = _speeds(weight_n, thrust, opposite_n)
+        if trio.sign * dot(torque, speeds**2) > coefficient * dot(speeds, drag) * spin_rad_s:
             low = opposite_n
         else:
             high = opposite_n
     return low
 
 
-def _speeds(vehicle: Vehicle, trio: Trio, opposite_n: float) -> Array:
+def _speeds(weight_n: float, thrust: Array, opposite_n: float) -> Array:
     """Return the speeds of a, b and o that carry the weight, the vehicle's unit, (3,)."""
-    pair_n = 0.5 * (vehicle.body.mass_kg * vehicle.gravity_m_s2 - opposite_n)
-    return np.sqrt(np.array([pair_n, pair_n, opposite_n]) / vehicle.allocation()[0, list(trio[1:4])])
-
-
-def _spin_drag(vehicle: Vehicle, trio: Trio, speeds: Array) -> float:
-    """Return the moment against a spin, N m for each rad/s."""
-    if vehicle.drag is None:
-        return 0.0
-    hubs_m = np.array(vehicle.rotors.position_m)[list(trio[1:4])]
-    return vehicle.drag.rotor_coefficient * dot(speeds, (hubs_m * hubs_m).sum(axis=1))
+    pair_n = 0.5 * (weight_n - opposite_n)
+    return np.sqrt(np.array([pair_n, pair_n, opposite_n]) / thrust)
 
 
 def _momentum(vehicle: Vehicle, trio: Trio, opposite_n: float) -> float:
     """Return the angular momentum of the rotors along body z, N m s, as they carry the weight."""
-    return dot(vehicle.rotor_momentum()[list(trio[1:4])], _speeds(vehicle, trio, opposite_n))
+    left = list(trio[1:4])
+    weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
+    return dot(vehicle.rotor_momentum()[left], _speeds(weight_n, vehicle.allocation()[0, left], opposite_n))
+
+
+def _off_zero(momentum: float) -> float:
+    return copysign(max(abs(momentum), _LEAST_MOMENTUM), momentum)

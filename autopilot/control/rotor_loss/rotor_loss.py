@@ -1,17 +1,34 @@
 """The loss of a rotor: detected, and the vehicle landed on the other three, whatever control law flew before."""
 
-from typing import Protocol
+from functools import lru_cache
+from math import isfinite
+from typing import Protocol, TypeAlias
 
 from colibri.autopilot.control.interface import Decision, VehicleState
 from colibri.autopilot.control.rotor_loss.detector import RotorWatch
-from colibri.autopilot.control.rotor_loss.three_rotors import ThreeRotors
+from colibri.autopilot.control.rotor_loss.reduced_attitude import ReducedAttitude, ThreeRotorsError
+from colibri.autopilot.control.rotor_loss.three_rotors import ThreeRotors, law_without
 from colibri.common.types import Array, FourRotors
 from colibri.plant.vehicle.description import Vehicle
 
 MAX_INTERVAL_S = 0.02
 """A vehicle that spins at four turns a second turns half a radian in so long: who decides less often cannot do it."""
+_HOVER = VehicleState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _CLEAR_M = 0.3
 """Closer to the ground than this it may touch, and the ground pushes as a rotor does."""
+
+Laws: TypeAlias = tuple[ReducedAttitude, ...]
+"""Of a vehicle's attitude without each of its rotors, (4,)."""
+
+
+@lru_cache(maxsize=16)
+def laws_of(vehicle: Vehicle, interval_s: float) -> Laws:
+    """Return the laws of a vehicle; what a trial has built is what is flown.
+
+    Raises:
+        ThreeRotorsError: There are none.
+    """
+    return tuple(law_without(vehicle, lost, interval_s) for lost in range(4))
 
 
 class Permission(Protocol):
@@ -29,12 +46,13 @@ class RotorLoss:
     Attributes:
         watch: Detects which is lost.
         enabled: Whether anything is done, or noticed.
+        impossible: Why the vehicle cannot be landed on three rotors; empty if it can.
     """
 
     def __init__(self, vehicle: Vehicle, interval_us: int) -> None:
         """Look after `vehicle`, which is controlled every `interval_us`."""
-        self._vehicle, self._interval_s = vehicle, interval_us * 1e-6
-        self._possible = self._interval_s <= MAX_INTERVAL_S
+        self._interval_s = interval_us * 1e-6
+        self._adopt_laws(vehicle)
         self.watch = RotorWatch(vehicle, self._interval_s)
         self._three: ThreeRotors | None = None
         self.enabled = True
@@ -56,8 +74,28 @@ class RotorLoss:
 
     def adopt(self, vehicle: Vehicle) -> None:
         """Go on with other numbers of the vehicle; one that is flown on three rotors goes on with those it has."""
-        self._vehicle = vehicle
+        self._adopt_laws(vehicle)
         self.watch.adopt(vehicle)
+
+    def try_out(self, vehicle: Vehicle) -> None:
+        """Lose each rotor of a vehicle of other numbers in hover, for two samples; nothing is kept but its laws.
+
+        Raises:
+            ThreeRotorsError: It cannot be landed on three rotors, where the one that is flown can.
+        """
+        trial = RotorLoss(vehicle, round(self._interval_s * 1e6))
+        if trial.impossible and not self.impossible:
+            raise ThreeRotorsError(f"no landing on three rotors: {trial.impossible}")
+        hover = vehicle.hover_speed / vehicle.rotors.max_speed
+        controls = (hover, hover, hover, hover)
+        for _ in range(2):
+            trial.look(_HOVER, controls, 0.0, airborne=True, ground_m=-1.0)
+        if not isfinite(trial.watch.max_evidence):
+            raise ThreeRotorsError("no rotor can be watched")
+        for lost in () if trial.impossible else range(4):
+            trial.resume(lost, trial.watch.speeds, _HOVER, -1.0, flying=True)
+            if not all(0.0 <= control <= 1.0 for control in trial.decide(_HOVER, 0.0)[0]):
+                raise ThreeRotorsError(f"no law flies it without rotor {lost + 1}")
 
     def obey(self, permission: Permission) -> None:
         """Watch, and land on three rotors, from now on only where that is allowed."""
@@ -72,8 +110,8 @@ class RotorLoss:
     def resume(self, lost: int, speeds: Array, state: VehicleState, ground_m: float, *, flying: bool) -> None:
         """Go on after a restart without a rotor that was lost before, the others turning at `speeds`."""
         self.watch.lost, self.watch.speeds = lost, speeds
-        if flying and self._possible:
-            self._three = ThreeRotors(self._vehicle, lost, self._interval_s, speeds, state, ground_m)
+        if flying and not self.impossible:
+            self._take_over(lost, state, ground_m)
 
     def forget(self) -> None:
         """Take all rotors for whole again."""
@@ -92,13 +130,13 @@ class RotorLoss:
             airborne: Whether the vehicle flies, and feels how.
             ground_m: Height of the ground, z of ENU, as far as it is known.
         """
-        if not (self.enabled and self._possible) or self.watch.lost is not None:
+        if not self.enabled or self.impossible or self.watch.lost is not None:
             return False
         clear = airborne and state.position_enu_m[2] - ground_m > _CLEAR_M
         lost = self.watch.step(state, controls, charge_ah, airborne=clear)
         if lost is None:
             return False
-        self._three = ThreeRotors(self._vehicle, lost, self._interval_s, self.watch.speeds, state, ground_m)
+        self._take_over(lost, state, ground_m)
         return True
 
     def decide(self, state: VehicleState, charge_ah: float) -> tuple[FourRotors, Decision]:
@@ -110,3 +148,16 @@ class RotorLoss:
     def end(self) -> None:
         """Stop flying on three rotors; what is lost stays lost."""
         self._three = None
+
+    def _adopt_laws(self, vehicle: Vehicle) -> None:
+        self._vehicle, self.impossible = vehicle, ""
+        if self._interval_s > MAX_INTERVAL_S:
+            self.impossible = f"the control law decides only every {self._interval_s:g} s"
+            return
+        try:
+            self._laws = laws_of(vehicle, self._interval_s)
+        except ThreeRotorsError as error:
+            self.impossible = str(error)
+
+    def _take_over(self, lost: int, state: VehicleState, ground_m: float) -> None:
+        self._three = ThreeRotors(self._vehicle, self._laws[lost], self._interval_s, self.watch.speeds, state, ground_m)

@@ -55,13 +55,19 @@ class ThreeRotors:
     """
 
     def __init__(
-        self, vehicle: Vehicle, lost: int, interval_s: float, speeds: Array, state: VehicleState, ground_m: float
+        self,
+        vehicle: Vehicle,
+        law: ReducedAttitude,
+        interval_s: float,
+        speeds: Array,
+        state: VehicleState,
+        ground_m: float,
     ) -> None:
         """Take over in flight.
 
         Args:
             vehicle: Before it lost a rotor.
-            lost: The rotor, 0..3.
+            law: Of its attitude, by `law_without`.
             interval_s: Between two control samples.
             speeds: Of the rotors now, parts of the largest, (4,).
             state: The vehicle now. It lands where it can stop.
@@ -69,15 +75,13 @@ class ThreeRotors:
         """
         self._vehicle, self._interval_s = vehicle, interval_s
         self._lag = rotor_lag(vehicle, interval_s)
-        measured = vehicle.sensors.gyroscope.range_rad_s * _SPIN_PART if vehicle.sensors else _MAX_SPIN_RAD_S
-        spin_rad_s = min(_MAX_SPIN_RAD_S, measured)
-        self.law = ReducedAttitude(vehicle, lost, interval_s, self._lag.planned, spin_rad_s, Weights())
+        self.law = law
         self._battery = BatteryModel(vehicle)
         self._full_n = vehicle.allocation()[0] * square(vehicle.rotors.max_speed)
         self._gravity = vehicle.gravity_m_s2
         self._weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
         self._speeds = speeds.copy()
-        self._speeds[lost] = 0.0
+        self._speeds[law.trio.lost] = 0.0
         self._tilt_m_s2 = self._gravity * tan(radians(_TILT_DEG))
         self._ground_m = ground_m
         self._place = stopping_place(state, 0.5 * self._tilt_m_s2)
@@ -111,7 +115,7 @@ class ThreeRotors:
         c1, c2, c3, c4 = (0.0, 0.0, 0.0, 0.0) if self.landed else commands.tolist()
         self.controls = (c1, c2, c3, c4)
         speeds = np.array(self.controls) * self._vehicle.rotors.max_speed
-        return Decision(speeds, _angles(direction, state.euler[2]), Diagnostics(fallback=Fallback.THREE_ROTORS))
+        return Decision(speeds, angles_of(direction, state.euler[2]), Diagnostics(fallback=Fallback.THREE_ROTORS))
 
     def _commands(self, thrust_n: float, direction: Array, rate: Array, charge_ah: float) -> Array:
         """Return the commands of the rotors, parts of the largest, (4,)."""
@@ -178,6 +182,17 @@ class ThreeRotors:
         self.landed = self.landed or knocked or self._held_s >= _STAYS_S
 
 
+def law_without(vehicle: Vehicle, lost: int, interval_s: float) -> ReducedAttitude:
+    """Return the law of the attitude of a vehicle that has lost rotor `lost`, 0..3: some ms.
+
+    Raises:
+        ThreeRotorsError: There is none.
+    """
+    measured = vehicle.sensors.gyroscope.range_rad_s * _SPIN_PART if vehicle.sensors else _MAX_SPIN_RAD_S
+    follows = rotor_lag(vehicle, interval_s).planned
+    return ReducedAttitude(vehicle, lost, interval_s, follows, min(_MAX_SPIN_RAD_S, measured), Weights())
+
+
 def shared(
     trio: Trio, thrust_n: float, d: float, f_o: float, full_n: Array, squared_limits: tuple[float, float]
 ) -> Array:
@@ -213,7 +228,7 @@ def _limit(acceleration: Array, max_acceleration_m_s2: float) -> None:
         acceleration[:2] *= max_acceleration_m_s2 / flat
 
 
-def _angles(direction: Array, psi: float) -> Vector:
+def angles_of(direction: Array, psi: float) -> Vector:
     """Return phi, theta, psi at which the body's z axis points there."""
     x, y, z = direction.tolist()
     forward, left = cos(psi) * x + sin(psi) * y, cos(psi) * y - sin(psi) * x

@@ -44,6 +44,7 @@ class Setting(WorldSetting):
         ground: What links to ground stations do: loss, delay_s, jitter_s, duplicate, reorder, corrupt, as in `Trouble`.
         identity: Towards ground stations: "px4" or "generic".
         system: MAVLink system id.
+        strict: Whether what a part of the autopilot raises in flight fails the test, rather than being replaced.
         ready: Whether the flight is handed over only after the first HEARTBEAT.
     """
 
@@ -59,6 +60,7 @@ class Setting(WorldSetting):
     ground: Mapping[str, float] = field(default_factory=dict)
     identity: str = "px4"
     system: int = 1
+    strict: bool = True
     ready: bool = True
 
     def plant_options(self, hover_rpm: float) -> list[str]:
@@ -81,6 +83,7 @@ class Setting(WorldSetting):
             identity=self.identity,
             system_id=self.system,
             state=state,
+            strict=self.strict,
         )
 
 

@@ -8,8 +8,8 @@ import pytest
 
 from colibri.autopilot.control.interface import Decision, Horizon, Preview, VehicleState
 from colibri.autopilot.control.profile import Profile, load_profile
-from colibri.autopilot.core.parts import Subscribers
-from colibri.autopilot.parameters.definitions import Numbers, definitions
+from colibri.autopilot.core.subscription import Flown, Subscribers
+from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, definitions
 from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
 from colibri.common.config import SettingsError
 from colibri.mavlink.parameters.store import ParamError, Parameters, Prepared, Value
@@ -221,3 +221,53 @@ def faulty() -> tuple[Parameters, list[str]]:
     numbers = Numbers(profile, vehicle)
     tuning = Tuning(numbers, lambda profile, _: Faulty(profile.table("faulty")), Faulty(table), words.append)
     return Parameters(definitions(profile, vehicle), tuning.prepare), words
+
+
+class Rigid:
+    """A trial in which nothing can be built."""
+
+    def try_vehicle(self, vehicle: Vehicle) -> None:
+        raise SettingsError(f"nothing flies {vehicle.body.mass_kg:g} kg")
+
+    def try_values(self, parameters: Parameters) -> None:
+        del parameters
+        raise ZeroDivisionError
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("VEH_MASS", 0.75, "VEH_MASS not changed: nothing flies 0.75 kg"),
+        ("MPC_JERK_MAX", 13.0, "MPC_JERK_MAX not changed: ZeroDivisionError"),
+    ],
+)
+def test_what_a_part_cannot_be_built_by_is_refused_in_words(name: str, value: float, said: str) -> None:
+    profile, vehicle = load_profile("flight"), load_vehicle("hummingbird")
+    build, words = builder(profile.controller, clock), list[str]()
+    parameters = Parameters(definitions(profile, vehicle))
+    tuning = Tuning(Numbers(profile, vehicle), build, build(profile, vehicle), words.append, parameters, Rigid())
+    parameters.ask(tuning.prepare)
+    assert parameters.set(name, value) == ParamError.VALUE_OUT_OF_RANGE
+    assert parameters[name] == parameters.default(name)
+    assert words == [said]
+    with pytest.raises(ImpossibleError):
+        tuning.try_all({**parameters.values, name: value})
+
+
+def test_a_change_that_a_subscriber_cannot_adopt_is_taken_back(flight: Flight) -> None:
+    adopted: list[float] = []
+
+    def adopt(vehicle: Vehicle) -> None:
+        if vehicle.body.mass_kg == 0.75:
+            raise ValueError("no")
+        adopted.append(vehicle.body.mass_kg)
+
+    tuned = Tuned(load_profile("flight"), load_vehicle("hummingbird"), flight.law)
+    flown = Flown(flight.parameters.values, tuned)
+    subscribers = Subscribers(parameters=(), behaviour=(), law=(), vehicle=(adopt,), flown=flown)
+    assert flight.parameters.set("VEH_MASS", 0.75) is None
+    with pytest.raises(ValueError, match="no"):
+        subscribers.adopt(flight.parameters)
+    subscribers.keep(flight.parameters)
+    assert flight.parameters["VEH_MASS"] == flight.parameters.default("VEH_MASS")
+    assert adopted == [0.698]

@@ -1,27 +1,33 @@
 """The attitude on three rotors: the periodic solution solves the plant's equations, and the gains are an LQR's."""
 
 from math import hypot
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec import structs
 
+from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.control.rotor_loss.reduced_attitude import (
     ReducedAttitude,
+    ThreeRotorsError,
     Weights,
     balancing_thrust,
     trio_without,
 )
-from colibri.autopilot.control.rotor_loss.three_rotors import shared
+from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
+from colibri.autopilot.control.rotor_loss.three_rotors import law_without, shared
 from colibri.autopilot.control.vehicle_model.rotor_lag import rotor_lag
 from colibri.plant.physics.equations import angular_acceleration
-from colibri.plant.vehicle.description import load_vehicle
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 HUMMINGBIRD = load_vehicle("hummingbird")
 INTERVAL_S = 0.008
 FOLLOWS = rotor_lag(HUMMINGBIRD, INTERVAL_S).planned
 SPIN_RAD_S = 27.0
+HOVER = VehicleState((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 def law(lost: int, vehicle: str = "hummingbird") -> ReducedAttitude:
@@ -98,3 +104,40 @@ def test_what_is_shared_is_within_limits_and_keeps_the_moment(
     assert forces[trio.b] - forces[trio.a] == pytest.approx(min(max(d, -room), room), abs=1e-9)
     if abs(d) < 2.0 and 0.1 < f_o < 2.0 and 6.0 < thrust_n < 6.0 + f_o and max_speed > 0.95:
         assert forces.sum() == pytest.approx(thrust_n)
+
+
+def with_rotors(**changes: Any) -> Vehicle:
+    return structs.replace(HUMMINGBIRD, rotors=structs.replace(HUMMINGBIRD.rotors, **changes))
+
+
+def test_an_opposite_rotor_without_an_arm_opens_no_cone() -> None:
+    """VEH_ROT3_X = 0, say: three rotors in a line."""
+    vehicle = with_rotors(position_m=((0.171, 0.0), (0.0, -0.171), (0.0, 0.0), (0.0, 0.171)))
+    attitude = law_without(vehicle, 0, INTERVAL_S)
+    assert attitude.solution(SPIN_RAD_S).opposite_n == 0.0
+    commands = attitude.command(np.array([0.1, 0.0, 0.99]), np.array([0.0, 0.0, SPIN_RAD_S]), np.zeros(2))
+    assert np.isfinite(commands).all()
+
+
+def test_where_body_and_rotors_cancel_the_solution_is_finite() -> None:
+    attitude = law(0)
+    r = -attitude._momentum / (0.006 - 0.0034)  # noqa: SLF001
+    rate = attitude.solution(r * attitude.trio.sign).rate
+    assert np.isfinite(rate).all()
+
+
+def test_rotors_that_do_not_turn_in_two_pairs_are_refused() -> None:
+    vehicle = with_rotors(direction=("ccw", "ccw", "ccw", "cw"))
+    with pytest.raises(ThreeRotorsError, match="two pairs"):
+        law_without(vehicle, 0, INTERVAL_S)
+    rotor_loss = RotorLoss(vehicle, 8000)
+    assert rotor_loss.impossible == "its rotors do not turn in two pairs"
+    assert not rotor_loss.look(HOVER, (0.5, 0.5, 0.5, 0.5), 0.0, airborne=True, ground_m=-1.0)
+
+
+def test_a_change_that_costs_the_landing_on_three_rotors_is_refused() -> None:
+    rotor_loss = RotorLoss(HUMMINGBIRD, 8000)
+    with pytest.raises(ThreeRotorsError, match="no landing on three rotors"):
+        rotor_loss.try_out(with_rotors(direction=("ccw", "ccw", "ccw", "cw")))
+    rotor_loss.try_out(with_rotors(strength=(1.0, 0.9, 1.0, 1.0)))
+    assert rotor_loss.lost is None

@@ -1,0 +1,37 @@
+"""The last resort: horizontal velocity braked, a descent, and the rotors stopped once the ground holds the vehicle.
+
+It depends on nothing but the state and the plain law: not on task, reference or the pilot's detector of landings.
+"""
+
+import numpy as np
+
+from colibri.autopilot.control.interface import Decision, VehicleState
+from colibri.autopilot.core.defence.plain_law import PlainLaw
+
+_SINK_1_S, _LEAST_M_S, _MOST_M_S = 0.5, 0.7, 2.0
+"""As fast as the height allows: metres a second for each metre."""
+_HELD_FOR_US = 700_000
+_SLOWER = 0.3
+"""Part of the sink asked for."""
+
+
+class Descent:
+    """The descent of one vehicle.
+
+    Attributes:
+        landed: Whether the ground holds it.
+    """
+
+    def __init__(self, now_us: int, ground_m: float, *, standing: bool) -> None:
+        """Begin at `now_us`, the ground being at z = `ground_m` of ENU; a vehicle that is `standing` stays there."""
+        self._ground_m = ground_m
+        self._sinks_since_us = self._held_since_us = now_us
+        self.landed = standing
+
+    def step(self, law: PlainLaw, now_us: int, state: VehicleState) -> Decision | None:
+        """Decide a control sample; None once it has landed: the rotors stand."""
+        sink_m_s = min(max(_SINK_1_S * (state.position_enu_m[2] - self._ground_m), _LEAST_M_S), _MOST_M_S)
+        if now_us - self._sinks_since_us < _HELD_FOR_US or abs(state.velocity_enu_m_s[2]) > _SLOWER * sink_m_s:
+            self._held_since_us = now_us
+        self.landed = self.landed or now_us - self._held_since_us >= _HELD_FOR_US
+        return None if self.landed else law.by_velocity(state, np.array([0.0, 0.0, -sink_m_s]))

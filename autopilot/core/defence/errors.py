@@ -1,0 +1,169 @@
+"""Exceptions caught in flight: recorded with what is needed to look into them, said once, counted; or raised.
+
+A part that has raised is tried again at its next turn, and is off for good after so many times.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from traceback import format_exception
+from typing import Final
+
+import msgspec
+
+from colibri.autopilot.commander.pilot import Pilot
+from colibri.common.serialization import to_bytes
+from colibri.mavlink.hil.sensors import Frame
+from colibri.mavlink.services.statustext import CRITICAL
+
+BATTERY: Final = "battery monitor"
+RESTART: Final = "restart"
+START: Final = "flight start"
+ESTIMATOR: Final = "estimator"
+STANDBY: Final = "inertial estimate"
+ROTOR_WATCH: Final = "rotor watch"
+SETPOINTS: Final = "setpoints"
+FAILSAFES: Final = "failsafes"
+TASK: Final = "flight task"
+GUIDANCE: Final = "guidance"
+LAW: Final = "control law"
+THREE_ROTORS: Final = "three rotors"
+PLAIN_LAW: Final = "plain law"
+FAULTS: Final = "injected faults"
+STEP: Final = "step"
+TELEMETRY: Final = "telemetry"
+STATIONS: Final = "ground stations"
+DATAGRAM: Final = "datagram"
+PARAMETERS: Final = "parameters"
+LOG: Final = "flight log"
+CHECKPOINT: Final = "checkpoint"
+PROCESS: Final = "process"
+
+INSTEAD: Final = {
+    BATTERY: "charge no longer known",
+    RESTART: "nothing goes on of the flight before",
+    START: "begun anew",
+    ESTIMATOR: "inertial sensors carry on",
+    STANDBY: "attitude stays as it was",
+    ROTOR_WATCH: "lost rotors may go unnoticed",
+    SETPOINTS: "none are taken",
+    FAILSAFES: "none may act",
+    TASK: "hold",
+    GUIDANCE: "descending",
+    LAW: "plain law flies",
+    THREE_ROTORS: "last command stays",
+    PLAIN_LAW: "last command stays",
+    FAULTS: "none are injected",
+    STEP: "descending",
+    TELEMETRY: "old values are sent",
+    STATIONS: "not served in this frame",
+    DATAGRAM: "dropped",
+    PARAMETERS: "old values stay",
+    LOG: "not recorded",
+    CHECKPOINT: "none for a restart",
+    PROCESS: "left out",
+}
+"""What a part is replaced by, in words; services of the hub are parts under names of their own."""
+
+TRIES = 3
+"""A part that raises so often is off."""
+_MAX_RECORDS = 3
+"""Of one part: what raises in every frame would fill the disk."""
+_MAX_KEPT = 100
+
+
+class ErrorRecord(msgspec.Struct, frozen=True, kw_only=True):
+    """An exception that was caught.
+
+    Attributes:
+        time_us: Simulated time of the frame.
+        part: What raised.
+        instead: What it is replaced by.
+        error: The exception in one line.
+        traceback: Whole.
+        mode: Flight mode.
+        armed: Whether the rotors might turn.
+        frame: Of the plant, by `to_bytes`; empty where there was none.
+        checkpoint: The flight as it was then, by `to_bytes`; empty where it cannot be recorded.
+    """
+
+    time_us: int
+    part: str
+    instead: str
+    error: str
+    traceback: str
+    mode: str
+    armed: bool
+    frame: bytes
+    checkpoint: bytes
+
+
+class Defence:
+    """Catches the exceptions of one vehicle.
+
+    Attributes:
+        frame: The one that is answered; None before the first.
+        counts: How often each part has raised.
+        off: Parts that raised too often.
+    """
+
+    def __init__(self, pilot: Pilot, say: Callable[[int, str], None], *, strict: bool) -> None:
+        """Report by `say`; `strict`: raise what is caught."""
+        self._pilot, self._say, self._strict = pilot, say, strict
+        self._checkpoint: Callable[[], object] | None = None
+        self._records: list[ErrorRecord] = []
+        self._kept = 0
+        self.frame: Frame | None = None
+        self.counts: Counter[str] = Counter()
+        self.off: set[str] = set()
+
+    def keep(self, checkpoint: Callable[[], object]) -> None:
+        """Record with each exception what `checkpoint` returns."""
+        self._checkpoint = checkpoint
+
+    def caught(self, part: str, error: Exception, instead: str = "") -> None:
+        """Take in an exception of a part, in the clause that has caught it; `instead` says what replaces it.
+
+        Raises:
+            Exception: The same one, if strict.
+        """
+        if self._strict:
+            raise error
+        self.counts[part] += 1
+        if self.counts[part] >= TRIES:
+            self.off.add(part)
+        instead = instead or INSTEAD[part]
+        if self.counts[part] == 1:
+            self._pilot.readiness.fail(f"{part} failed: restart the autopilot")
+            self._say(CRITICAL, f"{part} failed: {instead}")
+        if self.counts[part] <= _MAX_RECORDS and self._kept < _MAX_KEPT:
+            self._kept += 1
+            self._records.append(self._record(part, instead, error))
+
+    def take(self) -> list[ErrorRecord]:
+        """Return what was recorded since this was last asked."""
+        records, self._records = self._records, []
+        return records
+
+    def _record(self, part: str, instead: str, error: Exception) -> ErrorRecord:
+        frame, state = self.frame, self._pilot.state
+        words = " ".join(str(error).split())
+        return ErrorRecord(
+            time_us=0 if frame is None else frame.time_us,
+            part=part,
+            instead=instead,
+            error=f"{type(error).__name__}: {words}" if words else type(error).__name__,
+            traceback="".join(format_exception(error)),
+            mode=str(state.mode),
+            armed=state.armed,
+            frame=_bytes(lambda: frame),
+            checkpoint=_bytes(self._checkpoint),
+        )
+
+
+def _bytes(make: Callable[[], object] | None) -> bytes:
+    """Return what `make` returns as bytes; none where it raises: it may be what has failed."""
+    try:
+        made = None if make is None else make()
+        return b"" if made is None else to_bytes(made)
+    except Exception:
+        return b""

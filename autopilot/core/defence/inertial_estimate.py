@@ -1,0 +1,101 @@
+"""The state carried on where the estimator has raised: gyroscope and accelerometer alone, the barometer for height.
+
+A complementary filter (R. Mahony, T. Hamel, J.-M. Pflimlin, Nonlinear complementary filters on the special orthogonal
+group, IEEE TAC 53(5), 2008): the mean specific force of a vehicle that stays level points up. It knows no place: the
+horizontal velocity is integrated, and forgotten as fast as it becomes wrong.
+"""
+
+from math import isfinite, sqrt
+
+from colibri.autopilot.estimation.estimate import Estimate
+from colibri.common.earth.atmosphere import altitude_m
+from colibri.common.rotations import earth_from_body, normalized, rotation_matrix
+from colibri.common.types import Quaternion, Vector
+from colibri.mavlink.hil.sensors import SensorFrame, Updated
+from colibri.mavlink.hil.state import StateFrame
+
+_UPRIGHT_1_S = 0.05
+_FORGET_1_S = 0.15
+_HEIGHT_1_S, _CLIMB_1_S2 = 2.0, 1.0
+_MAX_STEP_S = 0.1
+_STEADY = (0.7, 1.3)
+"""Parts of gravity: only so much of a specific force says where up is."""
+
+
+class InertialEstimate:
+    """The state of one vehicle, from the last estimate on.
+
+    Attributes:
+        frame: The state now.
+    """
+
+    def __init__(self, estimate: Estimate, gravity_m_s2: float) -> None:
+        """Begin with an estimate."""
+        self.frame = estimate.frame
+        self._gravity = gravity_m_s2
+        self._gyro_bias, self._accel_bias = estimate.gyro_bias_rad_s, estimate.accel_bias_m_s2
+        self._rate = estimate.frame.rate_flu_rad_s
+        self._force: Vector | None = None
+        self._pressure_us: int | None = None
+        self._above_m = 0.0
+
+    def step(self, frame: SensorFrame) -> StateFrame:
+        """Take a frame, and return the state at its time."""
+        before = self.frame
+        interval_s = min(max((frame.time_us - before.time_us) * 1e-6, 0.0), _MAX_STEP_S)
+        self._rate = _read(frame, Updated.GYROSCOPE, frame.rate_flu_rad_s, self._gyro_bias) or self._rate
+        force = _read(frame, Updated.ACCELEROMETER, frame.specific_force_flu_m_s2, self._accel_bias)
+        self._force = force or self._force
+        attitude = turned(before.attitude, self._upright(before.attitude), interval_s)
+        x, y, z = before.position_enu_m
+        vx, vy, vz = before.velocity_enu_m_s
+        if self._force is not None:
+            ax, ay, az = earth_from_body(attitude, self._force)
+            kept = 1.0 - _FORGET_1_S * interval_s
+            vx, vy = (vx + ax * interval_s) * kept, (vy + ay * interval_s) * kept
+            vz += (az - self._gravity) * interval_s
+        z, vz = self._by_pressure(frame, z + vz * interval_s, vz)
+        place = (x + vx * interval_s, y + vy * interval_s, z)
+        self.frame = StateFrame(frame.time_us, place, (vx, vy, vz), attitude, self._rate)
+        return self.frame
+
+    def _upright(self, attitude: Quaternion) -> Vector:
+        """Return the rates, with what turns the estimated up to the measured one, rad/s."""
+        p, q, r = self._rate
+        if self._force is None:
+            return p, q, r
+        fx, fy, fz = self._force
+        size = sqrt(fx * fx + fy * fy + fz * fz)
+        if not _STEADY[0] < size / self._gravity < _STEADY[1]:
+            return p, q, r
+        ux, uy, uz = rotation_matrix(attitude)[2]
+        k = _UPRIGHT_1_S / size
+        return p + k * (fy * uz - fz * uy), q + k * (fz * ux - fx * uz), r + k * (fx * uy - fy * ux)
+
+    def _by_pressure(self, frame: SensorFrame, z: float, climb_m_s: float) -> tuple[float, float]:
+        """Return height and climb, drawn to the barometer's; the first pressure says how high it stands above."""
+        if not frame.has(Updated.BAROMETER) or not 0.0 < frame.pressure_pa < 2e5:
+            return z, climb_m_s
+        height_m, before_us, self._pressure_us = altitude_m(frame.pressure_pa), self._pressure_us, frame.time_us
+        if before_us is None:
+            self._above_m = z - height_m
+        interval_s = 0.0 if before_us is None else min((frame.time_us - before_us) * 1e-6, _MAX_STEP_S)
+        error_m = height_m + self._above_m - z
+        return z + _HEIGHT_1_S * interval_s * error_m, climb_m_s + _CLIMB_1_S2 * interval_s * error_m
+
+
+def turned(attitude: Quaternion, rate: Vector, interval_s: float) -> Quaternion:
+    """Return an attitude after a turn at body rates, rad/s, to the second order of so short a time."""
+    w, x, y, z = attitude
+    p, q, r = (0.5 * interval_s * each for each in rate)
+    return normalized(
+        (w - p * x - q * y - r * z, x + p * w + r * y - q * z, y + q * w - r * x + p * z, z + r * w + q * x - p * y)
+    )
+
+
+def _read(frame: SensorFrame, group: int, value: Vector, bias: Vector) -> Vector | None:
+    """Return what a sensor measures at a frame, less its bias; None where it measures nothing."""
+    if not frame.has(group) or not all(map(isfinite, value)):
+        return None
+    x, y, z = value
+    return x - bias[0], y - bias[1], z - bias[2]

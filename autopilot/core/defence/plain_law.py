@@ -1,0 +1,102 @@
+"""The plain law, which flies where the control law has raised: no plan, no solver, nothing that it could fail by.
+
+Velocity by PI, towards a place that is near; the thrust axis turned the shortest way, yaw only damped; the mixer gives
+up what matters least. Attitude and mixer are those of the LPV-MPC's recovery, good from any attitude and at any speed.
+"""
+
+from math import hypot, radians
+
+import numpy as np
+
+from colibri.autopilot.control.interface import AttitudeDemand, Decision, Horizon, VehicleState
+from colibri.autopilot.control.lpv_mpc.recovery import TurnGains, mix_with_priority, turning_moment
+from colibri.autopilot.control.rotor_loss.three_rotors import angles_of
+from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
+from colibri.common.compiled_rotations import quaternion_from_euler
+from colibri.common.elementary import square
+from colibri.common.kernels import tan
+from colibri.common.matrices import matvec, norm
+from colibri.common.rotations import rotation_matrix
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+_VELOCITY_1_S, _INTEGRAL_1_S2, _PLACE_1_S = 3.0, 1.0, 0.75
+_APPROACH_M_S = 3.0
+_MAX_TILT_RAD = radians(35.0)
+_MAX_LIFT_M_S2 = 4.0
+_TURN_PART, _RATE_PART, _MAX_RATE_1_S = 0.3, 0.66, 20.0
+"""The rate follows in the time of the rotors' lag and a sample, the attitude three times as slowly."""
+_MAX_RATE_RAD_S = 6.0
+_NOWHERE = np.zeros(3)
+
+
+class PlainLaw:
+    """The plain law of one vehicle; it remembers the acceleration that has held the velocity up to now."""
+
+    def __init__(self, vehicle: Vehicle, interval_s: float) -> None:
+        """Fly `vehicle`, deciding every `interval_s`; what is compiled is loaded here."""
+        self._interval_s = interval_s
+        self._max_speed = vehicle.rotors.max_speed
+        self._min_squared = square(vehicle.rotors.idle_speed / self._max_speed)
+        squared_from_wrench = exact_inverse(vehicle.allocation()) / square(self._max_speed)
+        self._from_thrust = squared_from_wrench[:, 0].copy()
+        self._from_moments = squared_from_wrench[:, 1:].copy()
+        self._inertia = np.array(vehicle.body.inertia_kg_m2)
+        self._mass_kg, self._gravity = vehicle.body.mass_kg, vehicle.gravity_m_s2
+        lag_s = vehicle.rotors.lag.time_constant_down_s if vehicle.rotors.lag else 0.0
+        rate_1_s = min(_RATE_PART / (lag_s + interval_s), _MAX_RATE_1_S)
+        self._turn = TurnGains(_TURN_PART * rate_1_s, rate_1_s, _MAX_RATE_RAD_S)
+        self._integral = _NOWHERE
+
+    def step(self, state: VehicleState, references: Horizon) -> Decision:
+        """Decide the rotor speeds to hold until the next control sample by the first of the references."""
+        place = references.position_enu_m[0] - np.array(state.position_enu_m)
+        towards = _shortened(_PLACE_1_S * place, _APPROACH_M_S)
+        velocity = references.velocity_enu_m_s[0] + towards
+        return self.by_velocity(state, velocity, references.acceleration_enu_m_s2[0])
+
+    def by_velocity(self, state: VehicleState, velocity: Array, acceleration: Array = _NOWHERE) -> Decision:
+        """Decide the same for a velocity, m/s, ENU, (3,), and an acceleration, m/s², beside it."""
+        error = velocity - np.array(state.velocity_enu_m_s)
+        flat = self._gravity * tan(_MAX_TILT_RAD)
+        wanted = _limited(_VELOCITY_1_S * error + self._integral + acceleration, flat)
+        integral = self._integral + _INTEGRAL_1_S2 * self._interval_s * _limited(error, 1.0)
+        self._integral = _limited(integral, 0.5 * flat)
+        wanted[2] += self._gravity
+        return self._decide(state, wanted, self._mass_kg * norm(wanted))
+
+    def step_attitude(self, state: VehicleState, demand: AttitudeDemand) -> Decision:
+        """Decide the same for an attitude and a thrust."""
+        phi, theta, psi = demand.angles[0].tolist()
+        up = np.array(rotation_matrix(quaternion_from_euler(phi, theta, psi)))[:, 2].copy()
+        return self._decide(state, up, float(demand.thrust_n[0]))
+
+    def _decide(self, state: VehicleState, along: Array, thrust_n: float) -> Decision:
+        """Turn the thrust axis to `along`, (3,); thrust as far as it points there."""
+        R = np.array(rotation_matrix(state.attitude))
+        direction = matvec(R.T, along / norm(along))
+        moments = turning_moment(direction, np.array(state.rate_flu_rad_s), self._inertia, self._turn)
+        squared = mix_with_priority(
+            max(thrust_n * float(direction[2]), 0.0),
+            moments,
+            self._from_thrust,
+            self._from_moments,
+            self._min_squared,
+            1.0,
+        )
+        return Decision(np.sqrt(squared) * self._max_speed, angles_of(along / norm(along), state.euler[2]))
+
+
+def _shortened(vector: Array, longest: float) -> Array:
+    length = norm(vector)
+    return vector * (longest / length) if length > longest else vector
+
+
+def _limited(acceleration: Array, flat: float) -> Array:
+    """Return an acceleration, (3,), within a horizontal and the vertical limit."""
+    limited = acceleration.copy()
+    length = hypot(limited[0], limited[1])
+    if length > flat:
+        limited[:2] *= flat / length
+    limited[2] = min(max(limited[2], -_MAX_LIFT_M_S2), _MAX_LIFT_M_S2)
+    return limited

@@ -1,0 +1,74 @@
+"""The state of each frame, whatever the estimator does: where it raises, the inertial sensors carry the state on."""
+
+from colibri.autopilot.core.defence import errors
+from colibri.autopilot.core.defence.errors import Defence
+from colibri.autopilot.core.defence.inertial_estimate import InertialEstimate
+from colibri.autopilot.estimation.state_source import StateSource
+from colibri.mavlink.hil.sensors import Frame, SensorFrame
+from colibri.mavlink.hil.state import StateFrame
+
+_BRIDGED = 5
+"""So many frames in a row are carried on as if nothing were; after more of them nobody knows the place."""
+_MAX_ERRORS = 50
+"""An estimator that has raised so often is not asked again."""
+_UNKNOWN_M = 1e3
+
+
+class StateEstimates:
+    """The states of one vehicle.
+
+    Attributes:
+        blind: Whether the inertial sensors alone tell the state, and no place.
+    """
+
+    def __init__(self, source: StateSource, defence: Defence, gravity_m_s2: float) -> None:
+        """Ask `source`."""
+        self._source, self._defence, self._gravity = source, defence, gravity_m_s2
+        self._inertial: InertialEstimate | None = None
+        self._missed = 0
+        self.blind = False
+
+    def state(self, frame: Frame, *, asked: bool) -> StateFrame | None:
+        """Return the state at a frame as `StateSource.state` does; None as long as there never was one."""
+        if not self.blind:
+            try:
+                known = self._source.state(frame, asked=asked)
+            except Exception as error:
+                self._defence.caught(errors.ESTIMATOR, error)
+            else:
+                self._inertial, self._missed = None, 0
+                return known
+        if isinstance(frame, StateFrame):
+            return frame
+        try:
+            return self._carry_on(frame)
+        except Exception as error:
+            self._defence.caught(errors.STANDBY, error)
+            return None if self._source.estimate is None else self._source.estimate.frame
+
+    def _carry_on(self, frame: SensorFrame) -> StateFrame | None:
+        estimate, self._source.sensed = self._source.estimate, frame
+        if estimate is None:
+            return None
+        self._missed += 1
+        if self._inertial is None:
+            self._inertial = InertialEstimate(estimate, self._gravity)
+        known = self._inertial.step(frame)
+        estimate = estimate._replace(frame=known, check=None)
+        if not self.blind and (self._missed > _BRIDGED or self._defence.counts[errors.ESTIMATOR] > _MAX_ERRORS):
+            self.blind = True
+        if self.blind:
+            (_, _, height_m), (_, _, climb_m_s) = estimate.position_std_m, estimate.velocity_std_m_s
+            health = estimate.health._replace(
+                horizontal_position=False,
+                horizontal_velocity=False,
+                dead_reckoning=True,
+                gps_lost_since_us=known.time_us,
+            )
+            estimate = estimate._replace(
+                position_std_m=(_UNKNOWN_M, _UNKNOWN_M, height_m),
+                velocity_std_m_s=(_UNKNOWN_M, _UNKNOWN_M, climb_m_s),
+                health=health,
+            )
+        self._source.estimate = estimate
+        return known

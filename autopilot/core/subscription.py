@@ -1,0 +1,82 @@
+"""Subscribers of the parameters: parts that adopt each change."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from functools import partial
+from typing import Any, NamedTuple
+
+from colibri.autopilot.control.interface import Controller
+from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.parameters.behaviour import behaviour
+from colibri.autopilot.parameters.retuning import Tuned
+from colibri.mavlink.parameters.store import Parameters, Value
+from colibri.plant.vehicle.description import Vehicle
+
+
+class Flown(NamedTuple):
+    """What is flown by.
+
+    Attributes:
+        values: Of all parameters.
+        tuned: Law and vehicle of them.
+    """
+
+    values: Mapping[str, Value]
+    tuned: Tuned
+
+
+class Subscribers:
+    """Callbacks that adopt a change, by what they take."""
+
+    def __init__(
+        self,
+        *,
+        parameters: tuple[Callable[[Parameters], None], ...],
+        behaviour: tuple[Callable[[Behaviour], None], ...],
+        law: tuple[Callable[[Controller[Any], Vehicle], None], ...],
+        vehicle: tuple[Callable[[Vehicle], None], ...],
+        flown: Flown | None = None,
+    ) -> None:
+        """Call these back.
+
+        Args:
+            parameters: Take all parameters.
+            behaviour: Take the numbers of the behaviour.
+            law: Take the control law and its vehicle; called only if one of their numbers has changed.
+            vehicle: Take the vehicle; likewise.
+            flown: What is flown by now, for `keep`.
+        """
+        self._parameters, self._behaviour, self._law, self._vehicle = parameters, behaviour, law, vehicle
+        self._flown = flown
+
+    def adopt(self, parameters: Parameters) -> None:
+        """Call back with the changes since the last call, if there are any."""
+        changes = parameters.take_changes()
+        if changes is None:
+            return
+        tuned = changes.made if isinstance(changes.made, Tuned) else None
+        for call in self._calls(parameters, tuned):
+            call()
+        if self._flown is not None:
+            self._flown = Flown(parameters.values, tuned or self._flown.tuned)
+
+    def keep(self, parameters: Parameters) -> None:
+        """Go back to what was flown before, as a subscriber could not adopt the last change."""
+        if self._flown is None:
+            return
+        parameters.load(self._flown.values)
+        parameters.take_changes()
+        calls = list[Callable[[], None]]()
+        with suppress(Exception):  # what has raised may raise again, and has adopted nothing
+            calls += self._calls(parameters, self._flown.tuned)
+        for call in calls:
+            with suppress(Exception):
+                call()
+
+    def _calls(self, parameters: Parameters, tuned: Tuned | None) -> Iterator[Callable[[], None]]:
+        yield from (partial(adopt, parameters) for adopt in self._parameters)
+        flies_by = behaviour(parameters)
+        yield from (partial(adopt, flies_by) for adopt in self._behaviour)
+        if tuned is not None:
+            yield from (partial(adopt, tuned.controller, tuned.vehicle) for adopt in self._law)
+            yield from (partial(adopt, tuned.vehicle) for adopt in self._vehicle)

@@ -1,0 +1,65 @@
+"""The trial of a change of parameters: whatever any part may build from it later is built, and tried, before."""
+
+from math import isfinite
+
+import numpy as np
+
+from colibri.autopilot.commander.rules.failsafe_parameters import settings
+from colibri.autopilot.control.interface import VehicleState
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.control.rotor_loss.rotor_loss import RotorLoss
+from colibri.autopilot.core.actuation import controls_of
+from colibri.autopilot.core.defence.plain_law import PlainLaw
+from colibri.autopilot.errors import AutopilotError
+from colibri.autopilot.ground.forecast import Forecaster
+from colibri.autopilot.guidance.attitude_reference import AttitudeReference, attitude_limits
+from colibri.autopilot.guidance.reference import at_rest, lead, still_target
+from colibri.autopilot.guidance.sample_grid import Instants
+from colibri.autopilot.parameters.definitions import behaviour
+from colibri.mavlink.parameters.store import Parameters
+from colibri.plant.vehicle.description import Vehicle
+
+_HOVER = VehicleState((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+class TrialError(AutopilotError):
+    """A change by which a part gives no finite numbers."""
+
+
+class Trial:
+    """Tries the changes of one vehicle's parameters; the control law is tried by `Tuning` itself."""
+
+    def __init__(self, loop: ControlLoop, rotor_loss: RotorLoss, planned_at: Instants) -> None:
+        """Try for a vehicle of these parts."""
+        self._loop, self._rotor_loss, self._planned_at = loop, rotor_loss, planned_at
+
+    def try_vehicle(self, vehicle: Vehicle) -> None:
+        """Build all that is built from a vehicle's numbers, and try each part in hover.
+
+        Raises:
+            AutopilotError: A part cannot be built, or flown.
+        """
+        loop, interval_s = self._loop, self._loop.control_interval_us * 1e-6
+        self._rotor_loss.try_out(vehicle)
+        controls_of(PlainLaw(vehicle, interval_s).by_velocity(_HOVER, np.zeros(3)), vehicle.rotors.max_speed)
+        Forecaster(vehicle, interval_s, loop.plan_columns)
+        if loop.takes_attitude:
+            attitude = AttitudeReference(vehicle, loop.preview)
+            if not isfinite(attitude.max_thrust_n / attitude.weight_n):
+                raise TrialError("the vehicle's thrust and weight are not finite")
+
+    def try_values(self, parameters: Parameters) -> None:
+        """Build behaviour, limits and failsafes from the parameters, and lead a reference by them for a sample.
+
+        Raises:
+            TrialError: The reference is not finite.
+        """
+        settings(parameters)
+        flies_by = behaviour(parameters)
+        preview = self._planned_at.preview
+        ahead = still_target((1.0, 1.0, 1.0), 1.0, preview.samples)
+        horizon, reference = lead(at_rest(_HOVER), ahead, flies_by.limits, preview.interval_us * 1e-6)
+        if not all(np.isfinite(column).all() for column in (*horizon, *reference)):
+            raise TrialError("no reference can be led within these limits")
+        if self._loop.takes_attitude:
+            AttitudeReference(self._loop.vehicle, self._loop.preview, attitude_limits(flies_by))

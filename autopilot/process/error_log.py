@@ -1,0 +1,47 @@
+"""The exceptions caught in flight, kept on disk: a line of JSON each, and one on the terminal for each part."""
+
+import sys
+from pathlib import Path
+
+import msgspec
+
+from colibri.autopilot.core.defence.errors import ErrorRecord
+from colibri.common.process.status import Status
+
+FILE = "errors.jsonl"
+
+
+class ErrorLog:
+    """The exceptions of one process.
+
+    Attributes:
+        failed: Whether there was any.
+    """
+
+    def __init__(self, folder: Path | None, status: Status) -> None:
+        """Append to `errors.jsonl` in `folder`; without one, tracebacks go to standard error."""
+        self._path = None if folder is None else folder / FILE
+        self._status = status
+        self._said: set[str] = set()
+        self.failed = False
+
+    def write(self, records: list[ErrorRecord]) -> None:
+        """Append records."""
+        for record in records:
+            self.failed = True
+            kept = self._kept(record)
+            if record.part not in self._said:
+                self._said.add(record.part)
+                where = f"; traceback in {self._path}" if kept else ""
+                self._status.say("error", f"{record.part} failed ({record.error}): {record.instead}{where}")
+
+    def _kept(self, record: ErrorRecord) -> bool:
+        if self._path is not None:
+            try:
+                with self._path.open("ab") as file:
+                    file.write(msgspec.json.encode(record) + b"\n")
+                return True
+            except OSError:
+                pass
+        sys.stderr.write(record.traceback)
+        return False

@@ -1,0 +1,62 @@
+"""Exceptions thrown into flights: a sample of `python -m tools.chaos`, which throws at many instants."""
+
+from math import inf
+
+import pytest
+
+from colibri.mavlink.hil.feedback import Feedback
+from tools.chaos.flights import SITUATIONS, Flown, airborne
+from tools.chaos.places import PLACES, Thrower, found
+from tools.harness.copter_flight import CopterFlight, in_the_air
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_place_is_where_it_is_said_to_be(place: str) -> None:
+    assert callable(found(place).method)
+
+
+def flown(flight: CopterFlight, situation: str, place: str, times: float) -> tuple[str, str]:
+    SITUATIONS[situation](flight)
+    verdict = Flown(flight, situation, Thrower(place, times)).judged()
+    return verdict.outcome, verdict.said
+
+
+@pytest.mark.parametrize(
+    ("place", "situation", "times", "outcome", "said"),
+    [
+        ("autopilot.control.loop:ControlLoop.decide", "hover", 1, "flown on", "control law failed: plain law flies"),
+        ("autopilot.control.qp:QpSolver.solve", "offboard", inf, "flown on", "control law failed: plain law flies"),
+        (
+            "autopilot.guidance.tasks.offboard:OffboardTask.update",
+            "offboard",
+            1,
+            "flown on",
+            "flight task failed: hold",
+        ),
+        ("autopilot.commander.pilot:Pilot.step", "hover", inf, "landed", "guidance failed: descending"),
+        ("autopilot.commander.pilot:Pilot.sense", "landing", inf, "landed", "step failed: descending"),
+        ("autopilot.ground.snapshots:SnapshotBuilder.take", "hover", inf, "flown on", "telemetry failed"),
+        ("mavlink.services.command:CommandService.receive", "hover", inf, "flown on", "CommandService failed"),
+        ("mavlink.streaming.service:StreamService.poll", "hover", inf, "flown on", "StreamService failed"),
+        (
+            "autopilot.core.subscription:Subscribers._calls",
+            "hover",
+            1,
+            "flown on",
+            "parameters failed: old values stay",
+        ),
+        ("autopilot.commander.supervisor:Supervisor.step", "hover", inf, "flown on", "failsafes failed: none may act"),
+    ],
+)
+def test_it_flies_on_or_lands(place: str, situation: str, times: float, outcome: str, said: str) -> None:
+    became, text = flown(in_the_air(3.0, strict=False), situation, place, times)
+    assert became == outcome
+    assert text.startswith(said)
+
+
+@pytest.mark.parametrize("times", [1, inf])
+def test_without_an_estimator_it_flies_on_or_lands_blind(times: float) -> None:
+    flight = airborne(Feedback.SENSORS)
+    outcome, said = flown(flight, "hover", "autopilot.estimation.estimator:Estimator.step", times)
+    assert outcome == ("flown on" if times == 1 else "landed")
+    assert said == "estimator failed: inertial sensors carry on"

@@ -1,0 +1,127 @@
+"""`python -m tools.chaos`: exceptions thrown into every place, at many instants of every situation; a table of it.
+
+Each case is a fork of the flight at its instant; flights on state and on sensors run side by side.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from math import inf
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from colibri.mavlink.hil.feedback import Feedback
+from tools.chaos.flights import SITUATIONS, Flown, airborne
+from tools.chaos.places import PLACES, Thrower
+from tools.harness.copter_flight import CopterFlight
+
+SPAN_S = 4.8
+"""Over which the instants of a situation are spread."""
+TIMES = {"once": 1.0, "on": inf}
+
+
+def main() -> int:
+    """Fly all cases; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m tools.chaos", description=__doc__)
+    parser.add_argument("--instants", type=int, default=20, help="of each situation (default %(default)s)")
+    parser.add_argument("--place", action="append", default=[], metavar="NAME", help="only places that contain this")
+    parser.add_argument("--table", type=Path, metavar="FILE", help="write the table there, as Markdown")
+    args = parser.parse_args()
+    places = [place for place in PLACES if not args.place or any(name in place for name in args.place)]
+    started_s, cases = perf_counter(), []
+    for case in _side_by_side(places, args.instants):
+        cases.append(case)
+        if case["bad"]:
+            sys.stdout.write(f"FAILED: {case}\n")
+            sys.stdout.flush()
+    lines = table(cases)
+    flown = sum(case["outcome"] != "not reached" for case in cases)
+    failed = sum(case["bad"] for case in cases)
+    lines += ["", f"{flown} flights with exceptions thrown, {failed} failed; {perf_counter() - started_s:.0f} s"]
+    sys.stdout.write("\n".join(lines) + "\n")
+    if args.table:
+        args.table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return 1 if failed or not flown else 0
+
+
+def table(cases: list[dict[str, Any]]) -> list[str]:
+    """Return a row for each place: what came of it in each situation, and what was said."""
+    outcomes: dict[str, dict[str, Counter[str]]] = defaultdict(lambda: defaultdict(Counter))
+    said: dict[str, Counter[str]] = defaultdict(Counter)
+    for case in cases:
+        if case["outcome"] != "not reached":
+            outcomes[case["place"]][case["situation"]][case["outcome"]] += 1
+            said[case["place"]][case["said"]] += 1
+    lines = [f"| place | {' | '.join(SITUATIONS)} | said |", "|---" * (len(SITUATIONS) + 2) + "|"]
+    for place, row in outcomes.items():
+        cells = [", ".join(f"{n} {what}" for what, n in sorted(row[name].items())) or "–" for name in SITUATIONS]
+        ((text, _),) = said[place].most_common(1)
+        lines.append(f"| `{place.partition(':')[2]}` | {' | '.join(cells)} | {text} |")
+    return lines
+
+
+def _side_by_side(places: list[str], instants: int) -> Iterator[dict[str, Any]]:
+    """Yield the cases of both kinds of feedback as they end."""
+    reading, writing = os.pipe()
+    children = []
+    for feedback in Feedback:
+        pid = os.fork()
+        if pid == 0:
+            os.close(reading)
+            _fly_all(feedback, places, instants, writing)
+            os._exit(0)
+        children.append(pid)
+    os.close(writing)
+    with os.fdopen(reading, encoding="utf-8") as lines:
+        for line in lines:
+            yield json.loads(line)
+    for pid in children:
+        if os.waitpid(pid, 0)[1] != 0:
+            raise RuntimeError("a process of the campaign has died")
+
+
+def _fly_all(feedback: Feedback, places: list[str], instants: int, out: int) -> None:
+    flight = airborne(feedback)
+    for situation, prepare in SITUATIONS.items():
+        pid = os.fork()
+        if pid == 0:
+            prepare(flight)
+            for _ in range(instants):
+                for place in places:
+                    for times in TIMES:
+                        _fly(flight, place, times, {"feedback": feedback, "situation": situation}, out)
+                _go_on(flight, situation, SPAN_S / instants)
+                if not flight.armed:
+                    break
+            os._exit(0)
+        _wait(pid)
+
+
+def _wait(pid: int) -> None:
+    """Wait for a process, and end with it where it has failed."""
+    if os.waitpid(pid, 0)[1] != 0:
+        os._exit(1)
+
+
+def _go_on(flight: CopterFlight, situation: str, seconds: float) -> None:
+    steers = situation == "offboard"
+    flight.run(seconds, (lambda: flight.setpoint(velocity=(3.0, 1.0, 0.0))) if steers else None)
+
+
+def _fly(flight: CopterFlight, place: str, times: str, case: dict[str, Any], out: int) -> None:
+    """Fly one case in a process of its own."""
+    pid = os.fork()
+    if pid == 0:
+        verdict = Flown(flight, case["situation"], Thrower(place, TIMES[times])).judged()
+        facts = {**case, "place": place, "times": times, "at_s": round(flight.time_s, 3), **verdict._asdict()}
+        os.write(out, (json.dumps({**facts, "bad": not verdict.holds}) + "\n").encode())
+        os._exit(0)
+    _wait(pid)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

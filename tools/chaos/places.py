@@ -1,0 +1,125 @@
+"""Where exceptions are thrown: methods of the vehicle's parts, by module and dotted name."""
+
+from collections.abc import Callable
+from importlib import import_module
+from math import inf
+from typing import Any, NamedTuple
+
+PACKAGE = "colibri."
+
+PLACES: tuple[str, ...] = (
+    "autopilot.estimation.state_source:StateSource.state",
+    "autopilot.estimation.estimator:Estimator.step",
+    "autopilot.estimation.estimator:Estimator._publish",
+    "autopilot.estimation.eskf:Filter.predict",
+    "autopilot.estimation.eskf:Filter.fuse_fix",
+    "autopilot.control.loop:ControlLoop.state",
+    "autopilot.core.supervision:Supervision.step",
+    "autopilot.control.rotor_loss.rotor_loss:RotorLoss.look",
+    "autopilot.control.rotor_loss.detector:RotorWatch.step",
+    "autopilot.commander.needs:ModeNeeds.steered",
+    "autopilot.commander.supervisor:Supervisor.position_known",
+    "autopilot.commander.supervisor:Supervisor.step",
+    "autopilot.commander.rules.failsafe_conditions:Conditions.look",
+    "autopilot.commander.pilot:Pilot.sense",
+    "autopilot.commander.pilot:Pilot.step",
+    "autopilot.commander.pilot:Pilot.context",
+    "autopilot.commander.pilot:Pilot.save",
+    "autopilot.guidance.tasks.position:HoldTask.update",
+    "autopilot.guidance.tasks.position:TaskSequence.update",
+    "autopilot.guidance.tasks.position:TrackTask.update",
+    "autopilot.guidance.tasks.position:LandTask.update",
+    "autopilot.guidance.tasks.offboard:OffboardTask.update",
+    "autopilot.commander.missions:MissionTask.update",
+    "autopilot.guidance.mission.executor:MissionExecutor.step",
+    "autopilot.commander.flight.reference_generator:ReferenceGenerator.lead",
+    "autopilot.commander.flight.ground_contact:GroundContact.watch",
+    "autopilot.core.actuation:Actuation.decide",
+    "autopilot.control.loop:ControlLoop.decide",
+    "autopilot.control.loop:ControlLoop._command",
+    "autopilot.control.lpv_mpc.law:LpvMpc.step",
+    "autopilot.control.lpv_mpc.law:LpvMpc._inputs",
+    "autopilot.control.lpv_mpc.outer_loop:OuterLoop.track",
+    "autopilot.control.lpv_mpc.attitude_mpc:AttitudeMpc.plan",
+    "autopilot.control.qp:QpSolver.solve",
+    "autopilot.core.report:Reporter.report",
+    "autopilot.ground.battery_monitor:BatteryMonitor.run",
+    "autopilot.ground.snapshots:SnapshotBuilder.take",
+    "autopilot.ground.forecast:Forecaster.forecast",
+    "autopilot.ground.stations:Stations.update",
+    "autopilot.ground.stations:Stations.receive_status",
+    "autopilot.ground.stations:Stations._tell",
+    "autopilot.ground.log_link:LogLink.record",
+    "autopilot.ground.fault_injection:Failures.take",
+    "mavlink.node.hub:Hub.receive",
+    "mavlink.node.hub:Hub.poll",
+    "mavlink.streaming.service:StreamService.poll",
+    "mavlink.streaming.heartbeat:HeartbeatService.poll",
+    "mavlink.streaming.heartbeat:HeartbeatService.receive",
+    "mavlink.services.command:CommandService.receive",
+    "mavlink.setpoints.arbitration:StreamedService.receive",
+    "mavlink.parameters.service:ParameterService.receive",
+    "autopilot.core.subscription:Subscribers.adopt",
+    "autopilot.core.subscription:Subscribers._calls",
+    "autopilot.core.checkpoint:Checkpointer.record",
+)
+
+
+class ChaosError(Exception):
+    """Thrown."""
+
+
+class Found(NamedTuple):
+    """A place.
+
+    Attributes:
+        owner: The class.
+        name: Of its method.
+        method: Itself.
+    """
+
+    owner: type
+    name: str
+    method: Callable[..., Any]
+
+
+def found(place: str) -> Found:
+    """Return where a place is.
+
+    Raises:
+        AttributeError, ImportError: It is called otherwise by now.
+    """
+    module, _, dotted = place.partition(":")
+    owner_name, _, name = dotted.partition(".")
+    owner = getattr(import_module(PACKAGE + module), owner_name)
+    return Found(owner, name, vars(owner)[name])
+
+
+class Thrower:
+    """Throws in one place, from the moment it is armed.
+
+    Attributes:
+        thrown: How often it has.
+    """
+
+    def __init__(self, place: str, times: float = inf) -> None:
+        """Throw `times` times."""
+        self._place, self._times = found(place), times
+        self.thrown = 0
+
+    def arm(self) -> None:
+        """Throw from now on."""
+        owner, name, method = self._place
+
+        def throwing(*args: Any, **options: Any) -> Any:
+            if self.thrown >= self._times:
+                return method(*args, **options)
+            self.thrown += 1
+            raise ChaosError(name)
+
+        setattr(owner, name, throwing)
+
+    def disarm(self) -> None:
+        """Put the place back in order."""
+        owner, name, method = self._place
+        setattr(owner, name, method)
