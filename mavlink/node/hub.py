@@ -198,7 +198,7 @@ class Hub:
     def _drop(self, service: Service, error: Exception) -> None:
         """Poll a service no more that has raised too often."""
         self._raised[service] += 1
-        self._tell(service, error, "it may go off")
+        self._tell(service, error, "tried again, then off")
         if self._raised[service] >= _TRIES:
             self._services = tuple(each for each in self._services if each is not service)
 

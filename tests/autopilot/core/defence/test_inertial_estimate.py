@@ -1,0 +1,41 @@
+"""The state carried on by inertial sensors and barometer alone."""
+
+from math import hypot
+
+import pytest
+
+from colibri.autopilot.core.defence.inertial_estimate import turned
+from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler, tilt_deg
+from colibri.mavlink.hil.feedback import Feedback
+from colibri.plant.physics.world import state_frame
+from tools.chaos.flights import airborne
+from tools.chaos.places import Thrower
+
+
+def test_an_attitude_turns_at_its_rates() -> None:
+    attitude = quaternion_from_euler(0.1, -0.2, 0.3)
+    for _ in range(1000):
+        attitude = turned(attitude, (0.0, 0.0, 1.0), 1e-3)
+    assert tilt_deg(attitude) == pytest.approx(tilt_deg(quaternion_from_euler(0.1, -0.2, 0.3)), abs=1e-3)
+    still = turned(attitude, (0.5, 0.0, 0.0), 0.0)
+    assert euler_from_quaternion(still) == pytest.approx(euler_from_quaternion(attitude))
+
+
+def test_attitude_height_and_speed_stay_right_for_as_long_as_a_landing_takes() -> None:
+    flight = airborne(Feedback.SENSORS)
+    thrower = Thrower("autopilot.estimation.estimator:Estimator.step")
+    thrower.arm()
+    try:
+        flight.run(6.0)
+    finally:
+        thrower.disarm()
+    estimate, truth = flight.copter.parts.state_source.estimate, state_frame(flight.world)
+    assert estimate is not None
+    assert not estimate.health.horizontal_position
+    assert flight.copter.pilot.saving.name == "DESCEND"
+    frame = estimate.frame
+    (x, y, z), (e, n, u) = frame.velocity_enu_m_s, truth.velocity_enu_m_s
+    assert hypot(x - e, y - n) < 0.6
+    assert abs(z - u) < 0.4
+    assert abs(frame.position_enu_m[2] - truth.position_enu_m[2]) < 1.0
+    assert abs(tilt_deg(frame.attitude) - tilt_deg(truth.attitude)) < 2.0
