@@ -21,7 +21,7 @@ Laws: TypeAlias = tuple[ReducedAttitude, ...]
 """Of a vehicle's attitude without each of its rotors, (4,)."""
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=4)
 def laws_of(vehicle: Vehicle, interval_s: float) -> Laws:
     """Return the laws of a vehicle; what a trial has built is what is flown.
 
