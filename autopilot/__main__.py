@@ -9,7 +9,7 @@ from colibri.common.process.arguments import ArgumentParser, add_common_argument
 from colibri.mavlink.hil.feedback import Feedback, feedback
 from colibri.mavlink.links.link import BlockingReceiver
 from colibri.mavlink.links.open import open_ground_link, open_link
-from colibri.mavlink.links.startup import begin
+from colibri.mavlink.links.startup import begin, report_compiling
 
 DEFAULT_PLANT = "udpout:127.0.0.1:14560"
 
@@ -59,11 +59,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = command_line().parse_args(argv)
     if args.simulator is None:
         link, status, stop = begin("autopilot", args.plant, args, open_link)
+        report_compiling(status)
         from colibri.autopilot.process.run import run
 
         return run(args, link, status, stop)
     args.feedback = Feedback.SENSORS
     simulator, status, stop = begin("autopilot", args.simulator, args, open_ground_link)
+    report_compiling(status)
     from colibri.autopilot.process.run import run
 
     return run(args, BlockingReceiver(simulator), status, stop)

@@ -83,7 +83,7 @@ def files_of(function: Callable[..., Any]) -> set[str]:
     return files
 
 
-def report_compiling(report: Callable[[int], None]) -> None:
+def on_compile(report: Callable[[int], None]) -> None:
     """Call `report` with how many functions this process has compiled so far, as it begins each; none from disk."""
     register("numba:compile", _Compiling(report))  # type: ignore[no-untyped-call]
 

@@ -8,7 +8,7 @@ from colibri.common.earth.home import DEFAULT_HOME, home
 from colibri.common.process.arguments import ArgumentParser, add_common_arguments, natural, positive, speed
 from colibri.common.process.lifecycle import fail
 from colibri.mavlink.links.open import open_ground_link, open_link
-from colibri.mavlink.links.startup import begin
+from colibri.mavlink.links.startup import begin, report_compiling
 from colibri.plant.process.options import add_world_arguments
 
 DEFAULT_LINKS = {
@@ -80,11 +80,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     if args.serve == "px4":
         link_to_px4, status, stop = begin("plant", url, args, open_ground_link)
         status.say("listening", f"waiting for PX4 on {link_to_px4.url}", url=link_to_px4.url)
+        report_compiling(status)
         from colibri.plant.process.px4_server import run as serve_px4
 
         return serve_px4(args, link_to_px4, status, stop)
     link, status, stop = begin("plant", url, args, open_link)
     status.say("listening", f"waiting for an autopilot on {link.url}", url=link.url)
+    report_compiling(status)
     if args.serve == "ardupilot-json":
         from colibri.plant.process.ardupilot_server import run
     else:

@@ -54,10 +54,13 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Compare as the command line says; return the exit code."""
-    if args.seeds:
-        from colibri.studies.seeds import compare_seeds
+    from colibri.flights.fly import occupied
 
-        return compare_seeds(args)
-    from colibri.studies.compare import compare
+    with occupied(args.out):
+        if args.seeds:
+            from colibri.studies.seeds import compare_seeds
 
-    return compare(args)
+            return compare_seeds(args)
+        from colibri.studies.compare import compare
+
+        return compare(args)

@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -15,7 +16,7 @@ from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, 
 from colibri.flights.children import Child, end_children, events_of, how_it_ended
 from colibri.flights.command_lines import options_of, plant_options
 from colibri.flights.fleet_status import StatusLines
-from colibri.flights.fly import LOGS, prepare
+from colibri.flights.fly import LOGS, occupied, prepare
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import check_reach, open_link
@@ -69,22 +70,21 @@ def ground_links(args: argparse.Namespace, instance: int) -> list[str]:
 def sitl(args: argparse.Namespace) -> int:
     """Fly as the command line says, until interrupted; return the exit code."""
     _check(args)
-    if args.out:
-        for instance in range(args.instance, args.instance + args.count):
+    instances = range(args.instance, args.instance + args.count)
+    fleet = [Member(it, number * args.spacing, ground_links(args, it)) for number, it in enumerate(instances)]
+    with ExitStack() as held:
+        for instance in instances if args.out else ():
+            held.enter_context(occupied(args.out / str(instance)))
             prepare(args.out / str(instance))
-    fleet = [
-        Member(instance, number * args.spacing, ground_links(args, instance))
-        for number, instance in enumerate(range(args.instance, args.instance + args.count))
-    ]
-    stop = Stop()
-    lines = StatusLines(quiet=args.quiet)
-    try:
-        for member in fleet:
-            _start_plant(member, args)
-        _watch(fleet, args, stop, lines)
-    finally:
-        end_children(child for member in fleet for child in member.children)
-        lines.close()
+        stop = Stop()
+        lines = StatusLines(quiet=args.quiet)
+        try:
+            for member in fleet:
+                _start_plant(member, args)
+            _watch(fleet, args, stop, lines)
+        finally:
+            end_children(child for member in fleet for child in member.children)
+            lines.close()
     return EXIT_FAILED if any(child.code() == EXIT_FAILED for member in fleet for child in member.children) else 0
 
 

@@ -8,7 +8,7 @@ from rich.live import Live
 from rich.table import Table
 
 _REDRAW_EVERY_S = 0.5
-_SHOWN = ("ground", "said", "heard", "silence", "answered", "refused", "flying", "error")
+_SHOWN = ("compiling", "ground", "said", "heard", "silence", "answered", "refused", "flying", "error")
 """Events that get a line of their own."""
 _COLUMNS: tuple[tuple[str, int, Literal["left", "right"]], ...] = (
     ("id", 3, "right"),
@@ -45,7 +45,7 @@ class StatusLines:
         """Add one event of a process of vehicle `instance`."""
         if event["event"] == "status":
             self._facts[instance] = event
-        elif event["event"] in _SHOWN and not self._quiet:
+        elif event["event"] in _SHOWN and event.get("functions", 1) == 1 and not self._quiet:
             self._console.print(f"{instance + 1:3d} {name}: {event['text']}", markup=False)
 
     def died(self, instance: int, name: str, how: str) -> None:

@@ -1,6 +1,5 @@
 """A flight as two processes over UDP: started, watched, ended."""
 
-import subprocess
 from collections.abc import Callable, Iterable
 
 from colibri.common.errors import InFlightError
@@ -29,7 +28,10 @@ class FlightError(InFlightError):
 
 
 def fly_processes(
-    plan: FlightPlan, progress: Callable[[float], None] = unseen, say: Callable[[str], None] = unseen
+    plan: FlightPlan,
+    progress: Callable[[float], None] = unseen,
+    say: Callable[[str], None] = unseen,
+    compiling: Callable[[int], None] = unseen,
 ) -> Summary:
     """Fly `plan` as two processes on a free port, as `fly_plan` does. Both are gone when this returns or raises.
 
@@ -37,18 +39,21 @@ def fly_processes(
         FlightError: One of them ended before the flight did.
     """
     children: dict[str, Child] = {}
+    compiled: dict[str, int] = {}
     try:
         children["plant"] = Child("plant", _plant_options(plan))
         over = False
         while not over:
             over = any(child.code() is not None for child in children.values())
             for child, event in events_of(children.values()):
-                if child.name == "autopilot":
+                if event["event"] == "compiling":
+                    compiled[child.name] = event["functions"]
+                    compiling(sum(compiled.values()))
+                elif child.name == "autopilot":
                     if event["event"] in _SHOWN:
                         say(event["text"])
                 elif event["event"] == "listening":
-                    said = subprocess.PIPE if plan.ground.links else subprocess.DEVNULL
-                    children["autopilot"] = Child("autopilot", _autopilot_options(plan, event["url"]), stdout=said)
+                    children["autopilot"] = Child("autopilot", _autopilot_options(plan, event["url"]))
                 elif event["event"] == "progress":
                     progress(event["sim_time_s"])
                 elif event["event"] == "ended":

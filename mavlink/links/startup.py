@@ -11,6 +11,8 @@ from colibri.mavlink.links.link import LinkError
 
 Link = TypeVar("Link")
 
+COMPILING = "compiling, once: half a minute and more"
+
 
 def begin(name: str, url: str, args: argparse.Namespace, opened: Callable[[str], Link]) -> tuple[Link, Status, Stop]:
     """Open the link at `url` by `opened` and take over signals, or end with one line.
@@ -27,3 +29,17 @@ def begin(name: str, url: str, args: argparse.Namespace, opened: Callable[[str],
     except LinkError as error:
         fail(str(error))
     return link, Status(name, as_json=args.json), stop
+
+
+def report_compiling(status: Status) -> None:
+    """Report from now on what is compiled: to a person once, to a program the number of functions so far.
+
+    It loads numba.
+    """
+    from colibri.common.jit import on_compile
+
+    def report(functions: int) -> None:
+        if status.as_json or functions == 1:
+            status.say("compiling", COMPILING, functions=functions)
+
+    on_compile(report)

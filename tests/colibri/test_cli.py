@@ -16,6 +16,7 @@ import pytest
 
 from colibri.cli.main import SUBCOMMANDS, main
 from colibri.cli.shared.processes import PROCESSES
+from colibri.common.process.folder_lock import FolderLock
 from colibri.mavlink.links.open import open_link
 from tools.harness.processes import wait_for
 
@@ -406,3 +407,18 @@ def test_what_a_stream_cannot_encode_is_escaped(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "w\\xe4ypoint" in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("command", "folder"),
+    [(("fly", "hover"), "."), (("compare", "--track", "hover"), "."), (("sitl", "--plant-port", "0"), "0")],
+    ids=["fly", "compare", "sitl"],
+)
+def test_two_flights_into_one_folder_are_refused_the_second_in_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], command: tuple[str, ...], folder: str
+) -> None:
+    with FolderLock(tmp_path / folder, "--out"), pytest.raises(SystemExit) as ended:
+        main([*command, "--out", str(tmp_path)])
+    assert ended.value.code == 2
+    in_use = f"--out {tmp_path / folder} is in use by another flight: end that or name another"
+    assert capfd.readouterr().err == f"colibri: error: {in_use}\n"

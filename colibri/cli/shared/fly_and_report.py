@@ -3,15 +3,16 @@
 import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from colibri.analysis.limits import exceeded
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
-from colibri.flights.fly import fly_plan, prepare
+from colibri.flights.fly import fly_plan, occupied, prepare
 from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.flights.processes import FlightError
+from colibri.mavlink.links.startup import COMPILING
 
 if TYPE_CHECKING:
     from colibri.analysis.report import Report
@@ -25,12 +26,17 @@ def fly(args: argparse.Namespace) -> int:
         plan = FlightPlan.from_arguments(args)
     except Error as error:
         fail(str(error))
+    with occupied(plan.out):
+        return _fly(plan, args)
+
+
+def _fly(plan: FlightPlan, args: argparse.Namespace) -> int:
     prepare(plan.out)
     try:
-        with _progress(plan, quiet=args.quiet) as (progress, say):
+        with _progress(plan, quiet=args.quiet) as (progress, say, compiling):
             if plan.track_note:
                 say(plan.track_note)
-            summary = fly_plan(plan, progress, say)
+            summary = fly_plan(plan, progress, say, compiling)
     except FlightError as error:
         _keep_what_there_is(plan, str(error))
         if error.said:
@@ -74,11 +80,19 @@ def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -
     return found
 
 
+class Shown(NamedTuple):
+    """What shows a flight, as `fly_plan` takes it: its simulated time, a line, the number of compiled functions."""
+
+    progress: Callable[[float], None]
+    say: Callable[[str], None]
+    compiling: Callable[[int], None]
+
+
 @contextmanager
-def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
+def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[Shown]:
     """Show on standard error a bar with simulated time and speed, and above it what there is to say."""
     if quiet:
-        yield unseen, unseen
+        yield Shown(unseen, unseen, unseen)
         return
     from rich.console import Console
     from rich.markup import escape
@@ -94,6 +108,9 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[tuple[Callable[[floa
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     bar = Progress(*columns, console=console, disable=not console.is_terminal)
     task = bar.add_task(escape(plan.track_name), total=plan.duration_s, speed="", start=False)
+    counted = (TextColumn("{task.completed} functions"), BarColumn(), TimeElapsedColumn())
+    compiler = Progress(*counted, console=console, disable=not console.is_terminal, transient=True)
+    compilation = compiler.add_task("", total=None)
     first_s: list[float] = []
     due_s = 0.0
 
@@ -103,6 +120,7 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[tuple[Callable[[floa
             return
         due_s = sim_time_s + plan.duration_s / _UPDATES
         if not first_s:
+            compiler.stop()
             bar.start()  # not before something flies: an error of the start stands alone
             bar.start_task(task)
             first_s.append(sim_time_s)
@@ -110,8 +128,18 @@ def _progress(plan: FlightPlan, *, quiet: bool) -> Iterator[tuple[Callable[[floa
         speed = f"{(sim_time_s - first_s[0]) / elapsed_s:.0f} × real time" if elapsed_s else ""
         bar.update(task, completed=sim_time_s, speed=speed)
 
+    def say(text: str) -> None:
+        console.print(text, markup=False)
+
+    def compiling(functions: int) -> None:
+        if not compiler.tasks[compilation].completed:
+            say(COMPILING)
+            compiler.start()
+        compiler.update(compilation, completed=functions)
+
     try:
-        yield show, lambda text: console.print(text, markup=False)
+        yield Shown(show, say, compiling)
         bar.update(task, completed=plan.duration_s)
     finally:
+        compiler.stop()
         bar.stop()
