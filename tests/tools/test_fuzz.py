@@ -14,6 +14,7 @@ from colibri.plant.vehicle.description import load_vehicle
 from tools.fuzz.campaign import campaign
 from tools.fuzz.datagrams import FRAME_US, Fuzzer
 from tools.fuzz.frames import AUTOPILOT, PLANT
+from tools.fuzz.ground import MAX_GROWTH_MIB, growth_mib
 from tools.fuzz.memory import NOW_S, Flight
 
 FRAMES = 50
@@ -71,3 +72,13 @@ def test_two_processes_under_fire(tmp_path: Path) -> None:
     outcome = campaign(tmp_path, 2500, burst=50, seed=1)
     assert outcome.failures == []
     assert set(outcome.sent.values()) == {2500}
+
+
+def test_a_leak_is_told_from_a_step_of_the_allocator() -> None:
+    chance = random.Random(1)
+    noise = [chance.uniform(-0.5, 0.5) for _ in range(60)]
+    for late in (5, 30, 55):
+        assert abs(growth_mib([200.0 + 18.0 * (i > late) + each for i, each in enumerate(noise)])) < 2.0
+    assert growth_mib([200.0 + 0.1 * i + each for i, each in enumerate(noise)]) > MAX_GROWTH_MIB
+    assert growth_mib([200.0 + 2.0 * (i // 15) + each for i, each in enumerate(noise)]) > MAX_GROWTH_MIB
+    assert growth_mib([200.0]) == 0.0

@@ -114,8 +114,6 @@ class Target:
     def prepare(self, state: State) -> None:
         """Reset a situation: everything as it is after the start but for the mode, and where it flies."""
         flight, copter = self.flight, self.flight.copter
-        copter.parameters.set("CA_FAILURE_MODE", 0)  # a rotor that was taken for lost is whole again
-        flight.step()
         copter.parameters.reset()
         copter.parameters.set("MIS_TAKEOFF_ALT", 40.0)
         for plan in (FENCE, RALLY, MISSION):
