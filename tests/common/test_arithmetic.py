@@ -19,7 +19,7 @@ OF_NUMPY = {
 }
 OF_SCIPY = {"autopilot/control/qp.py": {"scipy.optimize", "scipy.sparse"}}
 """To say why a QP has no solution, and to hand it to the sparse solvers: no number of a flight."""
-CHECKS = dict.fromkeys(("plant/physics/contact.py", "plant/vehicle/description.py"), {"linalg"})
+CHECKS = {path: {"linalg"} for path in ("plant/physics/contact.py", "plant/vehicle/description.py")}
 """A vehicle file is refused by its rank or its fastest rate: no number of a flight."""
 
 
