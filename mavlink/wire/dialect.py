@@ -294,8 +294,8 @@ def _layout_named(name: str) -> _Layout:
     return (_ParameterLayout if name in ("PARAM_VALUE", "PARAM_SET") else _Layout)(definition)
 
 
-@cache
 def _layout(message_id: int) -> _Layout | None:
+    """Return the layout of a message, None of an unknown one: of those, which anybody may send, none is kept."""
     definition = mav.mavlink_map.get(message_id)
     return None if definition is None else _layout_named(definition.msgname)
 

@@ -1,5 +1,7 @@
 """Bytes ⇄ messages: nothing malformed raises, nothing good is lost beside it."""
 
+import gc
+import sys
 from typing import Any
 
 import pytest
@@ -250,3 +252,19 @@ def test_what_a_frame_tells_without_being_decoded(old: bool) -> None:
 def test_nobody_can_tell_whether_an_unknown_message_is_intact() -> None:
     assert dialect.intact(heartbeat()[:7] + b"\xff\xff\xff" + heartbeat()[10:]) is None
     assert dialect.intact(sealed_heartbeat()) is True
+
+
+def test_unknown_messages_leave_nothing_behind() -> None:
+    """There are 2²⁴ numbers of messages, and anybody may send any of them."""
+    codec = Codec(1, 1)
+
+    def receive(first: int) -> int:
+        for message_id in range(first, first + 20_000):
+            frame = bytearray(Codec(1, 1).encode("HEARTBEAT", 2, 0, 0, 0, 4, 3))
+            frame[7:10] = message_id.to_bytes(3, "little")
+            assert codec.decode(bytes(frame)) == []
+        gc.collect()
+        return sys.getallocatedblocks()
+
+    before = receive(2**20)
+    assert receive(2**21) - before < 1000
