@@ -7,6 +7,7 @@ from typing import Annotated, Any, NamedTuple
 import msgspec
 import numpy as np
 
+from colibri.autopilot.control import recovery
 from colibri.autopilot.control.interface import (
     AttitudeDemand,
     Clock,
@@ -18,7 +19,7 @@ from colibri.autopilot.control.interface import (
     Preview,
     VehicleState,
 )
-from colibri.autopilot.control.lpv_mpc import position_loop, prediction, recovery
+from colibri.autopilot.control.lpv_mpc import position_loop, prediction
 from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc, AttitudeSettings, Plan
 from colibri.autopilot.control.lpv_mpc.condensing import Target
 from colibri.autopilot.control.lpv_mpc.outer_loop import GuidanceSettings, OuterLoop, Setpoint
@@ -27,7 +28,7 @@ from colibri.autopilot.control.lpv_mpc.prediction import InitialState
 from colibri.autopilot.control.qp import QpSolver
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
 from colibri.autopilot.control.vehicle_model import disturbance_observer, rotor_lag
-from colibri.autopilot.control.vehicle_model.airframe import airframe_of
+from colibri.autopilot.control.vehicle_model.airframe import airframe_of, drag_force
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.common.config import Count, Positive, Table, read_settings
 from colibri.common.elementary import square
@@ -249,7 +250,7 @@ class LpvMpc:
             return disturbance_observer.first_estimate(measured)
         middle = 0.5 * (memory.measured + measured)
         drag = np.empty(3)
-        position_loop.drag_force(self._observer.airframe, middle[:3], middle[6:], float(memory.mean_wrench[0]), drag)
+        drag_force(self._observer.airframe, middle[:3], middle[6:], float(memory.mean_wrench[0]), drag)
         momentum = dot(self._momentum, memory.speeds)
         return disturbance_observer.observe(
             memory.estimate, memory.measured, measured, memory.mean_wrench, momentum, drag, self._packed_observer

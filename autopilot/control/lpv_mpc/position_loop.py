@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.vehicle_model.airframe import Airframe
+from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
 from colibri.common import elementwise
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import atan2, cos, sin
@@ -111,15 +111,6 @@ def error_transition(poles: tuple[float, float], interval_s: float, samples: int
             [first * second * (b - a) / apart, (first * a - second * b) / apart],
         ]
     return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
-
-
-@compiled
-def drag_force(airframe: Airframe, velocity: Array, up: Array, thrust_n: float, out: Array) -> None:
-    """Write the drag, N, ENU, (3,), on a vehicle that moves at `velocity`, m/s, ENU, while it makes `thrust_n`."""
-    along = velocity[0] * up[0] + velocity[1] * up[1] + velocity[2] * up[2]
-    across = airframe.drag_xy + airframe.rotor_drag * sqrt(max(thrust_n, 0.0))
-    for i in range(3):
-        out[i] = -across * (velocity[i] - along * up[i]) - airframe.drag_z * along * up[i]
 
 
 @compiled

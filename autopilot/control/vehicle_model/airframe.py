@@ -1,7 +1,10 @@
 """The airframe's numbers as the control laws' kernels take them."""
 
+from math import sqrt
 from typing import NamedTuple
 
+from colibri.common.jit import compiled
+from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -29,3 +32,12 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
     rotors = vehicle.drag.rotor_coefficient * len(vehicle.rotors.position_m)
     speed_at_1_n = (len(vehicle.rotors.position_m) * vehicle.rotors.thrust_coefficient) ** -0.5
     return Airframe(mass_kg, gravity, 0.5 * (x + y), z, rotors * speed_at_1_n)
+
+
+@compiled
+def drag_force(airframe: Airframe, velocity: Array, up: Array, thrust_n: float, out: Array) -> None:
+    """Write the drag, N, ENU, (3,), on a vehicle that moves at `velocity`, m/s, ENU, while it makes `thrust_n`."""
+    along = velocity[0] * up[0] + velocity[1] * up[1] + velocity[2] * up[2]
+    across = airframe.drag_xy + airframe.rotor_drag * sqrt(max(thrust_n, 0.0))
+    for i in range(3):
+        out[i] = -across * (velocity[i] - along * up[i]) - airframe.drag_z * along * up[i]

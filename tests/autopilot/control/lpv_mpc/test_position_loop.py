@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from colibri.autopilot.control.lpv_mpc import position_loop
 from colibri.autopilot.control.lpv_mpc.position_loop import Limits, Loop, Motion
-from colibri.autopilot.control.vehicle_model.airframe import Airframe
+from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
 from colibri.common.rotations import quaternion_from_euler, rotation_matrix
 from tests.strategies import reals, vectors
 
@@ -58,7 +58,7 @@ def test_with_drag_the_force_holds_a_steady_motion(velocity: tuple[float, float,
     force = forces_for(NOTHING, v, (NOTHING, v, NOTHING), AIRFRAME)
     drag = np.empty(3)
     thrust = float(np.linalg.norm(force))
-    position_loop.drag_force(AIRFRAME, v, force / thrust, thrust, drag)
+    drag_force(AIRFRAME, v, force / thrust, thrust, drag)
     assert force + drag - np.array([0.0, 0.0, 0.698 * 9.81]) == pytest.approx(NOTHING, abs=2e-3 * (1.0 + v @ v))
 
 
