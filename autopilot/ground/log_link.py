@@ -15,8 +15,9 @@ LOG_LINK = -1
 class LogLink:
     """Records what one hub sends on the log's link."""
 
-    def __init__(self, hub: Hub, streams: StreamService, files: Files) -> None:
-        """Open the link; logs go to folder `logs` of `files`."""
+    def __init__(self, hub: Hub, streams: StreamService, files: Files, boot_unix_us: int = 0) -> None:
+        """Open the link; logs go to folder `logs` of `files`, dated from Unix time `boot_unix_us` at the start on."""
+        self._boot_unix_us = boot_unix_us
         self._streams = streams
         self._log = FlightLog(files, (LOGS,))
         self._framer = Framer()
@@ -42,7 +43,7 @@ class LogLink:
         if len(others) < len(outbox):
             for outgoing in outbox:
                 if outgoing.link == LOG_LINK:
-                    self._log.record(now_us, self._framer.take(outgoing.datagram))
+                    self._log.record(self._boot_unix_us + now_us, self._framer.take(outgoing.datagram))
         return others
 
     def close(self) -> None:

@@ -66,7 +66,7 @@ class StationSettings:
         system_id: MAVLink system id.
         identity: A name of `identity.IDENTITIES`.
         origin: Of the ENU frame.
-        boot_unix_us: Unix time at the start; 0 if it is unknown.
+        boot_unix_us: Unix time at simulated time 0, µs; 0 if it is unknown.
         signing: Checks and signs frames.
         files: What can be read and written by file transfer.
         logs: Where the logs of flights go; None: into folder `logs` of the files.
@@ -176,7 +176,7 @@ class Stations:
             observers=(self._streams,),
             caught=caught,
         )
-        self.log = LogLink(self.hub, self._streams, files)
+        self.log = LogLink(self.hub, self._streams, files, settings.boot_unix_us)
 
     def use(self, channel: int, kind: str) -> None:
         """Stream to `channel` what its kind gets by default."""

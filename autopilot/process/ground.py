@@ -71,6 +71,9 @@ class Ground:
             signing_key=args.signing_key,
             tick=tick_at(time()),
         )
+        self._boot_unix_us = args.boot_unix_us
+        if not (args.boot_unix_us or args.stepped):  # what is stepped is the same at every hour
+            self._boot_unix_us = round(time() * 1e6)
         self._first = None
         if args.track:
             self._first, note = load_track(args.track, vehicle, profile, args.floor)
@@ -198,7 +201,7 @@ class Ground:
             system_id=args.system_id,
             identity=args.identity,
             origin=args.home.origin,
-            boot_unix_us=round(time() * 1e6),
+            boot_unix_us=self._boot_unix_us,
             signing=self._state.signing,
             files=self._state.files,
             logs=self._state.logs,

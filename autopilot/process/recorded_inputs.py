@@ -33,6 +33,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         track: What it flew from the start; None where ground stations say what to fly.
         floor_m: Below which no track might lead; None for the ground of the vehicle.
         origin: Of the ENU frame.
+        boot_unix_us: Unix time at simulated time 0, which dates the telemetry log; 0 where it has simulated time.
         system_id: MAVLink system.
         identity: Towards ground stations.
         ground: Whether it served ground stations.
@@ -52,6 +53,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     track: str | None
     floor_m: float | None = None
     origin: Geodetic
+    boot_unix_us: int = 0
     system_id: int
     identity: str
     ground: bool

@@ -85,6 +85,7 @@ def _setup(args: argparse.Namespace, profile: Profile, vehicle: Vehicle) -> Setu
         track=flown,
         floor_m=args.floor,
         origin=args.home.origin,
+        boot_unix_us=args.boot_unix_us,
         system_id=args.system_id,
         identity=args.identity,
         ground=served,

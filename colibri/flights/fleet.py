@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, time
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.common.earth.geodesy import geodetic_of
@@ -44,6 +44,7 @@ class Member:
         links: The URLs that its autopilot serves; once it has opened them, with the ports that it has got.
         children: Its processes, as far as they are started.
         plant_url: Where its plant listens.
+        boot_unix_us: Unix time when its plant was started, which dates its telemetry logs.
         deaths_s: When a process of it has died, by the wall clock.
     """
 
@@ -52,6 +53,7 @@ class Member:
     links: list[str]
     children: list[Child] = field(default_factory=list)
     plant_url: str = ""
+    boot_unix_us: int = 0
     deaths_s: list[float] = field(default_factory=list)
 
     @property
@@ -129,6 +131,7 @@ def place_of(member: Member, args: argparse.Namespace) -> HomePlace:
 
 
 def _start_plant(member: Member, args: argparse.Namespace) -> None:
+    member.boot_unix_us = round(time() * 1e6)
     home = place_of(member, args)
     start = Start(psi=home.yaw_enu_deg)._replace(**args.start)
     vehicle = args.plant_vehicle or args.vehicle or load_profile(args.profile).simulation.vehicle
@@ -142,6 +145,7 @@ def _start_plant(member: Member, args: argparse.Namespace) -> None:
         speed=args.speed,
         home=home,
         system_id=member.system_id,
+        boot_unix_us=member.boot_unix_us,
         out=args.out and args.out / str(member.instance),
     )
     member.children.append(Child("plant", options))
@@ -163,6 +167,7 @@ def _start_autopilot(member: Member, args: argparse.Namespace) -> None:
         insecure=args.insecure,
         strict=args.strict,
         system_id=member.system_id,
+        boot_unix_us=member.boot_unix_us,
         out=args.out and args.out / str(member.instance),
     )
     member.children.append(Child("autopilot", options))

@@ -148,7 +148,8 @@ def recorded_frames(log: Iterable[Logged], setup: Setup) -> Iterator[Recorded]:
     plant = (setup.system_id, dialect.PLANT_COMPONENT)
     sent: dict[int, dict[bytes, None]] = {}
     commands: dict[int, ActuatorCommand] = {}
-    for time_us, frame in log:
+    for logged_us, frame in log:
+        time_us = logged_us - setup.boot_unix_us
         for message in codec.decode(frame):
             if message.source == plant:
                 sent.setdefault(time_us, {})[frame] = None  # once, however often it was sent

@@ -75,5 +75,12 @@ def add_common_arguments(parser: ArgumentParser, log: str) -> None:
     add = parser.add_argument
     add("--system-id", type=system_id, default=1, metavar="ID", help="MAVLink system (default 1)")
     add("--out", type=Path, metavar="DIR", help=f"write {log} there")
+    add(
+        "--boot-unix-us",
+        type=natural,
+        default=0,
+        metavar="N",
+        help="Unix time at simulated time 0, µs, by which telemetry logs are dated; the same for plant and autopilot",
+    )
     add("--json", action="store_true", help="status as JSON lines on standard output")
     add("--parent", type=natural, metavar="PID", help="end when that process, which started this one, ends")

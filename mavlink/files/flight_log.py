@@ -37,7 +37,7 @@ class FlightLog:
         self._write_at_us = 0
 
     def record(self, time_us: int, frames: Iterable[bytes]) -> None:
-        """Append frames, all of simulated time `time_us`, if a flight is being logged."""
+        """Append frames, all of time `time_us`, if a flight is being logged."""
         if self.name is None:
             return
         stamp = _STAMP.pack(time_us)

@@ -12,7 +12,7 @@ STAMP = struct.Struct(">Q")
 
 
 class Logged(NamedTuple):
-    """A frame of a log; the time of a flight's log is simulated."""
+    """A frame of a log; the time of a flight's log is simulated, or Unix time where it was dated."""
 
     time_us: int
     frame: bytes
@@ -44,7 +44,7 @@ class TlogWriter(LogFile):
     """A telemetry log that is written frame by frame."""
 
     def write(self, time_us: int, frames: Iterable[bytes]) -> None:
-        """Append frames, all of simulated time `time_us`.
+        """Append frames, all of time `time_us`.
 
         Raises:
             LogError: They cannot be written.

@@ -21,8 +21,12 @@ def truth_row(world: World) -> tuple[float, ...]:
 class PlantLogs:
     """What the plant writes: the truth at every frame, and every MAVLink frame."""
 
-    def __init__(self, folder: Path) -> None:
-        """Create `plant.csv` and `flight.tlog` in `folder`."""
+    def __init__(self, folder: Path, boot_unix_us: int = 0) -> None:
+        """Create `plant.csv` and `flight.tlog` in `folder`; `boot_unix_us`: Unix time at simulated time 0.
+
+        Without it the times of `flight.tlog` are simulated.
+        """
+        self._boot_unix_us = boot_unix_us
         self._truth = CsvLog(folder / "plant.csv", TRUTH_COLUMNS)
         self._tlog = TlogWriter(folder / "flight.tlog")
 
@@ -37,7 +41,7 @@ class PlantLogs:
     def write_frames(self, time_us: int, frames: list[bytes]) -> None:
         """Append frames of simulated time `time_us`."""
         if frames:
-            self._tlog.write(time_us, frames)
+            self._tlog.write(self._boot_unix_us + time_us, frames)
 
     def close(self) -> None:
         """Close both."""

@@ -8,6 +8,7 @@ from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from time import time
 
 import psutil
 import pytest
@@ -19,8 +20,10 @@ from colibri.common.earth.home import DEFAULT_HOME
 from colibri.flights.children import Child, end_children
 from colibri.flights.fleet import Member, ground_links, place_of, start_again
 from colibri.flights.fleet_status import StatusLines, status_table
+from colibri.flights.replay import replay_flight
 from colibri.mavlink.links.open import open_link
 from colibri.mavlink.wire.dialect import mav
+from colibri.mavlink.wire.tlog import decode
 from tests.clients.support.ground_station import GroundStation
 from tools.harness.processes import wait_for
 from tools.harness.sitl_process import WAITING, Vehicle, vehicle
@@ -223,9 +226,14 @@ def test_a_ground_station_shuts_it_down(tmp_path: Path) -> None:
         assert "  1 autopilot: shut down by a ground station" in flown.said.splitlines()
 
 
-def test_its_time_is_over(tmp_path: Path) -> None:
-    with vehicle(tmp_path, "--duration", "0.5") as flown:
+def test_its_time_is_over_and_its_log_has_the_date(tmp_path: Path) -> None:
+    began_us = time() * 1e6
+    with vehicle(tmp_path, "--duration", "0.5", "--out", str(tmp_path / "out")) as flown:
         assert flown.process.wait(30.0) == 0
+    tlog = tmp_path / "out" / "0" / "flight.tlog"
+    times_us = [time_us for time_us, _ in decode(tlog.read_bytes())]
+    assert began_us < times_us[0] < times_us[-1] < time() * 1e6
+    assert replay_flight(tlog) == (125, 496_000, None)
 
 
 FACT = {

@@ -18,6 +18,7 @@ from tools.harness.processes import Process, fly, running
 
 ROOT = Path(__file__).parents[2]
 CHANGED_US = 1_000_000
+BOOT_UNIX_US = 1_800_000_000_000_000
 
 
 @pytest.fixture(scope="module")
@@ -162,14 +163,15 @@ def test_what_cannot_be_replayed_is_one_line(
 
 
 def test_what_ground_stations_ordered_is_replayed(tmp_path: Path) -> None:
-    """Over UDP, in the air: the autopilot is killed and started again; then the vehicle lands."""
+    """Over UDP, in the air: the autopilot is killed and started again; then the vehicle lands. Its logs are dated."""
+    dated = f"--boot-unix-us={BOOT_UNIX_US}"
     out, logs = tmp_path / "out", tmp_path / "logs"
     logs.mkdir()
-    start = ("--vehicle", "hummingbird", "--start", "z=3,psi=90,rotors=4740", "--speed", "4", "--out", str(out))
+    start = (dated, "--vehicle", "hummingbird", "--start", "z=3,psi=90,rotors=4740", "--speed", "4", "--out", str(out))
     plant = Process(logs, "plant", "--link", "udpin:127.0.0.1:0", *start)
     with Observer() as seen, running(plant):
         url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
-        options = ("--plant", url, f"--gcs={seen.url}", "--out", str(out), "--state", str(tmp_path / "state"))
+        options = (dated, "--plant", url, f"--gcs={seen.url}", "--out", str(out), "--state", str(tmp_path / "state"))
         first = Process(logs, "autopilot", *options)
         with running(first):
             seen.wait(lambda sight: sight.time_s > 1.0, "the vehicle")
@@ -178,10 +180,11 @@ def test_what_ground_stations_ordered_is_replayed(tmp_path: Path) -> None:
         killed_s = seen.now.time_s
         second = Process(logs, "autopilot", *options)
         with running(second):
-            seen.wait(lambda sight: sight.time_s > killed_s + 0.5, "the vehicle again")
+            again_s = seen.wait(lambda sight: sight.time_s > killed_s + 0.5, "the vehicle again").time_s
             ack = seen.request("COMMAND_ACK", "COMMAND_LONG", mav.MAV_CMD_NAV_LAND, 0, *[0.0] * 7)
             assert (ack.command, ack.result) == (mav.MAV_CMD_NAV_LAND, mav.MAV_RESULT_ACCEPTED)
             seen.wait(lambda sight: not sight.armed, "the landing")
+            date = seen.request("SYSTEM_TIME", "COMMAND_LONG", mav.MAV_CMD_REQUEST_MESSAGE, 0, 2, *[0.0] * 6)
             plant.process.send_signal(signal.SIGINT)
             plant.wait()
     setups = [what for what in read((out / "inputs.jsonl").read_bytes()) if isinstance(what, Setup)]
@@ -190,3 +193,7 @@ def test_what_ground_stations_ordered_is_replayed(tmp_path: Path) -> None:
     assert difference is None
     assert commands > 500
     assert last_us > setups[1].first_us + 2_000_000
+    flight, *_, log = (out / "flight.tlog", *sorted((tmp_path / "state").rglob("*.tlog")))
+    assert next(decode(flight.read_bytes())).time_us == BOOT_UNIX_US
+    assert next(decode(log.read_bytes())).time_us > BOOT_UNIX_US + again_s * 1e6 - 1e6
+    assert date.time_unix_usec == BOOT_UNIX_US + date.time_boot_ms * 1000
