@@ -115,23 +115,29 @@ def _kernel(function: Callable[..., Any]) -> Any:
 
 @cache
 def _use_private_cache() -> bool:
-    """Have this process and its children keep machine code in a temporary folder of this user's; return if they can.
+    """Have this process and its children keep machine code in the private folder; return if they can."""
+    folder = private_folder()
+    if folder is not None:
+        config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = str(folder)  # type: ignore[attr-defined]
+    elif not os.environ.get(_SAID):
+        os.environ[_SAID] = "1"
+        sys.stderr.write(_NOWHERE)
+    return folder is not None
 
-    Machine code is run: nobody else may own the folder or write to it.
+
+def private_folder() -> Path | None:
+    """Return a temporary folder of this user's, made where it is missing; None where it cannot be.
+
+    What is kept there is run: nobody else may own the folder or write to it.
     """
     try:
         folder = Path(gettempdir()) / f"colibri-{os.getuid()}"
         folder.mkdir(0o700, exist_ok=True)
         status = folder.lstat()
-        private = S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o077
     except OSError:
-        private = False
-    if private:
-        config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = str(folder)  # type: ignore[attr-defined]
-    elif not os.environ.get(_SAID):
-        os.environ[_SAID] = "1"
-        sys.stderr.write(_NOWHERE)
-    return private
+        return None
+    private = S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o077
+    return folder if private else None
 
 
 @cache

@@ -1,5 +1,6 @@
 """`colibri`: the one command. Loads only what the subcommand needs."""
 
+import os
 import signal
 import sys
 import threading
@@ -12,6 +13,7 @@ from typing import NoReturn, Protocol, cast
 from colibri.cli.shared.processes import PROCESSES, run_process
 from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
+from colibri.common.process.library_folders import use_writable_folders
 from colibri.common.process.lifecycle import (
     EXIT_FAILED,
     EXIT_INTERRUPTED,
@@ -68,19 +70,36 @@ def main(argv: list[str] | None = None) -> int:
     use_one_thread()
     use_safe_path()
     end_quickly()
-    args = _parser(given).parse_args(given)
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that what was started is ended, too
     try:
-        return _subcommand(args.command).run(args)
+        args, unknown = _parser(given).parse_known_args(given)
+        if unknown:
+            fail(f"unrecognized arguments: {' '.join(unknown)} (see colibri {args.command} --help)")
+        use_writable_folders()
+        code = _subcommand(args.command).run(args)
+        sys.stdout.flush()
+        return code
     except Error as error:
         fail(str(error), EXIT_FAILED)
+    except BrokenPipeError:  # nobody reads any more: `colibri show ... | head`
+        _drop_what_cannot_be_printed()
+        return EXIT_FAILED
     except OSError as error:
         if error.errno not in _NO_ROOM:
             raise
+        _drop_what_cannot_be_printed()
         fail(f"cannot write {error.filename or 'to disk'}: {error.strerror}", EXIT_FAILED)
     except KeyboardInterrupt:
         fail("interrupted", EXIT_INTERRUPTED)
+
+
+def _drop_what_cannot_be_printed() -> None:
+    """Print the rest into the void where standard output takes no more: Python would report it again at its end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser(given: Sequence[str]) -> ArgumentParser:

@@ -1,0 +1,29 @@
+"""Where libraries keep what they remember, in a home that cannot be written to."""
+
+import os
+from pathlib import Path
+
+
+def use_writable_folders() -> None:
+    """Have matplotlib keep settings and fonts in the private folder where it cannot in the home: it would say so."""
+    if os.environ.get("MPLCONFIGDIR"):
+        return
+    try:
+        home = [Path.home() / ".config", Path.home() / ".cache"]
+    except RuntimeError:  # there is none
+        home = []
+    named = [os.environ.get("XDG_CONFIG_HOME"), os.environ.get("XDG_CACHE_HOME")]
+    folders = [Path(name) if name else folder for name, folder in zip(named, home, strict=False)]
+    if folders and all(map(_can_be_written, folders)):
+        return
+    from colibri.common.jit import private_folder  # which loads numba
+
+    folder = private_folder()
+    if folder is not None:
+        os.environ["MPLCONFIGDIR"] = str(folder)
+
+
+def _can_be_written(folder: Path) -> bool:
+    """Whether files can be made in a folder, which may have to be made itself."""
+    there = next(path for path in (folder, *folder.absolute().parents) if os.path.exists(path))
+    return there.is_dir() and os.access(there, os.W_OK | os.X_OK)
