@@ -80,6 +80,7 @@ def sitl(args: argparse.Namespace) -> int:
             prepare(args.out / str(instance))
         stop = Stop()
         lines = StatusLines(quiet=args.quiet)
+        lines.begin(args.count)
         try:
             for member in fleet:
                 _start_plant(member, args)

@@ -41,6 +41,11 @@ class StatusLines:
         self._drawn_s = 0.0
         self._live: Live | None = None
 
+    def begin(self, vehicles: int) -> None:
+        """Say to a terminal that processes are being started: they load for seconds before their first line."""
+        if self._console.is_terminal and not self._quiet:
+            self._console.print("starting" + (f" {vehicles} vehicles" if vehicles > 1 else ""), markup=False)
+
     def add(self, instance: int, name: str, event: dict[str, Any]) -> None:
         """Add one event of a process of vehicle `instance`."""
         if event["event"] == "status":

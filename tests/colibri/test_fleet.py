@@ -258,6 +258,17 @@ def drawn(*instances: int, width: int = 80) -> list[str]:
     return [line.rstrip() for line in capture.get().splitlines()]
 
 
+@pytest.mark.parametrize(("terminal", "said"), [("1", "starting 3 vehicles\n"), ("", "")])
+def test_a_terminal_is_told_at_once_that_it_starts(
+    terminal: str, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("FORCE_COLOR", terminal)
+    monkeypatch.setenv("NO_COLOR", "1")
+    StatusLines(quiet=False).begin(3)
+    StatusLines(quiet=True).begin(3)
+    assert capsys.readouterr().err == said
+
+
 def test_the_status_line_fits_a_terminal() -> None:
     assert drawn(0) == [
         " id    time   real mode       rotors     east  north      up    speed solver",
