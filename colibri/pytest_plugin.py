@@ -83,10 +83,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     mark = metafunc.definition.get_closest_marker("seeds")
     if mark is None or "sitl_seed" not in metafunc.fixturenames:
         return
-    values = _values(mark)
+    values = _values(mark, f"{metafunc.definition.name}: ")
     first, last = values["first"], values["last"]
     if not (isinstance(first, int) and isinstance(last, int) and first <= last):
-        pytest.fail(f"{_written(mark)}: give the first and the last seed, whole numbers", pytrace=False)
+        wrong = f"{metafunc.definition.name}: {_written(mark)}"
+        pytest.fail(f"{wrong}: give the first and the last seed, whole numbers", pytrace=False)
     metafunc.parametrize("sitl_seed", range(first, last + 1), indirect=True, ids=lambda seed: f"seed{seed}")
 
 
@@ -258,8 +259,11 @@ def _said(node: pytest.Item, seed: int | None) -> list[Mapping[str, Any]]:
     return said
 
 
-def _values(mark: pytest.Mark) -> dict[str, Any]:
-    """Return the values of a mark by their names, or fail in one line where it has not what `MARKS` says."""
+def _values(mark: pytest.Mark, of: str = "") -> dict[str, Any]:
+    """Return the values of a mark by their names, or fail in one line where it has not what `MARKS` says.
+
+    `of` begins the line, where pytest does not say which test it is.
+    """
     names = [name.strip() for name in MARKS[mark.name].partition("(")[2].partition(")")[0].split(",")]
     if mark.name == "sitl":
         needed, names = set(), []
@@ -269,7 +273,7 @@ def _values(mark: pytest.Mark) -> dict[str, Any]:
     values = {**dict(zip(names, mark.args, strict=False)), **mark.kwargs}
     wrong = len(mark.args) > len(names) or not needed <= set(values) or (names and not set(values) <= set(names))
     if wrong:
-        pytest.fail(f"mark is {MARKS[mark.name]}; not {_written(mark)}", pytrace=False)
+        pytest.fail(f"{of}mark is {MARKS[mark.name]}; not {_written(mark)}", pytrace=False)
     return values
 
 

@@ -61,6 +61,8 @@ def begin_fleet(
     Raises:
         SettingError: They cannot begin so.
     """
+    if count < 1:
+        raise SettingError(f"a fleet has at least one vehicle, not {count}")
     if places is None:
         places = [(number * spacing, 0.0) for number in range(count)]
     if len(places) != count:

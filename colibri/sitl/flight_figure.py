@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from colibri.common.process.library_folders import use_writable_folders
 from colibri.sitl.flight_record import Columns, mode_name, tilt_deg
 
 if TYPE_CHECKING:
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
 _MAX_TEXTS = 18
 """So many lines fit under the view from above; of more, the last."""
+_ROOM_FOR_LEGEND = 0.15
 _END_COLOUR = "tab:red"
 
 
@@ -30,6 +32,7 @@ def draw(
         title: What was flown.
         reason: Why it failed.
     """
+    use_writable_folders()
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(14.0, 8.5), layout="constrained")
@@ -55,10 +58,16 @@ def draw(
 
 
 def _draw_place(axes: "Axes", flown: Columns, failed_s: float) -> None:
-    for name, label in (("x", "east"), ("y", "north"), ("z", "up")):
-        axes.plot(flown["t"], flown[name], label=label)
+    for name, label, width_pt in (
+        ("x", "east", 4.0),
+        ("y", "north", 2.4),
+        ("z", "up", 1.2),
+    ):
+        axes.plot(flown["t"], flown[name], label=label, linewidth=width_pt)
     axes.set_ylabel("position, m")
-    axes.legend(loc="upper left")
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(bottom, top + _ROOM_FOR_LEGEND * (top - bottom))
+    axes.legend(loc="upper left", ncols=3)
     axes.text(
         *(failed_s, 1.06, f"failed at {failed_s:.3f} s"),
         transform=axes.get_xaxis_transform(),

@@ -233,7 +233,10 @@ class Station(Inbox):
             lambda _: send(), lambda: name in self._values or name in self._param_errors, f"the PARAM_VALUE of {name}"
         )
         if name in self._param_errors:
-            raise RefusedError(f"parameter {name}", self._param_errors[name], "PARAM_ERROR")
+            error = self._param_errors[name]
+            known = mav.enums["MAV_PARAM_ERROR"].get(error)
+            words = known.name.removeprefix("MAV_PARAM_ERROR_").replace("_", " ").lower() if known else "PARAM_ERROR"
+            raise RefusedError(f"parameter {name}", error, words)
         return self._values[name]
 
 

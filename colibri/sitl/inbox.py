@@ -1,11 +1,29 @@
 """What a ground station has received of a vehicle."""
 
-from collections import Counter, defaultdict
+from collections import Counter
+from difflib import get_close_matches
 from typing import Any
 
 from colibri.mavlink.wire.dialect import Codec, Message, mav
 
 _STATUSTEXT = int(mav.MAVLINK_MSG_ID_STATUSTEXT).to_bytes(3, "little")
+
+
+class Heard(dict[str, list[Any]]):
+    """Messages, as their fields, by name, the latest last; empty of one that was not received."""
+
+    def __missing__(self, name: str) -> list[Any]:
+        """Return an empty list for a message's name.
+
+        Raises:
+            ValueError: There is no such message: it would never be received.
+        """
+        names = [it.msgname for it in mav.mavlink_map.values()]
+        if name not in names:
+            near = get_close_matches(name, names)
+            raise ValueError(f"there is no message {name}" + (f": {' or '.join(near)}?" if near else ""))
+        messages = self[name] = []
+        return messages
 
 
 class Inbox:
@@ -21,7 +39,7 @@ class Inbox:
     def __init__(self, remembers: int = 20_000) -> None:
         """Begin empty; keep at most `remembers` messages of a name, and at least the last half of them."""
         self._remembers = remembers
-        self.heard: defaultdict[str, list[Any]] = defaultdict(list)
+        self.heard = Heard()
         self.counts: Counter[str] = Counter()
         self.acks: list[Any] = []
         self.texts: list[str] = []

@@ -32,7 +32,13 @@ class Stepped(Protocol):
         return self.time_us * 1e-6
 
     def run(self, seconds: float, each_frame: Callable[[], object] | None = None) -> None:
-        """Fly for so many seconds of simulated time; call `each_frame` before each frame."""
+        """Fly for so many seconds of simulated time; call `each_frame` before each frame.
+
+        Raises:
+            ValueError: Time does not run back.
+        """
+        if not seconds >= 0.0:
+            raise ValueError(f"seconds to fly must be from 0 on, not {seconds!r}")
         end_us = self.time_us + round(seconds * 1e6)
         while self.time_us < end_us:
             if each_frame is not None:

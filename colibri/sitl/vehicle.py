@@ -4,7 +4,7 @@ from argparse import ArgumentTypeError
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from math import dist, nan, pi
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from colibri.autopilot.commander.rules.modes import Mode, custom_mode
 from colibri.autopilot.parameters.behaviour import TRACKS
@@ -33,6 +33,8 @@ READY_WITHIN_S = 40.0
 CALM = "0@0"
 STICKS_EVERY_US = 40_000
 """25 times a second, as QGroundControl sends those of a joystick."""
+_SETTABLE = ("payload_kg", "wind")
+"""What tests may assign to."""
 _FIRST_STICKS_S = 0.2
 """How long sticks are sent over a bad link until some have come through."""
 
@@ -95,6 +97,18 @@ class Sitl(View, Stepped, Steered):
         self._texts = StatusTexts()
         self.fleet: Sequence[Sitl] = ()
         self.rotors = ActuatorCommand(0, (0.0, 0.0, 0.0, 0.0), armed=False)
+
+    if not TYPE_CHECKING:  # checkers know what there is
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            """Refuse what no vehicle has, once it is made: a typo would change nothing.
+
+            Raises:
+                AttributeError: There is no such attribute.
+            """
+            if "rotors" in self.__dict__ and not hasattr(self, name):
+                raise AttributeError(f"a vehicle has no {name} to set: choose {', '.join(_SETTABLE)}")
+            super().__setattr__(name, value)
 
     def begin(self) -> None:
         """Fly until the first HEARTBEAT of the vehicle, if the setting has it so."""

@@ -146,6 +146,10 @@ class View:
         """Of the whole flight: truth and command at each frame. The same on every machine of a kind, on every link."""
         return self.record.sha256
 
+    def __repr__(self) -> str:
+        """Return the same, as pytest shows it beside an assertion."""
+        return f"<vehicle {self.system}: {self}>"
+
     def __str__(self) -> str:
         """Return its state in a line, for the message of a failed test."""
         east, north, up = self.position

@@ -43,3 +43,5 @@ def test_places_are_of_one_frame() -> None:
         assert [sitl.system for sitl in flights.flown] == [1, 2, 3]
         with pytest.raises(SettingError, match="places: expected one for each of 2 vehicles, found 1"):
             begin_fleet(flights, 2, places=[(0.0, 0.0)])
+        with pytest.raises(SettingError, match="a fleet has at least one vehicle, not 0"):
+            begin_fleet(flights, 0)

@@ -33,6 +33,13 @@ def test_sticks_are_heard_as_soon_as_they_are_held(ground: dict[str, float]) -> 
         assert sitl.mode == "position"
 
 
+def test_an_assertion_shows_the_vehicle() -> None:
+    with Flights(Setting(airborne=3.0), None) as flights:
+        sitl = flights.begin()
+        assert repr(sitl) == f"<vehicle 1: {sitl}>"
+        assert repr(sitl).startswith("<vehicle 1: t = 0.")
+
+
 def test_what_there_is_not_is_refused_with_what_there_is() -> None:
     with Flights(Setting(airborne=3.0), None) as flights:
         sitl = flights.begin()
@@ -42,6 +49,14 @@ def test_what_there_is_not_is_refused_with_what_there_is() -> None:
             sitl.fly_track("wavy")
         with pytest.raises(ValueError, match=r"^there is no FAILURE_UNIT motorr: choose accel, .*motor, "):
             sitl.inject("motorr", "off")
+        with pytest.raises(ValueError, match=r"^there is no message COLISION: COLLISION\?$"):
+            sitl.heard("COLISION")
+        with pytest.raises(sitl.Refused, match=r"^parameter MPC_CRUISE was refused: does not exist \(result 1\)$"):
+            sitl.set_param("MPC_CRUISE", 3.0)
+        with pytest.raises(ValueError, match=r"^seconds to fly must be from 0 on, not -1$"):
+            sitl.run(-1)
+        with pytest.raises(AttributeError, match=r"^a vehicle has no wimd to set: choose payload_kg, wind$"):
+            setattr(sitl, "wimd", "5@270")  # noqa: B010 - a checker refuses it, too
         with pytest.raises(AttributeError, match="there is no link grund: choose ground, plant"):
             sitl.link.grund.loss = 0.1
         with pytest.raises(AttributeError, match="a link has no lost: choose corrupt, delay_s, down, "):

@@ -169,8 +169,8 @@ def test_what_cannot_be_kept_is_said_and_the_failure_still_reported(
 @pytest.mark.parametrize(
     ("mark", "line"),
     [
-        ("seeds(3)", "mark is seeds(first, last): one flight for each seed; not seeds(3)"),
-        ("seeds(3, 1)", "seeds(3, 1): give the first and the last seed, whole numbers"),
+        ("seeds(3)", "test: mark is seeds(first, last): one flight for each seed; not seeds(3)"),
+        ("seeds(3, 1)", "test: seeds(3, 1): give the first and the last seed, whole numbers"),
         ("seed()", "mark is seed(number): of everything random; not seed()"),
         ("vehicle(model='iris')", "mark is vehicle(name): what is flown; not vehicle(model='iris')"),
         ("wind('5@270', 'light', 3)", "mark is wind(wind, turbulence=None): *; not wind('5@270', 'light', 3)"),
