@@ -35,5 +35,6 @@ def test_a_home_that_cannot_be_written_to_is_not_spoken_of(tmp_path: Path) -> No
     command = [sys.executable, "-m", "colibri", "fly", "hover", *options]
     there = {"HOME": str(home), "TMPDIR": str(temporary)}
     done = subprocess.run(command, env={**unset, **there}, capture_output=True, text=True, check=True)
-    assert done.stderr == ""
+    assert str(home) not in done.stderr  # on a slow computer it says that it looks for fonts
+    assert "temporary cache directory" not in done.stderr
     assert list((temporary / f"colibri-{os.getuid()}").glob("fontlist-*.json"))
