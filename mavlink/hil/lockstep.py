@@ -16,7 +16,9 @@ faults, COMMAND_LONG with MAV_CMD_INJECT_FAILURE, to the datagram that answers a
 and with no other datagram, so each happens once, at that time; the next frame brings their COMMAND_ACK.
 
 A plant that runs freely waits for nobody: `FREE_RUNNING` in its HEARTBEAT. It sends each frame once, and takes any
-answer that is newer than the last. The autopilot then goes on from whatever newer frame it gets.
+answer that is newer than the last. The autopilot then goes on from whatever newer frame it gets. How a plant runs is
+learnt from its first HEARTBEAT, and again after silence. A plant that waits begins a new flight at time 0 and with no
+other frame.
 """
 
 from colibri.mavlink.hil.feedback import Feedback

@@ -43,7 +43,7 @@ class AutopilotEnd:
         self._frame_interval_us = frame_interval_us
         self._feedback = feedback
         self._made_of = MADE_OF[feedback]
-        self._runs_freely = False
+        self._runs_freely: bool | None = None
         self.refused: int | None = None
         self.repeated = 0
         self.dropped: Counter[str] = self._codec.dropped
@@ -73,7 +73,7 @@ class AutopilotEnd:
             elif message.name == "BATTERY_STATUS":
                 battery = decode_battery(message)
             elif message.name == "HEARTBEAT":
-                self._runs_freely = message.fields.custom_mode == FREE_RUNNING
+                self._receive_mode(message, now_s)
             else:
                 self.dropped["unexpected"] += 1
         if not parts:
@@ -119,16 +119,17 @@ class AutopilotEnd:
         return decode_state(first, *came) if came else None
 
     def _next(self, frame: Frame, now_s: float) -> Frame | None:
-        lost = self.silence_s(now_s) >= CALL_AFTER_S
         if frame.time_us == self._time_us:
             self._received_s = now_s
             self.repeated += 1
             if self._answer is not None:
                 self._outbox.append(self._answer)
             return None
-        if self._time_us is not None and not lost and not self._follows(frame.time_us, self._time_us):
-            self.dropped["out of step"] += 1
-            return None
+        if self._time_us is not None and not self._follows(frame.time_us, self._time_us):
+            lost = self.silence_s(now_s) >= CALL_AFTER_S
+            if not lost or not (self._runs_freely or frame.time_us == 0):
+                self.dropped["out of step"] += 1
+                return None
         self._received_s = now_s
         self._time_us = frame.time_us
         self._answer = None
@@ -136,6 +137,11 @@ class AutopilotEnd:
 
     def _follows(self, time_us: int, before_us: int) -> bool:
         return time_us > before_us if self._runs_freely else time_us == before_us + self._frame_interval_us
+
+    def _receive_mode(self, heartbeat: Message, now_s: float) -> None:
+        """Take in whether the plant runs freely: that does not change in a flight."""
+        if self._runs_freely is None or self.silence_s(now_s) >= CALL_AFTER_S:
+            self._runs_freely = heartbeat.fields.custom_mode == FREE_RUNNING
 
     def _receive_ack(self, message: Message) -> None:
         fields = message.fields

@@ -6,7 +6,13 @@ import pytest
 
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.mavlink.hil.feedback import Feedback
-from colibri.mavlink.hil.lockstep import CALL_AFTER_S, PEER_LOST_AFTER_S, RESEND_AFTER_S
+from colibri.mavlink.hil.lockstep import (
+    CALL_AFTER_S,
+    FREE_RUNNING,
+    PEER_LOST_AFTER_S,
+    RESEND_AFTER_S,
+    encode_heartbeat,
+)
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
 from colibri.mavlink.hil.plant_status import ReceivedFrame
@@ -70,6 +76,28 @@ def test_an_earlier_frame_begins_a_new_flight_only_after_silence(plant: PlantEnd
     (outgoing,) = plant.take_outbox()
     assert autopilot.receive(outgoing.datagram, 0.5) is None
     assert autopilot.receive(outgoing.datagram, CALL_AFTER_S) == ReceivedFrame(frame_at(0))
+
+
+@pytest.mark.parametrize("time_us", [INTERVAL_US, 4 * INTERVAL_US, 77 * INTERVAL_US])
+def test_no_silence_makes_another_frame_than_the_first_begin_one(
+    plant: PlantEnd, autopilot: AutopilotEnd, time_us: int
+) -> None:
+    call(autopilot, plant)
+    for before_us in (0, INTERVAL_US, 2 * INTERVAL_US):
+        answer_to(plant, autopilot, before_us)
+    plant.offer(frame_at(time_us), 0.0)
+    (outgoing,) = plant.take_outbox()
+    assert autopilot.receive(outgoing.datagram, 10.0 * CALL_AFTER_S) is None
+
+
+def test_a_heartbeat_in_mid_flight_does_not_make_the_plant_run_freely(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
+    call(autopilot, plant)
+    answer_to(plant, autopilot, 0)
+    forged = encode_heartbeat(Codec(1, dialect.PLANT_COMPONENT), 0, 0, armed=False, custom_mode=FREE_RUNNING)
+    assert autopilot.receive(forged, 0.5) is None
+    plant.offer(frame_at(5 * INTERVAL_US), 0.0)
+    (outgoing,) = plant.take_outbox()
+    assert autopilot.receive(outgoing.datagram, 0.5) is None
 
 
 def test_the_autopilot_calls_again_after_silence(plant: PlantEnd, autopilot: AutopilotEnd) -> None:
