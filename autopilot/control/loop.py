@@ -21,6 +21,7 @@ from colibri.autopilot.control.registry import (
     BuildError,
     DecisionError,
     LawError,
+    check_answer,
     check_controller,
     check_rotor_speeds,
     in_words,
@@ -73,7 +74,7 @@ class ControlLoop:
             SolverError: Its solver cannot be used.
         """
         self._name = profile.controller
-        self._controller = _build(profile, vehicle, clock)
+        self._controller = build_controller(profile, vehicle, clock)
         if isinstance(self._controller, CompiledController):
             self._controller.warm_up()
         self.vehicle = vehicle
@@ -148,10 +149,10 @@ class ControlLoop:
             DecisionError: The control law raised, or gave what no rotor can follow.
         """
         try:
-            return self._take(time_us, *self._controller.step(self._memory, time_us, state, references))
+            return self._take(time_us, self._controller.step(self._memory, time_us, state, references))
         except DecisionError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise self._raised(time_us, error) from error
 
     def decide_attitude(self, time_us: int, state: VehicleState, demand: AttitudeDemand) -> Decision:
@@ -162,10 +163,10 @@ class ControlLoop:
         """
         assert isinstance(self._controller, AttitudeController), "decided only where attitudes are taken"
         try:
-            return self._take(time_us, *self._controller.step_attitude(self._memory, time_us, state, demand))
+            return self._take(time_us, self._controller.step_attitude(self._memory, time_us, state, demand))
         except DecisionError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise self._raised(time_us, error) from error
 
     def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
@@ -178,13 +179,14 @@ class ControlLoop:
         """The law itself."""
         return self._controller
 
-    def _take(self, time_us: int, memory: Any, decision: Decision) -> Decision:
+    def _take(self, time_us: int, answer: tuple[Any, Decision]) -> Decision:
         """Remember and command what the law has decided."""
-        self._memory = memory
+        check_answer(self._name, answer, time_us)
+        self._memory, decision = answer
         self._command(decision.rotor_speeds, time_us)
         return decision
 
-    def _raised(self, time_us: int, error: Exception) -> LawError:
+    def _raised(self, time_us: int, error: BaseException) -> LawError:
         return LawError(f"controller {self._name} raised at t = {time_us / 1e6:.3f} s: {in_words(error)}")
 
     def _command(self, rotor_speeds: Array, time_us: int | None = None) -> None:
@@ -207,7 +209,14 @@ def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
     return 1000 * max(ms for ms in range(1, control_ms + 1) if control_ms % ms == 0 and ms <= wanted_ms)
 
 
-def _build(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:
+def build_controller(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:
+    """Return the control law of a profile for a vehicle.
+
+    Raises:
+        ControllerError: It cannot be used.
+        ProfileError: Its table is wrong.
+        SolverError: Its solver cannot be used.
+    """
     factory = load_controller(profile.controller)
     try:
         controller = factory(profile.table(profile.controller), vehicle, clock)
@@ -221,7 +230,7 @@ def _build(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:
         raise ProfileError(f"{profile.where}: controllers.{profile.controller}: {error}") from error
     except Error:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise BuildError(f"controller {profile.controller} cannot be built: {in_words(error)}") from error
     check_controller(profile.controller, controller)
     return controller

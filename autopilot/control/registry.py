@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from colibri.autopilot.control.interface import Clock, Controller
+from colibri.autopilot.control.interface import Clock, Controller, Decision
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.errors import Error, ForeignError, InFlightError
 from colibri.common.types import Array
@@ -102,12 +102,26 @@ def check_controller(name: str, controller: object) -> None:
         raise ControllerError(f"controller {name}: control_interval_us must be whole milliseconds up to a second")
 
 
-def in_words(error: Exception) -> str:
+def in_words(error: BaseException) -> str:
     """Return an exception as one line: a refusal in its own words, of anything else its type, too."""
     words = " ".join(str(error).split())
     if words and isinstance(error, Error):
         return words
     return f"{type(error).__name__}: {words}" if words else type(error).__name__
+
+
+def check_answer(name: str, answer: object, time_us: int) -> None:
+    """Check that what a control law returned at the simulated time `time_us` is what it remembers, and a decision.
+
+    Raises:
+        DecisionError: It is something else.
+    """
+    if isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[1], Decision):
+        return
+    raise DecisionError(
+        f"controller {name} returned {type(answer).__name__} at t = {time_us / 1e6:.3f} s: "
+        "expected two, what it remembers and a Decision"
+    )
 
 
 def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float, time_us: int | None = None) -> None:

@@ -13,11 +13,17 @@ class Status:
         """Speak as `name`."""
         self._name = name
         self.as_json = as_json
+        self._stream: TextIO | None = None
+
+    def take_standard_output(self) -> None:
+        """Keep standard output for status lines alone: what else is printed, by a control law say, is an error line."""
+        self._stream = os.fdopen(os.dup(1), "w", encoding="utf-8")
+        os.dup2(2, 1)
 
     def say(self, event: str, text: str, **facts: Any) -> None:
         """Report `event`: `text` for a person, `facts` for a program."""
         if self.as_json:
-            _print(sys.stdout, json.dumps({"event": event, "text": text, **facts}))
+            _print(self._stream or sys.stdout, json.dumps({"event": event, "text": text, **facts}))
         else:
             _print(sys.stderr, f"{self._name}: {text}")
 

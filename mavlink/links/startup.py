@@ -28,7 +28,10 @@ def begin(name: str, url: str, args: argparse.Namespace, opened: Callable[[str],
         link = opened(url)
     except LinkError as error:
         fail(str(error))
-    return link, Status(name, as_json=args.json), stop
+    status = Status(name, as_json=args.json)
+    if args.json:
+        status.take_standard_output()
+    return link, status, stop
 
 
 def report_compiling(status: Status) -> None:

@@ -255,3 +255,28 @@ def test_a_foreign_law_that_raises_while_it_is_built_is_one_line(tmp_path: Path)
     assert done.returncode == 2
     assert done.stderr.startswith(said)
     assert "their_law.py" in (tmp_path / "out" / "failure.txt").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "return None, Decision",
+            "return Decision",
+            "returned Decision at t = 0.000 s: expected two, what ",
+        ),
+        ("        error =", "        raise SystemExit(3)\n        error =", "raised at t = 0.000 s: SystemExit: 3"),
+    ],
+)
+def test_what_a_foreign_law_does_in_place_of_deciding_is_said(tmp_path: Path, old: str, new: str, said: str) -> None:
+    law = foreign_package(tmp_path, example().replace(old, new))
+    done = fly_theirs(tmp_path, law, "--controller", "their-name", "--link", "memory")
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"colibri: error: controller their-name {said}")
+
+
+def test_what_a_foreign_law_prints_is_shown(tmp_path: Path) -> None:
+    prints = example().replace("        error =", "        time_us or print('now', time_us)\n        error =")
+    flown = ("--controller", "their-name", "--link", "udp", "--duration", "0.5")
+    done = fly_theirs(tmp_path, foreign_package(tmp_path, prints), *flown)
+    assert (done.returncode, done.stderr) == (0, "now 0\n")
