@@ -5,8 +5,9 @@ series are exact to the last coefficient kept, so a track that is written as a f
 Source: Griewank and Walther, "Evaluating Derivatives" (2008), chapter 13.
 """
 
+from collections.abc import Callable
 from math import factorial
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -90,6 +91,21 @@ class TaylorSeries:
 
     __radd__ = __add__
     __rmul__ = __mul__
+
+
+def held(t: TaylorSeries, value: TaylorSeries | float) -> TaylorSeries:
+    """Return a number as a series at the times of `t` that it stays the same at; a series as it is."""
+    return value if isinstance(value, TaylorSeries) else 0.0 * t + value
+
+
+def in_series(formula: Callable[[TaylorSeries], Any]) -> Callable[[TaylorSeries], Any]:
+    """Return a formula of time whose value, or values, are series; where it gives a number, that does not change."""
+
+    def series(t: TaylorSeries) -> Any:
+        value = formula(t)
+        return tuple(held(t, one) for one in value) if np.iterable(value) else held(t, value)
+
+    return series
 
 
 def sin(x: TaylorSeries) -> TaylorSeries:

@@ -4,7 +4,7 @@ A name may carry options: `NAME[:KEY=VALUE[,KEY=VALUE…]]`. Those of the thesis
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite, pi, radians
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeAlias, get_args
@@ -17,7 +17,7 @@ from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
 from colibri.autopilot.guidance.trajectories.registry import TrackError as TrackError
 from colibri.autopilot.guidance.trajectories.registry import installed_names, load_installed
 from colibri.autopilot.guidance.trajectories.samples_file import Samples, read_samples
-from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, sin
+from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, held, in_series, sin
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
 from colibri.common.config import Table
 from colibri.common.errors import Error
@@ -142,10 +142,10 @@ class Hover(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
     def track(self) -> Track:
         """Return the track."""
-        return Track(lambda t: (_held(t, self.x), _held(t, self.y), _held(t, self.height)), self._yaw, inf)
+        return Track(lambda t: (held(t, self.x), held(t, self.y), held(t, self.height)), self._yaw, inf)
 
     def _yaw(self, t: TaylorSeries) -> TaylorSeries:
-        return _held(t, radians(self.yaw))
+        return held(t, radians(self.yaw))
 
 
 class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -163,7 +163,7 @@ class Lemniscate(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=
     def _position(self, t: TaylorSeries) -> Place:
         alpha = self._alpha(t)
         x = self.size * sin(alpha)
-        return x, x * cos(alpha), _held(t, self.height)
+        return x, x * cos(alpha), held(t, self.height)
 
     def _along(self, t: TaylorSeries) -> TaylorSeries:
         """Yaw along (cos α, cos 2α): seen from -90°, it never turns as far as 180° to either side, so never wraps."""
@@ -188,7 +188,7 @@ class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     def _position(self, t: TaylorSeries) -> Place:
         alpha = self._alpha(t)
-        return self.radius * cos(alpha), self.radius * sin(alpha), _held(t, self.height)
+        return self.radius * cos(alpha), self.radius * sin(alpha), held(t, self.height)
 
     def _along(self, t: TaylorSeries) -> TaylorSeries:
         return self._alpha(t) + 0.5 * pi
@@ -328,13 +328,16 @@ def _tried(name: str, options: TrackOptions) -> Track:
         TrackError: It does not.
     """
     try:
-        found = options.track()
-        starts = [axis.derivative(0).item() for axis in found.position(found.clock(np.zeros(1), 1))]
+        given = options.track()
+        found = replace(given, position=in_series(given.position), yaw=given.yaw and in_series(given.yaw))
+        start = found.clock(np.zeros(1), 1)
+        starts = [axis.derivative(0).item() for axis in found.position(start)]
+        yaw_rad = 0.0 if found.yaw is None else found.yaw(start).derivative(0).item()
     except Error:
         raise
     except Exception as error:
         raise TrackError(f"track {name}: {type(options).__name__}: {type(error).__name__}: {error}") from error
-    if not (isinstance(found, Track) and len(starts) == 3 and all(map(isfinite, starts))):
+    if len(starts) != 3 or not all(map(isfinite, (*starts, yaw_rad))):
         raise TrackError(f"track {name}: {type(options).__name__} gives no colibri.Track of three finite coordinates")
     return found
 
@@ -391,9 +394,5 @@ def _climb(t: TaylorSeries) -> TaylorSeries:
     return _CLIMB_M_S * t + _START_HEIGHT_M
 
 
-def _held(t: TaylorSeries, value: float) -> TaylorSeries:
-    return 0.0 * t + value
-
-
 def _east(t: TaylorSeries) -> TaylorSeries:
-    return _held(t, 0.0)
+    return held(t, 0.0)
