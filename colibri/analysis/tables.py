@@ -36,7 +36,7 @@ def print_table(title: str, headings: Row, rows: Sequence[Row], *, names: int) -
 
     table = Table(title=title, title_justify="left")
     for number, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if number < names else "right", no_wrap=True)
+        table.add_column(heading.replace(" (", "\n("), justify="left" if number < names else "right", no_wrap=True)
     for row, following in zip(rows, [*rows[1:], ("",)], strict=True):
         table.add_row(*row, end_section=following[0] != row[0])
     needed = Console(width=_MAX_WIDTH).measure(table).maximum

@@ -43,13 +43,14 @@ def compare(args: argparse.Namespace) -> int:
     kept = [kept_row(job) if args.resume else None for job in jobs]
     left = [job for job, row in zip(jobs, kept, strict=True) if row is None]
     if args.resume and not args.quiet:
-        print(f"--resume: {len(left)} of {len(jobs)} flights are flown, the others were, by the same contents")  # noqa: T201
+        print(f"--resume: {len(jobs) - len(left)} of {len(jobs)} flights were flown already, by the same contents")  # noqa: T201
     flown = iter(side_by_side(row_of, left, "flights", quiet=args.quiet, worth=lambda _job: 1))
     rows = [next(flown) if row is None else row for row in kept]
     write_table(args.out / "compare", COLUMNS, [row.cells for row in rows], names=2)
     if not args.quiet:
         title = f"RMS after {SETTLED_AFTER_S:.0f} s; written to {args.out}"
-        print_table(title, COLUMNS[:-1], [row.cells[:-1] for row in rows], names=2)
+        shown = len(COLUMNS) - (1 if any(row.lost for row in rows) else 2)
+        print_table(title, COLUMNS[:shown], [row.cells[:shown] for row in rows], names=2)
         for row in rows:
             controller, track, *_, at_s, why = row.cells
             if why:

@@ -5,11 +5,12 @@ from collections import Counter
 from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
+from time import perf_counter
 from typing import NamedTuple
 from urllib.parse import quote
 
+from colibri.autopilot.control.loop import build_controller
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.flights.plan import OPTIONS, FlightPlan
 
@@ -82,7 +83,8 @@ def jobs_of(args: argparse.Namespace) -> list[Job]:
     contenders = contenders_of(args.profile or DEFAULT_PROFILES, args.controller)
     jobs = [Job(contender, track, seed, args) for contender in contenders for track in tracks for seed in seeds]
     for job in jobs[:: len(seeds)]:
-        load_controller(job.plan(job.folder).profile.controller)
+        plan = job.plan(job.folder)
+        build_controller(plan.profile, plan.vehicle, perf_counter)
     return jobs
 
 

@@ -1,6 +1,7 @@
 """What came of each of many flights: a table that grows as they end, so that an interrupted comparison loses none."""
 
 import csv
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import IO, Any, NamedTuple, Self
@@ -90,11 +91,18 @@ def kept_flights(folder: Path, settings: str) -> dict[tuple[str, str, int], Flow
     except (OSError, UnicodeDecodeError) as error:
         raise KeptError(f"cannot read {folder / TABLE}: {error}") from error
     if were != settings:
-        raise KeptError(f"--resume: {folder} has flights by other settings ({were}): give another --out")
+        changed = _changed(were, settings)
+        raise KeptError(f"--resume: {folder} has flights by other settings ({changed}): give another --out")
     try:
         return {(flown.contender, flown.track, flown.seed): flown for flown in map(_flown, rows[1:])}
     except ValueError as error:
         raise KeptError(f"{folder / TABLE}: {error}; remove it, or leave --resume out") from error
+
+
+def _changed(were: str, settings: str) -> str:
+    """Return those of the settings that were others."""
+    old, new = (dict(one.partition("=")[::2] for one in re.split(r" (?=[a-z_]+=)", text)) for text in (were, settings))
+    return ", ".join(f"{name}={old.get(name)}, now {value}" for name, value in new.items() if value != old.get(name))
 
 
 def _flown(row: list[str]) -> Flown:

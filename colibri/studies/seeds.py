@@ -21,6 +21,7 @@ from colibri.common.types import Array
 from colibri.flights.fly import make_folder
 from colibri.flights.plan import OPTIONS
 from colibri.flights.provenance import provenance_of
+from colibri.mavlink.hil.feedback import Feedback
 from colibri.studies.contenders import Job, jobs_of
 from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, FlightsLog, Flown, kept_flights
 
@@ -29,8 +30,8 @@ HEADINGS = (
     *("control (m)", "true (m)", "est. horizontal (m)", "est. vertical (m)", "roll (°)", "pitch (°)", "yaw (°)"),
     "NEES",
 )
-
-
+_WITHOUT_ESTIMATE = 5
+"""So many of them say something of a flight on the state, where control and true error are the same."""
 _NO_INNOVATIONS = (0,) * len(MEASURED)
 
 
@@ -61,7 +62,8 @@ def compare_seeds(args: argparse.Namespace) -> int:
     draw_seeds(flights, args.out)
     if not args.quiet:
         over = f"after {SETTLED_AFTER_S:.0f} s, root mean squares over all flights (largest of one)"
-        print_table(f"{over}; written to {args.out}", HEADINGS, rows, names=2)
+        shown = len(HEADINGS) if args.feedback is Feedback.SENSORS else _WITHOUT_ESTIMATE
+        print_table(f"{over}; written to {args.out}", HEADINGS[:shown], [row[:shown] for row in rows], names=2)
         for each in flights:
             if each.lost:
                 print(f"{each.contender}, {each.track}, seed {each.seed}: lost: {each.lost}")  # noqa: T201

@@ -122,11 +122,13 @@ def test_a_copied_profile_has_a_name_of_its_own(tmp_path: Path) -> None:
     ]
 
 
-def test_a_profile_by_its_path_flies_within_out_and_is_called_by_its_name(tmp_path: Path) -> None:
+def test_a_profile_by_its_path_flies_within_out_and_is_called_by_its_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """By options of `colibri fly` that change neither the table nor its columns; again only what has changed."""
     copy, out = written(tmp_path / "p", "t2.toml"), tmp_path / "out"
     options = ["--track", "hover", "--duration", "0.5", "--wind", "2@270", "--without", "drag", "--start", "z=3"]
-    command = ["compare", "--profile", copy, *options, "--quiet", "--out", str(out)]
+    command = ["compare", "--profile", copy, *options, "--out", str(out)]
     assert main(command) == 0
     assert [path.name for path in (tmp_path / "p").iterdir()] == ["t2.toml"]
     folder = out / "flights" / "t2-hover"
@@ -136,7 +138,11 @@ def test_a_profile_by_its_path_flies_within_out_and_is_called_by_its_name(tmp_pa
     assert tuple(row) == COLUMNS
     assert (row["controller"], row["RMS (m)"], row["why"]) == ("t2", "-", "")
     flown = (folder / "plant.csv").stat().st_mtime_ns
+    capsys.readouterr()
     assert main([*command, "--resume"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("--resume: 1 of 1 flights were flown already, by the same contents\n")
+    assert max(map(len, said.splitlines()[2:])) <= 80, "as wide as a terminal"
     assert (folder / "plant.csv").stat().st_mtime_ns == flown
     written(tmp_path / "p", "t2.toml", "poles = [-5.0, -6.0]", "poles = [-1.0, -1.1]")
     assert main([*command, "--resume"]) == 0
@@ -176,6 +182,19 @@ def test_a_comparison_goes_on_after_a_lost_flight_and_says_why(
     assert "in step" in Path(lost["why"].removeprefix(why)).read_text(encoding="utf-8")
     assert fine["why"] == ""
     assert f"flight:geometric-se3, hover: lost at t = 0.20 s: {why}" in capsys.readouterr().out
+
+
+def test_a_law_that_cannot_be_built_is_found_before_anything_flies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    laws = {"geometric-se3": lambda *_: dict[str, object]()["gain"], "lpv-mpc": load_controller("lpv-mpc")}
+    monkeypatch.setattr(loop, "load_controller", laws.__getitem__)
+    options = ["--profile", "flight", "--profile", "flight:geometric-se3", "--track", "hover", "--duration", "0.5"]
+    with pytest.raises(SystemExit) as ended:
+        main(["compare", *options, "--out", str(tmp_path / "out")])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == "colibri: error: controller geometric-se3 cannot be built: KeyError: 'gain'\n"
+    assert not (tmp_path / "out" / "flights").exists()
 
 
 @pytest.mark.parametrize(

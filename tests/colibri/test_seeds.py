@@ -1,6 +1,7 @@
 """`colibri compare --seeds`: the same flights by many seeds."""
 
 import csv
+import re
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +97,7 @@ def test_what_is_there_is_not_flown_again(
     with pytest.raises(SystemExit) as end:
         main([*options, "--resume", "--wind", "5@270"])
     assert end.value.code == 2
-    assert "has flights by other settings" in capsys.readouterr().err
+    assert re.search(r"has flights by other settings \([a-z_]+=[^ ]+, now [^ ]+\): give", capsys.readouterr().err)
 
 
 def test_a_vehicle_that_is_lost_is_counted_and_ends_in_exit_code_1(tmp_path: Path) -> None:
@@ -177,7 +178,11 @@ def test_what_changed_since_is_flown_again(
 
     first = hashes()
     assert hashes("--resume") == first
-    assert "again" not in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "again" not in said
+    assert "control" in said
+    assert "NEES" not in said, "nothing is estimated"
+    assert max(map(len, said.splitlines()[1:])) <= 80
     profile.write_text("# a remark\n" + text.replace("poles = [-5.0, -6.0]", "poles = [-4.0, -6.0]"), encoding="utf-8")
     assert set(hashes("--resume")).isdisjoint(first)
     assert "--resume: 2 of 2 flights are flown again, by contents that changed\n" in capsys.readouterr().out
