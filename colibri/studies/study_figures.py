@@ -188,11 +188,15 @@ def _recovery(result: Result) -> Figure:
         for begin_s, end_s in _spans(flown.t[:-1], flown.decided_by(Fallback.RECOVERY)):
             axes.axvspan(begin_s, min(end_s, RECOVERY_SHOWN_S), color=_SHADE, linewidth=0.0, label="recovery law flies")
         _dress(axes, quantity)
+    middle_m, half_m = np.mean(height.get_ylim()), max(np.ptp(height.get_ylim()), _MIN_HEIGHTS_M) / 2.0
+    height.set_ylim(middle_m - half_m, middle_m + half_m)
+    height.ticklabel_format(axis="y", useOffset=False)
     rotors.set_xlabel("t (s)")
     put_head(figure, f"Recovery at 20 m: {result.row[0].replace('-', ', ')} ({result.row[1]})", columns=5)
     return figure
 
 
+_MIN_HEIGHTS_M = 0.02  # closer ticks would need more digits than there is room for
 _RECOVERY_QUANTITIES = ("height (m)", "tilt (°)", "rates (rad/s)", "Ω (rad/s)")
 
 

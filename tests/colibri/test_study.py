@@ -1,5 +1,6 @@
 """`colibri study`: what it flies, its tables and figures, and what bad input gets."""
 
+import re
 from dataclasses import replace
 from math import isnan
 from pathlib import Path
@@ -159,14 +160,22 @@ def test_an_unknown_study_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixt
     assert capsys.readouterr().err == f"colibri: error: there is no study flips: choose {', '.join(NAMES)}\n"
 
 
+_LEVEL = Flight("hover:height=20", start=(("x", 0.0), ("y", 0.0), ("z", 20.0), ("r", 10.0)), duration_s=0.4)
+"""Its height changes by a hundredth of a millimetre."""
+
+
 def test_a_study_from_the_command_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    cases = tuple(Case((f"{lap}", ""), "", Flight(f"lemniscate:lap={lap}", duration_s=0.4)) for lap in (6, 7))
+    flown = {"6": Flight("lemniscate:lap=6", duration_s=0.4), "level": _LEVEL}
+    cases = tuple(Case((name, ""), "", flight) for name, flight in flown.items())
     brief = of_name("recovery")._replace(cases=cases)
     monkeypatch.setattr("colibri.studies.studies.STUDIES", (brief,))
     assert main(["study", "recovery", "--out", str(tmp_path)]) == 0
     assert "recovery: recovery.md, recovery.csv, recovery.png" in " ".join(capsys.readouterr().out.split())
     assert (tmp_path / "recovery-6.svg").exists()
+    level = (tmp_path / "recovery-level.svg").read_text(encoding="utf-8")
+    assert "<!-- 20.000 -->" in level
+    assert not re.search(r"<!-- .*[+]", level), "an offset of the axis"
     lines = (tmp_path / "recovery.csv").read_text(encoding="utf-8").splitlines()
-    assert [line.split(",")[0] for line in lines] == ["start", "6", "7"]
+    assert [line.split(",")[0] for line in lines] == ["start", *flown]
