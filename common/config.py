@@ -59,9 +59,24 @@ def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
     except msgspec.ValidationError as reason:
         what, _, where = str(reason).partition(" - at `$.")
         key = where.rstrip("`")
-        raise error(f"{path}: {key}: {what}" if key else f"{path}: {what}") from reason
-    except (msgspec.DecodeError, UnicodeDecodeError, ValueError) as reason:
+        raise error(f"{path}: {key}: {what}{_choices(kind, key)}" if key else f"{path}: {what}") from reason
+    except UnicodeDecodeError as reason:
+        line = reason.object.count(b"\n", 0, reason.start) + 1
+        raise error(f"{path}: line {line}: is not UTF-8: save the file as that") from reason
+    except (msgspec.DecodeError, ValueError) as reason:
         raise error(f"{path}: {reason}") from reason
+
+
+def _choices(kind: Any, key: str) -> str:
+    """Return which words are right at a key, as the end of a refusal; empty where no choice is."""
+    found: Any = msgspec.inspect.type_info(kind)
+    for name in key.replace("[", ".[").split("."):
+        parts = found.types if isinstance(found, msgspec.inspect.UnionType) else (found,)
+        fields = {field.name: field.type for part in parts for field in getattr(part, "fields", ())}
+        items = [item for part in parts for item in getattr(part, "item_types", ())]
+        found = items[0] if name.startswith("[") and items else fields.get(name)
+    values = getattr(found, "values", ())
+    return f": choose {', '.join(values)}" if values else ""
 
 
 Negative: TypeAlias = Annotated[float, msgspec.Meta(lt=0.0)]
@@ -101,4 +116,5 @@ def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:
         return msgspec.convert(dict(table), type=kind)
     except msgspec.ValidationError as reason:
         what, _, where = str(reason).partition(" - at `$.")
-        raise SettingsError(f"{where.rstrip('`')}: {what}" if where else what) from reason
+        key = where.rstrip("`")
+        raise SettingsError(f"{key}: {what}{_choices(kind, key)}" if key else what) from reason

@@ -98,7 +98,7 @@ class TimeFigure(NamedTuple):
 def draw_flight(recording: Recording, plan: FlightPlan) -> list[Path]:
     """Draw all figures of a flight as PNG into the plan's folder; return their paths."""
     series = flight_series(recording, plan)
-    flight = f"{shortened(plan.track_name)}, profile {plan.profile.name}"
+    flight = f"{shortened(plan.track_name)}, {plan.flown_by}"
     paths = write_figure(draw_trajectory(series, f"{flight}: trajectory"), plan.out / "trajectory")
     for figure in flight_figures(series, plan):
         paths += write_figure(draw_times(series, figure, f"{flight}: {figure.subject}"), plan.out / figure.name)

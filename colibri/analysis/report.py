@@ -86,8 +86,8 @@ def write_report(figures: Report, path: Path) -> None:
     path.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 
 
-def print_report(figures: Report, out: Path) -> None:
-    """Show the report as a table on standard output."""
+def print_report(figures: Report, out: Path, *, flown_by: str | None = None) -> None:
+    """Show the report as a table on standard output; its title has the track, and `flown_by` or the profile."""
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -97,7 +97,7 @@ def print_report(figures: Report, out: Path) -> None:
 
     settled = figures["rmse_after_20s_m"]
     fallbacks = [f"{count} {name}" for name, count in figures["fallbacks"].items() if count]
-    title = escape(f"{figures['track']}, profile {figures['profile']}")
+    title = escape(f"{figures['track']}, {flown_by or 'profile ' + figures['profile']}")
     table = Table(title=title, show_header=False, title_justify="left")
     lost = {} if figures["lost"] is None else {f"lost at t = {figures['lost_at_s']:.2f} s": figures["lost"]}
     rows = lost | {

@@ -65,6 +65,7 @@ def main(argv: list[str] | None = None) -> int:
     """Run a subcommand; return the exit code."""
     given = sys.argv[1:] if argv is None else argv
     escape_what_no_stream_encodes()
+    _check_encoding(given)
     if given and given[0] in PROCESSES:
         return run_process(given[0], given[1:])
     use_one_thread()
@@ -100,6 +101,15 @@ def _drop_what_cannot_be_printed() -> None:
         sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _check_encoding(given: Sequence[str]) -> None:
+    """End with one line where a word cannot be written to a log, which is UTF-8."""
+    for word in given:
+        try:
+            word.encode()
+        except UnicodeEncodeError:
+            fail(f"{word} is not UTF-8 by this locale: rename the file, or try LC_ALL=C.UTF-8")
 
 
 def _parser(given: Sequence[str]) -> ArgumentParser:

@@ -27,7 +27,7 @@ def run(args: Namespace) -> int:
     except Error as error:
         fail(f"{args.folder}: {error}" if str(args.folder) not in str(error) else str(error))
     except OSError as error:
-        fail(f"{error.filename}: {error.strerror}")
+        fail(f"{error.filename or args.folder}: {error.strerror}")
     if not args.quiet:
         print(*paths, sep="\n")  # noqa: T201
     return 0

@@ -73,6 +73,7 @@ class FlightPlan(WorldSetting):
         feedback: What the plant sends to the autopilot.
         duration_s: Simulated time to fly.
         out: Folder for all that the flight leaves.
+        controller: Control law by option; None for the profile's.
         solver: QP solver by option; None for the profile's.
         ground: Who may watch and command.
         floor_m: Below which no track may lead, z of ENU; -inf for anywhere.
@@ -94,6 +95,7 @@ class FlightPlan(WorldSetting):
     feedback: Feedback
     duration_s: float
     out: Path
+    controller: str | None
     solver: str | None
     ground: GroundAccess
     floor_m: float
@@ -159,6 +161,7 @@ class FlightPlan(WorldSetting):
             feedback=args.feedback,
             duration_s=args.duration,
             out=args.out,
+            controller=args.controller,
             solver=args.solver,
             ground=GroundAccess(tuple(args.gcs), args.signing_key, args.insecure),
             floor_m=floor_m,
@@ -188,6 +191,11 @@ class FlightPlan(WorldSetting):
         }
         values = world_values(WorldSetting()) | unset | usual | options
         return cls.from_arguments(argparse.Namespace(**values, out=out))
+
+    @property
+    def flown_by(self) -> str:
+        """Profile, and control law if it is not the profile's, as tables and figures have them."""
+        return f"profile {self.profile.name}" + (f", controller {self.controller}" if self.controller else "")
 
     @property
     def weather(self) -> Weather:

@@ -53,6 +53,7 @@ class Names(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     plant_vehicle: str
     without: list[str]
     solver: str | None
+    controller: str | None = None
 
 
 class Provenance(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -128,6 +129,7 @@ def provenance_of(plan: FlightPlan) -> Provenance:
             plant_vehicle=plan.plant_vehicle_name,
             without=list(plan.without),
             solver=plan.solver,
+            controller=plan.controller,
         ),
         sha256={**hashes, "all": _hash([colibri, hashes])},
         **contents,

@@ -31,7 +31,7 @@ from colibri.mavlink.wire.dialect import Codec
 from colibri.mavlink.wire.tlog import Logged, TlogError, decode
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
-INPUTS = "inputs.jsonl"
+INPUTS, TLOG = "inputs.jsonl", "flight.tlog"
 _CUT_OFF_US = 1_000_000
 """Processes that are killed leave logs that end less apart than this."""
 _NO_CLOCK_S = 0.0
@@ -99,6 +99,8 @@ class ReplayError(Error):
 
 def replay(args: argparse.Namespace) -> int:
     """Replay as the command line says; return the exit code."""
+    if args.tlog.is_dir():
+        args.tlog /= TLOG
     try:
         outcome = replay_flight(args.tlog)
         ended_us = _logged_us(args.tlog)

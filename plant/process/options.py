@@ -32,7 +32,7 @@ def _start_value(pair: str) -> tuple[str, float]:
     try:
         return key, number(value)
     except ValueError:
-        raise ArgumentTypeError(f"{key}: must be a number, not {value}") from None
+        raise ArgumentTypeError(f"{key}: must be a number, not {value or 'nothing'}") from None
 
 
 def latency(text: str) -> float:

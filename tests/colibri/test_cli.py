@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from errno import ENOSPC
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -17,6 +18,7 @@ import pytest
 from colibri.cli.main import SUBCOMMANDS, main
 from colibri.cli.shared.processes import PROCESSES
 from colibri.common.process.folder_lock import FolderLock
+from colibri.flights.provenance import plan_of
 from colibri.mavlink.links.open import open_link
 from tools.harness.processes import wait_for
 
@@ -43,6 +45,15 @@ def edited(source: Path, old: str, new: str) -> Callable[[Path], str]:
         assert text.count(old) == 1
         path = folder / source.name
         path.write_text(text.replace(old, new), encoding="utf-8")
+        return str(path)
+
+    return write
+
+
+def recoded(source: Path) -> Callable[[Path], str]:
+    def write(folder: Path) -> str:
+        path = folder / source.name
+        path.write_bytes(source.read_bytes() + b"\n# gr\xf6\xdfer")
         return str(path)
 
     return write
@@ -104,6 +115,23 @@ BAD_INPUT = {
     "profile file": (
         (plain("spiral"), plain("--profile"), edited(PROFILE, "rotor_speed_rpm = 3000.0", "rotor_speed_rpm = -1.0")),
         "thesis.toml: simulation.rotor_speed_rpm: Expected `float` >= 0.0",
+    ),
+    "choice": (
+        (plain("spiral"), plain("--vehicle"), edited(VEHICLE, 'speed_unit = "rad/s"', 'speed_unit = "rad/sec"')),
+        "hummingbird.toml: rotors.speed_unit: Invalid enum value 'rad/sec': choose rad/s, rpm",
+    ),
+    "choice of a law": (
+        (plain("spiral"), plain("--profile"), edited(FLIGHT, '"along-plan"', '"ahead"')),
+        "flight.toml: controllers.lpv-mpc: attitude.scheduling: Invalid enum value 'ahead': choose along-plan, frozen",
+    ),
+    "no text": ((plain("spiral"), plain("--vehicle"), recoded(VEHICLE)), ": is not UTF-8: save the file as that"),
+    "start": (
+        (plain("spiral"), plain("--start"), plain("x=1,y")),
+        "--start: y: must be a number, not nothing",
+    ),
+    "no UTF-8": (
+        (plain("spiral"), plain("--vehicle"), plain("\udcfc.toml")),
+        "\\udcfc.toml is not UTF-8 by",
     ),
     "controller": (
         (plain("spiral"), plain("--controller"), plain("pid")),
@@ -298,6 +326,25 @@ def test_figures_are_drawn_of_what_a_flight_left(tmp_path: Path, capsys: pytest.
     assert all(Path(path).stat().st_size > 10_000 for path in drawn)
     assert exit_code(["plot", str(tmp_path)]) == 2
     assert "provenance.json is missing" in capsys.readouterr().err
+
+
+def test_figures_that_find_no_room_are_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(ENOSPC, os.strerror(ENOSPC))
+
+    assert exit_code(["fly", "hover", "--link", "memory", "--duration", "0.1", "--quiet", "--out", str(tmp_path)]) == 0
+    monkeypatch.setattr("colibri.analysis.figures.draw_flight", full)
+    assert exit_code(["plot", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == f"colibri: error: {tmp_path}: No space left on device\n"
+
+
+def test_titles_name_a_law_that_is_not_the_profiles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ("--link", "memory", "--duration", "0.1", "--no-figures", "--out", str(tmp_path))
+    assert exit_code(["fly", "hover", "--controller", "geometric-se3", *options]) == 0
+    assert capsys.readouterr().out.startswith("hover, profile flight, controller geometric-se3")
+    assert plan_of(tmp_path).flown_by == "profile flight, controller geometric-se3"
 
 
 def fly_slowly(out: Path) -> "subprocess.Popen[str]":

@@ -34,8 +34,9 @@ def copy(flight: Path, tmp_path: Path) -> Path:
 
 
 def test_a_flight_is_replayed(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", str(flight / "flight.tlog")]) == 0
-    assert capsys.readouterr().out == "500 commands up to t = 1.996 s, all identical\n"
+    for named in (flight / "flight.tlog", flight):
+        assert main(["replay", str(named)]) == 0
+        assert capsys.readouterr().out == "500 commands up to t = 1.996 s, all identical\n"
 
 
 def test_a_flight_is_replayed_by_what_it_was_wherever_it_lies(

@@ -76,7 +76,7 @@ def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -
 
         draw_flight(recording, plan)
     if not quiet:
-        print_report(found, plan.out)
+        print_report(found, plan.out, flown_by=plan.flown_by)
     return found
 
 
