@@ -11,7 +11,8 @@ The autopilot calls the plant with one datagram: SET_MESSAGE_INTERVAL (which mes
 ATTITUDE_QUATERNION for frames of the state, HIL_SENSOR for frames of sensors) and a HEARTBEAT. The plant begins with
 the first such call, and answers an autopilot that was started again where the flight stands.
 
-Beside its frame the plant sends its battery twice a second, and to whoever has just called. The autopilot may append
+Beside its frame the plant sends its battery twice a second, and to whoever has just called; and where commands take
+effect later than their frame, how much later the last one did (NAMED_VALUE_INT cmd_delay, µs). The autopilot may append
 faults, COMMAND_LONG with MAV_CMD_INJECT_FAILURE, to the datagram that answers a frame: they are taken with that answer
 and with no other datagram, so each happens once, at that time; the next frame brings their COMMAND_ACK.
 

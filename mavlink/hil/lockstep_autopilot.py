@@ -15,7 +15,7 @@ from colibri.mavlink.hil.lockstep import (
     MADE_OF,
     encode_heartbeat,
 )
-from colibri.mavlink.hil.plant_status import PlantStatus, ReceivedFrame, decode_battery, decode_result
+from colibri.mavlink.hil.plant_status import PlantStatus, ReceivedFrame, decode_battery, decode_delay, decode_result
 from colibri.mavlink.hil.sensors import Frame, decode_sensors
 from colibri.mavlink.hil.state import (
     ActuatorCommand,
@@ -60,7 +60,7 @@ class AutopilotEnd:
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         """Take one datagram in; return its frame if that is the next one to compute."""
         parts: dict[str, Message] = {}
-        battery, results = None, []
+        battery, delay_us, results = None, None, []
         for message in self._codec.decode(datagram):
             if message.source != self._plant:
                 self.dropped["foreign"] += 1
@@ -72,6 +72,8 @@ class AutopilotEnd:
                 self._receive_ack(message)
             elif message.name == "BATTERY_STATUS":
                 battery = decode_battery(message)
+            elif message.name == "NAMED_VALUE_INT":
+                delay_us = decode_delay(message)
             elif message.name == "HEARTBEAT":
                 self._receive_mode(message, now_s)
             else:
@@ -83,7 +85,7 @@ class AutopilotEnd:
             self.dropped["invalid"] += 1
             return None
         following = self._next(frame, now_s)
-        return None if following is None else ReceivedFrame(following, PlantStatus(battery, tuple(results)))
+        return None if following is None else ReceivedFrame(following, PlantStatus(battery, tuple(results), delay_us))
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault] = ()) -> None:
         """Send the command that answers the frame handed out last, with faults to happen then, and remember it."""

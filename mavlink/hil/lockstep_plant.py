@@ -24,6 +24,7 @@ from colibri.mavlink.hil.plant_status import (
     PlantBattery,
     PlantStatus,
     encode_battery,
+    encode_delay,
     encode_results,
 )
 from colibri.mavlink.hil.sensors import Frame, encode_sensors
@@ -116,6 +117,8 @@ class PlantEnd:
         self._battery = plant_status.battery
         if plant_status.battery is not None and frame.time_us % BATTERY_EVERY_US == 0:
             frames.append(encode_battery(self._codec, plant_status.battery))
+        if plant_status.delay_us is not None:
+            frames.append(encode_delay(self._codec, frame.time_us, plant_status.delay_us))
         if truth is not None:
             frames += encode_state(self._truth_codec, truth)
         self._frames = tuple(frames)

@@ -1,4 +1,4 @@
-"""What a plant sends its autopilot beside a frame: its battery, and the results of the faults requested."""
+"""What a plant sends its autopilot beside a frame: battery, results of faults requested, the delay of commands."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,6 +10,8 @@ from colibri.mavlink.wire.dialect import Codec, Message, mav
 _NO_CELL = 65535
 _MAX_MV = 65534
 _UNKNOWN_TEMPERATURE = 32767
+_DELAY = "cmd_delay"
+_MAX_I32 = 2**31 - 1
 
 
 class PlantBattery(NamedTuple):
@@ -40,10 +42,13 @@ class PlantStatus(NamedTuple):
     Attributes:
         battery: None where there is none, or it is not sent.
         results: Of the faults that came with the answer to the frame before, in order.
+        delay_us: From the frame that the last command answers to the moment at which the rotors began to follow it, µs;
+            None where they do so at once.
     """
 
     battery: PlantBattery | None = None
     results: tuple[FaultResult, ...] = ()
+    delay_us: int | None = None
 
 
 NOTHING = PlantStatus()
@@ -81,6 +86,17 @@ def encode_results(codec: Codec, results: Sequence[FaultResult], target: tuple[i
     return [
         codec.encode("COMMAND_ACK", faults.COMMAND, it.result, 0, it.unit << 8 | it.kind, *target) for it in results
     ]
+
+
+def encode_delay(codec: Codec, time_us: int, delay_us: int) -> bytes:
+    """Encode a delay of commands as NAMED_VALUE_INT, µs."""
+    return codec.encode("NAMED_VALUE_INT", time_us // 1000, _DELAY, min(delay_us, _MAX_I32))
+
+
+def decode_delay(message: Message) -> int | None:
+    """Decode a NAMED_VALUE_INT that says a delay, µs; None for any other."""
+    fields = message.fields
+    return fields.value if fields.name == _DELAY and fields.value >= 0 else None
 
 
 def decode_result(message: Message) -> FaultResult:

@@ -21,11 +21,16 @@ from colibri.plant.vehicle.description import Vehicle
 
 
 class Actuation:
-    """Commands on their way to the rotors, which follow the last that has arrived, also between two frames."""
+    """Commands on their way to the rotors, which follow the last that has arrived, also between two frames.
+
+    Attributes:
+        delay_us: From the frame that the last answers to its arrival; None before any has arrived.
+    """
 
     def __init__(self, first: ActuatorCommand) -> None:
         """Follow `first` until another arrives."""
         self._now = first
+        self.delay_us: int | None = None
         self._coming: deque[tuple[int, ActuatorCommand]] = deque()
 
     def arrive(self, from_us: int, command: ActuatorCommand) -> None:
@@ -37,7 +42,8 @@ class Actuation:
         now_us = begin_us
         while now_us < end_us:
             while self._coming and self._coming[0][0] <= now_us:
-                self._now = self._coming.popleft()[1]
+                from_us, self._now = self._coming.popleft()
+                self.delay_us = from_us - self._now.time_us
             until_us = min(end_us, self._coming[0][0]) if self._coming else end_us
             yield self._now, until_us - now_us
             now_us = until_us
@@ -76,7 +82,8 @@ class Plant:
 
     def measure(self) -> ReceivedFrame:
         """Return the frame of the world as it is now, and what goes beside it."""
-        return ReceivedFrame(self._measure(self.world), PlantStatus(self._physics.battery(self.world), self._results))
+        status = PlantStatus(self._physics.battery(self.world), self._results, self._actuation.delay_us or None)
+        return ReceivedFrame(self._measure(self.world), status)
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
         """Go on to the next frame, with the answer to this one and with faults that happen now."""

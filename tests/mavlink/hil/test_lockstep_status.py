@@ -86,6 +86,15 @@ def test_the_battery_is_told_twice_a_second_and_to_who_is_new(plant: PlantEnd, a
     assert ReceivedFrame(frame_at(11 * INTERVAL_US), PlantStatus(BATTERY)) in frames
 
 
+def test_a_delay_travels_with_its_frame_and_where_there_is_none_nothing_does(
+    plant: PlantEnd, autopilot: AutopilotEnd
+) -> None:
+    call(autopilot, plant)
+    without, late = offered(plant, 0), offered(plant, 0, PlantStatus(delay_us=16_123))
+    assert len(late) > len(without)
+    assert autopilot.receive(late, 0.0) == ReceivedFrame(frame_at(0), PlantStatus(delay_us=16_123))
+
+
 def test_a_plant_that_runs_freely_takes_what_is_newer(autopilot: AutopilotEnd) -> None:
     plant = PlantEnd(system_id=1, frame_interval_us=INTERVAL_US, waits=False)
     call(autopilot, plant)

@@ -67,3 +67,15 @@ def test_half_a_frame_is_half_a_frame() -> None:
     lag = VEHICLE.rotors.lag
     assert lag is not None
     assert flown(0, 3)[1] > late[1] > late[0]
+
+
+def test_a_plant_says_how_late_the_last_command_took_effect() -> None:
+    physics = Physics(VEHICLE, "rk4")
+    world, options = starting_world(Start(z=10.0, rotors=4740.0), VEHICLE), {"seed": 0, "interval_us": FRAME_US}
+    for latency_us, said in ((0, [None, None, None]), (4_500, [None, None, 9_000])):
+        plant = Plant(world, VEHICLE, physics, Feedback.STATE, DEFAULT_ORIGIN, **options, latency_us=latency_us)
+        delays = []
+        for _ in said:
+            delays.append(plant.measure().plant_status.delay_us)
+            plant.answer(ActuatorCommand(plant.world.time_us, (0.5,) * 4, armed=True))
+        assert delays == said
