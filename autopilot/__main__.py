@@ -4,6 +4,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from colibri.autopilot.process.options import add_delay
 from colibri.common.earth.home import DEFAULT_HOME, home
 from colibri.common.process.arguments import ArgumentParser, add_common_arguments
 from colibri.mavlink.hil.feedback import Feedback, feedback
@@ -42,6 +43,7 @@ def command_line() -> ArgumentParser:
         help="what to ask the plant for: the true state (default), or what sensors measure",
     )
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
+    add_delay(add)
     add("--gcs", action="append", default=[], metavar="URL", help="a ground station: udpout:, udpin:, tcp: or tcpin:")
     add("--stepped", metavar="URL", help="a program that speaks for all ground stations, frame by frame (for tests)")
     add("--home", type=home, default=DEFAULT_HOME, metavar="LAT,LON,ALT,YAW", help="the origin (default %(default)s)")

@@ -51,12 +51,14 @@ class Sensed(NamedTuple):
     Attributes:
         vehicle: None before the first state.
         position_known: Whether the position is known well enough to fly to places.
+        delay_us: How far ahead of now the vehicle is: references are those of when commands take effect.
     """
 
     now_us: int = 0
     vehicle: VehicleState | None = None
     steered: Steered = NOT_STEERED
     position_known: bool = True
+    delay_us: int = 0
 
 
 class PilotRecord(NamedTuple):
@@ -119,12 +121,14 @@ class Pilot:
         self.saving = Action.NONE
         self.terminated = False
 
-    def begin(self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None, rests: bool = False) -> None:
+    def begin(
+        self, now_us: int, vehicle: VehicleState, *, mode: Mode | None = None, rests: bool = False, delay_us: int = 0
+    ) -> None:
         """Take in the first state of a flight: the vehicle stands, or it is picked up in flight, in `mode` or in hold.
 
         One that is estimated at rest (`rests`) stands at any height: an estimate of height is not exact.
         """
-        self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
+        self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle, delay_us=delay_us)
         standing = mode is None and (rests or stands_at_first(vehicle, 0.0))
         self.generator.follow(vehicle)
         if standing:
@@ -182,14 +186,20 @@ class Pilot:
             self.readiness.trust_rotors()
 
     def sense(
-        self, now_us: int, vehicle: VehicleState, steered: Steered = NOT_STEERED, *, position_known: bool = True
+        self,
+        now_us: int,
+        vehicle: VehicleState,
+        steered: Steered = NOT_STEERED,
+        *,
+        position_known: bool = True,
+        delay_us: int = 0,
     ) -> None:
         """Take in the inputs of a control sample; the arguments are the fields of `Sensed`."""
-        self.sensed = Sensed(now_us, vehicle, steered, position_known)
+        self.sensed = Sensed(now_us, vehicle, steered, position_known, delay_us)
 
     def context(self) -> TaskContext:
         """Return the inputs of a task now."""
-        now_us, vehicle, steered, position_known = self.sensed
+        now_us, vehicle, steered, position_known, delay_us = self.sensed
         reference, behaviour = self.generator.reference, self.behaviour
         assert vehicle is not None, "the vehicle has been seen"
         assert reference is not None, "the vehicle has been seen"
@@ -198,7 +208,7 @@ class Pilot:
         if speed != behaviour.limits.speed_m_s:
             behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed))
         return TaskContext(
-            now_us,
+            now_us + delay_us,
             vehicle,
             reference,
             self.home.position_enu_m,
@@ -227,7 +237,7 @@ class Pilot:
         unmet = [need for need in missing if need is not Need.POSITION]  # a check of its own, and by force
         refusal = self._follow(Event.ARM, "rotors armed", missing=unmet)
         if refusal is None:
-            now_us, vehicle, _, _ = self.sensed
+            now_us, vehicle, *_ = self.sensed
             self.ground.arm(now_us)
             self.terminated = False
             if vehicle is not None:
@@ -302,7 +312,7 @@ class Pilot:
         if self.ground.standing:
             if not (wanted.lifts if isinstance(wanted, AttitudeMotion) else lifts(wanted.target, context.state)):
                 return self._idle()
-            self.ground.take_off(context.now_us)
+            self.ground.take_off(self.sensed.now_us)
         guidance = self._guidance(context, wanted, begins=self.ground.spin_up())
         ended = _ENDS.get(self.state.mode)
         if self.task.arrived(context) and ended is not None:
@@ -313,7 +323,7 @@ class Pilot:
         self, context: TaskContext, wanted: AttitudeMotion | Motion | PlannedMotion, *, begins: bool
     ) -> Guidance:
         """Return the references by which the output of a task is flown, and look for the ground."""
-        now_us, vehicle = context.now_us, context.state
+        now_us, vehicle = self.sensed.now_us, context.state
         if isinstance(wanted, AttitudeMotion):
             self.generator.set(wanted.reference)
             self.ground.watch(now_us, vehicle, sinks=wanted.sinks, drifts=wanted.drifts)
@@ -324,7 +334,7 @@ class Pilot:
 
     def _rest(self) -> Guidance:
         """Lie, or fall, with the rotors standing still or idle."""
-        now_us, vehicle, _, _ = self.sensed
+        now_us, vehicle, *_ = self.sensed
         assert vehicle is not None, "the vehicle has been seen"
         self.generator.rest(vehicle)
         self.ground.rest(now_us, vehicle)

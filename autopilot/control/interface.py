@@ -179,8 +179,8 @@ class Controller(Protocol[Memory]):
         Args:
             memory: What the step before returned.
             time_us: Simulated time, µs, a multiple of the control interval.
-            state: The vehicle now.
-            references: The references of `preview`.
+            state: The vehicle when the decision takes effect: now, unless a delay is compensated.
+            references: The references of `preview`, from that instant on.
         """
 
 

@@ -110,6 +110,13 @@ class ControlLoop:
             charge_ah = estimated(self._charged.charge_ah(self._memory), used_ah, self.vehicle)
             self._memory = self._charged.with_charge(self._memory, charge_ah)
 
+    @property
+    def charge_ah(self) -> float:
+        """Charge taken from the battery: as a law remembers it that does, else as the battery has reported it, Ah."""
+        if self._charged is None or self._memory is None:
+            return self._reported_ah
+        return self._charged.charge_ah(self._memory)
+
     def record(self) -> LoopRecord:
         """Return what is remembered; a law of somebody else's may remember what cannot be kept."""
         memory = b""

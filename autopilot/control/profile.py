@@ -38,6 +38,8 @@ class ProfileTables(Table, frozen=True, forbid_unknown_fields=True, kw_only=True
     """The control law that flies, by the name it is registered under."""
     references: References
     """Velocity and yaw from the track's formula, or by backward differences as in the thesis."""
+    delay_s: Annotated[float, msgspec.Meta(ge=0.0, le=0.2)] | None = None
+    """From a frame to the moment at which its command takes effect, compensated; None: as the plant measures it."""
     controllers: dict[str, dict[str, Any]]
     """The numbers of each control law that the profile knows; each law reads its own table strictly."""
     simulation: SimulationSettings
@@ -62,13 +64,14 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         """Return the numbers of a control law; none for one that the profile does not know."""
         return self.controllers.get(controller, {})
 
-    def with_choices(self, controller: str | None, solver: str | None) -> "Profile":
-        """Return the profile with another control law, and another QP solver in the table of the one that flies.
+    def with_choices(self, controller: str | None, solver: str | None, delay_s: float | None = None) -> "Profile":
+        """Return the profile with another control law, another QP solver in the table of that, and another delay.
 
         Raises:
             ProfileError: The control law has no QP to solve.
         """
-        chosen = msgspec.structs.replace(self, controller=controller or self.controller)
+        told_s = self.delay_s if delay_s is None else delay_s
+        chosen = msgspec.structs.replace(self, controller=controller or self.controller, delay_s=told_s)
         if solver is None:
             return chosen
         table = chosen.table(chosen.controller)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from colibri.autopilot.control.interface import Clock
+from colibri.autopilot.control.interface import Clock, VehicleState
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.checkpoint import Checkpoint, Checkpointer, History, fingerprint_of
 from colibri.autopilot.core.defence import errors
@@ -113,6 +113,8 @@ class Copter:
         self._plant_status, self.defence.frame = plant_status, frame
         if plant_status.battery is not None:
             self._know_charge(plant_status.battery)
+        if plant_status.delay_us is not None:
+            parts.delay.measure(plant_status.delay_us)
         self._wake(now_us)
         due = parts.loop.is_due(now_us)
         goes_on = follows(now_us, self._time_us, self.frame_interval_us)
@@ -129,16 +131,29 @@ class Copter:
         if due:
             try:
                 state = parts.loop.state(known)
-                guidance, decision = self._flying.step(now_us, state, blind=self._estimates.blind)
+                guidance, decision = self._flying.step(now_us, self._ahead(known, state), blind=self._estimates.blind)
             except Exception as error:
                 self.defence.caught(errors.STEP, error)
                 decision = self._flying.rescue(now_us, known)
             estimate = parts.state_source.estimate
         command = ActuatorCommand(now_us, parts.actuation.send(now_us), armed=self._flying.armed)
+        parts.delay.sent(command)
         duration_s = self._clock() - started_s
         if guidance is not None:
             self._sample = Sample(now_us, state, guidance, parts.actuation.decision, duration_s)
-        return Step(command, decision, duration_s, estimate, self._faults())
+        return Step(command, decision, duration_s, estimate, self._faults(), delay_us=parts.delay.delay_us)
+
+    def _ahead(self, known: StateFrame, state: VehicleState) -> VehicleState:
+        """Return the state at which a command of now takes effect; that of now where nothing delays it."""
+        parts, standing = self.parts, self.pilot.ground.standing
+        if parts.delay.delay_us == 0 or errors.DELAY in self.defence.off:
+            return state
+        try:
+            ahead = parts.delay.ahead(known, parts.battery.charge_ah, standing=standing)
+            return parts.loop.state(ahead)
+        except Exception as error:
+            self.defence.caught(errors.DELAY, error)
+            return state
 
     def _know_charge(self, battery: PlantBattery) -> None:
         if errors.BATTERY in self.defence.off:
@@ -160,6 +175,7 @@ class Copter:
         for part in (errors.RESTART, errors.START):
             try:
                 self._start.begin(known, self._time_us)
+                self.parts.delay.begin(self.parts.actuation.sent)
                 return
             except Exception as error:
                 self.defence.caught(part, error)

@@ -76,7 +76,8 @@ class FlightStart:
         speed = self._start_speed if frame.time_us == 0 else loop.vehicle.hover_speed
         loop.begin(loop.vehicle.rotors.idle_speed if rests else speed, parts.tasks.first_yaw_rad)
         mode = Mode.TRACK if parts.tasks.is_first else None
-        parts.pilot.begin(frame.time_us, loop.state(frame), mode=mode, rests=rests)
+        delay_us = parts.delay.delay_us
+        parts.pilot.begin(frame.time_us, loop.state(frame), mode=mode, rests=rests, delay_us=delay_us)
         parts.rotor_loss.forget()
         parts.actuation.begin(STILL if parts.pilot.ground.standing else loop.controls)
         parts.pilot.readiness.trust_rotors()

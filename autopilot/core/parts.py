@@ -9,6 +9,7 @@ from colibri.autopilot.commander.mode_tasks import ModeTasks
 from colibri.autopilot.commander.pilot import Pilot
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.commander.supervisor import Supervisor
+from colibri.autopilot.control.delay import DelayCompensation
 from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
@@ -22,6 +23,7 @@ from colibri.autopilot.ground.battery_monitor import BatteryMonitor
 from colibri.autopilot.ground.snapshots import SnapshotBuilder
 from colibri.autopilot.ground.stations import Stations, StationSettings
 from colibri.autopilot.guidance.attitude_reference import AttitudeReference, attitude_limits
+from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.autopilot.parameters.definitions import Numbers, behaviour, definitions
@@ -38,6 +40,7 @@ class Parts:
     parameters: Parameters
     subscribers: Subscribers
     loop: ControlLoop
+    delay: DelayCompensation
     state_source: StateSource
     actuation: Actuation
     rotor_loss: RotorLoss
@@ -87,6 +90,12 @@ def parts_of(
     if rotor_loss.impossible:
         lines.say(WARNING, f"no landing on three rotors: {rotor_loss.impossible}")
     actuation = Actuation(loop, rotor_loss)
+    delay = DelayCompensation(assumed)
+
+    def obey_delay(flies_by: Behaviour) -> None:
+        delay.tell(profile.delay_s if flies_by.delay_s < 0.0 else flies_by.delay_s)
+
+    obey_delay(flies_by)
     trial = Trial(loop, rotor_loss, planned_at)
     tuning = Tuning(numbers, builder(profile.controller, clock), loop, stations.warn, parameters, trial)
     if values:
@@ -96,15 +105,19 @@ def parts_of(
     leads = () if attitude is None else (attitude,)
     subscribers = Subscribers(
         parameters=(supervisor.adopt,),
-        behaviour=(pilot.adopt, missions.adopt, rotor_loss.obey, *(part.obey for part in leads)),
+        behaviour=(pilot.adopt, missions.adopt, rotor_loss.obey, obey_delay, *(part.obey for part in leads)),
         law=(loop.adopt,),
-        vehicle=(tasks.adopt, rotor_loss.adopt, actuation.adopt, snapshots.adopt, *(part.adopt for part in leads)),
+        vehicle=(
+            *(tasks.adopt, rotor_loss.adopt, actuation.adopt, delay.adopt, snapshots.adopt),
+            *(part.adopt for part in leads),
+        ),
         flown=Flown(parameters.values, Tuned(flown, assumed, loop.controller)),
     )
     return Parts(
         parameters,
         subscribers,
         loop,
+        delay,
         StateSource(estimator, loop.frame_interval_us),
         actuation,
         rotor_loss,

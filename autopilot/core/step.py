@@ -29,7 +29,7 @@ class Step(NamedTuple):
 
     Between two control samples the last command is sent again, and there is no decision. Where frames are
     states there is no estimate. Faults are requested of the plant with the command. Unless the vehicle is `known`, its
-    rotors stand.
+    rotors stand. The delay is the one that is compensated.
     """
 
     command: ActuatorCommand
@@ -38,6 +38,7 @@ class Step(NamedTuple):
     estimate: Estimate | None = None
     faults: tuple[Fault, ...] = ()
     known: bool = True
+    delay_us: int = 0
 
 
 def nothing_known(time_us: int, duration_s: float) -> Step:

@@ -38,7 +38,8 @@ class Supervision:
             except Exception as error:
                 defence.caught(errors.ROTOR_WATCH, error)
         steered, position_known = self._sensed(now_us)
-        parts.pilot.sense(now_us, state, steered, position_known=position_known)
+        delay_us = 0 if errors.DELAY in defence.off else parts.delay.delay_us
+        parts.pilot.sense(now_us, state, steered, position_known=position_known, delay_us=delay_us)
         if errors.FAILSAFES not in defence.off:
             try:
                 action = parts.supervisor.step(self._inputs(now_us, state), parts.pilot.flight)

@@ -1,5 +1,6 @@
 """An autopilot that flies one track, without ground stations."""
 
+from colibri.autopilot.control.delay import DelayCompensation
 from colibri.autopilot.control.interface import Clock
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
@@ -38,6 +39,7 @@ class Autopilot:
             SolverError: Its solver cannot be used.
         """
         self._loop = ControlLoop(profile, vehicle, clock)
+        self._delay = DelayCompensation(vehicle, profile.delay_s)
         self._planner = Planner(track, profile.references, self._loop.preview)
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock
@@ -58,6 +60,8 @@ class Autopilot:
         started_s = self._clock()
         if plant_status.battery is not None:
             self._loop.know_charge(plant_status.battery.used_ah)
+        if plant_status.delay_us is not None:
+            self._delay.measure(plant_status.delay_us)
         due = self._loop.is_due(frame.time_us)
         known = self._state_source.state(frame, asked=due)
         if known is None:
@@ -68,10 +72,14 @@ class Autopilot:
         self._time_us = frame.time_us
         decision = None
         if due:
-            state = self._loop.state(known)
-            decision = self._loop.decide(frame.time_us, state, self._planner.horizon(frame.time_us))
+            state = self._loop.state(self._delay.ahead(known, self._loop.charge_ah))
+            acts_us = frame.time_us + self._delay.delay_us
+            references = self._planner.horizon_at(acts_us, self._loop.control_interval_us)
+            decision = self._loop.decide(frame.time_us, state, references)
         command = ActuatorCommand(frame.time_us, self._loop.controls, armed=True)
-        return Step(command, decision, self._clock() - started_s, self._state_source.estimate if due else None)
+        self._delay.sent(command)
+        estimate = self._state_source.estimate if due else None
+        return Step(command, decision, self._clock() - started_s, estimate, delay_us=self._delay.delay_us)
 
     def _begin(self, frame: Frame) -> None:
         vehicle = self._loop.vehicle
@@ -79,3 +87,4 @@ class Autopilot:
         if self._time_us is None and self._state_source.rests:
             speed = vehicle.rotors.idle_speed
         self._loop.begin(speed, float(self._planner.horizon(frame.time_us).yaw_rad[0]))
+        self._delay.begin(self._loop.controls, rests=self._state_source.rests)

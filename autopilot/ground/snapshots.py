@@ -118,6 +118,7 @@ class SnapshotBuilder:
             battery=battery,
             setpoint=setpoint(guidance, decision, controls),
             solver=self._solver_state(now_us, state, guidance.horizon, decision, duration_s),
+            delay_us=pilot.sensed.delay_us,
             sticks=None if sticks is None else (sticks.pitch, sticks.roll, sticks.thrust, sticks.yaw),
             flight_started_us=pilot.ground.times.armed_us,
             takeoff_us=pilot.ground.times.takeoff_us,

@@ -14,7 +14,8 @@ class Behaviour:
     """Numbers of the vehicle's behaviour: each is a parameter, described in `parameters/behaviour.py`.
 
     Heights are above home, but for a take-off's, which is above where the vehicle stands. 0 is no limit of a distance
-    or height, and no disarming of a time. The solve time is what the control law is declared to take.
+    or height, and no disarming of a time. The solve time is what the control law is declared to take. The delay is that
+    of commands, compensated; negative: the profile's, which is measured unless it says one.
     """
 
     limits: Limits = _LIMITS
@@ -43,3 +44,4 @@ class Behaviour:
     land_on_three: bool = True
     inject_failures: bool = False
     solve_time_s: float = 0.0
+    delay_s: float = -0.001

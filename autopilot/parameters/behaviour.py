@@ -119,6 +119,11 @@ ROWS = (
         *(1e-3, 1),
     ),
     Row(
+        *("SYS_CMD_DELAY", "delay_s", "ms", -1.0, 200.0, "Delay of commands"),
+        "Compensated: from a frame until its command takes effect. -1: the profile's, or measured.",
+        *(1e-3, 1),
+    ),
+    Row(
         *("TRACK", "track", "", 0, len(TRACKS) - 1, "Track", "Which track mode Track flies."),
         values=tuple(enumerate(TRACKS)),
     ),

@@ -23,6 +23,7 @@ DECISION_COLUMNS = (
     *("t", "phi_ref", "theta_ref", "psi_ref"),
     *("qp_status", "fallback", "solve_time_us", "control_step_us", "cost", "slack"),
     *(f"active_{kind}" for kind in Active._fields),
+    "delay_us",
 )
 
 ESTIMATE_COLUMNS = (
@@ -80,7 +81,10 @@ class AutopilotLog:
         times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
         time_s = step.command.time_us / 1e6
         self._decisions.write(
-            (time_s, *step.decision.attitude_reference, *codes, *times_us, how.cost, how.slack, *how.active)
+            (
+                *(time_s, *step.decision.attitude_reference, *codes, *times_us, how.cost, how.slack, *how.active),
+                step.delay_us,
+            )
         )
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:

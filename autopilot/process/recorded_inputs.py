@@ -28,6 +28,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         profile: Name or file.
         controller: Of the profile's control laws.
         solver: QP solver chosen; None for the profile's.
+        delay_s: Delay chosen; None for the profile's.
         vehicle: That it controls, name or file.
         feedback: Kind of the frames, states or sensors.
         track: What it flew from the start; None where ground stations say what to fly.
@@ -48,6 +49,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     profile: str
     controller: str
     solver: str | None
+    delay_s: float | None = None
     vehicle: str
     feedback: Feedback
     track: str | None

@@ -10,6 +10,7 @@ from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.guidance.trajectories.loading import file_text, load_track
 from colibri.autopilot.process.client import Client
 from colibri.autopilot.process.logs import AutopilotLog
+from colibri.autopilot.process.options import delay_s
 from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
@@ -37,7 +38,7 @@ def loaded(args: argparse.Namespace) -> tuple[Profile, Vehicle]:
         ProfileError: There is no such profile, or it is wrong.
         VehicleError: There is no such vehicle.
     """
-    profile = load_profile(args.profile).with_choices(args.controller, args.solver)
+    profile = load_profile(args.profile).with_choices(args.controller, args.solver, delay_s(args.delay))
     vehicle = load_vehicle(args.vehicle or profile.simulation.vehicle)
     return profile, vehicle
 
@@ -80,6 +81,7 @@ def _setup(args: argparse.Namespace, profile: Profile, vehicle: Vehicle) -> Setu
         profile=args.profile,
         controller=profile.controller,
         solver=args.solver,
+        delay_s=delay_s(args.delay),
         vehicle=args.vehicle or profile.simulation.vehicle,
         feedback=args.feedback,
         track=flown,

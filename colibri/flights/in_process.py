@@ -11,6 +11,7 @@ from colibri.autopilot.core.track_autopilot import Autopilot
 from colibri.autopilot.estimation.state_source import estimator_for
 from colibri.autopilot.guidance.trajectories.loading import file_text
 from colibri.autopilot.process.logs import AutopilotLog
+from colibri.autopilot.process.options import delay_s
 from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.process.lifecycle import gc_frozen
@@ -92,6 +93,7 @@ def _setup(plan: FlightPlan) -> Setup:
         profile=plan.profile_name,
         controller=plan.profile.controller,
         solver=plan.solver,
+        delay_s=delay_s(plan.delay),
         vehicle=plan.vehicle_name,
         feedback=plan.feedback,
         track=plan.track_name,

@@ -10,6 +10,7 @@ from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.guidance.trajectories.planner import start_yaw
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track
+from colibri.autopilot.process.options import delay_s
 from colibri.common.errors import Error
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.open import check_reach
@@ -21,7 +22,7 @@ from colibri.plant.vehicle.description import Vehicle, VehicleError, load_vehicl
 
 OPTIONS = (
     *(each.name for each in fields(WorldSetting)),
-    *("solver", "vehicle", "plant_vehicle", "integrator", "feedback", "duration"),
+    *("solver", "delay", "vehicle", "plant_vehicle", "integrator", "feedback", "duration"),
 )
 """Names of the options that every command has that flies; track, profile, controller, link and folder are its own."""
 
@@ -75,11 +76,12 @@ class FlightPlan(WorldSetting):
         out: Folder for all that the flight leaves.
         controller: Control law by option; None for the profile's.
         solver: QP solver by option; None for the profile's.
+        delay: That is compensated, ms, by option; None for the profile's.
         ground: Who may watch and command.
         floor_m: Below which no track may lead, z of ENU; -inf for anywhere.
         track: The track to fly, changed where the vehicle could not fly it.
         track_note: What was changed, or which limit the track exceeds; empty for nothing.
-        profile: The profile, with controller and solver of the options.
+        profile: The profile, with controller, solver and delay of the options.
         vehicle: The vehicle that the autopilot controls.
         plant_vehicle: The vehicle that the plant flies, its parts left out.
     """
@@ -97,6 +99,7 @@ class FlightPlan(WorldSetting):
     out: Path
     controller: str | None
     solver: str | None
+    delay: float | None
     ground: GroundAccess
     floor_m: float
     track: Track
@@ -120,7 +123,7 @@ class FlightPlan(WorldSetting):
         if args.gcs and args.link != "udp":
             raise PlanError(f"--gcs needs --link udp: over {args.link} there is no autopilot to connect to")
         check_reach(args.gcs, signed=args.signing_key is not None, insecure=args.insecure)
-        profile = load_profile(args.profile).with_choices(args.controller, args.solver)
+        profile = load_profile(args.profile).with_choices(args.controller, args.solver, delay_s(args.delay))
         vehicle_name = args.vehicle or profile.simulation.vehicle
         plant_vehicle = load_vehicle(args.plant_vehicle or vehicle_name).without(args.without)
         return cls.of_contents(args, args.track, profile, load_vehicle(vehicle_name), plant_vehicle)
@@ -163,6 +166,7 @@ class FlightPlan(WorldSetting):
             out=args.out,
             controller=args.controller,
             solver=args.solver,
+            delay=args.delay,
             ground=GroundAccess(tuple(args.gcs), args.signing_key, args.insecure),
             floor_m=floor_m,
             track=to_fly,
@@ -179,7 +183,7 @@ class FlightPlan(WorldSetting):
         Raises:
             PlanError, ProfileError, VehicleError, TrackError: As `from_arguments`.
         """
-        unset = dict.fromkeys(("controller", "solver", "vehicle", "plant_vehicle", "integrator", "floor"))
+        unset = dict.fromkeys(("controller", "solver", "delay", "vehicle", "plant_vehicle", "integrator", "floor"))
         usual = {
             "gcs": (),
             "signing_key": None,

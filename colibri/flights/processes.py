@@ -87,6 +87,7 @@ def _autopilot_options(plan: FlightPlan, plant_url: str) -> list[str]:
         controller=plan.profile.controller,
         feedback=plan.feedback,
         solver=plan.solver,
+        delay=plan.delay,
         gcs=plan.ground.links,
         signing_key=plan.ground.signing_key,
         insecure=plan.ground.insecure,

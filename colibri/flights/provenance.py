@@ -63,7 +63,7 @@ class Provenance(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         colibri: Version that flew it.
         names: Of what follows by content.
         options: All others.
-        profile: With controller and solver of the options.
+        profile: With controller, solver and delay of the options.
         law: Where the control law comes from.
         vehicle: That the autopilot controlled.
         plant_vehicle: That the plant flew, its parts left out.
@@ -180,6 +180,7 @@ def plan_of(folder: Path) -> FlightPlan:
         signing_key=None,
         insecure=False,
         speed=inf,
+        delay=None,
         out=folder,
     )
     if kept.track_file is None:

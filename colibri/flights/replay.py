@@ -212,7 +212,7 @@ def _changed(inputs: Iterable[Input]) -> list[str]:
     changed = []
     for setup in (what for what in inputs if isinstance(what, Setup)):
         with suppress(Error):
-            now = load_profile(setup.profile).with_choices(setup.controller, setup.solver)
+            now = load_profile(setup.profile).with_choices(setup.controller, setup.solver, setup.delay_s)
             if setup.profile_tables not in (None, now):
                 changed.append(f"profile {setup.profile}")
         with suppress(Error):
@@ -233,7 +233,7 @@ def _logged_us(tlog: Path) -> int:
 def _begun(setup: Setup) -> Autopilot | Copter:
     """Return an autopilot that begins as it did then."""
     tables = setup.profile_tables or load_profile(setup.profile)
-    profile = tables.with_choices(setup.controller, setup.solver)
+    profile = tables.with_choices(setup.controller, setup.solver, setup.delay_s)
     vehicle = setup.vehicle_tables or load_vehicle(setup.vehicle)
     flown = _track(setup, vehicle, profile)
     if not setup.ground:

@@ -87,7 +87,7 @@ def debug_float_array(s: Snapshot) -> Fields:
 
 
 def named_value_float(s: Snapshot) -> list[Fields]:
-    """NAMED_VALUE_FLOAT (251), one a figure of the solver; names have at most ten letters."""
+    """NAMED_VALUE_FLOAT (251), one a figure: of the solver, and the delay compensated; names of at most ten letters."""
     solver = s.solver
     figures = {
         b"mpc_status": solver.status,
@@ -98,6 +98,7 @@ def named_value_float(s: Snapshot) -> list[Fields]:
         b"mpc_cost": solver.cost,
         b"mpc_slack": solver.slack,
         b"mpc_active": sum(solver.active),
+        b"delay_us": s.delay_us,
     }
     return [(boot_ms(s), name, float(value)) for name, value in figures.items()]
 

@@ -135,6 +135,7 @@ class Snapshot:
         attitude: Unit quaternion, FLU to ENU.
         rotor_speeds_rad_s: As the autopilot estimates them.
         controls: Commanded, parts of the largest speed.
+        delay_us: Of commands, compensated.
         sticks: Of the last MANUAL_CONTROL: pitch, roll, thrust, yaw, -1..1 (thrust 0..1); None without one.
         flight_started_us, takeoff_us, landing_us: Of the last arming, take-off and landing; 0 before.
         ground_m: Height of the ground below, over the origin.
@@ -169,6 +170,7 @@ class Snapshot:
     setpoint: Setpoint = NO_SETPOINT
     solver: SolverState = NOT_SOLVED
     wind_enu_m_s: Vector = NOWHERE
+    delay_us: int = 0
     sticks: FourRotors | None = None
     flight_started_us: int = 0
     takeoff_us: int = 0

@@ -84,8 +84,13 @@ class BatteryModel:
         return low
 
 
+def open_voltage_v(battery: Battery, charge_ah: float) -> float:
+    """Return the voltage without load once `charge_ah` is taken."""
+    used = min(charge_ah / battery.capacity_ah, 1.0)
+    return battery.full_voltage_v + (battery.empty_voltage_v - battery.full_voltage_v) * used
+
+
 def _voltage_v(battery: Battery, charge_ah: float, power_w: float) -> float:
     """Return the terminal voltage at which `power_w` is drawn: V² - V0 V + R P = 0, but at least half of V0."""
-    used = min(charge_ah / battery.capacity_ah, 1.0)
-    open_v = battery.full_voltage_v + (battery.empty_voltage_v - battery.full_voltage_v) * used
+    open_v = open_voltage_v(battery, charge_ah)
     return 0.5 * (open_v + sqrt(max(0.0, open_v * open_v - 4.0 * battery.resistance_ohm * power_w)))

@@ -20,6 +20,7 @@ RESTART: Final = "restart"
 START: Final = "flight start"
 ESTIMATOR: Final = "estimator"
 STANDBY: Final = "inertial estimate"
+DELAY: Final = "delay compensation"
 ROTOR_WATCH: Final = "rotor watch"
 SETPOINTS: Final = "setpoints"
 FAILSAFES: Final = "failsafes"
@@ -44,6 +45,7 @@ INSTEAD: Final = {
     START: "begun anew",
     ESTIMATOR: "inertial sensors carry on",
     STANDBY: "attitude stays as it was",
+    DELAY: "the delay is not compensated",
     ROTOR_WATCH: "lost rotors may go unnoticed",
     SETPOINTS: "none are taken",
     FAILSAFES: "none may act",

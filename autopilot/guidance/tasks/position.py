@@ -216,8 +216,9 @@ class TrackTask:
     def update(self, context: TaskContext) -> PlannedMotion:
         """Return the track."""
         since_us = context.now_us - self.began_us
-        for_law = self._planner_for_law.horizon(since_us) if self._planner_for_law else None
-        return PlannedMotion(self._planner.horizon(since_us), context.behaviour.limits, for_law)
+        grid_us = self._planner.preview.interval_us
+        for_law = self._planner_for_law.horizon_at(since_us, grid_us) if self._planner_for_law else None
+        return PlannedMotion(self._planner.horizon_at(since_us, grid_us), context.behaviour.limits, for_law)
 
     def arrived(self, context: TaskContext) -> bool:
         """Whether the track has ended."""

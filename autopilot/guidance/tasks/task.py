@@ -27,8 +27,8 @@ class TaskContext(NamedTuple):
     """Inputs of a task.
 
     Attributes:
-        now_us: Simulated time.
-        state: The vehicle.
+        now_us: Simulated time at which what is decided takes effect.
+        state: The vehicle then.
         reference: State of the reference.
         home_enu_m: Home.
         behaviour: The numbers that the vehicle flies by.

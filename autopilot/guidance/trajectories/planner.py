@@ -50,6 +50,12 @@ class Planner:
         ahead = slice(first, first + self.preview.samples)
         return Horizon(*(column[ahead] for column in self.table))
 
+    def horizon_at(self, time_us: int, grid_us: int) -> Horizon:
+        """Return the same for a time between two instants that are `grid_us` apart: each reference carried on."""
+        past_us = time_us % grid_us
+        horizon = self.horizon(time_us - past_us)
+        return carried(horizon, past_us * 1e-6) if past_us else horizon
+
     def _tabulate(self, block: int) -> Horizon:
         """Tabulate a block and what follows; for the differences from one sample before, if there is one."""
         first, lead = block * self._length, min(block, 1)
@@ -57,6 +63,22 @@ class Planner:
         interval_s = self.preview.interval_us * 1e-6
         by = _by_differences if self._references == "by-differences" else _by_formula
         return Horizon(*(column[lead:] for column in by(self._track, interval_s * samples, interval_s)))
+
+
+def carried(horizon: Horizon, by_s: float) -> Horizon:
+    """Return references a moment later each, by their derivatives."""
+    p, v, a, j, s, yaw, yaw_rate, yaw_acceleration = horizon
+    half, third, quarter = by_s / 2.0, by_s / 3.0, by_s / 4.0
+    return Horizon(
+        p + by_s * (v + half * (a + third * (j + quarter * s))),
+        v + by_s * (a + half * (j + third * s)),
+        a + by_s * (j + half * s),
+        j + by_s * s,
+        s,
+        yaw + by_s * (yaw_rate + half * yaw_acceleration),
+        yaw_rate + by_s * yaw_acceleration,
+        yaw_acceleration,
+    )
 
 
 def start_yaw(track: Track, references: References) -> float:

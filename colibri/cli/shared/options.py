@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from colibri.autopilot.process.options import add_delay
 from colibri.common.process.arguments import ArgumentParser, natural, number, positive
 from colibri.mavlink.hil.feedback import Feedback, feedback
 from colibri.plant.process.options import add_world_arguments
@@ -25,6 +26,7 @@ def add_flight_options(parser: ArgumentParser) -> None:
     add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
     add_feedback(add)
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
+    add_delay(add)
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
     add("--floor", type=number, metavar="M", help="no track may lead below this height, m (default: the ground, 0)")

@@ -1,8 +1,9 @@
 """`python -m tests.flights.processes.latency_over_udp SPEED MS...`: docs/latency.md with a plant that runs freely.
 
-Two processes over UDP beside the wall clock, and a relay between them that delays each datagram by half of the round
-trip. What the processes themselves take comes on top, and is measured: the time from a frame's being due to its answer.
-At a SPEED below 1 time is slow for the plant, and what else the computer does counts for less.
+The delay is not compensated. Two processes over UDP beside the wall clock, and a relay between them that delays each
+datagram by half of the round trip. What the processes themselves take comes on top, and is measured: the time from a
+frame's being due to its answer. At a SPEED below 1 time is slow for the plant, and what else the computer does counts
+for less.
 """
 
 import sys
@@ -64,7 +65,8 @@ def fly(case: Case, round_trip_ms: float, speed: float) -> tuple[Merit | None, f
         plant = Process(logs, "plant", "--realtime", "--link", "udpin:127.0.0.1:0", *options)
         url = plant.wait_for("listening")["url"].replace("udpin", "udpout")
         with DelayRelay(url, 0.5e-3 * round_trip_ms / speed) as relay:
-            autopilot = Process(logs, "autopilot", "--plant", relay.url, "--track", case.track, "--out", str(out))
+            to_fly = ("--plant", relay.url, "--track", case.track, "--delay", "0", "--out", str(out))
+            autopilot = Process(logs, "autopilot", *to_fly)
             with running(plant, autopilot):
                 plant.process.wait()
                 ended = plant.events("ended")

@@ -177,7 +177,7 @@ def test_a_place_is_told_to_a_centimetre(name: str) -> None:
 
 def test_each_figure_of_the_solver_has_a_name() -> None:
     figures = {fields.name: fields.value for fields in sent("NAMED_VALUE_FLOAT", FLYING)}
-    assert len(figures) == 8
+    assert len(figures) == 9
     assert figures["mpc_iter"] == 7.0
     assert figures["mpc_us"] == pytest.approx(100.0)
     assert figures["mpc_active"] == 10.0

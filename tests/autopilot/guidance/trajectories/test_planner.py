@@ -212,3 +212,13 @@ def test_after_its_end_a_track_holds_its_last_point(time_us: int, kind: Referenc
     horizon = horizon_from("wave", time_us, 2, kind)
     assert horizon.position_enu_m[1] == pytest.approx([-2.0, 200.0, 5.0])
     assert horizon.velocity_enu_m_s[1] == pytest.approx([0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("name", ["lemniscate", "circle:radius=3,speed=4"])
+def test_between_two_instants_references_are_the_tracks(name: str) -> None:
+    fine = Planner(track(name), "by-formula", Preview(1_000, 1))
+    coarse = Planner(track(name), "by-formula", PREVIEW)
+    assert np.array_equal(coarse.horizon_at(800_000, 8_000).position_enu_m, coarse.horizon(800_000).position_enu_m)
+    between, there = coarse.horizon_at(1_207_000, 8_000), fine.horizon(1_207_000)
+    for column, exact, within in zip(between, there, (1e-9, 1e-8, 1e-5, 1e-2, 1.0, 1e-5, 1e-3, 1.0), strict=True):
+        assert column[0] == pytest.approx(exact[0], abs=within)

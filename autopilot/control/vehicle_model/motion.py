@@ -1,0 +1,185 @@
+"""The vehicle's equations of motion as the autopilot models them, x' = f(x), and x carried forward by them.
+
+x is position, m, and velocity, m/s, ENU; the attitude quaternion, FLU body to ENU; body rates, rad/s, FLU; and rotor
+speeds in the vehicle's unit: 17 values. Rotors lag, drag, and turn the body by their momentum; they reach what the
+battery's voltage allows. There is neither wind nor ground: what is not modelled is a disturbance.
+"""
+
+from math import ceil, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.common.compiled_rotations import rotation_matrix
+from colibri.common.jit import Packed, compiled
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+STATES = 17
+POSITION, VELOCITY, ATTITUDE, RATE, ROTORS = slice(3), slice(3, 6), slice(6, 10), slice(10, 13), slice(13, 17)
+
+_STEP_S = 0.002
+_ROUNDING = 1e-6
+
+
+class MotionModel(NamedTuple):
+    """The numbers of a vehicle in its equations of motion; what is not modelled leaves no trace.
+
+    Attributes:
+        inertia: Ix, Iy, Iz, kg m², (3,).
+        allocation: From squared rotor speeds to U1 (N), U2, U3, U4 (N m), (4, 4).
+        momentum: Angular momentum of each rotor along body z, with its sign, N m s per speed unit, (4,).
+        arms_m: Forward and left of each rotor, (4, 2).
+        drag: Of the airframe along the FLU axes, N s/m, (3,).
+        rotor_drag: Of one rotor in its plane, N per m/s and per speed unit.
+        lag_up_s, lag_down_s: Time constants of rotors that speed up and slow down; 0 where they follow at once.
+        top_speed: Of a rotor, at the battery's full voltage.
+        power_w: Electrical power of each rotor, W per speed unit cubed, (4,).
+        full_voltage_v: Open-circuit voltage of the full battery.
+        resistance_ohm: Of the battery.
+    """
+
+    mass_kg: float
+    gravity_m_s2: float
+    inertia: Array
+    allocation: Array
+    momentum: Array
+    arms_m: Array
+    drag: Array
+    rotor_drag: float
+    lag_up_s: float
+    lag_down_s: float
+    top_speed: float
+    power_w: Array
+    full_voltage_v: float
+    resistance_ohm: float
+
+
+def motion_model(vehicle: Vehicle) -> MotionModel:
+    """Return the numbers of `vehicle`."""
+    rotors, drag, battery = vehicle.rotors, vehicle.drag, vehicle.battery
+    allocation = vehicle.allocation()
+    torque = np.abs(allocation[3]) * vehicle.rad_s_per_speed_unit
+    return MotionModel(
+        mass_kg=vehicle.body.mass_kg,
+        gravity_m_s2=vehicle.gravity_m_s2,
+        inertia=np.array(vehicle.body.inertia_kg_m2),
+        allocation=allocation,
+        momentum=vehicle.rotor_momentum(),
+        arms_m=np.array(rotors.position_m),
+        drag=np.array(drag.linear_n_s_m if drag else (0.0, 0.0, 0.0)),
+        rotor_drag=drag.rotor_coefficient if drag else 0.0,
+        lag_up_s=rotors.lag.time_constant_up_s if rotors.lag else 0.0,
+        lag_down_s=rotors.lag.time_constant_down_s if rotors.lag else 0.0,
+        top_speed=rotors.max_speed,
+        power_w=torque / battery.efficiency if battery else np.zeros(4),
+        full_voltage_v=battery.full_voltage_v if battery else 1.0,
+        resistance_ohm=battery.resistance_ohm if battery else 0.0,
+    )
+
+
+@compiled
+def carry(
+    x: Array, durations_s: Array, commands: Array, disturbance: Array, open_voltage_v: float, packed: Packed
+) -> Array:
+    """Return x, (17,), after commands that follow each other, by the classical Runge-Kutta rule.
+
+    Args:
+        x: Now.
+        durations_s: How long each command acts, (n,).
+        commands: Rotor speeds commanded, the vehicle's unit, (n, 4).
+        disturbance: Acceleration, m/s², ENU, and angular acceleration, rad/s², FLU, beside the model's, (6,).
+        open_voltage_v: Of the battery without load.
+        packed: The `MotionModel`.
+    """
+    x = x.copy()
+    k1, k2, k3, k4 = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
+    for command in range(durations_s.size):
+        steps = max(1, ceil(durations_s[command] / _STEP_S - _ROUNDING))
+        h = durations_s[command] / steps
+        target = commands[command]
+        _follow_at_once(x, target, open_voltage_v, packed[0])
+        for _ in range(steps):
+            _write_derivative(k1, x, target, disturbance, open_voltage_v, packed[0])
+            _write_derivative(k2, x + 0.5 * h * k1, target, disturbance, open_voltage_v, packed[0])
+            _write_derivative(k3, x + 0.5 * h * k2, target, disturbance, open_voltage_v, packed[0])
+            _write_derivative(k4, x + h * k3, target, disturbance, open_voltage_v, packed[0])
+            for i in range(x.size):
+                x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+    length = sqrt(x[6] * x[6] + x[7] * x[7] + x[8] * x[8] + x[9] * x[9])
+    for i in range(6, 10):
+        x[i] /= length
+    return x
+
+
+@compiled
+def thrust_n(speeds: Array, packed: Packed) -> float:
+    """Return the thrust of rotor speeds (4,), the vehicle's unit."""
+    thrust = 0.0
+    for i in range(4):
+        thrust += packed[0].allocation[0, i] * speeds[i] * speeds[i]
+    return thrust
+
+
+@compiled
+def _write_derivative(
+    change: Array, x: Array, target: Array, disturbance: Array, open_voltage_v: float, model: MotionModel
+) -> None:
+    """Write x' to `change`, (17,)."""
+    top = _top_speed(x[13:], open_voltage_v, model)
+    h, h_rate, u1, u2, u3, u4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(4):
+        speed = x[13 + i]
+        way = min(target[i], top) - speed
+        lag_s = model.lag_up_s if way > 0.0 else model.lag_down_s
+        change[13 + i] = way / lag_s if lag_s > 0.0 else 0.0
+        h += model.momentum[i] * speed
+        h_rate += model.momentum[i] * change[13 + i]
+        squared = speed * speed
+        u1 += model.allocation[0, i] * squared
+        u2 += model.allocation[1, i] * squared
+        u3 += model.allocation[2, i] * squared
+        u4 += model.allocation[3, i] * squared
+    qw, qx, qy, qz, p, q, r = x[6], x[7], x[8], x[9], x[10], x[11], x[12]
+    (a, b, c), (d, e, f), (g, j, k) = rotation_matrix((qw, qx, qy, qz))
+    vx, vy, vz = x[3], x[4], x[5]
+    u, v, w = a * vx + d * vy + g * vz, b * vx + e * vy + j * vz, c * vx + f * vy + k * vz
+    fx, fy, fz = -model.drag[0] * u, -model.drag[1] * v, u1 - model.drag[2] * w
+    for i in range(4):
+        drag, ahead_m, left_m = -model.rotor_drag * x[13 + i], model.arms_m[i, 0], model.arms_m[i, 1]
+        rotor_fx, rotor_fy = drag * (u - r * left_m), drag * (v + r * ahead_m)
+        fx += rotor_fx
+        fy += rotor_fy
+        u4 += ahead_m * rotor_fy - left_m * rotor_fx
+    change[0], change[1], change[2] = vx, vy, vz
+    change[3] = (a * fx + b * fy + c * fz) / model.mass_kg + disturbance[0]
+    change[4] = (d * fx + e * fy + f * fz) / model.mass_kg + disturbance[1]
+    change[5] = (g * fx + j * fy + k * fz) / model.mass_kg - model.gravity_m_s2 + disturbance[2]
+    change[6] = -0.5 * (qx * p + qy * q + qz * r)
+    change[7] = 0.5 * (qw * p + qy * r - qz * q)
+    change[8] = 0.5 * (qw * q + qz * p - qx * r)
+    change[9] = 0.5 * (qw * r + qx * q - qy * p)
+    ix, iy, iz = model.inertia[0], model.inertia[1], model.inertia[2]
+    change[10] = (q * r * (iy - iz) - q * h + u2) / ix + disturbance[3]
+    change[11] = (p * r * (iz - ix) + p * h + u3) / iy + disturbance[4]
+    change[12] = (p * q * (ix - iy) + u4 - h_rate) / iz + disturbance[5]
+
+
+@compiled
+def _top_speed(speeds: Array, open_voltage_v: float, model: MotionModel) -> float:
+    """Return the speed that the battery lets a rotor reach while all turn at `speeds`, (4,)."""
+    power_w = 0.0
+    for i in range(4):
+        power_w += model.power_w[i] * speeds[i] * speeds[i] * speeds[i]
+    root = sqrt(max(0.0, open_voltage_v * open_voltage_v - 4.0 * model.resistance_ohm * power_w))
+    return model.top_speed * (0.5 * (open_voltage_v + root) / model.full_voltage_v)
+
+
+@compiled
+def _follow_at_once(x: Array, target: Array, open_voltage_v: float, model: MotionModel) -> None:
+    """Turn rotors without lag at what is commanded, as far as the battery lets them."""
+    if model.lag_up_s > 0.0:
+        return
+    top = _top_speed(target, open_voltage_v, model)
+    for i in range(4):
+        x[13 + i] = min(target[i], top)
