@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from colibri.analysis.recording import COLUMNS, Recording
-from tools.pages.latency import STEP, Merit, Point, fly, merit, page
+from tools.pages.latency import LAWS, LEMNISCATE, STEP, WAYS, Flight, Merit, Point, fly, merit, page, told_ms
 
 GOOD, BAD = Merit(0.001, 0.0, 40.0), Merit(0.4, 0.1, 70.0)
 
@@ -33,14 +33,22 @@ def test_overshoot_is_how_far_it_goes_past() -> None:
 
 
 def test_the_page_says_up_to_where_it_flies() -> None:
-    text = page([Point(0, GOOD, GOOD), Point(8, GOOD, GOOD), Point(16, BAD, None), Point(24, None, None)])
-    assert "to within 2 cm up to a round trip of 8 ms" in text
-    assert "up to 16 ms in hover, and 8 ms on the lemniscate" in text
+    flown: dict[float, tuple[Merit | None, Merit | None]] = {0: (GOOD, GOOD), 8: (BAD, GOOD), 16: (GOOD, None)}
+    points = [Point(law, way, ms, *flown[ms]) for law in LAWS for way in WAYS for ms in flown]
+    text = page(points)
+    assert text.count("flown well up to 0 ms, kept up to 8 ms") == len(LAWS) * len(WAYS)
     assert text.count("| lost |") > 0
 
 
-def test_a_round_trip_within_a_control_sample_is_flown() -> None:
-    went = fly(STEP._replace(duration_s=4.0, judged_from_s=3.5), 6.0)
-    assert went is not None
-    assert went.rms_m < 0.01
-    assert 30.0 < went.tilt_deg < 60.0
+def test_what_is_told_is_never_below_zero() -> None:
+    assert [told_ms(way, 3.0) for way in WAYS] == [0.0, None, 0.0, 8.0]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_compensated_a_round_trip_is_flown_by_which_it_is_lost_else(law: str) -> None:
+    case = LEMNISCATE._replace(duration_s=4.0, judged_from_s=3.0)
+    at_once, late = fly(Flight(law, case, 0.0, None)), fly(Flight(law, case, 40.0, None))
+    assert at_once is not None
+    assert late is not None
+    assert late.rms_m < 1.5 * at_once.rms_m
+    assert fly(Flight(law, case, 40.0, 0.0)) is None
