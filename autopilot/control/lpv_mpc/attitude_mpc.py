@@ -10,8 +10,8 @@ from colibri.autopilot.control.interface import Active, Clock, Diagnostics
 from colibri.autopilot.control.lpv_mpc import condensing, prediction
 from colibri.autopilot.control.lpv_mpc.condensing import Problem, Target
 from colibri.autopilot.control.lpv_mpc.prediction import INPUTS, STATES, Body, InitialState
+from colibri.autopilot.control.parts.riccati import lqr
 from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus
-from colibri.autopilot.control.riccati import lqr
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag
 from colibri.common.config import Count, Degrees, Positive, Table

@@ -7,7 +7,6 @@ from typing import Annotated, Any, NamedTuple
 import msgspec
 import numpy as np
 
-from colibri.autopilot.control import recovery
 from colibri.autopilot.control.interface import (
     AttitudeDemand,
     Clock,
@@ -25,11 +24,13 @@ from colibri.autopilot.control.lpv_mpc.condensing import Target
 from colibri.autopilot.control.lpv_mpc.outer_loop import GuidanceSettings, OuterLoop, Setpoint
 from colibri.autopilot.control.lpv_mpc.position_loop import Motion
 from colibri.autopilot.control.lpv_mpc.prediction import InitialState
+from colibri.autopilot.control.parts import recovery
 from colibri.autopilot.control.qp import QpSolver
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
 from colibri.autopilot.control.vehicle_model import disturbance_observer, rotor_lag
-from colibri.autopilot.control.vehicle_model.airframe import airframe_of, drag_force
+from colibri.autopilot.control.vehicle_model.airframe import drag_force
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
+from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings, observer_of
 from colibri.common.config import Count, Positive, Table, read_settings
 from colibri.common.elementary import square
 from colibri.common.jit import packed
@@ -43,15 +44,6 @@ _RECOVER_BEYOND = cos(radians(75.0))
 """A thrust axis further from where it must point, or a steeper pitch, is for the recovery law."""
 _NO_YAW = np.empty(0)
 _NOWHERE = (0.0, 0.0, 0.0)
-
-
-class ObserverSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The disturbance observers."""
-
-    acceleration_rad_s: Positive
-    moment_rad_s: Positive
-    max_acceleration_m_s2: Positive
-    max_moment_n_m: Positive
 
 
 class FallbackSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -302,20 +294,3 @@ class LpvMpc:
         return recovery.mix_with_priority(
             thrust_n, moments, problem.from_thrust, problem.from_moments, problem.min_squared, maximum
         )
-
-
-def observer_of(settings: ObserverSettings, vehicle: Vehicle, interval_s: float) -> disturbance_observer.Observer:
-    """Return the disturbance observer of `vehicle` that takes a step every `interval_s`."""
-    on_velocity, on_acceleration = disturbance_observer.gains(settings.acceleration_rad_s, interval_s)
-    on_rate, on_turn = disturbance_observer.gains(settings.moment_rad_s, interval_s)
-    return disturbance_observer.Observer(
-        on_velocity,
-        on_acceleration,
-        on_rate,
-        on_turn,
-        settings.max_acceleration_m_s2,
-        settings.max_moment_n_m,
-        airframe_of(vehicle),
-        np.array(vehicle.body.inertia_kg_m2),
-        interval_s,
-    )

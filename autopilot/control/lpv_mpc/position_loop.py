@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
-from colibri.common import elementwise
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import atan2, cos, sin
 from colibri.common.types import Array
@@ -94,23 +93,6 @@ class Demands(NamedTuple):
     angles: Array
     thrusts: Array
     end: Array
-
-
-def error_transition(poles: tuple[float, float], interval_s: float, samples: int) -> Array:
-    """Return how an error and its rate (2,) go on at each sample from now, (samples, 2, 2), the poles being placed."""
-    first, second = poles
-    t = interval_s * np.arange(samples, dtype=np.float64)
-    if first == second:
-        decay = elementwise.exp(first * t)
-        rows = [[(1.0 - first * t) * decay, t * decay], [-first * first * t * decay, (1.0 + first * t) * decay]]
-    else:
-        a, b = elementwise.exp(first * t), elementwise.exp(second * t)
-        apart = first - second
-        rows = [
-            [(first * b - second * a) / apart, (a - b) / apart],
-            [first * second * (b - a) / apart, (first * a - second * b) / apart],
-        ]
-    return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
 
 
 @compiled

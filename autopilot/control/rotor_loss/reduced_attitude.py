@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.riccati import lqr
+from colibri.autopilot.control.parts.riccati import lqr
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.kernels import atan, exp, log, tan
 from colibri.common.matrices import dot, expm, matvec

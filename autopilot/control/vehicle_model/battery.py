@@ -7,6 +7,7 @@ charge taken, and the rotors' top speed in proportion to V.
 from math import sqrt
 
 from colibri.common.elementary import square
+from colibri.common.jit import compiled
 from colibri.common.matrices import dot
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Battery, Vehicle
@@ -57,6 +58,18 @@ class BatteryModel:
             return 1.0
         return self.terminal(charge_ah, speeds)[0] / self._battery.full_voltage_v
 
+    def limit_squared(self, charge_ah: float, expected: Array, limits: Array) -> None:
+        """Fill the largest squared speeds that a rotor can reach, (N,), while all have the power of those expected.
+
+        Squared speeds are in parts of the largest; those expected, (n, 4), stay after the last.
+        """
+        if self._battery is None:
+            limits[:] = 1.0
+            return
+        battery = self._battery
+        open_v, full_v = open_voltage_v(battery, charge_ah), battery.full_voltage_v
+        _fill_limits(expected, self._full_power_w, open_v, battery.resistance_ohm, full_v, limits)
+
     def max_common_speed(self, charge_ah: float) -> float:
         """Return the speed that all rotors can keep up together once `charge_ah` is taken, in parts of the largest."""
         if self._battery is None:
@@ -94,3 +107,19 @@ def _voltage_v(battery: Battery, charge_ah: float, power_w: float) -> float:
     """Return the terminal voltage at which `power_w` is drawn: V² - V0 V + R P = 0, but at least half of V0."""
     open_v = open_voltage_v(battery, charge_ah)
     return 0.5 * (open_v + sqrt(max(0.0, open_v * open_v - 4.0 * battery.resistance_ohm * power_w)))
+
+
+@compiled
+def _fill_limits(
+    expected: Array, full_power_w: float, open_v: float, resistance_ohm: float, full_v: float, limits: Array
+) -> None:
+    for n in range(limits.shape[0]):
+        if n < expected.shape[0]:
+            power_w = 0.0
+            for rotor in range(expected.shape[1]):
+                squared = min(max(expected[n, rotor], 0.0), 1.0)
+                power_w += full_power_w * squared * sqrt(squared)
+            voltage_v = 0.5 * (open_v + sqrt(max(0.0, open_v * open_v - 4.0 * resistance_ohm * power_w)))
+            limits[n] = voltage_v / full_v * (voltage_v / full_v)
+        else:
+            limits[n] = limits[n - 1]

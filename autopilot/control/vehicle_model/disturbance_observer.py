@@ -8,16 +8,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.vehicle_model.airframe import Airframe
+from colibri.autopilot.control.vehicle_model.airframe import Airframe, airframe_of
+from colibri.common.config import Positive, Table
 from colibri.common.elementary import square
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import exp
 from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
 
 ESTIMATES = 12
 """Velocity, m/s (ENU); body rates, rad/s; disturbances: acceleration, m/s² (ENU), and moment, N m."""
 MEASURED = 9
 """Velocity, m/s (ENU); body rates, rad/s; body z axis (ENU)."""
+
+
+class ObserverSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The disturbance observers."""
+
+    acceleration_rad_s: Positive
+    moment_rad_s: Positive
+    max_acceleration_m_s2: Positive
+    max_moment_n_m: Positive
 
 
 class Observer(NamedTuple):
@@ -43,6 +54,23 @@ class Observer(NamedTuple):
     airframe: Airframe
     inertia: Array
     interval_s: float
+
+
+def observer_of(settings: ObserverSettings, vehicle: Vehicle, interval_s: float) -> Observer:
+    """Return the disturbance observer of `vehicle` that takes a step every `interval_s`."""
+    on_velocity, on_acceleration = gains(settings.acceleration_rad_s, interval_s)
+    on_rate, on_turn = gains(settings.moment_rad_s, interval_s)
+    return Observer(
+        on_velocity,
+        on_acceleration,
+        on_rate,
+        on_turn,
+        settings.max_acceleration_m_s2,
+        settings.max_moment_n_m,
+        airframe_of(vehicle),
+        np.array(vehicle.body.inertia_kg_m2),
+        interval_s,
+    )
 
 
 def gains(frequency_rad_s: float, interval_s: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from math import hypot, radians
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Decision, Horizon, VehicleState
-from colibri.autopilot.control.recovery import TurnGains, mix_with_priority, turning_moment
+from colibri.autopilot.control.parts.recovery import TurnGains, mix_with_priority, turning_moment
 from colibri.autopilot.control.rotor_loss.three_rotors import angles_of
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.common.compiled_rotations import quaternion_from_euler

@@ -17,7 +17,7 @@ from colibri.plant.vehicle.description import load_vehicle
 VEHICLE = load_vehicle("hummingbird")
 PROFILE = load_profile("flight")
 WEIGHT_N = VEHICLE.body.mass_kg * VEHICLE.gravity_m_s2
-LAWS = ("lpv-mpc", "geometric-se3")
+LAWS = ("lpv-mpc", "whole-lpv-mpc", "geometric-se3")
 
 
 def build(name: str = "lpv-mpc") -> Any:

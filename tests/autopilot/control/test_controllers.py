@@ -49,7 +49,7 @@ def staying(preview: Preview) -> Horizon:
 
 
 def test_four_come_along() -> None:
-    assert controller_names() == ["cascade", "geometric-se3", "global-lpv-mpc", "lpv-mpc"]
+    assert controller_names() == ["cascade", "geometric-se3", "global-lpv-mpc", "lpv-mpc", "whole-lpv-mpc"]
 
 
 @pytest.mark.parametrize("name", PROFILES)

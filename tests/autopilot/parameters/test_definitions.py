@@ -35,7 +35,7 @@ def differences(before: Any, after: Any) -> set[str]:
     return {described(path) for path in numbers if read(before, path) != read(after, path)}
 
 
-@pytest.mark.parametrize("controller", ["lpv-mpc", "geometric-se3", "cascade", "global-lpv-mpc"])
+@pytest.mark.parametrize("controller", ["lpv-mpc", "whole-lpv-mpc", "geometric-se3", "cascade", "global-lpv-mpc"])
 @pytest.mark.parametrize("vehicle", ["hummingbird", "hummingbird-thesis"])
 def test_there_are_parameters_for_every_law_and_vehicle(controller: str, vehicle: str) -> None:
     profile = load_profile("flight" if controller in FLIGHT.controllers else "thesis").with_choices(controller, None)

@@ -10,6 +10,7 @@ from scipy.linalg import expm
 
 from colibri.autopilot.control.lpv_mpc import position_loop
 from colibri.autopilot.control.lpv_mpc.position_loop import Limits, Loop, Motion
+from colibri.autopilot.control.parts.error_dynamics import error_transition
 from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
 from colibri.common.rotations import quaternion_from_euler, rotation_matrix
 from tests.strategies import reals, vectors
@@ -25,7 +26,7 @@ NOTHING = np.zeros(3)
 def test_errors_go_on_as_the_poles_say(poles: tuple[float, float]) -> None:
     first, second = poles
     A = np.array([[0.0, 1.0], [-first * second, first + second]])
-    for sample, transition in enumerate(position_loop.error_transition(poles, 0.05, 12)):
+    for sample, transition in enumerate(error_transition(poles, 0.05, 12)):
         assert transition == pytest.approx(expm(A * 0.05 * sample), abs=1e-12)
 
 

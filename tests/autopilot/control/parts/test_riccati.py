@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_are
 
-from colibri.autopilot.control.riccati import lqr
+from colibri.autopilot.control.parts.riccati import lqr
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12), st.integers(1, 4))

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from colibri.autopilot.control.lpv_mpc.attitude_mpc import squared_speeds_from
-from colibri.autopilot.control.recovery import TurnGains, mix_with_priority, turning_moment
+from colibri.autopilot.control.parts.recovery import TurnGains, mix_with_priority, turning_moment
 from colibri.common.rotations import normalized, rotation_matrix
 from colibri.common.types import Quaternion, Vector
 from colibri.plant.vehicle.description import load_vehicle

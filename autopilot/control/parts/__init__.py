@@ -1,0 +1,1 @@
+"""Parts that several control laws are made of."""

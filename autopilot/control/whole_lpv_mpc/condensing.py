@@ -1,0 +1,378 @@
+"""The whole-vehicle MPC's QP, condensed to corrections of the rotor commands, as compiled kernels.
+
+    z = changes of the corrections: of each rotor in each block, then two slacks where soft limits are held
+    min ½ zᵀHz + fᵀz   subject to   G z <= h,   lower <= z <= upper
+
+A command is what the references ask for plus a correction that a block of steps has in common. The QP is about the
+nominal motion, whose corrections are those of the last plan. With b blocks the kernels take and fill:
+
+    motion, speeds   nominal, (N + 1, 13) and (N + 1, 4), of `model.roll_out`
+    responses        of `model.respond`, (N + 1, 12, 4 b)
+    H, f, lower, upper, G, h    (n, n), (n,), (n,), (n,), (m, n), (m,), with n = 4 b, or 4 b + 2 with slacks
+"""
+
+from math import floor, pi, sqrt
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from colibri.autopilot.control.whole_lpv_mpc.feed_forward import rate_between
+from colibri.autopilot.control.whole_lpv_mpc.model import (
+    DEVIATIONS,
+    POSITION,
+    RATE,
+    ROTATION,
+    ROTORS,
+    VELOCITY,
+)
+from colibri.common.compiled_rotations import euler_from_quaternion, rotation_matrix
+from colibri.common.jit import Packed, compiled
+from colibri.common.kernels import atan2
+from colibri.common.types import Array
+
+Integers: TypeAlias = NDArray[np.int64]
+
+STATES = DEVIATIONS + ROTORS
+"""Of the terminal cost: position, velocity, rotation, all in body axes, rates, squared rotor speeds."""
+SLACKS = 2
+TILT_SLACK, RATE_SLACK = 0, 1
+MOTION_ROWS = 7
+"""Of each step that is checked: tilt, and both sides of p, q and r."""
+PREDICTED = 16
+"""Position, m, velocity, m/s, ENU; phi, theta, psi, rad; p, q, r, rad/s; squared rotor speeds."""
+
+
+class Weights(NamedTuple):
+    """Of the errors at each step that counts, and of the corrections.
+
+    Attributes:
+        position, velocity: 1/m² and s²/m².
+        tilt: Of a demanded attitude, 1/rad².
+        heading: 1/rad².
+        rate: s²/rad².
+        thrust: Of a demanded thrust, 1/N².
+        first, next: Of the first correction's difference from the last plan's, and of each other's from the one before.
+    """
+
+    position: float
+    velocity: float
+    tilt: float
+    heading: float
+    rate: float
+    thrust: float
+    first: float
+    next: float
+
+
+class Problem(NamedTuple):
+    """What all QPs of one kind share.
+
+    Attributes:
+        starts: Step at which each block begins, and N, (b + 1,).
+        counted: Steps at which errors count, (c,).
+        checked: Steps at which soft limits are held, (d,).
+        weights: Of the errors.
+        terminal: S on the error at the end, (16, 16), symmetric.
+        allocation: Thrust of each rotor at its largest speed, N, (4,).
+        levels: Squared speed at each step that a unit correction of each block leads to, (b, N + 1).
+        min_cos_tilt: Of the soft limit.
+        max_rate: Of |p|, |q|, |r|, rad/s, (3,).
+    """
+
+    starts: Integers
+    counted: Integers
+    checked: Integers
+    weights: Weights
+    terminal: Array
+    allocation: Array
+    levels: Array
+    min_cos_tilt: float
+    max_rate: Array
+
+
+class Target(NamedTuple):
+    """What the motion is to follow; samples are from now to one past the horizon, n = N + 2.
+
+    Attributes:
+        position, velocity: m and m/s, ENU, (n, 3).
+        attitudes: Body to earth, (n, 3, 3).
+        yaw_rad: (n,), in any turn.
+        rates: rad/s, FLU, at samples 1 to N, (N, 3).
+        squared: Squared rotor speeds at samples 0 to N, (N + 1, 4).
+        thrusts_n: U1, (n,).
+    """
+
+    position: Array
+    velocity: Array
+    attitudes: Array
+    yaw_rad: Array
+    rates: Array
+    squared: Array
+    thrusts_n: Array
+
+
+@compiled
+def cost(
+    motion: Array,
+    speeds: Array,
+    responses: Array,
+    target: Target,
+    corrections: Array,
+    packed: Packed,
+    H: Array,
+    f: Array,
+) -> None:
+    """Fill H and f of the corrections' changes.
+
+    `corrections` are that which flew last and then the nominal ones, (b + 1, 4).
+    """
+    problem = packed[0]
+    weights = problem.weights
+    moved = responses.shape[2]
+    H[:, :] = 0.0
+    f[:] = 0.0
+    row = np.empty(moved)
+    for step in problem.counted:
+        X, x = responses[step], motion[step]
+        used = _used(problem.starts, step)
+        for i in range(3):
+            if weights.position > 0.0:
+                _add(weights.position, x[POSITION + i] - target.position[step, i], X[POSITION + i], used, H, f)
+                _add(weights.velocity, x[VELOCITY + i] - target.velocity[step, i], X[VELOCITY + i], used, H, f)
+            _add(weights.rate, x[10 + i] - target.rates[step - 1, i], X[RATE + i], used, H, f)
+        _add_attitude(step, x, speeds[step], X, target, problem, used, row, H, f)
+    _add_terminal(motion[-1], speeds[-1], responses[-1], target, problem, H, f)
+    for block in range(problem.starts.shape[0] - 1):
+        weight = weights.first if block == 0 else weights.next
+        for rotor in range(ROTORS):
+            here = ROTORS * block + rotor
+            change = weight * (corrections[block + 1, rotor] - corrections[block, rotor])
+            H[here, here] += weight
+            f[here] += change
+            if block > 0:
+                H[here - ROTORS, here - ROTORS] += weight
+                H[here, here - ROTORS] -= weight
+                f[here - ROTORS] -= change
+    for k in range(moved):
+        for i in range(k):
+            H[i, k] = H[k, i]
+
+
+@compiled
+def _used(starts: Integers, step: int) -> int:
+    """Return how many columns are not zero at a step."""
+    blocks = 0
+    while blocks < starts.shape[0] - 1 and starts[blocks] < step:
+        blocks += 1
+    return ROTORS * blocks
+
+
+@compiled
+def _add(weight: float, error: float, row: Array, used: int, H: Array, f: Array) -> None:
+    """Add ½ weight (error + row z)², to the lower triangle of H."""
+    for k in range(used):
+        weighted = weight * row[k]
+        f[k] += error * weighted
+        for i in range(k + 1):
+            H[k, i] += weighted * row[i]
+
+
+@compiled
+def _add_attitude(
+    step: int,
+    x: Array,
+    squared: Array,
+    X: Array,
+    target: Target,
+    problem: Problem,
+    used: int,
+    row: Array,
+    H: Array,
+    f: Array,
+) -> None:
+    """Add the errors of heading, and of a demanded tilt and thrust."""
+    weights = problem.weights
+    R = rotation_matrix((x[6], x[7], x[8], x[9]))
+    cos_pitch = max(sqrt(R[2][1] * R[2][1] + R[2][2] * R[2][2]), 1e-9)
+    s, c = R[2][1] / cos_pitch, R[2][2] / cos_pitch
+    error = _nearest(atan2(R[1][0], R[0][0]) - target.yaw_rad[step])
+    for k in range(used):
+        row[k] = s * X[ROTATION + 1, k] + c * X[ROTATION + 2, k]
+    _add(weights.heading, cos_pitch * error, row, used, H, f)
+    if weights.tilt > 0.0:
+        away = _rotation_error(target.attitudes[step], R)
+        for i in range(2):
+            _add(weights.tilt, away[i], X[ROTATION + i], used, H, f)
+    if weights.thrust > 0.0:
+        thrust = -target.thrusts_n[step]
+        for rotor in range(ROTORS):
+            thrust += problem.allocation[rotor] * squared[rotor]
+        for k in range(used):
+            row[k] = problem.allocation[k % ROTORS] * problem.levels[k // ROTORS, step]
+        _add(weights.thrust, thrust, row, used, H, f)
+
+
+@compiled
+def _nearest(angle: float) -> float:
+    """Return the same angle between -pi and pi."""
+    return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
+
+
+@compiled
+def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) -> Array:
+    """Return the rotation vector, rad, (3,), from the wanted attitude to R, of less than 90 degrees."""
+    error = np.empty(3)
+    rate_between(wanted, np.array(R), 1.0, error)
+    return error
+
+
+@compiled
+def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: Problem, H: Array, f: Array) -> None:
+    """Add ½ eᵀ S e of the error at the end, in the body axes there."""
+    steps, moved = target.rates.shape[0], X.shape[1]
+    R = rotation_matrix((x[6], x[7], x[8], x[9]))
+    away = _rotation_error(target.attitudes[steps], R)
+    error, E = np.zeros(STATES), np.zeros((STATES, moved))
+    for i in range(3):
+        for j in range(3):
+            error[i] += R[j][i] * (x[POSITION + j] - target.position[steps, j])
+            error[VELOCITY + i] += R[j][i] * (x[VELOCITY + j] - target.velocity[steps, j])
+            for k in range(moved):
+                E[i, k] += R[j][i] * X[POSITION + j, k]
+                E[VELOCITY + i, k] += R[j][i] * X[VELOCITY + j, k]
+        error[ROTATION + i] = away[i]
+        error[RATE + i] = x[10 + i] - target.rates[steps - 1, i]
+        E[ROTATION + i] = X[ROTATION + i]
+        E[RATE + i] = X[RATE + i]
+    for rotor in range(ROTORS):
+        error[DEVIATIONS + rotor] = squared[rotor] - target.squared[steps, rotor]
+        for block in range(problem.levels.shape[0]):
+            E[DEVIATIONS + rotor, ROTORS * block + rotor] = problem.levels[block, steps]
+    weighted = np.empty(moved)
+    for i in range(STATES):
+        total = 0.0
+        weighted[:] = 0.0
+        for j in range(STATES):
+            factor = problem.terminal[i, j]
+            total += factor * error[j]
+            for k in range(moved):
+                weighted[k] += factor * E[j, k]
+        for k in range(moved):
+            f[k] += E[i, k] * total
+            for j in range(k + 1):
+                H[k, j] += E[i, k] * weighted[j]
+
+
+@compiled
+def carry_over(last: Array, starts: Integers, corrections: Array) -> None:
+    """Fill corrections, (b + 1, 4), with that which flew last, and for each block the mean of the last plan's.
+
+    `last` is of the last plan, from the step that flew last on, (n, 4); after its end its last one goes on.
+    """
+    corrections[0] = last[0]
+    for block in range(starts.shape[0] - 1):
+        corrections[block + 1] = 0.0
+        steps = starts[block + 1] - starts[block]
+        for step in range(starts[block], starts[block + 1]):
+            for rotor in range(ROTORS):
+                corrections[block + 1, rotor] += last[min(step + 1, last.shape[0] - 1), rotor] / steps
+
+
+@compiled
+def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, lower: Array, upper: Array) -> None:
+    """Fill the bounds that keep each command within its limits, and move the nominal corrections within them.
+
+    `commands` are those of the references, (N, 4), within `limits`, (N, 2); `corrections` those of each block, (b, 4).
+    """
+    for block in range(corrections.shape[0]):
+        for rotor in range(ROTORS):
+            least, most = -np.inf, np.inf
+            for step in range(starts[block], starts[block + 1]):
+                least = max(least, limits[step, 0] - commands[step, rotor])
+                most = min(most, limits[step, 1] - commands[step, rotor])
+            corrections[block, rotor] = min(max(corrections[block, rotor], least), most)
+            lower[ROTORS * block + rotor] = least - corrections[block, rotor]
+            upper[ROTORS * block + rotor] = most - corrections[block, rotor]
+
+
+@compiled
+def exceeds(motion: Array, responses: Array, z: Array, packed: Packed) -> bool:
+    """Whether the plan that z, (4 b,), stands for goes beyond a soft limit at a step that is checked."""
+    problem = packed[0]
+    rates, turned = np.empty(3), np.empty(2)
+    for step in problem.checked:
+        x, X = motion[step], responses[step]
+        R = rotation_matrix((x[6], x[7], x[8], x[9]))
+        for i in range(3):
+            rates[i] = x[10 + i]
+            for k in range(z.shape[0]):
+                rates[i] += X[RATE + i, k] * z[k]
+            if abs(rates[i]) > problem.max_rate[i]:
+                return True
+        turned[:] = 0.0
+        for i in range(2):
+            for k in range(z.shape[0]):
+                turned[i] += X[ROTATION + i, k] * z[k]
+        if R[2][2] + R[2][0] * turned[1] - R[2][1] * turned[0] < problem.min_cos_tilt:
+            return True
+    return False
+
+
+@compiled
+def limit_motion(motion: Array, responses: Array, packed: Packed, G: Array, h: Array) -> None:
+    """Fill the soft rows of tilt and rates, (7 d, n) and (7 d,), each in parts of its limit."""
+    problem = packed[0]
+    moved = responses.shape[2]
+    count = 0
+    G[:, :] = 0.0
+    for step in problem.checked:
+        x, X = motion[step], responses[step]
+        R = rotation_matrix((x[6], x[7], x[8], x[9]))
+        for k in range(moved):
+            G[count, k] = R[2][1] * X[ROTATION, k] - R[2][0] * X[ROTATION + 1, k]
+        G[count, moved + TILT_SLACK] = -1.0
+        h[count] = R[2][2] - problem.min_cos_tilt
+        for i in range(3):
+            limit = problem.max_rate[i]
+            for side in range(2):
+                sign, at = 1.0 - 2.0 * side, count + 1 + 2 * i + side
+                for k in range(moved):
+                    G[at, k] = sign * X[RATE + i, k] / limit
+                G[at, moved + RATE_SLACK] = -1.0
+                h[at] = 1.0 - sign * x[10 + i] / limit
+        count += MOTION_ROWS
+
+
+@compiled
+def read_plan(motion: Array, speeds: Array, responses: Array, z: Array, levels: Array, psi: float) -> Array:
+    """Return the states that z, (4 b,), leads to, (N + 1, 16), see `PREDICTED`; psi is unwrapped from `psi` on."""
+    steps, moved = motion.shape[0], responses.shape[2]
+    states, change = np.empty((steps, PREDICTED)), np.empty(DEVIATIONS)
+    for step in range(steps):
+        x, X, state = motion[step], responses[step], states[step]
+        for i in range(DEVIATIONS):
+            change[i] = 0.0
+            for k in range(moved):
+                change[i] += X[i, k] * z[k]
+        for i in range(6):
+            state[i] = x[i] + change[i]
+        a, b, c = 0.5 * change[ROTATION], 0.5 * change[ROTATION + 1], 0.5 * change[ROTATION + 2]
+        length = sqrt(1.0 + a * a + b * b + c * c)
+        w, x_, y, z_ = x[6] / length, x[7] / length, x[8] / length, x[9] / length
+        turned = (
+            w - a * x_ - b * y - c * z_,
+            x_ + a * w + c * y - b * z_,
+            y + b * w + a * z_ - c * x_,
+            z_ + c * w + b * x_ - a * y,
+        )
+        phi, theta, yaw = euler_from_quaternion(turned)
+        psi += _nearest(yaw - psi)
+        state[6], state[7], state[8] = phi, theta, psi
+        for i in range(3):
+            state[9 + i] = x[10 + i] + change[RATE + i]
+        for rotor in range(ROTORS):
+            state[12 + rotor] = speeds[step, rotor]
+            for block in range(levels.shape[0]):
+                state[12 + rotor] += levels[block, step] * z[ROTORS * block + rotor]
+    return states

@@ -1,0 +1,271 @@
+"""The rotor commands that references alone ask for, as compiled kernels: a quadrotor with drag is differentially flat.
+
+The force that the thrust must make gives its direction, and with the yaw the attitude; successive attitudes give the
+body rates and their change, these the moments, and with the thrust the squared rotor speeds; commands lead them by the
+rotors' lag. Derivatives beyond the acceleration are differences between samples, so that drag is in all of them.
+Source of the flat outputs: Mellinger and Kumar, ICRA 2011; with drag: Faessler, Franchi and Scaramuzza, RA-L 2018.
+
+Samples are from now to one past the horizon of N steps, n = N + 2. Squared speeds are in parts of the largest.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.vehicle_model.airframe import drag_force
+from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance
+from colibri.common.jit import Packed, compiled
+from colibri.common.kernels import cos, sin
+from colibri.common.types import Array
+
+_DRAG_PASSES = 2
+"""Drag depends on the direction of the force that has to overcome it."""
+
+
+class ForceLimits(NamedTuple):
+    """Limits of the force that references may ask of the thrust: tangent of its tilt, and its vertical part, N."""
+
+    tilt_tangent: float
+    min_n: float
+    max_n: float
+
+
+class Guidance(NamedTuple):
+    """What stays the same between references and what they ask for.
+
+    Attributes:
+        k1_s2, k2_s: Gains on a large position error, 1/s², and on its rate, 1/s.
+        errors_ahead: Of `error_transition`, (n, 2, 2).
+        max_error_m: An error that is larger counts as this one.
+        from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
+    """
+
+    k1_s2: float
+    k2_s: float
+    errors_ahead: Array
+    max_error_m: float
+    from_wrench: Array
+
+
+class Flat(NamedTuple):
+    """What references ask for; each array is filled.
+
+    Attributes:
+        forces: Of the thrust, N, ENU, (n, 3).
+        attitudes: Body to earth, (n, 3, 3).
+        rates: Of the body, rad/s, FLU, at samples 1 to N, (N, 3).
+        squared: Squared rotor speeds at samples 0 to N, (N + 1, 4).
+    """
+
+    forces: Array
+    attitudes: Array
+    rates: Array
+    squared: Array
+
+
+@compiled
+def ask(
+    velocity: Array,
+    acceleration: Array,
+    yaw_rad: Array,
+    disturbance: Disturbance,
+    limits: ForceLimits,
+    from_wrench: Array,
+    packed: Packed,
+    out: Flat,
+) -> None:
+    """Fill `out` from references of velocity and acceleration, ENU, (n, 3), and yaw, rad, (n,).
+
+    `from_wrench` is from U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4); `packed` is the `Model`.
+    """
+    model = packed[0]
+    airframe = model.airframe
+    free, drag, up = np.empty(3), np.empty(3), np.empty(3)
+    for n in range(yaw_rad.shape[0]):
+        force = out.forces[n]
+        for i in range(3):
+            free[i] = airframe.mass_kg * (acceleration[n, i] - disturbance.acceleration[i])
+        free[2] += airframe.mass_kg * airframe.gravity_m_s2
+        force[:] = free
+        limit_force(force, limits)
+        for _ in range(_DRAG_PASSES):
+            thrust = length(force)
+            for i in range(3):
+                up[i] = force[i] / thrust
+            drag_force(airframe, velocity[n], up, thrust, drag)
+            for i in range(3):
+                force[i] = free[i] - drag[i]
+            limit_force(force, limits)
+        point(force, yaw_rad[n], out.attitudes[n])
+    turn(out, disturbance.moment, from_wrench, packed)
+
+
+@compiled
+def turn(flat: Flat, disturbance_n_m: Array, from_wrench: Array, packed: Packed) -> None:
+    """Fill rates and squared speeds of attitudes and forces."""
+    model = packed[0]
+    inertia, h = model.inertia, model.interval_s
+    steps = flat.rates.shape[0]
+    before, after, rate, wrench = np.empty(3), np.empty(3), np.empty(3), np.empty(ROTORS)
+    momentum = 0.0
+    rate_between(flat.attitudes[0], flat.attitudes[1], h, before)
+    for n in range(1, steps + 1):
+        rate_between(flat.attitudes[n], flat.attitudes[n + 1], h, after)
+        for i in range(3):
+            rate[i] = flat.rates[n - 1, i] = 0.5 * (before[i] + after[i])
+            wrench[1 + i] = inertia[i] * (after[i] - before[i]) / h - disturbance_n_m[i]
+        p, q, r = rate
+        ix, iy, iz = inertia[0], inertia[1], inertia[2]
+        wrench[0] = length(flat.forces[n])
+        wrench[1] -= (iy - iz) * q * r - momentum * q
+        wrench[2] -= (iz - ix) * p * r + momentum * p
+        wrench[3] -= (ix - iy) * p * q
+        momentum = 0.0
+        for rotor in range(ROTORS):
+            squared = 0.0
+            for i in range(ROTORS):
+                squared += from_wrench[rotor, i] * wrench[i]
+            flat.squared[n, rotor] = squared
+            momentum += model.momentum[rotor] * sqrt(max(squared, 0.0))
+        before, after = after, before
+    for rotor in range(ROTORS):
+        ahead = flat.squared[1 : min(4, steps + 1), rotor]
+        flat.squared[0, rotor] = 3.0 * (ahead[0] - ahead[1]) + ahead[2] if ahead.shape[0] == 3 else ahead[0]
+
+
+@compiled
+def lead(squared: Array, left: float, limits: Array, commands: Array) -> None:
+    """Fill the commands, (N, 4), that bring rotors from one of the squared speeds, (N + 1, 4), to the next.
+
+    `left` is the part of the way that the lag leaves after a step, and `limits` the least and the largest squared speed
+    of each step, (N, 2).
+    """
+    for n in range(commands.shape[0]):
+        for rotor in range(ROTORS):
+            command = squared[n, rotor] + (squared[n + 1, rotor] - squared[n, rotor]) / (1.0 - left)
+            commands[n, rotor] = min(max(command, limits[n, 0]), limits[n, 1])
+
+
+@compiled
+def limit_force(force: Array, limits: ForceLimits) -> None:
+    """Limit a force, N, ENU, (3,), in place, its vertical part first: height before place."""
+    force[2] = min(max(force[2], limits.min_n), limits.max_n)
+    horizontal = sqrt(force[0] * force[0] + force[1] * force[1])
+    left = sqrt(max(limits.max_n * limits.max_n - force[2] * force[2], 0.0))
+    allowed = min(force[2] * limits.tilt_tangent, left)
+    if horizontal > allowed:
+        force[0] *= allowed / horizontal
+        force[1] *= allowed / horizontal
+
+
+@compiled
+def point(force: Array, yaw_rad: float, attitude: Array) -> None:
+    """Write the attitude, body to earth, (3, 3), whose z axis points along a force, (3,), at a yaw as Euler's angle."""
+    s, c = sin(yaw_rad), cos(yaw_rad)
+    total = length(force)
+    z0, z1, z2 = force[0] / total, force[1] / total, force[2] / total
+    x0, x1, x2 = c * z2, s * z2, -s * z1 - c * z0
+    across = sqrt(x0 * x0 + x1 * x1 + x2 * x2)
+    x0, x1, x2 = x0 / across, x1 / across, x2 / across
+    attitude[0, 0], attitude[1, 0], attitude[2, 0] = x0, x1, x2
+    attitude[0, 1], attitude[1, 1], attitude[2, 1] = z1 * x2 - z2 * x1, z2 * x0 - z0 * x2, z0 * x1 - z1 * x0
+    attitude[0, 2], attitude[1, 2], attitude[2, 2] = z0, z1, z2
+
+
+@compiled
+def rate_between(before: Array, after: Array, interval_s: float, rate: Array) -> None:
+    """Write the body rate, rad/s, FLU, (3,), that turns one attitude, (3, 3), into the next: by less than 90°."""
+    squared = 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        twice = 0.0
+        for row in range(3):
+            twice += before[row, k] * after[row, j] - before[row, j] * after[row, k]
+        rate[i] = 0.5 * twice
+        squared += rate[i] * rate[i]
+    stretch = (1.0 + squared * (1.0 / 6.0 + squared * (3.0 / 40.0))) / interval_s
+    for i in range(3):
+        rate[i] *= stretch
+
+
+@compiled
+def length(vector: Array) -> float:
+    """Return the length of a vector (3,)."""
+    return sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+
+
+@compiled
+def approach(
+    position: Array,
+    velocity: Array,
+    references: tuple[Array, Array, Array],
+    law: Guidance,
+    near: tuple[Array, Array, Array],
+) -> None:
+    """Write references of position, velocity and acceleration, ENU, (n, 3) each, that lead to those given.
+
+    References not farther from the vehicle than the largest error are taken as they are. Of an error that is larger so
+    much counts, and of the reference's motion the same part, which keeps one that no vehicle can follow from leading
+    this one astray; and the smaller that part, the more does the error die as the gains have it in place of at once.
+    """
+    away, squared = np.empty(3), 0.0
+    for i in range(3):
+        away[i] = references[0][0, i] - position[i]
+        squared += away[i] * away[i]
+    part = min(1.0, law.max_error_m / max(sqrt(squared), law.max_error_m))
+    if part == 1.0:
+        for order in range(3):
+            near[order][:] = references[order]
+        return
+    for i in range(3):
+        error, error_rate = part * away[i], part * references[1][0, i] - velocity[i]
+        for n in range(references[0].shape[0]):
+            E = law.errors_ahead[n]
+            left = (1.0 - part) * (E[0, 0] * error + E[0, 1] * error_rate)
+            left_rate = (1.0 - part) * (E[1, 0] * error + E[1, 1] * error_rate)
+            moved = references[0][n, i] - references[0][0, i]
+            near[0][n, i] = position[i] + error + part * moved - left
+            near[1][n, i] = part * references[1][n, i] - left_rate
+            near[2][n, i] = part * references[2][n, i] + law.k1_s2 * left + law.k2_s * left_rate
+
+
+@compiled
+def guide(
+    rigid: Array,
+    references: tuple[Array, Array, Array, Array],
+    disturbance: Disturbance,
+    law: Guidance,
+    limits: ForceLimits,
+    vehicle: Packed,
+    near: tuple[Array, Array, Array],
+    out: Flat,
+) -> Array:
+    """Fill `near`, see `approach`, and `out`, see `ask`, from references of position, velocity, acceleration and yaw.
+
+    Return the force, N, ENU, (3,), by which the error now would die as the gains have it: where the thrust must point.
+    """
+    approach(rigid[:3], rigid[3:6], references[:3], law, near)
+    ask(near[1], near[2], references[3], disturbance, limits, law.from_wrench, vehicle, out)
+    airframe, force = vehicle[0].airframe, np.empty(3)
+    for i in range(3):
+        demanded = near[2][0, i] + law.k1_s2 * (near[0][0, i] - rigid[i]) + law.k2_s * (near[1][0, i] - rigid[3 + i])
+        force[i] = airframe.mass_kg * (demanded - disturbance.acceleration[i])
+    force[2] += airframe.mass_kg * airframe.gravity_m_s2
+    limit_force(force, limits)
+    return force
+
+
+@compiled
+def stand(angles: Array, thrust_n: Array, limits: ForceLimits, out: Flat) -> None:
+    """Fill attitudes and forces of demanded angles phi, theta, psi, rad, (n, 3), and thrusts, N, (n,)."""
+    for n in range(thrust_n.shape[0]):
+        phi, theta, psi = angles[n]
+        sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)
+        R = out.attitudes[n]
+        R[0, 0], R[0, 1], R[0, 2] = cp * ct, cp * st * sf - sp * cf, cp * st * cf + sp * sf
+        R[1, 0], R[1, 1], R[1, 2] = sp * ct, sp * st * sf + cp * cf, sp * st * cf - cp * sf
+        R[2, 0], R[2, 1], R[2, 2] = -st, ct * sf, ct * cf
+        thrust = min(max(thrust_n[n], limits.min_n), limits.max_n)
+        for i in range(3):
+            out.forces[n, i] = thrust * R[i, 2]

@@ -1,0 +1,299 @@
+"""The whole-vehicle LPV-MPC as a control law: references, observers, battery and fallbacks about one plan."""
+
+from collections.abc import Mapping
+from math import cos, radians, tan
+from typing import Annotated, Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from colibri.autopilot.control.interface import (
+    AttitudeDemand,
+    Clock,
+    Decision,
+    Diagnostics,
+    Fallback,
+    Horizon,
+    PlanColumns,
+    Preview,
+    VehicleState,
+)
+from colibri.autopilot.control.parts import recovery
+from colibri.autopilot.control.parts.error_dynamics import error_transition
+from colibri.autopilot.control.qp import QpSolver
+from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
+from colibri.autopilot.control.vehicle_model import disturbance_observer, rotor_lag
+from colibri.autopilot.control.vehicle_model.airframe import drag_force
+from colibri.autopilot.control.vehicle_model.battery import BatteryModel
+from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings, observer_of
+from colibri.autopilot.control.whole_lpv_mpc import feed_forward
+from colibri.autopilot.control.whole_lpv_mpc.condensing import Target
+from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, ForceLimits, Guidance
+from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance
+from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan, PlanSettings, WeightSettings, WholeMpc
+from colibri.autopilot.control.whole_lpv_mpc.planning import Now
+from colibri.common.config import Count, Degrees, Negative, Positive, Table, read_settings
+from colibri.common.elementary import square
+from colibri.common.jit import packed
+from colibri.common.kernels import asin, atan2
+from colibri.common.matrices import dot, matvec, norm
+from colibri.common.rotations import rotation_matrix
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+_RECOVER_BEYOND = cos(radians(75.0))
+"""A thrust axis further from where it must point is for the recovery law."""
+_NOWHERE = (0.0, 0.0, 0.0)
+
+
+class ReferenceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What of the references is followed."""
+
+    poles: tuple[Negative, Negative]
+    approach_speed_m_s: Positive
+    max_tilt_deg: Degrees
+    thrust_margin: Annotated[float, msgspec.Meta(ge=0.0, lt=0.5)]
+
+
+class FallbackSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What flies when no plan can be had."""
+
+    shifted_samples: Count
+    turn_1_s: Positive
+    rate_1_s: Positive
+    max_rate_rad_s: Positive
+
+
+class WholeLpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The control law."""
+
+    control_interval_s: ControlInterval
+    references: ReferenceSettings
+    observer: ObserverSettings
+    plan: PlanSettings
+    weights: WeightSettings
+    fallback: FallbackSettings
+    qp: QpSettings
+
+
+class Memory(NamedTuple):
+    """What the law carries from one control sample to the next.
+
+    Attributes:
+        speeds: Rotor speeds now, as the lag has them, parts of the largest, (4,).
+        wrench, mean_wrench: U1, N, and U2..U4, N m, now, and over the interval that ends now, (4,) each.
+        measured: What the observer measured a sample ago, (9,); None before the first.
+        estimate: Of the observer a sample ago, (12,).
+        charge_ah: Charge taken from the battery.
+        plan: The last plan, made `age` samples ago; None where there is none to build on.
+        age: Samples since that plan.
+    """
+
+    speeds: Array
+    wrench: Array
+    mean_wrench: Array
+    measured: Array | None
+    estimate: Array
+    charge_ah: float
+    plan: Plan | None
+    age: int
+
+
+class Inputs(NamedTuple):
+    """What a decision begins with.
+
+    Attributes:
+        rotation: Body to earth, (3, 3).
+        measured, estimate: Of the observer, (9,) and (12,).
+        now: For the plan.
+        limits: Of the force.
+    """
+
+    rotation: Array
+    measured: Array
+    estimate: Array
+    now: Now
+    limits: ForceLimits
+
+
+class WholeLpvMpc:
+    """The control law. Its predicted outputs are those of `condensing.PREDICTED`.
+
+    Attributes:
+        control_interval_us: The control sample.
+        preview: From now to one sample past the horizon.
+        plan_columns: Of the attitude in its predicted outputs.
+    """
+
+    plan_columns = PlanColumns(6, 7, 8, 11)
+
+    def __init__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> None:
+        """Control `vehicle` as the profile's `table` says; `clock` only measures.
+
+        Raises:
+            SettingsError: The table is wrong.
+            SolverError: The solver cannot be used.
+        """
+        settings = read_settings(table, WholeLpvMpcSettings)
+        self._interval_s = h = settings.control_interval_s
+        self.control_interval_us = interval_us(h)
+        self._vehicle = vehicle
+        self._lag = rotor_lag.rotor_lag(vehicle, h)
+        self._battery = BatteryModel(vehicle)
+        solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
+        self._mpc = WholeMpc(settings.plan, settings.weights, vehicle, solver, h, clock)
+        self.preview = Preview(self.control_interval_us, self._mpc.horizon + 2)
+        self._fallback = settings.fallback
+        self._observer = observer_of(settings.observer, vehicle, h)
+        self._packed_observer = packed(self._observer)
+        self._allocation = vehicle.allocation() * square(vehicle.rotors.max_speed)
+        self._momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
+        self._span_n = float(self._allocation[0].sum())
+        first, second = settings.references.poles
+        k1_s2, k2_s = first * second, -(first + second)
+        self._guidance = Guidance(
+            k1_s2,
+            k2_s,
+            error_transition(settings.references.poles, h, self.preview.samples),
+            settings.references.approach_speed_m_s * k2_s / k1_s2,
+            self._mpc.from_wrench,
+        )
+        self._tilt_tangent = tan(radians(settings.references.max_tilt_deg))
+        self._thrust_margin = settings.references.thrust_margin
+        self._turn = recovery.TurnGains(
+            settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s
+        )
+
+    def warm_up(self) -> None:
+        """Load what is compiled: three steps from hover, the last of them upside down."""
+        n = self.preview.samples
+        still, level = np.zeros((n, 3)), np.zeros(n)
+        references = Horizon(still, still, still, still, still, level, level, level)
+        memory = self.initial(self._vehicle.hover_speed)
+        for attitude in ((1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)):
+            state = VehicleState(_NOWHERE, _NOWHERE, attitude, _NOWHERE, _NOWHERE)
+            memory, _ = self.step(memory, 0, state, references)
+        self.step_attitude(
+            memory, 0, state._replace(attitude=(1.0, 0.0, 0.0, 0.0)), AttitudeDemand(still, still, level)
+        )
+
+    def initial(self, rotor_speed: float) -> Memory:
+        """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
+        speeds = np.full(ROTORS, rotor_speed / self._vehicle.rotors.max_speed)
+        wrench = matvec(self._allocation, speeds * speeds)
+        return Memory(speeds, wrench, wrench, None, np.zeros(disturbance_observer.ESTIMATES), 0.0, None, 0)
+
+    def charge_ah(self, memory: Memory) -> float:
+        """Return the charge taken from the battery, Ah."""
+        return memory.charge_ah
+
+    def with_charge(self, memory: Memory, charge_ah: float) -> Memory:
+        """Return the memory with another charge taken from the battery, Ah."""
+        return memory._replace(charge_ah=charge_ah)
+
+    def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
+        """Decide the rotor speeds to hold until the next control sample."""
+        del time_us
+        inputs = self._inputs(memory, state)
+        now, flat = inputs.now, self._flat()
+        n = self.preview.samples
+        near = (np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)))
+        p, v, a, _, _, yaw, _, _ = references
+        force = feed_forward.guide(
+            now.rigid, (p, v, a, yaw), now.disturbance, self._guidance, inputs.limits, self._mpc.model, near, flat
+        )
+        target = Target(near[0], near[1], flat.attitudes, yaw, flat.rates, flat.squared, np.zeros(n))
+        return self._decide(memory, inputs, target, force, on_track=True)
+
+    def step_attitude(
+        self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
+    ) -> tuple[Memory, Decision]:
+        """Decide the same for an attitude and a thrust, which is kept within what the rotors can make."""
+        del time_us
+        inputs = self._inputs(memory, state)
+        flat = self._flat()
+        feed_forward.stand(demand.angles, demand.thrust_n, inputs.limits, flat)
+        feed_forward.turn(flat, inputs.now.disturbance.moment, self._mpc.from_wrench, self._mpc.model)
+        nowhere = np.zeros((self.preview.samples, 3))
+        thrust_n = np.clip(demand.thrust_n, inputs.limits.min_n, inputs.limits.max_n)
+        yaw = demand.angles[:, 2].copy()
+        target = Target(nowhere, nowhere, flat.attitudes, yaw, flat.rates, flat.squared, thrust_n)
+        return self._decide(memory, inputs, target, flat.forces[0], on_track=False)
+
+    def _flat(self) -> Flat:
+        n, steps = self.preview.samples, self._mpc.horizon
+        return Flat(np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((steps, 3)), np.empty((steps + 1, ROTORS)))
+
+    def _inputs(self, memory: Memory, state: VehicleState) -> Inputs:
+        rotation = np.array(rotation_matrix(state.attitude))
+        measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2].tolist()])
+        estimate = self._estimate(memory, measured)
+        squared = memory.speeds * memory.speeds
+        rigid = np.array([*state.position_enu_m, *state.velocity_enu_m_s, *state.attitude, *state.rate_flu_rad_s])
+        min_squared = square(self._lag.min_speed)
+        limits = np.empty((self._mpc.horizon, 2))
+        limits[:, 0] = min_squared
+        expected = memory.plan.states[memory.age :, 12:] if memory.plan else squared[None, :]
+        self._battery.limit_squared(memory.charge_ah, expected, limits[:, 1])
+        now = Now(rigid, float(state.euler[2]), squared, Disturbance(estimate[6:9], estimate[9:]), limits)
+        max_squared = square(self._battery.max_common_speed(memory.charge_ah))
+        margin = self._thrust_margin * (max_squared - min_squared)
+        force = ForceLimits(
+            self._tilt_tangent, self._span_n * (min_squared + margin), self._span_n * (max_squared - margin)
+        )
+        return Inputs(rotation, measured, estimate, now, force)
+
+    def _estimate(self, memory: Memory, measured: Array) -> Array:
+        """Return the observer's estimate, (12,), with the measurement `measured`, (9,)."""
+        if memory.measured is None:
+            return disturbance_observer.first_estimate(measured)
+        middle = 0.5 * (memory.measured + measured)
+        drag = np.empty(3)
+        drag_force(self._observer.airframe, middle[:3], middle[6:], float(memory.mean_wrench[0]), drag)
+        momentum = dot(self._momentum, memory.speeds)
+        return disturbance_observer.observe(
+            memory.estimate, memory.measured, measured, memory.mean_wrench, momentum, drag, self._packed_observer
+        )
+
+    def _decide(
+        self, memory: Memory, inputs: Inputs, target: Target, force: Array, *, on_track: bool
+    ) -> tuple[Memory, Decision]:
+        squared, plan, age, diagnostics = self._choose(memory, inputs, target, force, on_track=on_track)
+        max_speed = self._battery.max_speed_now(memory.charge_ah, memory.speeds)
+        commands, speeds, wrench, mean_wrench = rotor_lag.actuate(
+            memory.speeds, squared, self._lag, max_speed, self._allocation
+        )
+        charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
+        after = Memory(speeds, wrench, mean_wrench, inputs.measured, inputs.estimate, charge_ah, plan, age)
+        R = target.attitudes[0]
+        angles = (atan2(R[2, 1], R[2, 2]), -asin(min(max(R[2, 0], -1.0), 1.0)), float(target.yaw_rad[0]))
+        return after, Decision(commands * self._vehicle.rotors.max_speed, angles, diagnostics)
+
+    def _choose(
+        self, memory: Memory, inputs: Inputs, target: Target, force: Array, *, on_track: bool
+    ) -> tuple[Array, Plan | None, int, Diagnostics]:
+        """Plan, or fall back: return squared rotor speeds, the plan to go on with, its age, and how it came about."""
+        if dot(force, inputs.rotation[:, 2].copy()) < _RECOVER_BEYOND * norm(force):
+            return self._recover(inputs, force, Diagnostics())
+        last = memory.plan.corrections[memory.age - 1 :] if memory.plan else None
+        plan, diagnostics = self._mpc.plan(inputs.now, target, last, on_track=on_track)
+        if plan is not None:
+            return plan.commands[0], plan, 1, diagnostics
+        if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._mpc.horizon - 1):
+            how = diagnostics._replace(fallback=Fallback.SHIFTED_PLAN)
+            return memory.plan.commands[memory.age], memory.plan, memory.age + 1, how
+        return self._recover(inputs, force, diagnostics)
+
+    def _recover(
+        self, inputs: Inputs, force: Array, diagnostics: Diagnostics
+    ) -> tuple[Array, Plan | None, int, Diagnostics]:
+        """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
+        direction = matvec(inputs.rotation.T, force / norm(force))
+        rates = inputs.now.rigid[10:]
+        moments = recovery.turning_moment(direction, rates, self._observer.inertia, self._turn)
+        thrust_n = max(dot(force, inputs.rotation[:, 2].copy()), 0.0)
+        from_wrench, (least, most) = self._mpc.from_wrench, inputs.now.limits[0].tolist()
+        squared = recovery.mix_with_priority(
+            thrust_n, moments, from_wrench[:, 0].copy(), from_wrench[:, 1:].copy(), least, most
+        )
+        return squared, None, 0, diagnostics._replace(fallback=Fallback.RECOVERY)

@@ -1,0 +1,233 @@
+"""The whole-vehicle LPV-MPC: rolls the last plan out, linearises about it, condenses, solves and reads the plan."""
+
+from math import cos, radians
+from typing import Annotated, NamedTuple
+
+import msgspec
+import numpy as np
+
+from colibri.autopilot.control.interface import Active, Clock, Diagnostics
+from colibri.autopilot.control.parts.riccati import lqr
+from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
+from colibri.autopilot.control.vehicle_model.airframe import airframe_of
+from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
+from colibri.autopilot.control.whole_lpv_mpc import condensing, model, planning
+from colibri.autopilot.control.whole_lpv_mpc.condensing import Problem, Target, Weights
+from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Lag, Model
+from colibri.autopilot.control.whole_lpv_mpc.planning import Now, Workspace
+from colibri.common.config import Count, Degrees, Positive, Table
+from colibri.common.elementary import exp, square
+from colibri.common.jit import packed
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+_MAX_SLACK = 100.0
+
+
+class WeightSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Of the cost."""
+
+    position: Positive
+    velocity: Positive
+    tilt: Positive
+    """Of a demanded attitude: where a place is demanded, the tilt follows from it."""
+    heading: Positive
+    rate: Positive
+    thrust: Positive
+    """Of a demanded thrust."""
+    first_correction: Positive
+    next_correction: Positive
+    terminal_thrust: Positive
+    """Part of the weight at which the terminal cost is taken."""
+
+
+class PlanSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The MPC."""
+
+    blocks: Annotated[tuple[Count, ...], msgspec.Meta(min_length=1)]
+    """Steps that each correction is held for; the horizon is their sum."""
+    count_every: Count
+    """Steps between those at which errors count."""
+    max_tilt_deg: Degrees
+    max_rate_rad_s: tuple[Positive, Positive, Positive]
+    check_every: Count
+    """Steps between those at which soft limits are held."""
+    slack_weight: Positive
+
+
+class Plan(NamedTuple):
+    """A solved QP.
+
+    Attributes:
+        corrections: Of each step's command, (N, 4).
+        commands: Squared speeds commanded at each step, (N, 4).
+        states: Predicted, (N + 1, 16), see `condensing.PREDICTED`.
+    """
+
+    corrections: Array
+    commands: Array
+    states: Array
+
+
+class WholeMpc:
+    """LPV-MPC of position, attitude and rotors together.
+
+    Attributes:
+        horizon: N.
+        model: The vehicle's numbers, as one record.
+        from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
+    """
+
+    def __init__(
+        self,
+        settings: PlanSettings,
+        weights: WeightSettings,
+        vehicle: Vehicle,
+        solver: QpSolver,
+        interval_s: float,
+        clock: Clock,
+    ) -> None:
+        """Control `vehicle` every `interval_s`; `clock` only measures, it decides nothing."""
+        self.horizon = n = sum(settings.blocks)
+        self._solver, self._clock = solver, clock
+        numbers = model_of(vehicle, interval_s)
+        self.model = packed(numbers)
+        self.from_wrench = exact_inverse(numbers.allocation)
+        starts = np.cumsum((0, *settings.blocks))
+        means, levels = lagging(starts, numbers.lag)
+        on_hold = Weights(
+            0.0, 0.0, weights.tilt, weights.heading, weights.rate, weights.thrust,
+            weights.first_correction, weights.next_correction,
+        )  # fmt: skip
+        on_track = on_hold._replace(position=weights.position, velocity=weights.velocity, tilt=0.0, thrust=0.0)
+        thrust_n = weights.terminal_thrust * vehicle.body.mass_kg * vehicle.gravity_m_s2
+        self._problems = [
+            packed(
+                Problem(
+                    starts,
+                    np.arange(settings.count_every, n + 1, settings.count_every),
+                    np.arange(settings.check_every, n + 1, settings.check_every),
+                    each,
+                    self._terminal(each, settings.count_every, thrust_n),
+                    numbers.allocation[0].copy(),
+                    levels,
+                    cos(radians(settings.max_tilt_deg)),
+                    np.array(settings.max_rate_rad_s),
+                )
+            )
+            for each in (on_track, on_hold)
+        ]
+        moved, rows = ROTORS * len(settings.blocks), condensing.MOTION_ROWS * (n // settings.check_every)
+        self._free = _empty_qp(moved, 0, 0, settings.slack_weight)
+        self._limited = _empty_qp(moved, condensing.SLACKS, rows, settings.slack_weight)
+        self._work = Workspace(
+            np.empty((n, ROTORS)),
+            np.empty((len(settings.blocks) + 1, ROTORS)),
+            np.empty((n + 1, model.RIGID)),
+            np.empty((n + 1, ROTORS)),
+            np.zeros((n + 1, model.DEVIATIONS, moved)),
+            means,
+            levels,
+        )
+        self._none = np.empty((0, ROTORS))
+
+    def _terminal(self, weights: Weights, count_every: int, thrust_n: float) -> Array:
+        """Return S, (16, 16): the cost of the LQR that goes on level at `thrust_n` after the horizon."""
+        A, B = model.hover_transition(thrust_n, self.model)
+        Q = np.zeros((condensing.STATES, condensing.STATES))
+        of_axes = [weights.position] * 3 + [weights.velocity] * 3 + [weights.tilt] * 2 + [weights.heading]
+        np.fill_diagonal(Q, np.array([*of_axes, *([weights.rate] * 3), 0.0, 0.0, 0.0, 0.0]) / count_every)
+        thrust = np.array(self.model["allocation"][0, 0])
+        Q[12:, 12:] += weights.thrust / count_every * thrust[:, None] * thrust
+        kept = slice(0, None) if weights.position > 0.0 else slice(model.ROTATION, None)
+        S = np.zeros_like(Q)
+        cost, _ = lqr(
+            np.ascontiguousarray(A[kept, kept]), np.ascontiguousarray(B[kept]), np.ascontiguousarray(Q[kept, kept]),
+            weights.next * np.eye(ROTORS),
+        )  # fmt: skip
+        S[kept, kept] = 0.5 * (cost + cost.T)
+        return S
+
+    def plan(self, now: Now, target: Target, last: Array | None, *, on_track: bool) -> tuple[Plan | None, Diagnostics]:
+        """Plan from `now` towards `target`; no plan where the QP is not solved.
+
+        Where the plan within the rotors' limits alone exceeds a soft limit, a second one has these, too.
+
+        Args:
+            now: What the plan begins with.
+            target: What it is to follow.
+            last: Corrections of the last plan, from that which flies now on, (n, 4); None without one.
+            on_track: Whether the place counts, or the attitude and the thrust.
+        """
+        problem = self._problems[0 if on_track else 1]
+        free, work = self._free, self._work
+        planning.condense(now, target, self._none if last is None else last, self.model, problem, work, free)
+        started_s = self._clock()
+        minimum = np.empty(len(free.f))
+        is_free = planning.free_minimum(free, minimum)
+        status, z = QpResult(QpStatus.SOLVED, minimum) if is_free else self._solver.solve(free)
+        slack, soft = 0.0, (0, 0)
+        if z is not None and condensing.exceeds(work.motion, work.responses, z, problem):
+            limited = self._limited
+            planning.limit(work, free, problem, limited)
+            status, z = self._solver.solve(limited)
+            if z is not None:
+                slack, soft = max(z[len(free.f) :].tolist()), planning.count_active(limited, z)
+                z = z[: len(free.f)].copy()
+        solve_time_s = self._clock() - started_s
+        if z is None:
+            return None, Diagnostics(status, solve_time_s=solve_time_s)
+        corrections, commands, states, binding = planning.read(work, free, z, now.psi, problem)
+        diagnostics = Diagnostics(
+            QpStatus.SOLVED,
+            solve_time_s=solve_time_s,
+            active=Active(binding, 0, *soft),
+            slack=slack,
+            predicted=states,
+            planned_squared=commands,
+        )
+        return Plan(corrections, commands, states), diagnostics
+
+
+def model_of(vehicle: Vehicle, interval_s: float) -> Model:
+    """Return the model of `vehicle`: its squared rotor speeds follow like the slower of its rotors' two lags."""
+    times = vehicle.rotors.lag
+    lag = Lag(0.0, 0.0, 0.0, 0.0)
+    if times:
+        rate_1_s = 1.0 / max(times.time_constant_up_s, times.time_constant_down_s)
+        left = exp(-interval_s * rate_1_s)
+        lag = Lag(left, exp(-0.5 * interval_s * rate_1_s), (1.0 - left) / (interval_s * rate_1_s), rate_1_s)
+    return Model(
+        airframe_of(vehicle),
+        np.array(vehicle.body.inertia_kg_m2),
+        vehicle.allocation() * square(vehicle.rotors.max_speed),
+        vehicle.rotor_momentum() * vehicle.rotors.max_speed,
+        lag,
+        interval_s,
+    )
+
+
+def lagging(starts: Array, lag: Lag) -> tuple[Array, Array]:
+    """Return what a unit command held for each block does: mean squared speed over each step, and at each end.
+
+    They are (b, N) and (b, N + 1); the mean is never 0 from the block's begin on.
+    """
+    blocks, steps = len(starts) - 1, int(starts[-1])
+    means, levels = np.zeros((blocks, steps)), np.zeros((blocks, steps + 1))
+    for block in range(blocks):
+        for step in range(int(starts[block]), steps):
+            command = 1.0 if step < starts[block + 1] else 0.0
+            away = levels[block, step] - command
+            means[block, step] = command + away * lag.left_mean
+            levels[block, step + 1] = command + away * lag.left
+    return means, levels
+
+
+def _empty_qp(moved: int, slacks: int, rows: int, slack_weight: float) -> Qp:
+    """Return a QP in `moved` variables and the slacks, with all that stays the same in it."""
+    n = moved + slacks
+    H, f = np.zeros((n, n)), np.zeros(n)
+    H[moved:, moved:] = slack_weight * np.eye(slacks)
+    f[moved:] = slack_weight
+    lower, upper = np.zeros(n), np.full(n, _MAX_SLACK)
+    return Qp(H, f, np.zeros((rows, n)), np.zeros(rows), lower, upper)

@@ -1,0 +1,114 @@
+"""Flatness: what references ask for, flown by the model, is the reference."""
+
+from math import cos, pi, sin, tan
+from typing import TypeAlias
+
+import numpy as np
+import pytest
+
+from colibri.autopilot.control.parts.error_dynamics import error_transition
+from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
+from colibri.autopilot.control.whole_lpv_mpc import feed_forward, model
+from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, ForceLimits, Guidance
+from colibri.autopilot.control.whole_lpv_mpc.model import RIGID, ROTORS, Disturbance
+from colibri.autopilot.control.whole_lpv_mpc.mpc import model_of
+from colibri.common.jit import packed
+from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler, rotation_matrix
+from colibri.plant.vehicle.description import load_vehicle
+
+INTERVAL_S = 0.008
+STEPS = 40
+MODEL = model_of(load_vehicle("hummingbird"), INTERVAL_S)
+PACKED = packed(MODEL)
+FROM_WRENCH = exact_inverse(MODEL.allocation)
+WIDE = ForceLimits(tan(1.2), 0.2, 19.0)
+CALM = Disturbance(np.zeros(3), np.zeros(3))
+GUIDANCE = Guidance(30.0, 11.0, error_transition((-5.0, -6.0), INTERVAL_S, STEPS + 2), 1.1, FROM_WRENCH)
+
+
+def flat() -> Flat:
+    n = STEPS + 2
+    return Flat(np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((STEPS, 3)), np.empty((STEPS + 1, ROTORS)))
+
+
+def circle(radius_m: float, period_s: float) -> tuple[np.ndarray, ...]:
+    """Position, velocity, acceleration and yaw on a level circle, looking outwards."""
+    angle = 2.0 * pi / period_s * INTERVAL_S * np.arange(STEPS + 2)
+    w, out = 2.0 * pi / period_s, np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    along = np.stack([-np.sin(angle), np.cos(angle), 0.0 * angle], axis=1)
+    return radius_m * out, radius_m * w * along, -radius_m * w * w * out, angle
+
+
+@pytest.mark.parametrize("disturbance", [CALM, Disturbance(np.array([0.5, -1.0, 0.7]), np.array([0.02, -0.01, 0.003]))])
+def test_what_a_circle_asks_for_flies_the_circle(disturbance: Disturbance) -> None:
+    """Open loop for 0.32 s at 6 m/s and 13 m/s², with drag, lag, gyroscopic terms and disturbances."""
+    p, v, a, yaw = circle(3.0, 3.0)
+    asked = flat()
+    feed_forward.ask(v, a, yaw, disturbance, WIDE, FROM_WRENCH, PACKED, asked)
+    commands, limits = np.empty((STEPS, ROTORS)), np.tile([0.01, 1.0], (STEPS, 1))
+    feed_forward.lead(asked.squared, MODEL.lag.left, limits, commands)
+    R = asked.attitudes[0]
+    psi, theta, phi = np.arctan2(R[1, 0], R[0, 0]), -np.arcsin(R[2, 0]), np.arctan2(R[2, 1], R[2, 2])
+    rate = 2.0 * asked.rates[0] - asked.rates[1]
+    rigid = np.concatenate([p[0], v[0], quaternion_from_euler(phi, theta, psi), rate])
+    motion, speeds = np.empty((STEPS + 1, RIGID)), np.empty((STEPS + 1, ROTORS))
+    model.roll_out(rigid, asked.squared[0], commands, disturbance, PACKED, motion, speeds)
+    assert np.abs(motion[:, :3] - p[:-1]).max() < 2e-3
+    assert np.abs(motion[:, 3:6] - v[:-1]).max() < 0.03
+    assert np.abs(motion[1:, 10:] - asked.rates).max() < 0.05
+
+
+def test_the_thrust_points_along_the_force_and_the_nose_where_yaw_says() -> None:
+    attitude = np.empty((3, 3))
+    force = np.array([2.0, -1.0, 6.0])
+    feed_forward.point(force, 2.2, attitude)
+    assert attitude @ attitude.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert attitude[:, 2] == pytest.approx(force / np.linalg.norm(force))
+    assert np.arctan2(attitude[1, 0], attitude[0, 0]) == pytest.approx(2.2)
+
+
+def test_a_rate_turns_one_attitude_into_the_next() -> None:
+    q = quaternion_from_euler(0.3, -0.5, 1.0)
+    before = np.array(rotation_matrix(q))
+    axis, angle = np.array([0.6, -0.64, 0.48]), 0.12
+    K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    after = before @ (np.eye(3) + sin(angle) * K + (1.0 - cos(angle)) * K @ K)
+    rate = np.empty(3)
+    feed_forward.rate_between(before, after, INTERVAL_S, rate)
+    assert rate == pytest.approx(axis * angle / INTERVAL_S, rel=1e-6)
+
+
+Three: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+def approached(position: np.ndarray, velocity: np.ndarray) -> tuple[Three, Three]:
+    p, v, a, _ = circle(3.0, 3.0)
+    references, near = (p, v, a), (np.empty_like(p), np.empty_like(p), np.empty_like(p))
+    feed_forward.approach(position, velocity, references, GUIDANCE, near)
+    return references, near
+
+
+def test_near_references_are_taken_as_they_are() -> None:
+    references, near = approached(np.array([3.0, 1.0, 0.0]), np.zeros(3))
+    assert all((one == other).all() for one, other in zip(references, near, strict=True))
+
+
+def test_from_far_away_a_slow_motion_leads_there_whatever_the_reference_does() -> None:
+    """At the approach speed of 3 m/s, 50 m away: neither the place nor the speed of the reference is asked for."""
+    _, near = approached(np.array([53.0, 0.0, 0.0]), np.array([-3.0, 0.0, 0.0]))
+    assert np.abs(np.diff(near[0], axis=0) / INTERVAL_S - near[1][:-1]).max() < 0.2
+    assert near[0][0] == pytest.approx([53.0, 0.0, 0.0], abs=0.03)
+    assert near[1][0] == pytest.approx([-3.0, 0.0, 0.0], abs=0.1)
+    assert np.abs(near[2][0]).max() < 1.6
+
+
+def test_a_demanded_attitude_stands_as_demanded() -> None:
+    asked, angles = flat(), np.tile([0.2, -0.4, 1.3], (STEPS + 2, 1))
+    feed_forward.stand(angles, np.full(STEPS + 2, 40.0), WIDE, asked)
+    q = quaternion_from_euler(0.2, -0.4, 1.3)
+    assert asked.attitudes[5] == pytest.approx(np.array(rotation_matrix(q)))
+    assert np.linalg.norm(asked.forces[0]) == pytest.approx(WIDE.max_n)
+    feed_forward.turn(asked, np.zeros(3), FROM_WRENCH, PACKED)
+    assert asked.rates == pytest.approx(np.zeros((STEPS, 3)), abs=1e-9)
+    assert euler_from_quaternion(q) == pytest.approx((0.2, -0.4, 1.3))
+    assert asked.squared[3] == pytest.approx(FROM_WRENCH[:, 0] * WIDE.max_n, rel=1e-9)

@@ -1,0 +1,171 @@
+"""The whole-vehicle law: flown over its own model's plant, and what flies when there is no plan."""
+
+from math import pi, radians
+
+import numpy as np
+import pytest
+
+from colibri.autopilot.control.interface import AttitudeDemand, Decision, Fallback, VehicleState
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.qp import QpResult, QpSolver, QpStatus
+from colibri.autopilot.control.whole_lpv_mpc.law import Memory, WholeLpvMpc
+from colibri.autopilot.guidance.trajectories.planner import Planner
+from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.common.compiled_rotations import euler_from_quaternion
+from colibri.common.rotations import nearest_turn
+from colibri.common.serialization import of_bytes, to_bytes
+from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.plant.physics.start import Start
+from colibri.plant.physics.world import Physics, World, starting_world, state_frame
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
+
+VEHICLE = load_vehicle("hummingbird")
+TABLE = load_profile("flight").table("whole-lpv-mpc")
+STEP_US = 8_000
+
+
+def law(vehicle: Vehicle = VEHICLE) -> WholeLpvMpc:
+    return WholeLpvMpc(TABLE, vehicle, lambda: 0.0)
+
+
+class Flight:
+    """The law over the plant, a control sample at a time."""
+
+    def __init__(self, start: Start, vehicle: Vehicle = VEHICLE, plant: Vehicle = VEHICLE) -> None:
+        self.law, self.physics = law(vehicle), Physics(plant, "rk4")
+        self.world: World = starting_world(start, plant)
+        self.memory: Memory = self.law.initial(vehicle.hover_speed)
+        self.decisions: list[Decision] = []
+        self.yaw_rad = radians(start.psi)
+
+    def state(self) -> VehicleState:
+        frame = state_frame(self.world)
+        phi, theta, psi = euler_from_quaternion(frame.attitude)
+        self.yaw_rad = nearest_turn(psi, self.yaw_rad)
+        euler = (phi, theta, self.yaw_rad)
+        return VehicleState(frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
+
+    def take(self, memory: Memory, decision: Decision) -> None:
+        self.memory = memory
+        self.decisions.append(decision)
+        c1, c2, c3, c4 = (decision.rotor_speeds / VEHICLE.rotors.max_speed).tolist()
+        command = ActuatorCommand(self.world.time_us, (c1, c2, c3, c4), armed=True)
+        self.world = self.physics.step(self.world, command, STEP_US)
+
+    def follow(self, name: str, seconds: float) -> np.ndarray:
+        """Fly a track; return the position errors, m."""
+        planner, errors = Planner(track(name), "by-formula", self.law.preview), []
+        for _ in range(round(seconds * 1e6) // STEP_US):
+            references = planner.horizon(self.world.time_us)
+            errors.append(np.linalg.norm(references.position_enu_m[0] - self.state().position_enu_m))
+            self.take(*self.law.step(self.memory, self.world.time_us, self.state(), references))
+        return np.array(errors)
+
+    def hold(self, phi: float, theta: float, thrust_n: float, seconds: float) -> None:
+        n = self.law.preview.samples
+        demand = AttitudeDemand(np.tile((phi, theta, 0.0), (n, 1)), np.zeros((n, 3)), np.full(n, thrust_n))
+        for _ in range(round(seconds * 1e6) // STEP_US):
+            self.take(*self.law.step_attitude(self.memory, self.world.time_us, self.state(), demand))
+
+
+HOVERING = Start(x=0.0, y=0.0, z=20.0, psi=0.0, rotors=4740.0)
+
+
+def test_a_lemniscate_is_followed_to_a_tenth_of_a_millimetre() -> None:
+    along_m_s = 4.0 * 2.0 * pi / 6.0
+    flight = Flight(HOVERING._replace(vx=along_m_s, vy=along_m_s))
+    errors = flight.follow("lemniscate:lap=6,height=20", 6.0)
+    assert errors[-375:].max() < 2e-4
+    assert {decision.diagnostics.fallback for decision in flight.decisions} == {None}
+
+
+@pytest.mark.parametrize("start", [{"x": -12.0}, {"x": 8.0, "z": 32.0}])
+def test_from_far_away_it_comes_without_overshoot(start: dict[str, float]) -> None:
+    flight = Flight(HOVERING._replace(**start))
+    away = np.array([start.get("x", 0.0), 0.0, start.get("z", 20.0) - 20.0])
+    beyond, last = 0.0, np.inf
+    planner = Planner(track("hover:height=20"), "by-formula", flight.law.preview)
+    for _ in range(1000):
+        flight.take(*flight.law.step(flight.memory, 0, flight.state(), planner.horizon(flight.world.time_us)))
+        left = np.array(flight.state().position_enu_m) - (0.0, 0.0, 20.0)
+        beyond, last = max(beyond, float(-left @ away) / float(np.linalg.norm(away))), float(np.linalg.norm(left))
+    assert beyond < 0.06
+    assert last < 0.01
+
+
+@pytest.mark.parametrize("turned", [{"phi": 170.0}, {"theta": -120.0, "p": 6.0, "q": 6.0, "r": 5.0}])
+def test_it_recovers_from_any_attitude(turned: dict[str, float]) -> None:
+    flight = Flight(HOVERING._replace(**turned))
+    errors = flight.follow("hover:height=20", 3.0)
+    assert flight.decisions[0].diagnostics.fallback is Fallback.RECOVERY
+    assert errors.max() < 2.5
+    assert errors[-1] < 0.01
+
+
+def test_an_attitude_and_a_thrust_are_held() -> None:
+    flight = Flight(HOVERING._replace(z=80.0))
+    flight.hold(0.3, -0.2, 9.0, 1.5)
+    assert flight.state().euler == pytest.approx((0.3, -0.2, 0.0), abs=0.01)
+    speeds = np.array(flight.world.rotor_speeds)
+    assert (VEHICLE.allocation()[0] * speeds**2).sum() == pytest.approx(9.0, rel=0.01)
+
+
+def failing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every QP fail, also those that need no solver."""
+    monkeypatch.setattr(QpSolver, "solve", lambda *_: QpResult(QpStatus.TIME_OUT, None))
+    monkeypatch.setattr(
+        "colibri.autopilot.control.whole_lpv_mpc.mpc.planning.free_minimum", lambda qp, z: bool(qp.f.sum() * 0.0 * z[0])
+    )
+
+
+def test_without_a_solution_the_last_plan_goes_on_and_then_the_recovery_flies(monkeypatch: pytest.MonkeyPatch) -> None:
+    flight = Flight(HOVERING._replace(x=0.3))
+    flight.follow("hover:height=20", 0.04)
+    failing(monkeypatch)
+    errors = flight.follow("hover:height=20", 4.0)
+    how = [decision.diagnostics.fallback for decision in flight.decisions]
+    assert how[:5] == [None] * 5
+    assert how[5:10] == [Fallback.SHIFTED_PLAN] * TABLE["fallback"]["shifted_samples"]
+    assert set(how[10:]) == {Fallback.RECOVERY}
+    assert errors[-1] < 0.1
+
+
+def test_its_plan_is_what_it_flies() -> None:
+    flight = Flight(HOVERING._replace(x=0.5))
+    flight.follow("hover:height=20", 0.4)
+    predicted = flight.decisions[-1].diagnostics.predicted
+    assert predicted is not None
+    flight.follow("hover:height=20", 0.08)
+    state = flight.state()
+    assert predicted[11, :3] == pytest.approx(state.position_enu_m, abs=0.01)
+    assert predicted[11, 6:9] == pytest.approx(state.euler, abs=0.1)
+
+
+def test_its_memory_is_plain_data_and_goes_on_bit_for_bit() -> None:
+    flight = Flight(HOVERING._replace(x=0.5))
+    flight.follow("hover:height=20", 0.1)
+    kept = of_bytes(Memory, to_bytes(flight.memory))
+    assert kept is not None
+    references = Planner(track("hover:height=20"), "by-formula", flight.law.preview).horizon(0)
+    ends = [law().step(memory, 0, flight.state(), references)[1].rotor_speeds for memory in (flight.memory, kept)]
+    assert ends[0].tobytes() == ends[1].tobytes()
+
+
+def test_what_the_battery_gives_bounds_its_commands() -> None:
+    flight = Flight(HOVERING._replace(z=2.0))
+    flight.memory = flight.law.with_charge(flight.memory, 2.0)
+    flight.follow("hover:height=40", 0.2)
+    planned = flight.decisions[-1].diagnostics.planned_squared
+    assert planned is not None
+    full = VEHICLE.battery
+    assert full is not None
+    empty = 9.0 + (full.full_voltage_v - full.empty_voltage_v) * (1.0 - 2.0 / full.capacity_ah)
+    assert planned.max() < (empty / full.full_voltage_v) ** 2
+    assert flight.law.charge_ah(flight.memory) > 2.0
+
+
+def test_an_unsolvable_qp_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch)
+    flight = Flight(HOVERING)
+    flight.follow("hover:height=20", 0.008)
+    assert flight.decisions[0].diagnostics.qp_status is QpStatus.TIME_OUT
