@@ -38,6 +38,7 @@ class Guidance(NamedTuple):
         k1_s2, k2_s: Gains on a large position error, 1/s², and on its rate, 1/s.
         errors_ahead: Of `error_transition`, (n, 2, 2).
         max_error_m: An error that is larger counts as this one.
+        exact_within_m: A reference as near as this is taken as it is.
         from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
     """
 
@@ -45,6 +46,7 @@ class Guidance(NamedTuple):
     k2_s: float
     errors_ahead: Array
     max_error_m: float
+    exact_within_m: float
     from_wrench: Array
 
 
@@ -205,25 +207,26 @@ def approach(
 ) -> None:
     """Write references of position, velocity and acceleration, ENU, (n, 3) each, that lead to those given.
 
-    References not farther from the vehicle than the largest error are taken as they are. Of an error that is larger so
-    much counts, and of the reference's motion the same part, which keeps one that no vehicle can follow from leading
-    this one astray; and the smaller that part, the more does the error die as the gains have it in place of at once.
+    References that are near enough are taken as they are. The farther they are, the more does the error die as the
+    gains have it in place of at once. Of an error that is larger than the largest only this counts, and of the
+    reference's motion the same part, which keeps one that no vehicle can follow from leading this one astray.
     """
     away, squared = np.empty(3), 0.0
     for i in range(3):
         away[i] = references[0][0, i] - position[i]
         squared += away[i] * away[i]
-    part = min(1.0, law.max_error_m / max(sqrt(squared), law.max_error_m))
-    if part == 1.0:
+    distance = sqrt(squared)
+    if distance <= law.exact_within_m:
         for order in range(3):
             near[order][:] = references[order]
         return
+    part, smooth = min(1.0, law.max_error_m / distance), 1.0 - law.exact_within_m / distance
     for i in range(3):
         error, error_rate = part * away[i], part * references[1][0, i] - velocity[i]
         for n in range(references[0].shape[0]):
             E = law.errors_ahead[n]
-            left = (1.0 - part) * (E[0, 0] * error + E[0, 1] * error_rate)
-            left_rate = (1.0 - part) * (E[1, 0] * error + E[1, 1] * error_rate)
+            left = smooth * (E[0, 0] * error + E[0, 1] * error_rate)
+            left_rate = smooth * (E[1, 0] * error + E[1, 1] * error_rate)
             moved = references[0][n, i] - references[0][0, i]
             near[0][n, i] = position[i] + error + part * moved - left
             near[1][n, i] = part * references[1][n, i] - left_rate

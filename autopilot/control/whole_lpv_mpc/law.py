@@ -1,7 +1,7 @@
 """The whole-vehicle LPV-MPC as a control law: references, observers, battery and fallbacks about one plan."""
 
 from collections.abc import Mapping
-from math import cos, radians, tan
+from math import radians
 from typing import Annotated, Any, NamedTuple
 
 import msgspec
@@ -33,7 +33,7 @@ from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance
 from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan, PlanSettings, WeightSettings, WholeMpc
 from colibri.autopilot.control.whole_lpv_mpc.planning import Now
 from colibri.common.config import Count, Degrees, Negative, Positive, Table, read_settings
-from colibri.common.elementary import square
+from colibri.common.elementary import cos, square, tan
 from colibri.common.jit import packed
 from colibri.common.kernels import asin, atan2
 from colibri.common.matrices import dot, matvec, norm
@@ -51,6 +51,7 @@ class ReferenceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=
 
     poles: tuple[Negative, Negative]
     approach_speed_m_s: Positive
+    exact_within_m: Positive
     max_tilt_deg: Degrees
     thrust_margin: Annotated[float, msgspec.Meta(ge=0.0, lt=0.5)]
 
@@ -156,6 +157,7 @@ class WholeLpvMpc:
             k2_s,
             error_transition(settings.references.poles, h, self.preview.samples),
             settings.references.approach_speed_m_s * k2_s / k1_s2,
+            settings.references.exact_within_m,
             self._mpc.from_wrench,
         )
         self._tilt_tangent = tan(radians(settings.references.max_tilt_deg))

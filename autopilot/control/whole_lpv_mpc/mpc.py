@@ -1,6 +1,6 @@
 """The whole-vehicle LPV-MPC: rolls the last plan out, linearises about it, condenses, solves and reads the plan."""
 
-from math import cos, radians
+from math import radians
 from typing import Annotated, NamedTuple
 
 import msgspec
@@ -16,7 +16,7 @@ from colibri.autopilot.control.whole_lpv_mpc.condensing import Problem, Target, 
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Lag, Model
 from colibri.autopilot.control.whole_lpv_mpc.planning import Now, Workspace
 from colibri.common.config import Count, Degrees, Positive, Table
-from colibri.common.elementary import exp, square
+from colibri.common.elementary import cos, exp, square
 from colibri.common.jit import packed
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
