@@ -14,7 +14,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from colibri.autopilot.guidance.trajectories.csv_table import MAX_DURATION_S
 from colibri.autopilot.guidance.trajectories.reach import (
     INTERVAL_S,
-    MARGIN,
     Demand,
     Reach,
     exact_motion,
@@ -60,15 +59,14 @@ def fit(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]
         TrackFileError: A waypoint is below the floor, or there is no such track; or the file says when to be where, and
             the track would have to be changed.
     """
-    for row in np.flatnonzero(waypoints.points_enu_m[:, 2] < floor_m - ROUNDING_M)[:1]:
-        height_m = waypoints.points_enu_m[row, 2]
-        raise waypoints.error(f"waypoint {row + 1} is at {height_m:g} m, below the floor of {floor_m:g} m")
+    check_heights(waypoints, floor_m)
     if waypoints.timed:
         return _as_timed(waypoints, reach, floor_m), ""
     stretch, slowed, limiting = np.ones(len(waypoints.times_s) - 1), waypoints, ""
     for count in range(_STRETCHES):
         track, dips = _held(slowed, floor_m)
-        excess, worst = _excess(reach.demands(exact_motion(track), track.duration_s), slowed, MARGIN)
+        demands = reach.demands(exact_motion(track), reach.charge_of_hover(track.duration_s))
+        excess, worst = _excess(demands, slowed, waypoints.margin)
         if excess.max() <= 1.0:
             changes = (_held_in_words(dips, floor_m), _stretched_in_words(stretch, limiting))
             return track, "; ".join(filter(None, changes))
@@ -79,6 +77,17 @@ def fit(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]
         if slowed.times_s[-1] > MAX_DURATION_S:
             break
     raise waypoints.error(f"not to be flown within {MAX_DURATION_S:g} s: it asks for a {worst}")
+
+
+def check_heights(waypoints: Waypoints, floor_m: float) -> None:
+    """Check that no waypoint is below the floor.
+
+    Raises:
+        TrackFileError: One is.
+    """
+    for row in np.flatnonzero(waypoints.points_enu_m[:, 2] < floor_m - ROUNDING_M)[:1]:
+        height_m = waypoints.points_enu_m[row, 2]
+        raise waypoints.error(f"waypoint {row + 1} is at {height_m:g} m, below the floor of {floor_m:g} m")
 
 
 def dips_of(track: Track, floor_m: float) -> Iterator[tuple[float, float]]:
@@ -101,7 +110,8 @@ def _as_timed(waypoints: Waypoints, reach: Reach, floor_m: float) -> Track:
     for dip in _dips(track, waypoints, floor_m):
         what = f"{_legs([dip.leg])} dips to {dip.height_m:.2f} m, below the floor of {floor_m:g} m"
         raise waypoints.error(f"{what}: add a waypoint there, or leave column t out")
-    excess, worst = _excess(reach.demands(mean_motion(track), track.duration_s), waypoints, 0.0)
+    demands = reach.demands(mean_motion(track), reach.charge_of_hover(track.duration_s))
+    excess, worst = _excess(demands, waypoints, 0.0)
     if excess.max() > 1.0:
         what = f"{_legs([int(excess.argmax())])} asks for a {worst}"
         raise waypoints.error(f"{what}: give it more time, or leave column t out")

@@ -8,6 +8,7 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
 from colibri.autopilot.guidance.trajectories.fitting import dips_of, fit
 from colibri.autopilot.guidance.trajectories.reach import Reach, exact_motion
+from colibri.autopilot.guidance.trajectories.time_optimal.fastest import fastest
 from colibri.autopilot.guidance.trajectories.tracks import (
     DURATION_S,
     OPTIONS,
@@ -36,8 +37,8 @@ class LoadedTrack(NamedTuple):
 def load_track(name: str, vehicle: Vehicle, profile: Profile, floor_m: float | None = None) -> LoadedTrack:
     """Return the track of that name as `vehicle` will fly it under `profile`.
 
-    One through waypoints is held above the floor and slowed down to what the vehicle can fly. Any other is flown as it
-    is, also beyond the limits.
+    One through waypoints is held above the floor and slowed down to what the vehicle can fly, or made as fast as that.
+    Any other is flown as it is, also beyond the limits.
 
     Args:
         name: `NAME[:KEY=VALUE[,KEY=VALUE…]]`.
@@ -48,17 +49,19 @@ def load_track(name: str, vehicle: Vehicle, profile: Profile, floor_m: float | N
     Raises:
         TrackError: There is no such track, its file cannot be flown, or it leads below the floor.
     """
-    found, reach = track(name), Reach(vehicle, profile)
+    found = track(name)
+    as_fast_as_can_be = found.waypoints is not None and found.waypoints.fastest
+    reach = Reach(vehicle, profile, exact_drag=as_fast_as_can_be)
     floor = (-inf if vehicle.ground is None else 0.0) if floor_m is None else floor_m
     if found.waypoints is not None:
         try:
-            fitted, changed = fit(found.waypoints, reach, floor)
+            fitted, changed = (fastest if as_fast_as_can_be else fit)(found.waypoints, reach, floor)
         except TrackFileError as error:
             raise TrackError(str(error)) from error
         return LoadedTrack(fitted, f"{found.waypoints.path}: {changed}" if changed else "")
     for time_s, height_m in dips_of(found, floor):
         raise TrackError(f"track {name} is at {height_m:.2f} m after {time_s:.2f} s, below the floor of {floor:g} m")
-    demands = reach.demands(exact_motion(found), min(found.duration_s, DURATION_S))
+    demands = reach.demands(exact_motion(found), reach.charge_of_hover(min(found.duration_s, DURATION_S)))
     beyond = [str(demand) for demand in demands if demand.excess(0.0).max() > 1.0]
     return LoadedTrack(found, f"track {name} asks for more than there is: {'; '.join(beyond)}" if beyond else "")
 

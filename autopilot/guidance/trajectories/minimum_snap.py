@@ -54,13 +54,21 @@ def minimise(order: int, times_s: Array, points: Array) -> PiecewisePolynomial:
         times_s: When it passes the points, s, strictly increasing, (n,), n >= 2.
         points: What it passes, (n, axes).
     """
-    from_ends = inverse(_ends(order))
-    elements = _elements(np.diff(times_s), matmul(matmul(from_ends.T, _cost(order)), from_ends))
-    knots = np.zeros((len(times_s), order, points.shape[1]))
+    return interpolate(times_s, minimal_knots(elements(np.diff(times_s), stiffness(order)), points))
+
+
+def minimal_knots(elements: Array, points: Array) -> Array:
+    """Return the derivatives at `points` (n, axes) where the cost is least, that of order 0 first, (n, order, axes).
+
+    Args:
+        elements: Cost of each segment, as `elements` gives it.
+        points: What is passed, (n, axes).
+    """
+    knots = np.zeros((len(points), elements.shape[2], points.shape[1]))
     knots[:, 0] = points
-    if len(times_s) > 2:
+    if len(points) > 2:
         knots[1:-1, 1:] = _free_derivatives(elements, points)
-    return interpolate(times_s, knots)
+    return knots
 
 
 def interpolate(times_s: Array, knots: Array) -> PiecewisePolynomial:
@@ -73,58 +81,69 @@ def interpolate(times_s: Array, knots: Array) -> PiecewisePolynomial:
     _, order, axes = knots.shape
     durations = np.diff(times_s)
     both = np.concatenate([knots[:-1], knots[1:]], axis=1)
-    in_own_time = both * np.tile(_powers(durations, order), 2)[:, :, None]
-    coefficients = matmul(inverse(_ends(order)), np.moveaxis(in_own_time, 0, 1).reshape(2 * order, -1))
+    in_own_time = both * np.tile(powers(durations, order), 2)[:, :, None]
+    coefficients = matmul(from_ends(order), np.moveaxis(in_own_time, 0, 1).reshape(2 * order, -1))
     return PiecewisePolynomial(times_s, np.moveaxis(coefficients.reshape(2 * order, len(durations), axes), 1, 0))
 
 
-def _ends(order: int) -> Array:
-    """Return the matrix from a polynomial's coefficients to its derivatives at 0, then at 1."""
-    powers = range(2 * order)
-    at_0 = [[float(factorial(k)) if power == k else 0.0 for power in powers] for k in range(order)]
-    at_1 = [[float(perm(power, k)) for power in powers] for k in range(order)]
-    return np.array(at_0 + at_1)
+def from_ends(order: int) -> Array:
+    """Return the matrix from a polynomial's derivatives at 0, then at 1, to its coefficients."""
+    columns = range(2 * order)
+    at_0 = [[float(factorial(k)) if power == k else 0.0 for power in columns] for k in range(order)]
+    at_1 = [[float(perm(power, k)) for power in columns] for k in range(order)]
+    return inverse(np.array(at_0 + at_1))
 
 
-def _cost(order: int) -> Array:
-    """Return H of the integral from 0 to 1 of the squared derivative, cᵀ H c."""
-    powers = range(2 * order)
+def stiffness(order: int) -> Array:
+    """Return the integral from 0 to 1 of the squared derivative as a form of the derivatives at 0, then at 1."""
+    columns = range(2 * order)
 
     def entry(i: int, j: int) -> float:
         return perm(i, order) * perm(j, order) / (i + j - 2 * order + 1) if min(i, j) >= order else 0.0
 
-    return np.array([[entry(i, j) for j in powers] for i in powers])
+    cost, to_coefficients = np.array([[entry(i, j) for j in columns] for i in columns]), from_ends(order)
+    return matmul(matmul(to_coefficients.T, cost), to_coefficients)
 
 
-def _powers(durations: Array, order: int) -> Array:
+def powers(durations: Array, order: int) -> Array:
     """Return what turns derivatives per second into those per segment, (segments, order)."""
     powers = np.ones((len(durations), order))
     powers[:, 1:] = durations[:, None]
     return np.cumprod(powers, axis=1, dtype=np.float64)
 
 
-def _elements(durations: Array, stiffness: Array) -> Array:
+def elements(durations: Array, stiffness: Array) -> Array:
     """Return each segment's cost as a form of the derivatives at its ends: (segments, end, order, end, order)."""
     order = len(stiffness) // 2
-    scale = np.tile(_powers(durations, order), 2)
-    elements = stiffness * scale[:, :, None] * scale[:, None, :] / _powers(durations, 2 * order)[:, -1:, None]
-    return elements.reshape(-1, 2, order, 2, order)
+    scale = np.tile(powers(durations, order), 2)
+    forms = stiffness * scale[:, :, None] * scale[:, None, :] / powers(durations, 2 * order)[:, -1:, None]
+    return forms.reshape(-1, 2, order, 2, order)
 
 
 def _free_derivatives(elements: Array, points: Array) -> Array:
-    """Return the derivatives at the inner points where the cost is least, (n - 2, order - 1, axes).
-
-    The blocks of the cost's curvature couple only neighbours: block elimination forwards, then backwards.
-    """
+    """Return the derivatives at the inner points where the cost is least, (n - 2, order - 1, axes)."""
     before, after = elements[:-1], elements[1:]
     pull = (
         before[:, 1, 1:, 0, :1] * points[:-2, None]
         + (before[:, 1, 1:, 1, :1] + after[:, 0, 1:, 0, :1]) * points[1:-1, None]
         + after[:, 0, 1:, 1, :1] * points[2:, None]
     )
+    return balanced(elements, -pull)
+
+
+def balanced(elements: Array, forces: Array) -> Array:
+    """Return the derivatives at the inner points whose product with the cost's curvature is `forces`.
+
+    The blocks of the curvature couple only neighbours: block elimination forwards, then backwards.
+
+    Args:
+        elements: Cost of each segment.
+        forces: (n - 2, order - 1, axes), n > 2.
+    """
+    before, after = elements[:-1], elements[1:]
     curvature = before[:, 1, 1:, 1, 1:] + after[:, 0, 1:, 0, 1:]
     coupling = after[:-1, 0, 1:, 1, 1:]
-    free = -pull
+    free = forces.copy()
     through = np.empty_like(coupling)
     for k, block in enumerate(coupling):
         through[k], free[k] = solve(curvature[k], block), solve(curvature[k], free[k])

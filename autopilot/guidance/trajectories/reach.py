@@ -23,8 +23,6 @@ from colibri.plant.vehicle.description import Vehicle
 
 INTERVAL_S = 0.01
 """Between the times at which a track is looked at."""
-MARGIN = 0.1
-"""Part of each range that a stretched path leaves to the control law, to come back to the path, also in wind."""
 
 _SNAP = 4
 _MAX_TILT_DEG = 80.0
@@ -32,6 +30,9 @@ _MAX_TILT_DEG = 80.0
 _SMALL_N = 1e-3
 _LEAST_THRUST = 0.05
 """Part of the weight: the direction of less thrust than that turns at no rate worth a number."""
+_CHARGE_SAMPLES = 10
+"""Charge is summed up at so many times `INTERVAL_S`."""
+_REFINEMENTS = 3
 _RESPONSE_SAMPLES = 20
 """A law comes back to its reference within about 0.2 s."""
 
@@ -63,6 +64,12 @@ class Demand:
         excess: Array = self.values / (self.limit - margin * self.span)
         return excess
 
+    def beyond(self, margin: float) -> Array:
+        """Return by how much of its range too much is asked for if `margin` of it is to be left, (n,); < 0 if not."""
+        too_much = self.limit - self.values if self.falls else self.values - self.limit
+        beyond: Array = too_much / self.span + margin
+        return beyond
+
     def __str__(self) -> str:
         """Return the most that is asked for, beside the limit."""
         value, most = (self.values.min(), "least") if self.falls else (self.values.max(), "most")
@@ -78,11 +85,27 @@ class Motion(NamedTuple):
     snap: Array
 
 
+class _Pulled(NamedTuple):
+    """What moves a vehicle: a force along the thrust, N, ENU, (n, 3); drag, N s/m, and thrust, N, (n, 1) each."""
+
+    force: Array
+    drag: Array
+    thrust_n: Array
+
+
 class Reach:
     """The limits of one vehicle under one profile."""
 
-    def __init__(self, vehicle: Vehicle, profile: Profile) -> None:
-        """Take the rotors' limits of `vehicle`, and those of tilt and body rates of the profile's law if it has any."""
+    def __init__(self, vehicle: Vehicle, profile: Profile, *, exact_drag: bool = False) -> None:
+        """Take the rotors' limits of `vehicle`, and those of tilt and body rates of the profile's law if it has any.
+
+        Args:
+            vehicle: That flies.
+            profile: Whose law flies it.
+            exact_drag: Whether drag is that of the thrust and tilt of each moment, not that of a hover in every
+                direction: beyond 10 m/s they differ by newtons.
+        """
+        self._exact_drag = exact_drag
         self._vehicle = vehicle
         self._airframe = airframe_of(vehicle)
         self._battery = BatteryModel(vehicle)
@@ -91,37 +114,70 @@ class Reach:
         self._max_tilt_deg = float(law.get("guidance", {}).get("max_tilt_deg", _MAX_TILT_DEG))
         self._max_rate = float(min(law.get("attitude", {}).get("max_rate_rad_s", (inf,))[:2]))
 
-    def demands(self, motion: Motion, duration_s: float) -> list[Demand]:
-        """Return what a motion of that duration asks for."""
-        v, a, j, s = motion
-        mass, drag = self._airframe.mass_kg, self._drag_n_s_m
-        force, rate, turn = mass * a + drag * v, mass * j + drag * a, mass * s + drag * j
-        weight_n = mass * self._airframe.gravity_m_s2
-        force[:, 2] += weight_n
-        thrust = _length(force)[:, None]
-        carrying = np.maximum(thrust, _LEAST_THRUST * weight_n)
+    def charge_of_hover(self, duration_s: float) -> float:
+        """Return the charge taken by a hover, Ah."""
+        rotors = self._vehicle.rotors
+        hovering = np.full(len(rotors.position_m), self._vehicle.hover_speed / rotors.max_speed)
+        return self._battery.charge_after(0.0, hovering, duration_s)
+
+    def charge_of(self, motion: Motion) -> float:
+        """Return the charge taken by a motion given at every `INTERVAL_S`, all rotors alike, Ah."""
+        rotors, interval_s, charge_ah = self._vehicle.rotors, _CHARGE_SAMPLES * INTERVAL_S, 0.0
+        some = Motion(*(column[::_CHARGE_SAMPLES] for column in motion))
+        thrust = np.maximum(self._pulled(some).thrust_n[:, 0], 0.0)
+        speeds = np.sqrt(thrust / (len(rotors.position_m) * rotors.thrust_coefficient)) / rotors.max_speed
+        for speed in speeds:
+            charge_ah = self._battery.charge_after(charge_ah, np.full(len(rotors.position_m), speed), interval_s)
+        return charge_ah
+
+    def demands(self, motion: Motion, charge_ah: float) -> list[Demand]:
+        """Return what a motion asks for, beside what there is once `charge_ah` was taken from the battery."""
+        _, a, j, s = motion
+        mass = self._airframe.mass_kg
+        pulled = self._pulled(motion)
+        force, rate, turn = pulled.force, mass * j + pulled.drag * a, mass * s + pulled.drag * j
+        carrying = np.maximum(_length(force)[:, None], _LEAST_THRUST * (mass * self._airframe.gravity_m_s2))
         up = force / carrying
         thrust_rate = _dot(up, rate)[:, None]
         up_rate = (rate - thrust_rate * up) / carrying
         up_turn = (turn - 2.0 * thrust_rate * up_rate) / carrying
         up_turn -= _dot(up, up_turn)[:, None] * up
         tilt = degrees(1.0) * elementwise.atan2(_length(force[:, :2]), force[:, 2])
-        demands = self._of_rotors(thrust, _length(up_turn)[:, None], duration_s)
+        demands = self._of_rotors(pulled.thrust_n, _length(up_turn)[:, None], charge_ah)
         demands.append(Demand("tilt", "degrees", tilt, self._max_tilt_deg, self._max_tilt_deg))
         if isfinite(self._max_rate):
             demands.append(Demand("body rate", "rad/s", _length(up_rate), self._max_rate, self._max_rate))
         return demands
 
-    def _of_rotors(self, thrust_n: Array, turn_rad_s2: Array, duration_s: float) -> list[Demand]:
-        """Return what is asked of the rotors: the moment may be about any axis of their plane.
+    def _pulled(self, motion: Motion) -> "_Pulled":
+        """Return what moves the vehicle.
 
-        Their limits are those on what the battery has left after so long a hover.
+        Drag across the rotors' axis is c (v - (v·z) z) with c = c_xy + c_r √T, along it c_z (v·z) z, so that
+        T z = m (a + g) + c v + (c_z - c) (v·z) z: the thrust points along m (a + g) + c v.
         """
+        airframe, v = self._airframe, motion.velocity
+        drag: Array = np.full((len(v), 1), self._drag_n_s_m)
+        force = self._force(motion, drag)
+        thrust = _length(force)[:, None]
+        for _ in range(_REFINEMENTS if self._exact_drag else 0):
+            drag = airframe.drag_xy + airframe.rotor_drag * np.sqrt(np.maximum(thrust, 0.0))
+            force = self._force(motion, drag)
+            length = _length(force)[:, None]
+            thrust = length + (airframe.drag_z - drag) * _dot(force, v)[:, None] / np.maximum(length, _SMALL_N)
+        return _Pulled(force, drag, thrust)
+
+    def _force(self, motion: Motion, drag: Array) -> Array:
+        """Return m (a + g) + c v, N, ENU, (n, 3)."""
+        force = self._airframe.mass_kg * motion.acceleration + drag * motion.velocity
+        force[:, 2] += self._airframe.mass_kg * self._airframe.gravity_m_s2
+        return force
+
+    def _of_rotors(self, thrust_n: Array, turn_rad_s2: Array, charge_ah: float) -> list[Demand]:
+        """Return what is asked of the rotors: the moment may be about any axis of their plane."""
         share, lever = self._mixed[:, 0], _length(self._mixed[:, 1:3])
         moment = max(self._vehicle.body.inertia_kg_m2[:2]) * turn_rad_s2
         rotors = self._vehicle.rotors
-        hovering = np.full(len(rotors.position_m), self._vehicle.hover_speed / rotors.max_speed)
-        top = self._battery.max_common_speed(self._battery.charge_after(0.0, hovering, duration_s)) * rotors.max_speed
+        top = self._battery.max_common_speed(charge_ah) * rotors.max_speed
         least, most = (rotors.thrust_coefficient * square(speed) for speed in (rotors.idle_speed, top))
         even, apart, span_n = thrust_n * share, moment * lever, most - least
         return [

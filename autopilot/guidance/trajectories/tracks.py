@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi, radians
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, TypeAlias, get_args
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args, get_origin
 
 import msgspec
 import numpy as np
@@ -198,16 +198,17 @@ class Circle(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 
 class WaypointFile(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Fly through the points of a CSV file with the least snap."""
+    """Fly through the points of a CSV file with the least snap, or as fast as a vehicle can."""
 
     lone: ClassVar[str | None] = "file"
 
     file: str
-    speed: Speed | None = None
+    speed: Speed | Literal["max"] | None = None
+    margin: Annotated[float, msgspec.Meta(ge=0.0, le=0.4)] | None = None
 
     def track(self) -> Track:
-        """Return the track."""
-        return through(read_waypoints(Path(self.file), self.speed))
+        """Return the track, before a vehicle is known."""
+        return through(read_waypoints(Path(self.file), self.speed, self.margin))
 
 
 class SamplesFile(TrackOptions, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -231,12 +232,13 @@ OPTIONS: dict[str, type[TrackOptions]] = {
 }
 
 
-def through(waypoints: Waypoints, heights: Array | None = None) -> Track:
+def through(waypoints: Waypoints, heights: Array | None = None, between: Array | None = None) -> Track:
     """Return the track through waypoints with the least snap, and the least yaw acceleration if they say which yaw.
 
     Args:
         waypoints: What it passes, and when.
         heights: Times, s, and heights, m, that its height passes besides, (n, 2), n >= 1; None for no others.
+        between: Times, s, and points, m, ENU, that it passes besides, (n, 4); None for no others.
     """
     from colibri.autopilot.guidance.trajectories.minimum_snap import (
         ACCELERATION,
@@ -245,11 +247,12 @@ def through(waypoints: Waypoints, heights: Array | None = None) -> Track:
     )
 
     times_s = waypoints.times_s
-    places = minimise(SNAP, times_s, waypoints.points_enu_m)
+    given = np.concatenate([times_s[:, None], waypoints.points_enu_m], axis=1)
+    passed = _in_time(given, between)
+    places = minimise(SNAP, passed[:, 0], passed[:, 1:])
     height = None
     if heights is not None:
-        passed = np.concatenate([np.stack([times_s, waypoints.points_enu_m[:, 2]], axis=1), heights])
-        passed = passed[np.argsort(passed[:, 0], kind="stable")]
+        passed = _in_time(given[:, [0, 3]], heights)
         height = minimise(SNAP, passed[:, 0], passed[:, 1:])
 
     def position(t: TaylorSeries) -> Place:
@@ -260,6 +263,12 @@ def through(waypoints: Waypoints, heights: Array | None = None) -> Track:
         return Track(position, None, float(times_s[-1]), waypoints)
     looks = minimise(ACCELERATION, times_s, waypoints.yaw_rad[:, None])
     return Track(position, lambda t: looks(t)[0], float(times_s[-1]), waypoints)
+
+
+def _in_time(rows: Array, others: Array | None) -> Array:
+    """Return both, in the order of their first column."""
+    both = rows if others is None else np.concatenate([rows, others])
+    return both[np.argsort(both[:, 0], kind="stable")]
 
 
 def sampled(samples: Samples) -> Track:
@@ -382,8 +391,14 @@ def _explained(reason: str, fields: dict[str, msgspec.structs.FieldInfo], given:
     what, _, key = reason.rstrip("`").partition(" - at `$.")
     if key not in fields:
         return what
-    choices = get_args(fields[key].type) if fields[key].type == YawChoice else ()
-    return f"{key}={given[key]}: {'choose ' + ', '.join(choices) if choices else what}"
+    words = [word for kind in (fields[key].type, *get_args(fields[key].type)) for word in _words(kind)]
+    if what.startswith("Invalid enum value"):
+        what = f"choose {', '.join(words)}{'' if fields[key].type == YawChoice else ', or a number'}"
+    return f"{key}={given[key]}: {what}"
+
+
+def _words(kind: Any) -> tuple[Any, ...]:
+    return get_args(kind) if get_origin(kind) is Literal else ()
 
 
 def _alpha(t: TaylorSeries) -> TaylorSeries:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -9,6 +10,8 @@ from colibri.autopilot.guidance.trajectories.csv_table import CsvTable, TrackFil
 from colibri.common.types import Array
 
 DEFAULT_SPEED_M_S = 2.0
+MARGIN = 0.1
+"""Part of each range that a path may leave to the control law, to come back to the path, also in wind."""
 MIN_LEG_S = 0.05
 
 _REQUIRED = ("x", "y", "z")
@@ -25,6 +28,8 @@ class Waypoints:
         points_enu_m: (n, 3), m, ENU.
         yaw_rad: Unwrapped the shorter way round, (n,), rad; None to look along the path.
         timed: Whether the file says when; else the times may be changed.
+        fastest: Whether they are to be flown as fast as can be.
+        margin: Part of each of the vehicle's ranges that is left to the control law where the times are changed.
     """
 
     path: Path
@@ -32,10 +37,16 @@ class Waypoints:
     points_enu_m: Array
     yaw_rad: Array | None
     timed: bool
+    fastest: bool = False
+    margin: float = MARGIN
 
     def stretched(self, factors: Array) -> "Waypoints":
         """Return the same with each leg so many times as long, (n - 1,)."""
-        return replace(self, times_s=np.concatenate([[0.0], np.cumsum(factors * np.diff(self.times_s))]))
+        return self.at(np.concatenate([[0.0], np.cumsum(factors * np.diff(self.times_s))]))
+
+    def at(self, times_s: Array) -> "Waypoints":
+        """Return the same at other times, s, (n,)."""
+        return replace(self, times_s=times_s)
 
     def leg_at(self, t: float) -> int:
         """Return the number of the leg at a time, s, from 0 on."""
@@ -46,22 +57,28 @@ class Waypoints:
         return TrackFileError(f"{self.path}: {what}")
 
 
-def read_waypoints(path: Path, speed_m_s: float | None) -> Waypoints:
+def read_waypoints(
+    path: Path, speed_m_s: float | Literal["max"] | None = None, margin: float | None = None
+) -> Waypoints:
     """Read a CSV file with a header of x, y, z (m, ENU), and if wanted t (s) and yaw (degrees).
 
-    Without `t`, the legs are flown at `speed_m_s` on average, 2 m/s if it is None; the first and the last, which begin
-    and end at rest, at half of it.
+    Without `t`, the legs are flown at `speed_m_s` on average, 2 m/s if it is None, or "max" until a vehicle is known;
+    the first and the last, which begin and end at rest, at half of it.
 
     Raises:
         TrackFileError: The file cannot be read, or not be flown.
     """
     table = read_table(path, _REQUIRED, _OPTIONAL)
     points, timed = table.matrix(_REQUIRED), "t" in table.values
-    if timed and speed_m_s is not None:
-        raise TrackFileError(f"{path}: line 1, column t: says when to be where, so leave speed out")
-    times_s = table.times(MIN_LEG_S) if timed else _times(table, points, speed_m_s or DEFAULT_SPEED_M_S)
+    for option, value in (("speed", speed_m_s), ("margin", margin)):
+        if timed and value is not None:
+            raise TrackFileError(f"{path}: line 1, column t: says when to be where, so leave {option} out")
+    fastest = speed_m_s == "max"
+    average_m_s = speed_m_s if isinstance(speed_m_s, float) else DEFAULT_SPEED_M_S
+    times_s = table.times(MIN_LEG_S) if timed else _times(table, points, average_m_s)
     yaw = table.values.get("yaw")
-    return Waypoints(path, times_s, points, None if yaw is None else np.unwrap(np.radians(yaw)), timed)
+    looks = None if yaw is None else np.unwrap(np.radians(yaw))
+    return Waypoints(path, times_s, points, looks, timed, fastest, MARGIN if margin is None else margin)
 
 
 def _times(table: CsvTable, points: Array, speed_m_s: float) -> Array:

@@ -9,9 +9,9 @@ import pytest
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
 from colibri.autopilot.guidance.trajectories.fitting import ROUNDING_M, fit
-from colibri.autopilot.guidance.trajectories.reach import MARGIN, Reach, exact_motion, times
+from colibri.autopilot.guidance.trajectories.reach import Demand, Reach, exact_motion, times
 from colibri.autopilot.guidance.trajectories.tracks import Track, position, through
-from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
+from colibri.autopilot.guidance.trajectories.waypoint_file import MARGIN, Waypoints, read_waypoints
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle
 from tests.autopilot.guidance.trajectories.paths import DIPS
@@ -37,7 +37,11 @@ def random_points(seed: int, lowest_m: float = 1.0) -> str:
 
 
 def excess(track: Track, margin: float) -> float:
-    return max(float(demand.excess(margin).max()) for demand in reach().demands(exact_motion(track), track.duration_s))
+    return max(float(demand.excess(margin).max()) for demand in _demands(track))
+
+
+def _demands(track: Track) -> list[Demand]:
+    return reach().demands(exact_motion(track), reach().charge_of_hover(track.duration_s))
 
 
 def heights(track: Track) -> Array:

@@ -43,7 +43,10 @@ def test_the_five_of_the_thesis() -> None:
         ("waypoints:speed=2", "track waypoints needs file: waypoints:file=FILE"),
         ("waypoints:a.csv,file=b.csv", "track waypoints: file is given twice"),
         ("waypoints:a.csv,b.csv", "track waypoints: options are KEY=VALUE[,KEY=VALUE…], not 'a.csv,b.csv': "
-         "choose file, speed"),
+         "choose file, speed, margin"),
+        ("waypoints:a.csv,speed=fast", "track waypoints: speed=fast: choose max, or a number"),
+        ("waypoints:a.csv,speed=0", "track waypoints: speed=0: Expected `float` >= 0.01"),
+        ("waypoints:a.csv,speed=max,margin=0.5", "track waypoints: margin=0.5: Expected `float` <= 0.4"),
         ("waypoints:a.csv", "a.csv: No such file or directory"),
     ],
 )  # fmt: skip

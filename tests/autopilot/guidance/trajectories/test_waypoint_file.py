@@ -72,9 +72,11 @@ def test_times_at_twenty_hertz_are_not_refused_for_their_rounding(tmp_path: Path
     assert len(read(tmp_path, "t,x,y,z\n" + "".join(rows)).times_s) == 100
 
 
-def test_a_speed_beside_times_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(TrackFileError, match="line 1, column t: says when to be where, so leave speed out"):
-        read(tmp_path, "x,y,z,t\n1,2,3,0\n1,2,4,2\n", 2.0)
+@pytest.mark.parametrize(("options", "what"), [("speed=2", "speed"), ("speed=max", "speed"), ("margin=0.1", "margin")])
+def test_what_changes_times_is_refused_beside_them(tmp_path: Path, options: str, what: str) -> None:
+    path = write(tmp_path, "x,y,z,t\n1,2,3,0\n1,2,4,2\n")
+    with pytest.raises(TrackError, match=f"line 1, column t: says when to be where, so leave {what} out"):
+        track(f"waypoints:{path},{options}")
 
 
 def test_what_is_no_text_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,220 @@
+"""What a flight through points costs: its duration, and what it asks for beyond a vehicle's limits; with the gradient.
+
+The flight is the one of least snap through the points. So its variables are few, times and points, and whatever they
+are, it is smooth. Source: Z. Wang, X. Zhou, C. Xu and F. Gao, "Geometrically constrained trajectory optimization for
+multicopters", IEEE Transactions on Robotics 38 (2022): the penalty, the durations without bounds and the gradient by
+the adjoint. How a demand changes with the motion is found by differences, so that its formula stands in `reach` alone.
+"""
+
+from math import factorial, inf
+
+import numpy as np
+
+from colibri.autopilot.guidance.trajectories.minimum_snap import (
+    SNAP,
+    balanced,
+    elements,
+    from_ends,
+    minimal_knots,
+    powers,
+    stiffness,
+)
+from colibri.autopilot.guidance.trajectories.reach import Motion, Reach
+from colibri.common.matrices import matmul
+from colibri.common.types import Array
+
+_INTERVALS = 16
+"""Of each piece, at whose ends it is looked at."""
+_STEPS = (1e-6, 1e-6, 1e-5, 1e-4)
+"""Of velocity, acceleration, jerk and snap, for the differences."""
+_ORDERS = np.tile(np.arange(float(SNAP)), 2)
+
+
+class FlightCost:
+    """Duration of a flight, s, and penalty, as a function of its leg times and of the points that it may choose.
+
+    Attributes:
+        weight: Of the penalty: the square of what is beyond a limit, in parts of its range (m below the floor),
+            integrated over time.
+        charge_ah: Taken from the battery when it must still do what is asked for.
+        floor_m: Below which it must not lead, m, ENU.
+    """
+
+    def __init__(self, reach: Reach, given: Array, pieces: int, margin: float) -> None:
+        """Set the problem.
+
+        Args:
+            reach: The vehicle's limits.
+            given: The waypoints, (legs + 1, 3), m, ENU.
+            pieces: Into which each leg is cut, of equal durations.
+            margin: Part of each range that is left to the control law.
+        """
+        self.weight, self.charge_ah, self.floor_m = 0.0, 0.0, -inf
+        self._reach, self._given, self._pieces = reach, given, pieces
+        self._margin = margin
+        self._stiffness = stiffness(SNAP)
+        self._sampling = _sampling()
+        self._share = np.full(_INTERVALS + 1, 1.0 / _INTERVALS)
+        self._share[[0, -1]] *= 0.5
+
+    def variables(self, legs_s: Array, points: Array) -> Array:
+        """Return leg times, s, (legs,), and all points, (legs pieces + 1, 3), as variables without bounds."""
+        chosen = np.arange(len(points)) % self._pieces > 0
+        return np.concatenate([_root(legs_s), points[chosen].ravel()])
+
+    def flight(self, x: Array) -> tuple[Array, Array]:
+        """Return leg times and points of variables."""
+        legs = len(self._given) - 1
+        points = np.empty((legs * self._pieces + 1, 3))
+        chosen = np.arange(len(points)) % self._pieces > 0
+        points[~chosen], points[chosen] = self._given, x[legs:].reshape(-1, 3)
+        return _duration(x[:legs])[0], points
+
+    def __call__(self, x: Array) -> tuple[float, Array]:
+        """Return cost and gradient, (n,)."""
+        legs_s, points = self.flight(x)
+        durations = np.repeat(legs_s / self._pieces, self._pieces)
+        forms = elements(durations, self._stiffness)
+        ends = _at_ends(minimal_knots(forms, points))
+        scale = np.tile(powers(durations, SNAP), 2)[:, :, None]
+        per_s = 1.0 / powers(durations, SNAP + 1).T[:, None, :, None]
+        own = matmul(self._sampling, np.moveaxis(scale * ends, 0, 1).reshape(2 * SNAP, -1))
+        motion = per_s * own.reshape(SNAP + 1, _INTERVALS + 1, len(durations), 3)
+        density, pull = self._penalty(motion)
+        penalty = self.weight * (self._share[:, None] * density).sum(axis=0)
+        pull *= self.weight * self._share[:, None, None] * durations[:, None]
+        slopes = _Slopes(forms, ends, durations)
+        slopes.of_durations += 1.0 + penalty
+        slopes.of_durations -= _total(np.arange(SNAP + 1.0)[:, None, None, None] * pull * motion, 2) / durations
+        forces = matmul(self._sampling.T, (per_s * pull).reshape(len(self._sampling), -1))
+        slopes.add(scale * np.moveaxis(forces.reshape(2 * SNAP, len(durations), 3), 0, 1))
+        by_legs = slopes.of_durations.reshape(-1, self._pieces).sum(axis=1) / self._pieces
+        chosen = np.arange(len(points)) % self._pieces > 0
+        gradient = np.concatenate([by_legs * _duration(x[: len(legs_s)])[1], slopes.of_points[chosen].ravel()])
+        return float((durations * (1.0 + penalty)).sum()), gradient
+
+    def _penalty(self, motion: Array) -> tuple[Array, Array]:
+        """Return the penalty of each sample, (samples, pieces), and its slope, (derivatives, samples, pieces, 3).
+
+        Args:
+            motion: Position and its derivatives, (derivatives, samples, pieces, 3).
+        """
+        slope = np.zeros_like(motion)
+        low = np.maximum(self.floor_m - motion[0, :, :, 2], 0.0)
+        slope[0, :, :, 2] = -2.0 * low
+        states = motion[1:].reshape(SNAP, -1, 3)
+        beyond = self._beyond(states)
+        excess = np.maximum(beyond, 0.0)
+        some = np.flatnonzero(excess.max(axis=0) > 0.0)
+        slopes = slope[1:].reshape(SNAP, -1, 3)
+        if len(some):
+            slopes[:, some] = self._slope(states[:, some], beyond[:, some], excess[:, some])
+        slope[1:] = slopes.reshape(motion[1:].shape)
+        return low * low + (excess * excess).sum(axis=0).reshape(low.shape), slope
+
+    def _slope(self, states: Array, beyond: Array, excess: Array) -> Array:
+        """Return the slope of the squared excess (demands, n) with velocity, acceleration, jerk, snap: (4, n, 3)."""
+        moved = np.repeat(states[:, None], 3 * SNAP, axis=1)
+        slope = np.empty_like(states)
+        for order, step in enumerate(_STEPS):
+            for axis in range(3):
+                moved[order, 3 * order + axis, :, axis] += step
+        change = self._beyond(moved.reshape(SNAP, -1, 3)).reshape(len(beyond), 3 * SNAP, -1) - beyond[:, None]
+        products = (2.0 * excess[:, None] * change).sum(axis=0)
+        for order, step in enumerate(_STEPS):
+            slope[order] = products[3 * order : 3 * order + 3].T / step
+        return slope
+
+    def _beyond(self, states: Array) -> Array:
+        """Return by how much each limit is exceeded, (demands, n), by velocity to snap, (4, n, 3)."""
+        demands = self._reach.demands(Motion(*states), self.charge_ah)
+        return np.stack([demand.beyond(self._margin) for demand in demands])
+
+
+class _Slopes:
+    """Slopes of a cost with the durations and the points of a path of least snap, as it yields to forces at its knots.
+
+    Attributes:
+        of_durations: (pieces,).
+        of_points: (pieces + 1, 3).
+    """
+
+    def __init__(self, forms: Array, ends: Array, durations: Array) -> None:
+        """Begin with none.
+
+        Args:
+            forms: The elements of the path.
+            ends: Derivatives at both ends of each piece, (pieces, 8, 3).
+            durations: Of the pieces, s.
+        """
+        self._forms, self._ends, self._durations = forms, ends, durations
+        self.of_durations = np.zeros(len(durations))
+        self.of_points = np.zeros((len(durations) + 1, 3))
+
+    def add(self, forces: Array) -> None:
+        """Add those of a cost that changes by `forces` with the derivatives at the ends of the pieces, (pieces, 8, 3).
+
+        With durations as powers d^order of derivatives of that order; inner derivatives answer by the adjoint.
+        """
+        at_knots = _at_knots(forces)
+        answer = np.zeros((*at_knots.shape[:2], 3))
+        if len(answer) > 2:
+            answer[1:-1, 1:] = balanced(self._forms, at_knots[1:-1, 1:])
+        answers = _at_ends(answer)
+        tension, reaction = self._applied(self._ends), self._applied(answers)
+        orders = _ORDERS[:, None]
+        change = (orders - (2.0 * SNAP - 1.0)) * answers * tension + orders * self._ends * reaction
+        self.of_durations += _total(orders * forces * self._ends - change, 0) / self._durations
+        self.of_points += (at_knots - _at_knots(reaction))[:, 0]
+
+    def _applied(self, ends: Array) -> Array:
+        """Return the product of each element with derivatives at its ends, (pieces, 8, 3)."""
+        forms = self._forms.reshape(-1, 2 * SNAP, 2 * SNAP)
+        applied: Array = (forms[:, :, :, None] * ends[:, None]).sum(axis=2)
+        return applied
+
+
+def _sampling() -> Array:
+    """Return position to snap of a piece, in its own time, from the derivatives at its ends, (5 samples, 8)."""
+    tau = np.arange(_INTERVALS + 1.0) / _INTERVALS
+    rows = np.zeros((SNAP + 1, len(tau), 2 * SNAP))
+    for order in range(SNAP + 1):
+        power = np.ones_like(tau)
+        for column in range(order, 2 * SNAP):
+            rows[order, :, column] = factorial(column) / factorial(column - order) * power
+            power = power * tau
+    return matmul(rows.reshape(-1, 2 * SNAP), from_ends(SNAP))
+
+
+def _at_ends(knots: Array) -> Array:
+    """Return what is at the ends of each piece, (pieces, 8, 3), of what is at the knots, (pieces + 1, 4, 3)."""
+    return np.concatenate([knots[:-1], knots[1:]], axis=1)
+
+
+def _at_knots(ends: Array) -> Array:
+    """Return the sums at the knots, (pieces + 1, 4, 3), of what is at the ends of each piece, (pieces, 8, 3)."""
+    knots = np.zeros((len(ends) + 1, SNAP, 3))
+    knots[:-1] += ends[:, :SNAP]
+    knots[1:] += ends[:, SNAP:]
+    return knots
+
+
+def _total(values: Array, pieces_axis: int) -> Array:
+    """Return the sums over all but one axis."""
+    moved = np.moveaxis(values, pieces_axis, -1)
+    total: Array = moved.reshape(-1, moved.shape[-1]).sum(axis=0)
+    return total
+
+
+def _duration(root: Array) -> tuple[Array, Array]:
+    """Return durations, s, always positive, and their slopes; 1 s at 0."""
+    below = 1.0 / ((0.5 * np.minimum(root, 0.0) - 1.0) * np.minimum(root, 0.0) + 1.0)
+    above = (0.5 * np.maximum(root, 0.0) + 1.0) * np.maximum(root, 0.0)
+    longer = root > 0.0
+    return np.where(longer, 1.0 + above, below), np.where(longer, 1.0 + root, (1.0 - root) * below * below)
+
+
+def _root(duration_s: Array) -> Array:
+    """Return what gives these durations."""
+    longer = np.sqrt(2.0 * np.maximum(duration_s, 1.0) - 1.0) - 1.0
+    return np.where(duration_s > 1.0, longer, 1.0 - np.sqrt(2.0 / np.minimum(duration_s, 1.0) - 1.0))

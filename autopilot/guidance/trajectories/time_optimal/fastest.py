@@ -1,0 +1,117 @@
+"""The fastest flight through waypoints that a vehicle's limits allow: optimised leg times, and points in between.
+
+First the leg times alone, the path being that of least snap; then each leg is cut into halves again and again, so that
+points in between may be chosen too. Each stage begins with the flight of the one before, its penalty light at first.
+What the penalty leaves beyond the limits is taken off in the end: all is flown slower by as much.
+"""
+
+from math import inf
+
+import numpy as np
+
+from colibri.autopilot.guidance.trajectories.csv_table import MAX_DURATION_S
+from colibri.autopilot.guidance.trajectories.fitting import check_heights, dips_of
+from colibri.autopilot.guidance.trajectories.reach import Reach, exact_motion
+from colibri.autopilot.guidance.trajectories.time_optimal.cost import FlightCost
+from colibri.autopilot.guidance.trajectories.time_optimal.lbfgs import minimise
+from colibri.autopilot.guidance.trajectories.tracks import Track, position, through
+from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
+from colibri.common.types import Array
+
+_PIECES, _LEAST_PIECES, _MOST_PIECES = 4, 16, 1024
+"""Of a leg, and of all legs: where there are few legs they are cut into more, where there are many into fewer."""
+_WEIGHTS = (1e2, 1e4)
+"""Of the penalty, one after another."""
+_ITERATIONS = 150
+_TOLERANCE = 1e-4
+_CLEARANCE_M = 0.01
+"""Above the floor, aimed at; more by what is found below it."""
+_LIFTS = 10
+_SLOWER = (0.0005, 0.05)
+"""In one pass."""
+
+
+def fastest(waypoints: Waypoints, reach: Reach, floor_m: float) -> tuple[Track, str]:
+    """Return the fastest track through waypoints that is found, and in words what it is.
+
+    Raises:
+        TrackFileError: A waypoint is below the floor, or there is no such track.
+    """
+    check_heights(waypoints, floor_m)
+    legs_s, points, pieces = np.diff(waypoints.times_s), waypoints.points_enu_m, 1
+    while True:
+        legs_s, points = _optimised(waypoints, reach, floor_m, legs_s, points)
+        if pieces >= _wanted_pieces(len(legs_s)):
+            return _within(waypoints, reach, legs_s, points)
+        pieces *= 2
+        points = _halved(_track(waypoints, legs_s, points), legs_s, pieces, floor_m)
+
+
+def _wanted_pieces(legs: int) -> int:
+    pieces = _PIECES
+    while pieces * legs < _LEAST_PIECES:
+        pieces *= 2
+    while pieces * legs > _MOST_PIECES and pieces > 2:
+        pieces //= 2
+    return pieces
+
+
+def _optimised(waypoints: Waypoints, reach: Reach, floor_m: float, legs_s: Array, points: Array) -> tuple[Array, Array]:
+    """Return better leg times and points, of as many pieces; what the battery still gives is that of the flight before.
+
+    Raises:
+        TrackFileError: It cannot be held above the floor.
+    """
+    pieces = (len(points) - 1) // len(legs_s)
+    cost = FlightCost(reach, waypoints.points_enu_m, pieces, waypoints.margin)
+    cost.floor_m = floor_m + _CLEARANCE_M if pieces > 1 else -inf
+    x, weights, lifts = cost.variables(legs_s, points), list(_WEIGHTS), 0
+    while weights:
+        cost.weight = weights.pop(0)
+        cost.charge_ah = reach.charge_of(exact_motion(_track(waypoints, legs_s, points)))
+        x = minimise(cost, x, _ITERATIONS, _TOLERANCE)
+        legs_s, points = cost.flight(x)
+        dips = list(dips_of(_track(waypoints, legs_s, points), floor_m)) if pieces > 1 and not weights else []
+        if dips and lifts == _LIFTS:
+            raise waypoints.error(f"it cannot be held above the floor of {floor_m:g} m: add a waypoint")
+        if dips:
+            cost.floor_m += 2.0 * (floor_m - min(height_m for _, height_m in dips))
+            weights, lifts = [cost.weight], lifts + 1
+    return legs_s, points
+
+
+def _halved(track: Track, legs_s: Array, pieces: int, floor_m: float) -> Array:
+    """Return the points of a track between as many pieces of each leg, above the floor."""
+    points = position(track, _knots(legs_s, pieces))
+    points[:, 2] = np.maximum(points[:, 2], floor_m)
+    return points
+
+
+def _within(waypoints: Waypoints, reach: Reach, legs_s: Array, points: Array) -> tuple[Track, str]:
+    """Return the track, slower by what it is beyond the limits, and what it is."""
+    while True:
+        track = _track(waypoints, legs_s, points)
+        motion = exact_motion(track)
+        demands = reach.demands(motion, reach.charge_of(motion))
+        beyond, worst = max((float(demand.beyond(waypoints.margin).max()), str(demand)) for demand in demands)
+        if beyond <= 0.0:
+            break
+        legs_s = (1.0 + min(max(0.2 * beyond, _SLOWER[0]), _SLOWER[1])) * legs_s
+        if legs_s.sum() > MAX_DURATION_S:
+            raise waypoints.error(f"not to be flown within {MAX_DURATION_S:g} s: it asks for a {worst}")
+    top_m_s = np.sqrt((motion.velocity * motion.velocity).sum(axis=1).max())
+    share = demands[0].values.max() / demands[0].limit
+    return track, f"fastest: {track.duration_s:.2f} s, up to {top_m_s:.1f} m/s and {share:.0%} of the thrust"
+
+
+def _track(waypoints: Waypoints, legs_s: Array, points: Array) -> Track:
+    """Return the track through points at these leg times."""
+    pieces = (len(points) - 1) // len(legs_s)
+    between = np.arange(len(points)) % pieces > 0
+    passed = np.concatenate([_knots(legs_s, pieces)[:, None], points], axis=1)
+    return through(waypoints.at(passed[~between, 0]), between=passed[between])
+
+
+def _knots(legs_s: Array, pieces: int) -> Array:
+    """Return when the pieces of the legs begin and end, s, (legs pieces + 1,)."""
+    return np.concatenate([[0.0], np.cumsum(np.repeat(legs_s / pieces, pieces))])

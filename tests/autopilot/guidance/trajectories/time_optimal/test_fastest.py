@@ -1,0 +1,108 @@
+"""The fastest flights: within the limits, above the floor, through every point, smooth, nearly as fast as can be."""
+
+from functools import cache
+from math import exp, log, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
+from colibri.autopilot.guidance.trajectories.fitting import ROUNDING_M, fit
+from colibri.autopilot.guidance.trajectories.loading import LoadedTrack, load_track
+from colibri.autopilot.guidance.trajectories.reach import Reach, exact_motion, times
+from colibri.autopilot.guidance.trajectories.time_optimal.fastest import fastest
+from colibri.autopilot.guidance.trajectories.tracks import position
+from colibri.autopilot.guidance.trajectories.waypoint_file import read_waypoints
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import load_vehicle
+
+LINE = "x,y,z\n0,0,3\n30,0,3\n"
+TURN = "x,y,z,yaw\n0,0,0,0\n12,0,1,0\n12,2,1,90\n0,2,0,90\n"
+
+
+@cache
+def reach() -> Reach:
+    return Reach(load_vehicle("hummingbird"), load_profile("flight"), exact_drag=True)
+
+
+def loaded(folder: Path, text: str, options: str = "") -> LoadedTrack:
+    (folder / "points.csv").write_text(text, encoding="utf-8")
+    vehicle, profile = load_vehicle("hummingbird"), load_profile("flight")
+    return load_track(f"waypoints:{folder / 'points.csv'},speed=max{options}", vehicle, profile)
+
+
+def beyond(flown: LoadedTrack, margin: float) -> float:
+    motion = exact_motion(flown.track)
+    demands = reach().demands(motion, reach().charge_of(motion))
+    return max(float(demand.beyond(margin).max()) for demand in demands)
+
+
+def bang_bang(distance_m: float, acceleration_m_s2: float, drag_1_s: float) -> float:
+    """Return the time of a straight line at full acceleration, then at full deceleration, s."""
+
+    def stop(accelerating_s: float) -> tuple[float, float]:
+        terminal = acceleration_m_s2 / drag_1_s
+        top = terminal * (1.0 - exp(-drag_1_s * accelerating_s))
+        braking_s = log(1.0 + drag_1_s * top / acceleration_m_s2) / drag_1_s
+        there = terminal * accelerating_s - top / drag_1_s
+        return there + top / drag_1_s - terminal * braking_s, accelerating_s + braking_s
+
+    low, high = 0.0, 10.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stop(middle)[0] < distance_m else (low, middle)
+    return stop(low)[1]
+
+
+def test_a_straight_line_is_flown_nearly_as_fast_as_thrust_and_tilt_allow(tmp_path: Path) -> None:
+    """Rotors that need no time to turn the vehicle over would be 12 % faster."""
+    flown = loaded(tmp_path, LINE)
+    motion = exact_motion(flown.track)
+    thrust, _, tilt, _ = reach().demands(motion, reach().charge_of(motion))
+    specific = 4.0 * (thrust.limit - 0.1 * thrust.span) / 0.698
+    level = min(sqrt(specific * specific - 9.81**2), 9.81 * np.tan(np.radians(0.9 * tilt.limit)))
+    assert flown.track.duration_s <= 1.2 * bang_bang(30.0, level, 0.025 / 0.698)
+    assert beyond(flown, 0.1) <= 0.0
+    assert flown.note.startswith(f"{tmp_path / 'points.csv'}: fastest: {flown.track.duration_s:.2f} s, up to ")
+    assert flown.note.endswith(" m/s and 90% of the thrust")
+
+
+def test_a_turn_from_the_floor_to_the_floor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 50)
+    flown = loaded(tmp_path, TURN)
+    track, waypoints = flown.track, flown.track.waypoints
+    assert waypoints is not None
+    assert position(track, waypoints.times_s) == pytest.approx(waypoints.points_enu_m, abs=1e-9)
+    assert position(track, times(track))[:, 2].min() >= -ROUNDING_M
+    assert beyond(flown, 0.1) <= 0.0
+    slow, _ = fit(read_waypoints(waypoints.path, 5.0), reach(), 0.0)
+    assert track.duration_s < 0.75 * slow.duration_s
+    assert track.yaw is not None
+    assert track.yaw(track.clock(waypoints.times_s, 0)).derivative(0) == pytest.approx(np.radians([0, 0, 90, 90]))
+    _is_smooth(flown)
+
+
+def _is_smooth(flown: LoadedTrack) -> None:
+    """Check that all that a law's preview reads, up to snap, is continuous."""
+    t: Array = np.arange(0.01, flown.track.duration_s - 0.01, 0.001)
+    for axis in flown.track.position(flown.track.clock(t, 5)):
+        for order in range(1, 5):
+            steepest = np.abs(axis.derivative(order + 1)).max()
+            assert np.abs(np.diff(axis.derivative(order))).max() <= 0.001 * steepest * 1.2
+
+
+def test_more_margin_is_slower_and_the_same_is_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("colibri.autopilot.guidance.trajectories.time_optimal.fastest._ITERATIONS", 10)
+    flown = [loaded(tmp_path, "x,y,z\n0,0,3\n4,0,3\n4,4,3\n", f",margin={margin}") for margin in (0.0, 0.3, 0.3)]
+    assert beyond(flown[0], 0.0) <= 0.0
+    assert beyond(flown[1], 0.3) <= 0.0
+    assert flown[1].track.duration_s > 1.1 * flown[0].track.duration_s
+    assert (exact_motion(flown[1].track).snap == exact_motion(flown[2].track).snap).all(), "bit for bit"
+
+
+def test_a_waypoint_below_the_floor_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "points.csv").write_text(LINE, encoding="utf-8")
+    with pytest.raises(TrackFileError, match=r"points\.csv: waypoint 1 is at 3 m, below the floor of 4 m"):
+        fastest(read_waypoints(tmp_path / "points.csv", "max"), reach(), 4.0)
