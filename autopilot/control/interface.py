@@ -7,6 +7,7 @@ next. What they remember they return too: a controller has no state of its own, 
 
 from collections.abc import Callable
 from enum import StrEnum
+from math import nan
 from typing import NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 from colibri.autopilot.control.qp import QpStatus
@@ -72,6 +73,7 @@ class VehicleState(NamedTuple):
         attitude: Unit quaternion wxyz, FLU body to ENU earth.
         euler: phi, theta, psi in rad, psi unwrapped.
         rate_flu_rad_s: Body rates p, q, r, rad/s, FLU.
+        airborne: Whether nothing but air and rotors acts on it: it is clear of the ground.
     """
 
     position_enu_m: Vector
@@ -79,6 +81,7 @@ class VehicleState(NamedTuple):
     attitude: Quaternion
     euler: Vector
     rate_flu_rad_s: Vector
+    airborne: bool = True
 
 
 class Fallback(StrEnum):
@@ -132,6 +135,7 @@ class Diagnostics(NamedTuple):
         slack: By how much soft limits are exceeded, in parts of each: the largest.
         predicted: Outputs predicted over the horizon, (N, p), in the order and units that the control law documents.
         planned_squared: Squared rotor speeds that the plan commands at each step, in parts of the largest, (N, 4).
+        mass_kg: Mass that the vehicle moves like under its thrust; nan for a control law that estimates none.
     """
 
     qp_status: QpStatus | None = None
@@ -142,6 +146,7 @@ class Diagnostics(NamedTuple):
     slack: float = 0.0
     predicted: Array | None = None
     planned_squared: Array | None = None
+    mass_kg: float = nan
 
 
 class Decision(NamedTuple):
@@ -210,6 +215,21 @@ class ChargeController(Controller[Memory], Protocol[Memory]):
 
     def with_charge(self, memory: Memory, charge_ah: float) -> Memory:
         """Return the memory with another charge taken from the battery, Ah."""
+
+
+@runtime_checkable
+class MassController(Controller[Memory], Protocol[Memory]):
+    """A control law that estimates its vehicle's mass in flight; optional.
+
+    A law that has this goes on with the mass that it has estimated where it restarts in mid-flight. Each take-off
+    begins with the vehicle's own: what was carried may have been left on the ground.
+    """
+
+    def mass_kg(self, memory: Memory) -> float:
+        """Return the mass that the law remembers, kg."""
+
+    def with_mass(self, memory: Memory, mass_kg: float) -> Memory:
+        """Return the memory with another mass, kg."""
 
 
 @runtime_checkable

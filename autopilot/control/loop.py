@@ -13,6 +13,7 @@ from colibri.autopilot.control.interface import (
     Controller,
     Decision,
     Horizon,
+    MassController,
     PlanController,
     VehicleState,
 )
@@ -81,7 +82,7 @@ class ControlLoop:
         self.preview = self._controller.preview
         self.takes_attitude = isinstance(self._controller, AttitudeController)
         self.plan_columns = self._controller.plan_columns if isinstance(self._controller, PlanController) else None
-        self._charged = _charged(self._controller)
+        self._charged, self._weighing = _charged(self._controller), _weighing(self._controller)
         self.control_interval_us = self._controller.control_interval_us
         self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
         self._memory: Any = None
@@ -102,6 +103,13 @@ class ControlLoop:
             self._memory = self._charged.with_charge(self._memory, charge_ah)
         self._yaw_rad = yaw_rad
         self._command(np.full(4, rotor_speed))
+
+    def begin_in_flight(self, yaw_rad: float) -> None:
+        """Begin anew in mid-flight, every rotor as in hover: with the charge that is left, and the mass estimated."""
+        before = self._memory
+        self.begin(self.vehicle.hover_speed, yaw_rad, afresh=False)
+        if self._weighing is not None and before is not None:
+            self._memory = self._weighing.with_mass(self._memory, self._weighing.mass_kg(before))
 
     def know_charge(self, used_ah: float) -> None:
         """Take in the charge that the battery itself reports, Ah: a law that remembers another goes on with this."""
@@ -128,15 +136,14 @@ class ControlLoop:
         return LoopRecord(self._yaw_rad, self.controls, memory)
 
     def resume(self, record: LoopRecord, *, seamless: bool) -> None:
-        """Go on with what was remembered: `seamless`, or as one begins in mid-flight, with the charge that is left."""
-        hover_speed = self.vehicle.hover_speed
-        first = self._controller.initial(hover_speed)
+        """Go on with what was remembered: `seamless`, or as one begins in mid-flight."""
+        first = self._controller.initial(self.vehicle.hover_speed)
         kept = of_bytes(type(first), record.memory)
         self._memory = first if kept is None else kept
         if seamless and kept is not None:
             self._yaw_rad, self.controls = record.yaw_rad, record.controls
         else:
-            self.begin(hover_speed, record.yaw_rad, afresh=False)
+            self.begin_in_flight(record.yaw_rad)
 
     def is_due(self, time_us: int) -> bool:
         """Whether a control sample is at `time_us`."""
@@ -178,7 +185,7 @@ class ControlLoop:
 
     def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
         """Go on with a law of the same kind and rhythm, built from other numbers; it takes over what is remembered."""
-        self._controller, self._charged = controller, _charged(controller)
+        self._controller, self._charged, self._weighing = controller, _charged(controller), _weighing(controller)
         self.vehicle = vehicle
 
     @property
@@ -205,6 +212,11 @@ class ControlLoop:
 def _charged(controller: Controller[Any]) -> ChargeController[Any] | None:
     """Return the law as one that counts what its battery gives; None if it does not."""
     return controller if isinstance(controller, ChargeController) else None
+
+
+def _weighing(controller: Controller[Any]) -> MassController[Any] | None:
+    """Return the law as one that estimates the mass; None if it does not."""
+    return controller if isinstance(controller, MassController) else None
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:

@@ -47,7 +47,7 @@ class FlightStart:
             self._resume(history, frame)
         elif before_us is not None and frame.time_us > before_us:
             loop = self._parts.loop
-            loop.begin(loop.vehicle.hover_speed, loop.state(frame).euler[2])
+            loop.begin_in_flight(loop.state(frame).euler[2])
             self._parts.rotor_loss.begin(loop.controls)
         else:
             self._begin(frame, again=before_us is not None)

@@ -86,7 +86,8 @@ class Flying:
             flown = errors.THREE_ROTORS if parts.rotor_loss.flies else errors.LAW
             try:
                 solve_time_s = parts.pilot.behaviour.solve_time_s
-                return actuation.decide(now_us, state, guidance, parts.battery.charge_ah, solve_time_s)
+                felt = state._replace(airborne=parts.pilot.ground.clear(state))
+                return actuation.decide(now_us, felt, guidance, parts.battery.charge_ah, solve_time_s)
             except Exception as error:
                 defence.caught(flown, error)
             if flown is errors.THREE_ROTORS and flown not in defence.off:

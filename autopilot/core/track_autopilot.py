@@ -6,11 +6,12 @@ from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.step import Step, follows, nothing_known
 from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
+from colibri.autopilot.guidance.landing_detector import is_clear, stands_at_first
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
 from colibri.mavlink.hil.sensors import Frame
-from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -44,6 +45,7 @@ class Autopilot:
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock
         self._time_us: int | None = None
+        self._ground_m: float | None = None
         self.frame_interval_us = self._loop.frame_interval_us
         self._state_source = StateSource(estimator, self.frame_interval_us)
 
@@ -68,11 +70,12 @@ class Autopilot:
             self._time_us = None
             return nothing_known(frame.time_us, self._clock() - started_s)
         if not follows(frame.time_us, self._time_us, self.frame_interval_us):
-            self._begin(frame)
+            self._begin(known)
         self._time_us = frame.time_us
         decision = None
         if due:
             state = self._loop.state(self._delay.ahead(known, self._loop.charge_ah))
+            state = state._replace(airborne=self._ground_m is None or is_clear(state, self._ground_m))
             acts_us = frame.time_us + self._delay.delay_us
             references = self._planner.horizon_at(acts_us, self._loop.control_interval_us)
             decision = self._loop.decide(frame.time_us, state, references)
@@ -81,10 +84,13 @@ class Autopilot:
         estimate = self._state_source.estimate if due else None
         return Step(command, decision, self._clock() - started_s, estimate, delay_us=self._delay.delay_us)
 
-    def _begin(self, frame: Frame) -> None:
+    def _begin(self, frame: StateFrame) -> None:
         vehicle = self._loop.vehicle
         speed = self._start_speed if frame.time_us == 0 else vehicle.hover_speed
-        if self._time_us is None and self._state_source.rests:
+        rests = self._time_us is None and self._state_source.rests
+        if rests:
             speed = vehicle.rotors.idle_speed
         self._loop.begin(speed, float(self._planner.horizon(frame.time_us).yaw_rad[0]))
         self._delay.begin(self._loop.controls, rests=self._state_source.rests)
+        state = self._loop.state(frame)
+        self._ground_m = state.position_enu_m[2] if rests or stands_at_first(state, 0.0) else None

@@ -1,5 +1,7 @@
 """Where the control law's plan leads: its predicted attitudes and thrusts, integrated to velocity and position."""
 
+from math import isnan
+
 import numpy as np
 
 from colibri.autopilot.control.interface import Diagnostics, Horizon, PlanColumns, VehicleState
@@ -29,14 +31,15 @@ class Forecaster:
         """Return points of the plan, the last at its end; of the references where the law predicts no attitude."""
         plan, squared = how.predicted, how.planned_squared
         if plan is not None and squared is not None and self._columns is not None:
-            return self._integrated(state, plan, squared, self._columns)
+            mass_kg = self._mass_kg if isnan(how.mass_kg) else how.mass_kg
+            return self._integrated(state, plan, squared, self._columns, mass_kg)
         if references is None or len(references.position_enu_m) < POINTS:
             return ()
         columns = references.position_enu_m, references.velocity_enu_m_s, references.acceleration_enu_m_s2
         return self._points(*columns, references.yaw_rad, references.yaw_rate_rad_s)
 
     def _integrated(
-        self, state: VehicleState, plan: Array, squared: Array, columns: PlanColumns
+        self, state: VehicleState, plan: Array, squared: Array, columns: PlanColumns, mass_kg: float
     ) -> tuple[Forecast, ...]:
         """Integrate thrust along the body's z axis and gravity; drag does not matter in so short a time."""
         ahead = plan[1:]
@@ -44,7 +47,7 @@ class Forecaster:
         x = cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi)
         y = cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi)
         up = np.stack([x, y, cos(phi) * cos(theta)], axis=1)
-        acceleration = up * (matvec(squared, self._full_thrust_n) / self._mass_kg)[:, None]
+        acceleration = up * (matvec(squared, self._full_thrust_n) / mass_kg)[:, None]
         acceleration[:, 2] -= self._gravity_m_s2
         velocity = np.array(state.velocity_enu_m_s) + self._interval_s * np.cumsum(acceleration, axis=0)
         position = np.array(state.position_enu_m) + self._interval_s * np.cumsum(velocity, axis=0)

@@ -153,6 +153,7 @@ class SnapshotBuilder:
             active=how.active,
             planned_squared=squared,
             horizon=forecast,
+            mass_kg=how.mass_kg,
         )
         return self._solver
 

@@ -13,6 +13,8 @@ _DRIFTING_FOR_US = 600_000
 CARRIED = 0.5
 """Thrust in parts of the weight, below which a vehicle of unknown velocity must be falling, or stand."""
 
+_CLEAR_M = 0.3
+
 STANDING_BELOW_M = 0.5
 STANDING_SLOWER_M_S = 0.3
 
@@ -56,3 +58,11 @@ def stands_at_first(state: VehicleState, home_z_m: float) -> bool:
     """Guess whether a vehicle that is seen for the first time stands: low and still."""
     still = max(map(abs, state.velocity_enu_m_s)) < STANDING_SLOWER_M_S
     return still and abs(state.position_enu_m[2] - home_z_m) < STANDING_BELOW_M
+
+
+def is_clear(state: VehicleState, ground_m: float) -> bool:
+    """Whether a vehicle in flight is too far from the height at which it last stood to touch the ground.
+
+    One that is below is as clear of it as one above: there the ground is lower.
+    """
+    return abs(state.position_enu_m[2] - ground_m) > _CLEAR_M

@@ -46,6 +46,9 @@ LPV_MPC = [
         "LPV_OBS_ACC_MAX", ("observer", "max_acceleration_m_s2"), "m/s^2", 0.01, 20.0, "Largest disturbance assumed"
     ),
     Number("LPV_OBS_MOM_MAX", ("observer", "max_moment_n_m"), "N m", 0.001, 10.0, "Largest disturbance moment assumed"),
+    Number("LPV_MASS_RATE", ("mass", "rate_1_s"), "1/s", 0.0, 2.0, "How fast the mass is learned; 0: never"),
+    Number("LPV_MASS_MIN", ("mass", "min_ratio"), "", 0.1, 1.0, "Least mass assumed, to VEH_MASS"),
+    Number("LPV_MASS_MAX", ("mass", "max_ratio"), "", 1.0, 10.0, "Largest mass assumed, to VEH_MASS"),
     *_axes("LPV_Q_PHI LPV_Q_THETA LPV_Q_PSI", ("attitude", "output_weight"), "", 1e-3, 1e3, "Weight on {} error"),
     *_axes("LPV_R_U2 LPV_R_U3 LPV_R_U4", ("attitude", "increment_weight"), "", 1e-3, 1e4, "Weight on {} changes"),
     *_axes(

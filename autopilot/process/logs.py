@@ -24,6 +24,7 @@ DECISION_COLUMNS = (
     *("qp_status", "fallback", "solve_time_us", "control_step_us", "cost", "slack"),
     *(f"active_{kind}" for kind in Active._fields),
     "delay_us",
+    "mass_kg",
 )
 
 ESTIMATE_COLUMNS = (
@@ -80,12 +81,8 @@ class AutopilotLog:
         codes = (STATUS_CODES[how.qp_status], FALLBACK_CODES[how.fallback])
         times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
         time_s = step.command.time_us / 1e6
-        self._decisions.write(
-            (
-                *(time_s, *step.decision.attitude_reference, *codes, *times_us, how.cost, how.slack, *how.active),
-                step.delay_us,
-            )
-        )
+        figures = (*times_us, how.cost, how.slack, *how.active, step.delay_us, how.mass_kg)
+        self._decisions.write((time_s, *step.decision.attitude_reference, *codes, *figures))
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
         """Record that the next frame is answered by a vehicle that begins with these parameters and this history."""

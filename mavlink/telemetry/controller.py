@@ -87,9 +87,9 @@ def debug_float_array(s: Snapshot) -> Fields:
 
 
 def named_value_float(s: Snapshot) -> list[Fields]:
-    """NAMED_VALUE_FLOAT (251), one a figure: of the solver, and the delay compensated; names of at most ten letters."""
+    """NAMED_VALUE_FLOAT (251), one a figure: of the law, and the delay compensated; names of at most ten letters."""
     solver = s.solver
-    figures = {
+    figures: dict[bytes, float] = {
         b"mpc_status": solver.status,
         b"mpc_fall": solver.fallback,
         b"mpc_iter": solver.iterations,
@@ -100,6 +100,8 @@ def named_value_float(s: Snapshot) -> list[Fields]:
         b"mpc_active": sum(solver.active),
         b"delay_us": s.delay_us,
     }
+    if not isnan(solver.mass_kg):
+        figures[b"mass_kg"] = solver.mass_kg
     return [(boot_ms(s), name, float(value)) for name, value in figures.items()]
 
 

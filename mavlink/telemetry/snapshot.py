@@ -80,6 +80,7 @@ class SolverState(NamedTuple):
         slack: By how much soft limits are exceeded, in parts of each: the largest.
         active: Constraints that bind: rotors, increments, angles, rates.
         planned_squared: Squared rotor speeds of the plan's steps, parts of the largest.
+        mass_kg: That the vehicle moves like; nan where the control law estimates none.
     """
 
     status: int = -1
@@ -92,6 +93,7 @@ class SolverState(NamedTuple):
     active: tuple[int, int, int, int] = (0, 0, 0, 0)
     planned_squared: tuple[FourRotors, ...] = ()
     horizon: tuple[Forecast, ...] = ()
+    mass_kg: float = nan
 
 
 class EstimatorState(NamedTuple):

@@ -6,7 +6,7 @@ from colibri.autopilot.commander.rules.modes import Event
 from colibri.autopilot.commander.status_queue import StatusQueue
 from colibri.autopilot.control.interface import VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
-from colibri.autopilot.guidance.landing_detector import Landing, watch
+from colibri.autopilot.guidance.landing_detector import Landing, is_clear, watch
 from colibri.mavlink.services.statustext import INFO, NOTICE
 
 
@@ -43,6 +43,7 @@ class GroundContact:
         self._lines = lines
         self._landing = Landing()
         self.standing = self.idles = True
+        self._sinks = False
         self.height_m = 0.0
         self.times = FlightTimes()
 
@@ -62,6 +63,10 @@ class GroundContact:
         self.standing, self.idles, self.height_m, self.times = record
         self.standing |= came_down
         self.idles |= came_down
+
+    def clear(self, vehicle: VehicleState) -> bool:
+        """Whether a vehicle has left the ground and is clear of it, and does not stay above what it must sink to."""
+        return not self.standing and not self._sinks and is_clear(vehicle, self.height_m)
 
     def arm(self, now_us: int) -> None:
         """Count a flight that begins with the arming at `now_us`."""
@@ -87,6 +92,7 @@ class GroundContact:
 
     def watch(self, now_us: int, vehicle: VehicleState, *, sinks: bool, drifts: bool = False) -> None:
         """Detect a landing of a vehicle in flight; `sinks` and `drifts` as of `landing_detector.watch`."""
+        self._sinks = sinks
         self._landing, stands = watch(self._landing, now_us, vehicle, sinks, drifts=drifts)
         if stands:
             self.land(now_us)

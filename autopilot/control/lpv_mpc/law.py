@@ -31,6 +31,7 @@ from colibri.autopilot.control.vehicle_model import disturbance_observer, rotor_
 from colibri.autopilot.control.vehicle_model.airframe import drag_force
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings, observer_of
+from colibri.autopilot.control.vehicle_model.mass import MassSettings, follow_mass, mass_model
 from colibri.common.config import Count, Positive, Table, read_settings
 from colibri.common.elementary import square
 from colibri.common.jit import packed
@@ -63,6 +64,7 @@ class LpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     control_interval_s: ControlInterval
     guidance: GuidanceSettings
     observer: ObserverSettings
+    mass: MassSettings
     attitude: AttitudeSettings
     fallback: FallbackSettings
     qp: QpSettings
@@ -78,6 +80,7 @@ class Memory(NamedTuple):
         measured: What the observer measured a sample ago, (9,); None before the first.
         estimate: Of the observer a sample ago, (12,).
         charge_ah: Charge taken from the battery.
+        mass_kg: That the vehicle moves like.
         plan: The last plan, made `age` samples ago; None where there is none to build on.
         age: Samples since that plan.
     """
@@ -89,6 +92,7 @@ class Memory(NamedTuple):
     measured: Array | None
     estimate: Array
     charge_ah: float
+    mass_kg: float
     plan: Plan | None
     age: int
 
@@ -99,12 +103,14 @@ class LawInputs(NamedTuple):
     Attributes:
         rotation: Body to earth, (3, 3).
         measured, estimate: Of the observer, (9,) and (12,).
+        mass_kg: That the vehicle moves like.
         now, motion: For the attitude's plan, and for the outer loop.
     """
 
     rotation: Array
     measured: Array
     estimate: Array
+    mass_kg: float
     now: InitialState
     motion: Motion
 
@@ -152,6 +158,7 @@ class LpvMpc:
         self._momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
         self._observer = observer_of(settings.observer, vehicle, self._interval_s)
         self._packed_observer = packed(self._observer)
+        self._packed_mass = packed(mass_model(settings.mass, vehicle, self._interval_s))
         self._turn = recovery.TurnGains(
             settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s
         )
@@ -171,9 +178,8 @@ class LpvMpc:
         """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
         speeds = np.full(4, rotor_speed / self._vehicle.rotors.max_speed)
         wrench = matvec(self._allocation, speeds * speeds)
-        return Memory(
-            speeds, wrench[1:].copy(), wrench, wrench, None, np.zeros(disturbance_observer.ESTIMATES), 0.0, None, 0
-        )
+        estimate, mass_kg = np.zeros(disturbance_observer.ESTIMATES), self._vehicle.body.mass_kg
+        return Memory(speeds, wrench[1:].copy(), wrench, wrench, None, estimate, 0.0, mass_kg, None, 0)
 
     def charge_ah(self, memory: Memory) -> float:
         """Return the charge taken from the battery, Ah."""
@@ -182,6 +188,14 @@ class LpvMpc:
     def with_charge(self, memory: Memory, charge_ah: float) -> Memory:
         """Return the memory with another charge taken from the battery, Ah."""
         return memory._replace(charge_ah=charge_ah)
+
+    def mass_kg(self, memory: Memory) -> float:
+        """Return the mass that the vehicle moves like."""
+        return memory.mass_kg
+
+    def with_mass(self, memory: Memory, mass_kg: float) -> Memory:
+        """Return the memory with another mass."""
+        return memory._replace(mass_kg=mass_kg)
 
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample."""
@@ -209,15 +223,18 @@ class LpvMpc:
         phi, theta, psi = state.euler
         p, q, r = state.rate_flu_rad_s
         thrust_n, *moments_n_m = memory.wrench.tolist()
+        mass_kg = memory.mass_kg
+        if state.airborne:
+            mass_kg = follow_mass(mass_kg, estimate[6:], measured[6:], thrust_n, self._packed_mass)
         x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
         momentum = dot(self._momentum, memory.speeds)
         max_speed = self._battery.max_speed_now(memory.charge_ah, memory.speeds)
         now = InitialState(x, memory.moments, estimate[9:], momentum, max_speed)
-        motion = Motion(np.array(state.position_enu_m), measured[:3], measured[6:], float(psi), thrust_n)
-        return LawInputs(rotation, measured, estimate, now, motion)
+        motion = Motion(np.array(state.position_enu_m), measured[:3], measured[6:], float(psi), thrust_n, mass_kg)
+        return LawInputs(rotation, measured, estimate, mass_kg, now, motion)
 
     def _decide(self, memory: Memory, inputs: LawInputs, setpoint: Setpoint) -> tuple[Memory, Decision]:
-        choice = self._choose(memory, inputs.now, setpoint, inputs.rotation)
+        choice = self._choose(memory, inputs, setpoint)
         commands, speeds, wrench, mean_wrench = rotor_lag.actuate(
             memory.speeds, choice.squared, self._lag, inputs.now.max_speed, self._allocation
         )
@@ -230,11 +247,13 @@ class LpvMpc:
             inputs.measured,
             inputs.estimate,
             charge_ah,
+            inputs.mass_kg,
             choice.plan,
             choice.age,
         )
         phi, theta, psi = setpoint.target.angles[0].tolist()
-        return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), choice.diagnostics)
+        how = choice.diagnostics._replace(mass_kg=inputs.mass_kg)
+        return after, Decision(commands * self._vehicle.rotors.max_speed, (phi, theta, psi), how)
 
     def estimate(self, memory: Memory, measured: Array) -> Array:
         """Return the observer's estimate, (12,), with the measurement `measured`, (9,)."""
@@ -245,12 +264,19 @@ class LpvMpc:
         drag_force(self._observer.airframe, middle[:3], middle[6:], float(memory.mean_wrench[0]), drag)
         momentum = dot(self._momentum, memory.speeds)
         return disturbance_observer.observe(
-            memory.estimate, memory.measured, measured, memory.mean_wrench, momentum, drag, self._packed_observer
+            memory.estimate,
+            memory.measured,
+            measured,
+            memory.mean_wrench,
+            momentum,
+            drag,
+            memory.mass_kg,
+            self._packed_observer,
         )
 
-    def _choose(self, memory: Memory, now: InitialState, setpoint: Setpoint, rotation: Array) -> Choice:
+    def _choose(self, memory: Memory, inputs: LawInputs, setpoint: Setpoint) -> Choice:
         """Plan; where that cannot be had, fall back."""
-        target = setpoint.target
+        target, now, rotation = setpoint.target, inputs.now, inputs.rotation
         steep = square(float(rotation[2, 0])) > 1.0 - square(_RECOVER_BEYOND)
         if steep or setpoint.aligned < _RECOVER_BEYOND:
             return self._recover(now, setpoint.force, rotation)
@@ -268,7 +294,7 @@ class LpvMpc:
             moments = self._attitude.lqr(now, target)
             how = diagnostics._replace(fallback=Fallback.LQR)
             return Choice(self._mixed(float(target.thrust_n[0]), moments, now), moments, None, age, how)
-        return self._descend(now, age, diagnostics)
+        return self._descend(inputs, age, diagnostics)
 
     def _recover(self, now: InitialState, force: Array, rotation: Array) -> Choice:
         """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
@@ -277,14 +303,15 @@ class LpvMpc:
         squared = self._mixed(max(dot(force, rotation[:, 2]), 0.0), moments, now)
         return Choice(squared, matvec(self._allocation[1:], squared), None, 1, Diagnostics(fallback=Fallback.RECOVERY))
 
-    def _descend(self, now: InitialState, age: int, diagnostics: Diagnostics) -> Choice:
+    def _descend(self, inputs: LawInputs, age: int, diagnostics: Diagnostics) -> Choice:
         """Level and sink, the last resort."""
+        now = inputs.now
         end = np.zeros(prediction.STATES + prediction.INPUTS)
         end[prediction.PSI] = now.x[prediction.PSI]
         end[9:] = end[6:9] = -now.disturbance_n_m
         level = Target(end[None, [0, 2, 4]], end, np.zeros(1))
         moments = self._attitude.lqr(now, level)
-        weight_n = self._observer.airframe.mass_kg * self._observer.airframe.gravity_m_s2
+        weight_n = inputs.mass_kg * self._vehicle.gravity_m_s2
         how = diagnostics._replace(fallback=Fallback.DESCENT)
         squared = self._mixed(weight_n * self._fallback.descent_thrust, moments, now)
         return Choice(squared, moments, None, age, how)

@@ -70,6 +70,7 @@ class Motion(NamedTuple):
         up: Body z axis, ENU, (3,).
         yaw_rad: psi, unwrapped.
         thrust_n: U1, N.
+        mass_kg: That the vehicle moves like.
     """
 
     position: Array
@@ -77,6 +78,7 @@ class Motion(NamedTuple):
     up: Array
     yaw_rad: float
     thrust_n: float
+    mass_kg: float
 
 
 class Demands(NamedTuple):
@@ -131,8 +133,8 @@ def wanted_forces(
             ahead_rate = E[1, 0] * e[i] + E[1, 1] * e_rate[i]
             moving[i] = near * references[1][n, i] - ahead_rate
             demanded = near * references[2][n, i] + k1 * ahead + k2 * ahead_rate - disturbance_m_s2[i]
-            free[i] = airframe.mass_kg * demanded
-        free[2] += airframe.mass_kg * airframe.gravity_m_s2
+            free[i] = motion.mass_kg * demanded
+        free[2] += motion.mass_kg * airframe.gravity_m_s2
         forces[n] = free
         limited_force(forces[n], limits)
         for _ in range(_DRAG_PASSES):

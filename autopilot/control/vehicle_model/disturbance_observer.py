@@ -1,4 +1,4 @@
-"""What the model does not explain: constant acceleration (wind, a wrong mass) and moment (a weak rotor), observed.
+"""What the model does not explain: constant acceleration (wind) and moment (a weak rotor), observed.
 
 A Luenberger observer on the velocity and one on the body rates, each with its disturbance as a further state and both
 poles at one place. They are driven by what the rotors really did, within their limits, so nothing winds up.
@@ -40,7 +40,7 @@ class Observer(NamedTuple):
         rate: Part of the rate's innovation that is corrected at once.
         angular_acceleration: Disturbance for each rad/s of innovation, 1/s.
         max_acceleration_m_s2, max_moment_n_m: Largest disturbances estimated.
-        airframe: Mass and gravity are of it.
+        airframe: Gravity is of it.
         inertia: Ix, Iy, Iz, kg m², (3,).
         interval_s: Between two samples.
     """
@@ -92,12 +92,13 @@ def observe(
     wrench: Array,
     momentum: float,
     drag_n: Array,
+    mass_kg: float,
     packed: Packed,
 ) -> Array:
     """Return the estimate (12,) now, from that of the sample before and what was measured then and now, (9,) each.
 
     Over the interval, `wrench` is the mean U1 (N), U2, U3, U4 (N m), (4,), `momentum` h of the rotors along body z,
-    N m s, and `drag_n` the mean drag, ENU, (3,). `packed` is the `Observer`.
+    N m s, and `drag_n` the mean drag, ENU, (3,), of a vehicle of `mass_kg`. `packed` is the `Observer`.
     """
     observer = packed[0]
     airframe, inertia, interval_s = observer.airframe, observer.inertia, observer.interval_s
@@ -112,7 +113,7 @@ def observe(
     turn[2] = (moment_n_m[2] + (ix - iy) * p * q) / iz
     after = np.empty(ESTIMATES)
     for i in range(3):
-        explained = (drag_n[i] + thrust_n * up[i]) / airframe.mass_kg - (airframe.gravity_m_s2 if i == 2 else 0.0)
+        explained = (drag_n[i] + thrust_n * up[i]) / mass_kg - (airframe.gravity_m_s2 if i == 2 else 0.0)
         expected = estimate[i] + interval_s * (explained + estimate[6 + i])
         innovation = now[i] - expected
         after[i] = expected + observer.velocity * innovation

@@ -1,4 +1,4 @@
-"""What a control law may have beside its interface: a charge that it counts, and a plan of attitudes."""
+"""What a control law may have beside its interface: a charge that it counts, a mass, and a plan of attitudes."""
 
 import re
 from pathlib import Path
@@ -14,6 +14,7 @@ from colibri.autopilot.control.interface import (
     Decision,
     Diagnostics,
     Horizon,
+    MassController,
     PlanColumns,
     PlanController,
     Preview,
@@ -31,6 +32,7 @@ HUMMINGBIRD = load_vehicle("hummingbird")
 NOTHING = (0.0, 0.0, 0.0)
 LEVEL = VehicleState(NOTHING, NOTHING, (1.0, 0.0, 0.0, 0.0), NOTHING, NOTHING)
 STAYING = Horizon(*(np.zeros((8, 3)) for _ in range(5)), *(np.zeros(8) for _ in range(3)))
+OF_FLIGHT = ("lpv-mpc", "whole-lpv-mpc")
 LAWS = {
     "lpv-mpc": "flight",
     "whole-lpv-mpc": "flight",
@@ -45,10 +47,11 @@ def law(name: str) -> Controller[Any]:
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_one_of_those_that_come_along_counts_its_charge_and_plans_attitudes(name: str) -> None:
+def test_one_of_those_that_come_along_counts_its_charge_estimates_its_mass_and_plans_attitudes(name: str) -> None:
     controller = law(name)
-    assert isinstance(controller, ChargeController) is ("lpv-mpc" in name and name != "global-lpv-mpc")
-    assert isinstance(controller, PlanController) is ("lpv-mpc" in name and name != "global-lpv-mpc")
+    assert isinstance(controller, ChargeController) is (name in OF_FLIGHT)
+    assert isinstance(controller, PlanController) is (name in OF_FLIGHT)
+    assert isinstance(controller, MassController) is (name == "lpv-mpc")
 
 
 def test_the_flight_profiles_law_remembers_the_charge_that_it_is_told() -> None:
@@ -130,6 +133,23 @@ def test_a_law_begins_with_what_its_battery_has_told(monkeypatch: pytest.MonkeyP
     assert empty.record().memory != before
 
 
+def test_the_mass_goes_on_in_mid_flight_and_begins_anew_with_a_flight() -> None:
+    loop = ControlLoop(load_profile("flight"), HUMMINGBIRD, lambda: 0.0)
+    assert isinstance(loop.controller, MassController)
+    staying = Horizon(*(np.zeros((loop.preview.samples, 3)),) * 5, *(np.zeros(loop.preview.samples),) * 3)
+    loop.begin(HUMMINGBIRD.hover_speed, 0.0)
+    for sample in range(50):
+        falling = LEVEL._replace(velocity_enu_m_s=(0.0, 0.0, -0.02 * sample))
+        flown_kg = loop.decide(8000 * sample, falling, staying).diagnostics.mass_kg
+    resumed = ControlLoop(load_profile("flight"), HUMMINGBIRD, lambda: 0.0)
+    resumed.resume(loop.record(), seamless=False)
+    loop.begin_in_flight(0.0)
+    assert loop.decide(0, LEVEL, staying).diagnostics.mass_kg == flown_kg > 1.001 * HUMMINGBIRD.body.mass_kg
+    assert resumed.decide(0, LEVEL, staying).diagnostics.mass_kg == flown_kg
+    loop.begin(HUMMINGBIRD.hover_speed, 0.0, afresh=False)
+    assert loop.decide(0, LEVEL, staying).diagnostics.mass_kg == HUMMINGBIRD.body.mass_kg
+
+
 def test_a_plan_is_shown_where_the_law_says_that_it_holds_the_attitude() -> None:
     plan, squared = np.zeros((21, 6)), np.full((20, 4), HUMMINGBIRD.hover_speed**2 / HUMMINGBIRD.rotors.max_speed**2)
     plan[:, 1] = 0.2
@@ -151,5 +171,5 @@ def test_of_a_law_without_a_plan_the_references_are_shown() -> None:
 def test_the_page_names_what_a_law_may_have() -> None:
     rows = re.findall(r"^\| (`.*`) \|", DOCS.read_text(encoding="utf-8"), re.MULTILINE)
     words = " ".join(rows)
-    for name in ("step_attitude", "charge_ah", "with_charge", "plan_columns"):
+    for name in ("step_attitude", "charge_ah", "with_charge", "mass_kg", "with_mass", "plan_columns"):
         assert f"`{name}" in words

@@ -181,6 +181,8 @@ def test_each_figure_of_the_solver_has_a_name() -> None:
     assert figures["mpc_iter"] == 7.0
     assert figures["mpc_us"] == pytest.approx(100.0)
     assert figures["mpc_active"] == 10.0
+    weighed = replace(FLYING, solver=FLYING.solver._replace(mass_kg=0.75))
+    assert {fields.name: fields.value for fields in sent("NAMED_VALUE_FLOAT", weighed)} == figures | {"mass_kg": 0.75}
 
 
 def test_the_array_is_laid_out_as_documented() -> None:

@@ -74,6 +74,30 @@ def test_without_a_solution_the_plan_goes_on_then_lqr_then_descent(
         assert ((decision.rotor_speeds >= 83.8) & (decision.rotor_speeds <= 838.0)).all()
 
 
+@pytest.mark.parametrize("airborne", [True, False])
+def test_the_mass_is_followed_only_in_the_air(airborne: bool) -> None:
+    controller, planner = build()
+    memory = controller.initial(VEHICLE.hover_speed)
+    falling = ON_SPIRAL._replace(velocity_enu_m_s=(0.0, 0.314, -0.1), airborne=airborne)
+    for state in (ON_SPIRAL, falling):
+        memory, decision = controller.step(memory, 0, state, planner.horizon(0))
+    assert (controller.mass_kg(memory) > VEHICLE.body.mass_kg) is airborne
+    assert decision.diagnostics.mass_kg == controller.mass_kg(memory)
+
+
+def test_a_heavier_vehicle_descends_on_more_thrust(monkeypatch: pytest.MonkeyPatch) -> None:
+    controller, planner = build()
+    failing(monkeypatch, QpStatus.TIME_OUT, after=0)
+    memory = controller.initial(VEHICLE.hover_speed)._replace(age=1000)
+    squared = []
+    for mass_kg in (VEHICLE.body.mass_kg, 1.3 * VEHICLE.body.mass_kg):
+        laden = controller.with_mass(memory, mass_kg)
+        after, decision = controller.step(laden, 0, ON_SPIRAL._replace(euler=(0.0, 0.0, 1.57)), planner.horizon(0))
+        assert decision.diagnostics.fallback is Fallback.DESCENT
+        squared.append(after.wrench[0] - memory.wrench[0])
+    assert squared[1] > 0.0 > squared[0]
+
+
 def test_without_any_plan_the_lqr_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
     controller, planner = build()
     failing(monkeypatch, QpStatus.TIME_OUT, after=0)

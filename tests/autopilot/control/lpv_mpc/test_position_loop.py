@@ -40,7 +40,7 @@ def forces_for(
     forces = np.empty((2, 3))
     r, v, a = (np.tile(part, (2, 1)) for part in reference)
     loop = Loop(*GAINS, np.tile(np.eye(2), (2, 1, 1)), airframe, np.ones(3), 1.0, 0.008)
-    motion = Motion(position, velocity, np.array([0.0, 0.0, 1.0]), 0.0, 0.0)
+    motion = Motion(position, velocity, np.array([0.0, 0.0, 1.0]), 0.0, 0.0, airframe.mass_kg)
     position_loop.wanted_forces(motion, (r, v, a, np.zeros(2)), disturbance, loop, LIMITS, forces)
     first: np.ndarray = forces[0]
     return first

@@ -31,7 +31,7 @@ def fly(acceleration: np.ndarray, moment: np.ndarray, seconds: float, observer: 
         now = measured.copy()
         now[:3] += INTERVAL_S * acceleration
         now[3:6] += INTERVAL_S * moment / INERTIA
-        estimate = observe(estimate, measured, now, HOVER, 0.0, NO_DRAG, packed(observer))
+        estimate = observe(estimate, measured, now, HOVER, 0.0, NO_DRAG, 0.7, packed(observer))
         measured = now
     return estimate
 
@@ -74,6 +74,6 @@ def test_the_models_coupling_and_drag_are_no_disturbance() -> None:
     now[:3] += h * drag / 0.7
     now[3:6] += h * np.array(turn)
     observer = Observer(*gains(9.0, h), *gains(12.0, h), 6.0, 0.3, AIRFRAME, INERTIA, h)
-    estimate = observe(first_estimate(before), before, now, HOVER, momentum, drag, packed(observer))
+    estimate = observe(first_estimate(before), before, now, HOVER, momentum, drag, 0.7, packed(observer))
     assert estimate[:6] == pytest.approx(now[:6], abs=1e-11)
     assert estimate[6:] == pytest.approx(np.zeros(6), abs=1e-9)
