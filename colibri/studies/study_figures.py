@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
+from numpy.lib.stride_tricks import sliding_window_view
 
 from colibri.analysis.figures import GRID, LIMIT, TOP_IN, Style, axes_grid, line_style, put_head, round_ticks
 from colibri.analysis.recording import ROTORS, SETTLED_AFTER_S
@@ -146,9 +147,7 @@ def running_rms(flown: Flown) -> tuple[Array, Array]:
     """Return times and the RMS of the position error over the window that ends then."""
     t, squared = flown.t, flown.recording.position_error_m**2
     samples = max(1, round(WINDOW_S / float(t[1] - t[0])))
-    total = np.concatenate([[0.0], np.cumsum(squared)])
-    mean = (total[samples:] - total[:-samples]) / samples
-    return t[samples - 1 :], np.sqrt(np.maximum(mean, 0.0))
+    return t[samples - 1 :], np.sqrt(sliding_window_view(squared, samples).mean(axis=1))
 
 
 def _recoveries(results: Sequence[Result]) -> Figure:
