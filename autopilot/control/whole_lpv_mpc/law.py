@@ -26,6 +26,7 @@ from colibri.autopilot.control.vehicle_model import disturbance_observer, rotor_
 from colibri.autopilot.control.vehicle_model.airframe import drag_force
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings, observer_of
+from colibri.autopilot.control.vehicle_model.mass import MassSettings, follow_mass, mass_model
 from colibri.autopilot.control.whole_lpv_mpc import feed_forward
 from colibri.autopilot.control.whole_lpv_mpc.condensing import Target
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, ForceLimits, Guidance
@@ -71,6 +72,7 @@ class WholeLpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_onl
     control_interval_s: ControlInterval
     references: ReferenceSettings
     observer: ObserverSettings
+    mass: MassSettings
     plan: PlanSettings
     weights: WeightSettings
     fallback: FallbackSettings
@@ -86,6 +88,7 @@ class Memory(NamedTuple):
         measured: What the observer measured a sample ago, (9,); None before the first.
         estimate: Of the observer a sample ago, (12,).
         charge_ah: Charge taken from the battery.
+        mass_kg: That the vehicle moves like.
         plan: The last plan, made `age` samples ago; None where there is none to build on.
         age: Samples since that plan.
     """
@@ -96,6 +99,7 @@ class Memory(NamedTuple):
     measured: Array | None
     estimate: Array
     charge_ah: float
+    mass_kg: float
     plan: Plan | None
     age: int
 
@@ -106,6 +110,7 @@ class Inputs(NamedTuple):
     Attributes:
         rotation: Body to earth, (3, 3).
         measured, estimate: Of the observer, (9,) and (12,).
+        mass_kg: That the vehicle moves like.
         now: For the plan.
         limits: Of the force.
     """
@@ -113,6 +118,7 @@ class Inputs(NamedTuple):
     rotation: Array
     measured: Array
     estimate: Array
+    mass_kg: float
     now: Now
     limits: ForceLimits
 
@@ -147,6 +153,7 @@ class WholeLpvMpc:
         self._fallback = settings.fallback
         self._observer = observer_of(settings.observer, vehicle, h)
         self._packed_observer = packed(self._observer)
+        self._packed_mass = packed(mass_model(settings.mass, vehicle, h))
         self._allocation = vehicle.allocation() * square(vehicle.rotors.max_speed)
         self._momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
         self._span_n = float(self._allocation[0].sum())
@@ -183,7 +190,8 @@ class WholeLpvMpc:
         """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
         speeds = np.full(ROTORS, rotor_speed / self._vehicle.rotors.max_speed)
         wrench = matvec(self._allocation, speeds * speeds)
-        return Memory(speeds, wrench, wrench, None, np.zeros(disturbance_observer.ESTIMATES), 0.0, None, 0)
+        estimate = np.zeros(disturbance_observer.ESTIMATES)
+        return Memory(speeds, wrench, wrench, None, estimate, 0.0, self._vehicle.body.mass_kg, None, 0)
 
     def charge_ah(self, memory: Memory) -> float:
         """Return the charge taken from the battery, Ah."""
@@ -192,6 +200,14 @@ class WholeLpvMpc:
     def with_charge(self, memory: Memory, charge_ah: float) -> Memory:
         """Return the memory with another charge taken from the battery, Ah."""
         return memory._replace(charge_ah=charge_ah)
+
+    def mass_kg(self, memory: Memory) -> float:
+        """Return the mass that the vehicle moves like."""
+        return memory.mass_kg
+
+    def with_mass(self, memory: Memory, mass_kg: float) -> Memory:
+        """Return the memory with another mass."""
+        return memory._replace(mass_kg=mass_kg)
 
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample."""
@@ -229,7 +245,10 @@ class WholeLpvMpc:
     def _inputs(self, memory: Memory, state: VehicleState) -> Inputs:
         rotation = np.array(rotation_matrix(state.attitude))
         measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2].tolist()])
-        estimate = self._estimate(memory, measured)
+        estimate, mass_kg = self._estimate(memory, measured), memory.mass_kg
+        if state.airborne:
+            mass_kg = follow_mass(mass_kg, estimate[6:], measured[6:], float(memory.wrench[0]), self._packed_mass)
+        self._mpc.model["airframe"]["mass_kg"] = mass_kg
         squared = memory.speeds * memory.speeds
         rigid = np.array([*state.position_enu_m, *state.velocity_enu_m_s, *state.attitude, *state.rate_flu_rad_s])
         min_squared = square(self._lag.min_speed)
@@ -243,7 +262,7 @@ class WholeLpvMpc:
         force = ForceLimits(
             self._tilt_tangent, self._span_n * (min_squared + margin), self._span_n * (max_squared - margin)
         )
-        return Inputs(rotation, measured, estimate, now, force)
+        return Inputs(rotation, measured, estimate, mass_kg, now, force)
 
     def _estimate(self, memory: Memory, measured: Array) -> Array:
         """Return the observer's estimate, (12,), with the measurement `measured`, (9,)."""
@@ -254,7 +273,14 @@ class WholeLpvMpc:
         drag_force(self._observer.airframe, middle[:3], middle[6:], float(memory.mean_wrench[0]), drag)
         momentum = dot(self._momentum, memory.speeds)
         return disturbance_observer.observe(
-            memory.estimate, memory.measured, measured, memory.mean_wrench, momentum, drag, self._packed_observer
+            memory.estimate,
+            memory.measured,
+            measured,
+            memory.mean_wrench,
+            momentum,
+            drag,
+            memory.mass_kg,
+            self._packed_observer,
         )
 
     def _decide(
@@ -266,10 +292,13 @@ class WholeLpvMpc:
             memory.speeds, squared, self._lag, max_speed, self._allocation
         )
         charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
-        after = Memory(speeds, wrench, mean_wrench, inputs.measured, inputs.estimate, charge_ah, plan, age)
+        after = Memory(
+            speeds, wrench, mean_wrench, inputs.measured, inputs.estimate, charge_ah, inputs.mass_kg, plan, age
+        )
         R = target.attitudes[0]
         angles = (atan2(R[2, 1], R[2, 2]), -asin(min(max(R[2, 0], -1.0), 1.0)), float(target.yaw_rad[0]))
-        return after, Decision(commands * self._vehicle.rotors.max_speed, angles, diagnostics)
+        how = diagnostics._replace(mass_kg=inputs.mass_kg)
+        return after, Decision(commands * self._vehicle.rotors.max_speed, angles, how)
 
     def _choose(
         self, memory: Memory, inputs: Inputs, target: Target, force: Array, *, on_track: bool

@@ -51,7 +51,7 @@ def test_one_of_those_that_come_along_counts_its_charge_estimates_its_mass_and_p
     controller = law(name)
     assert isinstance(controller, ChargeController) is (name in OF_FLIGHT)
     assert isinstance(controller, PlanController) is (name in OF_FLIGHT)
-    assert isinstance(controller, MassController) is (name == "lpv-mpc")
+    assert isinstance(controller, MassController) is (name in OF_FLIGHT)
 
 
 def test_the_flight_profiles_law_remembers_the_charge_that_it_is_told() -> None:
