@@ -146,7 +146,7 @@ def limits(results: Sequence[Result]) -> dict[str, Figure]:
 def running_rms(flown: Flown) -> tuple[Array, Array]:
     """Return times and the RMS of the position error over the window that ends then."""
     t, squared = flown.t, flown.recording.position_error_m**2
-    samples = max(1, round(WINDOW_S / float(t[1] - t[0])))
+    samples = min(max(1, round(WINDOW_S / float(t[1] - t[0]))), len(t))
     return t[samples - 1 :], np.sqrt(sliding_window_view(squared, samples).mean(axis=1))
 
 

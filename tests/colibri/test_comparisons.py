@@ -21,7 +21,7 @@ from colibri.studies.contenders import contenders_of, folder_name
 from colibri.studies.thesis_figures import FIGURES
 
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "flight.toml"
-INSTALLED = "cascade, geometric-se3, global-lpv-mpc, lpv-mpc"
+INSTALLED = "cascade, geometric-se3, global-lpv-mpc, lpv-mpc, whole-lpv-mpc"
 
 
 def test_every_figure_of_the_thesis_has_its_place() -> None:

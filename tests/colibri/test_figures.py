@@ -64,7 +64,14 @@ def fly(out: Path, duration_s: float) -> Flight:
         "integrator": "rk4",
         "floor": None,
     }
-    world: dict[str, Any] = {"wind": NO_WIND, "gusts": (), "turbulence": None, "without": (), "start": {}}
+    world: dict[str, Any] = {
+        "wind": NO_WIND,
+        "gusts": (),
+        "turbulence": None,
+        "without": (),
+        "start": {},
+        "delay": None,
+    }
     ground: dict[str, Any] = {"gcs": (), "signing_key": None, "insecure": False}
     plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files, **world, **ground))
     fly_locally(plan)

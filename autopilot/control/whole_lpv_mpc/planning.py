@@ -9,9 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.qp import Qp
-from colibri.autopilot.control.whole_lpv_mpc import condensing, feed_forward, model
-from colibri.autopilot.control.whole_lpv_mpc.condensing import Target
-from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance
+from colibri.autopilot.control.whole_lpv_mpc.condensing import (
+    MOTION_ROWS,
+    Target,
+    bound,
+    carry_over,
+    cost,
+    limit_motion,
+    read_plan,
+)
+from colibri.autopilot.control.whole_lpv_mpc.feed_forward import lead
+from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance, respond, roll_out
 from colibri.common.jit import Packed, compiled
 from colibri.common.types import Array
 
@@ -72,16 +80,16 @@ def condense(now: Now, target: Target, last: Array, vehicle: Packed, packed: Pac
     """
     starts = packed[0].starts
     commands, corrections = work.commands, work.corrections
-    feed_forward.lead(target.squared, vehicle[0].lag.left, now.limits, commands)
+    lead(target.squared, vehicle[0].lag.left, now.limits, commands)
     corrections[:] = 0.0
     if last.shape[0] > 0:
-        condensing.carry_over(last, starts, corrections)
-    condensing.bound(commands, now.limits, corrections[1:], starts, qp.lower, qp.upper)
+        carry_over(last, starts, corrections)
+    bound(commands, now.limits, corrections[1:], starts, qp.lower, qp.upper)
     nominal = np.empty_like(commands)
     _correct(commands, corrections[1:], starts, nominal)
-    model.roll_out(now.rigid, now.squared, nominal, now.disturbance, vehicle, work.motion, work.speeds)
-    model.respond(work.motion, work.speeds, work.means, work.levels, vehicle, work.responses)
-    condensing.cost(work.motion, work.speeds, work.responses, target, corrections, packed, qp.H, qp.f)
+    roll_out(now.rigid, now.squared, nominal, now.disturbance, vehicle, work.motion, work.speeds)
+    respond(work.motion, work.speeds, work.means, work.levels, vehicle, work.responses)
+    cost(work.motion, work.speeds, work.responses, target, corrections, packed, qp.H, qp.f)
 
 
 @compiled
@@ -134,7 +142,7 @@ def read(work: Workspace, qp: Qp, z: Array, psi: float, packed: Packed) -> tuple
                 binding += 1
     _correct(np.zeros_like(held), corrections, starts, held)
     _correct(work.commands, corrections, starts, commands)
-    states = condensing.read_plan(work.motion, work.speeds, work.responses, z, work.levels, psi)
+    states = read_plan(work.motion, work.speeds, work.responses, z, work.levels, psi)
     return held, commands, states, binding
 
 
@@ -153,7 +161,7 @@ def limit(work: Workspace, free: Qp, packed: Packed, qp: Qp) -> None:
     moved = free.f.shape[0]
     qp.H[:moved, :moved] = free.H
     qp.f[:moved], qp.lower[:moved], qp.upper[:moved] = free.f, free.lower, free.upper
-    condensing.limit_motion(work.motion, work.responses, packed, qp.G, qp.h)
+    limit_motion(work.motion, work.responses, packed, qp.G, qp.h)
 
 
 @compiled
@@ -165,7 +173,7 @@ def count_active(qp: Qp, z: Array) -> tuple[int, int]:
         for k in range(z.shape[0]):
             left -= qp.G[row, k] * z[k]
         if left <= _BINDING:
-            if row % condensing.MOTION_ROWS == 0:
+            if row % MOTION_ROWS == 0:
                 tilts += 1
             else:
                 rates += 1

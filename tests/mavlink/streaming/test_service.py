@@ -59,7 +59,7 @@ def test_the_defaults_hold_over_a_minute(kind: str) -> None:
         told = counts(sends, peer.channel)
         assert told.keys() == DEFAULTS[kind].keys()
         for name, interval_us in DEFAULTS[kind].items():
-            each = 8 if name == "NAMED_VALUE_FLOAT" else 1
+            each = 9 if name == "NAMED_VALUE_FLOAT" else 1
             assert told[name] / each == pytest.approx(60e6 / interval_us, abs=1.0), name
 
 
