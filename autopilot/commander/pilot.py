@@ -52,6 +52,7 @@ class Sensed(NamedTuple):
         vehicle: None before the first state.
         position_known: Whether the position is known well enough to fly to places.
         delay_us: How far ahead of now the vehicle is: references are those of when commands take effect.
+        lag_us: How far the control law's path time lags behind that.
     """
 
     now_us: int = 0
@@ -59,6 +60,7 @@ class Sensed(NamedTuple):
     steered: Steered = NOT_STEERED
     position_known: bool = True
     delay_us: int = 0
+    lag_us: int = 0
 
 
 class PilotRecord(NamedTuple):
@@ -193,13 +195,17 @@ class Pilot:
         *,
         position_known: bool = True,
         delay_us: int = 0,
+        lag_us: int = 0,
     ) -> None:
         """Take in the inputs of a control sample; the arguments are the fields of `Sensed`."""
-        self.sensed = Sensed(now_us, vehicle, steered, position_known, delay_us)
+        waited_us = lag_us - self.sensed.lag_us
+        if waited_us:
+            self.generator.wait(waited_us * 1e-6)
+        self.sensed = Sensed(now_us, vehicle, steered, position_known, delay_us, lag_us)
 
     def context(self) -> TaskContext:
         """Return the inputs of a task now."""
-        now_us, vehicle, steered, position_known, delay_us = self.sensed
+        now_us, vehicle, steered, position_known, delay_us, lag_us = self.sensed
         reference, behaviour = self.generator.reference, self.behaviour
         assert vehicle is not None, "the vehicle has been seen"
         assert reference is not None, "the vehicle has been seen"
@@ -208,7 +214,7 @@ class Pilot:
         if speed != behaviour.limits.speed_m_s:
             behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed))
         return TaskContext(
-            now_us + delay_us,
+            now_us + delay_us - lag_us,
             vehicle,
             reference,
             self.home.position_enu_m,

@@ -136,6 +136,7 @@ class Diagnostics(NamedTuple):
         predicted: Outputs predicted over the horizon, (N, p), in the order and units that the control law documents.
         planned_squared: Squared rotor speeds that the plan commands at each step, in parts of the largest, (N, 4).
         mass_kg: Mass that the vehicle moves like under its thrust; nan for a control law that estimates none.
+        lag_s: By which the law's path time was behind the clock; nan for a control law that keeps to the clock.
     """
 
     qp_status: QpStatus | None = None
@@ -147,6 +148,7 @@ class Diagnostics(NamedTuple):
     predicted: Array | None = None
     planned_squared: Array | None = None
     mass_kg: float = nan
+    lag_s: float = nan
 
 
 class Decision(NamedTuple):
@@ -230,6 +232,21 @@ class MassController(Controller[Memory], Protocol[Memory]):
 
     def with_mass(self, memory: Memory, mass_kg: float) -> Memory:
         """Return the memory with another mass, kg."""
+
+
+@runtime_checkable
+class PathController(Controller[Memory], Protocol[Memory]):
+    """A control law that flies along its path at a speed of its own; optional.
+
+    A law that has this is given references from a time on that lags behind the clock by what it says, so that it may
+    wait for itself where it cannot follow: missions, tracks and setpoints wait with it.
+    """
+
+    def lag_us(self, memory: Memory) -> int:
+        """Return by how much the law's path time lags behind the clock, µs, at least 0."""
+
+    def with_lag(self, memory: Memory, lag_us: int) -> Memory:
+        """Return the memory with another lag, µs."""
 
 
 @runtime_checkable

@@ -14,6 +14,7 @@ from colibri.autopilot.control.interface import (
     Decision,
     Horizon,
     MassController,
+    PathController,
     PlanController,
     VehicleState,
 )
@@ -82,7 +83,7 @@ class ControlLoop:
         self.preview = self._controller.preview
         self.takes_attitude = isinstance(self._controller, AttitudeController)
         self.plan_columns = self._controller.plan_columns if isinstance(self._controller, PlanController) else None
-        self._charged, self._weighing = _charged(self._controller), _weighing(self._controller)
+        self._take_in(self._controller)
         self.control_interval_us = self._controller.control_interval_us
         self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
         self._memory: Any = None
@@ -105,11 +106,15 @@ class ControlLoop:
         self._command(np.full(4, rotor_speed))
 
     def begin_in_flight(self, yaw_rad: float) -> None:
-        """Begin anew in mid-flight, every rotor as in hover: with the charge that is left, and the mass estimated."""
+        """Begin anew in mid-flight, every rotor as in hover: with the charge left, the mass estimated, and the lag."""
         before = self._memory
         self.begin(self.vehicle.hover_speed, yaw_rad, afresh=False)
-        if self._weighing is not None and before is not None:
+        if before is None:
+            return
+        if self._weighing is not None:
             self._memory = self._weighing.with_mass(self._memory, self._weighing.mass_kg(before))
+        if self._waiting is not None:
+            self._memory = self._waiting.with_lag(self._memory, self._waiting.lag_us(before))
 
     def know_charge(self, used_ah: float) -> None:
         """Take in the charge that the battery itself reports, Ah: a law that remembers another goes on with this."""
@@ -124,6 +129,11 @@ class ControlLoop:
         if self._charged is None or self._memory is None:
             return self._reported_ah
         return self._charged.charge_ah(self._memory)
+
+    @property
+    def lag_us(self) -> int:
+        """How far the law's path time is behind the clock, µs."""
+        return 0 if self._waiting is None or self._memory is None else self._waiting.lag_us(self._memory)
 
     def record(self) -> LoopRecord:
         """Return what is remembered; a law of somebody else's may remember what cannot be kept."""
@@ -185,13 +195,20 @@ class ControlLoop:
 
     def adopt(self, controller: Controller[Any], vehicle: Vehicle) -> None:
         """Go on with a law of the same kind and rhythm, built from other numbers; it takes over what is remembered."""
-        self._controller, self._charged, self._weighing = controller, _charged(controller), _weighing(controller)
+        self._take_in(controller)
         self.vehicle = vehicle
 
     @property
     def controller(self) -> Controller[Any]:
         """The law itself."""
         return self._controller
+
+    def _take_in(self, controller: Controller[Any]) -> None:
+        """Fly by a law, as what of the optional protocols it is."""
+        self._controller = controller
+        self._charged = controller if isinstance(controller, ChargeController) else None
+        self._weighing = controller if isinstance(controller, MassController) else None
+        self._waiting = controller if isinstance(controller, PathController) else None
 
     def _take(self, time_us: int, answer: tuple[Any, Decision]) -> Decision:
         """Remember and command what the law has decided."""
@@ -207,16 +224,6 @@ class ControlLoop:
         check_rotor_speeds(self._name, rotor_speeds, self.vehicle.rotors.max_speed, time_us)
         c1, c2, c3, c4 = (rotor_speeds / self.vehicle.rotors.max_speed).tolist()
         self.controls = (c1, c2, c3, c4)
-
-
-def _charged(controller: Controller[Any]) -> ChargeController[Any] | None:
-    """Return the law as one that counts what its battery gives; None if it does not."""
-    return controller if isinstance(controller, ChargeController) else None
-
-
-def _weighing(controller: Controller[Any]) -> MassController[Any] | None:
-    """Return the law as one that estimates the mass; None if it does not."""
-    return controller if isinstance(controller, MassController) else None
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:

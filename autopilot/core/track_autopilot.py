@@ -77,7 +77,7 @@ class Autopilot:
             state = self._loop.state(self._delay.ahead(known, self._loop.charge_ah))
             state = state._replace(airborne=self._ground_m is None or is_clear(state, self._ground_m))
             acts_us = frame.time_us + self._delay.delay_us
-            references = self._planner.horizon_at(acts_us, self._loop.control_interval_us)
+            references = self._planner.horizon_at(acts_us - self._loop.lag_us, self._loop.control_interval_us)
             decision = self._loop.decide(frame.time_us, state, references)
         command = ActuatorCommand(frame.time_us, self._loop.controls, armed=True)
         self._delay.sent(command)

@@ -19,6 +19,8 @@ from colibri.common.types import Array
 
 _REACHED = 1e-5
 """How far off a moving target the chain, whose snap changes once a sample, stays at most."""
+_CARRIED = 1e-2
+"""How far off it one is at most that was carried there by its derivatives."""
 _IN_ITS_SCALE = np.array([[1.0], [1.0], [1.0], [1e-2]])
 """Jerk is the last of the chain to settle, and the largest number of it."""
 
@@ -92,9 +94,15 @@ def target_of(horizon: Horizon) -> Target:
     return Target(motion, ALL_BOUND, np.stack(horizon[5:], axis=1))
 
 
-def lead(reference: Reference, target: Target, limits: Limits, interval_s: float) -> tuple[Horizon, Reference]:
-    """Return the references from now on, one for each instant of the target, and the chain's state at the second."""
-    if target.turns and target.kinds == ALL_BOUND and _is_at(reference, target.motion[0, :4], target.heading[0]):
+def lead(
+    reference: Reference, target: Target, limits: Limits, interval_s: float, *, waited: bool = False
+) -> tuple[Horizon, Reference]:
+    """Return the references from now on, one for each instant of the target, and the chain's state at the second.
+
+    A reference that has `waited` was carried to where it is by its derivatives.
+    """
+    bound = target.turns and target.kinds == ALL_BOUND
+    if bound and _is_at(reference, target.motion[0, :4], target.heading[0], waited=waited):
         return _on_target(reference, target)
     followed = integrator_chain.Target(
         target.motion, np.array(target.kinds, dtype=np.int64), target.heading, target.turns
@@ -114,10 +122,12 @@ def _on_target(reference: Reference, target: Target) -> tuple[Horizon, Reference
     return _horizon(target.motion, heading), after
 
 
-def lead_along(reference: Reference, plan: Horizon, limits: Limits, interval_s: float) -> tuple[Horizon, Reference]:
+def lead_along(
+    reference: Reference, plan: Horizon, limits: Limits, interval_s: float, *, waited: bool = False
+) -> tuple[Horizon, Reference]:
     """Do the same for a plan; once it is reached, without the arrays of a target, which take time every sample."""
-    if not _is_at(reference, _motion_at(plan, 0), (plan.yaw_rad[0], plan.yaw_rate_rad_s[0])):
-        return lead(reference, target_of(plan), limits, interval_s)
+    if not _is_at(reference, _motion_at(plan, 0), (plan.yaw_rad[0], plan.yaw_rate_rad_s[0]), waited=waited):
+        return lead(reference, target_of(plan), limits, interval_s, waited=waited)
     turns = round(float(reference.heading[0] - plan.yaw_rad[0]) / (2.0 * pi))
     if turns:
         plan = plan._replace(yaw_rad=plan.yaw_rad + 2.0 * pi * turns)
@@ -134,11 +144,12 @@ def _horizon(motion: Array, heading: Array) -> Horizon:
     return Horizon(p, v, a, j, s, yaw, rate, acceleration)
 
 
-def _is_at(reference: Reference, motion: Array, heading: Sequence[float] | Array) -> bool:
+def _is_at(reference: Reference, motion: Array, heading: Sequence[float] | Array, *, waited: bool) -> bool:
     """Whether the reference has reached a target, or still is on it: a target may jump, a reference may not."""
+    reached = _CARRIED if waited else _REACHED
     yaw = nearest_turn(float(heading[0]), float(reference.heading[0]))
-    if max(abs(float(reference.heading[0]) - yaw), abs(float(reference.heading[1]) - heading[1])) >= _REACHED:
+    if max(abs(float(reference.heading[0]) - yaw), abs(float(reference.heading[1]) - heading[1])) >= reached:
         return False
     if reference.motion.tobytes() == motion.tobytes():  # as at every sample but the first, and quickly compared
         return True
-    return bool((np.abs(reference.motion - motion) * _IN_ITS_SCALE).max() < _REACHED)
+    return bool((np.abs(reference.motion - motion) * _IN_ITS_SCALE).max() < reached)

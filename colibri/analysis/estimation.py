@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from colibri.analysis.consistency import NAVIGATION, Errors
-from colibri.analysis.recording import RecordingError, read_columns, read_csv
+from colibri.analysis.recording import RecordingError, path_times, read_columns, read_csv
 from colibri.autopilot.estimation.measurements.table import KINDS
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.rotations import earth_from_body, euler_from_quaternion, nearest_turn, rotation_matrix
@@ -110,7 +110,9 @@ def read_estimation(plan: FlightPlan) -> Estimation:
         t=said[:, 0],
         position_m=off,
         attitude_rad=np.array(angles),
-        control_m=np.linalg.norm(said[:, 1:4] - position(plan.track, said[:, 0]), axis=1),
+        control_m=np.linalg.norm(
+            said[:, 1:4] - position(plan.track, path_times(said[:, 0], read_csv(plan.out / "autopilot.csv"))), axis=1
+        ),
         deviation=said[:, [14, 15, 16, 20, 21, 22]],
         checked_s=checks[:, 0],
         nees=np.array(

@@ -25,6 +25,8 @@ COLUMNS = ("t", *STATE, *INPUT, *ATTITUDE_REFERENCE, *ROTORS, *POSITION_REFERENC
 _PLANT_STATE = slice(1, 14)
 _PLANT_ATTITUDE = slice(10, 14)
 _PLANT_ROTORS = slice(14, 18)
+_LAG = 16
+_SAME_S = 1e-7
 
 
 class RecordingError(InFlightError):
@@ -44,6 +46,7 @@ class Recording:
         control_step_us: Time of each control step, (m,).
         slack: By how much soft limits were planned to be exceeded, in parts of each, (m,).
         active: How many constraints of each kind were active, columns as in `interface.Active`, (m, 4).
+        lag_s: By which path time was last behind the clock; None for a control law that keeps to the clock.
         trajectory_sha256: Hash of the plant's states at every frame, as float64.
     """
 
@@ -54,6 +57,7 @@ class Recording:
     control_step_us: Array
     slack: Array
     active: NDArray[np.int64]
+    lag_s: float | None
     trajectory_sha256: str
 
     def __getitem__(self, column: str) -> Array:
@@ -66,7 +70,7 @@ class Recording:
 
     @property
     def position_error_m(self) -> Array:
-        """Distance to the reference of the same instant, (n,)."""
+        """Distance to the reference of the same instant, or of the path time then, (n,)."""
         error: Array = np.linalg.norm(self.columns(("x", "y", "z")) - self.columns(POSITION_REFERENCE), axis=1)
         return error
 
@@ -94,8 +98,16 @@ def read_recording(plan: FlightPlan) -> Recording:
         control_step_us=decisions[:, 7],
         slack=decisions[:, 9],
         active=decisions[:, 10:14].astype(np.int64),
+        lag_s=None if np.isnan(decisions[-1, _LAG]) else float(decisions[-1, _LAG]),
         trajectory_sha256=sha256(np.ascontiguousarray(plant[:, _PLANT_STATE]).tobytes()).hexdigest(),
     )
+
+
+def path_times(times_s: Array, decisions: Array) -> Array:
+    """Return the path time at each time, s: it lags behind the clock as it did in the last of the decisions, (m, k)."""
+    rows = np.searchsorted(decisions[:, 0], times_s + _SAME_S) - 1
+    times: Array = times_s - np.nan_to_num(decisions[np.maximum(rows, 0), _LAG])
+    return times
 
 
 def write_recording(recording: Recording, path: Path) -> None:
@@ -121,7 +133,7 @@ def _join(plan: FlightPlan, samples: Array, decisions: Array) -> Array:
             squared @ plan.plant_vehicle.allocation().T,
             np.vstack([start_reference, decisions[:, 1:4]]),
             samples[:, _PLANT_ROTORS],
-            position(plan.track, samples[:, 0]),
+            position(plan.track, path_times(samples[:, 0], decisions)),
         ]
     )
 

@@ -33,7 +33,7 @@ def flown(until_s: float = 30.0, **columns: Any) -> Recording:
         table[:, COLUMNS.index(name)] = values(t) if callable(values) else values
     nothing = np.zeros(0)
     codes = nothing.astype(np.int64)
-    return Recording(table, codes, codes, nothing, nothing, nothing, codes.reshape(0, 4), "")
+    return Recording(table, codes, codes, nothing, nothing, nothing, codes.reshape(0, 4), None, "")
 
 
 def test_one_that_stays_at_its_reference_is_not_lost(plan: FlightPlan) -> None:

@@ -9,6 +9,7 @@ from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.reference import Reference, at_rest, lead, lead_along, moving_with, still_target
 from colibri.autopilot.guidance.sample_grid import Instants
 from colibri.autopilot.guidance.tasks.task import Motion, PlannedMotion, TaskContext
+from colibri.autopilot.guidance.trajectories.planner import carried
 
 
 class Guidance(NamedTuple):
@@ -43,29 +44,44 @@ class ReferenceGenerator:
         self.interval_s = instants.preview.interval_us * 1e-6
         self.samples = instants.preview.samples
         self.reference: Reference | None = None
+        self._ahead: Horizon | None = None
+        self._waited = False
         motionless = Reference(np.zeros((4, 3)), np.zeros(2))
         lead(motionless, still_target((1.0, 0.0, 0.0), 0.0, self.samples), limits, self.interval_s)
 
     def set(self, reference: Reference) -> None:
         """Set the reference."""
-        self.reference = reference
+        self.reference, self._ahead = reference, None
 
     def follow(self, vehicle: VehicleState) -> None:
         """Set the reference to the vehicle's motion."""
-        self.reference = moving_with(vehicle)
+        self.set(moving_with(vehicle))
 
     def rest(self, vehicle: VehicleState) -> None:
         """Set the reference to rest where the vehicle is."""
-        self.reference = at_rest(vehicle)
+        self.set(at_rest(vehicle))
+
+    def wait(self, waited_s: float) -> None:
+        """Set the reference back on its way by path time that has not passed in the last sample.
+
+        More than a sample is no wait, but another path time: the reference is led to what is wanted there.
+        """
+        if self._ahead is not None and abs(waited_s) <= self.interval_s:
+            following = Horizon(*(column[1:2] for column in self._ahead))
+            p, v, a, j, _, yaw, yaw_rate, _ = carried(following, -waited_s)
+            self.reference = Reference(np.concatenate((p, v, a, j)), np.concatenate((yaw, yaw_rate)))
+            self._waited = True
 
     def lead(self, context: TaskContext, wanted: Motion | PlannedMotion) -> Horizon:
         """Move the reference on by one sample, and return the control law's preview of it."""
-        reference, limits, interval_s = context.reference, wanted.limits, context.interval_s
+        reference, limits, interval_s, waited = context.reference, wanted.limits, context.interval_s, self._waited
+        for_law = None
         if isinstance(wanted, PlannedMotion):
-            horizon, self.reference = lead_along(reference, wanted.horizon, limits, interval_s)
+            horizon, self.reference = lead_along(reference, wanted.horizon, limits, interval_s, waited=waited)
             if wanted.for_law is not None and horizon.position_enu_m is wanted.horizon.position_enu_m:
                 turned = horizon.yaw_rad[0] - wanted.horizon.yaw_rad[0]
-                return wanted.for_law._replace(yaw_rad=wanted.for_law.yaw_rad + turned)
+                for_law = wanted.for_law._replace(yaw_rad=wanted.for_law.yaw_rad + turned)
         else:
-            horizon, self.reference = lead(reference, wanted.target, limits, interval_s)
-        return self._instants.for_law(horizon)
+            horizon, self.reference = lead(reference, wanted.target, limits, interval_s, waited=waited)
+        self._ahead, self._waited = horizon, False
+        return self._instants.for_law(horizon) if for_law is None else for_law

@@ -110,6 +110,7 @@ class Target(NamedTuple):
     rates: Array
     squared: Array
     thrusts_n: Array
+    end_squared: Array
 
 
 @compiled
@@ -130,12 +131,13 @@ def cost(
     problem = packed[0]
     weights = problem.weights
     moved = responses.shape[2]
+    inputs = moved // (problem.starts.shape[0] - 1)
     H[:, :] = 0.0
     f[:] = 0.0
     row = np.empty(moved)
     for step in problem.counted:
         X, x = responses[step], motion[step]
-        used = _used(problem.starts, step)
+        used = inputs * _blocks(problem.starts, step)
         for i in range(3):
             if weights.position > 0.0:
                 _add(weights.position, x[POSITION + i] - target.position[step, i], X[POSITION + i], used, H, f)
@@ -146,26 +148,26 @@ def cost(
     for block in range(problem.starts.shape[0] - 1):
         weight = weights.first if block == 0 else weights.next
         for rotor in range(ROTORS):
-            here = ROTORS * block + rotor
+            here = inputs * block + rotor
             change = weight * (corrections[block + 1, rotor] - corrections[block, rotor])
             H[here, here] += weight
             f[here] += change
             if block > 0:
-                H[here - ROTORS, here - ROTORS] += weight
-                H[here, here - ROTORS] -= weight
-                f[here - ROTORS] -= change
+                H[here - inputs, here - inputs] += weight
+                H[here, here - inputs] -= weight
+                f[here - inputs] -= change
     for k in range(moved):
         for i in range(k):
             H[i, k] = H[k, i]
 
 
 @compiled
-def _used(starts: Integers, step: int) -> int:
-    """Return how many columns are not zero at a step."""
+def _blocks(starts: Integers, step: int) -> int:
+    """Return how many blocks have begun before a step."""
     blocks = 0
     while blocks < starts.shape[0] - 1 and starts[blocks] < step:
         blocks += 1
-    return ROTORS * blocks
+    return blocks
 
 
 @compiled
@@ -231,6 +233,7 @@ def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) ->
 def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: Problem, H: Array, f: Array) -> None:
     """Add ½ eᵀ S e of the error at the end, in the body axes there."""
     steps, moved = target.rates.shape[0], X.shape[1]
+    inputs = moved // problem.levels.shape[0]
     R = rotation_matrix((x[6], x[7], x[8], x[9]))
     away = _rotation_error(target.attitudes[steps], R)
     error, E = np.zeros(STATES), np.zeros((STATES, moved))
@@ -246,9 +249,9 @@ def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: P
         E[ROTATION + i] = X[ROTATION + i]
         E[RATE + i] = X[RATE + i]
     for rotor in range(ROTORS):
-        error[DEVIATIONS + rotor] = squared[rotor] - target.squared[steps, rotor]
+        error[DEVIATIONS + rotor] = squared[rotor] - target.end_squared[rotor]
         for block in range(problem.levels.shape[0]):
-            E[DEVIATIONS + rotor, ROTORS * block + rotor] = problem.levels[block, steps]
+            E[DEVIATIONS + rotor, inputs * block + rotor] = problem.levels[block, steps]
     weighted = np.empty(moved)
     for i in range(STATES):
         total = 0.0
@@ -265,26 +268,12 @@ def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: P
 
 
 @compiled
-def carry_over(last: Array, starts: Integers, corrections: Array) -> None:
-    """Fill corrections, (b + 1, 4), with that which flew last, and for each block the mean of the last plan's.
-
-    `last` is of the last plan, from the step that flew last on, (n, 4); after its end its last one goes on.
-    """
-    corrections[0] = last[0]
-    for block in range(starts.shape[0] - 1):
-        corrections[block + 1] = 0.0
-        steps = starts[block + 1] - starts[block]
-        for step in range(starts[block], starts[block + 1]):
-            for rotor in range(ROTORS):
-                corrections[block + 1, rotor] += last[min(step + 1, last.shape[0] - 1), rotor] / steps
-
-
-@compiled
 def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, lower: Array, upper: Array) -> None:
     """Fill the bounds that keep each command within its limits, and move the nominal corrections within them.
 
     `commands` are those of the references, (N, 4), within `limits`, (N, 2); `corrections` those of each block, (b, 4).
     """
+    inputs = lower.shape[0] // corrections.shape[0]
     for block in range(corrections.shape[0]):
         for rotor in range(ROTORS):
             least, most = -np.inf, np.inf
@@ -292,8 +281,8 @@ def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, 
                 least = max(least, limits[step, 0] - commands[step, rotor])
                 most = min(most, limits[step, 1] - commands[step, rotor])
             corrections[block, rotor] = min(max(corrections[block, rotor], least), most)
-            lower[ROTORS * block + rotor] = least - corrections[block, rotor]
-            upper[ROTORS * block + rotor] = most - corrections[block, rotor]
+            lower[inputs * block + rotor] = least - corrections[block, rotor]
+            upper[inputs * block + rotor] = most - corrections[block, rotor]
 
 
 @compiled
@@ -347,14 +336,15 @@ def limit_motion(motion: Array, responses: Array, packed: Packed, G: Array, h: A
 @compiled
 def read_plan(motion: Array, speeds: Array, responses: Array, z: Array, levels: Array, psi: float) -> Array:
     """Return the states that z, (4 b,), leads to, (N + 1, 16), see `PREDICTED`; psi is unwrapped from `psi` on."""
-    steps, moved = motion.shape[0], responses.shape[2]
+    steps, inputs = motion.shape[0], responses.shape[2] // levels.shape[0]
     states, change = np.empty((steps, PREDICTED)), np.empty(DEVIATIONS)
     for step in range(steps):
         x, X, state = motion[step], responses[step], states[step]
         for i in range(DEVIATIONS):
             change[i] = 0.0
-            for k in range(moved):
-                change[i] += X[i, k] * z[k]
+            for block in range(levels.shape[0]):
+                for k in range(inputs * block, inputs * block + ROTORS):
+                    change[i] += X[i, k] * z[k]
         for i in range(6):
             state[i] = x[i] + change[i]
         a, b, c = 0.5 * change[ROTATION], 0.5 * change[ROTATION + 1], 0.5 * change[ROTATION + 2]
@@ -374,5 +364,5 @@ def read_plan(motion: Array, speeds: Array, responses: Array, z: Array, levels: 
         for rotor in range(ROTORS):
             state[12 + rotor] = speeds[step, rotor]
             for block in range(levels.shape[0]):
-                state[12 + rotor] += levels[block, step] * z[ROTORS * block + rotor]
+                state[12 + rotor] += levels[block, step] * z[inputs * block + rotor]
     return states

@@ -39,6 +39,8 @@ class Guidance(NamedTuple):
         errors_ahead: Of `error_transition`, (n, 2, 2).
         max_error_m: An error that is larger counts as this one.
         exact_within_m: A reference as near as this is taken as it is.
+        interval_s: Between samples.
+        recovery_1_s2, recovery_1_s: Gains of the recovery, which turns slower than plans do.
         from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
     """
 
@@ -47,6 +49,9 @@ class Guidance(NamedTuple):
     errors_ahead: Array
     max_error_m: float
     exact_within_m: float
+    interval_s: float
+    recovery_1_s2: float
+    recovery_1_s: float
     from_wrench: Array
 
 
@@ -208,8 +213,9 @@ def approach(
     """Write references of position, velocity and acceleration, ENU, (n, 3) each, that lead to those given.
 
     References that are near enough are taken as they are. The farther they are, the more does the error die as the
-    gains have it in place of at once. Of an error that is larger than the largest only this counts, and of the
-    reference's motion the same part, which keeps one that no vehicle can follow from leading this one astray.
+    gains have it in place of at once. An error that is larger than the largest dies at the speed at which the largest
+    begins to, and of the reference's motion only the part counts that the largest is of it: one that no vehicle can
+    follow must not lead this one astray.
     """
     away, squared = np.empty(3), 0.0
     for i in range(3):
@@ -221,38 +227,35 @@ def approach(
             near[order][:] = references[order]
         return
     part, smooth = min(1.0, law.max_error_m / distance), 1.0 - law.exact_within_m / distance
+    is_far = distance > law.max_error_m
     for i in range(3):
-        error, error_rate = part * away[i], part * references[1][0, i] - velocity[i]
+        error, speed = away[i], 0.0
+        if is_far:
+            error, speed = 0.0, law.k1_s2 / law.k2_s * part * away[i]
+        error_rate = part * references[1][0, i] + speed - velocity[i]
         for n in range(references[0].shape[0]):
             E = law.errors_ahead[n]
             left = smooth * (E[0, 0] * error + E[0, 1] * error_rate)
             left_rate = smooth * (E[1, 0] * error + E[1, 1] * error_rate)
             moved = references[0][n, i] - references[0][0, i]
-            near[0][n, i] = position[i] + error + part * moved - left
-            near[1][n, i] = part * references[1][n, i] - left_rate
+            near[0][n, i] = position[i] + error + part * moved + speed * n * law.interval_s - left
+            near[1][n, i] = part * references[1][n, i] + speed - left_rate
             near[2][n, i] = part * references[2][n, i] + law.k1_s2 * left + law.k2_s * left_rate
 
 
 @compiled
-def guide(
-    rigid: Array,
-    references: tuple[Array, Array, Array, Array],
-    disturbance: Disturbance,
-    law: Guidance,
-    limits: ForceLimits,
+def demanded_force(
+    rigid: Array, near: tuple[Array, Array, Array], disturbance: Disturbance, law: Guidance, limits: ForceLimits,
     vehicle: Packed,
-    near: tuple[Array, Array, Array],
-    out: Flat,
-) -> Array:
-    """Fill `near`, see `approach`, and `out`, see `ask`, from references of position, velocity, acceleration and yaw.
+) -> Array:  # fmt: skip
+    """Return the force, N, ENU, (3,), by which the error now would die as the recovery has it: where thrust must point.
 
-    Return the force, N, ENU, (3,), by which the error now would die as the gains have it: where the thrust must point.
+    `near` are references that `approach` has written.
     """
-    approach(rigid[:3], rigid[3:6], references[:3], law, near)
-    ask(near[1], near[2], references[3], disturbance, limits, law.from_wrench, vehicle, out)
     airframe, force = vehicle[0].airframe, np.empty(3)
     for i in range(3):
-        demanded = near[2][0, i] + law.k1_s2 * (near[0][0, i] - rigid[i]) + law.k2_s * (near[1][0, i] - rigid[3 + i])
+        away, slower = near[0][0, i] - rigid[i], near[1][0, i] - rigid[3 + i]
+        demanded = near[2][0, i] + law.recovery_1_s2 * away + law.recovery_1_s * slower
         force[i] = airframe.mass_kg * (demanded - disturbance.acceleration[i])
     force[2] += airframe.mass_kg * airframe.gravity_m_s2
     limit_force(force, limits)

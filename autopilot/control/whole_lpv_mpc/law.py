@@ -1,7 +1,7 @@
 """The whole-vehicle LPV-MPC as a control law: references, observers, battery and fallbacks about one plan."""
 
 from collections.abc import Mapping
-from math import radians
+from math import ceil, radians
 from typing import Annotated, Any, NamedTuple
 
 import msgspec
@@ -27,23 +27,25 @@ from colibri.autopilot.control.vehicle_model.airframe import drag_force
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings, observer_of
 from colibri.autopilot.control.vehicle_model.mass import MassSettings, follow_mass, mass_model
-from colibri.autopilot.control.whole_lpv_mpc import feed_forward
-from colibri.autopilot.control.whole_lpv_mpc.condensing import Target
-from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, ForceLimits, Guidance
+from colibri.autopilot.control.whole_lpv_mpc.feed_forward import ForceLimits, Guidance
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance
 from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan, PlanSettings, WeightSettings, WholeMpc
+from colibri.autopilot.control.whole_lpv_mpc.path import PathSettings
 from colibri.autopilot.control.whole_lpv_mpc.planning import Now
+from colibri.autopilot.control.whole_lpv_mpc.targets import TargetBuilder, Wanted
 from colibri.common.config import Count, Degrees, Negative, Positive, Table, read_settings
 from colibri.common.elementary import cos, square, tan
 from colibri.common.jit import packed
 from colibri.common.kernels import asin, atan2
 from colibri.common.matrices import dot, matvec, norm
-from colibri.common.rotations import rotation_matrix
+from colibri.common.rotations import quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 _RECOVER_BEYOND = cos(radians(75.0))
 """A thrust axis further from where it must point is for the recovery law."""
+_AS_PLANNED = cos(radians(15.0))
+"""Unless the last plan has led there, to within this."""
 _NOWHERE = (0.0, 0.0, 0.0)
 
 
@@ -61,6 +63,7 @@ class FallbackSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
     """What flies when no plan can be had."""
 
     shifted_samples: Count
+    poles: tuple[Negative, Negative]
     turn_1_s: Positive
     rate_1_s: Positive
     max_rate_rad_s: Positive
@@ -74,6 +77,7 @@ class WholeLpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_onl
     observer: ObserverSettings
     mass: MassSettings
     plan: PlanSettings
+    path: PathSettings
     weights: WeightSettings
     fallback: FallbackSettings
     qp: QpSettings
@@ -91,6 +95,7 @@ class Memory(NamedTuple):
         mass_kg: That the vehicle moves like.
         plan: The last plan, made `age` samples ago; None where there is none to build on.
         age: Samples since that plan.
+        lag_us: By which path time is behind the clock, µs.
     """
 
     speeds: Array
@@ -102,6 +107,7 @@ class Memory(NamedTuple):
     mass_kg: float
     plan: Plan | None
     age: int
+    lag_us: int
 
 
 class Inputs(NamedTuple):
@@ -149,7 +155,9 @@ class WholeLpvMpc:
         self._battery = BatteryModel(vehicle)
         solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
         self._mpc = WholeMpc(settings.plan, settings.weights, vehicle, solver, h, clock)
-        self.preview = Preview(self.control_interval_us, self._mpc.horizon + 2)
+        self._is_on_clock = settings.path.min_speed == 1.0
+        samples = self._mpc.horizon + 2
+        self.preview = Preview(self.control_interval_us, ceil(settings.path.max_speed * samples))
         self._fallback = settings.fallback
         self._observer = observer_of(settings.observer, vehicle, h)
         self._packed_observer = packed(self._observer)
@@ -157,16 +165,18 @@ class WholeLpvMpc:
         self._allocation = vehicle.allocation() * square(vehicle.rotors.max_speed)
         self._momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
         self._span_n = float(self._allocation[0].sum())
-        first, second = settings.references.poles
-        k1_s2, k2_s = first * second, -(first + second)
-        self._guidance = Guidance(
+        k1_s2, k2_s = gains(settings.references.poles)
+        guidance = Guidance(
             k1_s2,
             k2_s,
-            error_transition(settings.references.poles, h, self.preview.samples),
+            error_transition(settings.references.poles, h, samples),
             settings.references.approach_speed_m_s * k2_s / k1_s2,
             settings.references.exact_within_m,
+            h,
+            *gains(settings.fallback.poles),
             self._mpc.from_wrench,
         )
+        self._targets = TargetBuilder(guidance, settings.path, self._mpc)
         self._tilt_tangent = tan(radians(settings.references.max_tilt_deg))
         self._thrust_margin = settings.references.thrust_margin
         self._turn = recovery.TurnGains(
@@ -191,7 +201,7 @@ class WholeLpvMpc:
         speeds = np.full(ROTORS, rotor_speed / self._vehicle.rotors.max_speed)
         wrench = matvec(self._allocation, speeds * speeds)
         estimate = np.zeros(disturbance_observer.ESTIMATES)
-        return Memory(speeds, wrench, wrench, None, estimate, 0.0, self._vehicle.body.mass_kg, None, 0)
+        return Memory(speeds, wrench, wrench, None, estimate, 0.0, self._vehicle.body.mass_kg, None, 0, 0)
 
     def charge_ah(self, memory: Memory) -> float:
         """Return the charge taken from the battery, Ah."""
@@ -209,19 +219,24 @@ class WholeLpvMpc:
         """Return the memory with another mass."""
         return memory._replace(mass_kg=mass_kg)
 
+    def lag_us(self, memory: Memory) -> int:
+        """Return by how much path time is behind the clock, µs."""
+        return memory.lag_us
+
+    def with_lag(self, memory: Memory, lag_us: int) -> Memory:
+        """Return the memory with another lag, µs."""
+        return memory._replace(lag_us=lag_us)
+
     def step(self, memory: Memory, time_us: int, state: VehicleState, references: Horizon) -> tuple[Memory, Decision]:
         """Decide the rotor speeds to hold until the next control sample."""
         del time_us
         inputs = self._inputs(memory, state)
-        now, flat = inputs.now, self._flat()
-        n = self.preview.samples
-        near = (np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)))
-        p, v, a, _, _, yaw, _, _ = references
-        force = feed_forward.guide(
-            now.rigid, (p, v, a, yaw), now.disturbance, self._guidance, inputs.limits, self._mpc.model, near, flat
-        )
-        target = Target(near[0], near[1], flat.attitudes, yaw, flat.rates, flat.squared, np.zeros(n))
-        return self._decide(memory, inputs, target, force, on_track=True)
+        if self._is_on_clock:
+            return self._decide(memory, inputs, self._targets.on_clock(inputs.now, inputs.limits, references))
+        kept = memory.plan.speeds if memory.plan else None
+        last = None if kept is None else kept[memory.age :]
+        wanted = self._targets.on_path(inputs.now, inputs.limits, references, last, memory.lag_us * 1e-6)
+        return self._decide(memory, inputs, wanted)
 
     def step_attitude(
         self, memory: Memory, time_us: int, state: VehicleState, demand: AttitudeDemand
@@ -229,18 +244,8 @@ class WholeLpvMpc:
         """Decide the same for an attitude and a thrust, which is kept within what the rotors can make."""
         del time_us
         inputs = self._inputs(memory, state)
-        flat = self._flat()
-        feed_forward.stand(demand.angles, demand.thrust_n, inputs.limits, flat)
-        feed_forward.turn(flat, inputs.now.disturbance.moment, self._mpc.from_wrench, self._mpc.model)
-        nowhere = np.zeros((self.preview.samples, 3))
-        thrust_n = np.clip(demand.thrust_n, inputs.limits.min_n, inputs.limits.max_n)
-        yaw = demand.angles[:, 2].copy()
-        target = Target(nowhere, nowhere, flat.attitudes, yaw, flat.rates, flat.squared, thrust_n)
-        return self._decide(memory, inputs, target, flat.forces[0], on_track=False)
-
-    def _flat(self) -> Flat:
-        n, steps = self.preview.samples, self._mpc.horizon
-        return Flat(np.empty((n, 3)), np.empty((n, 3, 3)), np.empty((steps, 3)), np.empty((steps + 1, ROTORS)))
+        wanted = self._targets.of_demand(inputs.now, inputs.limits, demand)
+        return self._decide(memory, inputs, wanted, on_track=False)
 
     def _inputs(self, memory: Memory, state: VehicleState) -> Inputs:
         rotation = np.array(rotation_matrix(state.attitude))
@@ -284,30 +289,50 @@ class WholeLpvMpc:
         )
 
     def _decide(
-        self, memory: Memory, inputs: Inputs, target: Target, force: Array, *, on_track: bool
+        self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool = True
     ) -> tuple[Memory, Decision]:
-        squared, plan, age, diagnostics = self._choose(memory, inputs, target, force, on_track=on_track)
+        squared, plan, age, diagnostics = self._choose(memory, inputs, wanted, on_track=on_track)
         max_speed = self._battery.max_speed_now(memory.charge_ah, memory.speeds)
         commands, speeds, wrench, mean_wrench = rotor_lag.actuate(
             memory.speeds, squared, self._lag, max_speed, self._allocation
         )
         charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
+        lag_us = self._lag_us(memory.lag_us, plan, age)
         after = Memory(
-            speeds, wrench, mean_wrench, inputs.measured, inputs.estimate, charge_ah, inputs.mass_kg, plan, age
+            speeds,
+            wrench,
+            mean_wrench,
+            inputs.measured,
+            inputs.estimate,
+            charge_ah,
+            inputs.mass_kg,
+            plan,
+            age,
+            lag_us,
         )
-        R = target.attitudes[0]
-        angles = (atan2(R[2, 1], R[2, 2]), -asin(min(max(R[2, 0], -1.0), 1.0)), float(target.yaw_rad[0]))
+        R = wanted.target.attitudes[0]
+        angles = (atan2(R[2, 1], R[2, 2]), -asin(min(max(R[2, 0], -1.0), 1.0)), float(wanted.target.yaw_rad[0]))
         how = diagnostics._replace(mass_kg=inputs.mass_kg)
+        if not self._is_on_clock:
+            how = how._replace(lag_s=memory.lag_us * 1e-6)
         return after, Decision(commands * self._vehicle.rotors.max_speed, angles, how)
 
+    def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
+        """Return the lag a sample later, on a plan that is so old then."""
+        if self._is_on_clock or plan is None or plan.speeds is None:
+            return 0 if self._is_on_clock else lag_us
+        passed_s = 0.5 * self._interval_s * float(plan.speeds[age - 1] + plan.speeds[age])
+        return max(lag_us + self.control_interval_us - round(passed_s * 1e6), 0)
+
     def _choose(
-        self, memory: Memory, inputs: Inputs, target: Target, force: Array, *, on_track: bool
+        self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
         """Plan, or fall back: return squared rotor speeds, the plan to go on with, its age, and how it came about."""
-        if dot(force, inputs.rotation[:, 2].copy()) < _RECOVER_BEYOND * norm(force):
+        target, force, path = wanted
+        if dot(force, inputs.rotation[:, 2].copy()) < _RECOVER_BEYOND * norm(force) and not _planned(memory, inputs):
             return self._recover(inputs, force, Diagnostics())
-        last = memory.plan.corrections[memory.age - 1 :] if memory.plan else None
-        plan, diagnostics = self._mpc.plan(inputs.now, target, last, on_track=on_track)
+        last = memory.plan.commands[memory.age :] if memory.plan else None
+        plan, diagnostics = self._mpc.plan(inputs.now, target, last, path, on_track=on_track)
         if plan is not None:
             return plan.commands[0], plan, 1, diagnostics
         if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._mpc.horizon - 1):
@@ -328,3 +353,17 @@ class WholeLpvMpc:
             thrust_n, moments, from_wrench[:, 0].copy(), from_wrench[:, 1:].copy(), least, most
         )
         return squared, None, 0, diagnostics._replace(fallback=Fallback.RECOVERY)
+
+
+def _planned(memory: Memory, inputs: Inputs) -> bool:
+    """Whether the last plan leads to the attitude now."""
+    if memory.plan is None:
+        return False
+    planned = rotation_matrix(quaternion_from_euler(*memory.plan.states[memory.age, 6:9].tolist()))
+    return dot(np.array([row[2] for row in planned]), inputs.rotation[:, 2].copy()) > _AS_PLANNED
+
+
+def gains(poles: tuple[float, float]) -> tuple[float, float]:
+    """Return the gains on an error, 1/s², and on its rate, 1/s, by which it dies with these poles, 1/s."""
+    first, second = poles
+    return first * second, -(first + second)

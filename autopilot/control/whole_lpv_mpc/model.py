@@ -279,6 +279,7 @@ def respond(motion: Array, speeds: Array, means: Array, levels: Array, packed: P
     """
     model = packed[0]
     T = _empty_transition()
+    inputs = responses.shape[2] // means.shape[0]
     responses[0] = 0.0
     for step in range(speeds.shape[0] - 1):
         squared = 0.5 * (speeds[step] + speeds[step + 1])
@@ -286,13 +287,13 @@ def respond(motion: Array, speeds: Array, means: Array, levels: Array, packed: P
         blocks = 0
         while blocks < means.shape[0] and means[blocks, step] != 0.0:
             blocks += 1
-        used = ROTORS * blocks
+        used = inputs * blocks
         _advance(responses[step], T, model.interval_s, used, responses[step + 1])
         X = responses[step + 1]
         for block in range(blocks):
             mean, change = means[block, step], levels[block, step + 1] - levels[block, step]
             for rotor in range(ROTORS):
-                column = ROTORS * block + rotor
+                column = inputs * block + rotor
                 for i in range(3):
                     X[POSITION + i, column] += T.place[i, rotor] * mean
                     X[VELOCITY + i, column] += T.force[i, rotor] * mean

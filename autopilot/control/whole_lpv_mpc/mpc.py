@@ -14,10 +14,11 @@ from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.control.whole_lpv_mpc import condensing, model, planning
 from colibri.autopilot.control.whole_lpv_mpc.condensing import Problem, Target, Weights
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Lag, Model
+from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, pace_of, read_speeds
 from colibri.autopilot.control.whole_lpv_mpc.planning import Now, Workspace
 from colibri.common.config import Count, Degrees, Positive, Table
 from colibri.common.elementary import cos, exp, square
-from colibri.common.jit import packed
+from colibri.common.jit import Packed, packed
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -59,14 +60,23 @@ class Plan(NamedTuple):
     """A solved QP.
 
     Attributes:
-        corrections: Of each step's command, (N, 4).
         commands: Squared speeds commanded at each step, (N, 4).
         states: Predicted, (N + 1, 16), see `condensing.PREDICTED`.
+        speeds: Along the path, (N + 2,); None on the clock.
     """
 
-    corrections: Array
     commands: Array
     states: Array
+    speeds: Array | None = None
+
+
+class _Kind(NamedTuple):
+    """QPs of one kind: what they share, their arrays, and the QP without and with soft limits."""
+
+    problem: Packed
+    work: Workspace
+    free: Qp
+    limited: Qp
 
 
 class WholeMpc:
@@ -76,6 +86,8 @@ class WholeMpc:
         horizon: N.
         model: The vehicle's numbers, as one record.
         from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
+        starts: Step at which each block begins, and N, (b + 1,).
+        pace: What the speeds along the path at the ends of blocks do.
     """
 
     def __init__(
@@ -101,33 +113,37 @@ class WholeMpc:
         )  # fmt: skip
         on_track = on_hold._replace(position=weights.position, velocity=weights.velocity, tilt=0.0, thrust=0.0)
         thrust_n = weights.terminal_thrust * vehicle.body.mass_kg * vehicle.gravity_m_s2
-        self._problems = [
-            packed(
-                Problem(
-                    starts,
-                    np.arange(settings.count_every, n + 1, settings.count_every),
-                    np.arange(settings.check_every, n + 1, settings.check_every),
-                    each,
-                    self._terminal(each, settings.count_every, thrust_n),
-                    numbers.allocation[0].copy(),
-                    levels,
-                    cos(radians(settings.max_tilt_deg)),
-                    np.array(settings.max_rate_rad_s),
-                )
-            )
-            for each in (on_track, on_hold)
-        ]
-        moved, rows = ROTORS * len(settings.blocks), condensing.MOTION_ROWS * (n // settings.check_every)
-        self._free = _empty_qp(moved, 0, 0, settings.slack_weight)
-        self._limited = _empty_qp(moved, condensing.SLACKS, rows, settings.slack_weight)
-        self._work = Workspace(
+        self.starts, self.pace = starts, pace_of(starts, interval_s)
+        blocks, rows = len(settings.blocks), condensing.MOTION_ROWS * (n // settings.check_every)
+        shared = Workspace(
             np.empty((n, ROTORS)),
-            np.empty((len(settings.blocks) + 1, ROTORS)),
+            np.empty((blocks + 1, ROTORS)),
             np.empty((n + 1, model.RIGID)),
             np.empty((n + 1, ROTORS)),
-            np.zeros((n + 1, model.DEVIATIONS, moved)),
+            np.empty(0),
             means,
             levels,
+        )
+        self._on_clock, self._on_path, self._on_hold = (
+            _Kind(
+                packed(
+                    Problem(
+                        starts,
+                        np.arange(settings.count_every, n + 1, settings.count_every),
+                        np.arange(settings.check_every, n + 1, settings.check_every),
+                        each,
+                        self._terminal(each, settings.count_every, thrust_n),
+                        numbers.allocation[0].copy(),
+                        levels,
+                        cos(radians(settings.max_tilt_deg)),
+                        np.array(settings.max_rate_rad_s),
+                    )
+                ),
+                shared._replace(responses=np.zeros((n + 1, model.DEVIATIONS, inputs * blocks))),
+                _empty_qp(inputs * blocks, 0, 0, settings.slack_weight),
+                _empty_qp(inputs * blocks, condensing.SLACKS, rows, settings.slack_weight),
+            )
+            for each, inputs in ((on_track, ROTORS), (on_track, ROTORS + 1), (on_hold, ROTORS))
         )
         self._none = np.empty((0, ROTORS))
 
@@ -148,7 +164,9 @@ class WholeMpc:
         S[kept, kept] = 0.5 * (cost + cost.T)
         return S
 
-    def plan(self, now: Now, target: Target, last: Array | None, *, on_track: bool) -> tuple[Plan | None, Diagnostics]:
+    def plan(
+        self, now: Now, target: Target, last: Array | None, path: PathNow | None = None, *, on_track: bool = True
+    ) -> tuple[Plan | None, Diagnostics]:
         """Plan from `now` towards `target`; no plan where the QP is not solved.
 
         Where the plan within the rotors' limits alone exceeds a soft limit, a second one has these, too.
@@ -156,19 +174,22 @@ class WholeMpc:
         Args:
             now: What the plan begins with.
             target: What it is to follow.
-            last: Corrections of the last plan, from that which flies now on, (n, 4); None without one.
+            last: Commands of the last plan, from now on, (n, 4); None without one.
+            path: The nominal speeds along the path, where they are free.
             on_track: Whether the place counts, or the attitude and the thrust.
         """
-        problem = self._problems[0 if on_track else 1]
-        free, work = self._free, self._work
-        planning.condense(now, target, self._none if last is None else last, self.model, problem, work, free)
+        problem, work, free, limited = self._on_path if path else self._on_clock if on_track else self._on_hold
+        last = self._none if last is None else last
+        if path is None:
+            planning.condense(now, target, last, self.model, problem, work, free)
+        else:
+            planning.condense_on_path(now, target, last, path, self.pace, self.model, problem, work, free)
         started_s = self._clock()
         minimum = np.empty(len(free.f))
-        is_free = planning.free_minimum(free, minimum)
+        is_free = planning.free_minimum(free, len(self.starts) - 1, minimum)
         status, z = QpResult(QpStatus.SOLVED, minimum) if is_free else self._solver.solve(free)
         slack, soft = 0.0, (0, 0)
         if z is not None and condensing.exceeds(work.motion, work.responses, z, problem):
-            limited = self._limited
             planning.limit(work, free, problem, limited)
             status, z = self._solver.solve(limited)
             if z is not None:
@@ -177,7 +198,7 @@ class WholeMpc:
         solve_time_s = self._clock() - started_s
         if z is None:
             return None, Diagnostics(status, solve_time_s=solve_time_s)
-        corrections, commands, states, binding = planning.read(work, free, z, now.psi, problem)
+        commands, states, binding = planning.read(work, free, z, now.psi, problem)
         diagnostics = Diagnostics(
             QpStatus.SOLVED,
             solve_time_s=solve_time_s,
@@ -186,7 +207,8 @@ class WholeMpc:
             predicted=states,
             planned_squared=commands,
         )
-        return Plan(corrections, commands, states), diagnostics
+        speeds = None if path is None else read_speeds(path.speeds, self.pace.shares, z)
+        return Plan(commands, states, speeds), diagnostics
 
 
 def model_of(vehicle: Vehicle, interval_s: float) -> Model:

@@ -11,15 +11,16 @@ import numpy as np
 from colibri.autopilot.control.qp import Qp
 from colibri.autopilot.control.whole_lpv_mpc.condensing import (
     MOTION_ROWS,
+    Integers,
     Target,
     bound,
-    carry_over,
     cost,
     limit_motion,
     read_plan,
 )
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import lead
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance, respond, roll_out
+from colibri.autopilot.control.whole_lpv_mpc.path import Pace, PathNow, fill_slides, price
 from colibri.common.jit import Packed, compiled
 from colibri.common.types import Array
 
@@ -72,34 +73,106 @@ def condense(now: Now, target: Target, last: Array, vehicle: Packed, packed: Pac
     Args:
         now: Where the plan begins.
         target: What it is to follow.
-        last: Corrections of the last plan, from that which flew last on, (n, 4); (0, 4) without one.
+        last: Commands of the last plan, from now on, (n, 4); (0, 4) without one.
         vehicle: The `Model`.
         packed: The `Problem`.
         work: Is filled.
         qp: Is filled, but for G and h.
     """
+    _expect(now, target, last, vehicle, packed, work, qp)
+    cost(work.motion, work.speeds, work.responses, target, work.corrections, packed, qp.H, qp.f)
+
+
+@compiled
+def condense_on_path(
+    now: Now,
+    target: Target,
+    last: Array,
+    path: PathNow,
+    pace: Pace,
+    vehicle: Packed,
+    packed: Packed,
+    work: Workspace,
+    qp: Qp,
+) -> None:
+    """Fill the QP in which the speed along the path is free, too; see `condense`."""
+    _expect(now, target, last, vehicle, packed, work, qp)
+    fill_slides(path, pace, work.responses)
+    cost(work.motion, work.speeds, work.responses, target, work.corrections, packed, qp.H, qp.f)
+    price(path, pace, packed[0].starts, qp)
+
+
+@compiled
+def _expect(now: Now, target: Target, last: Array, vehicle: Packed, packed: Packed, work: Workspace, qp: Qp) -> None:
+    """Fill the nominal motion, how it responds, and the bounds."""
     starts = packed[0].starts
     commands, corrections = work.commands, work.corrections
     lead(target.squared, vehicle[0].lag.left, now.limits, commands)
     corrections[:] = 0.0
+    ease(commands, starts, now.limits)
     if last.shape[0] > 0:
-        carry_over(last, starts, corrections)
+        carry_over(last, commands, starts, corrections)
     bound(commands, now.limits, corrections[1:], starts, qp.lower, qp.upper)
     nominal = np.empty_like(commands)
     _correct(commands, corrections[1:], starts, nominal)
     roll_out(now.rigid, now.squared, nominal, now.disturbance, vehicle, work.motion, work.speeds)
     respond(work.motion, work.speeds, work.means, work.levels, vehicle, work.responses)
-    cost(work.motion, work.speeds, work.responses, target, corrections, packed, qp.H, qp.f)
 
 
 @compiled
-def free_minimum(qp: Qp, z: Array) -> bool:
-    """Write the minimum of the cost alone, (n,), by Cholesky's factors; whether it lies within all bounds."""
-    n = z.shape[0]
-    L = np.empty((n, n))
+def ease(commands: Array, starts: Integers, limits: Array) -> None:
+    """Make the commands of the references vary within half of the rotors' range in each block.
+
+    A block has one correction: where references that cannot be followed ask for both ends of the range, it has none.
+    """
+    for block in range(starts.shape[0] - 1):
+        begin, end = starts[block], starts[block + 1]
+        for rotor in range(ROTORS):
+            low, high, least, most = np.inf, -np.inf, -np.inf, np.inf
+            for step in range(begin, end):
+                low, high = min(low, commands[step, rotor]), max(high, commands[step, rotor])
+                least, most = max(least, limits[step, 0]), min(most, limits[step, 1])
+            if high - low > 0.5 * (most - least):
+                part = 0.5 * (most - least) / (high - low)
+                to = min(max(0.5 * (low + high), 0.75 * least + 0.25 * most), 0.25 * least + 0.75 * most)
+                for step in range(begin, end):
+                    commands[step, rotor] = to + part * (commands[step, rotor] - 0.5 * (low + high))
+
+
+@compiled
+def carry_over(last: Array, commands: Array, starts: Integers, corrections: Array) -> None:
+    """Fill the correction of each block, and before them the first again, (b + 1, 4).
+
+    It is the mean of what the last plan commands from now on, (n, 4), and then goes on with, beyond `commands`, (N, 4).
+    """
+    for block in range(starts.shape[0] - 1):
+        corrections[block + 1] = 0.0
+        steps = starts[block + 1] - starts[block]
+        for step in range(starts[block], starts[block + 1]):
+            for rotor in range(ROTORS):
+                planned = last[min(step, last.shape[0] - 1), rotor]
+                corrections[block + 1, rotor] += (planned - commands[step, rotor]) / steps
+    corrections[0] = corrections[1]
+
+
+@compiled
+def free_minimum(qp: Qp, blocks: int, z: Array) -> bool:
+    """Write the minimum of the cost alone, (n,), by Cholesky's factors; whether it is that within all bounds.
+
+    Speeds along the path are taken at their upper bounds, where they are as long as the vehicle can keep the time.
+    """
+    n, inputs = z.shape[0], z.shape[0] // blocks
+    first_speed = ROTORS if inputs > ROTORS else n
+    L, left = np.empty((n, n)), np.empty(n)
     for i in range(n):
+        left[i] = -qp.f[i]
+        for k in range(first_speed, n, inputs):
+            left[i] -= qp.H[i, k] * qp.upper[k]
+        speed = i % inputs == ROTORS
         for j in range(i + 1):
             total = qp.H[i, j]
+            if speed or j % inputs == ROTORS:
+                total = 1.0 if i == j else 0.0
             for k in range(j):
                 total -= L[i, k] * L[j, k]
             if i > j:
@@ -109,7 +182,7 @@ def free_minimum(qp: Qp, z: Array) -> bool:
             else:
                 return False
     for i in range(n):
-        total = -qp.f[i]
+        total = qp.upper[i] if i % inputs == ROTORS else left[i]
         for k in range(i):
             total -= L[i, k] * z[k]
         z[i] = total / L[i, i]
@@ -118,32 +191,38 @@ def free_minimum(qp: Qp, z: Array) -> bool:
         for k in range(i + 1, n):
             total -= L[k, i] * z[k]
         z[i] = total / L[i, i]
-    within = True
     for i in range(n):
-        within = within and qp.lower[i] <= z[i] <= qp.upper[i]
-    return within
+        if not qp.lower[i] <= z[i] <= qp.upper[i]:
+            return False
+    for i in range(first_speed, n, inputs):
+        slope = -left[i]
+        for k in range(n):
+            if k % inputs != ROTORS:
+                slope += qp.H[i, k] * z[k]
+        if slope > 0.0:
+            return False
+    return True
 
 
 @compiled
-def read(work: Workspace, qp: Qp, z: Array, psi: float, packed: Packed) -> tuple[Array, Array, Array, int]:
-    """Return the plan that z, (n,), stands for, `psi` unwrapped: see `Plan`; and how many bounds of commands bind."""
+def read(work: Workspace, qp: Qp, z: Array, psi: float, packed: Packed) -> tuple[Array, Array, int]:
+    """Return commands and states of the plan that z, (n,), stands for, see `Plan`, and how many bounds bind in it.
+
+    `psi` is that now, unwrapped.
+    """
     starts = packed[0].starts
-    corrections, held, commands = (
-        work.corrections[1:].copy(),
-        np.empty_like(work.commands),
-        np.empty_like(work.commands),
-    )
+    corrections, commands = work.corrections[1:].copy(), np.empty_like(work.commands)
+    inputs = z.shape[0] // corrections.shape[0]
     binding = 0
     for block in range(corrections.shape[0]):
         for rotor in range(ROTORS):
-            k = ROTORS * block + rotor
+            k = inputs * block + rotor
             corrections[block, rotor] += z[k]
             if z[k] <= qp.lower[k] + _BINDING or z[k] >= qp.upper[k] - _BINDING:
                 binding += 1
-    _correct(np.zeros_like(held), corrections, starts, held)
     _correct(work.commands, corrections, starts, commands)
     states = read_plan(work.motion, work.speeds, work.responses, z, work.levels, psi)
-    return held, commands, states, binding
+    return commands, states, binding
 
 
 @compiled

@@ -27,7 +27,7 @@ class TaskContext(NamedTuple):
     """Inputs of a task.
 
     Attributes:
-        now_us: Simulated time at which what is decided takes effect.
+        now_us: Simulated time at which what is decided takes effect, less the control law's lag: path time.
         state: The vehicle then.
         reference: State of the reference.
         home_enu_m: Home.

@@ -23,7 +23,9 @@ PACKED = packed(MODEL)
 FROM_WRENCH = exact_inverse(MODEL.allocation)
 WIDE = ForceLimits(tan(1.2), 0.2, 19.0)
 CALM = Disturbance(np.zeros(3), np.zeros(3))
-GUIDANCE = Guidance(30.0, 11.0, error_transition((-5.0, -6.0), INTERVAL_S, STEPS + 2), 1.1, 0.3, FROM_WRENCH)
+GUIDANCE = Guidance(
+    30.0, 11.0, error_transition((-5.0, -6.0), INTERVAL_S, STEPS + 2), 1.1, 0.3, INTERVAL_S, 30.0, 11.0, FROM_WRENCH
+)
 
 
 def flat() -> Flat:

@@ -20,7 +20,7 @@ def random_qp(seed: int, room: float) -> Qp:
 @pytest.mark.parametrize("seed", range(5))
 def test_a_free_minimum_is_the_solvers(seed: int) -> None:
     qp, z = random_qp(seed, 10.0), np.empty(12)
-    assert planning.free_minimum(qp, z)
+    assert planning.free_minimum(qp, 3, z)
     solved = QpSolver("daqp", 1e-10).solve(qp).x
     assert solved is not None
     assert z == pytest.approx(solved, abs=1e-9)
@@ -33,7 +33,7 @@ def test_what_is_beyond_a_bound_or_has_no_minimum_is_not_free(spoil: str) -> Non
         qp.H[3, 3] = -1.0
     if spoil == "not a number":
         qp.f[2] = np.nan
-    assert not planning.free_minimum(qp, z)
+    assert not planning.free_minimum(qp, 3, z)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -51,8 +51,16 @@ def test_bounds_hold_the_nominal_plan_and_keep_every_command_within_its_limits(s
         assert (held <= limits[:, 1:] + 1e-12).all()
 
 
-def test_the_last_plan_is_carried_over_a_step_later() -> None:
-    last = np.arange(5.0)[:, None] * np.ones(ROTORS)
+def test_the_last_plan_is_carried_over_as_its_mean_beyond_what_references_ask_for() -> None:
+    last, commands = np.arange(1.0, 5.0)[:, None] * np.ones(ROTORS), np.full((6, ROTORS), 0.5)
     corrections = np.zeros((4, ROTORS))
-    condensing.carry_over(last, STARTS, corrections)
-    assert corrections[:, 0].tolist() == [0.0, 1.0, 2.5, 4.0]
+    planning.carry_over(last, commands, STARTS, corrections)
+    assert corrections[:, 0].tolist() == pytest.approx([0.5, 0.5, 2.0, 3.5])
+
+
+def test_commands_that_ask_for_both_ends_of_the_range_in_a_block_leave_it_a_correction() -> None:
+    limits = np.tile([0.0, 1.0], (6, 1))
+    commands = np.tile(np.array([0.4, 0.6, 0.5, 0.0, 1.0, 1.0])[:, None], ROTORS)
+    planning.ease(commands, STARTS, limits)
+    assert commands[:3, 0].tolist() == [0.4, 0.6, 0.5]
+    assert commands[3:, 0].tolist() == [0.25, 0.75, 0.75]

@@ -1,0 +1,185 @@
+"""The speed along the path as a part of the plan, as compiled kernels.
+
+Path time passes at σ seconds a second, and lags behind the clock by what is less than 1. References are functions of
+path time; σ is linear in time within a block, from the end of one to the end of the next, so that the vehicle's motion
+along its path has an acceleration:
+
+    p(t) = P(θ(t)),   dp/dt = σ P',   d²p/dt² = σ² P'' + dσ/dt P',   dθ/dt = σ
+
+The σ at the end of each block are variables of the QP beside the corrections of its rotors.
+"""
+
+from math import floor
+from typing import Annotated, NamedTuple
+
+import msgspec
+import numpy as np
+
+from colibri.autopilot.control.interface import Horizon
+from colibri.autopilot.control.qp import Qp
+from colibri.autopilot.control.whole_lpv_mpc.condensing import Integers
+from colibri.autopilot.control.whole_lpv_mpc.model import POSITION, ROTORS, VELOCITY
+from colibri.common.config import Positive, Table
+from colibri.common.jit import compiled
+from colibri.common.types import Array
+
+
+class PathSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The speed along the path, in parts of the references' own."""
+
+    min_speed: Annotated[float, msgspec.Meta(gt=0.0, le=1.0)]
+    """1 follows the clock."""
+    max_speed: Annotated[float, msgspec.Meta(ge=1.0, le=2.0)]
+    """To catch up with the clock."""
+    reward: Positive
+    """On path time gained, 1/s."""
+    change: Positive
+    """On the square of each change of a speed."""
+
+
+class Pace(NamedTuple):
+    """Of path time, what each σ does.
+
+    Attributes:
+        shares: Part of the σ at the end of each block in that of each sample, (N + 2, b).
+        passed: Path time, s, that a unit of each σ has made pass until each sample, (N + 2, b).
+    """
+
+    shares: Array
+    passed: Array
+
+
+class PathLimits(NamedTuple):
+    """Of one QP: bounds of σ, the reward on path time, 1/s, and the price of a change."""
+
+    lower: float
+    upper: float
+    reward: float
+    change: float
+
+
+class PathNow(NamedTuple):
+    """Of one QP: nominal σ and slopes at each sample, (N + 2,) and (N + 2, 6), which part counts, and the limits."""
+
+    speeds: Array
+    slopes: Array
+    part: float
+    limits: PathLimits
+
+
+def pace_of(starts: Integers, interval_s: float) -> Pace:
+    """Return what the σ at the ends of blocks that begin at `starts`, (b + 1,), do."""
+    blocks, samples = len(starts) - 1, int(starts[-1]) + 2
+    shares = np.zeros((samples, blocks))
+    for block in range(blocks):
+        begin, end = int(starts[block]), int(starts[block + 1])
+        for step in range(begin, end + 1):
+            shares[step, block] = (step - begin) / (end - begin)
+            if block > 0:
+                shares[step, block - 1] = (end - step) / (end - begin)
+    shares[-1] = shares[-2]
+    passed = np.zeros_like(shares)
+    for step in range(1, samples):
+        passed[step] = passed[step - 1] + 0.5 * interval_s * (shares[step - 1] + shares[step])
+    return Pace(shares, passed)
+
+
+@compiled
+def carry_speeds(last: Array, starts: Integers, lower: float, upper: float, speeds: Array) -> None:
+    """Fill σ at each sample, (N + 2,), from those of the last plan from now on, (n,)."""
+    speeds[0] = last[0]
+    for block in range(starts.shape[0] - 1):
+        begin, end = starts[block], starts[block + 1]
+        first, final = speeds[begin], min(max(last[min(end, last.shape[0] - 1)], lower), upper)
+        for step in range(begin + 1, end + 1):
+            speeds[step] = first + (final - first) * (step - begin) / (end - begin)
+    speeds[-1] = speeds[-2]
+
+
+@compiled
+def slide(
+    references: Horizon,
+    from_s: float,
+    speeds: Array,
+    interval_s: float,
+    out: tuple[Array, Array, Array, Array],
+    slopes: Array,
+) -> float:
+    """Fill references at the samples' path times, moving at σ; return the last one's path time, s.
+
+    Args:
+        references: At path times an interval apart.
+        from_s: Path time of the first sample.
+        speeds: σ at each sample, (n,).
+        interval_s: Between references, and between samples.
+        out: Position, velocity, acceleration, ENU, (n, 3) each, and yaw, (n,).
+        slopes: P' and P'', (n, 6).
+    """
+    p, v, a, j, s, yaw, yaw_rate, yaw_acceleration = references
+    passed = from_s / interval_s
+    samples = speeds.shape[0]
+    for n in range(samples):
+        if n > 0:
+            passed += 0.5 * (speeds[n - 1] + speeds[n])
+        row = min(floor(passed + 0.5), yaw.shape[0] - 1)
+        dt = (passed - row) * interval_s
+        before, after = max(n - 1, 0), min(n + 1, samples - 1)
+        change_1_s = (speeds[after] - speeds[before]) / ((after - before) * interval_s)
+        for i in range(3):
+            P1 = v[row, i] + dt * (a[row, i] + 0.5 * dt * (j[row, i] + dt / 3.0 * s[row, i]))
+            P2 = a[row, i] + dt * (j[row, i] + 0.5 * dt * s[row, i])
+            out[0][n, i] = p[row, i] + dt * (
+                v[row, i] + 0.5 * dt * (a[row, i] + dt / 3.0 * (j[row, i] + 0.25 * dt * s[row, i]))
+            )
+            out[1][n, i] = speeds[n] * P1
+            out[2][n, i] = speeds[n] * speeds[n] * P2 + change_1_s * P1
+            slopes[n, i], slopes[n, 3 + i] = P1, P2
+        out[3][n] = yaw[row] + dt * (yaw_rate[row] + 0.5 * dt * yaw_acceleration[row])
+    return passed * interval_s
+
+
+@compiled
+def fill_slides(path: PathNow, pace: Pace, responses: Array) -> None:
+    """Write how the deviation from the references changes with each σ, into the last column of each block.
+
+    `responses` are (N + 1, 12, 5 b).
+    """
+    inputs = ROTORS + 1
+    for step in range(responses.shape[0]):
+        for block in range(pace.shares.shape[1]):
+            column = inputs * block + ROTORS
+            share, passed = path.part * pace.shares[step, block], path.part * pace.passed[step, block]
+            for i in range(3):
+                P1, P2 = path.slopes[step, i], path.slopes[step, 3 + i]
+                responses[step, POSITION + i, column] = -passed * P1
+                responses[step, VELOCITY + i, column] = -(path.speeds[step] * passed * P2 + share * P1)
+
+
+@compiled
+def price(path: PathNow, pace: Pace, starts: Integers, qp: Qp) -> None:
+    """Add what each σ costs to the QP, and fill its bounds."""
+    inputs, limits = ROTORS + 1, path.limits
+    for block in range(starts.shape[0] - 1):
+        here = inputs * block + ROTORS
+        before, after = path.speeds[starts[block]], path.speeds[starts[block + 1]]
+        qp.lower[here], qp.upper[here] = limits.lower - after, limits.upper - after
+        change = limits.change * (after - before)
+        qp.f[here] += change - limits.reward * pace.passed[starts[-1], block]
+        qp.H[here, here] += limits.change
+        if block > 0:
+            there = here - inputs
+            qp.f[there] -= change
+            qp.H[there, there] += limits.change
+            qp.H[here, there] -= limits.change
+            qp.H[there, here] -= limits.change
+
+
+@compiled
+def read_speeds(speeds: Array, shares: Array, z: Array) -> Array:
+    """Return σ at each sample of the plan that z stands for, (N + 2,)."""
+    inputs = ROTORS + 1
+    planned = speeds.copy()
+    for sample in range(shares.shape[0]):
+        for block in range(shares.shape[1]):
+            planned[sample] += shares[sample, block] * z[inputs * block + ROTORS]
+    return planned

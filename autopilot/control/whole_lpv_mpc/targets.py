@@ -1,0 +1,119 @@
+"""From references, or a demanded attitude, to what a plan is to follow."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import AttitudeDemand, Horizon
+from colibri.autopilot.control.whole_lpv_mpc import feed_forward
+from colibri.autopilot.control.whole_lpv_mpc.condensing import Target
+from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, ForceLimits, Guidance
+from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
+from colibri.autopilot.control.whole_lpv_mpc.mpc import WholeMpc
+from colibri.autopilot.control.whole_lpv_mpc.path import PathLimits, PathNow, PathSettings, carry_speeds, slide
+from colibri.autopilot.control.whole_lpv_mpc.planning import Now
+from colibri.common.matrices import dot, norm
+from colibri.common.types import Array
+
+_STILL_M_S = 1e-3
+
+
+class Wanted(NamedTuple):
+    """What a plan is to follow.
+
+    Attributes:
+        target: At each sample.
+        force: Of the thrust now, N, ENU, (3,): where it must point.
+        path: The nominal speeds along the path; None where they are not free.
+    """
+
+    target: Target
+    force: Array
+    path: PathNow | None = None
+
+
+class TargetBuilder:
+    """Builds what plans are to follow."""
+
+    def __init__(self, guidance: Guidance, path: PathSettings, mpc: WholeMpc) -> None:
+        """Build it for plans of `mpc`."""
+        self._guidance, self._path, self._mpc = guidance, path, mpc
+        self._samples = mpc.horizon + 2
+
+    def on_clock(self, now: Now, limits: ForceLimits, references: Horizon) -> Wanted:
+        """Return what follows references at their times."""
+        n, mpc = self._samples, self._mpc
+        p, v, a, yaw = (column[:n] for column in (*references[:3], references[5]))
+        near, flat = _motion(n), _flat(n)
+        feed_forward.approach(now.rigid[:3], now.rigid[3:6], (p, v, a), self._guidance, near)
+        feed_forward.ask(near[1], near[2], yaw, now.disturbance, limits, mpc.from_wrench, mpc.model, flat)
+        return Wanted(_target(near, flat, yaw), self._force(now, limits, near))
+
+    def on_path(self, now: Now, limits: ForceLimits, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
+        """Return what follows references at the path times of the last plan.
+
+        What the rotors are asked for beforehand is that of the speed now, held; at the end, that of the speed there.
+
+        Args:
+            now: Where the plan begins.
+            limits: Of the force.
+            references: From path time on.
+            last: Speeds of the last plan from now on, (k,); None without one: then it begins at the vehicle's.
+            lag_s: By which path time is behind the clock.
+        """
+        n, h, guidance, mpc, path = self._samples, self._guidance.interval_s, self._guidance, self._mpc, self._path
+        upper = min(path.max_speed, 1.0 + lag_s / (mpc.horizon * h))
+        speeds, slopes = np.empty(n), np.empty((n, 6))
+        last = self._first_speed(now, references, upper) if last is None else last
+        carry_speeds(last, mpc.starts, path.min_speed, upper, speeds)
+        steady, nominal, ending = ((*_motion(samples), np.empty(samples)) for samples in (n, n, 3))
+        begin, end = float(speeds[0]), float(speeds[-1])
+        slide(references, 0.0, np.full(n, begin), h, steady, slopes)
+        passed_s = slide(references, 0.0, speeds, h, nominal, slopes)
+        slide(references, passed_s - 2.0 * h * end, np.full(3, end), h, ending, slopes[:3].copy())
+        near, flat, last_flat = _motion(n), _flat(n), _flat(3)
+        feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], guidance, near)
+        feed_forward.ask(near[1], near[2], steady[3], now.disturbance, limits, mpc.from_wrench, mpc.model, flat)
+        feed_forward.approach(now.rigid[:3], now.rigid[3:6], nominal[:3], guidance, near)
+        feed_forward.ask(*ending[1:], now.disturbance, limits, mpc.from_wrench, mpc.model, last_flat)
+        flat.attitudes[-2], flat.rates[-1] = last_flat.attitudes[1], last_flat.rates[0]
+        target = _target(near, flat, nominal[3])._replace(end_squared=last_flat.squared[1].copy())
+        distance_m = norm(nominal[0][0] - now.rigid[:3])
+        part = 1.0 if distance_m <= guidance.max_error_m else guidance.max_error_m / distance_m
+        bounds = PathLimits(path.min_speed, upper, path.reward, path.change)
+        return Wanted(target, self._force(now, limits, near), PathNow(speeds, slopes, part, bounds))
+
+    def _force(self, now: Now, limits: ForceLimits, near: tuple[Array, Array, Array]) -> Array:
+        return feed_forward.demanded_force(now.rigid, near, now.disturbance, self._guidance, limits, self._mpc.model)
+
+    def _first_speed(self, now: Now, references: Horizon, upper: float) -> Array:
+        """Return the speed along the path, (1,), at which the vehicle moves; the references' own where they stand."""
+        along, velocity = references.velocity_enu_m_s[0].copy(), now.rigid[3:6].copy()
+        squared = dot(along, along)
+        speed = dot(velocity, along) / squared if squared > _STILL_M_S * _STILL_M_S else 1.0
+        return np.array([min(max(speed, self._path.min_speed), upper)])
+
+    def of_demand(self, now: Now, limits: ForceLimits, demand: AttitudeDemand) -> Wanted:
+        """Return what follows a demanded attitude and a thrust, which is kept within what the rotors can make."""
+        n, flat = self._samples, _flat(self._samples)
+        angles, thrusts_n = demand.angles[:n], demand.thrust_n[:n]
+        feed_forward.stand(angles, thrusts_n, limits, flat)
+        feed_forward.turn(flat, now.disturbance.moment, self._mpc.from_wrench, self._mpc.model)
+        nowhere = np.zeros((n, 3))
+        target = _target((nowhere, nowhere, nowhere), flat, angles[:, 2].copy())
+        return Wanted(target._replace(thrusts_n=np.clip(thrusts_n, limits.min_n, limits.max_n)), flat.forces[0])
+
+
+def _motion(samples: int) -> tuple[Array, Array, Array]:
+    return np.empty((samples, 3)), np.empty((samples, 3)), np.empty((samples, 3))
+
+
+def _flat(samples: int) -> Flat:
+    return Flat(
+        np.empty((samples, 3)), np.empty((samples, 3, 3)), np.empty((samples - 2, 3)), np.empty((samples - 1, ROTORS))
+    )
+
+
+def _target(near: tuple[Array, Array, Array], flat: Flat, yaw_rad: Array) -> Target:
+    thrusts_n = np.zeros(len(yaw_rad))
+    return Target(near[0], near[1], flat.attitudes, yaw_rad, flat.rates, flat.squared, thrusts_n, flat.squared[-1])
