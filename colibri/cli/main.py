@@ -30,6 +30,7 @@ SUBCOMMANDS = {
     "figures": "fly all that the thesis shows and draw its figures",
     "compare": "fly several controllers on several tracks, side by side",
     "study": "fly what shows how far profile flight reaches, and draw it",
+    "certify": "prove what can be proven of a profile's attitude law",
     "bench": "measure how fast it flies",
     "plot": "draw the figures of a flight, however it ended",
     "show": "print the file of a profile or vehicle, to copy and change",

@@ -16,7 +16,7 @@ FACES = (
     *("colibri.analysis", "colibri.autopilot", "colibri.common", "colibri.flights", "colibri.mavlink"),
     *("colibri.plant", "colibri.sitl"),
 )
-PACKAGES = (*FACES, "colibri.bench", "colibri.cli", "colibri.studies", "colibri.verification")
+PACKAGES = (*FACES, "colibri.bench", "colibri.certification", "colibri.cli", "colibri.studies", "colibri.verification")
 MAX_IMPORT_MS = 50.0
 TRIES = 5
 IMPORT = "import sys, time; t = time.process_time(); import colibri; print((time.process_time() - t) * 1e3)"

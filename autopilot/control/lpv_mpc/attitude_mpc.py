@@ -68,6 +68,7 @@ class AttitudeMpc:
     Attributes:
         horizon: N.
         problem: What all its QPs share.
+        gain: K of the LQR that the terminal weight belongs to, (3, 12).
     """
 
     def __init__(
@@ -87,7 +88,7 @@ class AttitudeMpc:
         self._clock = clock
         self._along_plan = settings.scheduling == "along-plan"
         output_weight, increment_weight = np.array(settings.output_weight), np.array(settings.increment_weight)
-        terminal_weight, self._gain = _riccati(self._body, interval_s, output_weight, increment_weight)
+        terminal_weight, self.gain = _riccati(self._body, interval_s, output_weight, increment_weight)
         angle = radians(settings.max_angle_deg)
         self.problem = Problem(
             np.cumsum((0, *settings.moves[:-1])),
@@ -193,7 +194,7 @@ class AttitudeMpc:
         state = np.concatenate([now.x, now.u])
         wanted = target.end.copy()
         wanted[list(prediction.ANGLES)] = target.angles[0]
-        moments: Array = now.u - matvec(self._gain, state - wanted)
+        moments: Array = now.u - matvec(self.gain, state - wanted)
         return moments
 
 

@@ -81,7 +81,7 @@ class OuterLoop:
         p, v, a, *_, yaw, _, _ = references
         out = self._demands()
         aligned = position_loop.guide(
-            motion, (p, v, a, yaw), planned_yaw, disturbances, self._packed, self._limits(max_speed), out
+            motion, (p, v, a, yaw), planned_yaw, disturbances, self._packed, self.limits(max_speed), out
         )
         return Setpoint(out.forces[0], aligned, Target(out.angles[1:-1], out.end, out.thrusts))
 
@@ -89,7 +89,7 @@ class OuterLoop:
         """Return the setpoint that a demanded attitude is, its thrust within the same limits as when tracking."""
         out = self._demands()
         aligned = position_loop.hold_attitude(
-            motion, (demand.angles, demand.thrust_n), disturbance_n_m, self._packed, self._limits(max_speed), out
+            motion, (demand.angles, demand.thrust_n), disturbance_n_m, self._packed, self.limits(max_speed), out
         )
         return Setpoint(out.forces[0], aligned, Target(out.angles[1:-1], out.end, out.thrusts))
 
@@ -98,7 +98,8 @@ class OuterLoop:
         end = np.empty(prediction.STATES + prediction.INPUTS)
         return Demands(np.empty((n, 3)), np.empty((n, 3)), np.empty(self._steps), end)
 
-    def _limits(self, max_speed: float) -> Limits:
+    def limits(self, max_speed: float) -> Limits:
+        """Return the limits of what is demanded, where all rotors can turn at `max_speed`, in parts of the largest."""
         max_n = self._span_n * square(max_speed)
         margin_n = self._thrust_margin * (max_n - self._min_n)
         return Limits(self._tilt_tangent, self._min_n + margin_n, max_n - margin_n, self._position_error_m)

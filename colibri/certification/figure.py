@@ -1,0 +1,61 @@
+"""The figure of a certificate: its sets, and the flights that began on the border of one of them."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from colibri.autopilot.control.lpv_mpc.prediction import PHI, PSI, THETA, P, R
+from colibri.certification.certificate import Certificate
+from colibri.certification.flights import Flown
+from colibri.common.types import Array
+
+_SHOWN = 60
+_POINTS = 181
+_NAMES = {PHI: "error of φ (deg)", THETA: "error of θ (deg)", PSI: "error of ψ (deg)", P: "p (rad/s)", R: "r (rad/s)"}
+
+
+def draw(certificate: Certificate, flown: Flown, path: Path) -> None:
+    """Draw three projections of both sets with flights in them, and V over time."""
+    figure = Figure(figsize=(8.6, 6.4), layout="constrained")
+    axes = figure.subplots(2, 2)
+    for ax, pair in zip(axes.flat, ((PHI, P), (PHI, THETA), (PSI, R)), strict=False):
+        _draw_sets(ax, certificate, flown, *pair)
+    axes[0, 0].legend(loc="upper right", fontsize=7)
+    _draw_values(axes[1, 1], certificate, flown)
+    figure.savefig(path, dpi=150)
+
+
+def _draw_sets(ax: Axes, certificate: Certificate, flown: Flown, across: int, up: int) -> None:
+    units = np.array([_unit(across), _unit(up)])
+    shown = flown.states[:, :_SHOWN][:, :, [across, up]] * units
+    ax.plot(shown[..., 0], shown[..., 1], color="#999999", linewidth=0.4)
+    sets = (("invariant", "#0072B2", "never left"), ("attractor", "#D55E00", "tended to"))
+    for name, color, label in sets:
+        border = _projection(getattr(certificate, name).proof.P, across, up) * units[:, None]
+        ax.plot(*border, color=color, linewidth=1.6, label=label)
+    ax.set(xlabel=_NAMES[across], ylabel=_NAMES[up])
+    ax.grid(color="#DDDDDD", linewidth=0.6)
+
+
+def _draw_values(ax: Axes, certificate: Certificate, flown: Flown) -> None:
+    times = np.arange(len(flown.values)) * certificate.invariant.numbers.interval_s
+    ax.semilogy(times, flown.values.max(axis=1), color="#0072B2", label=f"largest of {flown.values.shape[1]} flights")
+    ax.semilogy(times, np.median(flown.values, axis=1), color="#999999", label="median")
+    ax.axhline(1.0, color="black", linewidth=0.8, linestyle="--")
+    ax.set(xlabel="time (s)", ylabel="V, 1 on the border")
+    ax.grid(color="#DDDDDD", linewidth=0.6)
+    ax.legend(loc="center right", fontsize=7)
+
+
+def _projection(form: Array, across: int, up: int) -> Array:
+    """Return the border, (2, n), of what zᵀPz <= 1 is in the plane of two states."""
+    shape = np.linalg.inv(form)[np.ix_([across, up], [across, up])]
+    angles = np.linspace(0.0, 2.0 * np.pi, _POINTS)
+    border: Array = np.linalg.cholesky(shape) @ np.array([np.cos(angles), np.sin(angles)])
+    return border
+
+
+def _unit(state: int) -> float:
+    return 180.0 / np.pi if state in (PHI, THETA, PSI) else 1.0

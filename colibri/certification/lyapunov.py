@@ -1,0 +1,271 @@
+"""Quadratic Lyapunov functions of an uncertain loop, each by one semidefinite program.
+
+Boyd, El Ghaoui, Feron and Balakrishnan, Linear Matrix Inequalities in System and Control Theory, SIAM 1994, chapters 5
+and 6. What is found here is found in floating point, and proves nothing until `exact` has checked it.
+"""
+
+from collections.abc import Callable
+from itertools import combinations_with_replacement
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
+
+from colibri.certification.loop import UncertainLoop, supply
+from colibri.certification.semidefinite import Inequality, minimise
+from colibri.common.types import Array
+
+_LEAST_MARGIN = 1e-6
+"""Of a Lyapunov function that is the identity or less, in coordinates in which it is about that."""
+_BISECTIONS = 6
+_SET_RATIOS = (0.98, 0.95)
+_ATTRACTOR_RATIOS = (0.95, 0.98)
+"""Of V from sample to sample: the first with which there is a set. Slower gives larger ones, faster smaller."""
+_STAGE_BESIDE = 1e-6
+"""Of the limits, that a weight sees states which the stage's cost does not."""
+_ROUNDING = 1e-7
+_SPARE = 1e-4
+"""Part by which whatever has to be kept is kept more than it must be, for the solver's errors."""
+
+
+class Proof(NamedTuple):
+    """What proves a decrease of V = zᵀPz, with the names of `loop.decrease`.
+
+    Attributes:
+        P: (n, n).
+        multipliers: (m,), and one of the disturbance.
+        sizes: Those of `loop.supply`, (k,).
+        ratio: Of V from a sample to the next.
+    """
+
+    P: Array
+    multipliers: Array
+    sizes: Array
+    ratio: float
+
+    def reach(self, rows: Array) -> Array:
+        """Return the largest f z of each row f, (l, n), in the set V <= 1, (l,)."""
+        reached: Array = np.sqrt(np.einsum("li,ij,lj->l", rows, np.linalg.inv(self.P), rows))
+        return reached
+
+
+class _Problem:
+    """The semidefinite programs of a loop in coordinates ζ = C z, and what they share."""
+
+    def __init__(self, loop: UncertainLoop, C: Array) -> None:
+        X = np.linalg.inv(C)
+        loop = loop.distinct()
+        self.C, self.sizes = C, np.linalg.norm(loop.channels @ X, axis=1)
+        self.size = len(C)
+        self.limits, self.stage, self.starts = loop.limits @ X, X.T @ loop.stage @ X, loop.starts @ C.T
+        self.outputs = loop.starts / np.sum(loop.starts**2, axis=1)[:, None] @ X
+        quadratic = supply(loop, self.sizes)
+        self._units = loop.gains @ self.sizes + loop.offsets
+        squared = self._units[:, None, None] ** 2
+        self.forms = X.T @ quadratic.forms @ X / squared
+        self.constants = quadratic.constants / self._units**2
+        entries = np.hstack([C @ loop.entries * self._units, C @ loop.disturbance])
+        beside = np.broadcast_to(entries, (len(loop.vertices), *entries.shape))
+        self._moved = np.concatenate([C @ loop.vertices @ X, beside], axis=2)
+        self.basis = _basis(loop.blocks(), self.size)
+        self._ones = np.ones(min(1, loop.disturbance.shape[1]))
+        self.unknowns = len(self.basis) + len(self.forms) + len(self._ones) + 1
+
+    def decrease(self, ratio: float, *, margin: bool = False, stage: bool = False) -> Inequality:
+        """Return that V decreases at every vertex: by the last unknown more, or by the stage's cost."""
+        n, m, b = self.size, len(self.forms), len(self.basis)
+        vertices, size = len(self._moved), self._moved.shape[2]
+        coefficients = np.zeros((vertices, self.unknowns, size, size))
+        weighted = np.einsum("jab,vbk->vjak", self.basis, self._moved, optimize=True)
+        coefficients[:, :b] = -np.einsum("vai,vjak->vjik", self._moved, weighted, optimize=True)
+        coefficients[:, :b, :n, :n] += ratio * self.basis
+        coefficients[:, b : b + m, :n, :n] = -self.forms
+        for i in range(n, size):
+            coefficients[:, b + min(i - n, m), i, i] = 1.0
+        constant = np.tile(-_ROUNDING * np.eye(size), (vertices, 1, 1))
+        if margin:
+            coefficients[:, -1] = -np.eye(size)
+        if stage:
+            constant[:, :n, :n] -= (1.0 + _SPARE) * self.stage
+        return Inequality(constant, coefficients)
+
+    def spread(self) -> Array:
+        """Return the cost by which the set V <= 1 reaches out to the starts."""
+        cost = np.zeros(self.unknowns)
+        cost[: len(self.basis)] = [np.sum(self.starts @ B * self.starts) for B in self.basis]
+        return cost
+
+    def bounded(self, constant: Array, sign: float, last: Array | None = None) -> Inequality:
+        """Return constant + sign P + (the last unknown) last >= 0."""
+        coefficients = np.zeros((self.unknowns, self.size, self.size))
+        coefficients[: len(self.basis)] = sign * self.basis
+        if last is not None:
+            coefficients[-1] = last
+        return Inequality(constant, coefficients)
+
+    def within(self, row: Array) -> Inequality:
+        """Return that |f ζ| <= 1 in the set V <= 1."""
+        n = self.size
+        constant, coefficients = np.zeros((n + 1, n + 1)), np.zeros((self.unknowns, n + 1, n + 1))
+        constant[:n, n] = constant[n, :n] = row * (1.0 + _SPARE)
+        constant[n, n] = 1.0
+        coefficients[: len(self.basis), :n, :n] = self.basis
+        return Inequality(constant, coefficients)
+
+    def supplied(self, ratio: float) -> Inequality:
+        """Return that what a disturbance adds to V is no more than what it loses where it is 1."""
+        coefficients = np.zeros((self.unknowns, 1, 1))
+        coefficients[len(self.basis) : -1, 0, 0] = -np.append(self.constants, self._ones)
+        return Inequality(np.array([[(1.0 - ratio) * (1.0 - _SPARE)]]), coefficients)
+
+    def proof(self, x: Array, ratio: float) -> Proof:
+        """Return the solution in the loop's own coordinates."""
+        b = len(self.basis)
+        P = self.C.T @ np.tensordot(x[:b], self.basis, 1) @ self.C
+        return Proof(0.5 * (P + P.T), x[b:-1] / np.append(self._units, self._ones) ** 2, self.sizes, ratio)
+
+
+def contraction(loop: UncertainLoop, ratio: float) -> Proof | None:
+    """Return a Lyapunov function that falls by `ratio` each sample, without disturbance; None where there is none."""
+    C = _coordinates_of_set(loop)
+    if C is None or spectral_radius(loop) >= 1.0:
+        return None
+    problem = _Problem(loop.undisturbed(), C)
+    cost = np.zeros(problem.unknowns)
+    cost[-1] = -1.0
+    x = minimise(cost, [problem.bounded(np.eye(problem.size), -1.0)], problem.decrease(ratio, margin=True))
+    return problem.proof(x, ratio) if x is not None and x[-1] > _LEAST_MARGIN else None
+
+
+def fastest(loop: UncertainLoop) -> Proof | None:
+    """Return the Lyapunov function that falls fastest, by bisection."""
+    best = contraction(loop, 1.0)
+    low, high = 0.5, 1.0
+    for _ in range(_BISECTIONS if best else 0):
+        ratio = 0.5 * (low + high)
+        found = contraction(loop, ratio)
+        low, high, best = (low, ratio, found) if found else (ratio, high, best)
+    return best
+
+
+def spectral_radius(loop: UncertainLoop) -> float:
+    """Return the largest modulus that an eigenvalue of a vertex has: from 1 on the loop is unstable."""
+    return float(np.abs(np.linalg.eigvals(loop.vertices)).max())
+
+
+def largest_scale(loop_at: Callable[[float], UncertainLoop | None], least: float) -> tuple[float, Proof] | None:
+    """Return the largest scale of the ranges, from `least` up to 1, that has a Lyapunov function, and that function.
+
+    By bisection, for a smaller box lies in a larger one; None where even the least scale has none.
+    """
+
+    def found_at(scale: float) -> Proof | None:
+        loop = loop_at(scale)
+        return contraction(loop, 1.0) if loop else None
+
+    best = found_at(least)
+    if best is None:
+        return None
+    low, high = least, 1.0
+    for _ in range(_BISECTIONS):
+        scale = 0.5 * (low + high)
+        found = found_at(scale)
+        low, high, best = (scale, high, found) if found else (low, scale, best)
+    return low, best
+
+
+def invariant_set(loop: UncertainLoop) -> Proof | None:
+    """Return the largest set V <= 1, within all limits, that no disturbance makes the loop leave."""
+    return _first(loop, _SET_RATIOS, _set_program)
+
+
+def attractor(loop: UncertainLoop) -> Proof | None:
+    """Return the smallest set V <= 1 that every trajectory tends to, whatever the disturbance does."""
+    return _first(loop, _ATTRACTOR_RATIOS, _attractor_program)
+
+
+def terminal_weight(loop: UncertainLoop) -> Proof | None:
+    """Return the least weight S with which V = zᵀSz falls by no less than the stage's cost, without disturbance."""
+    C = _coordinates(loop, loop.stage + _STAGE_BESIDE * np.diag(np.diag(loop.limits.T @ loop.limits)))
+    if C is None:
+        return None
+    problem = _Problem(loop.undisturbed(), C)
+    cost = np.zeros(problem.unknowns)
+    cost[: len(problem.basis)] = np.trace(problem.basis, axis1=1, axis2=2)
+    x = minimise(cost, [], problem.decrease(1.0, stage=True))
+    return problem.proof(x, 1.0) if x is not None else None
+
+
+def _set_program(problem: _Problem, ratio: float) -> tuple[Array, list[Inequality]]:
+    return problem.spread(), [problem.supplied(ratio), *(problem.within(row) for row in problem.limits)]
+
+
+def _attractor_program(problem: _Problem, ratio: float) -> tuple[Array, list[Inequality]]:
+    """Return the program of largest t with P >= t Σ fᵀf over the outputs f."""
+    cost = np.zeros(problem.unknowns)
+    cost[-1] = -1.0
+    zero = np.zeros((problem.size, problem.size))
+    return cost, [problem.supplied(ratio), problem.bounded(zero, 1.0, -(problem.outputs.T @ problem.outputs))]
+
+
+def _first(
+    loop: UncertainLoop,
+    ratios: tuple[float, ...],
+    program: Callable[[_Problem, float], tuple[Array, list[Inequality]]],
+) -> Proof | None:
+    """Return the proof of the first ratio that has one, found again in coordinates in which its set is a ball."""
+
+    def solved(C: Array | None, ratio: float) -> Proof | None:
+        if C is None:
+            return None
+        problem = _Problem(loop, C)
+        cost, always = program(problem, ratio)
+        x = minimise(cost, always, problem.decrease(ratio))
+        return problem.proof(x, ratio) if x is not None else None
+
+    first = _coordinates_of_set(loop)
+    found = next(filter(None, (solved(first, ratio) for ratio in ratios)), None)
+    return found and (solved(_root(found.P, loop), found.ratio) or found)
+
+
+def _coordinates(loop: UncertainLoop, weight: Array) -> Array | None:
+    """Return C, (n, n), of ζ = C z in which V = ζᵀζ falls by zᵀ weight z in the middle of the polytope, or by more.
+
+    None where even the middle is unstable.
+    """
+    middle = loop.vertices.mean(axis=0)
+    radius = float(np.abs(np.linalg.eigvals(middle)).max())
+    if radius >= 1.0:
+        return None
+    P = solve_discrete_lyapunov(middle.T / np.sqrt(0.5 * (1.0 + radius**2)), weight)
+    return _root(P, loop)
+
+
+def _coordinates_of_set(loop: UncertainLoop) -> Array | None:
+    """Return the same in which the nearest limit is at 1."""
+    C = _coordinates(loop, loop.stage + loop.limits.T @ loop.limits)
+    if C is None:
+        return None
+    nearest: float = np.linalg.norm(loop.limits @ np.linalg.inv(C), axis=1).max()
+    return C * nearest
+
+
+def _root(P: Array, loop: UncertainLoop) -> Array | None:
+    """Return C with CᵀC = P, block by block; None where P is not positive definite."""
+    C = np.zeros_like(P)
+    for block in loop.blocks():
+        part = np.ix_(block, block)
+        try:
+            C[part] = np.linalg.cholesky(P[part]).T
+        except np.linalg.LinAlgError:
+            return None
+    return C
+
+
+def _basis(blocks: list[list[int]], size: int) -> Array:
+    """Return the symmetric matrices that span those which couple only states of a block, (b, n, n)."""
+    pairs = [pair for block in blocks for pair in combinations_with_replacement(block, 2)]
+    basis = np.zeros((len(pairs), size, size))
+    for matrix, (i, j) in zip(basis, pairs, strict=True):
+        matrix[i, j] = matrix[j, i] = 1.0
+    return basis

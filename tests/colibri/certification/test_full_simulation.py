@@ -1,0 +1,84 @@
+"""The certified law in the whole plant: rotors, drag, battery and a disturbing moment, unlike the certificate's model.
+
+The law's own code decides, with every QP failing and its observer held at nothing, so that its LQR flies all the time.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from colibri.autopilot.control.interface import AttitudeDemand, Diagnostics, VehicleState
+from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc
+from colibri.autopilot.control.lpv_mpc.law import LpvMpc
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.qp import QpStatus
+from colibri.certification import certificate as certificates
+from colibri.certification.attitude import AttitudeNumbers
+from colibri.certification.report import fly_from
+from colibri.common.jit import packed
+from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
+from colibri.common.types import Array
+from colibri.plant.physics.equations import attitude_of
+from colibri.plant.physics.integrators import fixed_step
+from colibri.plant.physics.parameters import parameters_of
+from colibri.plant.vehicle.description import load_vehicle
+
+VEHICLE = load_vehicle("hummingbird")
+CERTIFIED = certificates.read(Path(__file__).parent / "flight.json", AttitudeNumbers).invariant
+STEP_S = 0.001
+SAMPLES = 125
+FLIGHTS = 40
+SHARE = 0.9
+"""Of the border's distance: what the model lacks is a disturbance, too."""
+
+
+def law() -> LpvMpc:
+    """Return the law with observers that observe next to nothing, and an LQR that never ends."""
+    table = load_profile("flight").table("lpv-mpc")
+    observer = {**table["observer"], "max_moment_n_m": 1e-12, "max_acceleration_m_s2": 1e-12}
+    fallback = {**table["fallback"], "lqr_samples": 1000}
+    return LpvMpc({**table, "observer": observer, "fallback": fallback}, VEHICLE, lambda: 0.0)
+
+
+def values(controller: LpvMpc, start: Array, moment_n_m: Array) -> list[float]:
+    """Return V at each sample of a flight that holds a level attitude, disturbed by a constant moment."""
+    parameters = packed(parameters_of(VEHICLE, (0.0, 0.0, 0.0)))
+    inertia = np.array(VEHICLE.body.inertia_kg_m2)
+    allocation, hover_n = VEHICLE.allocation(), VEHICLE.body.mass_kg * VEHICLE.gravity_m_s2
+    squared = np.linalg.solve(allocation, [hover_n, *start[6:9]])
+    x = np.zeros(18)
+    x[3:6], x[8] = start[[1, 3, 5]], 100.0
+    x[9:13] = quaternion_from_euler(start[0], start[2], start[4])
+    x[13:17] = np.sqrt(squared)
+    memory = controller.initial(VEHICLE.hover_speed)
+    wrench = np.array([hover_n, *start[6:9]])
+    speeds = np.sqrt(squared) / VEHICLE.rotors.max_speed
+    memory = memory._replace(speeds=speeds, moments=start[9:].copy(), wrench=wrench, mean_wrench=wrench)
+    count = controller.preview.samples
+    demand = AttitudeDemand(np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, hover_n))
+    found = []
+    for sample in range(SAMPLES):
+        euler = euler_from_quaternion(attitude_of(x.tolist()))
+        p, q, r = x[3:6].tolist()
+        z = np.array([euler[0], p, euler[1], q, euler[2], r, *memory.wrench[1:], *memory.moments])
+        found.append(float(z @ CERTIFIED.proof.P @ z))
+        u, v, w = x[:3].tolist()
+        state = VehicleState((0.0, 0.0, 100.0), (u, v, w), attitude_of(x.tolist()), euler, (p, q, r))
+        memory, decision = controller.step_attitude(memory, sample * 8000, state, demand)
+        for _ in range(round(CERTIFIED.numbers.interval_s / STEP_S)):
+            x, _ = fixed_step(x, tuple(decision.rotor_speeds.tolist()), parameters, STEP_S)
+            x[3:6] += STEP_S * moment_n_m / inertia
+    return found
+
+
+@pytest.mark.long
+def test_flights_of_the_whole_plant_stay_in_the_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(AttitudeMpc, "plan", lambda *_: (None, Diagnostics(QpStatus.INFEASIBLE)))
+    controller, rng = law(), np.random.default_rng(4)
+    certified = certificates.read(Path(__file__).parent / "flight.json", AttitudeNumbers)
+    starts = fly_from(certified, FLIGHTS, seed=4).states[0]
+    for start in SHARE * starts:
+        direction = rng.normal(size=3)
+        moment_n_m = CERTIFIED.numbers.disturbance_n_m * direction / np.linalg.norm(direction)
+        assert max(values(controller, start, moment_n_m)) <= 1.0
