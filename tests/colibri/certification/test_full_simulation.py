@@ -28,9 +28,6 @@ VEHICLE = load_vehicle("hummingbird")
 CERTIFIED = certificates.read(Path(__file__).parent / "flight.json", AttitudeNumbers).invariant
 STEP_S = 0.001
 SAMPLES = 125
-FLIGHTS = 40
-SHARE = 0.9
-"""Of the border's distance: what the model lacks is a disturbance, too."""
 
 
 def law() -> LpvMpc:
@@ -72,13 +69,12 @@ def values(controller: LpvMpc, start: Array, moment_n_m: Array) -> list[float]:
     return found
 
 
-@pytest.mark.long
-def test_flights_of_the_whole_plant_stay_in_the_set(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("flights", [40, pytest.param(1000, marks=pytest.mark.long)])
+def test_flights_of_the_whole_plant_stay_in_the_set(flights: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(AttitudeMpc, "plan", lambda *_: (None, Diagnostics(QpStatus.INFEASIBLE)))
     controller, rng = law(), np.random.default_rng(4)
     certified = certificates.read(Path(__file__).parent / "flight.json", AttitudeNumbers)
-    starts = fly_from(certified, FLIGHTS, seed=4).states[0]
-    for start in SHARE * starts:
+    for start in fly_from(certified, flights, seed=4).states[0]:
         direction = rng.normal(size=3)
         moment_n_m = CERTIFIED.numbers.disturbance_n_m * direction / np.linalg.norm(direction)
         assert max(values(controller, start, moment_n_m)) <= 1.0
