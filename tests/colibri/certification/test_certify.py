@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.profile import load_profile, profile_text
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers
 from colibri.certification.certificate import Certificate
@@ -16,7 +16,6 @@ from colibri.cli.main import main
 from colibri.plant.vehicle.description import load_vehicle
 
 HERE = Path(__file__).parent
-UNSTABLE = str(HERE / "unstable.toml")
 FLIGHT = LqrAttitude(load_profile("flight"), load_vehicle("hummingbird"), Conditions(0.01, 0.5))
 FLIGHTS = 1000
 
@@ -71,9 +70,25 @@ def test_beyond_the_largest_ranges_the_law_is_soon_unstable_indeed() -> None:
     assert spectral_radius(FLIGHT.loop(FLIGHT.numbers_at(0.69), float)) > 1.0
 
 
-def test_a_profile_that_is_unstable_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.fixture
+def unstable(tmp_path: Path) -> str:
+    """Return profile flight made unstable: next to nothing is done about pitch, and hardly any tilt is too much."""
+    text, made = profile_text("flight"), tmp_path / "unstable.toml"
+    for key, was, value in (
+        ("output_weight", "[1.0, 1.0, 0.1]", "[1.0, 1e-6, 1e-2]"),
+        ("max_angle_deg", "70.0", "88.0"),
+    ):
+        assert text.count(f"{key} = {was}") == 1
+        text = text.replace(f"{key} = {was}", f"{key} = {value}")
+    made.write_text(text, encoding="utf-8")
+    return str(made)
+
+
+def test_a_profile_that_is_unstable_is_refused(
+    unstable: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as end:
-        main(["certify", UNSTABLE, "--out", str(tmp_path), "--quiet"])
+        main(["certify", unstable, "--out", str(tmp_path), "--quiet"])
     assert end.value.code == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert "refused" in line
