@@ -114,9 +114,9 @@ def margins_of(law: CertifiedLaw, name: str, numbers: Any, proof: Proof) -> dict
     return margins | ({"limits": exact.limit_margin(loop, proof)} if name == "invariant" else {})
 
 
-def write(certificate: Certificate, path: Path) -> None:
-    """Write a certificate as JSON."""
-    entries = {
+def write(certificate: Certificate, about: dict[str, Any], path: Path) -> None:
+    """Write a certificate as JSON, with what it is about: law, conditions, and what it does not prove."""
+    entries = {"about": about} | {
         name: entry._asdict() | {"numbers": entry.numbers._asdict(), "proof": entry.proof._asdict()}
         for name, entry in certificate._asdict().items()
     }
@@ -126,7 +126,7 @@ def write(certificate: Certificate, path: Path) -> None:
 def read(path: Path, numbers: Callable[..., Any]) -> Certificate:
     """Read a certificate as `write` wrote it; `numbers` is the law's named tuple."""
     entries: dict[str, dict[str, Any]] = msgspec.json.decode(path.read_bytes())
-    return Certificate(**{name: _entry(numbers, **values) for name, values in entries.items()})
+    return Certificate(**{name: _entry(numbers, **entries[name]) for name in Certificate._fields})
 
 
 def _entry(
@@ -154,10 +154,10 @@ def _loop_at(law: CertifiedLaw, scale: float) -> UncertainLoop | None:
 
 def _why(law: CertifiedLaw, scale: float) -> str:
     """Return why there is no Lyapunov function: a vertex that is unstable by itself, or that none was found."""
-    loop = _loop_at(law, scale)
-    if loop is None:
-        return "the control interval is too long for them"
-    radius = lyapunov.spectral_radius(loop)
+    try:
+        radius = lyapunov.spectral_radius(law.loop(law.numbers_at(scale), float))
+    except RangeError as error:
+        return str(error)
     if radius >= 1.0:
         return f"a vertex is unstable by itself, with a spectral radius of {radius:.4f}"
     return "none is found, though every vertex is stable by itself"

@@ -34,7 +34,7 @@ def decrease_margin(loop: UncertainLoop, proof: Proof, *, weighted: bool = False
     """
     P, multipliers = _fractions(proof.P), _fractions(proof.multipliers)
     forms = supply(loop, _fractions(proof.sizes)).forms
-    if not _mirrored(loop, P, forms) or (multipliers < 0).any() or (_fractions(proof.sizes) <= 0).any():
+    if (multipliers <= 0).any() or (_fractions(proof.sizes) <= 0).any() or not _mirrored(loop, P, multipliers, forms):
         return 0.0
     ratio, stage = exactly(proof.ratio), loop.stage if weighted else 0
     matrices = (decrease(loop, A, P, multipliers, forms, ratio, stage) for A in loop.distinct().vertices)
@@ -70,11 +70,13 @@ def positive_margin(M: AnyArray) -> float:
 
 
 def is_positive(M: AnyArray) -> bool:
-    """Return whether M is shown to be positive definite.
+    """Return whether M is shown to be symmetric and positive definite.
 
     With X, what floating point has for the inverse of its Cholesky factor, X M Xᵀ is about the identity. Where it is
     strictly diagonally dominant, which integers decide, it is positive definite (Gershgorin), X is regular; so is M.
     """
+    if not (M == M.T).all():
+        return False
     try:
         factor = np.linalg.inv(np.linalg.cholesky(M.astype(float)))
     except np.linalg.LinAlgError:
@@ -91,12 +93,16 @@ def _margins(matrices: Iterable[AnyArray]) -> Iterable[float]:
     return map(positive_margin, matrices)
 
 
-def _mirrored(loop: UncertainLoop, P: AnyArray, forms: AnyArray) -> bool:
-    """Return whether the mirrors leave all as it is, so that distinct vertices are enough."""
+def _mirrored(loop: UncertainLoop, P: AnyArray, multipliers: AnyArray, forms: AnyArray) -> bool:
+    """Return whether the mirrors leave all as it is, so that distinct vertices are enough.
+
+    By a Schur complement the inequality depends on E and the multipliers μ of ξ only by E diag(1 / μ) Eᵀ.
+    """
+    entered = loop.entries / multipliers[: len(forms)] @ loop.entries.T
     return all(
         (row[:, None] * matrix * row == matrix).all()
         for row in loop.mirrors
-        for matrix in (P, *forms, loop.disturbance @ loop.disturbance.T, loop.entries @ loop.entries.T, loop.stage)
+        for matrix in (P, *forms, loop.disturbance @ loop.disturbance.T, entered, loop.stage)
     )
 
 

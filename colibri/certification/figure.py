@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from colibri.autopilot.control.lpv_mpc.prediction import PHI, PSI, THETA, P, R
 from colibri.certification.certificate import Certificate
 from colibri.certification.flights import Flown
+from colibri.certification.loop import AnyArray
 from colibri.common.types import Array
 
 _SHOWN = 60
@@ -17,12 +18,13 @@ _NAMES = {PHI: "error of φ (deg)", THETA: "error of θ (deg)", PSI: "error of �
 
 
 def draw(certificate: Certificate, flown: Flown, path: Path) -> None:
-    """Draw three projections of both sets with flights in them, and V over time."""
-    figure = Figure(figsize=(8.6, 6.4), layout="constrained")
+    """Draw both sets in three planes, with flights in them, and V over time."""
+    figure = Figure(figsize=(8.6, 6.9), layout="constrained")
     axes = figure.subplots(2, 2)
     for ax, pair in zip(axes.flat, ((PHI, P), (PHI, THETA), (PSI, R)), strict=False):
         _draw_sets(ax, certificate, flown, *pair)
-    axes[0, 0].legend(loc="upper right", fontsize=7)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=2, fontsize=8, frameon=False)
     _draw_values(axes[1, 1], certificate, flown)
     figure.savefig(path, dpi=150)
 
@@ -30,28 +32,35 @@ def draw(certificate: Certificate, flown: Flown, path: Path) -> None:
 def _draw_sets(ax: Axes, certificate: Certificate, flown: Flown, across: int, up: int) -> None:
     units = np.array([_unit(across), _unit(up)])
     shown = flown.states[:, :_SHOWN][:, :, [across, up]] * units
-    ax.plot(shown[..., 0], shown[..., 1], color="#999999", linewidth=0.4)
-    sets = (("invariant", "#0072B2", "never left"), ("attractor", "#D55E00", "tended to"))
-    for name, color, label in sets:
-        border = _projection(getattr(certificate, name).proof.P, across, up) * units[:, None]
-        ax.plot(*border, color=color, linewidth=1.6, label=label)
+    never_left, tended_to = (np.linalg.inv(each.proof.P) for each in (certificate.invariant, certificate.attractor))
+    plane = np.ix_([across, up], [across, up])
+    at_rest = np.linalg.inv(certificate.invariant.proof.P[plane])
+    for shape, color, style, label in (
+        (never_left[plane], "#0072B2", "-", "set that is never left: its shadow"),
+        (at_rest, "#0072B2", "--", "its section: no other error"),
+        (tended_to[plane], "#D55E00", "-", "tended to"),
+    ):
+        border = _border(shape) * units[:, None]
+        ax.plot(*border, color=color, linestyle=style, linewidth=1.6, label=label, zorder=3)
+    ax.plot(shown[:, 0, 0], shown[:, 0, 1], color="#999999", linewidth=0.7, label=f"{shown.shape[1]} of the flights")
+    ax.plot(shown[:, 1:, 0], shown[:, 1:, 1], color="#999999", linewidth=0.4)
+    ax.plot(shown[0, :, 0], shown[0, :, 1], ".", color="#444444", markersize=3, label="where they begin: V = 1")
     ax.set(xlabel=_NAMES[across], ylabel=_NAMES[up])
     ax.grid(color="#DDDDDD", linewidth=0.6)
 
 
 def _draw_values(ax: Axes, certificate: Certificate, flown: Flown) -> None:
     times = np.arange(len(flown.values)) * certificate.invariant.numbers.interval_s
-    ax.semilogy(times, flown.values.max(axis=1), color="#0072B2", label=f"largest of {flown.values.shape[1]} flights")
+    ax.semilogy(times, flown.values.max(axis=1), color="black", label=f"largest of {flown.values.shape[1]} flights")
     ax.semilogy(times, np.median(flown.values, axis=1), color="#999999", label="median")
     ax.axhline(1.0, color="black", linewidth=0.8, linestyle="--")
     ax.set(xlabel="time (s)", ylabel="V, 1 on the border")
     ax.grid(color="#DDDDDD", linewidth=0.6)
-    ax.legend(loc="center right", fontsize=7)
+    ax.legend(loc="upper right", bbox_to_anchor=(1.0, 0.95), fontsize=8)
 
 
-def _projection(form: Array, across: int, up: int) -> Array:
-    """Return the border, (2, n), of what zᵀPz <= 1 is in the plane of two states."""
-    shape = np.linalg.inv(form)[np.ix_([across, up], [across, up])]
+def _border(shape: AnyArray) -> Array:
+    """Return the border, (2, n), of xᵀ shape⁻¹ x <= 1."""
     angles = np.linspace(0.0, 2.0 * np.pi, _POINTS)
     border: Array = np.linalg.cholesky(shape) @ np.array([np.cos(angles), np.sin(angles)])
     return border

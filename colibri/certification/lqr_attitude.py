@@ -47,6 +47,7 @@ class LqrAttitude:
         mpc: The law's attitude controller.
         body: Its model of the vehicle.
         interval_s: The control sample.
+        conditions: What its certificate is to hold for.
         thrust_n: Of a hover, and the ends of the profile's range, N.
     """
 
@@ -58,10 +59,10 @@ class LqrAttitude:
             SettingsError: Its table is wrong.
         """
         if profile.controller != LAW:
-            raise UncertifiableError(f"{profile.where}: {profile.controller} cannot be certified: its law is not {LAW}")
+            raise UncertifiableError(f"{profile.where}: its law is {profile.controller}: only {LAW} can be certified")
         settings = read_settings(profile.table(LAW), LpvMpcSettings)
         self.interval_s = settings.control_interval_s
-        self._settings, self._vehicle, self._conditions = settings.attitude, vehicle, conditions
+        self._settings, self._vehicle, self.conditions = settings.attitude, vehicle, conditions
         lag = rotor_lag(vehicle, self.interval_s)
         solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
         self.mpc = AttitudeMpc(settings.attitude, vehicle, lag, solver, self.interval_s, lambda: 0.0)
@@ -106,7 +107,7 @@ class LqrAttitude:
             from_moments=problem.from_moments.tolist(),
             to_moments=(vehicle.allocation()[1:] * square(rotors.max_speed)).tolist(),
             headroom=round(float(headroom), _DIGITS),
-            disturbance_n_m=self._conditions.disturbance_n_m,
+            disturbance_n_m=self.conditions.disturbance_n_m,
             output_weight=np.asarray(problem.output_weight).tolist(),
             increment_weight=np.asarray(problem.increment_weight).tolist(),
         )

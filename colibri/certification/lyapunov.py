@@ -23,7 +23,8 @@ _ATTRACTOR_RATIOS = (0.95, 0.98)
 """Of V from sample to sample: the first with which there is a set. Slower gives larger ones, faster smaller."""
 _STAGE_BESIDE = 1e-6
 """Of the limits, that a weight sees states which the stage's cost does not."""
-_ROUNDING = 1e-7
+_ROUNDING = 1e-6
+"""By which matrices are more than positive semidefinite, for what the solver leaves: up to about 1e-7."""
 _SPARE = 1e-4
 """Part by which whatever has to be kept is kept more than it must be, for the solver's errors."""
 

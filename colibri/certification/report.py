@@ -4,6 +4,7 @@ from argparse import Namespace
 from math import log
 
 import numpy as np
+from scipy.linalg import eigh
 
 from colibri.analysis.tables import print_table, write_table
 from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, PHI, RATES, THETA
@@ -22,10 +23,19 @@ from colibri.plant.vehicle.description import load_vehicle
 CERTIFICATE, TABLE, FIGURE = "certificate.json", "certificate", "certificate.png"
 _DURATION_S = 1.0
 _STATES = 12
+_SEEN = 1e-12
+"""Part of its largest eigenvalue above which a weight is not zero."""
 _HEADINGS = ("what", "φ, θ, ψ (deg)", "p, q, r (rad/s)", "")
 _NOT_PROVEN = (
-    "Not proven: references that move, the constrained plan's own gain, saturated rotors, the observers, the position "
-    "loop, the estimator, delay, and a vehicle unlike the model (rotors' spin-up torque and drag, inertia, lag)."
+    "the gain of the plan itself",
+    "limits that bind",
+    "references that move",
+    "the observers of disturbance and mass",
+    "the position loop",
+    "the estimator",
+    "delay",
+    "a vehicle unlike the model (rotors' spin-up torque and drag, inertia, lag)",
+    "other laws (whole-lpv-mpc)",
 )
 
 
@@ -37,12 +47,21 @@ def certify_profile(args: Namespace) -> int:
         law = LqrAttitude(profile, vehicle, Conditions(args.moment, args.charge))
     except Error as error:
         fail(str(error))
+    for stale in (CERTIFICATE, FIGURE):
+        (args.out / stale).unlink(missing_ok=True)
     try:
         found = certificates.certify(law, args.least, lambda what: None if args.quiet else _say(what))
     except RefusedError as error:
         fail(f"{profile.where} on {vehicle.name}: refused: {error}", EXIT_FAILED)
     flown = fly_from(found, args.flights, args.seed)
-    certificates.write(found, args.out / CERTIFICATE)
+    about = {
+        "law": f"LQR of the attitude, {profile.where}",
+        "vehicle": vehicle.name,
+        **law.conditions._asdict(),
+        "thrust_n": law.thrusts_n(found.invariant.scale),
+        "not_proven": _NOT_PROVEN,
+    }
+    certificates.write(found, about, args.out / CERTIFICATE)
     rows = table(found, law)
     write_table(args.out / TABLE, _HEADINGS, rows, names=1)
     draw(found, flown, args.out / FIGURE)
@@ -50,7 +69,7 @@ def certify_profile(args: Namespace) -> int:
     if not args.quiet:
         print_table(f"{profile.name} on {vehicle.name}: LQR of the attitude", _HEADINGS, rows, names=1)
         _say(f"{args.flights} flights from its border, as disturbed as allowed: V, there 1, is at most {largest:.3f}")
-        _say(_NOT_PROVEN)
+        _say(f"Not proven: {', '.join(_NOT_PROVEN)}.")
     if largest > 1.0:
         fail(f"{profile.where} on {vehicle.name}: a flight left the set, V = {largest:.4f}", EXIT_FAILED)
     return 0
@@ -75,7 +94,7 @@ def table(found: Certificate, law: LqrAttitude) -> list[tuple[str, ...]]:
     held = np.degrees(attitudes_held(found))
     rate = -log(decay.proof.ratio) / (2.0 * decay.numbers.interval_s)
     least, most = law.thrusts_n(invariant.scale)
-    weights = np.linalg.eigvals(np.linalg.solve(law.mpc.problem.terminal_weight, terminal.proof.P)).real
+    weights = _relative(terminal.proof.P, law.mpc.problem.terminal_weight)
     margin = min(min(entry.margins.values()) for entry in found)
     at_rest = 1.0 / np.sqrt(np.diag(invariant.proof.P))
     return [
@@ -90,6 +109,14 @@ def table(found: Certificate, law: LqrAttitude) -> list[tuple[str, ...]]:
         ("terminal weight", "", "", f"{weights.min():.2f} to {weights.max():.3g} times the profile's"),
         ("exact check", "", "", f"least margin {margin:.1g}"),
     ]
+
+
+def _relative(weight: Array, other: Array) -> Array:
+    """Return the generalised eigenvalues of a weight to another, where the other is not zero, ascending."""
+    values, vectors = np.linalg.eigh(other)
+    seen = vectors[:, values > _SEEN * values[-1]]
+    found: Array = eigh(seen.T @ weight @ seen, seen.T @ other @ seen, eigvals_only=True)
+    return found
 
 
 def _ranges(what: str, entry: Entry) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """`colibri certify`: what is certified of profile flight, the flights that may not leave it, and what is refused."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +10,18 @@ from colibri.autopilot.control.profile import load_profile, profile_text
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers
 from colibri.certification.certificate import Certificate
+from colibri.certification.flights import Interval, integrate
 from colibri.certification.lqr_attitude import Conditions, LqrAttitude
-from colibri.certification.lyapunov import spectral_radius
+from colibri.certification.lyapunov import Proof, spectral_radius
 from colibri.certification.report import CERTIFICATE, FIGURE, attitudes_held, fly_from
 from colibri.cli.main import main
 from colibri.plant.vehicle.description import load_vehicle
 
 HERE = Path(__file__).parent
-FLIGHT = LqrAttitude(load_profile("flight"), load_vehicle("hummingbird"), Conditions(0.01, 0.5))
+CONDITIONS = Conditions(0.01, 0.5)
+FLIGHT = LqrAttitude(load_profile("flight"), load_vehicle("hummingbird"), CONDITIONS)
+REFUSED = 0.6
+"""Part of the ranges of the unstable profile: 52.8 degrees."""
 FLIGHTS = 1000
 
 
@@ -35,8 +40,36 @@ def test_the_certificate_is_confirmed_in_exact_arithmetic(certified: Certificate
     _, numbers, proof, margins = certified.invariant
     assert certificates.margins_of(FLIGHT, "invariant", numbers, proof) == pytest.approx(margins, rel=0.01)
     assert min(margins.values()) > 0.0
-    spoilt = proof._replace(ratio=0.9)
-    assert certificates.margins_of(FLIGHT, "attractor", numbers, spoilt)["decrease"] == 0.0
+
+
+def spoilt(proof: Proof, i: int, j: int, factor: float) -> Proof:
+    """Return the proof with one entry of P multiplied."""
+    P = proof.P.copy()
+    P[i, j] *= factor
+    return proof._replace(P=P)
+
+
+@pytest.mark.parametrize(
+    ("what", "spoil"),
+    [
+        ("decrease", lambda proof: spoilt(proof, 1, 1, 1.1)),
+        ("decrease", lambda proof: spoilt(proof, 0, 1, 1.0 + 1e-12)),
+        ("disturbance", lambda proof: proof._replace(multipliers=1.001 * proof.multipliers)),
+        ("limits", lambda proof: proof._replace(P=0.999 * proof.P)),
+    ],
+    ids=["P unlike", "P not symmetric", "larger multipliers", "larger set"],
+)
+def test_a_certificate_that_was_tampered_with_is_not_confirmed(
+    certified: Certificate, what: str, spoil: Callable[[Proof], Proof]
+) -> None:
+    _, numbers, proof, _ = certified.invariant
+    assert certificates.margins_of(FLIGHT, "invariant", numbers, spoil(proof))[what] <= 0.0
+
+
+def test_a_certificate_of_a_weaker_gain_is_not_confirmed(certified: Certificate) -> None:
+    _, numbers, proof, _ = certified.invariant
+    weaker = numbers._replace(gain=(0.8 * np.array(numbers.gain)).tolist())
+    assert certificates.margins_of(FLIGHT, "invariant", weaker, proof)["decrease"] == 0.0
 
 
 @pytest.mark.long
@@ -72,15 +105,10 @@ def test_beyond_the_largest_ranges_the_law_is_soon_unstable_indeed() -> None:
 
 @pytest.fixture
 def unstable(tmp_path: Path) -> str:
-    """Return profile flight made unstable: next to nothing is done about pitch, and hardly any tilt is too much."""
+    """Return profile flight made unstable: it may tilt further than its gain, that of hover, is stable."""
     text, made = profile_text("flight"), tmp_path / "unstable.toml"
-    for key, was, value in (
-        ("output_weight", "[1.0, 1.0, 0.1]", "[1.0, 1e-6, 1e-2]"),
-        ("max_angle_deg", "70.0", "88.0"),
-    ):
-        assert text.count(f"{key} = {was}") == 1
-        text = text.replace(f"{key} = {was}", f"{key} = {value}")
-    made.write_text(text, encoding="utf-8")
+    assert text.count("max_angle_deg = 70.0") == 1
+    made.write_text(text.replace("max_angle_deg = 70.0", "max_angle_deg = 88.0"), encoding="utf-8")
     return str(made)
 
 
@@ -88,7 +116,7 @@ def test_a_profile_that_is_unstable_is_refused(
     unstable: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as end:
-        main(["certify", unstable, "--out", str(tmp_path), "--quiet"])
+        main(["certify", unstable, "--least", str(REFUSED), "--out", str(tmp_path), "--quiet"])
     assert end.value.code == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert "refused" in line
@@ -96,11 +124,40 @@ def test_a_profile_that_is_unstable_is_refused(
     assert not (tmp_path / CERTIFICATE).exists()
 
 
+@pytest.mark.parametrize(("scale", "grows"), [(0.5, False), (REFUSED, True)])
+def test_what_is_refused_is_unstable_indeed(unstable: str, scale: float, grows: bool) -> None:
+    """An error far too small for what is not linear, where phi and theta are at the ends of their ranges."""
+    numbers = LqrAttitude(load_profile(unstable), load_vehicle("hummingbird"), CONDITIONS).numbers_at(scale)
+    z, nothing, gain = np.full((1, 12), 1e-9), np.zeros((1, 3)), np.array(numbers.gain)
+    held = 2.0 * np.arctan([numbers.half_tangents])
+    for _ in range(2000):
+        commands = z[:, 9:] - z @ gain.T
+        interval = Interval(commands, nothing, held, np.zeros(1), np.array(numbers.inertia_kg_m2), numbers.lag_s)
+        z = np.hstack([integrate(z[:, :9], interval, numbers.interval_s), commands])
+    assert bool(abs(z).max() > 1e-6) == grows
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> str:
+    """Return profile flight that flies whole-lpv-mpc."""
+    text, made = profile_text("flight"), tmp_path / "whole.toml"
+    made.write_text(text.replace('controller = "lpv-mpc"', 'controller = "whole-lpv-mpc"'), encoding="utf-8")
+    return str(made)
+
+
+def test_another_law_is_not_certified(whole: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["certify", whole, "--out", str(tmp_path)])
+    assert end.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "its law is whole-lpv-mpc: only lpv-mpc can be certified" in line
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
         (["nonsense"], "nonsense"),
-        (["thesis"], "cannot be certified"),
+        (["thesis"], "only lpv-mpc"),
         (["flight", "--vehicle", "nonsense"], "nonsense"),
         (["flight", "--charge", "1.5"], "part of 1"),
         (["flight", "--moment", "0"], "above zero"),
