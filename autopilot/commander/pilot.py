@@ -52,7 +52,7 @@ class Sensed(NamedTuple):
         vehicle: None before the first state.
         position_known: Whether the position is known well enough to fly to places.
         delay_us: How far ahead of now the vehicle is: references are those of when commands take effect.
-        lag_us: How far the control law's path time lags behind that.
+        path: By how much path time has fallen behind since the sample before, µs, and how fast it passes.
     """
 
     now_us: int = 0
@@ -60,7 +60,7 @@ class Sensed(NamedTuple):
     steered: Steered = NOT_STEERED
     position_known: bool = True
     delay_us: int = 0
-    lag_us: int = 0
+    path: tuple[int, float] = (0, 1.0)
 
 
 class PilotRecord(NamedTuple):
@@ -74,6 +74,7 @@ class PilotRecord(NamedTuple):
     speed_m_s: float | None
     saving: Action
     reference: Reference
+    lag_us: int = 0
 
 
 class Pilot:
@@ -117,6 +118,7 @@ class Pilot:
         self.generator = ReferenceGenerator(instants, behaviour.limits)
         self.readiness = Readiness(lines)
         self.sensed = Sensed()
+        self.lag_us = 0
         self.task: FlightTask = HoldTask()
         self._task_is_chosen = False
         self.speed_m_s: float | None = None
@@ -152,6 +154,7 @@ class Pilot:
             self.speed_m_s,
             self.saving,
             self.generator.reference,
+            self.lag_us,
         )
 
     def resume(
@@ -168,7 +171,7 @@ class Pilot:
         """
         self.sensed = self.sensed._replace(now_us=now_us, vehicle=vehicle)
         self.home.resume(record.home_enu_m, record.home_yaw_rad, chosen=record.home_is_chosen)
-        self.speed_m_s = record.speed_m_s
+        self.speed_m_s, self.lag_us = record.speed_m_s, record.lag_us
         ground = record.ground
         came_down = not seamless and not ground.standing and stands_at_first(vehicle, ground.height_m)
         self.ground.resume(ground, came_down=came_down)
@@ -195,17 +198,17 @@ class Pilot:
         *,
         position_known: bool = True,
         delay_us: int = 0,
-        lag_us: int = 0,
+        path: tuple[int, float] = (0, 1.0),
     ) -> None:
         """Take in the inputs of a control sample; the arguments are the fields of `Sensed`."""
-        waited_us = lag_us - self.sensed.lag_us
-        if waited_us:
-            self.generator.wait(waited_us * 1e-6)
-        self.sensed = Sensed(now_us, vehicle, steered, position_known, delay_us, lag_us)
+        waited_us, path_speed = path
+        self.lag_us += waited_us
+        self.generator.wait(waited_us * 1e-6, path_speed)
+        self.sensed = Sensed(now_us, vehicle, steered, position_known, delay_us, path)
 
     def context(self) -> TaskContext:
         """Return the inputs of a task now."""
-        now_us, vehicle, steered, position_known, delay_us, lag_us = self.sensed
+        now_us, vehicle, steered, position_known, delay_us, _ = self.sensed
         reference, behaviour = self.generator.reference, self.behaviour
         assert vehicle is not None, "the vehicle has been seen"
         assert reference is not None, "the vehicle has been seen"
@@ -214,7 +217,7 @@ class Pilot:
         if speed != behaviour.limits.speed_m_s:
             behaviour = replace(behaviour, limits=behaviour.limits._replace(speed_m_s=speed))
         return TaskContext(
-            now_us + delay_us - lag_us,
+            now_us + delay_us - self.lag_us,
             vehicle,
             reference,
             self.home.position_enu_m,
@@ -336,7 +339,7 @@ class Pilot:
             return Guidance(attitude=wanted.demand, begins=begins)
         horizon = self.generator.lead(context, wanted)
         self.ground.watch(now_us, vehicle, sinks=is_below(context.reference, vehicle))
-        return Guidance(horizon=horizon, begins=begins)
+        return Guidance(horizon=horizon, begins=begins, pace=wanted.pace)
 
     def _rest(self) -> Guidance:
         """Lie, or fall, with the rotors standing still or idle."""

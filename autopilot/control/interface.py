@@ -6,7 +6,7 @@ next. What they remember they return too: a controller has no state of its own, 
 """
 
 from collections.abc import Callable
-from enum import StrEnum
+from enum import Enum, StrEnum
 from math import nan
 from typing import NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
 
@@ -234,16 +234,40 @@ class MassController(Controller[Memory], Protocol[Memory]):
         """Return the memory with another mass, kg."""
 
 
+class Pace(Enum):
+    """How time passes along references, where a control law leaves the choice."""
+
+    CLOCK = "clock"
+    """As on the clock."""
+    WAITING = "waiting"
+    """More slowly where the vehicle cannot follow."""
+    CATCHING_UP = "catching up"
+    """So, and later faster, until what was lost is made up for."""
+
+
 @runtime_checkable
 class PathController(Controller[Memory], Protocol[Memory]):
-    """A control law that flies along its path at a speed of its own; optional.
+    """A control law that can fly along references at a speed of its own; optional.
 
-    A law that has this is given references from a time on that lags behind the clock by what it says, so that it may
-    wait for itself where it cannot follow: missions, tracks and setpoints wait with it.
+    Where it does, the references that it is given are those of path time, which lags behind the clock. `step` keeps to
+    the clock, with no lag.
+
+    Attributes:
+        min_path_speed: The least speed, in parts of the references' own; a law with 1 is not asked to.
     """
 
+    min_path_speed: float
+
+    def step_on_path(
+        self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
+    ) -> tuple[Memory, Decision]:
+        """Decide as `step` does, and how fast to go on along the references, which begin at path time."""
+
+    def path_speed(self, memory: Memory) -> float:
+        """Return the speed along the references, in parts of their own; 1 on the clock."""
+
     def lag_us(self, memory: Memory) -> int:
-        """Return by how much the law's path time lags behind the clock, µs, at least 0."""
+        """Return by how much path time lags behind the clock, µs, at least 0: what the law may make up for."""
 
     def with_lag(self, memory: Memory, lag_us: int) -> Memory:
         """Return the memory with another lag, µs."""

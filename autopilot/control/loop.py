@@ -14,6 +14,7 @@ from colibri.autopilot.control.interface import (
     Decision,
     Horizon,
     MassController,
+    Pace,
     PathController,
     PlanController,
     VehicleState,
@@ -87,6 +88,7 @@ class ControlLoop:
         self.control_interval_us = self._controller.control_interval_us
         self.frame_interval_us = _frame_interval_us(profile, self.control_interval_us)
         self._memory: Any = None
+        self._waited_us = 0
         self._reported_ah = 0.0
         self._is_plain = True
         self._yaw_rad = 0.0
@@ -131,9 +133,24 @@ class ControlLoop:
         return self._charged.charge_ah(self._memory)
 
     @property
+    def takes_path(self) -> bool:
+        """Whether the law flies along references at a speed of its own."""
+        return self._waiting is not None
+
+    @property
     def lag_us(self) -> int:
         """How far the law's path time is behind the clock, µs."""
         return 0 if self._waiting is None or self._memory is None else self._waiting.lag_us(self._memory)
+
+    @property
+    def path_speed(self) -> float:
+        """Speed of path time."""
+        return 1.0 if self._waiting is None or self._memory is None else self._waiting.path_speed(self._memory)
+
+    def take_waited_us(self) -> int:
+        """Return by how much path time has fallen behind since this was last asked, µs."""
+        waited_us, self._waited_us = self._waited_us, 0
+        return waited_us
 
     def record(self) -> LoopRecord:
         """Return what is remembered; a law of somebody else's may remember what cannot be kept."""
@@ -166,18 +183,32 @@ class ControlLoop:
         euler = (phi, theta, self._yaw_rad)
         return VehicleState(frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
 
-    def decide(self, time_us: int, state: VehicleState, references: Horizon) -> Decision:
+    def decide(self, time_us: int, state: VehicleState, references: Horizon, pace: Pace = Pace.CLOCK) -> Decision:
         """Decide the rotor speeds to hold until the next control sample.
+
+        A law that does not choose its speed along the references keeps to the clock at any pace.
 
         Raises:
             DecisionError: The control law raised, or gave what no rotor can follow.
         """
         try:
+            if self._waiting is not None and pace is not Pace.CLOCK:
+                return self._decide_on_path(self._waiting, time_us, state, references, pace)
             return self._take(time_us, self._controller.step(self._memory, time_us, state, references))
         except DecisionError:
             raise
         except (Exception, SystemExit) as error:
             raise self._raised(time_us, error) from error
+
+    def _decide_on_path(
+        self, law: PathController[Any], time_us: int, state: VehicleState, references: Horizon, pace: Pace
+    ) -> Decision:
+        if pace is Pace.WAITING:
+            self._memory = law.with_lag(self._memory, 0)
+        before_us = law.lag_us(self._memory)
+        decision = self._take(time_us, law.step_on_path(self._memory, time_us, state, references))
+        self._waited_us += law.lag_us(self._memory) - before_us
+        return decision
 
     def decide_attitude(self, time_us: int, state: VehicleState, demand: AttitudeDemand) -> Decision:
         """Decide the rotor speeds by which a law that takes attitudes follows `demand`.
@@ -208,7 +239,8 @@ class ControlLoop:
         self._controller = controller
         self._charged = controller if isinstance(controller, ChargeController) else None
         self._weighing = controller if isinstance(controller, MassController) else None
-        self._waiting = controller if isinstance(controller, PathController) else None
+        on_path = controller if isinstance(controller, PathController) else None
+        self._waiting = on_path if on_path is not None and on_path.min_path_speed < 1.0 else None
 
     def _take(self, time_us: int, answer: tuple[Any, Decision]) -> Decision:
         """Remember and command what the law has decided."""

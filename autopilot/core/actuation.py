@@ -143,7 +143,7 @@ class Actuation:
         elif guidance is not RESTS and self._solving.busy(now_us):
             return None
         if guidance.horizon is not None:
-            decision = loop.decide(now_us, state, guidance.horizon)
+            decision = loop.decide(now_us, state, guidance.horizon, guidance.pace)
         elif guidance.attitude is not None:
             decision = loop.decide_attitude(now_us, state, guidance.attitude)
         else:

@@ -39,8 +39,8 @@ class Supervision:
                 defence.caught(errors.ROTOR_WATCH, error)
         steered, position_known = self._sensed(now_us)
         delay_us = 0 if errors.DELAY in defence.off else parts.delay.delay_us
-        lag_us = parts.loop.lag_us
-        parts.pilot.sense(now_us, state, steered, position_known=position_known, delay_us=delay_us, lag_us=lag_us)
+        path = parts.loop.take_waited_us(), parts.loop.path_speed
+        parts.pilot.sense(now_us, state, steered, position_known=position_known, delay_us=delay_us, path=path)
         if errors.FAILSAFES not in defence.off:
             try:
                 action = parts.supervisor.step(self._inputs(now_us, state), parts.pilot.flight)

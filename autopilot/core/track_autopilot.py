@@ -1,7 +1,7 @@
 """An autopilot that flies one track, without ground stations."""
 
 from colibri.autopilot.control.delay import DelayCompensation
-from colibri.autopilot.control.interface import Clock
+from colibri.autopilot.control.interface import Clock, Pace
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.step import Step, follows, nothing_known
@@ -78,7 +78,7 @@ class Autopilot:
             state = state._replace(airborne=self._ground_m is None or is_clear(state, self._ground_m))
             acts_us = frame.time_us + self._delay.delay_us
             references = self._planner.horizon_at(acts_us - self._loop.lag_us, self._loop.control_interval_us)
-            decision = self._loop.decide(frame.time_us, state, references)
+            decision = self._loop.decide(frame.time_us, state, references, Pace.CATCHING_UP)
         command = ActuatorCommand(frame.time_us, self._loop.controls, armed=True)
         self._delay.sent(command)
         estimate = self._state_source.estimate if due else None

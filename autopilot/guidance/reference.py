@@ -78,6 +78,12 @@ def moving_with(state: VehicleState) -> Reference:
     return Reference(motion, np.array([state.euler[2], 0.0]))
 
 
+def slowed(reference: Reference, speed: float) -> Reference:
+    """Return a reference that moves as it does where time passes at `speed` along it."""
+    powers = np.array([[1.0], [speed], [speed * speed], [speed * speed * speed]])
+    return Reference(reference.motion * powers, reference.heading * np.array([1.0, speed]))
+
+
 def still_target(
     position_enu_m: Sequence[float], yaw_rad: float, samples: int, kinds: tuple[Kind, Kind, Kind] | None = None
 ) -> Target:

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.interface import AttitudeDemand, Horizon, VehicleState
+from colibri.autopilot.control.interface import AttitudeDemand, Horizon, Pace, VehicleState
 from colibri.autopilot.guidance.integrator_chain import Limits
-from colibri.autopilot.guidance.reference import Reference, at_rest, lead, lead_along, moving_with, still_target
+from colibri.autopilot.guidance.reference import Reference, at_rest, lead, lead_along, moving_with, slowed, still_target
 from colibri.autopilot.guidance.sample_grid import Instants
 from colibri.autopilot.guidance.tasks.task import Motion, PlannedMotion, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import carried
@@ -19,11 +19,13 @@ class Guidance(NamedTuple):
         horizon: References of position and yaw.
         attitude: References of attitude and thrust.
         begins: Whether the rotors leave idle now: the control law is reset.
+        pace: How time passes along the horizon.
     """
 
     horizon: Horizon | None = None
     attitude: AttitudeDemand | None = None
     begins: bool = False
+    pace: Pace = Pace.CLOCK
 
 
 RESTS = Guidance()
@@ -46,6 +48,7 @@ class ReferenceGenerator:
         self.reference: Reference | None = None
         self._ahead: Horizon | None = None
         self._waited = False
+        self._path_speed = 1.0
         motionless = Reference(np.zeros((4, 3)), np.zeros(2))
         lead(motionless, still_target((1.0, 0.0, 0.0), 0.0, self.samples), limits, self.interval_s)
 
@@ -61,12 +64,13 @@ class ReferenceGenerator:
         """Set the reference to rest where the vehicle is."""
         self.set(at_rest(vehicle))
 
-    def wait(self, waited_s: float) -> None:
+    def wait(self, waited_s: float, path_speed: float) -> None:
         """Set the reference back on its way by path time that has not passed in the last sample.
 
-        More than a sample is no wait, but another path time: the reference is led to what is wanted there.
+        Time passes at `path_speed` along it now.
         """
-        if self._ahead is not None and abs(waited_s) <= self.interval_s:
+        self._path_speed = path_speed
+        if waited_s != 0.0 and self._ahead is not None:
             following = Horizon(*(column[1:2] for column in self._ahead))
             p, v, a, j, _, yaw, yaw_rate, _ = carried(following, -waited_s)
             self.reference = Reference(np.concatenate((p, v, a, j)), np.concatenate((yaw, yaw_rate)))
@@ -75,6 +79,8 @@ class ReferenceGenerator:
     def lead(self, context: TaskContext, wanted: Motion | PlannedMotion) -> Horizon:
         """Move the reference on by one sample, and return the control law's preview of it."""
         reference, limits, interval_s, waited = context.reference, wanted.limits, context.interval_s, self._waited
+        if wanted.pace is Pace.CLOCK and self._path_speed != 1.0:
+            reference = slowed(reference, self._path_speed)
         for_law = None
         if isinstance(wanted, PlannedMotion):
             horizon, self.reference = lead_along(reference, wanted.horizon, limits, interval_s, waited=waited)

@@ -135,6 +135,7 @@ class WholeLpvMpc:
     Attributes:
         control_interval_us: The control sample.
         preview: From now to one sample past the horizon.
+        min_path_speed: The least speed along the references, in parts of their own.
         plan_columns: Of the attitude in its predicted outputs.
     """
 
@@ -155,7 +156,7 @@ class WholeLpvMpc:
         self._battery = BatteryModel(vehicle)
         solver = QpSolver(settings.qp.solver, settings.qp.tolerance, settings.qp.max_iterations)
         self._mpc = WholeMpc(settings.plan, settings.weights, vehicle, solver, h, clock)
-        self._is_on_clock = settings.path.min_speed == 1.0
+        self.min_path_speed = settings.path.min_speed
         samples = self._mpc.horizon + 2
         self.preview = Preview(self.control_interval_us, ceil(settings.path.max_speed * samples))
         self._fallback = settings.fallback
@@ -223,6 +224,11 @@ class WholeLpvMpc:
         """Return by how much path time is behind the clock, µs."""
         return memory.lag_us
 
+    def path_speed(self, memory: Memory) -> float:
+        """Return the speed along the references, in parts of their own."""
+        plan = memory.plan
+        return 1.0 if plan is None or plan.speeds is None else float(plan.speeds[memory.age])
+
     def with_lag(self, memory: Memory, lag_us: int) -> Memory:
         """Return the memory with another lag, µs."""
         return memory._replace(lag_us=lag_us)
@@ -231,8 +237,14 @@ class WholeLpvMpc:
         """Decide the rotor speeds to hold until the next control sample."""
         del time_us
         inputs = self._inputs(memory, state)
-        if self._is_on_clock:
-            return self._decide(memory, inputs, self._targets.on_clock(inputs.now, inputs.limits, references))
+        return self._decide(memory, inputs, self._targets.on_clock(inputs.now, inputs.limits, references))
+
+    def step_on_path(
+        self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
+    ) -> tuple[Memory, Decision]:
+        """Decide the same, and the speed along the references."""
+        del time_us
+        inputs = self._inputs(memory, state)
         kept = memory.plan.speeds if memory.plan else None
         last = None if kept is None else kept[memory.age :]
         wanted = self._targets.on_path(inputs.now, inputs.limits, references, last, memory.lag_us * 1e-6)
@@ -297,7 +309,7 @@ class WholeLpvMpc:
             memory.speeds, squared, self._lag, max_speed, self._allocation
         )
         charge_ah = self._battery.charge_after(memory.charge_ah, memory.speeds, self._interval_s)
-        lag_us = self._lag_us(memory.lag_us, plan, age)
+        lag_us = self._lag_us(memory.lag_us, plan, age) if wanted.path else 0
         after = Memory(
             speeds,
             wrench,
@@ -313,14 +325,14 @@ class WholeLpvMpc:
         R = wanted.target.attitudes[0]
         angles = (atan2(R[2, 1], R[2, 2]), -asin(min(max(R[2, 0], -1.0), 1.0)), float(wanted.target.yaw_rad[0]))
         how = diagnostics._replace(mass_kg=inputs.mass_kg)
-        if not self._is_on_clock:
+        if wanted.path:
             how = how._replace(lag_s=memory.lag_us * 1e-6)
         return after, Decision(commands * self._vehicle.rotors.max_speed, angles, how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
         """Return the lag a sample later, on a plan that is so old then."""
-        if self._is_on_clock or plan is None or plan.speeds is None:
-            return 0 if self._is_on_clock else lag_us
+        if plan is None or plan.speeds is None:
+            return lag_us
         passed_s = 0.5 * self._interval_s * float(plan.speeds[age - 1] + plan.speeds[age])
         return max(lag_us + self.control_interval_us - round(passed_s * 1e6), 0)
 

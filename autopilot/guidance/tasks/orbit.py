@@ -4,6 +4,7 @@ from math import copysign, hypot, pi, sqrt
 
 import numpy as np
 
+from colibri.autopilot.control.interface import Pace
 from colibri.autopilot.guidance.reference import ALL_BOUND, Target
 from colibri.autopilot.guidance.tasks.orders import Circle, GoTo
 from colibri.autopilot.guidance.tasks.position import GoToTask
@@ -53,7 +54,7 @@ class OrbitTask(EndlessTask):
         self._angle = float(angles[1])
         self.turns += abs(rate) * context.interval_s / (2.0 * pi)
         target = Target(self._motion(angles, rate), ALL_BOUND, self._heading(angles, rate))
-        return Motion(target, context.behaviour.limits)
+        return Motion(target, context.behaviour.limits, Pace.WAITING)
 
     def _angle_of(self, place: Vector) -> float:
         """Return where a place is seen from the centre, counter-clockwise from east; its own place counts as east."""

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from math import dist, hypot
 from typing import TypeAlias
 
+from colibri.autopilot.control.interface import Pace
 from colibri.autopilot.guidance.reference import Kind, Reference, still_target
 from colibri.autopilot.guidance.tasks.orders import GoTo, Hold, Land, Order, TakeOff
 from colibri.autopilot.guidance.tasks.task import (
@@ -52,7 +53,7 @@ class GoToTask:
         limits = context.behaviour.limits
         if self._speed_m_s is not None:
             limits = limits._replace(speed_m_s=min(self._speed_m_s, context.behaviour.max_speed_m_s))
-        return Motion(still_target(self._place, self._yaw_rad, context.samples), limits)
+        return Motion(still_target(self._place, self._yaw_rad, context.samples), limits, Pace.WAITING)
 
     def arrived(self, context: TaskContext) -> bool:
         """Whether the vehicle is there, and slow."""
@@ -115,7 +116,7 @@ class TakeoffTask:
             target = still_target((x, y, self._height_m), self._yaw_rad, context.samples, kinds)
             limits = context.behaviour.limits
         else:
-            target, limits = self._way.update(context)
+            target, limits, _ = self._way.update(context)
         return Motion(target, limits if self._speed_m_s is None else limits._replace(climb_m_s=self._speed_m_s))
 
     def arrived(self, context: TaskContext) -> bool:

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, Protocol, TypeAlias
 
-from colibri.autopilot.control.interface import AttitudeDemand, Horizon, VehicleState
+from colibri.autopilot.control.interface import AttitudeDemand, Horizon, Pace, VehicleState
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.reference import Kind, Reference, Target, target_of
@@ -71,10 +71,11 @@ class TaskContext(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion by position and yaw: the target of the reference, and the limits on the way there."""
+    """Motion by position and yaw: the target of the reference, the limits on the way there, and its pace."""
 
     target: Target
     limits: Limits
+    pace: Pace = Pace.CLOCK
 
 
 class PlannedMotion(NamedTuple):
@@ -87,6 +88,7 @@ class PlannedMotion(NamedTuple):
     horizon: Horizon
     limits: Limits
     for_law: Horizon | None = None
+    pace: Pace = Pace.CATCHING_UP
 
     @property
     def target(self) -> Target:

@@ -15,6 +15,8 @@ from colibri.autopilot.control.interface import (
     Diagnostics,
     Horizon,
     MassController,
+    Pace,
+    PathController,
     PlanColumns,
     PlanController,
     Preview,
@@ -52,6 +54,7 @@ def test_one_of_those_that_come_along_counts_its_charge_estimates_its_mass_and_p
     assert isinstance(controller, ChargeController) is (name in OF_FLIGHT)
     assert isinstance(controller, PlanController) is (name in OF_FLIGHT)
     assert isinstance(controller, MassController) is (name in OF_FLIGHT)
+    assert isinstance(controller, PathController) is (name == "whole-lpv-mpc")
 
 
 def test_the_flight_profiles_law_remembers_the_charge_that_it_is_told() -> None:
@@ -150,6 +153,53 @@ def test_the_mass_goes_on_in_mid_flight_and_begins_anew_with_a_flight() -> None:
     assert loop.decide(0, LEVEL, staying).diagnostics.mass_kg == HUMMINGBIRD.body.mass_kg
 
 
+class Waiting(Counting):
+    """A law that goes on along its references at half their speed."""
+
+    min_path_speed = 0.5
+
+    def initial(self, rotor_speed: float) -> Counted:
+        del rotor_speed
+        return Counted(0.0)
+
+    def step_on_path(
+        self, memory: Counted, time_us: int, state: VehicleState, references: Horizon
+    ) -> tuple[Counted, Decision]:
+        del time_us, state, references
+        return Counted(memory.taken + 5000.0), Decision(self.speeds, NOTHING)
+
+    def path_speed(self, memory: Counted) -> float:
+        return 0.5 if memory.taken else 1.0
+
+    def lag_us(self, memory: Counted) -> int:
+        return round(memory.taken)
+
+    def with_lag(self, memory: Counted, lag_us: int) -> Counted:
+        return memory._replace(taken=float(lag_us))
+
+
+def test_what_path_time_falls_behind_is_told_and_only_on_the_clock_made_up_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    loop = loop_of(monkeypatch, Waiting)
+    loop.begin(HUMMINGBIRD.hover_speed, 0.0)
+    assert (loop.take_waited_us(), loop.path_speed, loop.lag_us) == (0, 1.0, 0)
+    for pace, lag_us in ((Pace.CATCHING_UP, 5000), (Pace.CATCHING_UP, 10_000), (Pace.WAITING, 5000)):
+        loop.decide(0, LEVEL, STAYING, pace)
+        assert (loop.take_waited_us(), loop.path_speed, loop.lag_us) == (5000, 0.5, lag_us)
+    loop.begin_in_flight(0.0)
+    assert loop.lag_us == 5000
+    loop.decide(0, LEVEL, STAYING, Pace.CLOCK)
+    assert loop.take_waited_us() == 0
+
+
+def test_a_law_that_keeps_to_the_clock_is_not_asked_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Waiting, "min_path_speed", 1.0)
+    loop = loop_of(monkeypatch, Waiting)
+    loop.begin(HUMMINGBIRD.hover_speed, 0.0)
+    loop.decide(0, LEVEL, STAYING, Pace.CATCHING_UP)
+    assert not loop.takes_path
+    assert (loop.take_waited_us(), loop.lag_us) == (0, 0)
+
+
 def test_a_plan_is_shown_where_the_law_says_that_it_holds_the_attitude() -> None:
     plan, squared = np.zeros((21, 6)), np.full((20, 4), HUMMINGBIRD.hover_speed**2 / HUMMINGBIRD.rotors.max_speed**2)
     plan[:, 1] = 0.2
@@ -171,5 +221,8 @@ def test_of_a_law_without_a_plan_the_references_are_shown() -> None:
 def test_the_page_names_what_a_law_may_have() -> None:
     rows = re.findall(r"^\| (`.*`) \|", DOCS.read_text(encoding="utf-8"), re.MULTILINE)
     words = " ".join(rows)
-    for name in ("step_attitude", "charge_ah", "with_charge", "mass_kg", "with_mass", "plan_columns"):
+    for name in (
+        *("step_attitude", "charge_ah", "with_charge", "mass_kg", "with_mass", "plan_columns"),
+        *("min_path_speed", "step_on_path", "path_speed", "lag_us", "with_lag"),
+    ):
         assert f"`{name}" in words

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.interface import Horizon, Preview
+from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import Qp, QpSolver
 from colibri.autopilot.control.whole_lpv_mpc import path, planning
 from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpc
@@ -21,11 +22,7 @@ STARTS = np.array([0, 2, 6, 20])
 SAMPLES = int(STARTS[-1]) + 2
 PACE = path.pace_of(STARTS, INTERVAL_S)
 SPEEDS = np.array([1.0, 0.8, 0.5])
-ON_PATH = {
-    **TABLE,
-    "plan": {**TABLE["plan"], "blocks": [1, 2, 4, 8, 15, 30]},
-    "path": {**TABLE["path"], "min_speed": 0.1},
-}
+ON_PATH = load_profile("path").table("whole-lpv-mpc")
 
 
 def horizon() -> Horizon:
@@ -107,7 +104,7 @@ def on_path(lap_s: float, seconds: float) -> tuple[Flight, Array]:
     for _ in range(round(seconds / INTERVAL_S)):
         now_us = flight.world.time_us
         references = planner.horizon_at(now_us - flight.law.lag_us(flight.memory), 8_000)
-        flight.take(*flight.law.step(flight.memory, now_us, flight.state(), references))
+        flight.take(*flight.law.step_on_path(flight.memory, now_us, flight.state(), references))
         distances.append(np.linalg.norm(curve - np.array(flight.state().position_enu_m), axis=1).min())
     return flight, np.array(distances)
 
