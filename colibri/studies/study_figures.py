@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
-from numpy.lib.stride_tricks import sliding_window_view
 
 from colibri.analysis.figures import GRID, LIMIT, TOP_IN, Style, axes_grid, line_style, put_head, round_ticks
 from colibri.analysis.recording import ROTORS, SETTLED_AFTER_S
@@ -17,13 +16,19 @@ from colibri.studies.study_flights import Flown
 
 COLORS = ("#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7")
 """Okabe's and Ito's."""
-WINDOW_S = 1.0
 RECOVERY_SHOWN_S = 3.0
 LIMITS_SHOWN_S = 6.0
 
 _LEGEND_ROW_IN = 0.24
 _SHADE = "#E8E8E8"
-_CONTENDERS = {"thesis": "#D55E00", "SE(3)": "#0072B2", "LPV-MPC": "#000000"}
+_CONTENDERS = {
+    "thesis": "#D55E00",
+    "SE(3)": "#0072B2",
+    "LPV-MPC": "#000000",
+    "whole LPV-MPC": "#009E73",
+    "whole, on the path": "#CC79A7",
+}
+_ALSO_WITHOUT = ("SE(3)", "LPV-MPC", "whole LPV-MPC")
 _CALLED = {"thesis": "thesis, on its ideal vehicle"}
 
 
@@ -37,17 +42,28 @@ class Result(NamedTuple):
 
 def tracks(results: Sequence[Result]) -> dict[str, Figure]:
     """Draw RMS and largest error of every contender on every track."""
-    names = list(dict.fromkeys(result.row[0] for result in results))
-    groups = list(dict.fromkeys(result.group for result in results))
-    figure, [[axes]] = axes_grid(1, 1, TOP_IN, row_in=0.62 * len(names))
+    names = _names(result.row[0] for result in results)
+    figure, [[axes]] = axes_grid(1, 1, TOP_IN + _LEGEND_ROW_IN, row_in=0.62 * len(names))
     figure.subplots_adjust(left=0.17)
+    _compare(axes, [(result, result.row[0]) for result in results])
+    put_head(figure, "Position error, track by track", columns=3)
+    return {"tracks": figure}
+
+
+def _names(names: Iterable[str]) -> list[str]:
+    return list(dict.fromkeys(names))
+
+
+def _compare(axes: Axes, named: Sequence[tuple[Result, str]]) -> None:
+    """Draw a row for each name: RMS and largest error of every group."""
+    names, groups = _names(name for _, name in named), _names(result.group for result, _ in named)
     for group in groups:
         color = _CONTENDERS[group]
         places, rms, max_error, lost = [], [], [], []
-        for result in results:
+        for result, name in named:
             if result.group != group:
                 continue
-            place = -names.index(result.row[0]) + 0.2 * (groups.index(group) - 1)
+            place = -names.index(name) - 0.17 * (groups.index(group) - 0.5 * (len(groups) - 1))
             if result.flown.lost:
                 lost.append(place)
             else:
@@ -55,7 +71,7 @@ def tracks(results: Sequence[Result]) -> dict[str, Figure]:
                 rms.append(result.flown.rms_m)
                 max_error.append(result.flown.max_error_m)
         axes.hlines(places, rms, max_error, color=color, linewidth=1.4)
-        axes.plot(rms, places, "o", color=color, markersize=7, label=f"{_CALLED.get(group, group)}: RMS")
+        axes.plot(rms, places, "o", color=color, markersize=6, label=f"{_CALLED.get(group, group)}: RMS")
         axes.plot(max_error, places, "|", color=color, markersize=10, markeredgewidth=1.8)
         for place in lost:
             axes.text(0.99, place, "lost", transform=axes.get_yaxis_transform(), ha="right", va="center", color=color)
@@ -65,8 +81,6 @@ def tracks(results: Sequence[Result]) -> dict[str, Figure]:
     axes.set_ylim(-len(names) + 0.5, 0.5)
     axes.grid(axis="x", **GRID)
     axes.set_xlabel(f"position error after {SETTLED_AFTER_S:.0f} s (m)")
-    put_head(figure, "Position error, track by track")
-    return {"tracks": figure}
 
 
 def speed(results: Sequence[Result]) -> dict[str, Figure]:
@@ -79,6 +93,8 @@ def speed(results: Sequence[Result]) -> dict[str, Figure]:
     )
     for (axes,), (quantity, of) in zip(grid, quantities, strict=True):
         for group, battery in dict.fromkeys((result.group, result.row[2]) for result in results):
+            if battery == "without" and group not in _ALSO_WITHOUT:
+                continue
             shown = [result for result in results if (result.group, result.row[2]) == (group, battery)]
             label = group if battery == "with" else f"{group}, no battery"
             for crashed, marker in ((False, "o-" if battery == "with" else "o:"), (True, "x")):
@@ -112,29 +128,25 @@ def scheduling(results: Sequence[Result]) -> dict[str, Figure]:
 
 
 def robustness(results: Sequence[Result]) -> dict[str, Figure]:
-    """Draw the error over time under every perturbation, a row for each track."""
-    groups = list(dict.fromkeys(result.group for result in results))
-    names = list(dict.fromkeys(result.row[0] for result in results))
-    figure, grid = axes_grid(len(groups), 1, TOP_IN + 2 * _LEGEND_ROW_IN, row_in=2.6)
-    for group, (axes,) in zip(groups, grid, strict=True):
-        for result in results:
-            if result.group == group:
-                t, error = running_rms(result.flown)
-                number = names.index(result.row[0])
-                style = Style(COLORS[number % len(COLORS)], 3.6 - 0.3 * number)
-                axes.plot(t, error, label=result.row[0], **line_style(style))
-        axes.set_yscale("log")
-        _dress(axes, f"{group}: error (m)")
-    grid[-1][0].set_xlabel("t (s)")
-    put_head(figure, f"Position error, RMS over {WINDOW_S:.0f} s, with a plant that is not as planned", columns=3)
+    """Draw RMS and largest error of every contender with every plant, on each track."""
+    on = _names(result.row[0] for result in results)
+    plants = _names(result.row[1] for result in results)
+    figure, grid = axes_grid(len(on), 1, TOP_IN + _LEGEND_ROW_IN, row_in=0.55 * len(plants))
+    figure.subplots_adjust(left=0.33)
+    for track, (axes,) in zip(on, grid, strict=True):
+        _compare(axes, [(result, result.row[1]) for result in results if result.row[0] == track])
+        axes.set_title(track, loc="left", fontsize="medium")
+    put_head(figure, "Position error with a plant that is not as planned", columns=2)
     return {"robustness": figure}
 
 
 def recovery(results: Sequence[Result]) -> dict[str, Figure]:
-    """Draw the first seconds of every start: a figure each, and one of all."""
+    """Draw the first seconds of every start: a figure of all for each law, and one each of the last law."""
+    groups = _names(result.group for result in results)
+    by_group = {group: [result for result in results if result.group == group] for group in groups}
     return {
-        "recovery": _recoveries(results),
-        **{f"recovery-{result.row[0]}": _recovery(result) for result in results},
+        **{_file_name(f"recovery {group}".strip()): _recoveries(group, shown) for group, shown in by_group.items()},
+        **{f"recovery-{result.row[0]}": _recovery(result) for result in by_group[groups[-1]]},
     }
 
 
@@ -143,14 +155,7 @@ def limits(results: Sequence[Result]) -> dict[str, Figure]:
     return {"-".join(("limits", *map(_file_name, result.row))): _limits(result) for result in results}
 
 
-def running_rms(flown: Flown) -> tuple[Array, Array]:
-    """Return times and the RMS of the position error over the window that ends then."""
-    t, squared = flown.t, flown.recording.position_error_m**2
-    samples = min(max(1, round(WINDOW_S / float(t[1] - t[0]))), len(t))
-    return t[samples - 1 :], np.sqrt(sliding_window_view(squared, samples).mean(axis=1))
-
-
-def _recoveries(results: Sequence[Result]) -> Figure:
+def _recoveries(law: str, results: Sequence[Result]) -> Figure:
     figure, grid = axes_grid(3, 1, TOP_IN + _LEGEND_ROW_IN, row_in=1.7)
     quantities: tuple[tuple[str, Callable[[Flown], Array]], ...] = (
         ("height (m)", lambda flown: flown.recording["z"]),
@@ -169,7 +174,7 @@ def _recoveries(results: Sequence[Result]) -> Figure:
             )
         _dress(axes, quantity)
     grid[-1][0].set_xlabel("t (s)")
-    put_head(figure, "Recovery at 20 m, from every start", columns=3)
+    put_head(figure, f"Recovery at 20 m, from every start, {law}".removesuffix(", "), columns=3)
     return figure
 
 
@@ -268,4 +273,4 @@ def _spans(t: Array, holds: Any) -> list[tuple[float, float]]:
 
 
 def _file_name(text: str) -> str:
-    return text.replace(":", "-").replace("=", "-")
+    return text.replace(":", "-").replace("=", "-").replace(" ", "-")

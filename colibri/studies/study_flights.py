@@ -63,7 +63,7 @@ class Flight(NamedTuple):
         controller: Control law; None for the profile's.
         scheduling: Of the attitude LPV-MPC; None for the profile's.
         perturbation: Of the plant's vehicle.
-        without: Parts left out of the plant's vehicle, as in `Vehicle.without`.
+        without: Parts left out of the vehicle of plant and autopilot, as in `Vehicle.without`.
         max_speed: Largest rotor speed of plant and autopilot, in the vehicle's unit; None for the vehicle's.
         weather: Wind, gusts, turbulence.
         start: Keys and values as in `colibri.plant.physics.start.Start`, in place of the profile's.
@@ -86,12 +86,12 @@ class Flight(NamedTuple):
         plan = FlightPlan.of_options(
             out, track=self.track, profile=self.profile, controller=self.controller, link="memory"
         )
-        vehicle = _limited(plan.vehicle, self.max_speed)
+        vehicle = _limited(plan.vehicle, self.max_speed).without(self.without)
         return replace(
             plan,
             profile=_scheduled(plan.profile, self.scheduling),
             vehicle=vehicle,
-            plant_vehicle=self.perturbation.of(vehicle).without(self.without),
+            plant_vehicle=self.perturbation.of(vehicle),
             without=self.without,
             **self.weather._asdict(),
             start=plan.start._replace(**dict(self.start)),
@@ -152,12 +152,6 @@ class Flown:
         return float(error.max()) if len(error) else nan
 
     @property
-    def min_upright(self) -> float:
-        """Least upright part of the body's z axis once settled; not a number for a flight too short."""
-        upright = self.upright[self.settled]
-        return float(upright.min()) if len(upright) else nan
-
-    @property
     def lost(self) -> bool:
         """Whether it ended early, or ended up far off its reference."""
         return self.failure is not None or (not isnan(self.max_error_m) and self.max_error_m > LOST_M)
@@ -176,12 +170,6 @@ class Flown:
         """Return at which control samples `fallback` decided, (m,)."""
         decided: NDArray[np.bool_] = self.recording.fallback == FALLBACK_CODES[fallback]
         return decided
-
-    def falls_below(self, values: Array, bound: float) -> float:
-        """Return the time, s, at which `values` (n,) first are below `bound` after their largest; else not a number."""
-        peak = int(values.argmax())
-        below = np.flatnonzero(values[peak:] < bound)
-        return float(self.t[peak + below[0]]) if len(below) else nan
 
     def stays_below(self, values: Array, bound: float) -> float:
         """Return the time, s, from which `values` (n,) stay below `bound`; not a number if they do not."""

@@ -14,7 +14,6 @@ from colibri.flights.in_process import fly_locally
 from colibri.plant.environment.weather import Weather, Wind
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies.studies import FORMATS, STUDIES, Case, Measure, Study, table, write
-from colibri.studies.study_figures import running_rms
 from colibri.studies.study_flights import Flight, Flown, Perturbation, fly
 
 NAMES = ["tracks", "speed", "recovery", "robustness", "limits", "scheduling"]
@@ -95,7 +94,6 @@ def test_figures_of_merit(short: Flown) -> None:
     error = late.recording.position_error_m
     assert late.rms_m == pytest.approx(np.sqrt(np.mean(error**2)))
     assert late.max_error_m == error.max()
-    assert late.min_upright == late.upright.min()
 
 
 def test_far_off_is_lost(short: Flown) -> None:
@@ -110,16 +108,6 @@ def test_the_time_from_which_a_bound_holds(short: Flown) -> None:
     assert since_s == short.t[np.argmax(ramp < 5.0)]
     assert isnan(short.stays_below(ramp, -1.0))
     assert short.stays_below(ramp, 11.0) == 0.0
-    assert short.falls_below(ramp, 5.0) == since_s
-    assert isnan(short.falls_below(-ramp, -5.0))  # it only was before its largest
-
-
-def test_a_running_rms_of_what_is_constant() -> None:
-    longer = fly(Flight("hover", duration_s=1.6))
-    t, error = running_rms(longer)
-    assert t[-1] == pytest.approx(longer.t[-1])
-    last = longer.recording.position_error_m[longer.t > longer.t[-1] - 1.0 + 1e-6]
-    assert error[-1] == pytest.approx(np.sqrt(np.mean(last**2)))
 
 
 def test_a_table_has_a_row_for_each_name_and_columns_for_each_group(short: Flown) -> None:
@@ -138,7 +126,8 @@ def test_figures_and_tables_are_written(name: str, short: Flown, tmp_path: Path)
     flown[0] = replace(flown[0], failure="lost")
     written = {path.name for path in write(study, flown, tmp_path)}
     figures = written - {f"{name}.md", f"{name}.csv"}
-    assert {Path(figure).stem for figure in figures} >= ({name} if name != "limits" else {"limits-spiral-600-with"})
+    of_all = {"limits": "limits-spiral-600-with", "recovery": "recovery-whole-LPV-MPC"}
+    assert of_all.get(name, name) in {Path(figure).stem for figure in figures}
     assert figures == {f"{Path(figure).stem}.{suffix}" for figure in figures for suffix in FORMATS}
     assert {path.name for path in tmp_path.iterdir()} == written
     assert len((tmp_path / f"{name}.md").read_text(encoding="utf-8").splitlines()) == 2 + len(
