@@ -15,8 +15,8 @@ _PREFIX_LENGTH = 3
 
 def law_numbers(controller: str, table: Mapping[str, Any]) -> list[Number]:
     """Return the numbers in the table of a control law; where nobody described them, under names made of their keys."""
-    if controller == "lpv-mpc":
-        return [number for number in LPV_MPC if has(table, number.path)]
+    if controller in DESCRIBED:
+        return [number for number in DESCRIBED[controller] if has(table, number.path)]
     letters = "".join(letter for letter in controller.upper() if letter.isascii() and letter.isalnum())
     start = letters.lstrip("0123456789") or "LAW"
     return named(start[:_PREFIX_LENGTH], table, STRUCTURE)
@@ -32,23 +32,71 @@ def _axes(
     ]
 
 
-LPV_MPC = [
-    *(
-        Number(f"LPV_POLE{place + 1}", ("guidance", "poles", place), "rad/s", -20.0, -0.5, f"{turn} pole of position")
+def _poles(name: str, key: Path, what: str) -> list[Number]:
+    """Return two numbers, of two poles of what is named."""
+    return [
+        Number(f"{name}{place + 1}", (*key, "poles", place), "rad/s", -20.0, -0.5, f"{turn} pole of {what}")
         for place, turn in enumerate(_TURN)
-    ),
-    Number("LPV_APPROACH", ("guidance", "approach_speed_m_s"), "m/s", 0.1, 30.0, "Speed towards a far reference"),
-    Number("LPV_TILT_MAX", ("guidance", "max_tilt_deg"), "deg", 5.0, 80.0, "Largest tilt demanded", decimals=1),
-    Number("LPV_THR_MARGIN", ("guidance", "thrust_margin"), "norm", 0.0, 0.45, "Thrust range kept for moments"),
-    Number("LPV_OBS_ACC", ("observer", "acceleration_rad_s"), "rad/s", 0.1, 60.0, "Poles of the force observer"),
-    Number("LPV_OBS_MOM", ("observer", "moment_rad_s"), "rad/s", 0.1, 60.0, "Poles of the moment observer"),
-    Number(
-        "LPV_OBS_ACC_MAX", ("observer", "max_acceleration_m_s2"), "m/s^2", 0.01, 20.0, "Largest disturbance assumed"
-    ),
-    Number("LPV_OBS_MOM_MAX", ("observer", "max_moment_n_m"), "N m", 0.001, 10.0, "Largest disturbance moment assumed"),
-    Number("LPV_MASS_RATE", ("mass", "rate_1_s"), "1/s", 0.0, 2.0, "How fast the mass is learned; 0: never"),
-    Number("LPV_MASS_MIN", ("mass", "min_ratio"), "", 0.1, 1.0, "Least mass assumed, to VEH_MASS"),
-    Number("LPV_MASS_MAX", ("mass", "max_ratio"), "", 1.0, 10.0, "Largest mass assumed, to VEH_MASS"),
+    ]
+
+
+def _references(prefix: str, key: str) -> list[Number]:
+    """Return what bounds the references that either law follows."""
+    return [
+        Number(f"{prefix}_APPROACH", (key, "approach_speed_m_s"), "m/s", 0.1, 30.0, "Speed towards a far reference"),
+        Number(f"{prefix}_TILT_MAX", (key, "max_tilt_deg"), "deg", 5.0, 80.0, "Largest tilt demanded", decimals=1),
+        Number(f"{prefix}_THR_MARGIN", (key, "thrust_margin"), "norm", 0.0, 0.45, "Thrust range kept for moments"),
+    ]
+
+
+def _observed(prefix: str) -> list[Number]:
+    """Return the numbers of the disturbance observers and of the mass, which either law has."""
+    acceleration, moment, mass = f"{prefix}_OBS_ACC", f"{prefix}_OBS_MOM", f"{prefix}_MASS"
+    return [
+        Number(acceleration, ("observer", "acceleration_rad_s"), "rad/s", 0.1, 60.0, "Poles of the force observer"),
+        Number(moment, ("observer", "moment_rad_s"), "rad/s", 0.1, 60.0, "Poles of the moment observer"),
+        Number(
+            f"{acceleration}_MAX",
+            ("observer", "max_acceleration_m_s2"),
+            *("m/s^2", 0.01, 20.0, "Largest disturbance assumed"),
+        ),
+        Number(
+            f"{moment}_MAX", ("observer", "max_moment_n_m"), "N m", 0.001, 10.0, "Largest disturbance moment assumed"
+        ),
+        Number(f"{mass}_RATE", ("mass", "rate_1_s"), "1/s", 0.0, 2.0, "How fast the mass is learned; 0: never"),
+        Number(f"{mass}_MIN", ("mass", "min_ratio"), "", 0.1, 1.0, "Least mass assumed, to VEH_MASS"),
+        Number(f"{mass}_MAX", ("mass", "max_ratio"), "", 1.0, 10.0, "Largest mass assumed, to VEH_MASS"),
+    ]
+
+
+def _limits(prefix: str, key: str) -> list[Number]:
+    """Return the soft limits of the rates, and the weight on all soft ones."""
+    return [
+        *_axes(
+            f"{prefix}_RATE_P {prefix}_RATE_Q {prefix}_RATE_R",
+            (key, "max_rate_rad_s"),
+            *("rad/s", 0.5, 50.0, "Soft limit of the {} rate"),
+        ),
+        Number(f"{prefix}_SLACK", (key, "slack_weight"), "", 1.0, 1e6, "Weight on exceeded soft limits", decimals=1),
+    ]
+
+
+def _recovery(prefix: str) -> list[Number]:
+    """Return the numbers of the recovery, and of the solver, which either law has."""
+    return [
+        Number(f"{prefix}_FB_TURN", ("fallback", "turn_1_s"), "1/s", 0.1, 50.0, "Recovery: turn for each rad left"),
+        Number(
+            f"{prefix}_FB_RATE", ("fallback", "rate_1_s"), "1/s", 0.1, 100.0, "Recovery: how fast the turn is reached"
+        ),
+        Number(f"{prefix}_FB_FASTEST", ("fallback", "max_rate_rad_s"), "rad/s", 0.1, 50.0, "Recovery: fastest turn"),
+        Number(f"{prefix}_QP_ITER", ("qp", "max_iterations"), "", 20, 100_000, "Iterations of the QP's solver at most"),
+    ]
+
+
+LPV_MPC = [
+    *_poles("LPV_POLE", ("guidance",), "position"),
+    *_references("LPV", "guidance"),
+    *_observed("LPV"),
     *_axes("LPV_Q_PHI LPV_Q_THETA LPV_Q_PSI", ("attitude", "output_weight"), "", 1e-3, 1e3, "Weight on {} error"),
     *_axes("LPV_R_U2 LPV_R_U3 LPV_R_U4", ("attitude", "increment_weight"), "", 1e-3, 1e4, "Weight on {} changes"),
     *_axes(
@@ -58,20 +106,38 @@ LPV_MPC = [
         decimals=4,
     ),
     Number("LPV_ANGLE_MAX", ("attitude", "max_angle_deg"), "deg", 10.0, 85.0, "Soft limit of roll, pitch", 1.0, 1),
-    *_axes(
-        "LPV_RATE_P LPV_RATE_Q LPV_RATE_R",
-        ("attitude", "max_rate_rad_s"),
-        *("rad/s", 0.5, 50.0, "Soft limit of the {} rate"),
-    ),
-    Number("LPV_SLACK", ("attitude", "slack_weight"), "", 1.0, 1e6, "Weight on exceeded soft limits", decimals=1),
+    *_limits("LPV", "attitude"),
     Number("LPV_FB_SHIFTED", ("fallback", "shifted_samples"), "", 1, 1000, "Without a plan: samples of the last"),
     Number("LPV_FB_LQR", ("fallback", "lqr_samples"), "", 1, 1000, "Without a plan: then, samples of an LQR"),
     Number(
         "LPV_FB_DESCENT", ("fallback", "descent_thrust"), "norm", 0.5, 0.99, "Without a plan: then, thrust of weight"
     ),
-    Number("LPV_FB_TURN", ("fallback", "turn_1_s"), "1/s", 0.1, 50.0, "Recovery: turn for each rad left"),
-    Number("LPV_FB_RATE", ("fallback", "rate_1_s"), "1/s", 0.1, 100.0, "Recovery: how fast the turn is reached"),
-    Number("LPV_FB_FASTEST", ("fallback", "max_rate_rad_s"), "rad/s", 0.1, 50.0, "Recovery: fastest turn"),
-    Number("LPV_QP_ITER", ("qp", "max_iterations"), "", 20, 100_000, "Iterations of the QP's solver at most"),
+    *_recovery("LPV"),
 ]
 """Of `colibri.autopilot.control.lpv_mpc.law`: all but its samples and the solver."""
+WHOLE_LPV_MPC = [
+    *_poles("WHL_POLE", ("references",), "a large position error"),
+    Number("WHL_EXACT", ("references", "exact_within_m"), "m", 0.01, 10.0, "Nearer references are taken as they are"),
+    *_references("WHL", "references"),
+    *_observed("WHL"),
+    Number("WHL_ANGLE_MAX", ("plan", "max_tilt_deg"), "deg", 10.0, 85.0, "Soft limit of the tilt", decimals=1),
+    *_limits("WHL", "plan"),
+    Number("WHL_PATH_MIN", ("path", "min_speed"), "norm", 0.05, 1.0, "Least speed along the path; 1: on the clock"),
+    Number("WHL_PATH_REWARD", ("path", "reward"), "1/s", 0.01, 1e4, "Reward on path time: more is closer to it"),
+    Number("WHL_PATH_CHANGE", ("path", "change"), "", 1e-3, 1e4, "Weight on changes of the speed along it"),
+    Number("WHL_Q_POSITION", ("weights", "position"), "1/m^2", 1e-2, 1e5, "Weight on position error"),
+    Number("WHL_Q_VELOCITY", ("weights", "velocity"), "s^2/m^2", 1e-4, 1e4, "Weight on velocity error"),
+    Number("WHL_Q_HEADING", ("weights", "heading"), "1/rad^2", 1e-4, 1e3, "Weight on heading error"),
+    Number("WHL_Q_RATE", ("weights", "rate"), "s^2/rad^2", 1e-5, 1e2, "Weight on errors of the rates", decimals=4),
+    Number("WHL_Q_TILT", ("weights", "tilt"), "1/rad^2", 1e-3, 1e4, "Weight on tilt error, of demanded attitudes"),
+    Number("WHL_Q_THRUST", ("weights", "thrust"), "1/N^2", 1e-4, 1e3, "Weight on thrust error, of demanded ones"),
+    Number("WHL_R_FIRST", ("weights", "first_correction"), "", 1e-4, 1e2, "Weight on changes from the last plan"),
+    Number("WHL_R_NEXT", ("weights", "next_correction"), "", 1e-4, 1e2, "Weight on changes within a plan"),
+    Number("WHL_TERM_THRUST", ("weights", "terminal_thrust"), "norm", 0.5, 3.0, "Thrust of weight, after the plan"),
+    Number("WHL_FB_SHIFTED", ("fallback", "shifted_samples"), "", 1, 1000, "Without a plan: samples of the last"),
+    *_poles("WHL_FB_POLE", ("fallback",), "position, of recovery"),
+    *_recovery("WHL"),
+]
+"""Of `colibri.autopilot.control.whole_lpv_mpc.law`: all but its samples, its preview and the solver."""
+DESCRIBED = {"lpv-mpc": LPV_MPC, "whole-lpv-mpc": WHOLE_LPV_MPC}
+"""Name of a control law -> its numbers."""

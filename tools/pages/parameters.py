@@ -5,14 +5,15 @@ from itertools import groupby
 from pathlib import Path
 
 from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.parameters.control_law import DESCRIBED
 from colibri.autopilot.parameters.definitions import definitions
 from colibri.mavlink.parameters.store import FLOAT32_MAX, Kind, Parameter
 from colibri.plant.vehicle.description import load_vehicle
 
 _HEAD = """# Parameters
 
-What a ground station can change, in flight too, of profile `flight` on its vehicle; another control law brings the
-numbers of its own table. Changes are kept in `--state` and hold at the next start. Written by
+What a ground station can change, in flight too, of profile `flight` on its vehicle, by either of two control laws;
+another one brings the numbers of its own table. Changes are kept in `--state` and hold at the next start. Written by
 `python -m tools.pages parameters docs` from the definitions themselves; a test holds that they agree.
 """
 
@@ -20,7 +21,8 @@ numbers of its own table. Changes are kept in `--state` and hold at the next sta
 def page() -> str:
     """Return the page."""
     profile = load_profile("flight")
-    found = definitions(profile, load_vehicle(profile.simulation.vehicle))
+    vehicle = load_vehicle(profile.simulation.vehicle)
+    found = {p for law in DESCRIBED for p in definitions(profile.with_choices(law, None), vehicle)}
     ordered = sorted(found, key=lambda parameter: (parameter.group, parameter.name))
     lines = [_HEAD]
     for group, parameters in groupby(ordered, key=lambda parameter: parameter.group):

@@ -14,7 +14,7 @@ from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.autopilot.parameters.behaviour import ROWS, TRACKS
-from colibri.autopilot.parameters.control_law import STRUCTURE, law_numbers
+from colibri.autopilot.parameters.control_law import DESCRIBED, STRUCTURE, law_numbers
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, behaviour, definitions
 from colibri.autopilot.parameters.number_paths import described, named, paths, read
 from colibri.autopilot.parameters.vehicle_model import vehicle_numbers
@@ -22,7 +22,16 @@ from colibri.mavlink.parameters.store import Kind, ParamError, Parameters, float
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 FLIGHT, HUMMINGBIRD = load_profile("flight"), load_vehicle("hummingbird")
-NOT_IN_FLIGHT = {"control_interval_s", "attitude.check_every", "qp.tolerance"}
+NOT_IN_FLIGHT = {
+    "lpv-mpc": {
+        *("control_interval_s", "qp.tolerance", "attitude.check_every"),
+        *(f"attitude.moves[{place}]" for place in range(6)),
+    },
+    "whole-lpv-mpc": {
+        *("control_interval_s", "qp.tolerance", "plan.check_every", "plan.count_every", "path.max_speed"),
+        *(f"plan.blocks[{place}]" for place in range(6)),
+    },
+}
 
 
 def parameters_of(profile: Profile = FLIGHT, vehicle: Vehicle = HUMMINGBIRD) -> Parameters:
@@ -47,11 +56,13 @@ def test_there_are_parameters_for_every_law_and_vehicle(controller: str, vehicle
         assert isinstance(parameters[name], int)
 
 
-def test_every_number_of_the_flight_profile_that_can_change_is_a_parameter() -> None:
-    table = FLIGHT.table("lpv-mpc")
+@pytest.mark.parametrize("controller", DESCRIBED)
+def test_every_number_of_the_flight_profile_that_can_change_is_a_parameter(controller: str) -> None:
+    table = FLIGHT.table(controller)
     there = {described(path) for path in paths(table)}
-    known = {described(number.path) for number in law_numbers("lpv-mpc", table)}
-    assert there - known == NOT_IN_FLIGHT | {f"attitude.moves[{place}]" for place in range(6)}
+    numbers = law_numbers(controller, table)
+    assert numbers == DESCRIBED[controller]
+    assert there - {described(number.path) for number in numbers} == NOT_IN_FLIGHT[controller]
 
 
 def test_every_number_of_the_vehicle_but_the_ground_under_it_and_its_sensors_is_a_parameter() -> None:
@@ -72,16 +83,17 @@ def test_defaults_leave_everything_as_it_is() -> None:
     assert vehicle is HUMMINGBIRD
 
 
-def test_each_parameter_of_the_law_changes_its_own_number() -> None:
-    table = FLIGHT.table("lpv-mpc")
-    for number in law_numbers("lpv-mpc", table):
-        parameters = parameters_of()
-        value = int(number.maximum) if isinstance(parameters[number.name], int) else number.maximum
-        assert parameters.set(number.name, value) is None
-        profile, vehicle = Numbers(FLIGHT, HUMMINGBIRD).applied(parameters.values)
+@pytest.mark.parametrize("controller", DESCRIBED)
+def test_each_parameter_of_the_law_changes_its_own_number(controller: str) -> None:
+    profile, table = FLIGHT.with_choices(controller, None), FLIGHT.table(controller)
+    for number in law_numbers(controller, table):
+        parameters = parameters_of(profile)
+        name, bound = number.name, number.minimum if read(table, number.path) == number.maximum else number.maximum
+        assert parameters.set(name, int(bound) if isinstance(parameters[name], int) else bound) is None
+        changed, vehicle = Numbers(profile, HUMMINGBIRD).applied(parameters.values)
         assert vehicle is HUMMINGBIRD
-        assert differences(table, profile.table("lpv-mpc")) == {described(number.path)}
-        assert read(profile.table("lpv-mpc"), number.path) == pytest.approx(number.maximum, rel=1e-6)
+        assert differences(table, changed.table(controller)) == {described(number.path)}
+        assert read(changed.table(controller), number.path) == pytest.approx(bound, rel=1e-6)
     assert load_profile("flight") == FLIGHT
 
 

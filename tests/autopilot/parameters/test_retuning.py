@@ -9,6 +9,7 @@ import pytest
 from colibri.autopilot.control.interface import Decision, Horizon, Preview, VehicleState
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.core.subscription import Flown, Subscribers
+from colibri.autopilot.parameters.control_law import DESCRIBED
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, definitions
 from colibri.autopilot.parameters.retuning import Tuned, Tuning, builder
 from colibri.common.config import SettingsError
@@ -55,7 +56,7 @@ def made(parameters: Parameters) -> Tuned | None:
 
 @pytest.fixture
 def flight() -> Flight:
-    return Flight(load_profile("flight"), load_vehicle("hummingbird"))
+    return Flight(load_profile("flight").with_choices("lpv-mpc", None), load_vehicle("hummingbird"))
 
 
 def test_a_change_gives_a_new_law_that_goes_on_with_the_old_ones_memory(flight: Flight) -> None:
@@ -85,11 +86,14 @@ def test_what_cannot_be_together_is_refused(flight: Flight, name: str, value: fl
     assert made(flight.parameters) is None
 
 
-def test_each_number_can_be_at_its_bounds_or_is_refused(flight: Flight) -> None:
+@pytest.mark.parametrize("controller", DESCRIBED)
+def test_each_number_can_be_at_its_bounds_or_is_refused(controller: str) -> None:
     """Nothing raises, and whatever is accepted can be hovered with."""
+    flight = Flight(load_profile("flight").with_choices(controller, None), load_vehicle("hummingbird"))
+    numbers = {number.name for number in DESCRIBED[controller]}
     refused = set()
     for parameter in flight.parameters:
-        if not parameter.name.startswith(("LPV_", "VEH_")):
+        if parameter.name not in numbers and not parameter.name.startswith("VEH_"):
             continue
         for bound in (parameter.minimum, parameter.maximum):
             if flight.parameters.set(parameter.name, bound) is not None:
