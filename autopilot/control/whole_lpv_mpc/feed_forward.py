@@ -24,11 +24,18 @@ _DRAG_PASSES = 2
 
 
 class ForceLimits(NamedTuple):
-    """Limits of the force that references may ask of the thrust: tangent of its tilt, and its vertical part, N."""
+    """Limits of the force that is asked of the thrust.
+
+    Attributes:
+        tilt_tangent: Tangent of its largest tilt.
+        min_n, max_n: What the rotors can make, N.
+        min_up_n: Least vertical part, N, where references ask: less would have no direction to speak of.
+    """
 
     tilt_tangent: float
     min_n: float
     max_n: float
+    min_up_n: float
 
 
 class Guidance(NamedTuple):
@@ -157,7 +164,7 @@ def lead(squared: Array, left: float, limits: Array, commands: Array) -> None:
 @compiled
 def limit_force(force: Array, limits: ForceLimits) -> None:
     """Limit a force, N, ENU, (3,), in place, its vertical part first: height before place."""
-    force[2] = min(max(force[2], limits.min_n), limits.max_n)
+    force[2] = min(max(force[2], limits.min_up_n), limits.max_n)
     horizontal = sqrt(force[0] * force[0] + force[1] * force[1])
     left = sqrt(max(limits.max_n * limits.max_n - force[2] * force[2], 0.0))
     allowed = min(force[2] * limits.tilt_tangent, left)

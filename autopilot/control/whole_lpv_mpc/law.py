@@ -46,6 +46,10 @@ _RECOVER_BEYOND = cos(radians(75.0))
 """A thrust axis further from where it must point is for the recovery law."""
 _AS_PLANNED = cos(radians(15.0))
 """Unless the last plan has led there, to within this."""
+_SHARES, _ALWAYS, _LIMITED_STEPS = 3.0, 0.5, 3
+"""At first, no rotor has more than so many shares of the thrust that must point along its axis, or than such a part of
+its share in hover: where little thrust is to be made, moments must not make much of it. A vehicle that stands, and does
+not know it, would be tipped over by the moments that it takes for a disturbance."""
 _NOWHERE = (0.0, 0.0, 0.0)
 
 
@@ -56,7 +60,8 @@ class ReferenceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=
     approach_speed_m_s: Positive
     exact_within_m: Positive
     max_tilt_deg: Degrees
-    thrust_margin: Annotated[float, msgspec.Meta(ge=0.0, lt=0.5)]
+    min_thrust: Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
+    """Part of the weight."""
 
 
 class FallbackSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -166,6 +171,7 @@ class WholeLpvMpc:
         self._allocation = vehicle.allocation() * square(vehicle.rotors.max_speed)
         self._momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
         self._span_n = float(self._allocation[0].sum())
+        self._hover_squared = vehicle.body.mass_kg * vehicle.gravity_m_s2 / self._span_n
         k1_s2, k2_s = gains(settings.references.poles)
         guidance = Guidance(
             k1_s2,
@@ -179,7 +185,7 @@ class WholeLpvMpc:
         )
         self._targets = TargetBuilder(guidance, settings.path, self._mpc)
         self._tilt_tangent = tan(radians(settings.references.max_tilt_deg))
-        self._thrust_margin = settings.references.thrust_margin
+        self._min_up_n = settings.references.min_thrust * self._hover_squared * self._span_n
         self._turn = recovery.TurnGains(
             settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s
         )
@@ -275,10 +281,8 @@ class WholeLpvMpc:
         self._battery.limit_squared(memory.charge_ah, expected, limits[:, 1])
         now = Now(rigid, float(state.euler[2]), squared, Disturbance(estimate[6:9], estimate[9:]), limits)
         max_squared = square(self._battery.max_common_speed(memory.charge_ah))
-        margin = self._thrust_margin * (max_squared - min_squared)
-        force = ForceLimits(
-            self._tilt_tangent, self._span_n * (min_squared + margin), self._span_n * (max_squared - margin)
-        )
+        min_n, max_n = self._span_n * min_squared, self._span_n * max_squared
+        force = ForceLimits(self._tilt_tangent, min_n, max_n, max(self._min_up_n, min_n))
         return Inputs(rotation, measured, estimate, mass_kg, now, force)
 
     def _estimate(self, memory: Memory, measured: Array) -> Array:
@@ -341,8 +345,12 @@ class WholeLpvMpc:
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
         """Plan, or fall back: return squared rotor speeds, the plan to go on with, its age, and how it came about."""
         target, force, path = wanted
-        if dot(force, inputs.rotation[:, 2].copy()) < _RECOVER_BEYOND * norm(force) and not _planned(memory, inputs):
+        along_n = dot(force, inputs.rotation[:, 2].copy())
+        if along_n < _RECOVER_BEYOND * norm(force) and not _planned(memory, inputs):
             return self._recover(inputs, force, Diagnostics())
+        most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
+        at_first = inputs.now.limits[:_LIMITED_STEPS, 1]
+        np.minimum(at_first, most, out=at_first)
         last = memory.plan.commands[memory.age :] if memory.plan else None
         plan, diagnostics = self._mpc.plan(inputs.now, target, last, path, on_track=on_track)
         if plan is not None:

@@ -21,7 +21,7 @@ STEPS = 40
 MODEL = model_of(load_vehicle("hummingbird"), INTERVAL_S)
 PACKED = packed(MODEL)
 FROM_WRENCH = exact_inverse(MODEL.allocation)
-WIDE = ForceLimits(tan(1.2), 0.2, 19.0)
+WIDE = ForceLimits(tan(1.2), 0.2, 19.0, 0.2)
 CALM = Disturbance(np.zeros(3), np.zeros(3))
 GUIDANCE = Guidance(
     30.0, 11.0, error_transition((-5.0, -6.0), INTERVAL_S, STEPS + 2), 1.1, 0.3, INTERVAL_S, 30.0, 11.0, FROM_WRENCH
@@ -102,6 +102,12 @@ def test_from_far_away_a_slow_motion_leads_there_whatever_the_reference_does() -
     assert near[0][0] == pytest.approx([53.0, 0.0, 0.0], abs=0.03)
     assert near[1][0] == pytest.approx([-3.0, 0.0, 0.0], abs=0.1)
     assert np.abs(near[2][0]).max() < 1.6
+
+
+def test_the_least_thrust_that_is_asked_for_has_a_direction() -> None:
+    force = np.array([0.5, 0.0, -3.0])
+    feed_forward.limit_force(force, WIDE._replace(min_up_n=1.5))
+    assert force == pytest.approx([0.5, 0.0, 1.5])
 
 
 def test_a_demanded_attitude_stands_as_demanded() -> None:

@@ -14,6 +14,7 @@ from colibri.autopilot.guidance.trajectories.tracks import track
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.rotations import nearest_turn
 from colibri.common.serialization import of_bytes, to_bytes
+from colibri.common.types import Vector
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
@@ -37,13 +38,15 @@ class Flight:
         self.memory: Memory = self.law.initial(vehicle.hover_speed)
         self.decisions: list[Decision] = []
         self.yaw_rad = radians(start.psi)
+        self.off_m: Vector = (0.0, 0.0, 0.0)
 
     def state(self) -> VehicleState:
         frame = state_frame(self.world)
         phi, theta, psi = euler_from_quaternion(frame.attitude)
         self.yaw_rad = nearest_turn(psi, self.yaw_rad)
         euler = (phi, theta, self.yaw_rad)
-        return VehicleState(frame.position_enu_m, frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
+        x, y, z = (true + off for true, off in zip(frame.position_enu_m, self.off_m, strict=True))
+        return VehicleState((x, y, z), frame.velocity_enu_m_s, frame.attitude, euler, frame.rate_flu_rad_s)
 
     def take(self, memory: Memory, decision: Decision) -> None:
         self.memory = memory
@@ -163,6 +166,17 @@ def test_what_the_battery_gives_bounds_its_commands() -> None:
     empty = 9.0 + (full.full_voltage_v - full.empty_voltage_v) * (1.0 - 2.0 / full.capacity_ah)
     assert planned.max() < (empty / full.full_voltage_v) ** 2
     assert flight.law.charge_ah(flight.memory) > 2.0
+
+
+@pytest.mark.parametrize("off_m", [(0.25, 0.0, 0.3), (0.25, 0.1, 0.2), (0.5, 0.1, 0.4)])
+def test_on_the_ground_it_does_not_tip_over(off_m: Vector) -> None:
+    """The estimate has it too high, and aside of where it is to be: the reference is below the ground."""
+    flight = Flight(Start(x=0.0, y=0.0, z=0.0, psi=0.0, rotors=4740.0))
+    flight.off_m = off_m
+    flight.follow("hover:height=0", 2.0)
+    phi, theta, _ = flight.state().euler
+    assert max(abs(phi), abs(theta)) < radians(0.1)
+    assert max(decision.rotor_speeds.max() for decision in flight.decisions[-50:]) < 0.8 * VEHICLE.hover_speed
 
 
 def test_an_unsolvable_qp_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
