@@ -40,11 +40,15 @@ def _poles(name: str, key: Path, what: str) -> list[Number]:
     ]
 
 
-def _references(prefix: str, key: str) -> list[Number]:
+def _references(prefix: str) -> list[Number]:
     """Return what bounds the references that either law follows."""
     return [
-        Number(f"{prefix}_APPROACH", (key, "approach_speed_m_s"), "m/s", 0.1, 30.0, "Speed towards a far reference"),
-        Number(f"{prefix}_TILT_MAX", (key, "max_tilt_deg"), "deg", 5.0, 80.0, "Largest tilt demanded", decimals=1),
+        Number(
+            f"{prefix}_APPROACH", ("guidance", "approach_speed_m_s"), "m/s", 0.1, 30.0, "Speed towards a far reference"
+        ),
+        Number(
+            f"{prefix}_TILT_MAX", ("guidance", "max_tilt_deg"), "deg", 5.0, 80.0, "Largest tilt demanded", decimals=1
+        ),
     ]
 
 
@@ -94,7 +98,7 @@ def _recovery(prefix: str) -> list[Number]:
 
 LPV_MPC = [
     *_poles("LPV_POLE", ("guidance",), "position"),
-    *_references("LPV", "guidance"),
+    *_references("LPV"),
     Number("LPV_THR_MARGIN", ("guidance", "thrust_margin"), "norm", 0.0, 0.45, "Thrust range kept for moments"),
     *_observed("LPV"),
     *_axes("LPV_Q_PHI LPV_Q_THETA LPV_Q_PSI", ("attitude", "output_weight"), "", 1e-3, 1e3, "Weight on {} error"),
@@ -116,10 +120,10 @@ LPV_MPC = [
 ]
 """Of `colibri.autopilot.control.lpv_mpc.law`: all but its samples and the solver."""
 WHOLE_LPV_MPC = [
-    *_poles("WHL_POLE", ("references",), "a large position error"),
-    Number("WHL_EXACT", ("references", "exact_within_m"), "m", 0.01, 10.0, "Nearer references are taken as they are"),
-    *_references("WHL", "references"),
-    Number("WHL_THR_MIN", ("references", "min_thrust"), "norm", 0.01, 0.9, "Least thrust of references, of weight"),
+    *_poles("WHL_POLE", ("guidance",), "a large position error"),
+    Number("WHL_EXACT", ("guidance", "exact_within_m"), "m", 0.01, 10.0, "Nearer references are taken as they are"),
+    *_references("WHL"),
+    Number("WHL_THR_MIN", ("guidance", "min_thrust"), "norm", 0.01, 0.9, "Least thrust of references, of weight"),
     *_observed("WHL"),
     Number("WHL_ANGLE_MAX", ("plan", "max_tilt_deg"), "deg", 10.0, 85.0, "Soft limit of the tilt", decimals=1),
     *_limits("WHL", "plan"),

@@ -53,7 +53,7 @@ not know it, would be tipped over by the moments that it takes for a disturbance
 _NOWHERE = (0.0, 0.0, 0.0)
 
 
-class ReferenceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What of the references is followed."""
 
     poles: tuple[Negative, Negative]
@@ -78,7 +78,7 @@ class WholeLpvMpcSettings(Table, frozen=True, forbid_unknown_fields=True, kw_onl
     """The control law."""
 
     control_interval_s: ControlInterval
-    references: ReferenceSettings
+    guidance: GuidanceSettings
     observer: ObserverSettings
     mass: MassSettings
     plan: PlanSettings
@@ -172,20 +172,20 @@ class WholeLpvMpc:
         self._momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
         self._span_n = float(self._allocation[0].sum())
         self._hover_squared = vehicle.body.mass_kg * vehicle.gravity_m_s2 / self._span_n
-        k1_s2, k2_s = gains(settings.references.poles)
+        k1_s2, k2_s = gains(settings.guidance.poles)
         guidance = Guidance(
             k1_s2,
             k2_s,
-            error_transition(settings.references.poles, h, samples),
-            settings.references.approach_speed_m_s * k2_s / k1_s2,
-            settings.references.exact_within_m,
+            error_transition(settings.guidance.poles, h, samples),
+            settings.guidance.approach_speed_m_s * k2_s / k1_s2,
+            settings.guidance.exact_within_m,
             h,
             *gains(settings.fallback.poles),
             self._mpc.from_wrench,
         )
         self._targets = TargetBuilder(guidance, settings.path, self._mpc)
-        self._tilt_tangent = tan(radians(settings.references.max_tilt_deg))
-        self._min_up_n = settings.references.min_thrust * self._hover_squared * self._span_n
+        self._tilt_tangent = tan(radians(settings.guidance.max_tilt_deg))
+        self._min_up_n = settings.guidance.min_thrust * self._hover_squared * self._span_n
         self._turn = recovery.TurnGains(
             settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s
         )
