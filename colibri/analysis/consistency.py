@@ -7,7 +7,6 @@ independent flights, the sum of normalised errors squared is χ² of as many deg
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtri  # scipy.stats has it too, and takes a second to load
 
 from colibri.common.types import Array
 
@@ -45,5 +44,7 @@ class Bounds(NamedTuple):
 
 def bounds(numbers: int, flights: int, level: float = 0.95) -> Bounds:
     """Return where the mean of χ² of `numbers` degrees of freedom over `flights` lies, with probability `level`."""
+    from scipy.special import chdtri  # slow to load, and scipy.stats, which has it too, slower: a report does without
+
     lower, upper = (float(chdtri(numbers * flights, above)) for above in (0.5 + 0.5 * level, 0.5 - 0.5 * level))
     return Bounds(lower / flights, upper / flights)
