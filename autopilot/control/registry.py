@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoints, entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -42,7 +42,13 @@ Factory: TypeAlias = Callable[[Mapping[str, Any], Vehicle, Clock], Controller[An
 
 def controller_names() -> list[str]:
     """Return the names of the control laws that are installed."""
-    return sorted({entry.name for entry in entry_points(group=GROUP)})
+    return sorted({entry.name for entry in registered()})
+
+
+@cache
+def registered() -> EntryPoints:
+    """Return the entry points of all control laws; looked up once, for that reads a file of every package there is."""
+    return entry_points(group=GROUP)
 
 
 def load_controller(name: str) -> Factory:
@@ -51,7 +57,7 @@ def load_controller(name: str) -> Factory:
     Raises:
         ControllerError: There is none, or its package cannot be loaded.
     """
-    for entry in entry_points(group=GROUP, name=name):
+    for entry in registered().select(name=name):
         try:
             factory: Factory = entry.load()
         except (ImportError, AttributeError) as error:
@@ -81,7 +87,7 @@ def origin_of(name: str) -> Origin:
     Raises:
         ControllerError: There is none.
     """
-    for entry in entry_points(group=GROUP, name=name):
+    for entry in registered().select(name=name):
         package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else ""
         spec = find_spec(entry.module)
         file = Path(spec.origin) if spec and spec.origin else None
