@@ -2,6 +2,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out/spiral
+# Every command starts processes, the tests hundreds of them: each would compile all modules anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: setup fly test test-long lint test-clients fuzz chaos scenarios scenarios-rough soak soak-clients kills \
   golden verify-pythons bench lock clean
