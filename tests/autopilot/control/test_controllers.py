@@ -5,9 +5,10 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from math import pi
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pytest
@@ -22,14 +23,18 @@ from colibri.autopilot.control.registry import (
     check_rotor_speeds,
     controller_names,
     load_controller,
+    origin_of,
+    registered,
 )
 from colibri.autopilot.control.vehicle_model.mixer import Mixer
+from colibri.cli.main import main
 from colibri.common.config import SettingsError
 from colibri.common.rotations import quaternion_from_euler
 from colibri.plant.vehicle.description import load_vehicle
 from tools.harness.processes import fly, fly_thesis, rows
 
 DOCS = Path(__file__).parents[3] / "docs"
+FLIGHT = ("fly", "spiral", "--quiet", "--no-figures")
 PROFILES = {"cascade": "thesis", "global-lpv-mpc": "thesis", "geometric-se3": "se3"}
 
 
@@ -160,8 +165,8 @@ def test_the_geometric_controller_follows_an_ideal_vehicle_exactly(tmp_path: Pat
     assert figures["solver"] is None
 
 
-def foreign_package(folder: Path, source: str) -> dict[str, str]:
-    """Install a package as pip would, as far as Python looks; return the environment to find it with."""
+def foreign_package(folder: Path, source: str) -> None:
+    """Install a package as pip would, as far as Python looks."""
     (folder / "their_law.py").write_text(source, encoding="utf-8")
     information = folder / "their_law-1.0.dist-info"
     information.mkdir()
@@ -169,7 +174,43 @@ def foreign_package(folder: Path, source: str) -> dict[str, str]:
     (information / "entry_points.txt").write_text(
         "[colibri.controllers]\ntheir-name = their_law:TheirLaw\nbroken = their_law:Nowhere\n", encoding="utf-8"
     )
-    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}
+
+
+class Ended(NamedTuple):
+    """How a command ended: its exit code, and what it wrote to standard error."""
+
+    returncode: int | str | None
+    stderr: str
+
+
+FlyTheirs: TypeAlias = Callable[..., Ended]
+
+
+@pytest.fixture
+def fly_theirs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> Iterator[FlyTheirs]:
+    """Install a law by its source and fly: here, and in whatever process is started for it."""
+    found = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+
+    def forget() -> None:
+        sys.modules.pop("their_law", None)
+        registered.cache_clear()
+        origin_of.cache_clear()
+
+    def fly_it(source: str, *options: str) -> Ended:
+        foreign_package(tmp_path, source)
+        monkeypatch.syspath_prepend(tmp_path)
+        monkeypatch.setenv("PYTHONPATH", found)
+        forget()
+        try:
+            code: int | str | None = main([*FLIGHT, "--out", str(tmp_path / "out"), *options])
+        except SystemExit as ended:
+            code = ended.code
+        return Ended(code, capfd.readouterr().err)
+
+    yield fly_it
+    forget()
 
 
 def example() -> str:
@@ -179,26 +220,14 @@ def example() -> str:
     return code
 
 
-def fly_theirs(folder: Path, environment: dict[str, str], *options: str) -> "subprocess.CompletedProcess[str]":
-    command = [
-        sys.executable,
-        "-m",
-        "colibri",
-        "fly",
-        "spiral",
-        "--quiet",
-        "--no-figures",
-        "--out",
-        str(folder / "out"),
-    ]
-    return subprocess.run([*command, *options], env=environment, capture_output=True, text=True, check=False)
-
-
 @pytest.mark.parametrize("link", ["direct", pytest.param("udp", marks=pytest.mark.long)])
 def test_the_example_of_the_docs_flies(tmp_path: Path, link: str) -> None:
     assert len(example().splitlines()) <= 36
-    environment = foreign_package(tmp_path, example())
-    done = fly_theirs(tmp_path, environment, "--controller", "their-name", "--link", link, "--duration", "40")
+    foreign_package(tmp_path, example())
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
+    options = ("--controller", "their-name", "--link", link, "--duration", "40", "--out", str(tmp_path / "out"))
+    command = [sys.executable, "-m", "colibri", *FLIGHT, *options]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     figures = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert figures["controller"] == "their-name"
@@ -206,24 +235,24 @@ def test_the_example_of_the_docs_flies(tmp_path: Path, link: str) -> None:
 
 
 @pytest.mark.parametrize("link", ["udp", "direct"])
-def test_a_foreign_law_that_cannot_be_loaded_is_one_line(tmp_path: Path, link: str) -> None:
-    done = fly_theirs(tmp_path, foreign_package(tmp_path, example()), "--controller", "broken", "--link", link)
+def test_a_foreign_law_that_cannot_be_loaded_is_one_line(fly_theirs: FlyTheirs, link: str) -> None:
+    done = fly_theirs(example(), "--controller", "broken", "--link", link)
     assert done.returncode == 2
     assert done.stderr.startswith("colibri: error: controller broken (their_law:Nowhere) cannot be loaded: ")
     assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("link", ["direct", pytest.param("udp", marks=pytest.mark.long)])
-def test_a_foreign_law_that_cannot_be_built_says_why_in_one_line(tmp_path: Path, link: str) -> None:
+def test_a_foreign_law_that_cannot_be_built_says_why_in_one_line(fly_theirs: FlyTheirs, link: str) -> None:
     law = "import colibri\n\n\ndef TheirLaw(*_):\n    raise colibri.Error('mind the gap')\n"
-    done = fly_theirs(tmp_path, foreign_package(tmp_path, law), "--controller", "their-name", "--link", link)
+    done = fly_theirs(law, "--controller", "their-name", "--link", link)
     assert (done.returncode, done.stderr) == (2, "colibri: error: mind the gap\n")
 
 
 @pytest.mark.parametrize("link", ["direct", pytest.param("udp", marks=pytest.mark.long)])
-def test_a_foreign_law_that_goes_wild_ends_in_words(tmp_path: Path, link: str) -> None:
+def test_a_foreign_law_that_goes_wild_ends_in_words(fly_theirs: FlyTheirs, link: str) -> None:
     wild = example().replace("rotor_speeds=", "rotor_speeds=float('nan') * ")
-    done = fly_theirs(tmp_path, foreign_package(tmp_path, wild), "--controller", "their-name", "--link", link)
+    done = fly_theirs(wild, "--controller", "their-name", "--link", link)
     assert done.returncode == 1
     said = "colibri: error: controller their-name gave rotor speeds [nan nan nan nan] at t = 0.000 s: expected four"
     assert said in done.stderr
@@ -231,9 +260,11 @@ def test_a_foreign_law_that_goes_wild_ends_in_words(tmp_path: Path, link: str) -
 
 
 @pytest.mark.parametrize("link", ["memory", pytest.param("udp", marks=pytest.mark.long)])
-def test_a_foreign_law_that_raises_is_a_lost_flight_whose_traceback_is_kept(tmp_path: Path, link: str) -> None:
+def test_a_foreign_law_that_raises_is_a_lost_flight_whose_traceback_is_kept(
+    tmp_path: Path, fly_theirs: FlyTheirs, link: str
+) -> None:
     raises = example().replace("        error =", "        time_us < 500_000 or {}['gain']\n        error =")
-    done = fly_theirs(tmp_path, foreign_package(tmp_path, raises), "--controller", "their-name", "--link", link)
+    done = fly_theirs(raises, "--controller", "their-name", "--link", link)
     out = tmp_path / "out"
     why = "controller their-name raised at t = 0.500 s: KeyError: 'gain'"
     assert done.returncode == 1
@@ -248,9 +279,9 @@ def test_a_foreign_law_that_raises_is_a_lost_flight_whose_traceback_is_kept(tmp_
     assert report["lost_at_s"] == 0.5
 
 
-def test_a_foreign_law_that_raises_while_it_is_built_is_one_line(tmp_path: Path) -> None:
+def test_a_foreign_law_that_raises_while_it_is_built_is_one_line(tmp_path: Path, fly_theirs: FlyTheirs) -> None:
     raises = example().replace("self.mixer = ", "self.mixer = 1 / 0 * ")
-    done = fly_theirs(tmp_path, foreign_package(tmp_path, raises), "--controller", "their-name", "--link", "memory")
+    done = fly_theirs(raises, "--controller", "their-name", "--link", "memory")
     said = "colibri: error: controller their-name cannot be built: ZeroDivisionError: division by zero; its traceback"
     assert done.returncode == 2
     assert done.stderr.startswith(said)
@@ -268,15 +299,16 @@ def test_a_foreign_law_that_raises_while_it_is_built_is_one_line(tmp_path: Path)
         ("        error =", "        raise SystemExit(3)\n        error =", "raised at t = 0.000 s: SystemExit: 3"),
     ],
 )
-def test_what_a_foreign_law_does_in_place_of_deciding_is_said(tmp_path: Path, old: str, new: str, said: str) -> None:
-    law = foreign_package(tmp_path, example().replace(old, new))
-    done = fly_theirs(tmp_path, law, "--controller", "their-name", "--link", "memory")
+def test_what_a_foreign_law_does_in_place_of_deciding_is_said(
+    fly_theirs: FlyTheirs, old: str, new: str, said: str
+) -> None:
+    done = fly_theirs(example().replace(old, new), "--controller", "their-name", "--link", "memory")
     assert done.returncode == 1
     assert done.stderr.startswith(f"colibri: error: controller their-name {said}")
 
 
-def test_what_a_foreign_law_prints_is_shown(tmp_path: Path) -> None:
+def test_what_a_foreign_law_prints_is_shown(fly_theirs: FlyTheirs) -> None:
     prints = example().replace("        error =", "        time_us or print('now', time_us)\n        error =")
     flown = ("--controller", "their-name", "--link", "udp", "--duration", "0.5")
-    done = fly_theirs(tmp_path, foreign_package(tmp_path, prints), *flown)
+    done = fly_theirs(prints, *flown)
     assert (done.returncode, done.stderr) == (0, "now 0\n")

@@ -8,6 +8,7 @@ import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.profile import load_profile
+from colibri.cli.main import main
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.physics.start import Start
 from tools.harness.copter_flight import CopterFlight
@@ -89,9 +90,12 @@ def test_a_ground_station_may_take_over(tmp_path: Path) -> None:
         (("--gcs", "radio:1"), "radio:1: expected udpin:HOST:PORT or udpout:HOST:PORT"),
     ],
 )
-def test_an_invitation_that_cannot_be_is_one_line(tmp_path: Path, options: tuple[str, ...], line: str) -> None:
-    command = [sys.executable, "-m", "colibri", "fly", "spiral", *options, "--quiet", "--out", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"colibri: error: {line}")
-    assert done.stderr.count("\n") == 1
+def test_an_invitation_that_cannot_be_is_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], options: tuple[str, ...], line: str
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["fly", "spiral", *options, "--quiet", "--out", str(tmp_path)])
+    assert ended.value.code == 2
+    said = capfd.readouterr().err
+    assert said.startswith(f"colibri: error: {line}")
+    assert said.count("\n") == 1
