@@ -106,13 +106,13 @@ def test_it_gets_all_that_it_asks_for_when_it_connects(tmp_path: Path) -> None:
 def test_it_flies_where_it_is_told_to(tmp_path: Path) -> None:
     with connected(tmp_path) as (station, flown):
         seen = flown.seen
-        take_off(station, flown, 6.0)
+        take_off(station, flown, 3.0)
 
-        # Go to a place, 20 m to the east and 10 m up.
+        # Go to a place, 20 m to the east and 5 m up.
         x, y = degrees_e7(20.0, 0.0)
         four = (-1, mavlink2.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0, nan)
         frame = mavlink2.MAV_FRAME_GLOBAL
-        assert station.command_int(mavlink2.MAV_CMD_DO_REPOSITION, frame, four, x, y, GROUND_M + 10.0) == ACCEPTED
+        assert station.command_int(mavlink2.MAV_CMD_DO_REPOSITION, frame, four, x, y, GROUND_M + 5.0) == ACCEPTED
         station.until(seen, lambda s: s.position_enu_m[0] > 6.0, "the way")
 
         # Pause.
@@ -121,8 +121,8 @@ def test_it_flies_where_it_is_told_to(tmp_path: Path) -> None:
         assert 6.0 < paused.position_enu_m[0] < 19.0
 
         # Change the height alone, and then the heading alone: east.
-        assert reposition(station, nan, nan, nan, GROUND_M + 4.0) == ACCEPTED
-        station.until(seen, lambda s: abs(s.height_m - 4.0) < 0.1, "the height")
+        assert reposition(station, nan, nan, nan, GROUND_M + 2.0) == ACCEPTED
+        station.until(seen, lambda s: abs(s.height_m - 2.0) < 0.1, "the height")
         assert reposition(station, 0.5 * pi, nan, nan, nan) == ACCEPTED
         station.until(seen, lambda s: abs(s.euler_rad[2]) < 0.05, "the heading")
         assert dist(seen.now.position_enu_m[:2], paused.position_enu_m[:2]) < 0.3
@@ -131,9 +131,9 @@ def test_it_flies_where_it_is_told_to(tmp_path: Path) -> None:
         assert station.command(mavlink2.MAV_CMD_DO_CHANGE_SPEED, 1, 2.0, -1, 0, 0, 0, 0) == ACCEPTED
         x, y = degrees_e7(0.0, 5.0)
         around = (4.0, nan, 0, nan)
-        assert station.command_int(mavlink2.MAV_CMD_DO_ORBIT, frame, around, x, y, GROUND_M + 5.0) == ACCEPTED
+        assert station.command_int(mavlink2.MAV_CMD_DO_ORBIT, frame, around, x, y, GROUND_M + 3.0) == ACCEPTED
         station.until(seen, lambda s: s.mode is Mode.ORBIT, "the orbit")
-        station.until(seen, lambda s: abs(dist(s.position_enu_m, (0.0, 5.0, 5.0)) - 4.0) < 0.2, "the circle")
+        station.until(seen, lambda s: abs(dist(s.position_enu_m, (0.0, 5.0, 3.0)) - 4.0) < 0.2, "the circle")
         station.until(seen, lambda s: abs(hypot(*s.velocity_enu_m_s) - 2.0) < 0.2, "the speed")
         station.until(seen, lambda s: abs(off_inward(s)) < 0.05, "the heading")
 

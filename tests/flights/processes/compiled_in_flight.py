@@ -36,6 +36,12 @@ def fly(flight: CopterFlight) -> None:
         flight.run(0.1)
         assert flight.select(Mode.OFFBOARD) == ACCEPTED
         flight.run(0.3, lambda name=name, fields=fields: flight.send(name, *fields))  # type: ignore[misc]
+    flight.stick()
+    for mode in (Mode.POSITION, Mode.ALTITUDE, Mode.STABILIZED):
+        flight.step()
+        assert flight.select(mode) == ACCEPTED
+        flight.stick()
+        flight.run(0.1)
     flight.client.send("MANUAL_CONTROL", 1, 200, 200, 500, 200, 0)
     flight.run(0.1)
     for mode in (Mode.POSITION, Mode.ALTITUDE, Mode.STABILIZED, Mode.TRACK, Mode.HOLD):
@@ -44,7 +50,7 @@ def fly(flight: CopterFlight) -> None:
     assert flight.command(mav.MAV_CMD_DO_ORBIT, 3.0, 1.0, 0.0, nan, nan, nan, nan) == ACCEPTED
     flight.run(0.3)
     assert flight.select(Mode.RETURN) == ACCEPTED
-    flight.run(1.0)
+    flight.run(2.0)
 
 
 def main() -> None:

@@ -75,7 +75,7 @@ def test_a_ground_station_may_take_over(tmp_path: Path) -> None:
     """A track is a mode like any other: another one can be chosen."""
     station = Station(255, orders=[HOLD])
     with OnPort(station) as port:
-        report = fly(tmp_path, "lemniscate", "--gcs", port.url, "--speed", "max", "--duration", "10")
+        report = fly(tmp_path, "lemniscate", "--gcs", port.url, "--speed", "max", "--duration", "6")
     assert station.acks[Ack(mav.MAV_CMD_DO_SET_MODE, ACCEPTED, station.identity)] == 1
     flown = states(tmp_path)
     assert report["max_error_m"] > 1.0
