@@ -6,7 +6,8 @@ from colibri.analysis.lost import Lost, lost
 from colibri.analysis.recording import Recording, RecordingError, read_recording, write_recording
 from colibri.analysis.report import Report, report, write_report
 from colibri.common.errors import InFlightError
-from colibri.flights.fly import fly_plan, prepare
+from colibri.flights.fly import fly_plan
+from colibri.flights.folder import prepare
 from colibri.flights.plan import FlightPlan, Summary
 
 

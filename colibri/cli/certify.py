@@ -50,7 +50,7 @@ def add_options(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Certify as the command line says; return the exit code."""
     from colibri.certification.report import certify_profile
-    from colibri.flights.fly import occupied
+    from colibri.flights.folder import occupied
 
     with occupied(args.out):
         return certify_profile(args)

@@ -54,7 +54,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Compare as the command line says; return the exit code."""
-    from colibri.flights.fly import occupied
+    from colibri.flights.folder import occupied
 
     with occupied(args.out):
         if args.seeds:

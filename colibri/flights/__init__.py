@@ -6,7 +6,7 @@ from colibri.common.lazy import public
 
 if TYPE_CHECKING:
     from colibri.flights.fly import fly_plan as fly_plan
-    from colibri.flights.fly import prepare as prepare
+    from colibri.flights.folder import prepare as prepare
     from colibri.flights.plan import FlightPlan as FlightPlan
     from colibri.flights.plan import PlanError as PlanError
     from colibri.flights.plan import Summary as Summary

@@ -16,7 +16,7 @@ from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, 
 from colibri.flights.children import Child, end_children, events_of, how_it_ended
 from colibri.flights.command_lines import options_of, plant_options
 from colibri.flights.fleet_status import StatusLines
-from colibri.flights.fly import LOGS, occupied, prepare
+from colibri.flights.folder import LOGS, occupied, prepare
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.links.link import LinkError
 from colibri.mavlink.links.open import check_reach, open_link

@@ -1,23 +1,13 @@
-"""The folder of a flight, and a planned flight flown over whichever link."""
+"""A planned flight, flown over whichever link."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
-from tempfile import TemporaryFile
+from collections.abc import Callable
 
 from colibri.common.errors import InFlightError
-from colibri.common.process.failure_file import FAILURE, keep_failure
-from colibri.common.process.folder_lock import FolderInUseError, FolderLock
-from colibri.common.process.lifecycle import EXIT_FAILED, fail
+from colibri.common.process.failure_file import keep_failure
+from colibri.common.process.lifecycle import EXIT_FAILED
 from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.flights.processes import FlightError, fly_processes
-from colibri.flights.provenance import PROVENANCE, write_provenance
-
-LOGS = (
-    *("flight.csv", "flight.tlog", "plant.csv", "autopilot.csv", "inputs.jsonl", "estimate.csv", "filter.csv"),
-    *("report.json", FAILURE, PROVENANCE),
-)
-FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "rotors.png", "error.png")
+from colibri.flights.provenance import write_provenance
 
 
 def fly_plan(
@@ -45,35 +35,3 @@ def fly_plan(
         return fly_locally(plan, progress)
     except InFlightError as error:
         raise FlightError(keep_failure(error, plan.out), EXIT_FAILED, said=False) from error
-
-
-def prepare(out: Path) -> None:
-    """Make the folder of a flight, and leave nothing of an earlier one in it."""
-    make_folder(out)
-    try:
-        for name in (*LOGS, *FIGURES):
-            (out / name).unlink(missing_ok=True)
-    except OSError as error:
-        fail(f"cannot write to --out {out}: {error.strerror}")
-
-
-@contextmanager
-def occupied(out: Path) -> Iterator[None]:
-    """Keep other commands from writing to a folder meanwhile, or end with one line where one of them does."""
-    make_folder(out)
-    try:
-        lock = FolderLock(out, "--out")
-    except FolderInUseError as error:
-        fail(str(error))
-    with lock:
-        yield
-
-
-def make_folder(out: Path) -> None:
-    """Make a folder that can be written to, or end with one line."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=out):
-            pass
-    except OSError as error:
-        fail(f"cannot write to --out {out}: {error.strerror}")

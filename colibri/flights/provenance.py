@@ -15,13 +15,12 @@ from colibri.autopilot.control.registry import Origin, origin_of
 from colibri.autopilot.guidance.trajectories.loading import file_text, with_file
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import fail
+from colibri.flights.folder import PROVENANCE
 from colibri.flights.plan import FlightPlan
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.plant.environment.weather import RecordedWind
 from colibri.plant.process.options import gust, recorded_wind, wind
 from colibri.plant.vehicle.description import Vehicle
-
-PROVENANCE = "provenance.json"
 
 
 class ProvenanceError(Error):

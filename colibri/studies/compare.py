@@ -10,7 +10,7 @@ from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.tables import print_table, write_table
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
-from colibri.flights.fly import make_folder
+from colibri.flights.folder import make_folder
 from colibri.flights.provenance import ProvenanceError, provenance_of, read_provenance
 from colibri.studies.contenders import Job, jobs_of
 

@@ -18,7 +18,7 @@ from colibri.common.errors import Error
 from colibri.common.process.failure_file import FAILURE
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.common.types import Array
-from colibri.flights.fly import make_folder
+from colibri.flights.folder import make_folder
 from colibri.flights.plan import OPTIONS
 from colibri.flights.provenance import provenance_of
 from colibri.mavlink.hil.feedback import Feedback

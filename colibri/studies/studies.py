@@ -17,7 +17,7 @@ from colibri.analysis.tables import Row, write_table
 from colibri.autopilot.control.interface import Fallback
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
 from colibri.common.process.lifecycle import fail
-from colibri.flights.fly import make_folder
+from colibri.flights.folder import make_folder
 from colibri.plant.environment.weather import Weather, Wind
 from colibri.studies import study_figures
 from colibri.studies.study_figures import Result

@@ -23,7 +23,7 @@ from colibri.analysis.figures import (
 from colibri.analysis.outcome import keep_flight
 from colibri.analysis.parallel import side_by_side
 from colibri.common.process.lifecycle import fail
-from colibri.flights.fly import make_folder, prepare
+from colibri.flights.folder import make_folder, prepare
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
 

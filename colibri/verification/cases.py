@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from colibri.analysis.outcome import keep_flight
 from colibri.common.process.lifecycle import fail
-from colibri.flights.fly import fly_plan, prepare
+from colibri.flights.fly import fly_plan
+from colibri.flights.folder import prepare
 from colibri.flights.plan import FlightPlan
 from colibri.plant.process.options import wind
 from colibri.sitl.backends.setting import setting_of

@@ -11,7 +11,7 @@ import msgspec
 
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
-from colibri.flights.fly import make_folder
+from colibri.flights.folder import make_folder
 from colibri.verification.cases import Case, SitlCase
 from colibri.verification.golden_flights import FLIGHTS
 

@@ -9,7 +9,8 @@ from colibri.analysis.limits import exceeded
 from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, EXIT_INTERRUPTED, fail
-from colibri.flights.fly import fly_plan, occupied, prepare
+from colibri.flights.fly import fly_plan
+from colibri.flights.folder import occupied, prepare
 from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.flights.processes import FlightError
 from colibri.mavlink.links.startup import COMPILING

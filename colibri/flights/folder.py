@@ -1,0 +1,49 @@
+"""The folder of a flight: what is in it, emptied for the next one, kept from other commands meanwhile."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryFile
+
+from colibri.common.process.failure_file import FAILURE
+from colibri.common.process.folder_lock import FolderInUseError, FolderLock
+from colibri.common.process.lifecycle import fail
+
+PROVENANCE = "provenance.json"
+LOGS = (
+    *("flight.csv", "flight.tlog", "plant.csv", "autopilot.csv", "inputs.jsonl", "estimate.csv", "filter.csv"),
+    *("report.json", FAILURE, PROVENANCE),
+)
+FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "rotors.png", "error.png")
+
+
+def prepare(out: Path) -> None:
+    """Make the folder of a flight, and leave nothing of an earlier one in it."""
+    make_folder(out)
+    try:
+        for name in (*LOGS, *FIGURES):
+            (out / name).unlink(missing_ok=True)
+    except OSError as error:
+        fail(f"cannot write to --out {out}: {error.strerror}")
+
+
+@contextmanager
+def occupied(out: Path) -> Iterator[None]:
+    """Keep other commands from writing to a folder meanwhile, or end with one line where one of them does."""
+    make_folder(out)
+    try:
+        lock = FolderLock(out, "--out")
+    except FolderInUseError as error:
+        fail(str(error))
+    with lock:
+        yield
+
+
+def make_folder(out: Path) -> None:
+    """Make a folder that can be written to, or end with one line."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=out):
+            pass
+    except OSError as error:
+        fail(f"cannot write to --out {out}: {error.strerror}")
