@@ -4,7 +4,7 @@ import ast
 import builtins
 import subprocess
 import sys
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -36,10 +36,13 @@ INSIDE = {
 """Exceptions that never leave their file's callers: no user sees them."""
 
 
-def sources() -> Iterator[tuple[Path, ast.Module]]:
+@cache
+def sources() -> list[tuple[Path, ast.Module]]:
     paths = [path for link in sorted(SHIPPED.iterdir()) for path in link.rglob("*.py")]  # rglob follows no links below
-    for path in [*SHIPPED.glob("*.py"), *paths]:
-        yield path.relative_to(SHIPPED), ast.parse(path.read_text(encoding="utf-8"))
+    return [
+        (path.relative_to(SHIPPED), ast.parse(path.read_text(encoding="utf-8")))
+        for path in [*SHIPPED.glob("*.py"), *paths]
+    ]
 
 
 def names(node: ast.expr | None) -> list[str]:
@@ -50,6 +53,7 @@ def names(node: ast.expr | None) -> list[str]:
     return [each.attr if isinstance(each, ast.Attribute) else getattr(each, "id", "") for each in elements]
 
 
+@cache
 def exceptions() -> dict[str, tuple[str, set[str]]]:
     """Return each exception class that is shipped: its file, and the names of all that it derives from."""
     classes: dict[str, tuple[str, list[str]]] = {}

@@ -98,6 +98,11 @@ def test_each_instance_has_its_own_port_for_sdks() -> None:
     assert ground_links(asked, 2) == ["udpout:127.0.0.1:14550", "udpout:127.0.0.1:14542"]
 
 
+def test_who_only_starts_vehicles_does_not_load_what_flies() -> None:
+    program = "import sys, colibri.flights.fleet; print({'numba', 'scipy', 'qpsolvers'} & set(sys.modules))"
+    assert subprocess.check_output([sys.executable, "-c", program], text=True) == "set()\n"
+
+
 @contextmanager
 def standing(folder: Path, *links: str) -> Iterator[tuple[Vehicle, list[psutil.Process]]]:
     """Run a vehicle while the block lasts, and see its plant and its autopilot."""
