@@ -28,6 +28,8 @@ _CONTENDERS = {
     "whole LPV-MPC": "#009E73",
     "whole, on the path": "#CC79A7",
 }
+_MOST_M = 50.0
+"""What is further off is drawn as if it were so far off."""
 _ALSO_WITHOUT = ("SE(3)", "LPV-MPC", "whole LPV-MPC")
 _CALLED = {"thesis": "thesis, on its ideal vehicle"}
 
@@ -85,10 +87,10 @@ def _compare(axes: Axes, named: Sequence[tuple[Result, str]]) -> None:
 
 def speed(results: Sequence[Result]) -> dict[str, Figure]:
     """Draw error and tilt against the top speed of the lemniscate."""
-    figure, grid = axes_grid(3, 1, TOP_IN + _LEGEND_ROW_IN, row_in=1.7)
+    figure, grid = axes_grid(3, 1, TOP_IN + 2 * _LEGEND_ROW_IN, row_in=2.1)
     quantities: tuple[tuple[str, Callable[[Flown], float]], ...] = (
-        ("RMS (m)", lambda flown: flown.rms_m),
-        ("maximum (m)", lambda flown: flown.max_error_m),
+        ("RMS (m)", lambda flown: min(flown.rms_m, _MOST_M)),
+        ("maximum (m)", lambda flown: min(flown.max_error_m, _MOST_M)),
         ("largest tilt (°)", lambda flown: float(flown.tilt_deg[flown.settled].max(initial=0.0))),
     )
     for (axes,), (quantity, of) in zip(grid, quantities, strict=True):
@@ -132,10 +134,13 @@ def robustness(results: Sequence[Result]) -> dict[str, Figure]:
     on = _names(result.row[0] for result in results)
     plants = _names(result.row[1] for result in results)
     figure, grid = axes_grid(len(on), 1, TOP_IN + _LEGEND_ROW_IN, row_in=0.55 * len(plants))
-    figure.subplots_adjust(left=0.33)
+    figure.subplots_adjust(left=0.26)
     for track, (axes,) in zip(on, grid, strict=True):
-        _compare(axes, [(result, result.row[1]) for result in results if result.row[0] == track])
-        axes.set_title(track, loc="left", fontsize="medium")
+        named = [(result, result.row[1].replace(", ", ",\n")) for result in results if result.row[0] == track]
+        _compare(axes, named)
+        axes.set_ylabel(track, fontweight="bold")
+    for (axes,) in grid[:-1]:
+        axes.set_xlabel("")
     put_head(figure, "Position error with a plant that is not as planned", columns=2)
     return {"robustness": figure}
 

@@ -23,6 +23,7 @@ from colibri.plant.environment.weather import NO_WEATHER, Weather
 from colibri.plant.process.logs import TRUTH_COLUMNS
 from colibri.plant.vehicle.description import Vehicle
 
+_AWAY_M = 200.0
 _GROUNDED_M = 0.1
 """No study flies so low; a vehicle on its back lies as high as one on its feet, or a little lower."""
 _SAMPLE_TIME_S = 1e-6
@@ -158,8 +159,9 @@ class Flown:
 
     @property
     def crashed(self) -> bool:
-        """Whether it ended early, or came down to the ground."""
-        return self.failure is not None or float(self.recording["z"].min()) < _GROUNDED_M
+        """Whether it ended early, came down to the ground, or flew away."""
+        came_down = float(self.recording["z"].min()) < _GROUNDED_M
+        return self.failure is not None or came_down or float(self.recording.position_error_m.max()) > _AWAY_M
 
     @property
     def height_lost_m(self) -> float:

@@ -67,7 +67,10 @@ BAD_INPUT = {
     "track": ((plain("loop"),), "unknown track loop: choose spiral, expanding-spiral, line, wave"),
     "track option": ((plain("circle:speed=fast"),), "track circle: speed=fast: Expected `float`, got `str`"),
     "waypoints": ((plain("waypoints:nowhere.csv"),), "nowhere.csv: No such file or directory"),
-    "profile": ((plain("spiral"), plain("--profile"), plain("fast")), "unknown profile fast: choose flight, se3, "),
+    "profile": (
+        (plain("spiral"), plain("--profile"), plain("fast")),
+        "unknown profile fast: choose flight, path, se3, ",
+    ),
     "vehicle": ((plain("spiral"), plain("--vehicle"), plain("dragonfly")), "unknown vehicle dragonfly: choose"),
     "solver": ((plain("spiral"), plain("--solver"), plain("simplex")), "unknown solver simplex: installed are"),
     "extra": ((plain("spiral"), plain("--solver"), plain("gurobi")), "gurobi is not installed: pip install"),
