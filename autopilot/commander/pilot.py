@@ -52,7 +52,8 @@ class Sensed(NamedTuple):
         vehicle: None before the first state.
         position_known: Whether the position is known well enough to fly to places.
         delay_us: How far ahead of now the vehicle is: references are those of when commands take effect.
-        path: By how much path time has fallen behind since the sample before, µs, and how fast it passes.
+        waited_us: By how much path time has fallen behind since the sample before.
+        path_speed: How fast path time passes, in parts of the clock's.
     """
 
     now_us: int = 0
@@ -60,7 +61,8 @@ class Sensed(NamedTuple):
     steered: Steered = NOT_STEERED
     position_known: bool = True
     delay_us: int = 0
-    path: tuple[int, float] = (0, 1.0)
+    waited_us: int = 0
+    path_speed: float = 1.0
 
 
 class PilotRecord(NamedTuple):
@@ -92,6 +94,7 @@ class Pilot:
         readiness: Arming checks, and a failed rotor.
         sensed: Inputs of the last control sample.
         task: What is flown.
+        lag_us: By how much path time lags behind the clock.
         speed_m_s: Cruise speed requested for this flight; None for the parameters'.
         saving: The failsafe that is flown, until a mode is selected or the rotors stop.
         terminated: Whether a failsafe stopped the rotors in the air.
@@ -198,17 +201,17 @@ class Pilot:
         *,
         position_known: bool = True,
         delay_us: int = 0,
-        path: tuple[int, float] = (0, 1.0),
+        waited_us: int = 0,
+        path_speed: float = 1.0,
     ) -> None:
         """Take in the inputs of a control sample; the arguments are the fields of `Sensed`."""
-        waited_us, path_speed = path
         self.lag_us += waited_us
         self.generator.wait(waited_us * 1e-6, path_speed)
-        self.sensed = Sensed(now_us, vehicle, steered, position_known, delay_us, path)
+        self.sensed = Sensed(now_us, vehicle, steered, position_known, delay_us, waited_us, path_speed)
 
     def context(self) -> TaskContext:
         """Return the inputs of a task now."""
-        now_us, vehicle, steered, position_known, delay_us, _ = self.sensed
+        now_us, vehicle, steered, position_known, delay_us, *_ = self.sensed
         reference, behaviour = self.generator.reference, self.behaviour
         assert vehicle is not None, "the vehicle has been seen"
         assert reference is not None, "the vehicle has been seen"

@@ -136,7 +136,7 @@ class Diagnostics(NamedTuple):
         predicted: Outputs predicted over the horizon, (N, p), in the order and units that the control law documents.
         planned_squared: Squared rotor speeds that the plan commands at each step, in parts of the largest, (N, 4).
         mass_kg: Mass that the vehicle moves like under its thrust; nan for a control law that estimates none.
-        lag_s: By which the law's path time was behind the clock; nan for a control law that keeps to the clock.
+        path_lag_s: By which the law's path time was behind the clock; nan for a control law that keeps to the clock.
     """
 
     qp_status: QpStatus | None = None
@@ -148,7 +148,7 @@ class Diagnostics(NamedTuple):
     predicted: Array | None = None
     planned_squared: Array | None = None
     mass_kg: float = nan
-    lag_s: float = nan
+    path_lag_s: float = nan
 
 
 class Decision(NamedTuple):

@@ -133,11 +133,6 @@ class ControlLoop:
         return self._charged.charge_ah(self._memory)
 
     @property
-    def takes_path(self) -> bool:
-        """Whether the law flies along references at a speed of its own."""
-        return self._waiting is not None
-
-    @property
     def lag_us(self) -> int:
         """How far the law's path time is behind the clock, µs."""
         return 0 if self._waiting is None or self._memory is None else self._waiting.lag_us(self._memory)

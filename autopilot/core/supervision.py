@@ -39,8 +39,15 @@ class Supervision:
                 defence.caught(errors.ROTOR_WATCH, error)
         steered, position_known = self._sensed(now_us)
         delay_us = 0 if errors.DELAY in defence.off else parts.delay.delay_us
-        path = parts.loop.take_waited_us(), parts.loop.path_speed
-        parts.pilot.sense(now_us, state, steered, position_known=position_known, delay_us=delay_us, path=path)
+        parts.pilot.sense(
+            now_us,
+            state,
+            steered,
+            position_known=position_known,
+            delay_us=delay_us,
+            waited_us=parts.loop.take_waited_us(),
+            path_speed=parts.loop.path_speed,
+        )
         if errors.FAILSAFES not in defence.off:
             try:
                 action = parts.supervisor.step(self._inputs(now_us, state), parts.pilot.flight)

@@ -154,7 +154,7 @@ class SnapshotBuilder:
             planned_squared=squared,
             horizon=forecast,
             mass_kg=how.mass_kg,
-            lag_s=how.lag_s,
+            path_lag_s=how.path_lag_s,
         )
         return self._solver
 

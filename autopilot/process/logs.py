@@ -25,7 +25,7 @@ DECISION_COLUMNS = (
     *(f"active_{kind}" for kind in Active._fields),
     "delay_us",
     "mass_kg",
-    "lag_s",
+    "path_lag_s",
 )
 
 ESTIMATE_COLUMNS = (
@@ -82,7 +82,7 @@ class AutopilotLog:
         codes = (STATUS_CODES[how.qp_status], FALLBACK_CODES[how.fallback])
         times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
         time_s = step.command.time_us / 1e6
-        figures = (*times_us, how.cost, how.slack, *how.active, step.delay_us, how.mass_kg, how.lag_s)
+        figures = (*times_us, how.cost, how.slack, *how.active, step.delay_us, how.mass_kg, how.path_lag_s)
         self._decisions.write((time_s, *step.decision.attitude_reference, *codes, *figures))
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:

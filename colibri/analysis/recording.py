@@ -46,7 +46,7 @@ class Recording:
         control_step_us: Time of each control step, (m,).
         slack: By how much soft limits were planned to be exceeded, in parts of each, (m,).
         active: How many constraints of each kind were active, columns as in `interface.Active`, (m, 4).
-        lag_s: By which path time was last behind the clock; None for a control law that keeps to the clock.
+        path_lag_s: By which path time was last behind the clock; None for a control law that keeps to the clock.
         trajectory_sha256: Hash of the plant's states at every frame, as float64.
     """
 
@@ -57,7 +57,7 @@ class Recording:
     control_step_us: Array
     slack: Array
     active: NDArray[np.int64]
-    lag_s: float | None
+    path_lag_s: float | None
     trajectory_sha256: str
 
     def __getitem__(self, column: str) -> Array:
@@ -98,7 +98,7 @@ def read_recording(plan: FlightPlan) -> Recording:
         control_step_us=decisions[:, 7],
         slack=decisions[:, 9],
         active=decisions[:, 10:14].astype(np.int64),
-        lag_s=None if np.isnan(decisions[-1, _LAG]) else float(decisions[-1, _LAG]),
+        path_lag_s=None if np.isnan(decisions[-1, _LAG]) else float(decisions[-1, _LAG]),
         trajectory_sha256=sha256(np.ascontiguousarray(plant[:, _PLANT_STATE]).tobytes()).hexdigest(),
     )
 

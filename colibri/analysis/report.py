@@ -71,7 +71,7 @@ def report(plan: FlightPlan, summary: Summary | None, recording: Recording, lost
             zip(Active._fields, np.count_nonzero(recording.active, axis=0).tolist(), strict=True)
         ),
         "max_slack": float(recording.slack.max()),
-        "lag_s": recording.lag_s,
+        "path_lag_s": recording.path_lag_s,
         "trajectory_sha256": recording.trajectory_sha256,
     }
 
@@ -107,7 +107,7 @@ def print_report(figures: Report, out: Path, *, flown_by: str | None = None) -> 
         f"position error, RMS after {SETTLED_AFTER_S:.0f} s": "-" if settled is None else length(settled),
         **_estimation_rows(figures),
         "position error, maximum": length(figures["max_error_m"]),
-        **({} if figures["lag_s"] is None else {"behind the clock at the end": f"{figures['lag_s']:.2f} s"}),
+        **({} if figures["path_lag_s"] is None else {"behind the clock at the end": f"{figures['path_lag_s']:.2f} s"}),
         "QP solve time, p50 / p99": times("solve_time_us"),
         "control step, p50 / p99": times("control_step_us"),
         "flown": f"{figures['sim_time_s']:.1f} s in {figures['wall_time_s']:.2f} s",

@@ -13,7 +13,6 @@ from typing import NoReturn, Protocol, cast
 from colibri.cli.shared.processes import PROCESSES, run_process
 from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.library_folders import use_writable_folders
 from colibri.common.process.lifecycle import (
     EXIT_FAILED,
     EXIT_INTERRUPTED,
@@ -23,6 +22,7 @@ from colibri.common.process.lifecycle import (
     use_one_thread,
     use_safe_path,
 )
+from colibri.common.process.writable_folders import use_writable_folders
 
 SUBCOMMANDS = {
     "fly": "fly a track and report how well it went",

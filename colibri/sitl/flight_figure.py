@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from colibri.common.process.library_folders import use_writable_folders
+from colibri.common.process.writable_folders import use_writable_folders
 from colibri.sitl.flight_record import Columns, mode_name, tilt_deg
 
 if TYPE_CHECKING:

@@ -102,8 +102,8 @@ def named_value_float(s: Snapshot) -> list[Fields]:
     }
     if not isnan(solver.mass_kg):
         figures[b"mass_kg"] = solver.mass_kg
-    if not isnan(solver.lag_s):
-        figures[b"path_lag_s"] = solver.lag_s
+    if not isnan(solver.path_lag_s):
+        figures[b"path_lag_s"] = solver.path_lag_s
     return [(boot_ms(s), name, float(value)) for name, value in figures.items()]
 
 

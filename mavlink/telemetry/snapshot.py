@@ -81,7 +81,7 @@ class SolverState(NamedTuple):
         active: Constraints that bind: rotors, increments, angles, rates.
         planned_squared: Squared rotor speeds of the plan's steps, parts of the largest.
         mass_kg: That the vehicle moves like; nan where the control law estimates none.
-        lag_s: By which the path time is behind the clock; nan where the control law keeps to the clock.
+        path_lag_s: By which the path time is behind the clock; nan where the control law keeps to the clock.
     """
 
     status: int = -1
@@ -95,7 +95,7 @@ class SolverState(NamedTuple):
     planned_squared: tuple[FourRotors, ...] = ()
     horizon: tuple[Forecast, ...] = ()
     mass_kg: float = nan
-    lag_s: float = nan
+    path_lag_s: float = nan
 
 
 class EstimatorState(NamedTuple):

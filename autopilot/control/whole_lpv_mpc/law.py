@@ -330,7 +330,7 @@ class WholeLpvMpc:
         angles = (atan2(R[2, 1], R[2, 2]), -asin(min(max(R[2, 0], -1.0), 1.0)), float(wanted.target.yaw_rad[0]))
         how = diagnostics._replace(mass_kg=inputs.mass_kg)
         if wanted.path:
-            how = how._replace(lag_s=memory.lag_us * 1e-6)
+            how = how._replace(path_lag_s=memory.lag_us * 1e-6)
         return after, Decision(commands * self._vehicle.rotors.max_speed, angles, how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:

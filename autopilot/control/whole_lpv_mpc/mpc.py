@@ -14,7 +14,7 @@ from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.control.whole_lpv_mpc import condensing, model, planning
 from colibri.autopilot.control.whole_lpv_mpc.condensing import Problem, Target, Weights
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Lag, Model
-from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, pace_of, read_speeds
+from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, read_speeds, speed_effects
 from colibri.autopilot.control.whole_lpv_mpc.planning import Now, Workspace
 from colibri.common.config import Count, Degrees, Positive, Table
 from colibri.common.elementary import cos, exp, square
@@ -87,7 +87,6 @@ class WholeMpc:
         model: The vehicle's numbers, as one record.
         from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
         starts: Step at which each block begins, and N, (b + 1,).
-        pace: What the speeds along the path at the ends of blocks do.
     """
 
     def __init__(
@@ -113,7 +112,7 @@ class WholeMpc:
         )  # fmt: skip
         on_track = on_hold._replace(position=weights.position, velocity=weights.velocity, tilt=0.0, thrust=0.0)
         thrust_n = weights.terminal_thrust * vehicle.body.mass_kg * vehicle.gravity_m_s2
-        self.starts, self.pace = starts, pace_of(starts, interval_s)
+        self.starts, self._effects = starts, speed_effects(starts, interval_s)
         blocks, rows = len(settings.blocks), condensing.MOTION_ROWS * (n // settings.check_every)
         shared = Workspace(
             np.empty((n, ROTORS)),
@@ -183,7 +182,7 @@ class WholeMpc:
         if path is None:
             planning.condense(now, target, last, self.model, problem, work, free)
         else:
-            planning.condense_on_path(now, target, last, path, self.pace, self.model, problem, work, free)
+            planning.condense_on_path(now, target, last, path, self._effects, self.model, problem, work, free)
         started_s = self._clock()
         minimum = np.empty(len(free.f))
         is_free = planning.free_minimum(free, len(self.starts) - 1, minimum)
@@ -207,7 +206,7 @@ class WholeMpc:
             predicted=states,
             planned_squared=commands,
         )
-        speeds = None if path is None else read_speeds(path.speeds, self.pace.shares, z)
+        speeds = None if path is None else read_speeds(path.speeds, self._effects.shares, z)
         return Plan(commands, states, speeds), diagnostics
 
 

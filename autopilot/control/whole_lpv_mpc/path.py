@@ -37,8 +37,8 @@ class PathSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """On the square of each change of a speed."""
 
 
-class Pace(NamedTuple):
-    """Of path time, what each σ does.
+class SpeedEffects(NamedTuple):
+    """What each σ at the end of a block does to the speeds and to path time.
 
     Attributes:
         shares: Part of the σ at the end of each block in that of each sample, (N + 2, b).
@@ -67,7 +67,7 @@ class PathNow(NamedTuple):
     limits: PathLimits
 
 
-def pace_of(starts: Integers, interval_s: float) -> Pace:
+def speed_effects(starts: Integers, interval_s: float) -> SpeedEffects:
     """Return what the σ at the ends of blocks that begin at `starts`, (b + 1,), do."""
     blocks, samples = len(starts) - 1, int(starts[-1]) + 2
     shares = np.zeros((samples, blocks))
@@ -81,7 +81,7 @@ def pace_of(starts: Integers, interval_s: float) -> Pace:
     passed = np.zeros_like(shares)
     for step in range(1, samples):
         passed[step] = passed[step - 1] + 0.5 * interval_s * (shares[step - 1] + shares[step])
-    return Pace(shares, passed)
+    return SpeedEffects(shares, passed)
 
 
 @compiled
@@ -139,16 +139,16 @@ def slide(
 
 
 @compiled
-def fill_slides(path: PathNow, pace: Pace, responses: Array) -> None:
+def fill_slides(path: PathNow, effects: SpeedEffects, responses: Array) -> None:
     """Write how the deviation from the references changes with each σ, into the last column of each block.
 
     `responses` are (N + 1, 12, 5 b).
     """
     inputs = ROTORS + 1
     for step in range(responses.shape[0]):
-        for block in range(pace.shares.shape[1]):
+        for block in range(effects.shares.shape[1]):
             column = inputs * block + ROTORS
-            share, passed = path.part * pace.shares[step, block], path.part * pace.passed[step, block]
+            share, passed = path.part * effects.shares[step, block], path.part * effects.passed[step, block]
             for i in range(3):
                 P1, P2 = path.slopes[step, i], path.slopes[step, 3 + i]
                 responses[step, POSITION + i, column] = -passed * P1
@@ -156,7 +156,7 @@ def fill_slides(path: PathNow, pace: Pace, responses: Array) -> None:
 
 
 @compiled
-def price(path: PathNow, pace: Pace, starts: Integers, qp: Qp) -> None:
+def price(path: PathNow, effects: SpeedEffects, starts: Integers, qp: Qp) -> None:
     """Add what each σ costs to the QP, and fill its bounds."""
     inputs, limits = ROTORS + 1, path.limits
     for block in range(starts.shape[0] - 1):
@@ -164,7 +164,7 @@ def price(path: PathNow, pace: Pace, starts: Integers, qp: Qp) -> None:
         before, after = path.speeds[starts[block]], path.speeds[starts[block + 1]]
         qp.lower[here], qp.upper[here] = limits.lower - after, limits.upper - after
         change = limits.change * (after - before)
-        qp.f[here] += change - limits.reward * pace.passed[starts[-1], block]
+        qp.f[here] += change - limits.reward * effects.passed[starts[-1], block]
         qp.H[here, here] += limits.change
         if block > 0:
             there = here - inputs

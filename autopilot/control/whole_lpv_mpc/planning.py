@@ -20,7 +20,7 @@ from colibri.autopilot.control.whole_lpv_mpc.condensing import (
 )
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import lead
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance, respond, roll_out
-from colibri.autopilot.control.whole_lpv_mpc.path import Pace, PathNow, fill_slides, price
+from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
 from colibri.common.jit import Packed, compiled
 from colibri.common.types import Array
 
@@ -89,7 +89,7 @@ def condense_on_path(
     target: Target,
     last: Array,
     path: PathNow,
-    pace: Pace,
+    effects: SpeedEffects,
     vehicle: Packed,
     packed: Packed,
     work: Workspace,
@@ -97,9 +97,9 @@ def condense_on_path(
 ) -> None:
     """Fill the QP in which the speed along the path is free, too; see `condense`."""
     _expect(now, target, last, vehicle, packed, work, qp)
-    fill_slides(path, pace, work.responses)
+    fill_slides(path, effects, work.responses)
     cost(work.motion, work.speeds, work.responses, target, work.corrections, packed, qp.H, qp.f)
-    price(path, pace, packed[0].starts, qp)
+    price(path, effects, packed[0].starts, qp)
 
 
 @compiled

@@ -196,7 +196,6 @@ def test_a_law_that_keeps_to_the_clock_is_not_asked_otherwise(monkeypatch: pytes
     loop = loop_of(monkeypatch, Waiting)
     loop.begin(HUMMINGBIRD.hover_speed, 0.0)
     loop.decide(0, LEVEL, STAYING, Pace.CATCHING_UP)
-    assert not loop.takes_path
     assert (loop.take_waited_us(), loop.lag_us) == (0, 0)
 
 

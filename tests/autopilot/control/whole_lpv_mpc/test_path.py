@@ -20,7 +20,7 @@ from tests.autopilot.control.whole_lpv_mpc.test_law import TABLE, VEHICLE, Fligh
 INTERVAL_S = 0.008
 STARTS = np.array([0, 2, 6, 20])
 SAMPLES = int(STARTS[-1]) + 2
-PACE = path.pace_of(STARTS, INTERVAL_S)
+EFFECTS = path.speed_effects(STARTS, INTERVAL_S)
 SPEEDS = np.array([1.0, 0.8, 0.5])
 ON_PATH = load_profile("path").table("whole-lpv-mpc")
 
@@ -70,7 +70,7 @@ def test_what_each_speed_changes_is_the_derivative_of_the_deviation() -> None:
     references, nominal = horizon(), speeds_of(SPEEDS)
     (p, v, _, _), slopes, _ = slid(references, nominal)
     responses = np.zeros((SAMPLES - 1, DEVIATIONS, (ROTORS + 1) * len(SPEEDS)))
-    path.fill_slides(PathNow(nominal, slopes, 1.0, PathLimits(0.1, 1.0, 60.0, 1.0)), PACE, responses)
+    path.fill_slides(PathNow(nominal, slopes, 1.0, PathLimits(0.1, 1.0, 60.0, 1.0)), EFFECTS, responses)
     for block, by in enumerate(1e-5 * np.eye(len(SPEEDS))):
         (moved, faster, _, _), _, _ = slid(references, speeds_of(SPEEDS + by))
         column = responses[:, :, (ROTORS + 1) * block + ROTORS]
@@ -115,7 +115,7 @@ def test_what_cannot_keep_the_time_stays_on_the_path() -> None:
     assert 0.5 < lag_s < 4.0
     assert distances_m[250:].max() < 0.1
     assert all(decision.diagnostics.fallback is None for decision in flight.decisions)
-    assert flight.decisions[-1].diagnostics.lag_s == pytest.approx(lag_s, abs=0.01)
+    assert flight.decisions[-1].diagnostics.path_lag_s == pytest.approx(lag_s, abs=0.01)
 
 
 def test_what_can_keep_the_time_catches_up_with_it() -> None:
