@@ -12,7 +12,7 @@ from types import FunctionType
 from typing import Any, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
-from numba import config, njit
+from numba import __version__, config, njit
 from numba.core.event import Event, Listener, register
 from numpy.typing import NDArray
 
@@ -109,7 +109,9 @@ def _kernel(function: Callable[..., Any]) -> Any:
         if not _use_private_cache():
             return njit(error_model="numpy")(function)
         kernel = njit(cache=True, error_model="numpy")(function)
-    kernel._cache._cache_file._source_stamp = tuple(sorted(map(_hash, files_of(function))))  # noqa: SLF001
+    on_disk = kernel._cache._cache_file  # noqa: SLF001
+    # The version is compared before the rest is read, which fails where it names a type that has gone since.
+    on_disk._version = on_disk._source_stamp = (__version__, *sorted(map(_hash, files_of(function))))  # noqa: SLF001
     return kernel
 
 

@@ -29,17 +29,22 @@ KERNELS = {
 }
 CALLER = """
 from colibri.common.jit import compiled
-from callee import doubled
+from callee import {argument}, doubled
 
 @compiled
 def quadrupled(x):
-    return doubled(doubled(x))
+    return doubled(doubled(x.value))
 
 if __name__ == "__main__":
-    print(quadrupled(1.0), sum(quadrupled.stats.cache_hits.values()))
+    print(quadrupled({argument}(1.0)), sum(quadrupled.stats.cache_hits.values()))
 """
 CALLEE = """
+from typing import NamedTuple
+
 from colibri.common.jit import compiled
+
+class {argument}(NamedTuple):
+    value: float
 
 @compiled
 def doubled(x):
@@ -78,17 +83,19 @@ def _run(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, env=done, capture_output=True, text=True, check=True)
 
 
-def _write(folder: Path, factor: float) -> None:
-    (folder / "callee.py").write_text(CALLEE.format(factor=factor))
-    (folder / "caller.py").write_text(CALLER)
+def _write(folder: Path, factor: float, argument: str = "Number") -> None:
+    (folder / "callee.py").write_text(CALLEE.format(factor=factor, argument=argument))
+    (folder / "caller.py").write_text(CALLER.format(argument=argument))
 
 
-def test_machine_code_is_renewed_with_a_kernel_that_it_calls(tmp_path: Path) -> None:
+def test_machine_code_is_renewed_with_a_kernel_that_it_calls_and_with_the_types_of_its_arguments(
+    tmp_path: Path,
+) -> None:
     said = []
-    for factor in (2.0, 2.0, 3.0):
-        _write(tmp_path, factor)
+    for factor, argument in ((2.0, "Number"), (2.0, "Number"), (3.0, "Number"), (3.0, "Length")):
+        _write(tmp_path, factor, argument)
         said.append(_run(tmp_path).stdout.strip())
-    assert said == ["4.0 0", "4.0 1", "9.0 0"]
+    assert said == ["4.0 0", "4.0 1", "9.0 0", "9.0 0"]
 
 
 @pytest.mark.parametrize("trusted", [True, False], ids=["private", "open to others"])
