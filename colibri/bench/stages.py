@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc
-from colibri.autopilot.control.lpv_mpc.law import LpvMpc
 from colibri.autopilot.control.lpv_mpc.outer_loop import OuterLoop
+from colibri.autopilot.control.parts.vehicle_tracking import VehicleTracker
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus, installed_solvers
 from colibri.autopilot.control.vehicle_model import rotor_lag
@@ -55,7 +55,7 @@ class Stage(NamedTuple):
 
 CONTROL_STEP = Stage("control step", Autopilot, "step")
 STAGES = (
-    Stage("estimate", LpvMpc, "estimate"),
+    Stage("estimate", VehicleTracker, "estimate"),
     Stage("position", OuterLoop, "track"),
     Stage("LPV", AttitudeMpc, "predict"),
     Stage("condense", AttitudeMpc, "condense"),

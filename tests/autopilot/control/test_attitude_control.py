@@ -175,5 +175,5 @@ def test_both_ways_share_what_they_remember() -> None:
         else:
             memory, decision = controller.step(memory, 8000 * sample, turned(3.0), references)
         assert decision.diagnostics.qp_status is QpStatus.SOLVED
-        assert memory.charge_ah > before.charge_ah
+        assert controller.charge_ah(memory) > controller.charge_ah(before)
         assert memory.plan is not None

@@ -75,14 +75,15 @@ def values(controller: LpvMpc, start: Array, disturbance: Callable[[int, Array],
     memory = controller.initial(VEHICLE.hover_speed)
     wrench = np.array([hover_n, *start[6:9]])
     speeds = np.sqrt(squared) / VEHICLE.rotors.max_speed
-    memory = memory._replace(speeds=speeds, moments=start[9:].copy(), wrench=wrench, mean_wrench=wrench)
+    tracked = memory.tracked._replace(speeds=speeds, wrench=wrench, mean_wrench=wrench)
+    memory = memory._replace(tracked=tracked, moments=start[9:].copy())
     count = controller.preview.samples
     demand = AttitudeDemand(np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, hover_n))
     found = []
     for sample in range(SAMPLES):
         euler = euler_from_quaternion(attitude_of(x.tolist()))
         p, q, r = x[3:6].tolist()
-        z = np.array([euler[0], p, euler[1], q, euler[2], r, *memory.wrench[1:], *memory.moments])
+        z = np.array([euler[0], p, euler[1], q, euler[2], r, *memory.tracked.wrench[1:], *memory.moments])
         found.append(float(z @ CERTIFIED.proof.P @ z))
         moment_n_m = disturbance(sample, z)
         u, v, w = x[:3].tolist()

@@ -94,7 +94,7 @@ def test_a_heavier_vehicle_descends_on_more_thrust(monkeypatch: pytest.MonkeyPat
         laden = controller.with_mass(memory, mass_kg)
         after, decision = controller.step(laden, 0, ON_SPIRAL._replace(euler=(0.0, 0.0, 1.57)), planner.horizon(0))
         assert decision.diagnostics.fallback is Fallback.DESCENT
-        squared.append(after.wrench[0] - memory.wrench[0])
+        squared.append(after.tracked.wrench[0] - memory.tracked.wrench[0])
     assert squared[1] > 0.0 > squared[0]
 
 
@@ -156,7 +156,8 @@ def test_whatever_moments_a_fallback_left_the_next_qp_can_be_solved(u: tuple[flo
     memory = controller.initial(VEHICLE.hover_speed)._replace(moments=np.array(u))
     for thrust_speed in (100.0, VEHICLE.hover_speed, 800.0):
         speeds = np.full(4, thrust_speed / VEHICLE.rotors.max_speed)
-        _, decision = controller.step(memory._replace(speeds=speeds), 0, turned(20, -30), planner.horizon(0))
+        memory = memory._replace(tracked=memory.tracked._replace(speeds=speeds))
+        _, decision = controller.step(memory, 0, turned(20, -30), planner.horizon(0))
         assert decision.diagnostics.qp_status is QpStatus.SOLVED
 
 
@@ -167,7 +168,7 @@ def test_commands_within_the_plans_limits_are_never_cut() -> None:
     for state in (turned(40, 0), turned(-30, 30, (4, -4, 2))):
         memory = controller.initial(VEHICLE.hover_speed)
         for sample in range(20):
-            speeds = memory.speeds
+            speeds = memory.tracked.speeds
             memory, decision = controller.step(memory, 8000 * sample, state, planner.horizon(0))
             planned = decision.diagnostics.planned_squared
             assert planned is not None
