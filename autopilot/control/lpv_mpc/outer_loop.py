@@ -10,7 +10,7 @@ from colibri.autopilot.control.interface import AttitudeDemand, Horizon
 from colibri.autopilot.control.lpv_mpc import position_loop, prediction
 from colibri.autopilot.control.lpv_mpc.condensing import Target
 from colibri.autopilot.control.lpv_mpc.position_loop import Demands, Limits, Loop, Motion
-from colibri.autopilot.control.parts.error_dynamics import error_transition
+from colibri.autopilot.control.parts.error_dynamics import error_transition, gains
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag
 from colibri.common.config import Degrees, Negative, Positive, Table
@@ -53,8 +53,7 @@ class OuterLoop:
 
     def __init__(self, settings: GuidanceSettings, vehicle: Vehicle, lag: RotorLag, interval_s: float, n: int) -> None:
         """Control `vehicle` every `interval_s` over a horizon of `n` steps."""
-        first, second = settings.poles
-        k1_s2, k2_s = first * second, -(first + second)
+        k1_s2, k2_s = gains(settings.poles)
         self._samples, self._steps = n + 2, n
         errors_ahead = error_transition(settings.poles, interval_s, self._samples)
         inertia = np.array(vehicle.body.inertia_kg_m2)

@@ -6,6 +6,12 @@ from colibri.common import elementwise
 from colibri.common.types import Array
 
 
+def gains(poles: tuple[float, float]) -> tuple[float, float]:
+    """Return the gains on an error, 1/s², and on its rate, 1/s, by which it dies with these poles, 1/s."""
+    first, second = poles
+    return first * second, -(first + second)
+
+
 def error_transition(poles: tuple[float, float], interval_s: float, samples: int) -> Array:
     """Return how an error and its rate (2,) go on at each sample from now, (samples, 2, 2), the poles being placed."""
     first, second = poles

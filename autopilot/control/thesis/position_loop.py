@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from colibri.autopilot.control.parts.error_dynamics import gains
 from colibri.common.config import Count, Negative, Table
 from colibri.common.kernels import atan, cos, sin
 from colibri.common.types import Vector
@@ -33,8 +34,7 @@ class PositionController:
 
     def __init__(self, settings: PositionSettings, vehicle: Vehicle) -> None:
         """Control `vehicle` with the poles of `settings`."""
-        first, second = settings.poles
-        self._k1, self._k2 = first * second, -(first + second)
+        self._k1, self._k2 = gains(settings.poles)
         self._mass_kg = vehicle.body.mass_kg
         self._gravity_m_s2 = vehicle.gravity_m_s2
 

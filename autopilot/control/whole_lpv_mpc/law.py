@@ -19,7 +19,7 @@ from colibri.autopilot.control.interface import (
     VehicleState,
 )
 from colibri.autopilot.control.parts import recovery
-from colibri.autopilot.control.parts.error_dynamics import error_transition
+from colibri.autopilot.control.parts.error_dynamics import error_transition, gains
 from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, TrackingLaw, VehicleTracker
 from colibri.autopilot.control.qp import QpSolver
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
@@ -287,9 +287,3 @@ def _planned(memory: Memory, inputs: Inputs) -> bool:
         return False
     planned = rotation_matrix(quaternion_from_euler(*memory.plan.states[memory.age, 6:9].tolist()))
     return dot(np.array([row[2] for row in planned]), inputs.observed.rotation[:, 2].copy()) > _AS_PLANNED
-
-
-def gains(poles: tuple[float, float]) -> tuple[float, float]:
-    """Return the gains on an error, 1/s², and on its rate, 1/s, by which it dies with these poles, 1/s."""
-    first, second = poles
-    return first * second, -(first + second)
