@@ -72,7 +72,7 @@ class LqrAttitude:
         outer_loop = OuterLoop(settings.guidance, vehicle, lag, self.interval_s, self.mpc.horizon)
         limits = outer_loop.limits(self._max_squared**0.5)
         hover_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
-        self.thrust_n = (limits.min_thrust_n, hover_n, limits.max_thrust_n)
+        self.thrust_n = (limits.min_n, hover_n, limits.max_n)
 
     def loop(self, numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
         """Return the loop of these numbers, in floats or in fractions."""

@@ -18,7 +18,7 @@ from colibri.autopilot.control.interface import (
     Preview,
     VehicleState,
 )
-from colibri.autopilot.control.lpv_mpc import position_loop, prediction
+from colibri.autopilot.control.lpv_mpc import prediction
 from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc, AttitudeSettings, Plan
 from colibri.autopilot.control.lpv_mpc.condensing import Target
 from colibri.autopilot.control.lpv_mpc.outer_loop import GuidanceSettings, OuterLoop, Setpoint
@@ -33,7 +33,7 @@ from colibri.autopilot.control.vehicle_model.mass import MassSettings
 from colibri.common.config import Count, Positive, Table, read_settings
 from colibri.common.elementary import square
 from colibri.common.kernels import cos
-from colibri.common.matrices import dot, matvec
+from colibri.common.matrices import dot, matvec, norm
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -206,7 +206,7 @@ class LpvMpc(TrackingLaw[Memory]):
 
     def _recover(self, now: InitialState, force: Array, rotation: Array) -> Choice:
         """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
-        direction = matvec(rotation.T, force / position_loop.length(force))
+        direction = matvec(rotation.T, force / norm(force))
         moments = recovery.turning_moment(direction, now.x[list(prediction.RATES)], self.tracker.inertia, self._turn)
         squared = self._mixed(max(dot(force, rotation[:, 2]), 0.0), moments, now)
         moments = matvec(self.tracker.allocation[1:], squared)

@@ -9,8 +9,9 @@ import numpy as np
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon
 from colibri.autopilot.control.lpv_mpc import position_loop, prediction
 from colibri.autopilot.control.lpv_mpc.condensing import Target
-from colibri.autopilot.control.lpv_mpc.position_loop import Demands, Limits, Loop, Motion
+from colibri.autopilot.control.lpv_mpc.position_loop import Demands, Loop, Motion
 from colibri.autopilot.control.parts.error_dynamics import error_transition, gains
+from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag
 from colibri.common.config import Degrees, Negative, Positive, Table
@@ -57,13 +58,14 @@ class OuterLoop:
         self._samples, self._steps = n + 2, n
         errors_ahead = error_transition(settings.poles, interval_s, self._samples)
         inertia = np.array(vehicle.body.inertia_kg_m2)
-        self.loop = Loop(k1_s2, k2_s, errors_ahead, airframe_of(vehicle), inertia, lag.planned, interval_s)
+        max_error_m = settings.approach_speed_m_s * k2_s / k1_s2
+        airframe, follows = airframe_of(vehicle), lag.planned
+        self.loop = Loop(k1_s2, k2_s, errors_ahead, max_error_m, airframe, inertia, follows, interval_s)
         self._packed = packed(self.loop)
         self._span_n = float((vehicle.allocation() * square(vehicle.rotors.max_speed))[0].sum())
         self._min_n = self._span_n * square(lag.min_speed)
         self._thrust_margin = settings.thrust_margin
         self._tilt_tangent = tan(radians(settings.max_tilt_deg))
-        self._position_error_m = settings.approach_speed_m_s * k2_s / k1_s2
 
     def track(
         self, motion: Motion, references: Horizon, planned_yaw: Array, disturbances: Array, max_speed: float
@@ -97,8 +99,9 @@ class OuterLoop:
         end = np.empty(prediction.STATES + prediction.INPUTS)
         return Demands(np.empty((n, 3)), np.empty((n, 3)), np.empty(self._steps), end)
 
-    def limits(self, max_speed: float) -> Limits:
+    def limits(self, max_speed: float) -> ForceLimits:
         """Return the limits of what is demanded, where all rotors can turn at `max_speed`, in parts of the largest."""
         max_n = self._span_n * square(max_speed)
         margin_n = self._thrust_margin * (max_n - self._min_n)
-        return Limits(self._tilt_tangent, self._min_n + margin_n, max_n - margin_n, self._position_error_m)
+        min_n = self._min_n + margin_n
+        return ForceLimits(self._tilt_tangent, min_n, max_n - margin_n, min_n)

@@ -15,30 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
+from colibri.autopilot.control.parts.thrust_force import ForceLimits, overcome_drag
+from colibri.autopilot.control.vehicle_model.airframe import Airframe
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import atan2, cos, sin
+from colibri.common.matrices import norm
 from colibri.common.types import Array
-
-_DRAG_PASSES = 2
-"""Drag depends on the direction of the force that has to overcome it."""
-
-
-class Limits(NamedTuple):
-    """Limits of the outer loop's demands.
-
-    Attributes:
-        tilt_tangent: Tangent of the largest tilt.
-        min_thrust_n, max_thrust_n: Least and largest thrust, N.
-        position_error_m: A larger error counts as this one, which limits the speed of an approach; velocity and
-            acceleration of a reference that far away are followed in the same proportion, which keeps one that no
-            vehicle can follow from leading this one astray.
-    """
-
-    tilt_tangent: float
-    min_thrust_n: float
-    max_thrust_n: float
-    position_error_m: float
 
 
 class Loop(NamedTuple):
@@ -47,6 +29,9 @@ class Loop(NamedTuple):
     Attributes:
         k1_s2, k2_s: Gains on the position error, 1/s², and on its rate, 1/s.
         errors_ahead: Of `error_transition`, (N + 2, 2, 2).
+        max_error_m: A larger error counts as this one, which limits the speed of an approach; velocity and
+            acceleration of a reference that far away are followed in the same proportion, which keeps one that no
+            vehicle can follow from leading this one astray.
         airframe: The vehicle.
         inertia: Ix, Iy, Iz, kg m², (3,).
         follows: Part of the way to its command that thrust goes in a step.
@@ -56,6 +41,7 @@ class Loop(NamedTuple):
     k1_s2: float
     k2_s: float
     errors_ahead: Array
+    max_error_m: float
     airframe: Airframe
     inertia: Array
     follows: float
@@ -98,53 +84,32 @@ class Demands(NamedTuple):
 
 
 @compiled
-def limited_force(force: Array, limits: Limits) -> None:
-    """Limit a force in place, its vertical part first: height before place."""
-    force[2] = min(max(force[2], limits.min_thrust_n), limits.max_thrust_n)
-    horizontal = sqrt(force[0] * force[0] + force[1] * force[1])
-    left = sqrt(max(limits.max_thrust_n * limits.max_thrust_n - force[2] * force[2], 0.0))
-    allowed = min(force[2] * limits.tilt_tangent, left)
-    if horizontal > allowed:
-        force[0] *= allowed / horizontal
-        force[1] *= allowed / horizontal
-
-
-@compiled
 def wanted_forces(
     motion: Motion,
     references: tuple[Array, Array, Array, Array],
     disturbance_m_s2: Array,
     loop: Loop,
-    limits: Limits,
+    limits: ForceLimits,
     forces: Array,
 ) -> None:
     """Fill `forces` with what the thrust must do at each sample."""
     airframe = loop.airframe
     e = references[0][0] - motion.position
-    near = min(1.0, limits.position_error_m / max(length(e), limits.position_error_m))
+    near = min(1.0, loop.max_error_m / max(norm(e), loop.max_error_m))
     e *= near
     e_rate = near * references[1][0] - motion.velocity
     k1, k2 = loop.k1_s2, loop.k2_s
-    free, drag, moving, up = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    moving = np.empty(forces.shape)
     for n in range(forces.shape[0]):
         E = loop.errors_ahead[n]
         for i in range(3):
             ahead = E[0, 0] * e[i] + E[0, 1] * e_rate[i]
             ahead_rate = E[1, 0] * e[i] + E[1, 1] * e_rate[i]
-            moving[i] = near * references[1][n, i] - ahead_rate
+            moving[n, i] = near * references[1][n, i] - ahead_rate
             demanded = near * references[2][n, i] + k1 * ahead + k2 * ahead_rate - disturbance_m_s2[i]
-            free[i] = motion.mass_kg * demanded
-        free[2] += motion.mass_kg * airframe.gravity_m_s2
-        forces[n] = free
-        limited_force(forces[n], limits)
-        for _ in range(_DRAG_PASSES):
-            thrust = length(forces[n])
-            for i in range(3):
-                up[i] = forces[n, i] / thrust
-            drag_force(airframe, moving, up, thrust, drag)
-            for i in range(3):
-                forces[n, i] = free[i] - drag[i]
-            limited_force(forces[n], limits)
+            forces[n, i] = motion.mass_kg * demanded
+        forces[n, 2] += motion.mass_kg * airframe.gravity_m_s2
+    overcome_drag(moving, airframe, limits, forces)
 
 
 @compiled
@@ -160,7 +125,9 @@ def attitudes(forces: Array, yaw_wanted: Array, yaw_predicted: Array, angles: Ar
 
 
 @compiled
-def thrust_commands(thrust_n: float, forces: Array, up: Array, follows: float, limits: Limits, commands: Array) -> None:
+def thrust_commands(
+    thrust_n: float, forces: Array, up: Array, follows: float, limits: ForceLimits, commands: Array
+) -> None:
     """Fill `commands`, N, (N,), so that the lagging thrust, now `thrust_n`, is the wanted one at the end of each step.
 
     The next thrust is the part of the force along the body's z axis; those after it assume the attitude. `follows` is
@@ -168,9 +135,9 @@ def thrust_commands(thrust_n: float, forces: Array, up: Array, follows: float, l
     """
     for n in range(commands.shape[0]):
         force = forces[n + 1]
-        wanted = force[0] * up[0] + force[1] * up[1] + force[2] * up[2] if n == 0 else length(force)
+        wanted = force[0] * up[0] + force[1] * up[1] + force[2] * up[2] if n == 0 else norm(force)
         command = thrust_n + (wanted - thrust_n) / follows
-        command = min(max(command, limits.min_thrust_n), limits.max_thrust_n)
+        command = min(max(command, limits.min_n), limits.max_n)
         thrust_n += (command - thrust_n) * follows
         commands[n] = command
 
@@ -215,7 +182,7 @@ def guide(
     planned_yaw: Array,
     disturbances: Array,
     packed: Packed,
-    limits: Limits,
+    limits: ForceLimits,
     out: Demands,
 ) -> float:
     """Compute all demands of references; return the cosine of the angle from the thrust to where it must point.
@@ -230,7 +197,7 @@ def guide(
     thrust_commands(motion.thrust_n, out.forces, motion.up, loop.follows, limits, out.thrusts)
     end_of_motion(out.angles, loop.inertia, disturbances[3:], loop.interval_s, out.end)
     force, up = out.forces[0], motion.up
-    aligned: float = (force[0] * up[0] + force[1] * up[1] + force[2] * up[2]) / length(force)
+    aligned: float = (force[0] * up[0] + force[1] * up[1] + force[2] * up[2]) / norm(force)
     return aligned
 
 
@@ -240,7 +207,7 @@ def hold_attitude(
     demanded: tuple[Array, Array],
     disturbance_n_m: Array,
     packed: Packed,
-    limits: Limits,
+    limits: ForceLimits,
     out: Demands,
 ) -> float:
     """Compute the demands of given angles, (n, 3), and thrust, N, (n,); return the same cosine as `guide`.
@@ -254,7 +221,7 @@ def hold_attitude(
     for n in range(angles.shape[0]):
         angles[n] = demanded[0][n]
         angles[n, 2] += turns
-        along[n, 2] = min(max(demanded[1][n], limits.min_thrust_n), limits.max_thrust_n)
+        along[n, 2] = min(max(demanded[1][n], limits.min_n), limits.max_n)
     thrust_commands(motion.thrust_n, along, np.array([0.0, 0.0, 1.0]), loop.follows, limits, out.thrusts)
     end_of_motion(angles, loop.inertia, disturbance_n_m, loop.interval_s, out.end)
     phi, theta, psi = angles[0]
@@ -263,9 +230,3 @@ def hold_attitude(
     force[2] = along[0, 2] * cos(phi) * cos(theta)
     aligned: float = (force[0] * up[0] + force[1] * up[1] + force[2] * up[2]) / along[0, 2]
     return aligned
-
-
-@compiled
-def length(vector: Array) -> float:
-    """Return the length of a vector (3,)."""
-    return sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])

@@ -13,29 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.vehicle_model.airframe import drag_force
+from colibri.autopilot.control.parts.thrust_force import ForceLimits, limit_force, overcome_drag
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import cos, sin
+from colibri.common.matrices import norm
 from colibri.common.types import Array
-
-_DRAG_PASSES = 2
-"""Drag depends on the direction of the force that has to overcome it."""
-
-
-class ForceLimits(NamedTuple):
-    """Limits of the force that is asked of the thrust.
-
-    Attributes:
-        tilt_tangent: Tangent of its largest tilt.
-        min_n, max_n: What the rotors can make, N.
-        min_up_n: Least vertical part, N, where references ask: less would have no direction to speak of.
-    """
-
-    tilt_tangent: float
-    min_n: float
-    max_n: float
-    min_up_n: float
 
 
 class Guidance(NamedTuple):
@@ -95,23 +78,13 @@ def ask(
     """
     model = packed[0]
     airframe = model.airframe
-    free, drag, up = np.empty(3), np.empty(3), np.empty(3)
     for n in range(yaw_rad.shape[0]):
-        force = out.forces[n]
         for i in range(3):
-            free[i] = airframe.mass_kg * (acceleration[n, i] - disturbance.acceleration[i])
-        free[2] += airframe.mass_kg * airframe.gravity_m_s2
-        force[:] = free
-        limit_force(force, limits)
-        for _ in range(_DRAG_PASSES):
-            thrust = length(force)
-            for i in range(3):
-                up[i] = force[i] / thrust
-            drag_force(airframe, velocity[n], up, thrust, drag)
-            for i in range(3):
-                force[i] = free[i] - drag[i]
-            limit_force(force, limits)
-        point(force, yaw_rad[n], out.attitudes[n])
+            out.forces[n, i] = airframe.mass_kg * (acceleration[n, i] - disturbance.acceleration[i])
+        out.forces[n, 2] += airframe.mass_kg * airframe.gravity_m_s2
+    overcome_drag(velocity, airframe, limits, out.forces)
+    for n in range(yaw_rad.shape[0]):
+        point(out.forces[n], yaw_rad[n], out.attitudes[n])
     turn(out, disturbance.moment, from_wrench, packed)
 
 
@@ -131,7 +104,7 @@ def turn(flat: Flat, disturbance_n_m: Array, from_wrench: Array, packed: Packed)
             wrench[1 + i] = inertia[i] * (after[i] - before[i]) / h - disturbance_n_m[i]
         p, q, r = rate
         ix, iy, iz = inertia[0], inertia[1], inertia[2]
-        wrench[0] = length(flat.forces[n])
+        wrench[0] = norm(flat.forces[n])
         wrench[1] -= (iy - iz) * q * r - momentum * q
         wrench[2] -= (iz - ix) * p * r + momentum * p
         wrench[3] -= (ix - iy) * p * q
@@ -162,22 +135,10 @@ def lead(squared: Array, left: float, limits: Array, commands: Array) -> None:
 
 
 @compiled
-def limit_force(force: Array, limits: ForceLimits) -> None:
-    """Limit a force, N, ENU, (3,), in place, its vertical part first: height before place."""
-    force[2] = min(max(force[2], limits.min_up_n), limits.max_n)
-    horizontal = sqrt(force[0] * force[0] + force[1] * force[1])
-    left = sqrt(max(limits.max_n * limits.max_n - force[2] * force[2], 0.0))
-    allowed = min(force[2] * limits.tilt_tangent, left)
-    if horizontal > allowed:
-        force[0] *= allowed / horizontal
-        force[1] *= allowed / horizontal
-
-
-@compiled
 def point(force: Array, yaw_rad: float, attitude: Array) -> None:
     """Write the attitude, body to earth, (3, 3), whose z axis points along a force, (3,), at a yaw as Euler's angle."""
     s, c = sin(yaw_rad), cos(yaw_rad)
-    total = length(force)
+    total = norm(force)
     z0, z1, z2 = force[0] / total, force[1] / total, force[2] / total
     x0, x1, x2 = c * z2, s * z2, -s * z1 - c * z0
     across = sqrt(x0 * x0 + x1 * x1 + x2 * x2)
@@ -201,12 +162,6 @@ def rate_between(before: Array, after: Array, interval_s: float, rate: Array) ->
     stretch = (1.0 + squared * (1.0 / 6.0 + squared * (3.0 / 40.0))) / interval_s
     for i in range(3):
         rate[i] *= stretch
-
-
-@compiled
-def length(vector: Array) -> float:
-    """Return the length of a vector (3,)."""
-    return sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
 
 
 @compiled

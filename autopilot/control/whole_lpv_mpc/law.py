@@ -20,12 +20,13 @@ from colibri.autopilot.control.interface import (
 )
 from colibri.autopilot.control.parts import recovery
 from colibri.autopilot.control.parts.error_dynamics import error_transition, gains
+from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, TrackingLaw, VehicleTracker
 from colibri.autopilot.control.qp import QpSolver
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
 from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings
 from colibri.autopilot.control.vehicle_model.mass import MassSettings
-from colibri.autopilot.control.whole_lpv_mpc.feed_forward import ForceLimits, Guidance
+from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Guidance
 from colibri.autopilot.control.whole_lpv_mpc.model import Disturbance
 from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan, PlanSettings, WeightSettings, WholeMpc
 from colibri.autopilot.control.whole_lpv_mpc.path import PathSettings

@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon
+from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.whole_lpv_mpc import feed_forward
 from colibri.autopilot.control.whole_lpv_mpc.condensing import Target
-from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, ForceLimits, Guidance
+from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, Guidance
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
 from colibri.autopilot.control.whole_lpv_mpc.mpc import WholeMpc
 from colibri.autopilot.control.whole_lpv_mpc.path import PathLimits, PathNow, PathSettings, carry_speeds, slide

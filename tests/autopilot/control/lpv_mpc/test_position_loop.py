@@ -1,6 +1,6 @@
 """The outer loop: forces, attitudes and thrusts against what they stand for."""
 
-from math import pi, sqrt, tan
+from math import pi, tan
 
 import numpy as np
 import pytest
@@ -9,15 +9,17 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from colibri.autopilot.control.lpv_mpc import position_loop
-from colibri.autopilot.control.lpv_mpc.position_loop import Limits, Loop, Motion
+from colibri.autopilot.control.lpv_mpc.position_loop import Loop, Motion
 from colibri.autopilot.control.parts.error_dynamics import error_transition
+from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
 from colibri.common.rotations import quaternion_from_euler, rotation_matrix
 from tests.strategies import reals, vectors
 
 AIRFRAME = Airframe(0.698, 9.81, 0.025, 0.05, 0.06)
 NO_DRAG = Airframe(0.698, 9.81, 0.0, 0.0, 0.0)
-LIMITS = Limits(tan(1.0), 1.0, 18.0, 1.5)
+LIMITS = ForceLimits(tan(1.0), 1.0, 18.0, 1.0)
+MAX_ERROR_M = 1.5
 GAINS = (20.0, 9.0)
 NOTHING = np.zeros(3)
 
@@ -39,7 +41,7 @@ def forces_for(
 ) -> np.ndarray:
     forces = np.empty((2, 3))
     r, v, a = (np.tile(part, (2, 1)) for part in reference)
-    loop = Loop(*GAINS, np.tile(np.eye(2), (2, 1, 1)), airframe, np.ones(3), 1.0, 0.008)
+    loop = Loop(*GAINS, np.tile(np.eye(2), (2, 1, 1)), MAX_ERROR_M, airframe, np.ones(3), 1.0, 0.008)
     motion = Motion(position, velocity, np.array([0.0, 0.0, 1.0]), 0.0, 0.0, airframe.mass_kg)
     position_loop.wanted_forces(motion, (r, v, a, np.zeros(2)), disturbance, loop, LIMITS, forces)
     first: np.ndarray = forces[0]
@@ -66,19 +68,8 @@ def test_with_drag_the_force_holds_a_steady_motion(velocity: tuple[float, float,
 def test_a_far_reference_is_approached_at_a_limited_speed() -> None:
     """At the distance that counts at most, feedback is at rest at the speed of approach."""
     far = np.array([100.0, 0.0, 0.0])
-    resting = np.array([LIMITS.position_error_m * GAINS[0] / GAINS[1], 0.0, 0.0])
+    resting = np.array([MAX_ERROR_M * GAINS[0] / GAINS[1], 0.0, 0.0])
     assert forces_for(NOTHING, resting, (far, NOTHING, NOTHING)) == pytest.approx([0.0, 0.0, 0.698 * 9.81])
-
-
-@given(vectors(100.0))
-def test_limited_forces_keep_height_before_place(force: tuple[float, float, float]) -> None:
-    limited = np.array(force)
-    position_loop.limited_force(limited, LIMITS)
-    assert limited[2] == min(max(force[2], 1.0), 18.0)
-    horizontal = sqrt(limited[0] ** 2 + limited[1] ** 2)
-    assert horizontal <= limited[2] * LIMITS.tilt_tangent * (1.0 + 1e-12)
-    assert np.linalg.norm(limited) <= 18.0 * (1.0 + 1e-12)
-    assert force[0] * limited[1] == pytest.approx(force[1] * limited[0], abs=1e-9)
 
 
 @given(reals(8.0), reals(8.0), st.floats(0.5, 15.0), reals(pi), reals(pi))
@@ -101,7 +92,7 @@ def test_commanded_thrust_leads_its_lag() -> None:
     for wanted, command in zip((6.5, float(np.linalg.norm(forces[2]))), commands, strict=False):
         thrust += 0.3 * (command - thrust)
         assert thrust == pytest.approx(wanted)
-    assert commands[2] == LIMITS.max_thrust_n
+    assert commands[2] == LIMITS.max_n
 
 
 def test_the_end_of_the_horizon_moves_as_the_angles_do() -> None:

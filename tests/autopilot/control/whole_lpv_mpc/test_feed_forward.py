@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.control.parts.error_dynamics import error_transition
+from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.control.whole_lpv_mpc import feed_forward, model
-from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, ForceLimits, Guidance
+from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, Guidance
 from colibri.autopilot.control.whole_lpv_mpc.model import RIGID, ROTORS, Disturbance
 from colibri.autopilot.control.whole_lpv_mpc.mpc import model_of
 from colibri.common.jit import packed
@@ -102,12 +103,6 @@ def test_from_far_away_a_slow_motion_leads_there_whatever_the_reference_does() -
     assert near[0][0] == pytest.approx([53.0, 0.0, 0.0], abs=0.03)
     assert near[1][0] == pytest.approx([-3.0, 0.0, 0.0], abs=0.1)
     assert np.abs(near[2][0]).max() < 1.6
-
-
-def test_the_least_thrust_that_is_asked_for_has_a_direction() -> None:
-    force = np.array([0.5, 0.0, -3.0])
-    feed_forward.limit_force(force, WIDE._replace(min_up_n=1.5))
-    assert force == pytest.approx([0.5, 0.0, 1.5])
 
 
 def test_a_demanded_attitude_stands_as_demanded() -> None:
