@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from colibri.autopilot.core.track_autopilot import Autopilot as Autopilot
     from colibri.autopilot.errors import AutopilotError as AutopilotError
     from colibri.autopilot.guidance.trajectories.registry import TrackError as TrackError
+    from colibri.autopilot.guidance.trajectories.registry import track as track
+    from colibri.autopilot.guidance.trajectories.registry import track_names as track_names
     from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries as TaylorSeries
     from colibri.autopilot.guidance.trajectories.tracks import Track as Track
     from colibri.autopilot.guidance.trajectories.tracks import TrackOptions as TrackOptions
-    from colibri.autopilot.guidance.trajectories.tracks import track as track
-    from colibri.autopilot.guidance.trajectories.tracks import track_names as track_names
 else:
     __getattr__, __dir__ = public(__name__)

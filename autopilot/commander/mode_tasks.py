@@ -28,7 +28,8 @@ from colibri.autopilot.guidance.tasks.position import (
 from colibri.autopilot.guidance.tasks.sticks import PositionTask
 from colibri.autopilot.guidance.tasks.task import FlightTask, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import Planner, start_yaw
-from colibri.autopilot.guidance.trajectories.tracks import Track, track
+from colibri.autopilot.guidance.trajectories.registry import track
+from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.plant.vehicle.description import Vehicle
 
 TaskFactory: TypeAlias = Callable[[TaskContext], FlightTask]

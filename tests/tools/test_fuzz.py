@@ -7,7 +7,7 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.core.track_autopilot import Autopilot
-from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import Codec
 from colibri.plant.vehicle.description import load_vehicle

@@ -8,17 +8,9 @@ from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
 from colibri.autopilot.guidance.trajectories.fitting import dips_of, fit
 from colibri.autopilot.guidance.trajectories.reach import Reach, exact_motion
+from colibri.autopilot.guidance.trajectories.registry import TrackError, read_options, track
 from colibri.autopilot.guidance.trajectories.time_optimal.fastest import fastest
-from colibri.autopilot.guidance.trajectories.tracks import (
-    DURATION_S,
-    OPTIONS,
-    SamplesFile,
-    Track,
-    TrackError,
-    WaypointFile,
-    read_options,
-    track,
-)
+from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, OPTIONS, SamplesFile, Track, WaypointFile
 from colibri.plant.vehicle.description import Vehicle
 
 

@@ -1,9 +1,21 @@
-"""Tracks of other packages, found as entry points."""
+"""Tracks by name and options: Colibri's own, and those of other packages, found as entry points.
 
+A name may carry options: `NAME[:KEY=VALUE[,KEY=VALUE…]]`. Those of the thesis take none.
+"""
+
+from dataclasses import replace
 from importlib.metadata import entry_points
-from typing import Any
+from math import isfinite
+from typing import Any, Literal, get_args, get_origin
+
+import msgspec
+import numpy as np
 
 from colibri.autopilot.errors import AutopilotError
+from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
+from colibri.autopilot.guidance.trajectories.taylor import in_series
+from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS, Track, TrackOptions, YawChoice
+from colibri.common.errors import Error
 
 GROUP = "colibri.tracks"
 
@@ -12,12 +24,42 @@ class TrackError(AutopilotError):
     """There is no such track, or it cannot be flown; one line says what there is."""
 
 
-def installed_names() -> list[str]:
+def track(name: str) -> Track:
+    """Return the track of that name, `NAME[:KEY=VALUE[,KEY=VALUE…]]`. One through waypoints reads its file.
+
+    Raises:
+        TrackError: There is no such track or option, a value is impossible, or its file cannot be flown.
+    """
+    base, colon, text = name.partition(":")
+    if base in THESIS_TRACKS and not colon:
+        return THESIS_TRACKS[base]
+    if base in THESIS_TRACKS:
+        raise TrackError(f"track {base} takes no options, but these do: {', '.join(OPTIONS)}")
+    if base in OPTIONS:
+        try:
+            return read_options(base, OPTIONS[base], text if colon else None).track()
+        except TrackFileError as error:
+            raise TrackError(str(error)) from error
+    kind = _load_installed(base)
+    if kind is None:
+        raise TrackError(f"unknown track {base}: choose {', '.join(track_names())}")
+    if not (isinstance(kind, type) and issubclass(kind, TrackOptions)):
+        raise TrackError(f"track {base}: {kind} is no subclass of colibri.TrackOptions")
+    return _tried(base, read_options(base, kind, text if colon else None))
+
+
+def track_names() -> list[str]:
+    """Return the names of all tracks: Colibri's own, then those of other packages."""
+    own = [*THESIS_TRACKS, *OPTIONS]
+    return own + [name for name in _installed_names() if name not in own]
+
+
+def _installed_names() -> list[str]:
     """Return the names of the tracks of other packages."""
     return sorted({entry.name for entry in entry_points(group=GROUP)})
 
 
-def load_installed(name: str) -> Any:
+def _load_installed(name: str) -> Any:
     """Return what another package registered as track `name`; None if none has.
 
     Raises:
@@ -29,3 +71,74 @@ def load_installed(name: str) -> Any:
         except (ImportError, AttributeError) as error:
             raise TrackError(f"track {name} ({entry.value}) cannot be loaded: {error}") from error
     return None
+
+
+def _tried(name: str, options: TrackOptions) -> Track:
+    """Return the track of another package, if it gives three coordinates at the start.
+
+    Raises:
+        TrackError: It does not.
+    """
+    try:
+        given = options.track()
+        found = replace(given, position=in_series(given.position), yaw=given.yaw and in_series(given.yaw))
+        start = found.clock(np.zeros(1), 1)
+        starts = [axis.derivative(0).item() for axis in found.position(start)]
+        yaw_rad = 0.0 if found.yaw is None else found.yaw(start).derivative(0).item()
+    except Error:
+        raise
+    except Exception as error:
+        raise TrackError(f"track {name}: {type(options).__name__}: {type(error).__name__}: {error}") from error
+    if len(starts) != 3 or not all(map(isfinite, (*starts, yaw_rad))):
+        raise TrackError(f"track {name}: {type(options).__name__} gives no colibri.Track of three finite coordinates")
+    return found
+
+
+def read_options(name: str, kind: type[TrackOptions], text: str | None) -> TrackOptions:
+    """Read the options of a track strictly."""
+    fields = {field.name: field for field in msgspec.structs.fields(kind)}
+    given = _pairs(name, kind, text)
+    for key in given:
+        if key not in fields:
+            raise TrackError(f"track {name} has no option {key}: choose {', '.join(fields)}")
+    for key, field in fields.items():
+        if field.required and key not in given:
+            raise TrackError(f"track {name} needs {key}: {name}:{key}={key.upper()}")
+    try:
+        return msgspec.convert(given, type=kind, strict=False)
+    except msgspec.ValidationError as reason:
+        raise TrackError(f"track {name}: {_explained(str(reason), fields, given)}") from reason
+
+
+def _pairs(name: str, kind: type[TrackOptions], text: str | None) -> dict[str, str]:
+    """Take options apart; the first may be a value alone, if the track has a lone option."""
+    given: dict[str, str] = {}
+    for number, item in enumerate([] if text is None else text.split(",")):
+        key, equals, value = item.partition("=")
+        if not equals and item and number == 0 and kind.lone:
+            key, equals, value = kind.lone, "=", item
+        if not equals or not key or not value:
+            raise TrackError(f"track {name}: options are KEY=VALUE[,KEY=VALUE…], not {text!r}: {_keys(kind)}")
+        if key in given:
+            raise TrackError(f"track {name}: {key} is given twice")
+        given[key] = value
+    return given
+
+
+def _keys(kind: type[TrackOptions]) -> str:
+    return f"choose {', '.join(kind.__struct_fields__)}"
+
+
+def _explained(reason: str, fields: dict[str, msgspec.structs.FieldInfo], given: dict[str, str]) -> str:
+    """Say which value is impossible, and what there is."""
+    what, _, key = reason.rstrip("`").partition(" - at `$.")
+    if key not in fields:
+        return what
+    words = [word for kind in (fields[key].type, *get_args(fields[key].type)) for word in _words(kind)]
+    if what.startswith("Invalid enum value"):
+        what = f"choose {', '.join(words)}{'' if fields[key].type == YawChoice else ', or a number'}"
+    return f"{key}={given[key]}: {what}"
+
+
+def _words(kind: Any) -> tuple[Any, ...]:
+    return get_args(kind) if get_origin(kind) is Literal else ()

@@ -1,26 +1,19 @@
-"""The tracks: position and yaw as formulas of time, from which every derivative follows; found by name and options.
-
-A name may carry options: `NAME[:KEY=VALUE[,KEY=VALUE…]]`. Those of the thesis take none. Other packages may bring more.
-"""
+"""The tracks: position and yaw as formulas of time, from which every derivative follows."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from math import inf, isfinite, pi, radians
+from dataclasses import dataclass
+from math import inf, pi, radians
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args, get_origin
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
-from colibri.autopilot.guidance.trajectories.registry import TrackError as TrackError
-from colibri.autopilot.guidance.trajectories.registry import installed_names, load_installed
 from colibri.autopilot.guidance.trajectories.samples_file import Samples, read_samples
-from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, held, in_series, sin
+from colibri.autopilot.guidance.trajectories.taylor import TaylorSeries, atan2, cos, held, sin
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
 from colibri.common.config import Table
-from colibri.common.errors import Error
 from colibri.common.types import Array
 
 Place: TypeAlias = tuple[TaylorSeries, TaylorSeries, TaylorSeries]
@@ -288,36 +281,6 @@ def sampled(samples: Samples) -> Track:
     return Track(position, lambda t: looks(t)[0], float(times_s[-1]))
 
 
-def track(name: str) -> Track:
-    """Return the track of that name, `NAME[:KEY=VALUE[,KEY=VALUE…]]`. One through waypoints reads its file.
-
-    Raises:
-        TrackError: There is no such track or option, a value is impossible, or its file cannot be flown.
-    """
-    base, colon, text = name.partition(":")
-    if base in THESIS_TRACKS and not colon:
-        return THESIS_TRACKS[base]
-    if base in THESIS_TRACKS:
-        raise TrackError(f"track {base} takes no options, but these do: {', '.join(OPTIONS)}")
-    if base in OPTIONS:
-        try:
-            return read_options(base, OPTIONS[base], text if colon else None).track()
-        except TrackFileError as error:
-            raise TrackError(str(error)) from error
-    kind = load_installed(base)
-    if kind is None:
-        raise TrackError(f"unknown track {base}: choose {', '.join(track_names())}")
-    if not (isinstance(kind, type) and issubclass(kind, TrackOptions)):
-        raise TrackError(f"track {base}: {kind} is no subclass of colibri.TrackOptions")
-    return _tried(base, read_options(base, kind, text if colon else None))
-
-
-def track_names() -> list[str]:
-    """Return the names of all tracks: Colibri's own, then those of other packages."""
-    own = [*THESIS_TRACKS, *OPTIONS]
-    return own + [name for name in installed_names() if name not in own]
-
-
 def position(track: Track, t: Array, derivative: int = 0) -> Array:
     """Return a derivative of the position on a track, (n, 3), in m / s^derivative, ENU; at rest after its end.
 
@@ -328,77 +291,6 @@ def position(track: Track, t: Array, derivative: int = 0) -> Array:
     """
     time = track.clock(np.asarray(t, dtype=np.float64), derivative)
     return np.stack([axis.derivative(derivative) for axis in track.position(time)], axis=-1)
-
-
-def _tried(name: str, options: TrackOptions) -> Track:
-    """Return the track of another package, if it gives three coordinates at the start.
-
-    Raises:
-        TrackError: It does not.
-    """
-    try:
-        given = options.track()
-        found = replace(given, position=in_series(given.position), yaw=given.yaw and in_series(given.yaw))
-        start = found.clock(np.zeros(1), 1)
-        starts = [axis.derivative(0).item() for axis in found.position(start)]
-        yaw_rad = 0.0 if found.yaw is None else found.yaw(start).derivative(0).item()
-    except Error:
-        raise
-    except Exception as error:
-        raise TrackError(f"track {name}: {type(options).__name__}: {type(error).__name__}: {error}") from error
-    if len(starts) != 3 or not all(map(isfinite, (*starts, yaw_rad))):
-        raise TrackError(f"track {name}: {type(options).__name__} gives no colibri.Track of three finite coordinates")
-    return found
-
-
-def read_options(name: str, kind: type[TrackOptions], text: str | None) -> TrackOptions:
-    """Read the options of a track strictly."""
-    fields = {field.name: field for field in msgspec.structs.fields(kind)}
-    given = _pairs(name, kind, text)
-    for key in given:
-        if key not in fields:
-            raise TrackError(f"track {name} has no option {key}: choose {', '.join(fields)}")
-    for key, field in fields.items():
-        if field.required and key not in given:
-            raise TrackError(f"track {name} needs {key}: {name}:{key}={key.upper()}")
-    try:
-        return msgspec.convert(given, type=kind, strict=False)
-    except msgspec.ValidationError as reason:
-        raise TrackError(f"track {name}: {_explained(str(reason), fields, given)}") from reason
-
-
-def _pairs(name: str, kind: type[TrackOptions], text: str | None) -> dict[str, str]:
-    """Take options apart; the first may be a value alone, if the track has a lone option."""
-    given: dict[str, str] = {}
-    for number, item in enumerate([] if text is None else text.split(",")):
-        key, equals, value = item.partition("=")
-        if not equals and item and number == 0 and kind.lone:
-            key, equals, value = kind.lone, "=", item
-        if not equals or not key or not value:
-            raise TrackError(f"track {name}: options are KEY=VALUE[,KEY=VALUE…], not {text!r}: {_keys(kind)}")
-        if key in given:
-            raise TrackError(f"track {name}: {key} is given twice")
-        given[key] = value
-    return given
-
-
-def _keys(kind: type[TrackOptions]) -> str:
-    return f"choose {', '.join(kind.__struct_fields__)}"
-
-
-def _explained(reason: str, fields: dict[str, msgspec.structs.FieldInfo], given: dict[str, str]) -> str:
-    """Say which value is impossible, and what there is."""
-    what, _, key = reason.rstrip("`").partition(" - at `$.")
-    if key not in fields:
-        return what
-    words = [word for kind in (fields[key].type, *get_args(fields[key].type)) for word in _words(kind)]
-    if what.startswith("Invalid enum value"):
-        what = f"choose {', '.join(words)}{'' if fields[key].type == YawChoice else ', or a number'}"
-    return f"{key}={given[key]}: {what}"
-
-
-def _words(kind: Any) -> tuple[Any, ...]:
-    return get_args(kind) if get_origin(kind) is Literal else ()
 
 
 def _alpha(t: TaylorSeries) -> TaylorSeries:

@@ -10,7 +10,7 @@ from colibri.autopilot.guidance.tasks.follow import FollowTargetTask
 from colibri.autopilot.guidance.tasks.offboard import OffboardTask
 from colibri.autopilot.guidance.tasks.position import HoldTask, TakeoffTask, TaskSequence, TrackTask
 from colibri.autopilot.guidance.tasks.sticks import PositionTask
-from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.mavlink.mission.items import FENCE, MISSION
 from colibri.mavlink.setpoints.setpoints import OffboardSetpoint, Sticks, TargetState
 from tests.autopilot.commander.cockpit import FLYING, Cockpit, item

@@ -8,7 +8,7 @@ import pytest
 
 from colibri.autopilot.control.profile import Profile, ProfileError, load_profile
 from colibri.autopilot.core.track_autopilot import Autopilot
-from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.common.rotations import quaternion_from_euler
 from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import load_vehicle

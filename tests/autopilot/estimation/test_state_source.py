@@ -9,7 +9,7 @@ from colibri.autopilot.estimation.estimate import Estimate, Health
 from colibri.autopilot.estimation.estimator import Estimator
 from colibri.autopilot.estimation.state_source import StateSource, estimator_for
 from colibri.autopilot.ground.stations import StationSettings
-from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
 from colibri.common.rotations import quaternion_from_euler
 from colibri.mavlink.hil.feedback import Feedback

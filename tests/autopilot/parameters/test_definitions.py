@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
-from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.autopilot.parameters.behaviour import ROWS, TRACKS
 from colibri.autopilot.parameters.control_law import DESCRIBED, STRUCTURE, law_numbers
 from colibri.autopilot.parameters.definitions import ImpossibleError, Numbers, behaviour, definitions

@@ -17,7 +17,8 @@ from colibri.analysis.recording import STATE
 from colibri.autopilot.control.interface import Preview
 from colibri.autopilot.control.qp import IN_SOLVERS_EXTRA
 from colibri.autopilot.guidance.trajectories.planner import Planner
-from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, position, track
+from colibri.autopilot.guidance.trajectories.registry import track
+from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, position
 from colibri.cli.main import main
 from colibri.common.rotations import earth_from_body, quaternion_from_euler
 from colibri.common.types import Array

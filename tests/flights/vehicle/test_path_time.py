@@ -6,7 +6,8 @@ from msgspec import structs
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.autopilot.control.profile import load_profile
-from colibri.autopilot.guidance.trajectories.tracks import position, track
+from colibri.autopilot.guidance.trajectories.registry import track
+from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.types import Vector
 from colibri.plant.physics.start import Start
 from tools.harness.copter_flight import ACCEPTED, CopterFlight

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
-from colibri.autopilot.guidance.trajectories.tracks import position, track
+from colibri.autopilot.guidance.trajectories.registry import track
+from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, geodetic_of
 from colibri.mavlink.mission.items import MISSION, MissionItem
 from colibri.mavlink.wire.dialect import mav

@@ -6,7 +6,8 @@ from math import degrees
 import numpy as np
 
 from colibri.autopilot.guidance.trajectories.planner import start_yaw
-from colibri.autopilot.guidance.trajectories.tracks import position, track
+from colibri.autopilot.guidance.trajectories.registry import track
+from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.flight_record import Columns
 from colibri.sitl.vehicle import Sitl

@@ -12,7 +12,7 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
 from colibri.autopilot.control.vehicle_model.rotor_lag import lead, rotor_lag
 from colibri.autopilot.guidance.trajectories.planner import Planner
-from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 

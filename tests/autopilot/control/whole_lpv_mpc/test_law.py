@@ -10,7 +10,7 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import QpResult, QpSolver, QpStatus
 from colibri.autopilot.control.whole_lpv_mpc.law import Memory, WholeLpvMpc
 from colibri.autopilot.guidance.trajectories.planner import Planner
-from colibri.autopilot.guidance.trajectories.tracks import track
+from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.rotations import nearest_turn
 from colibri.common.serialization import of_bytes, to_bytes

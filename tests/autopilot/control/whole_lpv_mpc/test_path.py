@@ -11,7 +11,8 @@ from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpc
 from colibri.autopilot.control.whole_lpv_mpc.model import DEVIATIONS, POSITION, ROTORS, VELOCITY
 from colibri.autopilot.control.whole_lpv_mpc.path import PathLimits, PathNow
 from colibri.autopilot.guidance.trajectories.planner import Planner
-from colibri.autopilot.guidance.trajectories.tracks import position, track
+from colibri.autopilot.guidance.trajectories.registry import track
+from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.config import SettingsError
 from colibri.common.types import Array
 from colibri.plant.physics.start import Start

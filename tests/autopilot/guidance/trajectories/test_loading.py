@@ -14,7 +14,8 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.loading import LoadedTrack, load_track
-from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, TrackError, position, track
+from colibri.autopilot.guidance.trajectories.registry import TrackError, track
+from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS, position
 from colibri.cli.main import main
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import load_vehicle

@@ -9,7 +9,8 @@ import pytest
 from colibri.autopilot.control.interface import Horizon, Preview
 from colibri.autopilot.control.profile import References
 from colibri.autopilot.guidance.trajectories.planner import Planner, start_yaw
-from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, OPTIONS, THESIS_TRACKS, position, track
+from colibri.autopilot.guidance.trajectories.registry import track
+from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, OPTIONS, THESIS_TRACKS, position
 from colibri.common.types import Array
 
 INTERVAL_S = 0.4

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS, Track, TrackError, position, track
+from colibri.autopilot.guidance.trajectories.registry import TrackError, track
+from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS, Track, position
 from colibri.cli.fly import TRACK_HELP
 
 

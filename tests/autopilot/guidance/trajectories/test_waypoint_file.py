@@ -7,7 +7,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from colibri.autopilot.guidance.trajectories.csv_table import TrackFileError
-from colibri.autopilot.guidance.trajectories.tracks import TrackError, position, track
+from colibri.autopilot.guidance.trajectories.registry import TrackError, track
+from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints, read_waypoints
 
 
