@@ -1,0 +1,29 @@
+"""The command line, run in this process, and files to hand to it."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from colibri.cli.main import main
+
+VEHICLE = Path(__file__).parents[3] / "plant" / "vehicle" / "models" / "hummingbird.toml"
+PROFILE = Path(__file__).parents[3] / "autopilot" / "profiles" / "thesis.toml"
+FLIGHT = PROFILE.with_name("flight.toml")
+
+
+def edited(source: Path, old: str, new: str) -> Callable[[Path], str]:
+    def write(folder: Path) -> str:
+        text = source.read_text(encoding="utf-8")
+        assert text.count(old) == 1
+        path = folder / source.name
+        path.write_text(text.replace(old, new), encoding="utf-8")
+        return str(path)
+
+    return write
+
+
+def exit_code(command: list[str]) -> int | str | None:
+    """Run a command; return what the shell would see."""
+    try:
+        return main(command)
+    except SystemExit as ended:
+        return ended.code

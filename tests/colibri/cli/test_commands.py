@@ -1,0 +1,130 @@
+"""What commands print, and what they leave."""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from errno import ENOSPC
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from colibri.cli.main import SUBCOMMANDS, main
+from colibri.cli.shared.processes import PROCESSES
+from colibri.flights.provenance import plan_of
+from tests.colibri.cli.commands import FLIGHT, VEHICLE, edited, exit_code
+
+FIGURES = ("trajectory", "position", "attitude", "inputs", "rotors", "error")
+MAX_HELP_S = 0.2
+"""Of a core, startup of Python included."""
+HELP = """
+import sys
+from colibri.cli.main import SUBCOMMANDS, main
+from colibri.cli.shared.processes import PROCESSES
+try:
+    main(["--help"])
+finally:
+    print(*sys.modules, file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize("command", SUBCOMMANDS)
+def test_every_subcommand_has_options_and_a_call(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code([command, "--help"]) == 0
+    assert capsys.readouterr().out.startswith(f"usage: colibri {command} ")
+    assert callable(import_module(f"colibri.cli.{command}").run)
+
+
+def test_help_names_every_command_and_loads_nothing_that_is_large() -> None:
+    took_s = []
+    for _ in range(5):
+        before_s = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        done = subprocess.run([sys.executable, "-c", HELP], capture_output=True, text=True, check=True)
+        took_s.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before_s)
+    for command in (*SUBCOMMANDS, *PROCESSES):
+        assert f"\n    {command}" in done.stdout
+    assert not {"numpy", "numba", "msgspec", "pymavlink", "rich"} & set(done.stderr.split())
+    assert min(took_s) < MAX_HELP_S
+
+
+@pytest.mark.parametrize("package", ["plant", "autopilot"])
+def test_help_says_what_a_stranger_needs(package: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", f"colibri.{package}", "--help"], capture_output=True, text=True, check=True
+    )
+    assert f"Example: colibri {package}" in done.stdout
+    assert "14560" in done.stdout
+
+
+def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code(["--version"]) == 0
+    assert capsys.readouterr().out == f"colibri {version('colibri-sitl')}\n"
+
+
+@pytest.mark.parametrize(("what", "file"), [("profile", FLIGHT), ("vehicle", VEHICLE)])
+def test_a_file_of_colibris_own_is_shown_to_be_copied(
+    what: str, file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert exit_code(["show", what, file.stem]) == 0
+    assert capsys.readouterr().out == file.read_text(encoding="utf-8")
+    assert exit_code(["show", what, "nobody"]) == 2
+    assert capsys.readouterr().err.startswith(f"colibri: error: unknown {what} nobody: choose ")
+
+
+def test_figures_are_drawn_of_what_a_flight_left(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By what is in its folder alone: neither its profile nor its waypoints are there any more."""
+    profile, points = edited(FLIGHT, 'name = "flight"', 'name = "mine"')(tmp_path), tmp_path / "points.csv"
+    points.write_text("x,y,z\n0,0,1\n2,0,2\n", encoding="utf-8")
+    out = tmp_path / "out"
+    options = ("--profile", profile, "--link", "memory", "--duration", "0.5", "--wind", "2@270", "--no-figures")
+    assert exit_code(["fly", f"waypoints:{points}", *options, "--quiet", "--out", str(out)]) == 0
+    Path(profile).unlink()
+    points.unlink()
+    (out / "report.json").unlink()
+    assert exit_code(["plot", str(out)]) == 0
+    drawn = capsys.readouterr().out.split()
+    assert drawn == [str(out / f"{name}.png") for name in FIGURES]
+    assert all(Path(path).stat().st_size > 10_000 for path in drawn)
+    assert exit_code(["plot", str(tmp_path)]) == 2
+    assert "provenance.json is missing" in capsys.readouterr().err
+
+
+def test_figures_that_find_no_room_are_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(ENOSPC, os.strerror(ENOSPC))
+
+    assert exit_code(["fly", "hover", "--link", "memory", "--duration", "0.1", "--quiet", "--out", str(tmp_path)]) == 0
+    monkeypatch.setattr("colibri.analysis.figures.draw_flight", full)
+    assert exit_code(["plot", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == f"colibri: error: {tmp_path}: No space left on device\n"
+
+
+def test_titles_name_a_law_that_is_not_the_profiles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ("--link", "memory", "--duration", "0.1", "--no-figures", "--out", str(tmp_path))
+    assert exit_code(["fly", "hover", "--controller", "geometric-se3", *options]) == 0
+    assert capsys.readouterr().out.startswith("hover, profile flight, controller geometric-se3")
+    assert plan_of(tmp_path).flown_by == "profile flight, controller geometric-se3"
+
+
+def test_a_flight_leaves_what_the_readme_names(tmp_path: Path) -> None:
+    assert main(["fly", "crown", "--duration", "21", "--seed", "7", "--quiet", "--out", str(tmp_path)]) == 0
+    report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert {
+        "track": "crown",
+        "profile": "flight",
+        "link": "udp",
+        "seed": 7,
+        "solver": "daqp",
+    }.items() <= report.items()
+    assert set(report["solve_time_us"]) == set(report["control_step_us"]) == {"p50", "p99", "max"}
+    assert report["sim_time_s"] == 21.0
+    assert report["real_time_factor"] == pytest.approx(21.0 / report["wall_time_s"])
+    assert 0.0 < report["rmse_after_20s_m"] <= report["rmse_m"] <= report["max_error_m"]
+    assert len(report["trajectory_sha256"]) == 64
+    assert {"flight.csv", "flight.tlog"} <= {path.name for path in tmp_path.iterdir()}
+    assert len(list(tmp_path.glob("*.png"))) == 6

@@ -1,0 +1,101 @@
+"""The processes of a command: how they begin, how they are interrupted, and what ends with what."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+
+from tools.harness.processes import wait_for
+
+
+def fly_slowly(out: Path) -> "subprocess.Popen[str]":
+    command = [sys.executable, "-m", "colibri", "fly", "spiral", "--speed", "10", "--no-figures", "--out", str(out)]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True)
+
+
+def has_flown(out: Path) -> bool:
+    log = out / "plant.csv"
+    return log.exists() and log.stat().st_size > 10_000
+
+
+def alive(process: psutil.Process) -> bool:
+    return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+
+
+@pytest.mark.parametrize("whom", ["group", pytest.param("parent", marks=pytest.mark.long)])
+def test_ctrl_c_ends_all_and_keeps_what_was_logged(tmp_path: Path, whom: str) -> None:
+    """A terminal interrupts the whole group; `kill` ends only the command itself."""
+    flight = fly_slowly(tmp_path)
+    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
+    children = psutil.Process(flight.pid).children(recursive=True)
+    assert len(children) == 2
+    if whom == "group":
+        os.killpg(flight.pid, signal.SIGINT)
+    else:
+        flight.send_signal(signal.SIGTERM)
+    _, said = flight.communicate(timeout=60.0)
+    assert flight.returncode == 130
+    assert said.splitlines()[-1] == f"colibri: error: interrupted; what was logged is in {tmp_path}"
+    assert "Traceback" not in said
+    assert not any(child.is_running() for child in children)
+    flown = (tmp_path / "flight.csv").read_text(encoding="utf-8").splitlines()
+    assert len(flown) > 10
+    assert flown[0].startswith("t,u,v,w,p,q,r,x,y,z,phi,theta,psi,U1")
+
+
+@pytest.mark.parametrize("name", ["autopilot", pytest.param("plant", marks=pytest.mark.long)])
+def test_a_process_that_dies_ends_the_flight_in_words(tmp_path: Path, name: str) -> None:
+    flight = fly_slowly(tmp_path)
+    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
+    children = psutil.Process(flight.pid).children(recursive=True)
+    (victim,) = (child for child in children if name in child.cmdline()[3])
+    victim.send_signal(signal.SIGKILL)
+    _, said = flight.communicate(timeout=60.0)
+    assert flight.returncode == 1
+    expected = f"colibri: error: the {name} was killed by SIGKILL; what was logged is in {tmp_path}"
+    assert said.splitlines()[-1] == expected
+    assert not any(child.is_running() for child in children)
+
+
+def test_no_process_outlives_a_parent_that_was_killed(tmp_path: Path) -> None:
+    flight = fly_slowly(tmp_path)
+    wait_for(lambda: has_flown(tmp_path), "the flight to begin")
+    children = psutil.Process(flight.pid).children(recursive=True)
+    flight.kill()
+    flight.communicate()
+    wait_for(lambda: not any(alive(child) for child in children), "both processes to end")
+
+
+@pytest.mark.parametrize("package", ["plant", "autopilot"])
+def test_a_process_whose_parent_was_gone_before_it_began_ends(package: str) -> None:
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    link = ("--link", "udpin:127.0.0.1:0") if package == "plant" else ("--plant", "udpout:127.0.0.1:9")
+    command = [sys.executable, "-m", f"colibri.{package}", "--json", "--parent", str(gone.pid), *link]
+    assert subprocess.run(command, capture_output=True, check=False, timeout=60.0).returncode == 130
+
+
+@pytest.mark.parametrize(
+    "options",
+    [("fly", "hover", "--link", "udp", "--no-figures"), ("compare", "--track", "hover")],
+    ids=["fly", "compare"],
+)
+def test_files_of_the_working_directory_shadow_no_module(tmp_path: Path, options: tuple[str, ...]) -> None:
+    for name in ("plant", "autopilot", "mavlink", "numpy", "signal", "json"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('of the working directory')")
+    command = [
+        str(Path(sys.executable).parent / "colibri"),
+        *options,
+        "--profile",
+        "flight",
+        "--duration",
+        "0.1",
+        "--quiet",
+    ]
+    done = subprocess.run([*command, "--out", "out"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "of the working directory" not in done.stdout + done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
