@@ -1,7 +1,7 @@
 """The autopilot's end of the conversation in lockstep."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from colibri.mavlink.hil.faults import COMMAND as INJECT_FAILURE
 from colibri.mavlink.hil.faults import Fault, encode_fault
@@ -16,14 +16,17 @@ from colibri.mavlink.hil.lockstep import (
     encode_heartbeat,
 )
 from colibri.mavlink.hil.plant_status import PlantStatus, ReceivedFrame, decode_battery, decode_delay, decode_result
-from colibri.mavlink.hil.sensors import Frame, decode_sensors
+from colibri.mavlink.hil.sensors import Frame, decode_sensors, read_sensors
 from colibri.mavlink.hil.state import (
     ActuatorCommand,
     decode_state,
     encode_actuators,
+    read_state,
 )
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message
+
+_READERS = {Feedback.STATE: read_state, Feedback.SENSORS: read_sensors}
 
 
 class AutopilotEnd:
@@ -40,9 +43,11 @@ class AutopilotEnd:
         """Speak as the autopilot of `system_id`, ask the plant for a frame of `feedback` every `frame_interval_us`."""
         self._codec = Codec(system_id, dialect.AUTOPILOT_COMPONENT)
         self._plant = (system_id, dialect.PLANT_COMPONENT)
+        self._plant_bytes = bytes(self._plant)
         self._frame_interval_us = frame_interval_us
         self._feedback = feedback
         self._made_of = MADE_OF[feedback]
+        self._read: Callable[[bytes, bytes], Frame | None] = _READERS[feedback]
         self._runs_freely: bool | None = None
         self.refused: int | None = None
         self.repeated = 0
@@ -59,6 +64,13 @@ class AutopilotEnd:
 
     def receive(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         """Take one datagram in; return its frame if that is the next one to compute."""
+        frame = self._read(datagram, self._plant_bytes)
+        if frame is None:
+            return self._receive_any(datagram, now_s)
+        following = self._next(frame, now_s)
+        return None if following is None else ReceivedFrame(following)
+
+    def _receive_any(self, datagram: bytes, now_s: float) -> ReceivedFrame | None:
         parts: dict[str, Message] = {}
         battery, delay_us, results = None, None, []
         for message in self._codec.decode(datagram):

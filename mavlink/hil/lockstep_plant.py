@@ -33,6 +33,7 @@ from colibri.mavlink.hil.state import (
     StateFrame,
     decode_actuators,
     encode_state,
+    read_actuators,
 )
 from colibri.mavlink.hil.world_changes import PAYLOAD, WIND, WorldChange, decode_change
 from colibri.mavlink.wire import dialect
@@ -82,6 +83,7 @@ class PlantEnd:
         self._codec = Codec(system_id, dialect.PLANT_COMPONENT)
         self._truth_codec = Codec(system_id, dialect.TRUTH_COMPONENT)
         self._autopilot = (system_id, dialect.AUTOPILOT_COMPONENT)
+        self._autopilot_bytes = bytes(self._autopilot)
         self.peer: Address | None = None
         self.frame_interval_us = frame_interval_us
         self.feedback = Feedback.STATE
@@ -128,6 +130,13 @@ class PlantEnd:
 
     def receive(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
         """Take one datagram in; return the command that answers the frame awaited, if it holds that."""
+        command = read_actuators(datagram, self._autopilot_bytes) if sender == self.peer else None
+        if command is None:
+            return self._receive_any(datagram, sender, now_s)
+        self._note(datagram, now_s)
+        return self._accept(command)
+
+    def _receive_any(self, datagram: bytes, sender: Address, now_s: float) -> ActuatorCommand | None:
         command = None
         asked: list[Message] = []
         for message in self._codec.decode(datagram):
@@ -141,13 +150,12 @@ class PlantEnd:
             elif message.name == "COMMAND_LONG":
                 self._obey(message, sender)
             elif message.name == "HIL_ACTUATOR_CONTROLS" and sender == self.peer:
-                command = self._accept(message) or command
+                command = self._accept(decode_actuators(message)) or command
             else:
                 self.dropped["unexpected"] += 1
                 continue
             if sender == self.peer:
-                self._peer_received_s = now_s
-                self.received.append(message.frame)
+                self._note(message.frame, now_s)
         for message in asked:
             self._receive_fault(message, answered=command is not None)
         return command
@@ -231,8 +239,11 @@ class PlantEnd:
         self.feedback, self.frame_interval_us = feedback, int(interval_us)
         return dialect.RESULT_ACCEPTED
 
-    def _accept(self, message: Message) -> ActuatorCommand | None:
-        command = decode_actuators(message)
+    def _note(self, frame: bytes, now_s: float) -> None:
+        self._peer_received_s = now_s
+        self.received.append(frame)
+
+    def _accept(self, command: ActuatorCommand | None) -> ActuatorCommand | None:
         if command is None:
             self.dropped["invalid"] += 1
         elif not self._is_awaited(command.time_us):

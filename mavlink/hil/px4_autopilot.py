@@ -78,7 +78,7 @@ class FlierEnd:
         assert self._zero_us is not None, "what is answered has come"
         self._armed = command.armed
         controls = self._to_motors(command.controls)
-        moved = replace(command, time_us=command.time_us + self._zero_us, controls=controls)
+        moved = command._replace(time_us=command.time_us + self._zero_us, controls=controls)
         self._answer = encode_actuators(self._codec, moved)
         self._outbox.append(self._answer)
 

@@ -6,7 +6,7 @@ that PX4 reads: https://docs.px4.io/main/en/simulation/ and https://mavlink.io/e
 judged here: an autopilot must cope with any number that a broken sensor sends.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from math import degrees, hypot, inf, isfinite, nan
@@ -18,11 +18,19 @@ from colibri.common.kernels import atan2
 from colibri.common.types import Vector
 from colibri.mavlink.hil.state import StateFrame
 from colibri.mavlink.wire.dialect import Codec, Message, mav
+from colibri.mavlink.wire.fixed_frames import FixedFrame
 from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
 
 _UNKNOWN_COVARIANCE = 255
 _INVALID, _PERFECT = 1, 100
 """DISTANCE_SENSOR.signal_quality."""
+_FIELDS = (
+    "time_usec xacc yacc zacc xgyro ygyro zgyro xmag ymag zmag "
+    "abs_pressure diff_pressure pressure_alt temperature fields_updated"
+)
+_SENSOR = FixedFrame("HIL_SENSOR", _FIELDS)
+_BY_SIZE = {layout.size: layout for layout in (_SENSOR, *(FixedFrame("HIL_SENSOR", f"{_FIELDS}:{it}") for it in "BH"))}
+"""With as many bytes of `fields_updated` as are not zero."""
 
 
 class Updated:
@@ -131,17 +139,19 @@ Frame: TypeAlias = StateFrame | SensorFrame
 def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
     """Encode a frame as HIL_SENSOR, and the messages of what else is new; the pressure altitude is the standard's."""
     messages = [
-        codec.encode(
-            "HIL_SENSOR",
-            frame.time_us,
-            *frd_from_flu(frame.specific_force_flu_m_s2),
-            *frd_from_flu(frame.rate_flu_rad_s),
-            *frd_from_flu(frame.magnetic_field_flu_gauss),
-            frame.pressure_pa / 100.0,
-            0.0,
-            altitude_m(frame.pressure_pa),
-            frame.temperature_c,
-            frame.updated,
+        _SENSOR.encode(
+            codec,
+            (
+                frame.time_us,
+                *frd_from_flu(frame.specific_force_flu_m_s2),
+                *frd_from_flu(frame.rate_flu_rad_s),
+                *frd_from_flu(frame.magnetic_field_flu_gauss),
+                frame.pressure_pa / 100.0,
+                0.0,
+                altitude_m(frame.pressure_pa),
+                frame.temperature_c,
+                frame.updated,
+            ),
         )
     ]
     for row in OWN_MESSAGES:
@@ -151,19 +161,31 @@ def encode_sensors(codec: Codec, frame: SensorFrame) -> list[bytes]:
     return messages
 
 
+def read_sensors(datagram: bytes, source: bytes) -> SensorFrame | None:
+    """Read a datagram that is nothing but a HIL_SENSOR of `source`, with no other zeros left out; None of any other."""
+    layout = _BY_SIZE.get(len(datagram))
+    numbers = layout and layout.read(datagram, 0, source)
+    return _measured(numbers) if numbers else None
+
+
 def decode_sensors(sensor: Message, *others: Message) -> SensorFrame:
     """Decode a HIL_SENSOR, and those of `OWN_MESSAGES` that came with it."""
-    s = sensor.fields
-    measured = {row.field: row.decoded(other) for other in others for row in OWN_MESSAGES if row.message == other.name}
+    own = {row.field: row.decoded(other) for other in others for row in OWN_MESSAGES if row.message == other.name}
+    return _measured([getattr(sensor.fields, name) for name in _FIELDS.split()], **own)
+
+
+def _measured(numbers: Sequence[Any], **own: Any) -> SensorFrame:
+    """Return the frame of a HIL_SENSOR's fields, and of what sensors with messages of their own measured."""
+    time_us, xacc, yacc, zacc, xgyro, ygyro, zgyro, xmag, ymag, zmag, hpa, _, _, temperature_c, updated = numbers
     return SensorFrame(
-        time_us=s.time_usec,
-        updated=s.fields_updated,
-        specific_force_flu_m_s2=frd_from_flu((s.xacc, s.yacc, s.zacc)),
-        rate_flu_rad_s=frd_from_flu((s.xgyro, s.ygyro, s.zgyro)),
-        magnetic_field_flu_gauss=frd_from_flu((s.xmag, s.ymag, s.zmag)),
-        pressure_pa=s.abs_pressure * 100.0,
-        temperature_c=s.temperature,
-        **measured,
+        time_us,
+        updated,
+        frd_from_flu((xacc, yacc, zacc)),
+        frd_from_flu((xgyro, ygyro, zgyro)),
+        frd_from_flu((xmag, ymag, zmag)),
+        pressure_pa=hpa * 100.0,
+        temperature_c=temperature_c,
+        **own,
     )
 
 

@@ -1,26 +1,28 @@
-"""What plant and autopilot send each other: dataclasses in SI, ENU/FLU, and their MAVLink messages.
+"""What plant and autopilot send each other: tuples in SI, ENU/FLU, and their MAVLink messages.
 
 Anything that a receiver could not fly on (not finite, out of range, halves of different frames) decodes to None.
 """
 
-from dataclasses import dataclass
 from math import isfinite
+from typing import NamedTuple
 
 from colibri.common.rotations import normalized
-from colibri.common.types import Quaternion, Vector
+from colibri.common.types import FourRotors, Quaternion, Vector
 from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, MODE_HIL, Codec, Message
+from colibri.mavlink.wire.fixed_frames import FixedFrame
 from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
 
 ROTORS = 4
 LOCKSTEP_FLAG = 1
 """HIL_ACTUATOR_CONTROLS.flags bit 0: the simulator waits for this message."""
 
-_CONTROLS_ON_WIRE = 16
 _UNIT_NORM_TOLERANCE = 1e-3
+_ATTITUDE = FixedFrame("ATTITUDE_QUATERNION", "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed")
+_POSITION = FixedFrame("LOCAL_POSITION_NED", "time_boot_ms x y z vx vy vz")
+_ACTUATORS = FixedFrame("HIL_ACTUATOR_CONTROLS", f"time_usec flags controls[{ROTORS}] mode")
 
 
-@dataclass(frozen=True, slots=True)
-class StateFrame:
+class StateFrame(NamedTuple):
     """The vehicle's state at one instant of simulated time.
 
     Attributes:
@@ -35,61 +37,96 @@ class StateFrame:
     rate_flu_rad_s: Vector
 
 
-@dataclass(frozen=True, slots=True)
-class ActuatorCommand:
+class ActuatorCommand(NamedTuple):
     """The rotor speeds that answer the frame of `time_us`, 0..1 of the maximum, in the vehicle's rotor order."""
 
     time_us: int
-    controls: tuple[float, float, float, float]
+    controls: FourRotors
     armed: bool
 
 
 def encode_state(codec: Codec, frame: StateFrame) -> list[bytes]:
     """Encode a frame as ATTITUDE_QUATERNION and LOCAL_POSITION_NED of the same `time_boot_ms`."""
-    time_boot_ms = frame.time_us // 1000
+    time_us, position, velocity, attitude, rate = frame
+    time_boot_ms = time_us // 1000
     return [
-        codec.encode(
-            "ATTITUDE_QUATERNION",
-            time_boot_ms,
-            *ned_frd_from_enu_flu(frame.attitude),
-            *frd_from_flu(frame.rate_flu_rad_s),
-        ),
-        codec.encode(
-            "LOCAL_POSITION_NED",
-            time_boot_ms,
-            *ned_from_enu(frame.position_enu_m),
-            *ned_from_enu(frame.velocity_enu_m_s),
-        ),
+        _ATTITUDE.encode(codec, (time_boot_ms, *ned_frd_from_enu_flu(attitude), *frd_from_flu(rate))),
+        _POSITION.encode(codec, (time_boot_ms, *ned_from_enu(position), *ned_from_enu(velocity))),
     ]
+
+
+def read_state(datagram: bytes, source: bytes) -> StateFrame | None:
+    """Read a datagram that is nothing but the two frames of `source`, with no zeros left out; None of any other."""
+    if len(datagram) != _ATTITUDE.size + _POSITION.size:
+        return None
+    attitude = _ATTITUDE.read(datagram, 0, source)
+    position = _POSITION.read(datagram, _ATTITUDE.size, source)
+    return _state(*attitude, *position) if attitude and position else None
 
 
 def decode_state(attitude: Message, position: Message) -> StateFrame | None:
     """Decode an ATTITUDE_QUATERNION and a LOCAL_POSITION_NED; None if they cannot be one frame."""
     a, p = attitude.fields, position.fields
-    q = (a.q1, a.q2, a.q3, a.q4)
-    vectors = (a.rollspeed, a.pitchspeed, a.yawspeed, p.x, p.y, p.z, p.vx, p.vy, p.vz)
-    is_unit = abs(sum(component * component for component in q) - 1.0) < _UNIT_NORM_TOLERANCE
-    if a.time_boot_ms != p.time_boot_ms or not all(map(isfinite, vectors)) or not is_unit:
+    turning = (a.time_boot_ms, a.q1, a.q2, a.q3, a.q4, a.rollspeed, a.pitchspeed, a.yawspeed)
+    return _state(*turning, p.time_boot_ms, p.x, p.y, p.z, p.vx, p.vy, p.vz)
+
+
+def _state(
+    attitude_ms: int,
+    q1: float,
+    q2: float,
+    q3: float,
+    q4: float,
+    rollspeed: float,
+    pitchspeed: float,
+    yawspeed: float,
+    position_ms: int,
+    x: float,
+    y: float,
+    z: float,
+    vx: float,
+    vy: float,
+    vz: float,
+) -> StateFrame | None:
+    """Return the frame of the fields of both messages; single floats all, whose sum is finite if each of them is."""
+    all_finite = isfinite(rollspeed + pitchspeed + yawspeed + x + y + z + vx + vy + vz)
+    is_unit = abs(q1 * q1 + q2 * q2 + q3 * q3 + q4 * q4 - 1.0) < _UNIT_NORM_TOLERANCE
+    if attitude_ms != position_ms or not all_finite or not is_unit:
         return None
     return StateFrame(
-        time_us=a.time_boot_ms * 1000,
-        position_enu_m=ned_from_enu((p.x, p.y, p.z)),
-        velocity_enu_m_s=ned_from_enu((p.vx, p.vy, p.vz)),
-        attitude=ned_frd_from_enu_flu(normalized(q)),
-        rate_flu_rad_s=frd_from_flu((a.rollspeed, a.pitchspeed, a.yawspeed)),
+        attitude_ms * 1000,
+        ned_from_enu((x, y, z)),
+        ned_from_enu((vx, vy, vz)),
+        ned_frd_from_enu_flu(normalized((q1, q2, q3, q4))),
+        frd_from_flu((rollspeed, pitchspeed, yawspeed)),
     )
 
 
 def encode_actuators(codec: Codec, command: ActuatorCommand) -> bytes:
     """Encode a command as HIL_ACTUATOR_CONTROLS."""
-    mode = MODE_CUSTOM | MODE_HIL | (MODE_ARMED if command.armed else 0)
-    controls = [*command.controls, *([0.0] * (_CONTROLS_ON_WIRE - ROTORS))]
-    return codec.encode("HIL_ACTUATOR_CONTROLS", command.time_us, controls, mode, LOCKSTEP_FLAG)
+    time_us, controls, armed = command
+    mode = MODE_CUSTOM | MODE_HIL | (MODE_ARMED if armed else 0)
+    return _ACTUATORS.encode(codec, (time_us, LOCKSTEP_FLAG, *controls, mode))
+
+
+def read_actuators(datagram: bytes, source: bytes) -> ActuatorCommand | None:
+    """Read a datagram that is nothing but a command of `source`; None of any other, and as `decode_actuators`."""
+    if len(datagram) != _ACTUATORS.size:
+        return None
+    numbers = _ACTUATORS.read(datagram, 0, source)
+    return _command(*numbers) if numbers else None
 
 
 def decode_actuators(message: Message) -> ActuatorCommand | None:
     """Decode a HIL_ACTUATOR_CONTROLS; None if a rotor could not follow it."""
-    c1, c2, c3, c4 = message.fields.controls[:ROTORS]
-    if not all(0.0 <= control <= 1.0 for control in (c1, c2, c3, c4)):
+    fields = message.fields
+    c1, c2, c3, c4 = fields.controls[:ROTORS]
+    return _command(fields.time_usec, fields.flags, c1, c2, c3, c4, fields.mode)
+
+
+def _command(
+    time_us: int, _flags: int, c1: float, c2: float, c3: float, c4: float, mode: int
+) -> ActuatorCommand | None:
+    if not (0.0 <= c1 <= 1.0 and 0.0 <= c2 <= 1.0 and 0.0 <= c3 <= 1.0 and 0.0 <= c4 <= 1.0):
         return None
-    return ActuatorCommand(message.fields.time_usec, (c1, c2, c3, c4), bool(message.fields.mode & MODE_ARMED))
+    return ActuatorCommand(time_us, (c1, c2, c3, c4), bool(mode & MODE_ARMED))

@@ -47,10 +47,11 @@ UNKNOWN = "UNKNOWN"
 
 _HEADER = Struct("<BBBBBBBHB")
 """Marker, payload length, two flags, sequence, system, component, message id (its low 16 bits, its high 8)."""
+HEADER_BYTES = _HEADER.size
 _HEADER_BYTES_V1: int = mav.HEADER_LEN_V1
 _PARAM_VALUE = Struct("<I")
-_CRC_BYTES = 2
-_CRC_START = 0xFFFF
+CRC_BYTES = 2
+CRC_START = 0xFFFF
 
 
 def bits(prefix: str, names: str) -> int:
@@ -103,11 +104,11 @@ def sequence_of(frame: bytes) -> int:
 def intact(frame: bytes) -> bool | None:
     """Whether the CRC of a whole frame of MAVLink 1 or 2 holds; None where the dialect has no such message."""
     start = _header_bytes(frame)
-    layout = _layout(int.from_bytes(frame[7:start], "little") if start == _HEADER.size else frame[start - 1])
+    layout = _layout(int.from_bytes(frame[7:start], "little") if start == HEADER_BYTES else frame[start - 1])
     if layout is None:
         return None
     end = start + frame[1]
-    return layout.crc(frame[:end]) == frame[end : end + _CRC_BYTES]
+    return layout.crc(frame[:end]) == frame[end : end + CRC_BYTES]
 
 
 class Codec:
@@ -133,6 +134,7 @@ class Codec:
         self._sequence = 0
         self._keep_unknown = keep_unknown
         self.source = (system_id, component_id)
+        self._source_bytes = bytes(self.source)
         self.seal: Callable[[bytes], bytes] | None = None
         self.dropped: Counter[str] = Counter()
 
@@ -142,9 +144,17 @@ class Codec:
         Text is bytes, or a str that goes out as UTF-8; what is too long is cut. `param_value` of PARAM_VALUE and of
         PARAM_SET may be `Bits`.
         """
+        layout = _layout_named(name)
+        return self.framed(layout.payload(fields), layout.message_id, layout.crc_extra)
+
+    def framed(self, payload: bytes, message_id: bytes, crc_extra: bytes) -> bytes:
+        """Return the next frame, with this payload; zeros at its end are left out."""
+        payload = payload.rstrip(b"\0") or b"\0"
         flags = 0 if self.seal is None else SIGNED
-        frame = _layout_named(name).frame(fields, flags, self._sequence, self.source)
+        begin = bytes((MARKER, len(payload), flags, 0, self._sequence))
         self._sequence = (self._sequence + 1) % 256
+        frame = begin + self._source_bytes + message_id + payload
+        frame += crc16(frame[1:] + crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
         return frame if self.seal is None else frame + self.seal(frame)
 
     def decode(self, datagram: bytes) -> list[Message]:
@@ -156,7 +166,7 @@ class Codec:
         """Return what pymavlink makes of a datagram; count what it cannot."""
         self._mav.buf = bytearray()
         self._mav.buf_index = 0
-        self._mav.expected_length = _HEADER_BYTES_V1 + _CRC_BYTES
+        self._mav.expected_length = _HEADER_BYTES_V1 + CRC_BYTES
         decoded = self._mav.parse_buffer(datagram) or ()
         if self._mav.buf_len():
             self.dropped["truncated"] += 1
@@ -184,11 +194,11 @@ class _Layout:
         """Take the layout from pymavlink's class of the message."""
         definition = missing_messages.with_later_fields(definition)
         self.name: str = definition.msgname
-        self._id: int = definition.id
+        self.message_id: bytes = definition.id.to_bytes(3, "little")
+        self.crc_extra = bytes([definition.crc_extra])
         self._size: int = definition.unpacker.size
         self._pack: Callable[..., bytes] = definition.unpacker.pack
         self._unpack: Callable[[bytes], tuple[Any, ...]] = definition.unpacker.unpack
-        self._crc_extra = bytes([definition.crc_extra])
         self._fields: Any = namedtuple("_fields", definition.fieldnames)  # type: ignore[misc]
         self._defaults: tuple[Any, ...] = definition.__init__.__defaults__ or ()
         order = [definition.fieldnames.index(name) for name in definition.ordered_fieldnames]
@@ -200,11 +210,8 @@ class _Layout:
         self._lengths: list[int] | None = lengths if any(lengths) else None
         self._texts = [i for i, kind in enumerate(definition.fieldtypes) if kind == "char"]
 
-    def frame(self, fields: Sequence[Any], flags: int, sequence: int, source: tuple[int, int]) -> bytes:
-        """Return the whole frame but for a signature.
-
-        Fields of extensions may be missing; zeros at the end of the payload are left out.
-        """
+    def payload(self, fields: Sequence[Any]) -> bytes:
+        """Return the payload; fields of extensions may be missing."""
         missing = len(self._fields._fields) - len(fields)
         if missing:
             fields = (*fields, *self._defaults[-missing:])
@@ -213,14 +220,11 @@ class _Layout:
         values = self._in_order_of_wire(fields)
         if self._lengths is not None:
             values = _flat(values, self._lengths)
-        payload = self._pack(*values).rstrip(b"\0") or b"\0"
-        header = _HEADER.pack(MARKER, len(payload), flags, 0, sequence, *source, self._id & 0xFFFF, self._id >> 16)
-        frame = header + payload
-        return frame + self.crc(frame)
+        return self._pack(*values)
 
     def crc(self, header_and_payload: bytes) -> bytes:
         """Return the checksum behind a header and a payload."""
-        return _crc16(header_and_payload[1:] + self._crc_extra, _CRC_START).to_bytes(_CRC_BYTES, "little")
+        return crc16(header_and_payload[1:] + self.crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
 
     def read(self, payload: bytes) -> Any:
         """Return the fields of a payload, of which zeros at the end, and what a later dialect added, may be missing."""
@@ -256,11 +260,11 @@ def _whole_messages(datagram: bytes) -> list[Message] | None:
     messages, end, after = [], len(datagram), 0
     while after < end:
         at = after
-        if end - at < _HEADER.size:
+        if end - at < HEADER_BYTES:
             return None
         marker, length, incompatible, _, _, system, component, low, high = _HEADER.unpack_from(datagram, at)
-        crc_at = at + _HEADER.size + length
-        after = crc_at + _CRC_BYTES
+        crc_at = at + HEADER_BYTES + length
+        after = crc_at + CRC_BYTES
         if incompatible == SIGNED:
             after += SIGNATURE_BYTES
         elif incompatible:
@@ -268,15 +272,15 @@ def _whole_messages(datagram: bytes) -> list[Message] | None:
         if marker != MARKER or after > end:
             return None
         layout = _layout(low | high << 16)
-        if layout is None or layout.crc(datagram[at:crc_at]) != datagram[crc_at : crc_at + _CRC_BYTES]:
+        if layout is None or layout.crc(datagram[at:crc_at]) != datagram[crc_at : crc_at + CRC_BYTES]:
             return None
-        fields = layout.read(datagram[at + _HEADER.size : crc_at])
+        fields = layout.read(datagram[at + HEADER_BYTES : crc_at])
         messages.append(Message(layout.name, (system, component), fields, datagram[at:after]))
     return messages
 
 
 def _header_bytes(frame: bytes) -> int:
-    return _HEADER.size if frame[0] == MARKER else _HEADER_BYTES_V1
+    return HEADER_BYTES if frame[0] == MARKER else _HEADER_BYTES_V1
 
 
 def _slow_crc16(data: bytes, _start: int) -> int:
@@ -284,14 +288,18 @@ def _slow_crc16(data: bytes, _start: int) -> int:
     return crc
 
 
-_crc16: Callable[[bytes, int], int] = getattr(mav, "mcrf4xx", None) or _slow_crc16
+crc16: Callable[[bytes, int], int] = getattr(mav, "mcrf4xx", None) or _slow_crc16
 """The compiled checksum that pymavlink found, without the object that it puts around it."""
+
+
+def definition_of(name: str) -> Any:
+    """Return pymavlink's class of a message."""
+    return getattr(mav, f"MAVLink_{name.lower()}_message")
 
 
 @cache
 def _layout_named(name: str) -> _Layout:
-    definition = getattr(mav, f"MAVLink_{name.lower()}_message")
-    return (_ParameterLayout if name in ("PARAM_VALUE", "PARAM_SET") else _Layout)(definition)
+    return (_ParameterLayout if name in ("PARAM_VALUE", "PARAM_SET") else _Layout)(definition_of(name))
 
 
 def _layout(message_id: int) -> _Layout | None:

@@ -105,7 +105,7 @@ def test_a_state_that_stays_the_same_though_it_moves_is_not_flown_on(monkeypatch
     def stuck(frame: Frame) -> Frame:
         assert isinstance(frame, StateFrame)
         kept.append(frame)
-        return replace(kept[0], time_us=frame.time_us)
+        return kept[0]._replace(time_us=frame.time_us)
 
     between(monkeypatch, flight, stuck)
     assert flight.wait_until(lambda: not flight.armed, within=2.0) == pytest.approx(0.5, abs=0.05)
