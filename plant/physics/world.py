@@ -1,7 +1,7 @@
 """The world: vehicle, rotors, battery and time, advanced one frame at a time: (world, command) -> world."""
 
-from dataclasses import dataclass
 from math import isfinite, nan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +26,7 @@ _LEVEL: State = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
 _MOMENT_S = 1e-3
 
 
-@dataclass(frozen=True, slots=True)
-class World:
+class World(NamedTuple):
     """Everything that the next step depends on.
 
     Attributes:
@@ -75,6 +74,7 @@ class Physics:
         self._top = vehicle.rotors.max_speed
         self._battery = vehicle.battery
         self._as_built = self._parameters.copy()
+        self._power: list[float] = self._parameters["power"][0].tolist()
         self._held: list[float | None] | None = None
         self._integrate(np.array((*_LEVEL, *_STANDING, 0.0)), _STANDING, self._parameters, _MOMENT_S)
 
@@ -112,9 +112,8 @@ class Physics:
         """Return what the battery gives; None without one."""
         if self._battery is None:
             return None
-        numbers = self._parameters[0]
         power_w = 0.0
-        for at_one_w, speed in zip(numbers["power"].tolist(), world.rotor_speeds, strict=True):
+        for at_one_w, speed in zip(self._power, world.rotor_speeds, strict=True):
             power_w += at_one_w * speed * speed * speed
         voltage_v = world.voltage_v if isfinite(world.voltage_v) else self._battery.full_voltage_v
         left = max(0.0, 1.0 - world.charge_used_ah / self._battery.capacity_ah)
@@ -130,6 +129,7 @@ class Physics:
         """Have a rotor make a part of the thrust and torque that it was built for, and take that part of the power."""
         for name in ("thrust", "yaw_moment", "power"):
             self._parameters[name][0, rotor] = part * self._as_built[name][0, rotor]
+        self._power = self._parameters["power"][0].tolist()
 
     def resist(self, times: float) -> None:
         """Have the battery resist so many times as much as it was built to."""

@@ -1,7 +1,6 @@
 """The plant as a simulator of PX4: in lockstep with it, or, while it starts, at the pace of the wall clock."""
 
 import argparse
-from dataclasses import replace
 from math import hypot
 from time import perf_counter, sleep
 from typing import Any
@@ -85,7 +84,7 @@ class Simulator:
         """Fly from the start with the PX4 that has called; return whether the time is over, and not only PX4 gone."""
         began_s, call = perf_counter(), self._end.calls
         suite = SensorSuite(self._sensors, self._physics, self._origin, seed=self._seed, interval_us=self._interval_us)
-        world = replace(self._start, time_us=self._interval_us)  # PX4's clock has no use for 0
+        world = self._start._replace(time_us=self._interval_us)  # PX4's clock has no use for 0
         pace, progress, frames = Pace(self._speed, began_s), Progress(self._status), 0
         while not self._stop and self._end.peer is not None and self._end.calls == call:
             if world.time_us > self._duration_us:

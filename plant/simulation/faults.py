@@ -4,7 +4,6 @@ A fault happens at an instant between two frames; what it does then depends on t
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from colibri.mavlink.hil.faults import ALL, BATTERY, MOTOR, OFF, OK, SENSORS, STUCK, WRONG, Fault, Part, judged
 from colibri.mavlink.hil.feedback import Feedback
@@ -69,4 +68,4 @@ class Faults:
         after_ah = used_ah if fault.kind == OK else max(used_ah, (1.0 - left) * self._battery.capacity_ah)
         self._taken_ah = after_ah - used_ah
         self._physics.resist(resistance)
-        return replace(world, charge_used_ah=after_ah)
+        return world._replace(charge_used_ah=after_ah)

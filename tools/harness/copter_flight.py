@@ -4,7 +4,6 @@ Nothing is simulated of the links but the bytes.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import nan
 from typing import Any
 
@@ -142,7 +141,7 @@ class CopterFlight(Stepped, Steered):
 
     def reset_world(self, start: Start) -> None:
         """Reset the plant to `start` at this time."""
-        self.world = replace(starting_world(start, self._assumed, self._weather), time_us=self.world.time_us)
+        self.world = starting_world(start, self._assumed, self._weather)._replace(time_us=self.world.time_us)
 
     def restart(self, history: History | None = None) -> None:
         """Start the autopilot again, wherever the vehicle is; with the history of a flight it flies on at once."""
@@ -229,7 +228,7 @@ class CopterFlight(Stepped, Steered):
         """Have so much of the full battery's charge gone at once, and fly one frame."""
         assert self._assumed.battery is not None
         gone_ah = part * self._assumed.battery.capacity_ah
-        self.world = replace(self.world, charge_used_ah=self.world.charge_used_ah + gone_ah)
+        self.world = self.world._replace(charge_used_ah=self.world.charge_used_ah + gone_ah)
         self.step()
 
     def inject(self, unit: int, kind: int, instance: int = 0, *values: float) -> int:

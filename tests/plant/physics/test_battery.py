@@ -1,6 +1,5 @@
 """The battery: sag, charge, top speed, and what an empty one gives."""
 
-from dataclasses import replace
 from math import isnan
 
 import msgspec
@@ -63,7 +62,7 @@ def test_what_the_battery_can_hold_is_held_exactly() -> None:
 
 
 def test_an_empty_battery_gives_what_its_voltage_allows() -> None:
-    empty = replace(starting_world(Start(z=500.0), VEHICLE), charge_used_ah=3.0 * AH)
+    empty = starting_world(Start(z=500.0), VEHICLE)._replace(charge_used_ah=3.0 * AH)
     world = flight(VEHICLE, empty, command(TOP, vehicle=VEHICLE), 1.0)[-1]
     assert world.voltage_v < EMPTY_V
     assert max(world.rotor_speeds) == pytest.approx(TOP * world.voltage_v / FULL_V, rel=1e-3)

@@ -1,7 +1,5 @@
 """The watch on the rotors: which one is lost, how soon, and that nothing else is taken for it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -110,7 +108,7 @@ def test_one_jump_is_no_rotor(jump: tuple[float, ...], after: int) -> None:
     assert flight.fly(WHOLE, after) is None
     state = np.array(flight.world.state)
     state[:6] += jump
-    flight.world = replace(flight.world, state=tuple(state.tolist()))
+    flight.world = flight.world._replace(state=tuple(state.tolist()))
     assert flight.fly(WHOLE, 20) is None
     assert flight.watch.max_evidence <= MAX_EVIDENCE
 
