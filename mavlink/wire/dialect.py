@@ -48,6 +48,7 @@ UNKNOWN = "UNKNOWN"
 _HEADER = Struct("<BBBBBBBHB")
 """Marker, payload length, two flags, sequence, system, component, message id (its low 16 bits, its high 8)."""
 HEADER_BYTES = _HEADER.size
+_MARKER = bytes([MARKER])
 _HEADER_BYTES_V1: int = mav.HEADER_LEN_V1
 _PARAM_VALUE = Struct("<I")
 CRC_BYTES = 2
@@ -149,13 +150,14 @@ class Codec:
 
     def framed(self, payload: bytes, message_id: bytes, crc_extra: bytes) -> bytes:
         """Return the next frame, with this payload; zeros at its end are left out."""
-        payload = payload.rstrip(b"\0") or b"\0"
-        flags = 0 if self.seal is None else SIGNED
-        begin = bytes((MARKER, len(payload), flags, 0, self._sequence))
-        self._sequence = (self._sequence + 1) % 256
-        frame = begin + self._source_bytes + message_id + payload
-        frame += crc16(frame[1:] + crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
-        return frame if self.seal is None else frame + self.seal(frame)
+        if not payload[-1]:
+            payload = payload.rstrip(b"\0") or b"\0"
+        sequence, seal = self._sequence, self.seal
+        self._sequence = (sequence + 1) % 256
+        flags = 0 if seal is None else SIGNED
+        covered = bytes((len(payload), flags, 0, sequence)) + self._source_bytes + message_id + payload
+        frame = _MARKER + covered + crc16(covered + crc_extra, CRC_START).to_bytes(CRC_BYTES, "little")
+        return frame if seal is None else frame + seal(frame)
 
     def decode(self, datagram: bytes) -> list[Message]:
         """Return the messages of one datagram. A datagram holds whole frames: none continues the one before."""
