@@ -8,8 +8,9 @@ With e = reference - target, each step of the cascade demands of the next
     snap          s_t + k_j (wanted jerk - j)
 
 and bounds what it adds to the target's own motion. The acceleration is bounded by what the jerk can end within 1 / k_v,
-too: more could not be taken back in time, and would overshoot. A target that is reached is followed exactly, whatever
-it does.
+too: more could not be taken back in time, and would overshoot. The snap is bounded, since it is what the moments
+are made for: a target that jumps must not ask for all of them at once. A target that is reached is followed exactly,
+whatever it does.
 """
 
 from math import ceil, floor, pi, radians, sqrt
@@ -28,6 +29,9 @@ K_POSITION, K_VELOCITY, K_ACCELERATION, K_JERK = 1.5, 4.0, 12.0, 36.0
 K_YAW, K_YAW_RATE = 2.0, 8.0
 _MAX_STEP_S = 0.02
 """The quickest loop, of the jerk, must not become unstable: 36 / s times this is below 1."""
+_JERK_ENDS_S = 0.11
+"""In which the largest jerk can be ended by the largest snap: less than 1 / k_a would be of use to nobody, and with
+more a target is overshot."""
 _STOPPING = 0.6
 """Part of the acceleration that stopping may count on; the rest is for keeping to it."""
 
@@ -155,7 +159,10 @@ def _drive_axes(motion: Array, target: Array, kinds: Integers, axes: Axes, snap:
         wanted[i] = K_ACCELERATION * (target[2, i] + wanted[i] - a[i])
     _bound(wanted, first, last, axes.jerk_m_s3)
     for i in range(first, last):
-        snap[i] = target[4, i] + K_JERK * (target[3, i] + wanted[i] - j[i])
+        wanted[i] = K_JERK * (target[3, i] + wanted[i] - j[i])
+    _bound(wanted, first, last, axes.jerk_m_s3 / _JERK_ENDS_S)
+    for i in range(first, last):
+        snap[i] = target[4, i] + wanted[i]
 
 
 @compiled

@@ -123,6 +123,10 @@ WHOLE_LPV_MPC = [
     *_poles("WHL_POLE", ("guidance",), "a large position error"),
     Number("WHL_EXACT", ("guidance", "exact_within_m"), "m", 0.01, 10.0, "Nearer references are taken as they are"),
     *_references("WHL"),
+    Number("WHL_FOLLOW", ("guidance", "follow_within_m"), "m", 0.01, 10.0, "Farther references count in part"),
+    Number(
+        "WHL_ACC_MAX", ("guidance", "max_acceleration_m_s2"), "m/s^2", 0.5, 50.0, "Acceleration of large errors' end"
+    ),
     Number("WHL_THR_MIN", ("guidance", "min_thrust"), "norm", 0.01, 0.9, "Least thrust of references, of weight"),
     *_observed("WHL"),
     Number("WHL_ANGLE_MAX", ("plan", "max_tilt_deg"), "deg", 10.0, 85.0, "Soft limit of the tilt", decimals=1),

@@ -19,7 +19,7 @@ from colibri.autopilot.control.qp import installed_solvers
 from colibri.bench.sensing import FLIGHTS_A_RUN, sensing_figures
 from colibri.bench.serving import CHANNELS, serving_figures
 from colibri.bench.speed import CONTROL_S, LINKS, THESIS_LINKS, Peer, Report, rate_figures, thesis_figures
-from colibri.bench.stages import MOVES, STAGES, stage_figures
+from colibri.bench.stages import BLOCKS, STAGES, stage_figures
 from colibri.common.process.lifecycle import fail
 
 PROFILE = "flight"
@@ -59,7 +59,7 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
 
 def parts(wanted: list[str], runs: int, *, beside: bool) -> int:
     """Return how often `report` will be called."""
-    stages = 1 + len(MOVES) * (1 + len(installed_solvers()))
+    stages = 1 + len(BLOCKS) * (1 + len(installed_solvers()))
     flights = 1 + runs * len(CONTROL_S) * (len(LINKS) + beside)
     ground = len(CHANNELS) + 2 * runs
     sensors = 1 + runs * FLIGHTS_A_RUN

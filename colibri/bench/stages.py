@@ -12,14 +12,15 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc
-from colibri.autopilot.control.lpv_mpc.outer_loop import OuterLoop
 from colibri.autopilot.control.parts.vehicle_tracking import VehicleTracker
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.qp import Qp, QpSolver, QpStatus, installed_solvers
 from colibri.autopilot.control.vehicle_model import rotor_lag
+from colibri.autopilot.control.whole_lpv_mpc import planning
+from colibri.autopilot.control.whole_lpv_mpc.mpc import WholeMpc
+from colibri.autopilot.control.whole_lpv_mpc.targets import TargetBuilder
 from colibri.autopilot.core.track_autopilot import Autopilot
-from colibri.bench.variants import CONTROLLER, TRACK, plan_of, with_moves
+from colibri.bench.variants import CONTROLLER, TRACK, plan_of, with_blocks
 from colibri.flights.in_process import fly_locally
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
 from colibri.mavlink.hil.lockstep_plant import PlantEnd
@@ -28,14 +29,13 @@ from colibri.mavlink.links.udp import UdpLink
 
 Figures: TypeAlias = dict[str, float]
 
-MOVES: Mapping[int, tuple[int, ...]] = {
-    4: (1, 1, 2),
-    10: (1, 1, 2, 3, 3),
-    20: (1, 1, 2, 4, 5, 7),
-    40: (1, 1, 2, 4, 5, 7, 9, 11),
+BLOCKS: Mapping[int, tuple[int, ...]] = {
+    12: (1, 2, 3, 6),
+    28: (1, 2, 3, 5, 7, 10),
+    60: (1, 2, 4, 8, 15, 30),
 }
-"""For each horizon, how many steps each planned moment is held for: the profile's, cut short or gone on with."""
-PROFILE_HORIZON = 20
+"""For each horizon, how many steps each correction is held for: less than profile `flight`, as it, and as `path`."""
+PROFILE_HORIZON = 28
 
 _QPS = 100
 """How many QPs of a flight each solver solves."""
@@ -56,11 +56,10 @@ class Stage(NamedTuple):
 CONTROL_STEP = Stage("control step", Autopilot, "step")
 STAGES = (
     Stage("estimate", VehicleTracker, "estimate"),
-    Stage("position", OuterLoop, "track"),
-    Stage("LPV", AttitudeMpc, "predict"),
-    Stage("condense", AttitudeMpc, "condense"),
-    Stage("QP", QpSolver, "solve"),
-    Stage("read plan", AttitudeMpc, "read"),
+    Stage("references", TargetBuilder, "on_clock"),
+    Stage("condense", planning, "condense"),
+    Stage("QP", WholeMpc, "solve"),
+    Stage("read plan", planning, "read"),
     Stage("mixer", rotor_lag, "actuate"),
     CONTROL_STEP,
 )
@@ -94,7 +93,7 @@ def measured_flight(profile: Profile, folder: Path, duration_s: float) -> Flight
     every = max(1, round(duration_s * 1e6 / _control_interval_us(profile) / _QPS))
     seen, flying = 0, False
 
-    def keep_qp(_result: Any, qp: Qp) -> None:
+    def keep_qp(_result: Any, qp: Qp, *_: Any) -> None:
         nonlocal seen
         if seen % every == 0:
             flight.qps.append(deepcopy(qp))
@@ -128,13 +127,13 @@ def stage_figures(profile: Profile, folder: Path, duration_s: float, report: Cal
     horizons: dict[str, Any] = {}
     solvers: dict[str, dict[str, Figures]] = {}
     link: dict[str, Figures] = {}
-    for horizon, moves in MOVES.items():
-        chosen = with_moves(profile, moves)
+    for horizon, blocks in BLOCKS.items():
+        chosen = with_blocks(profile, blocks)
         report(f"stages, N = {horizon}")
         measured_flight(chosen, folder, min(duration_s, 0.5))
         flight = measured_flight(chosen, folder, duration_s)
         us = {stage.name: summary(flight.times_us[stage.name]) for stage in STAGES}
-        horizons[str(horizon)] = {"moves": list(moves), "us": us}
+        horizons[str(horizon)] = {"blocks": list(blocks), "us": us}
         solvers[str(horizon)] = {}
         for solver in installed_solvers():
             report(f"QP by {solver}, N = {horizon}")

@@ -11,14 +11,14 @@ import msgspec
 from colibri.autopilot.control.profile import Profile, ProfileTables
 from colibri.flights.plan import FlightPlan
 
-CONTROLLER = "lpv-mpc"
+CONTROLLER = "whole-lpv-mpc"
 TRACK = "lemniscate"
 
 
-def with_moves(profile: Profile, moves: Sequence[int]) -> Profile:
-    """Return the profile with another horizon: steps that each planned moment is held for."""
+def with_blocks(profile: Profile, blocks: Sequence[int]) -> Profile:
+    """Return the profile with another horizon: steps that each planned correction is held for."""
     table = profile.table(CONTROLLER)
-    return _with_table(profile, {**table, "attitude": {**table["attitude"], "moves": list(moves)}})
+    return _with_table(profile, {**table, "plan": {**table["plan"], "blocks": list(blocks)}})
 
 
 def with_intervals(profile: Profile, *, frame_s: float, control_s: float) -> Profile:

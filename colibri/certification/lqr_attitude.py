@@ -55,11 +55,11 @@ class LqrAttitude:
         """Take the law from the profile.
 
         Raises:
-            UncertifiableError: The profile flies another law.
+            UncertifiableError: The profile has no numbers for it.
             SettingsError: Its table is wrong.
         """
-        if profile.controller != LAW:
-            raise UncertifiableError(f"{profile.where}: its law is {profile.controller}: only {LAW} can be certified")
+        if not profile.table(LAW):
+            raise UncertifiableError(f"{profile.where}: has no numbers for {LAW}: only that law can be certified")
         settings = read_settings(profile.table(LAW), LpvMpcSettings)
         self.interval_s = settings.control_interval_s
         self._settings, self._vehicle, self.conditions = settings.attitude, vehicle, conditions

@@ -14,7 +14,7 @@ from colibri.certification.attitude import attitude_loop
 from colibri.certification.certificate import Certificate, Entry, RefusedError
 from colibri.certification.figure import draw
 from colibri.certification.flights import Flown, fly
-from colibri.certification.lqr_attitude import Conditions, LqrAttitude
+from colibri.certification.lqr_attitude import LAW, Conditions, LqrAttitude
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, fail
 from colibri.common.types import Array
@@ -55,7 +55,7 @@ def certify_profile(args: Namespace) -> int:
         fail(f"{profile.where} on {vehicle.name}: refused: {error}", EXIT_FAILED)
     flown = fly_from(found, args.flights, args.seed)
     about = {
-        "law": f"LQR of the attitude, {profile.where}",
+        "law": f"LQR of the attitude of {LAW}, {profile.where}",
         "vehicle": vehicle.name,
         **law.conditions._asdict(),
         "thrust_n": law.thrusts_n(found.invariant.scale),
@@ -67,7 +67,7 @@ def certify_profile(args: Namespace) -> int:
     draw(found, flown, args.out / FIGURE)
     largest = float(flown.values[1:].max())
     if not args.quiet:
-        print_table(f"{profile.name} on {vehicle.name}: LQR of the attitude", _HEADINGS, rows, names=1)
+        print_table(f"{profile.name} on {vehicle.name}: LQR of the attitude of {LAW}", _HEADINGS, rows, names=1)
         _say(f"{args.flights} flights from its border, as disturbed as allowed: V, there 1, is at most {largest:.3f}")
         _say(f"Not proven: {', '.join(_NOT_PROVEN)}.")
     if largest > 1.0:

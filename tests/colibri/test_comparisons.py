@@ -172,7 +172,7 @@ def test_a_comparison_goes_on_after_a_lost_flight_and_says_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(compare, "side_by_side", lambda work, jobs, *_, **__: [work(job) for job in jobs])
-    laws = {"geometric-se3": Raises, "lpv-mpc": load_controller("lpv-mpc")}
+    laws = {"geometric-se3": Raises, "whole-lpv-mpc": load_controller("whole-lpv-mpc")}
     monkeypatch.setattr(loop, "load_controller", laws.__getitem__)
     options = ["--profile", "flight:geometric-se3", "--profile", "flight", "--track", "hover", "--duration", "0.5"]
     assert main(["compare", *options, "--out", str(tmp_path)]) == 1
@@ -187,7 +187,7 @@ def test_a_comparison_goes_on_after_a_lost_flight_and_says_why(
 def test_a_law_that_cannot_be_built_is_found_before_anything_flies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    laws = {"geometric-se3": lambda *_: dict[str, object]()["gain"], "lpv-mpc": load_controller("lpv-mpc")}
+    laws = {"geometric-se3": lambda *_: dict[str, object]()["gain"], "whole-lpv-mpc": load_controller("whole-lpv-mpc")}
     monkeypatch.setattr(loop, "load_controller", laws.__getitem__)
     options = ["--profile", "flight", "--profile", "flight:geometric-se3", "--track", "hover", "--duration", "0.5"]
     with pytest.raises(SystemExit) as ended:

@@ -106,7 +106,7 @@ def test_a_vehicle_that_cannot_be_flown_is_no_success(tmp_path: Path, capsys: py
     assert end.value.code == 1
     said = capsys.readouterr().err
     assert said.startswith("colibri: error: lost at t = ")
-    assert ", on the ground at t = " in said
+    assert ": on the ground, " in said
     assert said.endswith(f"; the logs are in {tmp_path}\n")
     report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert report["lost"] in said

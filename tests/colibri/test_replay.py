@@ -112,7 +112,7 @@ def test_the_first_command_that_differs_is_named(copy: Path, capsys: pytest.Capt
 
 def test_another_autopilot_is_found_out(copy: Path) -> None:
     inputs = copy / "inputs.jsonl"
-    inputs.write_text(inputs.read_text().replace('"lpv-mpc"', '"geometric-se3"').replace('"flight"', '"se3"'))
+    inputs.write_text(inputs.read_text().replace('"whole-lpv-mpc"', '"geometric-se3"').replace('"flight"', '"se3"'))
     difference = replay_flight(copy / "flight.tlog").difference
     assert difference is not None
     assert difference.recorded.time_us == 0

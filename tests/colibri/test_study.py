@@ -52,9 +52,11 @@ def test_every_case_has_a_cell_of_its_own_and_can_be_flown(name: str, tmp_path: 
 
 
 def test_a_flight_changes_what_it_says_and_nothing_else(tmp_path: Path) -> None:
-    plain = Flight("spiral").plan(tmp_path)
+    plain = Flight("spiral", controller="lpv-mpc").plan(tmp_path)
     weather = Weather(Wind(5.0, 270.0), turbulence="light", seed=3)
-    flight = Flight("spiral", weather=weather, start=(("phi", 170.0),), scheduling="frozen", duration_s=3.0)
+    flight = Flight(
+        "spiral", controller="lpv-mpc", weather=weather, start=(("phi", 170.0),), scheduling="frozen", duration_s=3.0
+    )
     changed = flight.plan(tmp_path)
     assert (changed.weather, changed.start, changed.duration_s) == (weather, plain.start._replace(phi=170.0), 3.0)
     assert changed.profile.table("lpv-mpc")["attitude"]["scheduling"] == "frozen"

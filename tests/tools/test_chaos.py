@@ -25,7 +25,13 @@ def flown(flight: CopterFlight, situation: str, place: str, times: float) -> tup
     ("place", "situation", "times", "outcome", "said"),
     [
         ("autopilot.control.loop:ControlLoop.decide", "hover", 1, "flown on", "control law failed: plain law flies"),
-        ("autopilot.control.qp:QpSolver.solve", "offboard", inf, "flown on", "control law failed: plain law flies"),
+        (
+            "autopilot.control.whole_lpv_mpc.mpc:WholeMpc.solve",
+            "offboard",
+            inf,
+            "flown on",
+            "control law failed: plain law flies",
+        ),
         (
             "autopilot.guidance.tasks.offboard:OffboardTask.update",
             "offboard",

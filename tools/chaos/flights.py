@@ -142,7 +142,7 @@ class Flown:
         if n % 25 == 1:
             flight.send("COMMAND_LONG", SYSTEM, COMPONENT, mav.MAV_CMD_REQUEST_MESSAGE, 0, 148.0, *(0.0,) * 6)
         if n == 3:
-            flight.send("PARAM_SET", SYSTEM, COMPONENT, b"LPV_POLE1", -5.1, mav.MAV_PARAM_TYPE_REAL32)
+            flight.send("PARAM_SET", SYSTEM, COMPONENT, b"WHL_POLE1", -7.1, mav.MAV_PARAM_TYPE_REAL32)
         if n % 10 == 0 and self._situation == "offboard":
             flight.setpoint(velocity=(3.0, 1.0, 0.0))
         flight.step()

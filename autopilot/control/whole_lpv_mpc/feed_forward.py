@@ -20,14 +20,18 @@ from colibri.common.kernels import cos, sin
 from colibri.common.matrices import norm
 from colibri.common.types import Array
 
+_JUMP_M_S = 0.02
+"""A change of velocity from one reference to the next that is so much more than their accelerations make is a jump."""
+
 
 class Guidance(NamedTuple):
     """What stays the same between references and what they ask for.
 
     Attributes:
         k1_s2, k2_s: Gains on a large position error, 1/s², and on its rate, 1/s.
-        errors_ahead: Of `error_transition`, (n, 2, 2).
         max_error_m: An error that is larger counts as this one.
+        follow_within_m: Of a reference that is farther than this, only a part of the motion counts.
+        max_acceleration_m_s2: With which an error dies.
         exact_within_m: A reference as near as this is taken as it is.
         interval_s: Between samples.
         recovery_1_s2, recovery_1_s: Gains of the recovery, which turns slower than plans do.
@@ -36,8 +40,9 @@ class Guidance(NamedTuple):
 
     k1_s2: float
     k2_s: float
-    errors_ahead: Array
     max_error_m: float
+    follow_within_m: float
+    max_acceleration_m_s2: float
     exact_within_m: float
     interval_s: float
     recovery_1_s2: float
@@ -165,6 +170,37 @@ def rate_between(before: Array, after: Array, interval_s: float, rate: Array) ->
 
 
 @compiled
+def before_jump(
+    position: Array, velocity: Array, acceleration: Array, yaw_rad: Array, interval_s: float
+) -> tuple[Array, Array, Array, Array]:
+    """Return references, ENU, (n, 3) each, and of yaw, (n,), as they go on from before a jump of the velocity.
+
+    No vehicle follows a jump, as at the end of a track that does not slow down: one that bends towards what comes after
+    it is off what comes before.
+    """
+    n = position.shape[0]
+    for k in range(n - 1):
+        jump, bent = 0.0, 0.0
+        for i in range(3):
+            change = acceleration[k + 1, i] - acceleration[k, i]
+            along = velocity[k + 1, i] - velocity[k, i] - interval_s * (acceleration[k, i] + 0.5 * change)
+            jump += along * along
+            bent += change * change
+        if jump > _JUMP_M_S * _JUMP_M_S and jump > interval_s * interval_s * bent:
+            p, v, a, yaw = position.copy(), velocity.copy(), acceleration.copy(), yaw_rad.copy()
+            for later in range(k + 1, n):
+                t = (later - k) * interval_s
+                yaw[later] = yaw[later - 1] + (yaw[k] - yaw[k - 1] if k else 0.0)
+                for i in range(3):
+                    jerk = (a[k, i] - a[k - 1, i]) / interval_s if k else 0.0
+                    a[later, i] = a[k, i] + t * jerk
+                    v[later, i] = v[k, i] + t * (a[k, i] + t * jerk / 2.0)
+                    p[later, i] = p[k, i] + t * (v[k, i] + t * (a[k, i] / 2.0 + t * jerk / 6.0))
+            return p, v, a, yaw
+    return position, velocity, acceleration, yaw_rad
+
+
+@compiled
 def approach(
     position: Array,
     velocity: Array,
@@ -175,9 +211,9 @@ def approach(
     """Write references of position, velocity and acceleration, ENU, (n, 3) each, that lead to those given.
 
     References that are near enough are taken as they are. The farther they are, the more does the error die as the
-    gains have it in place of at once. An error that is larger than the largest dies at the speed at which the largest
-    begins to, and of the reference's motion only the part counts that the largest is of it: one that no vehicle can
-    follow must not lead this one astray.
+    gains have it in place of at once, and as much slower as it takes to keep to the largest acceleration. An error that
+    is larger than the largest dies at the speed at which the largest begins to. Of the motion of a reference that is
+    farther than what is followed only a part counts: one that no vehicle can follow must not lead this one astray.
     """
     away, squared = np.empty(3), 0.0
     for i in range(3):
@@ -188,21 +224,36 @@ def approach(
         for order in range(3):
             near[order][:] = references[order]
         return
-    part, smooth = min(1.0, law.max_error_m / distance), 1.0 - law.exact_within_m / distance
-    is_far = distance > law.max_error_m
+    part, smooth = min(1.0, law.follow_within_m / distance), 1.0 - law.exact_within_m / distance
+    is_far, h = distance > law.max_error_m, law.interval_s
+    error, error_rate, drift = np.zeros(3), np.empty(3), np.zeros(3)
     for i in range(3):
-        error, speed = away[i], 0.0
         if is_far:
-            error, speed = 0.0, law.k1_s2 / law.k2_s * part * away[i]
-        error_rate = part * references[1][0, i] + speed - velocity[i]
+            drift[i] = law.k1_s2 / law.k2_s * law.max_error_m / distance * away[i]
+        else:
+            error[i] = away[i]
+        error_rate[i] = part * references[1][0, i] + drift[i] - velocity[i]
+    slower = slowed_by(norm(error), norm(error_rate), law)
+    k1, k2 = law.k1_s2 / (slower * slower), law.k2_s / slower
+    for i in range(3):
+        left, left_rate = smooth * error[i], smooth * error_rate[i]
         for n in range(references[0].shape[0]):
-            E = law.errors_ahead[n]
-            left = smooth * (E[0, 0] * error + E[0, 1] * error_rate)
-            left_rate = smooth * (E[1, 0] * error + E[1, 1] * error_rate)
+            left_acceleration = -k1 * left - k2 * left_rate
             moved = references[0][n, i] - references[0][0, i]
-            near[0][n, i] = position[i] + error + part * moved + speed * n * law.interval_s - left
-            near[1][n, i] = part * references[1][n, i] + speed - left_rate
-            near[2][n, i] = part * references[2][n, i] + law.k1_s2 * left + law.k2_s * left_rate
+            near[0][n, i] = position[i] + error[i] + part * moved + drift[i] * n * h - left
+            near[1][n, i] = part * references[1][n, i] + drift[i] - left_rate
+            near[2][n, i] = part * references[2][n, i] - left_acceleration
+            jerk = -k1 * left_rate - k2 * left_acceleration
+            snap = -k1 * left_acceleration - k2 * jerk
+            left += h * (left_rate + h / 2.0 * (left_acceleration + h / 3.0 * (jerk + h / 4.0 * snap)))
+            left_rate += h * (left_acceleration + h / 2.0 * (jerk + h / 3.0 * snap))
+
+
+@compiled
+def slowed_by(error_m: float, error_rate_m_s: float, law: Guidance) -> float:
+    """Return how many times slower an error must die so that its acceleration is within the largest; 1 or more."""
+    half = 0.5 * law.k2_s * error_rate_m_s / law.max_acceleration_m_s2
+    return max(half + sqrt(half * half + law.k1_s2 * error_m / law.max_acceleration_m_s2), 1.0)
 
 
 @compiled

@@ -19,7 +19,7 @@ from colibri.autopilot.control.interface import (
     VehicleState,
 )
 from colibri.autopilot.control.parts import recovery
-from colibri.autopilot.control.parts.error_dynamics import error_transition, gains
+from colibri.autopilot.control.parts.error_dynamics import gains
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.parts.vehicle_tracking import Observed, Tracked, TrackingLaw, VehicleTracker
 from colibri.autopilot.control.qp import QpSolver
@@ -36,7 +36,7 @@ from colibri.common.config import Count, Degrees, Negative, Positive, Table, rea
 from colibri.common.elementary import cos, square, tan
 from colibri.common.kernels import asin, atan2
 from colibri.common.matrices import dot, matvec, norm
-from colibri.common.rotations import quaternion_from_euler, rotation_matrix
+from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -55,6 +55,8 @@ class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     poles: tuple[Negative, Negative]
     approach_speed_m_s: Positive
+    follow_within_m: Positive
+    max_acceleration_m_s2: Positive
     exact_within_m: Positive
     max_tilt_deg: Degrees
     min_thrust: Annotated[float, msgspec.Meta(gt=0.0, lt=1.0)]
@@ -150,8 +152,9 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         guidance = Guidance(
             k1_s2,
             k2_s,
-            error_transition(settings.guidance.poles, h, samples),
             settings.guidance.approach_speed_m_s * k2_s / k1_s2,
+            settings.guidance.follow_within_m,
+            settings.guidance.max_acceleration_m_s2,
             settings.guidance.exact_within_m,
             h,
             *gains(settings.fallback.poles),
@@ -234,7 +237,11 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         commands, after = self.tracker.actuate(tracked, observed, squared, max_speed)
         lag_us = self._lag_us(memory.lag_us, plan, age) if wanted.path else 0
         R = wanted.target.attitudes[0]
-        angles = (atan2(R[2, 1], R[2, 2]), -asin(min(max(R[2, 0], -1.0), 1.0)), float(wanted.target.yaw_rad[0]))
+        angles = (
+            atan2(R[2, 1], R[2, 2]),
+            -asin(min(max(R[2, 0], -1.0), 1.0)),
+            nearest_turn(float(wanted.target.yaw_rad[0]), inputs.now.psi),
+        )
         how = diagnostics._replace(mass_kg=observed.mass_kg)
         if wanted.path:
             how = how._replace(path_lag_s=memory.lag_us * 1e-6)

@@ -184,16 +184,7 @@ class WholeMpc:
         else:
             planning.condense_on_path(now, target, last, path, self._effects, self.model, problem, work, free)
         started_s = self._clock()
-        minimum = np.empty(len(free.f))
-        is_free = planning.free_minimum(free, len(self.starts) - 1, minimum)
-        status, z = QpResult(QpStatus.SOLVED, minimum) if is_free else self._solver.solve(free)
-        slack, soft = 0.0, (0, 0)
-        if z is not None and condensing.exceeds(work.motion, work.responses, z, problem):
-            planning.limit(work, free, problem, limited)
-            status, z = self._solver.solve(limited)
-            if z is not None:
-                slack, soft = max(z[len(free.f) :].tolist()), planning.count_active(limited, z)
-                z = z[: len(free.f)].copy()
+        status, z, slack, soft = self.solve(free, limited, problem, work)
         solve_time_s = self._clock() - started_s
         if z is None:
             return None, Diagnostics(status, solve_time_s=solve_time_s)
@@ -208,6 +199,25 @@ class WholeMpc:
         )
         speeds = None if path is None else read_speeds(path.speeds, self._effects.shares, z)
         return Plan(commands, states, speeds), diagnostics
+
+    def solve(
+        self, free: Qp, limited: Qp, problem: Packed, work: Workspace
+    ) -> tuple[QpStatus, Array | None, float, tuple[int, int]]:
+        """Return how the QP ended, its corrections, the largest slack, and how many soft limits of tilt and rates bind.
+
+        No solver is asked where the minimum within no limits is within the rotors'; soft limits are added where it, or
+        the solver's, exceeds one.
+        """
+        minimum = np.empty(len(free.f))
+        is_free = planning.free_minimum(free, len(self.starts) - 1, minimum)
+        status, z = QpResult(QpStatus.SOLVED, minimum) if is_free else self._solver.solve(free)
+        if z is None or not condensing.exceeds(work.motion, work.responses, z, problem):
+            return status, z, 0.0, (0, 0)
+        planning.limit(work, free, problem, limited)
+        status, z = self._solver.solve(limited)
+        if z is None:
+            return status, z, 0.0, (0, 0)
+        return status, z[: len(free.f)].copy(), max(z[len(free.f) :].tolist()), planning.count_active(limited, z)
 
 
 def model_of(vehicle: Vehicle, interval_s: float) -> Model:

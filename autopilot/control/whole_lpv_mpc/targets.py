@@ -45,6 +45,7 @@ class TargetBuilder:
         """Return what follows references at their times."""
         n, mpc = self._samples, self._mpc
         p, v, a, yaw = (column[:n] for column in (*references[:3], references[5]))
+        p, v, a, yaw = feed_forward.before_jump(p, v, a, yaw, self._guidance.interval_s)
         near, flat = _motion(n), _flat(n)
         feed_forward.approach(now.rigid[:3], now.rigid[3:6], (p, v, a), self._guidance, near)
         feed_forward.ask(near[1], near[2], yaw, now.disturbance, limits, mpc.from_wrench, mpc.model, flat)

@@ -112,7 +112,8 @@ class Reach:
         self._mixed = np.abs(inverse(vehicle.allocation())) * vehicle.rotors.thrust_coefficient
         law = profile.table(profile.controller)
         self._max_tilt_deg = float(law.get("guidance", {}).get("max_tilt_deg", _MAX_TILT_DEG))
-        self._max_rate = float(min(law.get("attitude", {}).get("max_rate_rad_s", (inf,))[:2]))
+        predicted = law.get("plan", law.get("attitude", {}))
+        self._max_rate = float(min(predicted.get("max_rate_rad_s", (inf,))[:2]))
 
     def charge_of_hover(self, duration_s: float) -> float:
         """Return the charge taken by a hover, Ah."""

@@ -14,7 +14,7 @@ from colibri.mavlink.links.open import open_link
 
 Prepare = Callable[[Path], str]
 
-PARAMETERS = "lpv-mpc-asctec-hummingbird.params"
+PARAMETERS = "whole-lpv-mpc-asctec-hummingbird.params"
 
 
 class AtOnce(Stop):

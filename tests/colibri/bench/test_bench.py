@@ -11,7 +11,7 @@ import pytest
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
 from colibri.bench import run, sensing, serving, speed, stages
-from colibri.bench.variants import plan_of, toml_lines, with_intervals, with_moves
+from colibri.bench.variants import plan_of, toml_lines, with_blocks, with_intervals
 from colibri.cli.main import main
 
 SHORT_S = "0.2"
@@ -31,9 +31,9 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 def test_every_stage_takes_time_at_every_horizon(measured: dict[str, Any]) -> None:
     assert set(measured) == {"settings", "stages"}
     horizons = measured["stages"]["horizons"]
-    assert {int(horizon) for horizon in horizons} == set(stages.MOVES)
+    assert {int(horizon) for horizon in horizons} == set(stages.BLOCKS)
     for horizon, figures in horizons.items():
-        assert sum(figures["moves"]) == int(horizon)
+        assert sum(figures["blocks"]) == int(horizon)
         assert set(figures["us"]) == {stage.name for stage in stages.STAGES}
         assert all(0.0 < figure["p50"] <= figure["p99"] for figure in figures["us"].values())
 
@@ -126,7 +126,7 @@ def test_bad_input_is_one_line(options: tuple[str, ...], capsys: pytest.CaptureF
 
 
 def test_a_profile_written_is_the_profile_read(tmp_path: Path) -> None:
-    profile = with_intervals(with_moves(load_profile("flight"), (1, 2)), frame_s=0.002, control_s=0.008)
+    profile = with_intervals(with_blocks(load_profile("flight"), (1, 2)), frame_s=0.002, control_s=0.008)
     read = plan_of(profile, tmp_path, 1.0, "memory").profile
     assert (read.name, read.file) == ("profile", str(tmp_path / "profile.toml"))
     assert msgspec.structs.replace(read, name=profile.name, file=profile.file) == profile
@@ -138,5 +138,5 @@ def test_toml_leaves_out_what_is_not_given() -> None:
 
 
 def test_the_flight_profile_is_measured_at_its_own_horizon() -> None:
-    moves = load_profile(run.PROFILE).table("lpv-mpc")["attitude"]["moves"]
-    assert tuple(msgspec.convert(moves, list[int])) == stages.MOVES[stages.PROFILE_HORIZON]
+    blocks = load_profile(run.PROFILE).table("whole-lpv-mpc")["plan"]["blocks"]
+    assert tuple(msgspec.convert(blocks, list[int])) == stages.BLOCKS[stages.PROFILE_HORIZON]

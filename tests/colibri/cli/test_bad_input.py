@@ -67,9 +67,9 @@ BAD_INPUT = {
         (plain("spiral"), plain("--profile"), edited(PROFILE, "horizon = 4   ", "horizon = 0   ")),
         "thesis.toml: controllers.cascade: attitude.horizon: Expected `int` >= 1",
     ),
-    "no moves": (
-        (plain("spiral"), plain("--profile"), edited(FLIGHT, "moves = [1, 1, 2, 4, 5, 7]", "moves = []")),
-        "flight.toml: controllers.lpv-mpc: attitude.moves: Expected `array` of length >= 1",
+    "no blocks": (
+        (plain("spiral"), plain("--profile"), edited(FLIGHT, "blocks = [1, 2, 3, 5, 7, 10]", "blocks = []")),
+        "flight.toml: controllers.whole-lpv-mpc: plan.blocks: Expected `array` of length >= 1",
     ),
     "frames that divide nothing": (
         (plain("spiral"), plain("--profile"), edited(FLIGHT, "frame_interval_s = 0.004", "frame_interval_s = 0.003")),
@@ -88,7 +88,10 @@ BAD_INPUT = {
         "hummingbird.toml: rotors.speed_unit: Invalid enum value 'rad/sec': choose rad/s, rpm",
     ),
     "choice of a law": (
-        (plain("spiral"), plain("--profile"), edited(FLIGHT, '"along-plan"', '"ahead"')),
+        (
+            *(plain("spiral"), plain("--controller"), plain("lpv-mpc"), plain("--profile")),
+            edited(FLIGHT, '"along-plan"', '"ahead"'),
+        ),
         "flight.toml: controllers.lpv-mpc: attitude.scheduling: Invalid enum value 'ahead': choose along-plan, frozen",
     ),
     "no text": ((plain("spiral"), plain("--vehicle"), recoded(VEHICLE)), ": is not UTF-8: save the file as that"),

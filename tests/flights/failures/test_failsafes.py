@@ -265,9 +265,10 @@ def test_a_rotor_that_failed_leads_down() -> None:
 
 
 def test_a_control_law_that_finds_no_plan_stops() -> None:
-    table = FLIGHT.controllers["lpv-mpc"]
+    table = FLIGHT.table("lpv-mpc")
     hopeless = {**table, "qp": {**table["qp"], "max_iterations": 1}}
-    profile = structs.replace(FLIGHT, controllers={**FLIGHT.controllers, "lpv-mpc": hopeless})
+    laws = {**FLIGHT.controllers, "lpv-mpc": hopeless}
+    profile = structs.replace(FLIGHT, controller="lpv-mpc", controllers=laws)
     flight = in_the_air(20.0, profile=profile)
     assert flight.select(Mode.TRACK) == ACCEPTED
     assert flight.wait_until(lambda: flight.mode is Mode.HOLD, within=1.0) == pytest.approx(0.5, abs=0.05)

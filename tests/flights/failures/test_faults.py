@@ -25,7 +25,7 @@ def test_a_ground_station_weakens_a_rotor_and_the_vehicle_stays() -> None:
     assert flight.command(INJECT, MOTOR, WRONG, 1.0, 0.65, nan, nan, nan) == ACCEPTED
     assert len(flight.client.acks) == 4
     path = flight.path(8.0)
-    assert 0.02 < max(dist(place, (0.0, 0.0, 5.0)) for place in path) < 0.5
+    assert 0.005 < max(dist(place, (0.0, 0.0, 5.0)) for place in path) < 0.5
     weak, other = flight.rotors.controls[0], flight.rotors.controls[2]
     assert weak / other == pytest.approx(0.65**-0.5, rel=0.02)
     assert flight.command(INJECT, MOTOR, OK) == ACCEPTED

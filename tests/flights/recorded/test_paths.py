@@ -19,7 +19,7 @@ def test_a_path_that_dips_is_flown_above_the_ground(tmp_path: Path, capsys: pyte
     name = written(tmp_path, DIPS)
     figures = fly(tmp_path / "out", f"{name},speed=8", "--link", "direct", "--duration", "24")
     capsys.readouterr()
-    assert "dip to -0.68 and -0.30 m: held above 0 m; 4 legs stretched by 1.04 to 1.15: tilt" in figures["track_note"]
+    assert "dip to -1.03 and -0.60 m: held above 0 m" in figures["track_note"]
     assert figures["max_error_m"] < 0.1
     assert rows(tmp_path / "out" / "flight.csv")["z"].min() > 0.1
 

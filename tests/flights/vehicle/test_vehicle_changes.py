@@ -36,7 +36,7 @@ def test_a_speed_and_a_behaviour_act_at_once() -> None:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("MPC_JERK_MAX", 5.0), ("LPV_Q_PHI", 2.0), ("LPV_POLE1", -4.0), ("VEH_MASS", 0.733), ("TRACK", 3)],
+    [("MPC_JERK_MAX", 5.0), ("WHL_Q_POSITION", 50.0), ("WHL_POLE1", -5.0), ("VEH_MASS", 0.733), ("TRACK", 3)],
 )
 def test_a_number_that_changes_in_flight_jolts_nothing(name: str, value: Value) -> None:
     flight = in_the_air(wind_enu_m_s=(3.0, 0.0, 0.0))

@@ -6,7 +6,6 @@ from typing import TypeAlias
 import numpy as np
 import pytest
 
-from colibri.autopilot.control.parts.error_dynamics import error_transition
 from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.control.whole_lpv_mpc import feed_forward, model
@@ -25,7 +24,16 @@ FROM_WRENCH = exact_inverse(MODEL.allocation)
 WIDE = ForceLimits(tan(1.2), 0.2, 19.0, 0.2)
 CALM = Disturbance(np.zeros(3), np.zeros(3))
 GUIDANCE = Guidance(
-    30.0, 11.0, error_transition((-5.0, -6.0), INTERVAL_S, STEPS + 2), 1.1, 0.3, INTERVAL_S, 30.0, 11.0, FROM_WRENCH
+    k1_s2=30.0,
+    k2_s=11.0,
+    max_error_m=1.1,
+    follow_within_m=1.1,
+    max_acceleration_m_s2=10.0,
+    exact_within_m=0.3,
+    interval_s=INTERVAL_S,
+    recovery_1_s2=30.0,
+    recovery_1_s=11.0,
+    from_wrench=FROM_WRENCH,
 )
 
 
@@ -103,6 +111,36 @@ def test_from_far_away_a_slow_motion_leads_there_whatever_the_reference_does() -
     assert near[0][0] == pytest.approx([53.0, 0.0, 0.0], abs=0.03)
     assert near[1][0] == pytest.approx([-3.0, 0.0, 0.0], abs=0.1)
     assert np.abs(near[2][0]).max() < 1.6
+
+
+def test_the_way_back_is_one_motion_and_keeps_to_its_acceleration() -> None:
+    """A vehicle that falls at 6 m/s, 1 m off a place that stands."""
+    still = np.zeros((STEPS + 2, 3))
+    p, v, a = near = (still.copy(), still.copy(), still.copy())
+    position, velocity = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -6.0])
+    feed_forward.approach(position, velocity, (still, still, still), GUIDANCE, near)
+    assert np.linalg.norm(a, axis=1).max() < 10.0
+    assert a[0, 2] > 5.0
+    assert np.diff(p, axis=0) / INTERVAL_S == pytest.approx(0.5 * (v[1:] + v[:-1]), abs=1e-3)
+    assert np.diff(v, axis=0) / INTERVAL_S == pytest.approx(0.5 * (a[1:] + a[:-1]), abs=1e-3)
+
+
+def test_what_comes_after_a_jump_is_not_followed_before_it() -> None:
+    p, v, a, yaw = circle(3.0, 10.0)
+    ends, stands, rests, looks = p.copy(), v.copy(), a.copy(), yaw.copy()
+    ends[20:], stands[20:], rests[20:], looks[20:] = p[20], 0.0, 0.0, yaw[20]
+    followed = feed_forward.before_jump(ends, stands, rests, looks, INTERVAL_S)
+    for wanted, got in zip((p, v, a, yaw), followed, strict=True):
+        assert (got[:20] == wanted[:20]).all()
+        assert np.abs(got - wanted).max() < 0.02 * np.abs(wanted).max()
+    assert stands[20, 1] == 0.0, "what was given stays"
+
+
+@pytest.mark.parametrize("lap_s", [1.0, 3.0, 30.0])
+def test_a_motion_without_a_jump_is_followed_as_it_is(lap_s: float) -> None:
+    p, v, a, yaw = circle(4.0, lap_s)
+    followed = feed_forward.before_jump(p, v, a, yaw, INTERVAL_S)
+    assert all((one == other).all() for one, other in zip(followed, (p, v, a, yaw), strict=True))
 
 
 def test_a_demanded_attitude_stands_as_demanded() -> None:

@@ -26,7 +26,7 @@ def test_attitude_height_and_speed_stay_right_for_as_long_as_a_landing_takes() -
     thrower = Thrower("autopilot.estimation.estimator:Estimator.step")
     thrower.arm()
     try:
-        flight.run(6.0)
+        flight.run(5.5)  # shortly before it touches down
     finally:
         thrower.disarm()
     estimate, truth = flight.copter.parts.state_source.estimate, state_frame(flight.world)

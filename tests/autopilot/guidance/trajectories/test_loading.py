@@ -58,7 +58,7 @@ def test_a_formula_beyond_the_limits_is_flown_as_it_is_and_said() -> None:
     assert (position(fast.track, t) == position(track("lemniscate:lap=3"), t)).all()
     assert fast.note == (
         "track lemniscate:lap=3 asks for more than there is: thrust of 6.87 N a rotor, where 3.5 is the most; "
-        "tilt of 75.4 degrees, where 66 is the most; body rate of 15.3 rad/s, where 10 is the most"
+        "tilt of 75.4 degrees, where 70 is the most; body rate of 15.3 rad/s, where 10 is the most"
     )
 
 
