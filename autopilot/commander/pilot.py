@@ -341,7 +341,7 @@ class Pilot:
             self.ground.watch(now_us, vehicle, sinks=wanted.sinks, drifts=wanted.drifts)
             return Guidance(attitude=wanted.demand, begins=begins)
         horizon = self.generator.lead(context, wanted)
-        self.ground.watch(now_us, vehicle, sinks=is_below(context.reference, vehicle))
+        self.ground.watch(now_us, vehicle, sinks=is_below(context.reference.height_m, vehicle))
         return Guidance(horizon=horizon, begins=begins, pace=wanted.pace)
 
     def _rest(self) -> Guidance:

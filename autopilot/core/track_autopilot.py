@@ -6,7 +6,7 @@ from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.core.step import Step, follows, nothing_known
 from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
-from colibri.autopilot.guidance.landing_detector import is_clear, stands_at_first
+from colibri.autopilot.guidance.landing_detector import Landing, is_below, is_clear, stands_at_first, watch
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.mavlink.hil.plant_status import NOTHING, PlantStatus
@@ -45,7 +45,7 @@ class Autopilot:
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)
         self._clock = clock
         self._time_us: int | None = None
-        self._ground_m: float | None = None
+        self._landing, self._ground_m = Landing(), 0.0
         self.frame_interval_us = self._loop.frame_interval_us
         self._state_source = StateSource(estimator, self.frame_interval_us)
 
@@ -75,9 +75,11 @@ class Autopilot:
         decision = None
         if due:
             state = self._loop.state(self._delay.ahead(known, self._loop.charge_ah))
-            state = state._replace(airborne=self._ground_m is None or is_clear(state, self._ground_m))
             acts_us = frame.time_us + self._delay.delay_us
             references = self._planner.horizon_at(acts_us - self._loop.lag_us, self._loop.control_interval_us)
+            sinks = is_below(float(references.position_enu_m[0, 2]), state)
+            self._landing, _ = watch(self._landing, frame.time_us, state, sinks)
+            state = state._replace(airborne=is_clear(self._landing, state, self._ground_m))
             decision = self._loop.decide(frame.time_us, state, references, Pace.CATCHING_UP)
         command = ActuatorCommand(frame.time_us, self._loop.controls, armed=True)
         self._delay.sent(command)
@@ -93,4 +95,6 @@ class Autopilot:
         self._loop.begin(speed, float(self._planner.horizon(frame.time_us).yaw_rad[0]))
         self._delay.begin(self._loop.controls, rests=self._state_source.rests)
         state = self._loop.state(frame)
-        self._ground_m = state.position_enu_m[2] if rests or stands_at_first(state, 0.0) else None
+        self._landing, self._ground_m = Landing(), 0.0
+        if rests or stands_at_first(state, 0.0):
+            self._ground_m = state.position_enu_m[2]

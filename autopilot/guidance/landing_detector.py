@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 from colibri.autopilot.control.interface import VehicleState
-from colibri.autopilot.guidance.reference import Reference
 
 _BELOW_M = 0.15
 _STILL_M_S = 0.15
@@ -49,9 +48,9 @@ def watch(
     return landing, now_us - landing.since_us >= for_us
 
 
-def is_below(reference: Reference, state: VehicleState) -> bool:
-    """Whether the reference is so far below the vehicle that it must sink."""
-    return float(reference.motion[0, 2]) < state.position_enu_m[2] - _BELOW_M
+def is_below(height_m: float, state: VehicleState) -> bool:
+    """Whether a reference, z of ENU, is so far below the vehicle that it must sink."""
+    return height_m < state.position_enu_m[2] - _BELOW_M
 
 
 def stands_at_first(state: VehicleState, home_z_m: float) -> bool:
@@ -60,9 +59,9 @@ def stands_at_first(state: VehicleState, home_z_m: float) -> bool:
     return still and abs(state.position_enu_m[2] - home_z_m) < STANDING_BELOW_M
 
 
-def is_clear(state: VehicleState, ground_m: float) -> bool:
-    """Whether a vehicle in flight is too far from the height at which it last stood to touch the ground.
+def is_clear(landing: Landing, state: VehicleState, ground_m: float) -> bool:
+    """Whether a vehicle in flight does not touch the ground: nothing holds it, and it is away from where it last stood.
 
-    One that is below is as clear of it as one above: there the ground is lower.
+    One that is below that height is as clear of it as one above: there the ground is lower.
     """
-    return abs(state.position_enu_m[2] - ground_m) > _CLEAR_M
+    return landing.since_us is None and abs(state.position_enu_m[2] - ground_m) > _CLEAR_M

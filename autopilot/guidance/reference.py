@@ -47,6 +47,11 @@ class Reference(NamedTuple):
     motion: Array
     heading: Array
 
+    @property
+    def height_m(self) -> float:
+        """Position, z of ENU."""
+        return float(self.motion[0, 2])
+
 
 class Target(NamedTuple):
     """Target of the reference at every instant of the preview.

@@ -43,7 +43,6 @@ class GroundContact:
         self._lines = lines
         self._landing = Landing()
         self.standing = self.idles = True
-        self._sinks = False
         self.height_m = 0.0
         self.times = FlightTimes()
 
@@ -65,8 +64,8 @@ class GroundContact:
         self.idles |= came_down
 
     def clear(self, vehicle: VehicleState) -> bool:
-        """Whether a vehicle has left the ground and is clear of it, and does not stay above what it must sink to."""
-        return not self.standing and not self._sinks and is_clear(vehicle, self.height_m)
+        """Whether a vehicle has left the ground and is clear of it."""
+        return not self.standing and is_clear(self._landing, vehicle, self.height_m)
 
     def arm(self, now_us: int) -> None:
         """Count a flight that begins with the arming at `now_us`."""
@@ -92,7 +91,6 @@ class GroundContact:
 
     def watch(self, now_us: int, vehicle: VehicleState, *, sinks: bool, drifts: bool = False) -> None:
         """Detect a landing of a vehicle in flight; `sinks` and `drifts` as of `landing_detector.watch`."""
-        self._sinks = sinks
         self._landing, stands = watch(self._landing, now_us, vehicle, sinks, drifts=drifts)
         if stands:
             self.land(now_us)

@@ -89,7 +89,7 @@ class AltitudeTask(EndlessTask):
             thrust_n=self._loop.thrust_n(reference, context)
         )
         motion = self._tilt.by_command(command, context)
-        return motion._replace(reference=reference, lifts=lifting, sinks=is_below(reference, context.state))
+        return motion._replace(reference=reference, lifts=lifting, sinks=is_below(reference.height_m, context.state))
 
     def _climb(self, sticks: Sticks, context: TaskContext) -> tuple[Reference, bool]:
         """Return the height's reference, where the vehicle is otherwise, and whether it is to leave the ground."""
