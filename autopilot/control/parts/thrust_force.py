@@ -44,16 +44,15 @@ def limit_force(force: Array, limits: ForceLimits) -> None:
 @compiled
 def overcome_drag(velocities: Array, airframe: Airframe, limits: ForceLimits, forces: Array) -> None:
     """Make forces, (n, 3), that would do without drag those that do with it, at velocities, m/s, ENU, (n, 3)."""
-    free, drag, up = np.empty(3), np.empty(3), np.empty(3)
+    free = np.empty(3)
     for n in range(forces.shape[0]):
         force = forces[n]
         free[:] = force
         limit_force(force, limits)
         for _ in range(_DRAG_PASSES):
             thrust = norm(force)
-            for i in range(3):
-                up[i] = force[i] / thrust
-            drag_force(airframe, velocities[n], up, thrust, drag)
+            up = (force[0] / thrust, force[1] / thrust, force[2] / thrust)
+            drag = drag_force(airframe, velocities[n], up, thrust)
             for i in range(3):
                 force[i] = free[i] - drag[i]
             limit_force(force, limits)

@@ -6,7 +6,6 @@ import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Horizon, VehicleState
 from colibri.autopilot.control.vehicle_model import disturbance_observer, rotor_lag
-from colibri.autopilot.control.vehicle_model.airframe import drag_force
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings, observer_of
 from colibri.autopilot.control.vehicle_model.mass import MassSettings, follow_mass, mass_model
@@ -78,7 +77,7 @@ class VehicleTracker:
         self.momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
         observing = observer_of(observer, vehicle, interval_s)
         self.inertia = observing.inertia
-        self._airframe, self._interval_s = observing.airframe, interval_s
+        self._interval_s = interval_s
         self._observer, self._mass = packed(observing), packed(mass_model(mass, vehicle, interval_s))
 
     def initial(self, rotor_speed: float) -> Tracked:
@@ -100,16 +99,12 @@ class VehicleTracker:
         """Return the observer's estimate, (12,), with the measurement `measured`, (9,)."""
         if tracked.measured is None:
             return disturbance_observer.first_estimate(measured)
-        middle = 0.5 * (tracked.measured + measured)
-        drag = np.empty(3)
-        drag_force(self._airframe, middle[:3], middle[6:], float(tracked.mean_wrench[0]), drag)
         return disturbance_observer.observe(
             tracked.estimate,
             tracked.measured,
             measured,
             tracked.mean_wrench,
             dot(self.momentum, tracked.speeds),
-            drag,
             tracked.mass_kg,
             self._observer,
         )

@@ -4,7 +4,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from colibri.common.jit import compiled
-from colibri.common.types import Array
+from colibri.common.types import Array, Vector
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -35,9 +35,12 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
 
 
 @compiled
-def drag_force(airframe: Airframe, velocity: Array, up: Array, thrust_n: float, out: Array) -> None:
-    """Write the drag, N, ENU, (3,), on a vehicle that moves at `velocity`, m/s, ENU, while it makes `thrust_n`."""
+def drag_force(airframe: Airframe, velocity: Array | Vector, up: Array | Vector, thrust_n: float) -> Vector:
+    """Return the drag, N, ENU, on a vehicle that moves at `velocity`, m/s, ENU, while it makes `thrust_n` along `up`."""
     along = velocity[0] * up[0] + velocity[1] * up[1] + velocity[2] * up[2]
     across = airframe.drag_xy + airframe.rotor_drag * sqrt(max(thrust_n, 0.0))
-    for i in range(3):
-        out[i] = -across * (velocity[i] - along * up[i]) - airframe.drag_z * along * up[i]
+    return (
+        -across * (velocity[0] - along * up[0]) - airframe.drag_z * along * up[0],
+        -across * (velocity[1] - along * up[1]) - airframe.drag_z * along * up[1],
+        -across * (velocity[2] - along * up[2]) - airframe.drag_z * along * up[2],
+    )

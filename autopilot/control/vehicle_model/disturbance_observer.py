@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.vehicle_model.airframe import Airframe, airframe_of
+from colibri.autopilot.control.vehicle_model.airframe import Airframe, airframe_of, drag_force
 from colibri.common.config import Positive, Table
 from colibri.common.elementary import square
 from colibri.common.jit import Packed, compiled
@@ -40,7 +40,7 @@ class Observer(NamedTuple):
         rate: Part of the rate's innovation that is corrected at once.
         angular_acceleration: Disturbance for each rad/s of innovation, 1/s.
         max_acceleration_m_s2, max_moment_n_m: Largest disturbances estimated.
-        airframe: Gravity is of it.
+        airframe: Gravity and drag are of it.
         inertia: Ix, Iy, Iz, kg m², (3,).
         interval_s: Between two samples.
     """
@@ -91,20 +91,20 @@ def observe(
     now: Array,
     wrench: Array,
     momentum: float,
-    drag_n: Array,
     mass_kg: float,
     packed: Packed,
 ) -> Array:
     """Return the estimate (12,) now, from that of the sample before and what was measured then and now, (9,) each.
 
     Over the interval, `wrench` is the mean U1 (N), U2, U3, U4 (N m), (4,), `momentum` h of the rotors along body z,
-    N m s, and `drag_n` the mean drag, ENU, (3,), of a vehicle of `mass_kg`. `packed` is the `Observer`.
+    N m s, of a vehicle of `mass_kg`. `packed` is the `Observer`.
     """
     observer = packed[0]
     airframe, inertia, interval_s = observer.airframe, observer.inertia, observer.interval_s
     thrust_n, moment_n_m = wrench[0], wrench[1:]
     middle = 0.5 * (before + now)
     rate, up = middle[3:6], middle[6:]
+    drag_n = drag_force(airframe, middle[:3], up, thrust_n)
     turn = np.empty(3)
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
     p, q, r = rate

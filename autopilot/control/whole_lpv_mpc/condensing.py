@@ -340,10 +340,10 @@ def read_plan(motion: Array, speeds: Array, responses: Array, z: Array, levels: 
     states, change = np.empty((steps, PREDICTED)), np.empty(DEVIATIONS)
     for step in range(steps):
         x, X, state = motion[step], responses[step], states[step]
-        for i in range(DEVIATIONS):
-            change[i] = 0.0
-            for block in range(levels.shape[0]):
-                for k in range(inputs * block, inputs * block + ROTORS):
+        change[:] = 0.0
+        for block in range(levels.shape[0]):
+            for k in range(inputs * block, inputs * block + ROTORS):
+                for i in range(DEVIATIONS):  # twelve sums side by side: none waits for another
                     change[i] += X[i, k] * z[k]
         for i in range(6):
             state[i] = x[i] + change[i]

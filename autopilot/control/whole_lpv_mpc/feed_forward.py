@@ -67,6 +67,38 @@ class Flat(NamedTuple):
 
 
 @compiled
+def follow(
+    rigid: Array,
+    references: tuple[Array, Array, Array, Array],
+    disturbance: Disturbance,
+    limits: ForceLimits,
+    law: Packed,
+    vehicle: Packed,
+    near: tuple[Array, Array, Array],
+    yaw_rad: Array,
+    out: Flat,
+) -> Array:
+    """Fill what follows references at their times; return the force, N, ENU, (3,), along which thrust must point now.
+
+    Args:
+        rigid: State, see `model.RIGID`, (13,).
+        references: Of position, velocity and acceleration, ENU, (n, 3) each, and of yaw, rad, (n,).
+        disturbance: On the vehicle.
+        limits: Of the force.
+        law: The `Guidance`.
+        vehicle: The `Model`.
+        near: Is filled with references that `approach` them.
+        yaw_rad: Is filled, (n,).
+        out: Is filled.
+    """
+    p, v, a, yaw = before_jump(references, law[0].interval_s)
+    yaw_rad[:] = yaw
+    approach(rigid[:3], rigid[3:6], (p, v, a), law, near)
+    ask(near[1], near[2], yaw_rad, disturbance, limits, law[0].from_wrench, vehicle, out)
+    return demanded_force(rigid, near, disturbance, law, limits, vehicle)
+
+
+@compiled
 def ask(
     velocity: Array,
     acceleration: Array,
@@ -171,13 +203,14 @@ def rate_between(before: Array, after: Array, interval_s: float, rate: Array) ->
 
 @compiled
 def before_jump(
-    position: Array, velocity: Array, acceleration: Array, yaw_rad: Array, interval_s: float
+    references: tuple[Array, Array, Array, Array], interval_s: float
 ) -> tuple[Array, Array, Array, Array]:
     """Return references, ENU, (n, 3) each, and of yaw, (n,), as they go on from before a jump of the velocity.
 
     No vehicle follows a jump, as at the end of a track that does not slow down: one that bends towards what comes after
     it is off what comes before.
     """
+    position, velocity, acceleration, yaw_rad = references
     n = position.shape[0]
     for k in range(n - 1):
         jump, bent = 0.0, 0.0
@@ -197,7 +230,7 @@ def before_jump(
                     v[later, i] = v[k, i] + t * (a[k, i] + t * jerk / 2.0)
                     p[later, i] = p[k, i] + t * (v[k, i] + t * (a[k, i] / 2.0 + t * jerk / 6.0))
             return p, v, a, yaw
-    return position, velocity, acceleration, yaw_rad
+    return references
 
 
 @compiled
@@ -205,7 +238,7 @@ def approach(
     position: Array,
     velocity: Array,
     references: tuple[Array, Array, Array],
-    law: Guidance,
+    packed: Packed,
     near: tuple[Array, Array, Array],
 ) -> None:
     """Write references of position, velocity and acceleration, ENU, (n, 3) each, that lead to those given.
@@ -214,7 +247,9 @@ def approach(
     gains have it in place of at once, and as much slower as it takes to keep to the largest acceleration. An error that
     is larger than the largest dies at the speed at which the largest begins to. Of the motion of a reference that is
     farther than what is followed only a part counts: one that no vehicle can follow must not lead this one astray.
+    `packed` is the `Guidance`.
     """
+    law = packed[0]
     away, squared = np.empty(3), 0.0
     for i in range(3):
         away[i] = references[0][0, i] - position[i]
@@ -258,14 +293,14 @@ def slowed_by(error_m: float, error_rate_m_s: float, law: Guidance) -> float:
 
 @compiled
 def demanded_force(
-    rigid: Array, near: tuple[Array, Array, Array], disturbance: Disturbance, law: Guidance, limits: ForceLimits,
+    rigid: Array, near: tuple[Array, Array, Array], disturbance: Disturbance, packed: Packed, limits: ForceLimits,
     vehicle: Packed,
 ) -> Array:  # fmt: skip
     """Return the force, N, ENU, (3,), by which the error now would die as the recovery has it: where thrust must point.
 
-    `near` are references that `approach` has written.
+    `near` are references that `approach` has written, `packed` is the `Guidance`.
     """
-    airframe, force = vehicle[0].airframe, np.empty(3)
+    law, airframe, force = packed[0], vehicle[0].airframe, np.empty(3)
     for i in range(3):
         away, slower = near[0][0, i] - rigid[i], near[1][0, i] - rigid[3 + i]
         demanded = near[2][0, i] + law.recovery_1_s2 * away + law.recovery_1_s * slower

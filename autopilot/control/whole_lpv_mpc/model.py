@@ -132,21 +132,21 @@ def _write_rates(
 ) -> None:
     """Write dx/dt of the rigid body, (13,), whose rotors, (4,), turn at `squared` and are commanded to `command`."""
     airframe, inertia, allocation = model.airframe, model.inertia, model.allocation
-    thrust, moment = 0.0, np.zeros(3)
+    thrust, roll, pitch, yaw = 0.0, 0.0, 0.0, 0.0
     momentum, spin_up = 0.0, 0.0
     for i in range(ROTORS):
         s = max(squared[i], 0.0)
         speed = max(sqrt(s), _LEAST_SPEED)
         thrust += allocation[0, i] * s
-        for axis in range(3):
-            moment[axis] += allocation[1 + axis, i] * s
+        roll += allocation[1, i] * s
+        pitch += allocation[2, i] * s
+        yaw += allocation[3, i] * s
         momentum += model.momentum[i] * speed
         spin_up += model.momentum[i] * 0.5 * (command[i] - s) * model.lag.rate_1_s / speed
     qw, qx, qy, qz = x[6], x[7], x[8], x[9]
     p, q, r = x[10], x[11], x[12]
-    up, drag = np.empty(3), np.empty(3)
-    up[0], up[1], up[2] = 2.0 * (qx * qz + qw * qy), 2.0 * (qy * qz - qw * qx), 1.0 - 2.0 * (qx * qx + qy * qy)
-    drag_force(airframe, x[VELOCITY : VELOCITY + 3], up, thrust, drag)
+    up = (2.0 * (qx * qz + qw * qy), 2.0 * (qy * qz - qw * qx), 1.0 - 2.0 * (qx * qx + qy * qy))
+    drag = drag_force(airframe, (x[3], x[4], x[5]), up, thrust)
     for i in range(3):
         rates[i] = x[VELOCITY + i]
         rates[VELOCITY + i] = (thrust * up[i] + drag[i]) / airframe.mass_kg + disturbance.acceleration[i]
@@ -156,9 +156,9 @@ def _write_rates(
     rates[8] = 0.5 * (qw * q + qz * p - qx * r)
     rates[9] = 0.5 * (qw * r + qx * q - qy * p)
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
-    rates[10] = (moment[0] + disturbance.moment[0] + (iy - iz) * q * r - momentum * q) / ix
-    rates[11] = (moment[1] + disturbance.moment[1] + (iz - ix) * p * r + momentum * p) / iy
-    rates[12] = (moment[2] + disturbance.moment[2] + (ix - iy) * p * q - spin_up) / iz
+    rates[10] = (roll + disturbance.moment[0] + (iy - iz) * q * r - momentum * q) / ix
+    rates[11] = (pitch + disturbance.moment[1] + (iz - ix) * p * r + momentum * p) / iy
+    rates[12] = (yaw + disturbance.moment[2] + (ix - iy) * p * q - spin_up) / iz
 
 
 class Transition(NamedTuple):
@@ -173,6 +173,7 @@ class Transition(NamedTuple):
         force, place: Of the mean squared speeds over the step on velocity and position.
         moment, turn: The same on rates and rotation.
         spin: Of the change of squared speeds over the step on the rate r, (4,).
+        V, W, G: Derivatives that these are made of: of velocity by rotation, of rotation by rotation, of rates by rates.
     """
 
     drag: Array
@@ -188,6 +189,9 @@ class Transition(NamedTuple):
     moment: Array
     turn: Array
     spin: Array
+    V: Array
+    W: Array
+    G: Array
 
 
 @compiled
@@ -196,6 +200,7 @@ def _empty_transition() -> Transition:
     return Transition(
         np.empty(nine), np.empty(nine), np.empty(nine), np.empty(nine), np.empty(nine), np.empty(nine), np.empty(nine),
         np.empty(nine), np.empty(twelve), np.empty(twelve), np.empty(twelve), np.empty(twelve), np.empty(ROTORS),
+        np.zeros(nine), np.zeros(nine), np.zeros(nine),
     )  # fmt: skip
 
 
@@ -206,26 +211,21 @@ def _linearise(x: Array, to: Array, squared: Array, model: Model, out: Transitio
     Taylor's series to the third power of the step, its matrices those of the step's middle.
     """
     airframe, inertia, allocation, h = model.airframe, model.inertia, model.allocation, model.interval_s
-    q = x[_QUATERNION:_BODY_RATE] + to[_QUATERNION:_BODY_RATE]
-    length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    R = rotation_matrix((q[0] / length, q[1] / length, q[2] / length, q[3] / length))
-    rate = 0.5 * (x[_BODY_RATE:] + to[_BODY_RATE:])
+    qw, qx, qy, qz = x[6] + to[6], x[7] + to[7], x[8] + to[8], x[9] + to[9]
+    length = sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
+    R = rotation_matrix((qw / length, qx / length, qy / length, qz / length))
+    p, q, r = 0.5 * (x[10] + to[10]), 0.5 * (x[11] + to[11]), 0.5 * (x[12] + to[12])
     thrust, momentum = 0.0, 0.0
     for i in range(ROTORS):
         thrust += allocation[0, i] * squared[i]
         momentum += model.momentum[i] * sqrt(max(squared[i], 0.0))
-    p, q_, r = rate[0], rate[1], rate[2]
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
-    G = np.array(
-        (
-            (0.0, ((iy - iz) * r - momentum) / ix, (iy - iz) * q_ / ix),
-            (((iz - ix) * r + momentum) / iy, 0.0, (iz - ix) * p / iy),
-            ((ix - iy) * q_ / iz, (ix - iy) * p / iz, 0.0),
-        )
-    )
-    W = np.array(((0.0, r, -q_), (-r, 0.0, p), (q_, -p, 0.0)))
+    V, W, G, D = out.V, out.W, out.G, out.drag
+    W[0, 1], W[0, 2], W[1, 0], W[1, 2], W[2, 0], W[2, 1] = r, -q, -r, p, q, -p
+    G[0, 1], G[0, 2] = ((iy - iz) * r - momentum) / ix, (iy - iz) * q / ix
+    G[1, 0], G[1, 2] = ((iz - ix) * r + momentum) / iy, (iz - ix) * p / iy
+    G[2, 0], G[2, 1] = (ix - iy) * q / iz, (ix - iy) * p / iz
     across = airframe.drag_xy + airframe.rotor_drag * sqrt(max(thrust, 0.0))
-    V, D = np.zeros((3, 3)), out.drag
     for i in range(3):
         V[i, 0], V[i, 1] = -thrust / airframe.mass_kg * R[i][1], thrust / airframe.mass_kg * R[i][0]
         for j in range(3):
@@ -281,8 +281,10 @@ def respond(motion: Array, speeds: Array, means: Array, levels: Array, packed: P
     T = _empty_transition()
     inputs = responses.shape[2] // means.shape[0]
     responses[0] = 0.0
+    squared = np.empty(ROTORS)
     for step in range(speeds.shape[0] - 1):
-        squared = 0.5 * (speeds[step] + speeds[step + 1])
+        for rotor in range(ROTORS):
+            squared[rotor] = 0.5 * (speeds[step, rotor] + speeds[step + 1, rotor])
         _linearise(motion[step], motion[step + 1], squared, model, T)
         blocks = 0
         while blocks < means.shape[0] and means[blocks, step] != 0.0:
@@ -313,15 +315,18 @@ def _advance(X: Array, T: Transition, h: float, used: int, after: Array) -> None
             fall[c] = X[VELOCITY + i, c]
             turn[c] = 0.0
             spin[c] = 0.0
-        for j in range(3):
+        for j in range(3):  # a loop for each row written: those that name more arrays are not vectorised
             pr, pw = T.position_rotation[i, j], T.position_rate[i, j]
             d, vr, vw = T.drag[i, j], T.velocity_rotation[i, j], T.velocity_rate[i, j]
             rr, rw, ww = T.rotation[i, j], T.rotation_rate[i, j], T.rate[i, j]
             v, rotation, rate = X[VELOCITY + j], X[ROTATION + j], X[RATE + j]
             for c in range(used):
                 place[c] += pr * rotation[c] + pw * rate[c]
+            for c in range(used):
                 fall[c] += d * v[c] + vr * rotation[c] + vw * rate[c]
+            for c in range(used):
                 turn[c] += rr * rotation[c] + rw * rate[c]
+            for c in range(used):
                 spin[c] += ww * rate[c]
 
 

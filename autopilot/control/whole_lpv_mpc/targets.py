@@ -13,6 +13,7 @@ from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
 from colibri.autopilot.control.whole_lpv_mpc.mpc import WholeMpc
 from colibri.autopilot.control.whole_lpv_mpc.path import PathLimits, PathNow, PathSettings, carry_speeds, slide
 from colibri.autopilot.control.whole_lpv_mpc.planning import Now
+from colibri.common.jit import packed
 from colibri.common.matrices import dot, norm
 from colibri.common.types import Array
 
@@ -39,17 +40,20 @@ class TargetBuilder:
     def __init__(self, guidance: Guidance, path: PathSettings, mpc: WholeMpc) -> None:
         """Build it for plans of `mpc`."""
         self._guidance, self._path, self._mpc = guidance, path, mpc
-        self._samples = mpc.horizon + 2
+        self._law = packed(guidance)
+        self._samples = n = mpc.horizon + 2
+        self._near, self._flat = _motion(n), _flat(n)
+        self._on_clock = _target(self._near, self._flat, np.empty(n))
 
     def on_clock(self, now: Now, limits: ForceLimits, references: Horizon) -> Wanted:
-        """Return what follows references at their times."""
-        n, mpc = self._samples, self._mpc
-        p, v, a, yaw = (column[:n] for column in (*references[:3], references[5]))
-        p, v, a, yaw = feed_forward.before_jump(p, v, a, yaw, self._guidance.interval_s)
-        near, flat = _motion(n), _flat(n)
-        feed_forward.approach(now.rigid[:3], now.rigid[3:6], (p, v, a), self._guidance, near)
-        feed_forward.ask(near[1], near[2], yaw, now.disturbance, limits, mpc.from_wrench, mpc.model, flat)
-        return Wanted(_target(near, flat, yaw), self._force(now, limits, near))
+        """Return what follows references at their times, until that of the next is asked for."""
+        n, target = self._samples, self._on_clock
+        p, v, a, yaw = references[0][:n], references[1][:n], references[2][:n], references[5][:n]
+        force = feed_forward.follow(
+            now.rigid, (p, v, a, yaw), now.disturbance, limits, self._law, self._mpc.model, self._near, target.yaw_rad,
+            self._flat,
+        )  # fmt: skip
+        return Wanted(target, force)
 
     def on_path(self, now: Now, limits: ForceLimits, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
         """Return what follows references at the path times of the last plan.
@@ -74,19 +78,17 @@ class TargetBuilder:
         passed_s = slide(references, 0.0, speeds, h, nominal, slopes)
         slide(references, passed_s - 2.0 * h * end, np.full(3, end), h, ending, slopes[:3].copy())
         near, flat, last_flat = _motion(n), _flat(n), _flat(3)
-        feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], guidance, near)
+        feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], self._law, near)
         feed_forward.ask(near[1], near[2], steady[3], now.disturbance, limits, mpc.from_wrench, mpc.model, flat)
-        feed_forward.approach(now.rigid[:3], now.rigid[3:6], nominal[:3], guidance, near)
+        feed_forward.approach(now.rigid[:3], now.rigid[3:6], nominal[:3], self._law, near)
         feed_forward.ask(*ending[1:], now.disturbance, limits, mpc.from_wrench, mpc.model, last_flat)
         flat.attitudes[-2], flat.rates[-1] = last_flat.attitudes[1], last_flat.rates[0]
         target = _target(near, flat, nominal[3])._replace(end_squared=last_flat.squared[1].copy())
         distance_m = norm(nominal[0][0] - now.rigid[:3])
         part = 1.0 if distance_m <= guidance.max_error_m else guidance.max_error_m / distance_m
         bounds = PathLimits(path.min_speed, upper, path.reward, path.change)
-        return Wanted(target, self._force(now, limits, near), PathNow(speeds, slopes, part, bounds))
-
-    def _force(self, now: Now, limits: ForceLimits, near: tuple[Array, Array, Array]) -> Array:
-        return feed_forward.demanded_force(now.rigid, near, now.disturbance, self._guidance, limits, self._mpc.model)
+        force = feed_forward.demanded_force(now.rigid, near, now.disturbance, self._law, limits, mpc.model)
+        return Wanted(target, force, PathNow(speeds, slopes, part, bounds))
 
     def _first_speed(self, now: Now, references: Horizon, upper: float) -> Array:
         """Return the speed along the path, (1,), at which the vehicle moves; the references' own where they stand."""

@@ -59,10 +59,9 @@ def test_with_drag_the_force_holds_a_steady_motion(velocity: tuple[float, float,
     """Thrust, weight and the drag at that thrust's own tilt are in balance."""
     v = np.array(velocity)
     force = forces_for(NOTHING, v, (NOTHING, v, NOTHING), AIRFRAME)
-    drag = np.empty(3)
     thrust = float(np.linalg.norm(force))
-    drag_force(AIRFRAME, v, force / thrust, thrust, drag)
-    assert force + drag - np.array([0.0, 0.0, 0.698 * 9.81]) == pytest.approx(NOTHING, abs=2e-3 * (1.0 + v @ v))
+    drag = drag_force(AIRFRAME, v, force / thrust, thrust)
+    assert force + np.array(drag) - np.array([0.0, 0.0, 0.698 * 9.81]) == pytest.approx(NOTHING, abs=2e-3 * (1.0 + v @ v))
 
 
 def test_a_far_reference_is_approached_at_a_limited_speed() -> None:

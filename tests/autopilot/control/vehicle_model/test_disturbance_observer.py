@@ -19,7 +19,6 @@ INERTIA = np.array([0.003, 0.004, 0.006])
 OBSERVER = Observer(*gains(9.0, INTERVAL_S), *gains(12.0, INTERVAL_S), 6.0, 0.3, AIRFRAME, INERTIA, INTERVAL_S)
 HOVER = np.array([0.7 * 9.81, 0.0, 0.0, 0.0])
 NO_MOMENT = np.zeros(3)
-NO_DRAG = np.zeros(3)
 
 
 def fly(acceleration: np.ndarray, moment: np.ndarray, seconds: float, observer: Observer = OBSERVER) -> np.ndarray:
@@ -31,7 +30,7 @@ def fly(acceleration: np.ndarray, moment: np.ndarray, seconds: float, observer: 
         now = measured.copy()
         now[:3] += INTERVAL_S * acceleration
         now[3:6] += INTERVAL_S * moment / INERTIA
-        estimate = observe(estimate, measured, now, HOVER, 0.0, NO_DRAG, 0.7, packed(observer))
+        estimate = observe(estimate, measured, now, HOVER, 0.0, 0.7, packed(observer))
         measured = now
     return estimate
 
@@ -65,7 +64,8 @@ def test_the_models_coupling_and_drag_are_no_disturbance() -> None:
     """Euler's equation with the rotors' momentum, and a drag that slows: one small step, seen by none."""
     h = 1e-6
     before = np.array([3.0, -1.0, 0.5, 2.0, -1.0, 0.7, 0.0, 0.0, 1.0])
-    drag = np.array([-0.5, 0.2, -0.025])
+    airframe = AIRFRAME._replace(drag_xy=0.2, drag_z=0.05)
+    drag = np.array([-0.6, 0.2, -0.025])
     p, q, r = before[3:6]
     ix, iy, iz = INERTIA
     momentum = 2e-3
@@ -73,7 +73,7 @@ def test_the_models_coupling_and_drag_are_no_disturbance() -> None:
     now = before.copy()
     now[:3] += h * drag / 0.7
     now[3:6] += h * np.array(turn)
-    observer = Observer(*gains(9.0, h), *gains(12.0, h), 6.0, 0.3, AIRFRAME, INERTIA, h)
-    estimate = observe(first_estimate(before), before, now, HOVER, momentum, drag, 0.7, packed(observer))
+    observer = Observer(*gains(9.0, h), *gains(12.0, h), 6.0, 0.3, airframe, INERTIA, h)
+    estimate = observe(first_estimate(before), before, now, HOVER, momentum, 0.7, packed(observer))
     assert estimate[:6] == pytest.approx(now[:6], abs=1e-11)
     assert estimate[6:] == pytest.approx(np.zeros(6), abs=1e-9)

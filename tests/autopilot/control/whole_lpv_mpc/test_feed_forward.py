@@ -95,7 +95,7 @@ Three: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 def approached(position: np.ndarray, velocity: np.ndarray) -> tuple[Three, Three]:
     p, v, a, _ = circle(3.0, 3.0)
     references, near = (p, v, a), (np.empty_like(p), np.empty_like(p), np.empty_like(p))
-    feed_forward.approach(position, velocity, references, GUIDANCE, near)
+    feed_forward.approach(position, velocity, references, packed(GUIDANCE), near)
     return references, near
 
 
@@ -118,7 +118,7 @@ def test_the_way_back_is_one_motion_and_keeps_to_its_acceleration() -> None:
     still = np.zeros((STEPS + 2, 3))
     p, v, a = near = (still.copy(), still.copy(), still.copy())
     position, velocity = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, -6.0])
-    feed_forward.approach(position, velocity, (still, still, still), GUIDANCE, near)
+    feed_forward.approach(position, velocity, (still, still, still), packed(GUIDANCE), near)
     assert np.linalg.norm(a, axis=1).max() < 10.0
     assert a[0, 2] > 5.0
     assert np.diff(p, axis=0) / INTERVAL_S == pytest.approx(0.5 * (v[1:] + v[:-1]), abs=1e-3)
@@ -129,7 +129,7 @@ def test_what_comes_after_a_jump_is_not_followed_before_it() -> None:
     p, v, a, yaw = circle(3.0, 10.0)
     ends, stands, rests, looks = p.copy(), v.copy(), a.copy(), yaw.copy()
     ends[20:], stands[20:], rests[20:], looks[20:] = p[20], 0.0, 0.0, yaw[20]
-    followed = feed_forward.before_jump(ends, stands, rests, looks, INTERVAL_S)
+    followed = feed_forward.before_jump((ends, stands, rests, looks), INTERVAL_S)
     for wanted, got in zip((p, v, a, yaw), followed, strict=True):
         assert (got[:20] == wanted[:20]).all()
         assert np.abs(got - wanted).max() < 0.02 * np.abs(wanted).max()
@@ -139,7 +139,7 @@ def test_what_comes_after_a_jump_is_not_followed_before_it() -> None:
 @pytest.mark.parametrize("lap_s", [1.0, 3.0, 30.0])
 def test_a_motion_without_a_jump_is_followed_as_it_is(lap_s: float) -> None:
     p, v, a, yaw = circle(4.0, lap_s)
-    followed = feed_forward.before_jump(p, v, a, yaw, INTERVAL_S)
+    followed = feed_forward.before_jump((p, v, a, yaw), INTERVAL_S)
     assert all((one == other).all() for one, other in zip(followed, (p, v, a, yaw), strict=True))
 
 

@@ -29,9 +29,8 @@ def test_exact_drag_is_that_of_the_control_laws(
     thrust_n, drag = 4.0 * float(thrust.values[0]), np.zeros(3)
     needed = airframe.mass_kg * (np.array(acceleration) + np.array([0.0, 0.0, airframe.gravity_m_s2]))
     for _ in range(50):
-        drag_force(
-            airframe, np.array(velocity), (needed - drag) / np.sqrt(((needed - drag) ** 2).sum()), thrust_n, drag
-        )
+        up = (needed - drag) / np.sqrt(((needed - drag) ** 2).sum())
+        drag = np.array(drag_force(airframe, velocity, up, thrust_n))
     force = needed - drag
     assert thrust_n == pytest.approx(np.sqrt((force * force).sum()), rel=2e-3)
     assert float(tilt.values[0]) == pytest.approx(np.degrees(np.arctan2(np.hypot(*force[:2]), force[2])), abs=0.1)
