@@ -239,11 +239,13 @@ def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: P
     error, E = np.zeros(STATES), np.zeros((STATES, moved))
     for i in range(3):
         for j in range(3):
-            error[i] += R[j][i] * (x[POSITION + j] - target.position[steps, j])
-            error[VELOCITY + i] += R[j][i] * (x[VELOCITY + j] - target.velocity[steps, j])
+            turned = R[j][i]
+            error[i] += turned * (x[POSITION + j] - target.position[steps, j])
+            error[VELOCITY + i] += turned * (x[VELOCITY + j] - target.velocity[steps, j])
             for k in range(moved):
-                E[i, k] += R[j][i] * X[POSITION + j, k]
-                E[VELOCITY + i, k] += R[j][i] * X[VELOCITY + j, k]
+                E[i, k] += turned * X[POSITION + j, k]
+            for k in range(moved):
+                E[VELOCITY + i, k] += turned * X[VELOCITY + j, k]
         error[ROTATION + i] = away[i]
         error[RATE + i] = x[10 + i] - target.rates[steps - 1, i]
         E[ROTATION + i] = X[ROTATION + i]
