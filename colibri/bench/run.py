@@ -16,34 +16,41 @@ from rich.table import Table
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
+from colibri.bench.commands import COMMANDS, colibri_of, command_figures
 from colibri.bench.sensing import FLIGHTS_A_RUN, sensing_figures
 from colibri.bench.serving import CHANNELS, serving_figures
-from colibri.bench.speed import CONTROL_S, LINKS, THESIS_LINKS, Peer, Report, rate_figures, thesis_figures
+from colibri.bench.speed import CONTROL_S, LINKS, Peer, Report, rate_figures
 from colibri.bench.stages import BLOCKS, STAGES, stage_figures
 from colibri.common.process.lifecycle import fail
 
 PROFILE = "flight"
 MIN_DURATION_S, MAX_DURATION_S = 0.1, 1000.0
 _SERVED = {"p50 µs": "p50", "p99 µs": "p99", "messages a second": "messages_hz"}
+_SPREAD = ("min", "median", "max")
 _QUANTILES = {"p50": "p50", "p99": "p99"}
 
 
 def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
     """Measure what the command line says, flights beside `peer`; print tables, write JSON; return the exit code."""
-    wanted = args.only or ["stages", "flights", "sensors", "ground", "thesis"]
+    wanted = args.only or ["stages", "flights", "sensors", "ground", "commands"]
     if not MIN_DURATION_S <= args.duration <= MAX_DURATION_S:
         fail(f"--duration: {MIN_DURATION_S:g} to {MAX_DURATION_S:g} s, not {args.duration:g}")
     if args.out:
         _check_writable(args.out)
+    if args.against:
+        colibri_of(args.against)
     figures: dict[str, Any] = {"settings": _settings(args)}
-    with _progress(parts(wanted, args.runs, beside=peer is not None)) as report, TemporaryDirectory() as folder:
+    with (
+        _progress(parts(wanted, args.runs, beside=peer is not None, against=args.against is not None)) as report,
+        TemporaryDirectory() as folder,
+    ):
         flown = (load_profile(PROFILE), Path(folder), args.duration)
         measures: dict[str, Callable[[], dict[str, Any]]] = {
             "stages": lambda: stage_figures(*flown, report),
             "flights": lambda: rate_figures(*flown, args.runs, report, peer),
             "sensors": lambda: sensing_figures(*flown, args.runs, report),
             "ground": lambda: serving_figures(*flown, args.runs, report),
-            "thesis": lambda: thesis_figures(args.runs, report),
+            "commands": lambda: command_figures(args.duration, args.runs, report, args.against),
         }
         figures |= {name: measure() for name, measure in measures.items() if name in wanted}
     if args.out:
@@ -57,14 +64,14 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
     return {"profile": PROFILE, "runs": args.runs, "duration_s": args.duration, **machine}
 
 
-def parts(wanted: list[str], runs: int, *, beside: bool) -> int:
+def parts(wanted: list[str], runs: int, *, beside: bool, against: bool = False) -> int:
     """Return how often `report` will be called."""
     stages = 1 + len(BLOCKS) * (1 + len(installed_solvers()))
     flights = 1 + runs * len(CONTROL_S) * (len(LINKS) + beside)
     ground = len(CHANNELS) + 2 * runs
     sensors = 1 + runs * FLIGHTS_A_RUN
-    thesis = runs * len(THESIS_LINKS)
-    parts = {"stages": stages, "flights": flights, "sensors": sensors, "ground": ground, "thesis": thesis}
+    commands = runs * COMMANDS * (1 + against)
+    parts = {"stages": stages, "flights": flights, "sensors": sensors, "ground": ground, "commands": commands}
     return sum(parts[section] for section in set(wanted))
 
 
@@ -102,8 +109,10 @@ def _print(figures: Mapping[str, Any]) -> None:
     if "ground" in figures:
         for table in _ground_tables(figures["ground"]):
             console.print(table)
-    if "thesis" in figures:
-        console.print(_spread(f"spiral, profile thesis, {settings['runs']} flights a link", figures["thesis"]))
+    if "commands" in figures:
+        rows = figures["commands"]
+        columns = (*_SPREAD, "goal", *(("other", "ratio") if "ratio" in next(iter(rows.values())) else ()))
+        console.print(_columns(f"whole commands, {settings['runs']} runs", rows, {name: name for name in columns}))
 
 
 def _stage_tables(stages: Mapping[str, Any]) -> Iterator[Table]:
@@ -141,7 +150,7 @@ def _of_stage(figure: Mapping[str, float]) -> str:
 
 
 def _spread(title: str, rows: Mapping[str, Mapping[str, float]]) -> Table:
-    return _columns(title, rows, {name: name for name in ("min", "median", "max")})
+    return _columns(title, rows, {name: name for name in _SPREAD})
 
 
 def _columns(title: str, rows: Mapping[str, Mapping[str, float]], columns: Mapping[str, str]) -> Table:

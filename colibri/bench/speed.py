@@ -1,13 +1,8 @@
-"""Real-time factors: profile `flight` at several frame rates, beside a peer if there is one, and the spiral."""
+"""Real-time factors: profile `flight` at several frame rates, beside a peer if there is one."""
 
-import json
-import subprocess
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from statistics import median
-from tempfile import TemporaryDirectory
-from time import perf_counter
 from typing import Any, NamedTuple, TypeAlias
 
 from colibri.autopilot.control.profile import Profile
@@ -23,7 +18,6 @@ Samples: TypeAlias = dict[str, list[float]]
 CONTROL_S: Mapping[int, float] = {100: 0.01, 250: 0.008, 500: 0.008}
 """Control interval at each frame rate, Hz."""
 LINKS = ("memory", "udp")
-THESIS_LINKS = ("udp", "memory")
 
 _PEER_MAX_S = 2.0
 """A peer may take longer than the time that it simulates."""
@@ -68,17 +62,6 @@ def rate_figures(
     return {"track": TRACK, "control_interval_s": {str(hz): s for hz, s in CONTROL_S.items()}, "rates_hz": rates}
 
 
-def thesis_figures(runs: int, report: Report) -> dict[str, Any]:
-    """Fly the thesis's spiral through the whole command, as a user would."""
-    samples: Samples = {}
-    for run in range(runs):
-        for link in THESIS_LINKS:
-            report(f"spiral, {link}, {run + 1} of {runs}")
-            for name, value in _command(link).items():
-                samples.setdefault(name, []).append(value)
-    return {name: summarised(values) for name, values in samples.items()}
-
-
 def summarised(values: Iterable[float]) -> dict[str, float]:
     """Return minimum, median and maximum."""
     ordered = sorted(values)
@@ -101,22 +84,3 @@ def real_time_factor(plan: FlightPlan) -> float:
         return plan.duration_s / fly_plan(plan).wall_time_s
     except FlightError as error:
         fail(str(error), EXIT_FAILED)
-
-
-def _command(link: str) -> dict[str, float]:
-    """Run the command in a process of its own."""
-    with TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "colibri", "fly", "spiral", "--profile", "thesis", "--link", link]
-        started_s = perf_counter()
-        done = subprocess.run([*command, "--quiet", "--no-figures", "--out", folder], check=False)
-        command_s = perf_counter() - started_s
-        if done.returncode:
-            fail(f"a flight ended with exit code {done.returncode}", EXIT_FAILED)
-        report = json.loads((Path(folder) / "report.json").read_text(encoding="utf-8"))
-    return {
-        f"{link}: real-time factor": report["real_time_factor"],
-        f"{link}: whole command, s": command_s,
-        f"{link}: QP solve time p50, µs": report["solve_time_us"]["p50"],
-        f"{link}: control step p50, µs": report["control_step_us"]["p50"],
-        f"{link}: control step p99, µs": report["control_step_us"]["p99"],
-    }

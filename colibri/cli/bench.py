@@ -12,10 +12,10 @@ def add_options(parser: ArgumentParser) -> None:
     add(
         "--only",
         action="append",
-        choices=("stages", "flights", "sensors", "ground", "thesis"),
+        choices=("stages", "flights", "sensors", "ground", "commands"),
         help="stages: each stage of a control step; flights: times real time at several rates; "
         "sensors: the estimator, and flights on sensors beside those on the state; ground: serving ground "
-        "stations, and the control step beside it; thesis: its spiral through the whole command; may be repeated "
+        "stations, and the control step beside it; commands: whole ones, beside their goals; may be repeated "
         "(default: all)",
     )
     add("--runs", type=int, default=3, choices=range(1, 101), metavar="N", help="flights of each kind (default 3)")
@@ -24,7 +24,13 @@ def add_options(parser: ArgumentParser) -> None:
         type=positive,
         default=10.0,
         metavar="S",
-        help="simulated time of a flight, but of the spiral's (default %(default)s)",
+        help="simulated time of a flight, but of the thesis's spiral (default %(default)s)",
+    )
+    add(
+        "--against",
+        type=Path,
+        metavar="FOLDER",
+        help="another checkout that is set up: have it run the whole commands in turn with this one",
     )
     add("--out", type=Path, metavar="FILE", help="write the figures as JSON there")
 

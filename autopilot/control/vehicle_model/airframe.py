@@ -36,7 +36,7 @@ def airframe_of(vehicle: Vehicle) -> Airframe:
 
 @compiled
 def drag_force(airframe: Airframe, velocity: Array | Vector, up: Array | Vector, thrust_n: float) -> Vector:
-    """Return the drag, N, ENU, on a vehicle that moves at `velocity`, m/s, ENU, while it makes `thrust_n` along `up`."""
+    """Return the drag, N, on a vehicle that moves at `velocity`, m/s, and makes `thrust_n` along `up`; all are ENU."""
     along = velocity[0] * up[0] + velocity[1] * up[1] + velocity[2] * up[2]
     across = airframe.drag_xy + airframe.rotor_drag * sqrt(max(thrust_n, 0.0))
     return (

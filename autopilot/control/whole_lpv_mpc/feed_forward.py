@@ -202,9 +202,7 @@ def rate_between(before: Array, after: Array, interval_s: float, rate: Array) ->
 
 
 @compiled
-def before_jump(
-    references: tuple[Array, Array, Array, Array], interval_s: float
-) -> tuple[Array, Array, Array, Array]:
+def before_jump(references: tuple[Array, Array, Array, Array], interval_s: float) -> tuple[Array, Array, Array, Array]:
     """Return references, ENU, (n, 3) each, and of yaw, (n,), as they go on from before a jump of the velocity.
 
     No vehicle follows a jump, as at the end of a track that does not slow down: one that bends towards what comes after

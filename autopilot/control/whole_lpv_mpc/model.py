@@ -173,7 +173,7 @@ class Transition(NamedTuple):
         force, place: Of the mean squared speeds over the step on velocity and position.
         moment, turn: The same on rates and rotation.
         spin: Of the change of squared speeds over the step on the rate r, (4,).
-        V, W, G: Derivatives that these are made of: of velocity by rotation, of rotation by rotation, of rates by rates.
+        V, W, G: Derivatives that all are made of: of velocity and rotation by rotation, and of rates by rates.
     """
 
     drag: Array

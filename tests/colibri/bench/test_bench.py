@@ -1,6 +1,7 @@
 """`colibri bench`: what it says and writes; no test asserts how fast anything is."""
 
 import json
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
-from colibri.bench import run, sensing, serving, speed, stages
+from colibri.bench import commands, run, sensing, serving, speed, stages
 from colibri.bench.variants import plan_of, toml_lines, with_blocks, with_intervals
 from colibri.cli.main import main
 
@@ -69,10 +70,18 @@ def test_flights_are_measured_at_every_rate(tmp_path: Path, monkeypatch: pytest.
 
 
 @pytest.mark.long
-def test_the_spiral_flies_through_the_whole_command(tmp_path: Path) -> None:
-    thesis = figures_of(tmp_path / "thesis.json", "--only", "thesis")["thesis"]
-    assert {name.partition(":")[0] for name in thesis} == set(speed.THESIS_LINKS)
-    assert all(0.0 < figure["min"] <= figure["median"] <= figure["max"] for figure in thesis.values())
+def test_whole_commands_run_in_turn_with_those_of_another_checkout(tmp_path: Path) -> None:
+    """The other is this one: the same program, so a ratio of two runs of it."""
+    other = tmp_path / "other" / ".venv" / "bin" / "colibri"
+    other.parent.mkdir(parents=True)
+    other.write_text(f'#!/bin/sh\nexec {sys.executable} -m colibri "$@"\n')
+    other.chmod(0o700)
+    options = ("--only", "commands", "--against", str(tmp_path / "other"), "--duration", "2")
+    figures = figures_of(tmp_path / "commands.json", *options)["commands"]
+    assert len(figures) == len(commands.GOALS)
+    for figure in figures.values():
+        assert 0.0 < figure["min"] <= figure["median"] <= figure["max"]
+        assert figure["ratio"] == pytest.approx(figure["median"] / figure["other"])
 
 
 @pytest.mark.long
@@ -114,6 +123,7 @@ def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.Monkey
         ("--duration", "0.01"),
         ("--duration", "1000000"),
         ("--out", "/nowhere/figures.json"),
+        ("--against", "/nowhere"),
     ],
 )
 def test_bad_input_is_one_line(options: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

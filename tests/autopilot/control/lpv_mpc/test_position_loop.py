@@ -61,7 +61,9 @@ def test_with_drag_the_force_holds_a_steady_motion(velocity: tuple[float, float,
     force = forces_for(NOTHING, v, (NOTHING, v, NOTHING), AIRFRAME)
     thrust = float(np.linalg.norm(force))
     drag = drag_force(AIRFRAME, v, force / thrust, thrust)
-    assert force + np.array(drag) - np.array([0.0, 0.0, 0.698 * 9.81]) == pytest.approx(NOTHING, abs=2e-3 * (1.0 + v @ v))
+    assert force + np.array(drag) - np.array([0.0, 0.0, 0.698 * 9.81]) == pytest.approx(
+        NOTHING, abs=2e-3 * (1.0 + v @ v)
+    )
 
 
 def test_a_far_reference_is_approached_at_a_limited_speed() -> None:
