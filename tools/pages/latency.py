@@ -34,8 +34,8 @@ The command that answers a frame acts a round trip after it, the one before it i
   takes effect: by the commands that were sent and act until then, with rotor lag, drag and what the battery's voltage
   allows.
 - What moves the vehicle beside that, wind or a wrong mass, is observed as the difference of each state from the one
-  predicted for it, at 10 rad/s, and carried along. In wind of 5 m/s and over 40 ms the lemniscate below is so flown to
-  1.0 cm, as without delay (0.9 cm); without the observer to 3.3.
+  predicted for it, at 10 rad/s, and carried along. In wind of 5 m/s and over 40 ms `lpv-mpc` so flies the lemniscate
+  below to 1.0 cm, as without delay (0.9 cm); without the observer to 3.3.
 - References are those of *t + d*, tracks and moving setpoints alike. So the law finds commands that act at once, and
   what it remembers of its own rotors is right.
 - Failsafes, the landing, the flight on three rotors see the same state. Telemetry shows the vehicle as it is.
@@ -262,7 +262,8 @@ def draw(points: Sequence[Point], path: Path) -> None:
         grid[1][column].set_xlabel("round trip (ms)")
     for row in grid:
         row[0].set_ylabel("error, RMS (m)")
-    grid[1][0].legend(fontsize=8)
+    names = grid[1][0].get_legend_handles_labels()
+    figure.legend(*names, loc="outside upper left", ncols=len(WAYS), fontsize=9, frameon=False)
     figure.savefig(path, dpi=110)
 
 

@@ -57,7 +57,9 @@ def draw(flights: dict[str, dict[str, Laden]]) -> Figure:
     *heights, masses = figure.subplots(len(flights) + 1, 1, sharex=True)
     for axes, (track, flown) in zip(heights, flights.items(), strict=True):
         for label, laden in flown.items():
-            axes.plot(laden.t, 1e3 * laden.height_error_m, color=_COLOURS[label], linewidth=1.2, label=label)
+            shown = laden.t >= _SHOWN_FROM_S  # what came before would set the scale
+            t, error_mm = laden.t[shown], 1e3 * laden.height_error_m[shown]
+            axes.plot(t, error_mm, color=_COLOURS[label], linewidth=1.2, label=label)
         _dress(axes, f"{track} (mm)")
     title = f"Height error, {1e3 * PAYLOAD_KG:.0f} g picked up at {PICKED_UP_S:g} s and dropped at {DROPPED_S:g} s"
     put_head(figure, title)
