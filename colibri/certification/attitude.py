@@ -1,20 +1,20 @@
-"""The attitude under the LQR of `lpv-mpc`, as an uncertain loop: exact kinematics, Euler's equation, the rotors' lag.
+"""The attitude under a law that commands moments, as an uncertain loop: kinematics, Euler's equation, the rotors' lag.
 
-State, 12: errors of phi, p, theta, q, psi, r to a constant attitude, moments M1, M2, M3, and those last commanded. In
-x' = A(rho) x + B u of `prediction` the columns of A that belong to angles are zero, so that the error to any constant
-attitude obeys the same equation, with the angles themselves in rho. Nothing is linearised and nothing discretised: over
-an interval h, with rho(t) anywhere in the box of its ranges,
+State, 12: errors of the attitude, angles as the law's `Kinematics` have them, each before its body rate; moments M1, M2,
+M3; and those that the law remembers as last commanded. Errors to any constant attitude obey these equations. Nothing is
+linearised and nothing discretised: over an interval h, with rho(t) anywhere in the box of its ranges,
 
-    ω(h) = ω + h G ω + I⁻¹ (b1 M + b2 u) + ξ_ω          G: mean of the gyroscopic matrix, affine in p, q, r
-    Φ(h) = Φ + T (h ω + I⁻¹ (c1 M + c2 u)) + ξ_Φ        T: mean of T(phi, theta) [2.7]
+    ω(h) = ω + h G ω + I⁻¹ (b1 M + b2 u) + κ e3 (M(h) - M) + ξ_ω     G: mean of the gyroscopic matrix, affine in p, q, r
+    Φ(h) = Φ + T (h ω + I⁻¹ (c1 M + c2 u) + ...) + ξ_Φ                T: mean of the kinematic matrix
+    u = C z + ξ_u
 
-Means lie in convex hulls, and ξ, what is of second order in h or of the rotors' momentum, is bounded entry by entry. T
-is the product of two points, (sin φ, cos φ) and (tan θ, 1 / cos θ), each on a curve that lies in a polygon: its chord,
-and its tangents at both ends and in the middle. With the tangents of half the angles rational, so are all vertices.
+Means lie in convex hulls, and ξ, what is of second order in h, of the rotors' momentum, or of what a law commands beyond
+its gain, is bounded entry by entry. κ: rotors that are spun up turn the body the other way.
 """
 
+from collections.abc import Callable
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -26,13 +26,15 @@ _ANGLES, _RATES = list(ANGLES), list(RATES)
 _MOMENTS = list(range(M1, M3 + 1))
 _COMMANDS = list(range(STATES, _SIZE))
 _SIGNS = (-1, 1)
-_MIRRORS = (
+MIRRORS = (
     (-1, -1, 1, 1, -1, -1, -1, 1, -1, -1, 1, -1),
     (1, 1, -1, -1, -1, -1, 1, -1, -1, 1, -1, -1),
 )
 """Left and right exchanged, and fore and aft: signs of the states. The rotors' momentum changes its sign, too."""
 
 
+_HALF_A_TURN = 4
+"""Or more, rad: largest error of an angle that has no limit."""
 _STARTS = (1.0, 1.0, 0.3, 10.0, 10.0, 5.0)
 """phi, theta, psi, rad, to p, q, r, rad/s."""
 
@@ -45,42 +47,68 @@ class AttitudeNumbers(NamedTuple):
         lag_s: Of the moments; 0 where they follow at once.
         stays: exp(-h / lag), to 16 digits.
         inertia_kg_m2: (3,).
-        gain: K of the law, (3, 12): the commands change by -K z.
-        half_tangents: tan(phi / 2) and tan(theta / 2) at the ends of their ranges.
+        commanded: C, (2, 3, 12): moments that the law commands, and those that it then remembers as last commanded.
+        unsure: Of both, the bound of each state's part in what the law commands beyond that, (2, 3, 12).
+        angles: What the `Kinematics` need of the angles' ranges.
         rates_rad_s: Ranges of |p|, |q|, |r|.
         momentum_n_m_s: Range of the rotors' |h| along body z.
-        max_increment_n_m: Largest changes of the commands in a sample, (3,).
+        spin_s: κ Iz, of rotors that turn at the same speed.
+        spin_spread_s: By how much each moment's may differ, for they do not, (3,).
+        max_increment_n_m: Largest changes of the commands in a sample, (3,); none where they have no limit.
         from_moments: Squared rotor speeds of moments, parts of the largest, (4, 3).
         to_moments: Moments of squared rotor speeds, N m, (3, 4).
         headroom: Squared speed that the thrust leaves to moments on either side, of every rotor, same parts.
         disturbance_n_m: Range of the length |d| of the moment that disturbs.
-        output_weight, increment_weight: Diagonals of the law's Q and R, (3,) each.
+        angle_weight, rate_weight, increment_weight: What a sample costs: of errors, and of what the law commands beyond
+            what it remembers, (3,) each.
     """
 
     interval_s: Any
     lag_s: Any
     stays: Any
     inertia_kg_m2: Any
-    gain: Any
-    half_tangents: Any
+    commanded: Any
+    unsure: Any
+    angles: Any
     rates_rad_s: Any
     momentum_n_m_s: Any
+    spin_s: Any
+    spin_spread_s: Any
     max_increment_n_m: Any
     from_moments: Any
     to_moments: Any
     headroom: Any
     disturbance_n_m: Any
-    output_weight: Any
+    angle_weight: Any
+    rate_weight: Any
     increment_weight: Any
+
+
+class Kinematic(NamedTuple):
+    """What ranges of angles and rates amount to in Φ' = T ω.
+
+    Attributes:
+        vertices: Of T, (v, 3, 3).
+        max_change: Largest |dT/dt|, (3, 3).
+        max_angles: Of the angles that are limited, the first ones, rad, rounded down.
+    """
+
+    vertices: AnyArray
+    max_change: AnyArray
+    max_angles: AnyArray
+
+
+Kinematics: TypeAlias = Callable[[AttitudeNumbers], Kinematic]
 
 
 class Box(NamedTuple):
     """What the ranges amount to.
 
     Attributes:
-        kinematic, gyroscopic: Vertices of T, (16, 3, 3), and of G without the rotors, (8, 3, 3).
+        kinematic, gyroscopic: Vertices of T, (v, 3, 3), and of G without the rotors, (8, 3, 3).
         max_kinematic, max_gyroscopic, max_change: Largest |T|, |G| and |dT/dt|, (3, 3) each.
-        max_angles: Of phi and theta, rad, rounded down, (2,).
+        beside: Largest |T - 1|, (3, 3).
+        max_angles: Of the angles that are limited, rad, rounded down.
     """
 
     kinematic: AnyArray
@@ -88,28 +116,32 @@ class Box(NamedTuple):
     max_kinematic: AnyArray
     max_gyroscopic: AnyArray
     max_change: AnyArray
+    beside: AnyArray
     max_angles: AnyArray
 
 
-def attitude_loop(numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
+def attitude_loop(numbers: AttitudeNumbers, number: Number, kinematics: Kinematics) -> UncertainLoop:
     """Return the loop in floats, or exactly in fractions."""
     n = AttitudeNumbers(*(_made(value, number) for value in numbers))
-    box = box_of(n)
+    box = box_of(n, kinematics)
     eye: AnyArray = np.array([[number(float(i == j)) for j in range(_SIZE)] for i in range(_SIZE)])
-    commanded = eye[_COMMANDS] - n.gain
+    applied, _ = n.commanded
+    change = applied - eye[_COMMANDS]
     gains, offsets = _remainders(n, box)
-    weight = eye[:, _ANGLES] * n.output_weight
+    weight = np.concatenate([n.angle_weight, n.rate_weight])
     return UncertainLoop(
         vertices=np.array([_transition(T, G, n, eye) for T in box.kinematic for G in box.gyroscopic]),
-        entries=eye[:, _ANGLES + _RATES],
-        channels=np.vstack([eye[_RATES], eye[_MOMENTS], commanded]),
+        entries=np.hstack([eye[:, _ANGLES + _RATES], _of_commands(n, eye), eye[:, _COMMANDS]]),
+        channels=np.vstack(
+            [eye[_RATES], eye[_MOMENTS], applied, eye[_ANGLES], eye[_COMMANDS], applied - eye[_MOMENTS]]
+        ),
         gains=gains,
         offsets=offsets,
         disturbance=eye[:, _RATES] * (n.interval_s * n.disturbance_n_m / n.inertia_kg_m2),
         limits=_limits(n, box, eye),
         starts=np.diag([number(start) for start in _STARTS]) @ eye[_ANGLES + _RATES],
-        stage=weight @ eye[_ANGLES] + (n.gain.T * n.increment_weight) @ n.gain,
-        mirrors=np.array(_MIRRORS),
+        stage=(eye[:, _ANGLES + _RATES] * weight) @ eye[_ANGLES + _RATES] + (change.T * n.increment_weight) @ change,
+        mirrors=np.array(MIRRORS),
     ).reduced()
 
 
@@ -117,30 +149,20 @@ def _made(value: Any, number: Number) -> Any:
     return np.array([_made(item, number) for item in value]) if isinstance(value, list) else number(value)
 
 
-def box_of(n: AttitudeNumbers) -> Box:
+def box_of(n: AttitudeNumbers, kinematics: Kinematics) -> Box:
     """Return the vertices and bounds of the ranges in `n`, arrays of floats or of fractions."""
-    (t, u), (p, q, r) = n.half_tangents, n.rates_rad_s
-    sine, cosine = 2 * t / (1 + t * t), (1 - t * t) / (1 + t * t)
-    tangent, secant = 2 * u / (1 - u * u), (1 + u * u) / (1 - u * u)
-    roll = ((-sine, cosine), (-t, 1), (t, 1), (sine, cosine))
-    pitch = ((-tangent, secant), (-u, 1), (u, 1), (tangent, secant))
-    phi_rate, theta_rate = p + tangent * (sine * q + r), q + sine * r
-    steep, slope = secant * secant * theta_rate, secant * tangent * theta_rate
-    change = [  # of each entry of T, every factor at its largest
-        [0, tangent * phi_rate + sine * steep, sine * tangent * phi_rate + steep],
-        [0, sine * phi_rate, phi_rate],
-        [0, secant * phi_rate + sine * slope, secant * sine * phi_rate + slope],
-    ]
-    kinematic = np.array([_kinematic(*x, *y) for x, y in product(roll, pitch)])
+    kinematic, max_change, max_angles = kinematics(n)
+    p, q, r = n.rates_rad_s
     gyroscopic = np.array([_gyroscopic(n.inertia_kg_m2, a * p, b * q, c * r) for a, b, c in product(_SIGNS, repeat=3)])
-    angles = 2 * n.half_tangents - 2 * n.half_tangents**3 / 3  # the arcus tangent's series, whose next term is positive
     return Box(
-        kinematic, gyroscopic, abs(kinematic).max(0), abs(gyroscopic).max(0) + _rotors(n), np.array(change), angles
+        kinematic,
+        gyroscopic,
+        abs(kinematic).max(0),
+        abs(gyroscopic).max(0) + _rotors(n),
+        max_change,
+        abs(kinematic - np.eye(INPUTS, dtype=int)).max(0),
+        max_angles,
     )
-
-
-def _kinematic(sine: Any, cosine: Any, tangent: Any, secant: Any) -> AnyArray:
-    return np.array([[1, sine * tangent, cosine * tangent], [0, cosine, -sine], [0, sine * secant, cosine * secant]])
 
 
 def _gyroscopic(inertia: AnyArray, p: Any, q: Any, r: Any) -> AnyArray:
@@ -164,24 +186,43 @@ def _kernels(n: AttitudeNumbers) -> tuple[Any, Any, Any, Any]:
     return begun, h - begun, begun_twice, h * h / 2 - begun_twice
 
 
+def _pushes(n: AttitudeNumbers, moments: AnyArray, commands: AnyArray) -> tuple[AnyArray, AnyArray]:
+    """Return what moments and commands, rows (3, k), make of rates over h, and of the rates' integral."""
+    b1, b2, c1, c2 = _kernels(n)
+    once, twice = b1 * moments + b2 * commands, c1 * moments + c2 * commands
+    spun, spun_once = (1 - n.stays) * (commands - moments), once - n.interval_s * moments
+    once[2] += n.spin_s * spun[2]
+    twice[2] += n.spin_s * spun_once[2]
+    by_inertia = 1 / n.inertia_kg_m2[:, None]
+    return once * by_inertia, twice * by_inertia
+
+
 def _transition(T: AnyArray, G: AnyArray, n: AttitudeNumbers, eye: AnyArray) -> AnyArray:
     """Return A, (12, 12)."""
-    b1, b2, c1, c2 = _kernels(n)
-    moments, commanded = eye[_MOMENTS], eye[_COMMANDS] - n.gain
-    by_inertia = 1 / n.inertia_kg_m2[:, None]
+    moments, (applied, remembered) = eye[_MOMENTS], n.commanded
+    once, twice = _pushes(n, moments, applied)
     A = 0 * eye
-    A[_ANGLES] = eye[_ANGLES] + T @ (n.interval_s * eye[_RATES] + (c1 * moments + c2 * commanded) * by_inertia)
-    A[_RATES] = eye[_RATES] + n.interval_s * (G @ eye[_RATES]) + (b1 * moments + b2 * commanded) * by_inertia
-    A[_MOMENTS] = n.stays * moments + (1 - n.stays) * commanded
-    A[_COMMANDS] = commanded
+    A[_ANGLES] = eye[_ANGLES] + T @ (n.interval_s * eye[_RATES] + twice)
+    A[_RATES] = eye[_RATES] + n.interval_s * (G @ eye[_RATES]) + once
+    A[_MOMENTS] = n.stays * moments + (1 - n.stays) * applied
+    A[_COMMANDS] = remembered
     return A
 
 
-def _remainders(n: AttitudeNumbers, box: Box) -> tuple[AnyArray, AnyArray]:
-    """Return the bounds of ξ: for each of |ω|, |M| and |u|, (6, 9), and by the disturbance but for its mean, (6,).
+def _of_commands(n: AttitudeNumbers, eye: AnyArray) -> AnyArray:
+    """Return what commands alone make of the state, (12, 3), with T = 1."""
+    one = eye[:INPUTS, :INPUTS]
+    once, twice = _pushes(n, 0 * one, one)
+    B = 0 * eye[:, :INPUTS]
+    B[_ANGLES], B[_RATES], B[_MOMENTS] = twice, once, (1 - n.stays) * one
+    return B
 
-    The rates within the interval are at most W (|ω| + I⁻¹ (b1 |M| + b2 |u| + h d)), W = (1 - h |G|)⁻¹ (Gronwall), and
-    |T(t) - T| is at most h / 2 times the largest change of T.
+
+def _remainders(n: AttitudeNumbers, box: Box) -> tuple[AnyArray, AnyArray]:
+    """Return the bounds of ξ for each of the channels, (12, 18), and by the disturbance but for its mean, (12,).
+
+    The rates within the interval are at most W (|ω| + I⁻¹ (b1 |M| + b2 |u| + h d) + S |u - M|), W = (1 - h |G|)⁻¹
+    (Gronwall), and |T(t) - T| is at most h / 2 times the largest change of T.
     """
     h, T, G = n.interval_s, box.max_kinematic, box.max_gyroscopic
     b1, b2, c1, c2 = _kernels(n)
@@ -189,16 +230,32 @@ def _remainders(n: AttitudeNumbers, box: Box) -> tuple[AnyArray, AnyArray]:
     within = h * h / 2 * (G @ _inverse(one - h * G))  # of ∫∫ |G ω|, for each of the largest rates
     turned, drifted = G @ within, T @ within
     twice = h / 2 * box.max_change
-    gains = np.block(
+    spread = 0 * G
+    spread[2] = (1 - n.stays) * n.spin_spread_s * by_inertia[2]
+    spun = spread.copy()
+    spun[2, 2] += (1 - n.stays) * abs(n.spin_s) * by_inertia[2]
+    by_commands = np.vstack([(b2 * drifted + c2 * twice) * by_inertia, (b2 * turned + c2 * G) * by_inertia])
+    by_changes = np.vstack([(drifted + h * twice) @ spun + h * (T @ spread), (turned + h * G) @ spun + spread])
+    _, turning = _pushes(n, 0 * G, one + 0 * G)
+    none = 0 * G
+    beyond = (by_commands + by_changes + np.vstack([box.beside @ abs(turning), none])) @ n.unsure[0]
+    of_states = np.vstack([beyond, *n.unsure])
+    of_states[:6, _RATES] += np.vstack([drifted, turned + h * _rotors(n)])
+    of_states[:6, _MOMENTS] += np.vstack([(b1 * drifted + c1 * twice) * by_inertia, (b1 * turned + c1 * G) * by_inertia])
+    of_rest = np.hstack([of_states[:, _ANGLES], of_states[:, _COMMANDS]])
+    gains = np.hstack(
         [
-            [drifted, (b1 * drifted + c1 * twice) * by_inertia, (b2 * drifted + c2 * twice) * by_inertia],
-            [turned + h * _rotors(n), (b1 * turned + c1 * G) * by_inertia, (b2 * turned + c2 * G) * by_inertia],
+            of_states[:, _RATES],
+            of_states[:, _MOMENTS],
+            np.vstack([by_commands, none, none]),
+            of_rest,
+            np.vstack([by_changes, none, none]),
         ]
     )
     pushed = by_inertia * n.disturbance_n_m
     on_angles = (h * drifted + h * h / 2 * T) @ pushed
     on_rates = (h * h / 2 * G + h * turned) @ pushed
-    return gains, np.concatenate([on_angles, on_rates])
+    return gains, np.concatenate([on_angles, on_rates, 0 * on_angles, 0 * on_rates])
 
 
 def _inverse(matrix: AnyArray) -> AnyArray:
@@ -224,18 +281,43 @@ def _limits(n: AttitudeNumbers, box: Box, eye: AnyArray) -> AnyArray:
     if n.headroom <= 0:
         raise RangeError("the thrust leaves the rotors nothing for moments")
     h, rates = n.interval_s, n.rates_rad_s
-    moments = abs(n.to_moments).sum(axis=1) * n.headroom
-    turns = h * (box.max_gyroscopic @ rates + (moments + n.disturbance_n_m) / n.inertia_kg_m2)
-    angles_left = box.max_angles - h * (box.max_kinematic @ rates)[:2]
-    rates_left = rates - turns
-    if (angles_left <= 0).any() or (rates_left <= 0).any():
+    limited = len(box.max_angles)
+    angles_left = box.max_angles - h * (box.max_kinematic @ rates)[:limited]
+    rates_left = rates - _turns(n, box)
+    rotors_left = [n.headroom - each for each in _unsure_speeds(n, box)]
+    if min(*angles_left, *rates_left) <= 0:
         raise RangeError("a control interval is long enough to leave these ranges of angles and rates")
-    return np.vstack(
-        [
-            eye[_ANGLES[:2]] / angles_left[:, None],
-            eye[_RATES] / rates_left[:, None],
-            n.gain / n.max_increment_n_m[:, None],
-            n.from_moments @ (eye[_COMMANDS] - n.gain) / n.headroom,
-            n.from_moments @ eye[_MOMENTS] / n.headroom,
-        ]
-    )
+    if min(map(min, rotors_left)) <= 0:
+        raise RangeError("what the law may command beyond its gain is more than the rotors can do")
+    change = n.commanded[0] - eye[_COMMANDS]
+    rows = [
+        eye[_ANGLES[:limited]] / angles_left[:, None],
+        eye[_RATES] / rates_left[:, None],
+        change[: len(n.max_increment_n_m)] / n.max_increment_n_m[:, None],
+        *(n.from_moments @ C / left[:, None] for C, left in zip(n.commanded, rotors_left, strict=True)),
+        n.from_moments @ eye[_MOMENTS] / n.headroom,
+    ]
+    return np.array(list(dict.fromkeys(map(tuple, np.vstack(rows)))))
+
+
+def _moments(n: AttitudeNumbers) -> AnyArray:
+    """Return the largest moments within the headroom, (3,)."""
+    largest: AnyArray = abs(n.to_moments).sum(axis=1) * n.headroom
+    return largest
+
+
+def _turns(n: AttitudeNumbers, box: Box) -> AnyArray:
+    """Return the largest change of the rates in an interval, (3,)."""
+    moments = _moments(n)
+    turns: AnyArray = (moments + n.disturbance_n_m) * n.interval_s
+    turns[2] += (abs(n.spin_s) * moments[2] + n.spin_spread_s @ moments) * 2
+    return turns / n.inertia_kg_m2 + n.interval_s * (box.max_gyroscopic @ n.rates_rad_s)
+
+
+def _unsure_speeds(n: AttitudeNumbers, box: Box) -> AnyArray:
+    """Return the largest squared speeds, (2, 4), that the law commands and remembers beyond its gain."""
+    largest = np.concatenate([n.rates_rad_s, _moments(n), _moments(n)])
+    angles = np.concatenate([box.max_angles, [_HALF_A_TURN] * (INPUTS - len(box.max_angles))])
+    beyond = n.unsure[:, :, _RATES + _MOMENTS + _COMMANDS] @ largest + n.unsure[:, :, _ANGLES] @ angles
+    squared: AnyArray = beyond @ abs(n.from_moments).T
+    return squared

@@ -14,15 +14,18 @@ from colibri.common.types import Array
 
 _SHOWN = 60
 _POINTS = 181
-_NAMES = {PHI: "error of φ (deg)", THETA: "error of θ (deg)", PSI: "error of ψ (deg)", P: "p (rad/s)", R: "r (rad/s)"}
+_RATE_NAMES = {P: "p (rad/s)", R: "r (rad/s)"}
 
 
-def draw(certificate: Certificate, flown: Flown, path: Path) -> None:
-    """Draw both sets in three planes, with flights in them, and V over time."""
+def draw(certificate: Certificate, flown: Flown, axes_names: tuple[str, ...], path: Path) -> None:
+    """Draw both sets in three planes, with flights in them, and V over time; names are those of the three angles."""
+    errors = zip((PHI, THETA, PSI), axes_names, strict=True)
+    names = _RATE_NAMES | {state: f"error, {name} (deg)" for state, name in errors}
     figure = Figure(figsize=(8.6, 6.9), layout="constrained")
     axes = figure.subplots(2, 2)
     for ax, pair in zip(axes.flat, ((PHI, P), (PHI, THETA), (PSI, R)), strict=False):
         _draw_sets(ax, certificate, flown, *pair)
+        ax.set(xlabel=names[pair[0]], ylabel=names[pair[1]])
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=2, fontsize=8, frameon=False)
     _draw_values(axes[1, 1], certificate, flown)
@@ -45,7 +48,6 @@ def _draw_sets(ax: Axes, certificate: Certificate, flown: Flown, across: int, up
     ax.plot(shown[:, 0, 0], shown[:, 0, 1], color="#999999", linewidth=0.7, label=f"{shown.shape[1]} of the flights")
     ax.plot(shown[:, 1:, 0], shown[:, 1:, 1], color="#999999", linewidth=0.4)
     ax.plot(shown[0, :, 0], shown[0, :, 1], ".", color="#444444", markersize=3, label="where they begin: V = 1")
-    ax.set(xlabel=_NAMES[across], ylabel=_NAMES[up])
     ax.grid(color="#DDDDDD", linewidth=0.6)
 
 

@@ -84,9 +84,14 @@ class UncertainLoop(NamedTuple):
         return self._replace(offsets=0 * self.offsets, disturbance=self.disturbance[:, :0]).reduced()
 
     def reduced(self) -> "UncertainLoop":
-        """Return the loop without rows of ξ that are always zero."""
-        kept = (self.gains != 0).any(axis=1) | (self.offsets != 0)
-        return self._replace(entries=self.entries[:, kept], gains=self.gains[kept], offsets=self.offsets[kept])
+        """Return the loop without rows of ξ that are always zero, and without channels that none depends on."""
+        rows, columns = (self.gains != 0).any(axis=1) | (self.offsets != 0), (self.gains != 0).any(axis=0)
+        return self._replace(
+            entries=self.entries[:, rows],
+            channels=self.channels[columns],
+            gains=self.gains[np.ix_(rows, columns)],
+            offsets=self.offsets[rows],
+        )
 
 
 class Supply(NamedTuple):

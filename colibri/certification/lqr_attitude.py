@@ -1,43 +1,30 @@
-"""The law of a profile that is certified: the LQR of `lpv-mpc`, to which its terminal weight and fallback belong."""
+"""The attitude's LQR of `lpv-mpc`, to which its terminal weight and fallback belong, as a law that is certified."""
 
+from itertools import product
 from math import exp, radians, tan
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc, body_of
 from colibri.autopilot.control.lpv_mpc.law import LpvMpcSettings
 from colibri.autopilot.control.lpv_mpc.outer_loop import OuterLoop
-from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.lpv_mpc.prediction import INPUTS, PHI, STATES, THETA
 from colibri.autopilot.control.qp import QpSolver
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel
 from colibri.autopilot.control.vehicle_model.rotor_lag import rotor_lag
-from colibri.certification.attitude import AttitudeNumbers, attitude_loop
-from colibri.certification.loop import Number, UncertainLoop
+from colibri.certification.attitude import AttitudeNumbers, Kinematic, attitude_loop
+from colibri.certification.certificate import Entry
+from colibri.certification.flights import Conditions, Flyer, Momentum
+from colibri.certification.loop import AnyArray, Number, UncertainLoop
 from colibri.common.config import read_settings
 from colibri.common.elementary import square
-from colibri.common.errors import Error
+from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
-LAW = "lpv-mpc"
+_TILT = [PHI, THETA]
 _DIGITS = 10
 """Of numbers that are chosen here: short ones keep exact arithmetic short."""
-
-
-class UncertifiableError(Error):
-    """A profile whose law cannot be certified."""
-
-
-class Conditions(NamedTuple):
-    """What a certificate is to hold for.
-
-    Attributes:
-        disturbance_n_m: Length of the moment that disturbs.
-        charge_part: Part of the battery's charge that may be taken.
-    """
-
-    disturbance_n_m: float
-    charge_part: float
 
 
 class LqrAttitude:
@@ -51,16 +38,17 @@ class LqrAttitude:
         thrust_n: Of a hover, and the ends of the profile's range, N.
     """
 
-    def __init__(self, profile: Profile, vehicle: Vehicle, conditions: Conditions) -> None:
-        """Take the law from the profile.
+    what = "LQR of the attitude of lpv-mpc"
+    axes = ("φ", "θ", "ψ")
+    not_proven = ("the gain of the plan itself", "the moment of rotors that are spun up")
+
+    def __init__(self, table: dict[str, Any], vehicle: Vehicle, conditions: Conditions) -> None:
+        """Take the law's numbers from the profile's `table`.
 
         Raises:
-            UncertifiableError: The profile has no numbers for it.
-            SettingsError: Its table is wrong.
+            SettingsError: The table is wrong.
         """
-        if not profile.table(LAW):
-            raise UncertifiableError(f"{profile.where}: has no numbers for {LAW}: only that law can be certified")
-        settings = read_settings(profile.table(LAW), LpvMpcSettings)
+        settings = read_settings(table, LpvMpcSettings)
         self.interval_s = settings.control_interval_s
         self._settings, self._vehicle, self.conditions = settings.attitude, vehicle, conditions
         lag = rotor_lag(vehicle, self.interval_s)
@@ -76,7 +64,27 @@ class LqrAttitude:
 
     def loop(self, numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
         """Return the loop of these numbers, in floats or in fractions."""
-        return attitude_loop(numbers, number)
+        return attitude_loop(numbers, number, of_euler_angles)
+
+    @property
+    def terminal_weight(self) -> Array:
+        """Of the law's plans, (12, 12)."""
+        return self.mpc.problem.terminal_weight
+
+    def ranges(self, numbers: AttitudeNumbers) -> str:
+        """Return the ranges of the angles, deg, in words."""
+        phi, theta = np.degrees(2.0 * np.arctan(numbers.angles))
+        return f"{phi:.1f}, {theta:.1f}, any"
+
+    def held(self, entry: Entry) -> Array:
+        """Return the largest constant |phi| and |theta|, rad, (2,), around which the set of an entry keeps all limits."""
+        limits = np.asarray(self.loop(entry.numbers, float).limits, dtype=float)
+        room: Array = 1.0 / limits[[0, 1], _TILT] - entry.proof.reach(np.eye(STATES + INPUTS)[_TILT])
+        return room
+
+    def flyer(self, entry: Entry, held: Array, rng: np.random.Generator) -> Flyer:
+        """Return the law as it flies the equations to `held`, rad, (flights, 2)."""
+        return _LqrFlyer(entry.numbers, held, rng)
 
     def thrusts_n(self, scale: float) -> tuple[float, float]:
         """Return the range of the thrust: from that of a hover towards both ends of the profile's, by this part."""
@@ -93,21 +101,77 @@ class LqrAttitude:
         speeds = self._max_squared**0.5 - problem.min_squared**0.5
         momentum = abs(vehicle.rotor_momentum()).sum() / 2 * speeds * rotors.max_speed
         angle = radians(self._settings.max_angle_deg) * scale
+        commanded = np.eye(3, 12, 9) - self.mpc.gain
         lag_s = 1.0 / body.lag_1_s if body.lag_1_s else 0.0
         return AttitudeNumbers(
             interval_s=self.interval_s,
             lag_s=lag_s,
             stays=exp(-self.interval_s / lag_s) if lag_s else 0.0,
             inertia_kg_m2=[body.ix, body.iy, body.iz],
-            gain=self.mpc.gain.tolist(),
-            half_tangents=[round(tan(angle / 2), _DIGITS)] * 2,
+            commanded=[commanded.tolist()] * 2,
+            unsure=np.zeros((2, *commanded.shape)).tolist(),
+            angles=[round(tan(angle / 2), _DIGITS)] * 2,
             rates_rad_s=[round(scale * rate, _DIGITS) for rate in self._settings.max_rate_rad_s],
             momentum_n_m_s=round(momentum, _DIGITS),
+            spin_s=0.0,
+            spin_spread_s=[0.0] * 3,
             max_increment_n_m=list(self._settings.max_increment_n_m),
             from_moments=problem.from_moments.tolist(),
             to_moments=(vehicle.allocation()[1:] * square(rotors.max_speed)).tolist(),
             headroom=round(float(headroom), _DIGITS),
             disturbance_n_m=self.conditions.disturbance_n_m,
-            output_weight=np.asarray(problem.output_weight).tolist(),
+            angle_weight=np.asarray(problem.output_weight).tolist(),
+            rate_weight=[0.0] * 3,
             increment_weight=np.asarray(problem.increment_weight).tolist(),
         )
+
+
+class _LqrFlyer:
+    """Flights under the gain; trigonometric functions of the angles."""
+
+    def __init__(self, numbers: AttitudeNumbers, held: Array, rng: np.random.Generator) -> None:
+        self._numbers, self._held, self._rng = numbers, held, rng
+
+    def commands(self, z: Array) -> tuple[Array, Array]:
+        commands = z @ np.array(self._numbers.commanded[0]).T
+        return commands, commands
+
+    def turn(self, angles: Array, rates: Array) -> Array:
+        phi, theta = (angles[:, :2] + self._held).T
+        p, q, r = rates.T
+        across = np.sin(phi) * q + np.cos(phi) * r
+        return np.column_stack(
+            [p + np.tan(theta) * across, np.cos(phi) * q - np.sin(phi) * r, across / np.cos(theta)]
+        )
+
+    def momentum(self) -> Momentum:
+        constant = self._rng.uniform(-1.0, 1.0, len(self._held)) * self._numbers.momentum_n_m_s
+        return lambda _moments, _changes: (constant, 0.0 * constant)
+
+
+def of_euler_angles(n: AttitudeNumbers) -> Kinematic:
+    """Return T(phi, theta) [2.7] over ranges whose half angles have the tangents `n.angles`, (2,); psi is in any range.
+
+    T is the product of two points, (sin φ, cos φ) and (tan θ, 1 / cos θ), each on a curve that lies in a polygon: its
+    chord, and its tangents at both ends and in the middle. With the tangents of half the angles rational, so are all
+    vertices.
+    """
+    (t, u), (p, q, r) = n.angles, n.rates_rad_s
+    sine, cosine = 2 * t / (1 + t * t), (1 - t * t) / (1 + t * t)
+    tangent, secant = 2 * u / (1 - u * u), (1 + u * u) / (1 - u * u)
+    roll = ((-sine, cosine), (-t, 1), (t, 1), (sine, cosine))
+    pitch = ((-tangent, secant), (-u, 1), (u, 1), (tangent, secant))
+    phi_rate, theta_rate = p + tangent * (sine * q + r), q + sine * r
+    steep, slope = secant * secant * theta_rate, secant * tangent * theta_rate
+    change = [  # of each entry of T, every factor at its largest
+        [0, tangent * phi_rate + sine * steep, sine * tangent * phi_rate + steep],
+        [0, sine * phi_rate, phi_rate],
+        [0, secant * phi_rate + sine * slope, secant * sine * phi_rate + slope],
+    ]
+    vertices = np.array([_of_points(*x, *y) for x, y in product(roll, pitch)])
+    angles = 2 * n.angles - 2 * n.angles**3 / 3  # the arcus tangent's series, whose next term is positive
+    return Kinematic(vertices, np.array(change), angles)
+
+
+def _of_points(sine: Any, cosine: Any, tangent: Any, secant: Any) -> AnyArray:
+    return np.array([[1, sine * tangent, cosine * tangent], [0, cosine, -sine], [0, sine * secant, cosine * secant]])

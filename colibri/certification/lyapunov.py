@@ -18,8 +18,8 @@ from colibri.common.types import Array
 _LEAST_MARGIN = 1e-6
 """Of a Lyapunov function that is the identity or less, in coordinates in which it is about that."""
 _BISECTIONS = 6
-_SET_RATIOS = (0.98, 0.95)
-_ATTRACTOR_RATIOS = (0.95, 0.98)
+_SET_RATIOS = (0.98, 0.95, 0.99)
+_ATTRACTOR_RATIOS = (0.95, 0.98, 0.99)
 """Of V from sample to sample: the first with which there is a set. Slower gives larger ones, faster smaller."""
 _STAGE_BESIDE = 1e-6
 """Of the limits, that a weight sees states which the stage's cost does not."""
@@ -61,7 +61,8 @@ class _Problem:
         self.limits, self.stage, self.starts = loop.limits @ X, X.T @ loop.stage @ X, loop.starts @ C.T
         self.outputs = loop.starts / np.sum(loop.starts**2, axis=1)[:, None] @ X
         quadratic = supply(loop, self.sizes)
-        self._units = loop.gains @ self.sizes + loop.offsets
+        entered = np.linalg.norm(C @ loop.entries, axis=0)
+        self._units = np.sqrt((loop.gains @ self.sizes + loop.offsets) / entered)  # so that multipliers are about 1
         squared = self._units[:, None, None] ** 2
         self.forms = X.T @ quadratic.forms @ X / squared
         self.constants = quadratic.constants / self._units**2
@@ -129,7 +130,7 @@ class _Problem:
 def contraction(loop: UncertainLoop, ratio: float) -> Proof | None:
     """Return a Lyapunov function that falls by `ratio` each sample, without disturbance; None where there is none."""
     C = _coordinates_of_set(loop)
-    if C is None or spectral_radius(loop) >= 1.0:
+    if C is None or spectral_radius(loop) ** 2 >= ratio:
         return None
     problem = _Problem(loop.undisturbed(), C)
     cost = np.zeros(problem.unknowns)
@@ -141,7 +142,7 @@ def contraction(loop: UncertainLoop, ratio: float) -> Proof | None:
 def fastest(loop: UncertainLoop) -> Proof | None:
     """Return the Lyapunov function that falls fastest, by bisection."""
     best = contraction(loop, 1.0)
-    low, high = 0.5, 1.0
+    low, high = spectral_radius(loop) ** 2, 1.0
     for _ in range(_BISECTIONS if best else 0):
         ratio = 0.5 * (low + high)
         found = contraction(loop, ratio)
@@ -217,7 +218,7 @@ def _first(
     """Return the proof of the first ratio that has one, found again in coordinates in which its set is a ball."""
 
     def solved(C: Array | None, ratio: float) -> Proof | None:
-        if C is None:
+        if C is None or spectral_radius(loop) ** 2 >= ratio:
             return None
         problem = _Problem(loop, C)
         cost, always = program(problem, ratio)

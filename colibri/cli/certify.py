@@ -25,7 +25,8 @@ def some(text: str) -> int:
 def add_options(parser: ArgumentParser) -> None:
     """Add the options of `colibri certify`."""
     add = parser.add_argument
-    add("profile", metavar="PROFILE", help="control profile name or .toml, with numbers for lpv-mpc")
+    add("profile", metavar="PROFILE", help="control profile name or .toml")
+    add("--controller", metavar="NAME", help="control law that the profile has numbers for (default: its own)")
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--moment", type=positive, default=0.01, metavar="NM", help="moment that disturbs, N m (default %(default)s)")
     add(

@@ -87,6 +87,7 @@ class WholeMpc:
         model: The vehicle's numbers, as one record.
         from_wrench: From U1, N, and U2, U3, U4, N m, to squared speeds, (4, 4).
         starts: Step at which each block begins, and N, (b + 1,).
+        terminal_on_hold: S of a demanded attitude, see `Problem`.
     """
 
     def __init__(
@@ -112,6 +113,7 @@ class WholeMpc:
         )  # fmt: skip
         on_track = on_hold._replace(position=weights.position, velocity=weights.velocity, tilt=0.0, thrust=0.0)
         thrust_n = weights.terminal_thrust * vehicle.body.mass_kg * vehicle.gravity_m_s2
+        self.terminal_on_hold = self._terminal(on_hold, settings.count_every, thrust_n)
         self.starts, self._effects = starts, speed_effects(starts, interval_s)
         blocks, rows = len(settings.blocks), condensing.MOTION_ROWS * (n // settings.check_every)
         shared = Workspace(

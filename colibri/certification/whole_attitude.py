@@ -1,0 +1,292 @@
+"""The attitude under `whole-lpv-mpc` where no limit binds: the gain of its QP, read from the law itself.
+
+A demanded attitude goes into the same QP as a place, with other weights. Its minimum is a function of the error of the
+attitude, the rates, the rotors' squared speeds and the corrections of the last plan, of which it remembers what it had
+for this sample. The derivative at rest, level, in hover, is the gain that is certified: nothing of the law is derived
+again, its own step is asked. In body axes it hardly depends on the attitude held, nor on the thrust: what it does
+depend is a bounded remainder.
+"""
+
+from functools import cached_property
+from itertools import product
+from math import exp, pi, radians, sin, sqrt
+from typing import Any
+
+import numpy as np
+
+from colibri.autopilot.control.interface import AttitudeDemand, VehicleState
+from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, M1, M3, RATES, STATES
+from colibri.autopilot.control.qp import QpSolver
+from colibri.autopilot.control.whole_lpv_mpc.law import Memory, WholeLpvMpc, WholeLpvMpcSettings
+from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan, WholeMpc
+from colibri.certification.attitude import MIRRORS, AttitudeNumbers, Kinematic, attitude_loop
+from colibri.certification.certificate import Entry
+from colibri.certification.flights import Conditions, Flyer, Momentum
+from colibri.certification.loop import AnyArray, Number, RangeError, UncertainLoop
+from colibri.common.config import read_settings
+from colibri.common.elementary import square
+from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
+from colibri.common.types import Array
+from colibri.plant.vehicle.description import Vehicle
+
+_DIGITS = 10
+_GAIN_DIGITS = 8
+_ANGLES, _RATES = list(ANGLES), list(RATES)
+_MOMENTS, _COMMANDS = slice(M1, M3 + 1), slice(STATES, STATES + INPUTS)
+_STEP = 1e-4
+"""Of states, rad, rad/s and N m, for a derivative."""
+_THRUST_PART = 0.5
+"""Of a part of the profile's ranges, that of the thrust's: what it leaves is the rotors' for moments."""
+_SPARED = 0.2
+"""Part of the squared speed that the thrust asks for which moments leave every rotor."""
+_HELD_RAD = radians(20.0)
+"""Largest |phi| and |theta| that may be held: of them the gain's heading depends."""
+_GRID = 4
+_BETWEEN = 1.5
+"""What the gain differs anywhere in their ranges, to what it does at most on a grid."""
+_ETA_SPARE = 1e-9
+_PREDICTED = 16
+
+
+class WholeAttitude:
+    """The unconstrained attitude law of a profile.
+
+    Attributes:
+        conditions: What its certificate is to hold for.
+        commanded: C, see `AttitudeNumbers`, (2, 3, 12).
+        max_squared: Squared speed that all rotors can keep up together, in parts of the largest.
+    """
+
+    what = "unconstrained attitude law of whole-lpv-mpc"
+    axes = ("about x", "about y", "about z")
+    not_proven = (
+        "what its QP commands beyond its gain at rest: of second order in the errors",
+        "a thrust that changes",
+    )
+
+    def __init__(self, table: dict[str, Any], vehicle: Vehicle, conditions: Conditions) -> None:
+        """Take the law's numbers from the profile's `table`.
+
+        Raises:
+            SettingsError: The table is wrong.
+        """
+        self._settings, self._vehicle, self.conditions = read_settings(table, WholeLpvMpcSettings), vehicle, conditions
+        self._law = WholeLpvMpc(table, vehicle, lambda: 0.0)
+        plan, weights, qp = self._settings.plan, self._settings.weights, self._settings.qp
+        solver = QpSolver(qp.solver, qp.tolerance, qp.max_iterations)
+        self._terminal = WholeMpc(
+            plan, weights, vehicle, solver, self._settings.control_interval_s, lambda: 0.0
+        ).terminal_on_hold
+        self._to_wrench = vehicle.allocation() * square(vehicle.rotors.max_speed)
+        self._from_wrench = np.linalg.inv(self._to_wrench)
+        self._horizon = sum(self._settings.plan.blocks)
+        capacity_ah = vehicle.battery.capacity_ah if vehicle.battery else 0.0
+        self._charge_ah = conditions.charge_part * capacity_ah
+        self.max_squared = square(self._law.tracker.battery.max_common_speed(self._charge_ah))
+        self._min_squared = square(self._law.tracker.lag.min_speed)
+        self._hover_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
+        self.commanded = np.array([_mirrored(rows) for rows in self._gain(0.0, self._hover_n).round(_GAIN_DIGITS)])
+
+    def loop(self, numbers: AttitudeNumbers, number: Number) -> UncertainLoop:
+        """Return the loop of these numbers, in floats or in fractions."""
+        return attitude_loop(numbers, number, of_error)
+
+    @cached_property
+    def terminal_weight(self) -> Array:
+        """Of the law's plans for an attitude, (12, 12)."""
+        S = self._terminal
+        from_moments = self._from_wrench[:, 1:]
+        kept = [*range(6, 12)]
+        order = _ANGLES + _RATES
+        weight = np.zeros((STATES + INPUTS, STATES + INPUTS))
+        weight[np.ix_(order, order)] = S[np.ix_(kept, kept)]
+        weight[np.ix_(order, range(M1, M3 + 1))] = S[np.ix_(kept, range(12, 16))] @ from_moments
+        weight[np.ix_(range(M1, M3 + 1), order)] = weight[np.ix_(order, range(M1, M3 + 1))].T
+        weight[_MOMENTS, _MOMENTS] = from_moments.T @ S[12:, 12:] @ from_moments
+        return weight
+
+    def thrusts_n(self, scale: float) -> tuple[float, float]:
+        """Return the range of the thrust: from that of a hover towards both ends of what the rotors can make."""
+        span_n, part = float(self._to_wrench[0].sum()), _THRUST_PART * scale
+        least, most = self._min_squared * span_n, self.max_squared * span_n
+        return self._hover_n - part * (self._hover_n - least), self._hover_n + part * (most - self._hover_n)
+
+    def ranges(self, numbers: AttitudeNumbers) -> str:
+        """Return the ranges of the angles, deg, in words."""
+        return ", ".join(f"{angle:.1f}" for angle in np.degrees(2.0 * np.arcsin(0.5 * np.array(numbers.angles[:-1]))))
+
+    def held(self, entry: Entry) -> Array:
+        """Return the largest constant |phi| and |theta|, rad, (2,): errors are in body axes, wherever those point."""
+        del entry
+        return np.full(2, _HELD_RAD)
+
+    def flyer(self, entry: Entry, held: Array, rng: np.random.Generator) -> Flyer:
+        """Return the law as it flies the equations to `held`, rad, (flights, 2), at any heading and thrust of the range."""
+        flights = len(held)
+        thrusts_n = rng.uniform(*self.thrusts_n(entry.scale), flights)
+        headings = rng.uniform(-pi, pi, flights)
+        return _WholeFlyer(self, np.column_stack([held, headings]), thrusts_n)
+
+    def momentum(self, thrusts_n: Array) -> Momentum:
+        """Return the rotors' momentum, and its rate, at constant thrusts, N, (flights,)."""
+        momentum, from_moments = self._vehicle.rotor_momentum() * self._vehicle.rotors.max_speed, self._from_wrench[:, 1:]
+        level = thrusts_n[:, None] * self._from_wrench[:, 0]
+
+        def of_moments(moments: Array, changes: Array) -> tuple[Array, Array]:
+            speeds = np.sqrt(level + moments @ from_moments.T)
+            return speeds @ momentum, (0.5 * changes @ from_moments.T / speeds) @ momentum
+
+        return of_moments
+
+    def numbers_at(self, scale: float) -> AttitudeNumbers:
+        """Return the numbers of the loop whose ranges are this part of the profile's."""
+        vehicle, settings = self._vehicle, self._settings
+        thrusts_n, from_moments = self.thrusts_n(scale), self._from_wrench[:, 1:]
+        least, most = (n / float(self._to_wrench[0].sum()) for n in thrusts_n)
+        headroom = min(self.max_squared - most, least - max(self._min_squared, _SPARED * least))
+        slowest, fastest = sqrt(max(least - headroom, 0.0)), sqrt(most + headroom)
+        momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
+        # Squared speeds that change by ds change speeds by ds / (before + after).
+        slow, fast = 0.5 / slowest, 0.5 / fastest
+        largest = [round(2.0 * sin(0.5 * scale * radians(settings.plan.max_tilt_deg)), _DIGITS)] * INPUTS
+        eta = sqrt(max(1.0 - 0.25 * sum(map(square, largest)), 0.0)) - _ETA_SPARE
+        weights = settings.weights
+        lag = vehicle.rotors.lag
+        lag_s = max(lag.time_constant_up_s, lag.time_constant_down_s) if lag else 0.0
+        each = 1.0 / settings.plan.count_every
+        return AttitudeNumbers(
+            interval_s=settings.control_interval_s,
+            lag_s=lag_s,
+            stays=exp(-settings.control_interval_s / lag_s) if lag_s else 0.0,
+            inertia_kg_m2=list(vehicle.body.inertia_kg_m2),
+            commanded=self.commanded.tolist(),
+            unsure=self._unsure(thrusts_n).tolist(),
+            angles=[*largest, round(eta, _DIGITS)],
+            rates_rad_s=[round(scale * rate, _DIGITS) for rate in settings.plan.max_rate_rad_s],
+            momentum_n_m_s=round(float(np.abs(momentum).sum()) / 2.0 * (fastest - slowest), _DIGITS),
+            spin_s=round(float(-0.5 * (slow + fast) * momentum @ from_moments[:, 2]), _DIGITS),
+            spin_spread_s=(0.5 * (slow - fast) * np.abs(momentum) @ np.abs(from_moments)).round(_DIGITS).tolist(),
+            max_increment_n_m=[],
+            from_moments=from_moments.tolist(),
+            to_moments=self._to_wrench[1:].tolist(),
+            headroom=round(headroom, _DIGITS),
+            disturbance_n_m=self.conditions.disturbance_n_m,
+            angle_weight=[each * weights.tilt, each * weights.tilt, each * weights.heading],
+            rate_weight=[each * weights.rate] * 3,
+            increment_weight=(weights.first_correction * np.abs(from_moments.T @ from_moments).sum(axis=1)).tolist(),
+        )
+
+    def decide(self, z: Array, held: tuple[float, float, float], thrust_n: float, plan: Plan | None) -> tuple[Any, Plan]:
+        """Return moments commanded and remembered, (2, 3), and the plan, of the law's own step; nothing is observed.
+
+        Args:
+            z: Errors, (12,).
+            held: Euler angles demanded, rad.
+            thrust_n: Demanded, and that of the rotors.
+            plan: The last one; None for one of the corrections in `z`.
+        """
+        law, n = self._law, self._law.preview.samples
+        if plan is None:
+            steady = self._squared(thrust_n, z[_COMMANDS])
+            states = np.zeros((self._horizon + 1, _PREDICTED))
+            states[:, 12:] = self._squared(thrust_n, 0.0 * z[_COMMANDS])
+            plan = Plan(np.tile(steady, (self._horizon, 1)), states)
+        tracked = law.initial(0.0).tracked._replace(
+            speeds=np.sqrt(self._squared(thrust_n, z[_MOMENTS])), charge_ah=self._charge_ah
+        )
+        half = 0.5 * z[_ANGLES]
+        attitude = _product(quaternion_from_euler(*held), (sqrt(1.0 - half @ half), *half.tolist()))
+        nowhere, (p, q, r) = (0.0, 0.0, 0.0), z[_RATES].tolist()
+        state = VehicleState(nowhere, nowhere, attitude, euler_from_quaternion(attitude), (p, q, r))
+        demand = AttitudeDemand(np.tile(held, (n, 1)), np.zeros((n, 3)), np.full(n, thrust_n))
+        after, _ = law.step_attitude(Memory(tracked, plan, 1, 0), 0, state, demand)
+        made = after.plan
+        if made is None:
+            raise RangeError("the law makes no plan there")
+        first = self._settings.plan.blocks[0]
+        remembered = made.commands[1 : 1 + first].mean(axis=0)
+        return np.array([self._to_wrench[1:] @ made.commands[0], self._to_wrench[1:] @ remembered]), made
+
+    def _squared(self, thrust_n: float, moments: Array) -> Array:
+        squared: Array = self._from_wrench @ np.array([thrust_n, *moments])
+        return squared
+
+    def _gain(self, phi: float, thrust_n: float) -> Array:
+        """Return the derivative of what is commanded and remembered at rest, (2, 3, 12)."""
+        columns = []
+        for step in _STEP * np.eye(STATES + INPUTS):
+            above, _ = self.decide(step, (phi, 0.0, 0.0), thrust_n, None)
+            below, _ = self.decide(-step, (phi, 0.0, 0.0), thrust_n, None)
+            columns.append((above - below) / (2.0 * _STEP))
+        return np.stack(columns, axis=2)
+
+    def _unsure(self, thrusts_n: tuple[float, float]) -> Array:
+        """Return what the gain may differ from that in hover, level, at all attitudes that may be held and thrusts."""
+        grid = product(np.linspace(-_HELD_RAD, _HELD_RAD, _GRID + 1).tolist(), (*thrusts_n, self._hover_n))
+        differs = [np.abs(self._gain(phi, thrust_n) - self.commanded) for phi, thrust_n in grid]
+        unsure: Array = (_BETWEEN * np.max(differs, axis=0)).round(_GAIN_DIGITS)
+        return unsure
+
+
+class _WholeFlyer:
+    """Flights by the law's own steps; each has its plan."""
+
+    def __init__(self, law: WholeAttitude, held: Array, thrusts_n: Array) -> None:
+        self._law, self._held, self._thrusts_n = law, held.tolist(), thrusts_n
+        self._plans: list[Plan | None] = [None] * len(held)
+
+    def commands(self, z: Array) -> tuple[Array, Array]:
+        both = np.empty((len(z), 2, INPUTS))
+        for i, thrust_n in enumerate(self._thrusts_n.tolist()):
+            phi, theta, psi = self._held[i]
+            both[i], self._plans[i] = self._law.decide(z[i], (phi, theta, psi), thrust_n, self._plans[i])
+        return both[:, 0], both[:, 1]
+
+    def turn(self, angles: Array, rates: Array) -> Array:
+        eta = np.sqrt(1.0 - 0.25 * np.sum(angles * angles, axis=1))
+        turned: Array = eta[:, None] * rates + 0.5 * np.cross(angles, rates)
+        return turned
+
+    def momentum(self) -> Momentum:
+        return self._law.momentum(self._thrusts_n)
+
+
+def _mirrored(rows: Array) -> Array:
+    """Return rows, (3, 12), of moments without what would not be its own mirror image."""
+    signs = np.array(MIRRORS)
+    own = (signs[:, _MOMENTS, None] * signs[:, None, :] == 1).all(axis=0)
+    kept: Array = np.where(own, rows, 0.0)
+    return kept
+
+
+def _product(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float, float]:
+    """Return the product of two quaternions."""
+    (w, x, y, z), (v, i, j, k) = a, b
+    return (
+        w * v - x * i - y * j - z * k,
+        w * i + x * v + y * k - z * j,
+        w * j - x * k + y * v + z * i,
+        w * k + x * j - y * i + z * v,
+    )
+
+
+def of_error(n: AttitudeNumbers) -> Kinematic:
+    """Return T of ε, twice the vector part of the quaternion from the attitude held to that now, in body axes.
+
+    ε' = (η + ½ [ε]×) ω, with η = √(1 - ¼ ε²): affine in both, whatever attitude is held. `n.angles` are the ranges of
+    |ε|, (3,), and the least η.
+    """
+    *ranges, least = n.angles
+    x, y, z = ranges = np.array(ranges)
+    if least <= 0 or 4 * least * least > 4 - x * x - y * y - z * z:
+        raise RangeError("errors of the attitude are too large together")
+    corners = np.array(list(product((-1, 1), repeat=3))) * ranges
+    vertices = np.array([_of_quaternion(*corner, eta) for corner in corners for eta in (least, 1)])
+    change = abs(vertices).max(0) @ n.rates_rad_s / 2  # of ½ ε
+    along = ranges @ n.rates_rad_s / 4
+    dx, dy, dz = change
+    return Kinematic(vertices, np.array([[along, dz, dy], [dz, along, dx], [dy, dx, along]]), ranges)
+
+
+def _of_quaternion(x: Any, y: Any, z: Any, eta: Any) -> AnyArray:
+    return np.array([[eta, -z / 2, y / 2], [z / 2, eta, -x / 2], [-y / 2, x / 2, eta]])
