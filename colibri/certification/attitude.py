@@ -1,15 +1,15 @@
 """The attitude under a law that commands moments, as an uncertain loop: kinematics, Euler's equation, the rotors' lag.
 
-State, 12: errors of the attitude, angles as the law's `Kinematics` have them, each before its body rate; moments M1, M2,
-M3; and those that the law remembers as last commanded. Errors to any constant attitude obey these equations. Nothing is
-linearised and nothing discretised: over an interval h, with rho(t) anywhere in the box of its ranges,
+State, 12: errors of the attitude, angles as the law's `Kinematics` have them, each before its body rate; moments M1,
+M2, M3; and those that the law remembers as last commanded. Errors to any constant attitude obey these equations.
+Nothing is linearised and nothing discretised: over an interval h, angles and rates anywhere in their ranges,
 
     ω(h) = ω + h G ω + I⁻¹ (b1 M + b2 u) + κ e3 (M(h) - M) + ξ_ω     G: mean of the gyroscopic matrix, affine in p, q, r
     Φ(h) = Φ + T (h ω + I⁻¹ (c1 M + c2 u) + ...) + ξ_Φ                T: mean of the kinematic matrix
     u = C z + ξ_u
 
-Means lie in convex hulls, and ξ, what is of second order in h, of the rotors' momentum, or of what a law commands beyond
-its gain, is bounded entry by entry. κ: rotors that are spun up turn the body the other way.
+Means lie in convex hulls, and ξ, what is of second order in h, of the rotors' momentum, or of what a gain may differ,
+is bounded entry by entry. κ: rotors that are spun up turn the body the other way.
 """
 
 from collections.abc import Callable
@@ -241,7 +241,9 @@ def _remainders(n: AttitudeNumbers, box: Box) -> tuple[AnyArray, AnyArray]:
     beyond = (by_commands + by_changes + np.vstack([box.beside @ abs(turning), none])) @ n.unsure[0]
     of_states = np.vstack([beyond, *n.unsure])
     of_states[:6, _RATES] += np.vstack([drifted, turned + h * _rotors(n)])
-    of_states[:6, _MOMENTS] += np.vstack([(b1 * drifted + c1 * twice) * by_inertia, (b1 * turned + c1 * G) * by_inertia])
+    of_states[:6, _MOMENTS] += np.vstack(
+        [(b1 * drifted + c1 * twice) * by_inertia, (b1 * turned + c1 * G) * by_inertia]
+    )
     of_rest = np.hstack([of_states[:, _ANGLES], of_states[:, _COMMANDS]])
     gains = np.hstack(
         [
@@ -311,7 +313,8 @@ def _turns(n: AttitudeNumbers, box: Box) -> AnyArray:
     moments = _moments(n)
     turns: AnyArray = (moments + n.disturbance_n_m) * n.interval_s
     turns[2] += (abs(n.spin_s) * moments[2] + n.spin_spread_s @ moments) * 2
-    return turns / n.inertia_kg_m2 + n.interval_s * (box.max_gyroscopic @ n.rates_rad_s)
+    turns = turns / n.inertia_kg_m2 + n.interval_s * (box.max_gyroscopic @ n.rates_rad_s)
+    return turns
 
 
 def _unsure_speeds(n: AttitudeNumbers, box: Box) -> AnyArray:

@@ -52,19 +52,23 @@ class Flyer(Protocol):
 
 
 class AttitudeLaw(CertifiedLaw, Protocol):
-    """A law of the attitude that can be certified and flown.
+    """A law of the attitude that can be certified and flown."""
 
-    Attributes:
-        what: The law, as reports call it.
-        not_proven: What is not, of this law only.
-        axes: Names of the three angles.
-        conditions: What its certificate is to hold for.
-    """
+    @property
+    def what(self) -> str:
+        """The law, as reports call it."""
 
-    what: str
-    not_proven: tuple[str, ...]
-    axes: tuple[str, str, str]
-    conditions: Conditions
+    @property
+    def not_proven(self) -> tuple[str, ...]:
+        """What is not proven of this law, beside what is of none."""
+
+    @property
+    def axes(self) -> tuple[str, str, str]:
+        """Names of the three angles."""
+
+    @property
+    def conditions(self) -> Conditions:
+        """What its certificate is to hold for."""
 
     @property
     def terminal_weight(self) -> Array:

@@ -77,7 +77,7 @@ class LqrAttitude:
         return f"{phi:.1f}, {theta:.1f}, any"
 
     def held(self, entry: Entry) -> Array:
-        """Return the largest constant |phi| and |theta|, rad, (2,), around which the set of an entry keeps all limits."""
+        """Return the largest constant |phi| and |theta|, rad, (2,), around which its set keeps all limits."""
         limits = np.asarray(self.loop(entry.numbers, float).limits, dtype=float)
         room: Array = 1.0 / limits[[0, 1], _TILT] - entry.proof.reach(np.eye(STATES + INPUTS)[_TILT])
         return room
@@ -140,9 +140,7 @@ class _LqrFlyer:
         phi, theta = (angles[:, :2] + self._held).T
         p, q, r = rates.T
         across = np.sin(phi) * q + np.cos(phi) * r
-        return np.column_stack(
-            [p + np.tan(theta) * across, np.cos(phi) * q - np.sin(phi) * r, across / np.cos(theta)]
-        )
+        return np.column_stack([p + np.tan(theta) * across, np.cos(phi) * q - np.sin(phi) * r, across / np.cos(theta)])
 
     def momentum(self) -> Momentum:
         constant = self._rng.uniform(-1.0, 1.0, len(self._held)) * self._numbers.momentum_n_m_s

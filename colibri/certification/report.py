@@ -1,9 +1,7 @@
 """`colibri certify`: a profile's law certified, flown from the border of its set, and told as a table."""
 
 from argparse import Namespace
-from collections.abc import Callable
 from math import log
-from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -23,7 +21,7 @@ from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 CERTIFICATE, TABLE, FIGURE = "certificate.json", "certificate", "certificate.png"
-LAWS: dict[str, Callable[[dict[str, Any], Vehicle, Conditions], AttitudeLaw]] = {
+LAWS: dict[str, type[LqrAttitude] | type[WholeAttitude]] = {
     "lpv-mpc": LqrAttitude,
     "whole-lpv-mpc": WholeAttitude,
 }

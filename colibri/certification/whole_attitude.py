@@ -1,10 +1,10 @@
 """The attitude under `whole-lpv-mpc` where no limit binds: the gain of its QP, read from the law itself.
 
 A demanded attitude goes into the same QP as a place, with other weights. Its minimum is a function of the error of the
-attitude, the rates, the rotors' squared speeds and the corrections of the last plan, of which it remembers what it had
-for this sample. The derivative at rest, level, in hover, is the gain that is certified: nothing of the law is derived
-again, its own step is asked. In body axes it hardly depends on the attitude held, nor on the thrust: what it does
-depend is a bounded remainder.
+attitude, the rates, the rotors' squared speeds and the corrections of the last plan, of which next to nothing counts
+but what it had for this sample. The derivative at rest, level, in hover, is the gain that is certified: nothing of the
+law is derived again, its own step is asked. In body axes it hardly depends on the attitude held, nor on the thrust:
+what it does depend is a bounded remainder.
 """
 
 from functools import cached_property
@@ -18,6 +18,7 @@ from colibri.autopilot.control.interface import AttitudeDemand, VehicleState
 from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, M1, M3, RATES, STATES
 from colibri.autopilot.control.qp import QpSolver
 from colibri.autopilot.control.whole_lpv_mpc.law import Memory, WholeLpvMpc, WholeLpvMpcSettings
+from colibri.autopilot.control.whole_lpv_mpc.model import DEVIATIONS, ROTATION
 from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan, WholeMpc
 from colibri.certification.attitude import MIRRORS, AttitudeNumbers, Kinematic, attitude_loop
 from colibri.certification.certificate import Entry
@@ -40,7 +41,7 @@ _THRUST_PART = 0.5
 _SPARED = 0.2
 """Part of the squared speed that the thrust asks for which moments leave every rotor."""
 _HELD_RAD = radians(20.0)
-"""Largest |phi| and |theta| that may be held: of them the gain's heading depends."""
+"""Largest |phi| and |theta| that may be held: on phi the gain depends, for the heading has a weight of its own."""
 _GRID = 4
 _BETWEEN = 1.5
 """What the gain differs anywhere in their ranges, to what it does at most on a grid."""
@@ -61,6 +62,8 @@ class WholeAttitude:
     axes = ("about x", "about y", "about z")
     not_proven = (
         "what its QP commands beyond its gain at rest: of second order in the errors",
+        "that the last plan's later corrections count for nothing: for less than a thousandth",
+        "that the gain is within its bound between a grid of attitudes and thrusts",
         "a thrust that changes",
     )
 
@@ -74,11 +77,9 @@ class WholeAttitude:
         self._law = WholeLpvMpc(table, vehicle, lambda: 0.0)
         plan, weights, qp = self._settings.plan, self._settings.weights, self._settings.qp
         solver = QpSolver(qp.solver, qp.tolerance, qp.max_iterations)
-        self._terminal = WholeMpc(
-            plan, weights, vehicle, solver, self._settings.control_interval_s, lambda: 0.0
-        ).terminal_on_hold
-        self._to_wrench = vehicle.allocation() * square(vehicle.rotors.max_speed)
-        self._from_wrench = np.linalg.inv(self._to_wrench)
+        mpc = WholeMpc(plan, weights, vehicle, solver, self._settings.control_interval_s, lambda: 0.0)
+        self._terminal, self._from_wrench = mpc.terminal_on_hold, mpc.from_wrench
+        self._to_wrench = self._law.tracker.allocation
         self._horizon = sum(self._settings.plan.blocks)
         capacity_ah = vehicle.battery.capacity_ah if vehicle.battery else 0.0
         self._charge_ah = conditions.charge_part * capacity_ah
@@ -96,13 +97,10 @@ class WholeAttitude:
         """Of the law's plans for an attitude, (12, 12)."""
         S = self._terminal
         from_moments = self._from_wrench[:, 1:]
-        kept = [*range(6, 12)]
-        order = _ANGLES + _RATES
-        weight = np.zeros((STATES + INPUTS, STATES + INPUTS))
-        weight[np.ix_(order, order)] = S[np.ix_(kept, kept)]
-        weight[np.ix_(order, range(M1, M3 + 1))] = S[np.ix_(kept, range(12, 16))] @ from_moments
-        weight[np.ix_(range(M1, M3 + 1), order)] = weight[np.ix_(order, range(M1, M3 + 1))].T
-        weight[_MOMENTS, _MOMENTS] = from_moments.T @ S[12:, 12:] @ from_moments
+        of_state = np.zeros((len(S), STATES + INPUTS))
+        of_state[range(ROTATION, DEVIATIONS), _ANGLES + _RATES] = 1.0
+        of_state[DEVIATIONS:, _MOMENTS] = from_moments
+        weight: Array = of_state.T @ S @ of_state
         return weight
 
     def thrusts_n(self, scale: float) -> tuple[float, float]:
@@ -121,7 +119,7 @@ class WholeAttitude:
         return np.full(2, _HELD_RAD)
 
     def flyer(self, entry: Entry, held: Array, rng: np.random.Generator) -> Flyer:
-        """Return the law as it flies the equations to `held`, rad, (flights, 2), at any heading and thrust of the range."""
+        """Return the law as it flies the equations to `held`, rad, (flights, 2), at any heading and thrust."""
         flights = len(held)
         thrusts_n = rng.uniform(*self.thrusts_n(entry.scale), flights)
         headings = rng.uniform(-pi, pi, flights)
@@ -129,7 +127,10 @@ class WholeAttitude:
 
     def momentum(self, thrusts_n: Array) -> Momentum:
         """Return the rotors' momentum, and its rate, at constant thrusts, N, (flights,)."""
-        momentum, from_moments = self._vehicle.rotor_momentum() * self._vehicle.rotors.max_speed, self._from_wrench[:, 1:]
+        momentum, from_moments = (
+            self._vehicle.rotor_momentum() * self._vehicle.rotors.max_speed,
+            self._from_wrench[:, 1:],
+        )
         level = thrusts_n[:, None] * self._from_wrench[:, 0]
 
         def of_moments(moments: Array, changes: Array) -> tuple[Array, Array]:
@@ -145,7 +146,7 @@ class WholeAttitude:
         least, most = (n / float(self._to_wrench[0].sum()) for n in thrusts_n)
         headroom = min(self.max_squared - most, least - max(self._min_squared, _SPARED * least))
         slowest, fastest = sqrt(max(least - headroom, 0.0)), sqrt(most + headroom)
-        momentum = vehicle.rotor_momentum() * vehicle.rotors.max_speed
+        momentum = self._law.tracker.momentum
         # Squared speeds that change by ds change speeds by ds / (before + after).
         slow, fast = 0.5 / slowest, 0.5 / fastest
         largest = [round(2.0 * sin(0.5 * scale * radians(settings.plan.max_tilt_deg)), _DIGITS)] * INPUTS
@@ -176,7 +177,9 @@ class WholeAttitude:
             increment_weight=(weights.first_correction * np.abs(from_moments.T @ from_moments).sum(axis=1)).tolist(),
         )
 
-    def decide(self, z: Array, held: tuple[float, float, float], thrust_n: float, plan: Plan | None) -> tuple[Any, Plan]:
+    def decide(
+        self, z: Array, held: tuple[float, float, float], thrust_n: float, plan: Plan | None
+    ) -> tuple[Any, Plan]:
         """Return moments commanded and remembered, (2, 3), and the plan, of the law's own step; nothing is observed.
 
         Args:
@@ -204,7 +207,7 @@ class WholeAttitude:
         if made is None:
             raise RangeError("the law makes no plan there")
         first = self._settings.plan.blocks[0]
-        remembered = made.commands[1 : 1 + first].mean(axis=0)
+        remembered = np.vstack([made.commands, made.commands[-1:]])[1 : 1 + first].mean(axis=0)
         return np.array([self._to_wrench[1:] @ made.commands[0], self._to_wrench[1:] @ remembered]), made
 
     def _squared(self, thrust_n: float, moments: Array) -> Array:
@@ -281,12 +284,13 @@ def of_error(n: AttitudeNumbers) -> Kinematic:
     if least <= 0 or 4 * least * least > 4 - x * x - y * y - z * z:
         raise RangeError("errors of the attitude are too large together")
     corners = np.array(list(product((-1, 1), repeat=3))) * ranges
-    vertices = np.array([_of_quaternion(*corner, eta) for corner in corners for eta in (least, 1)])
+    vertices = np.array([_of_quaternion(corner, eta) for corner in corners for eta in (least, 1)])
     change = abs(vertices).max(0) @ n.rates_rad_s / 2  # of ½ ε
     along = ranges @ n.rates_rad_s / 4
     dx, dy, dz = change
     return Kinematic(vertices, np.array([[along, dz, dy], [dz, along, dx], [dy, dx, along]]), ranges)
 
 
-def _of_quaternion(x: Any, y: Any, z: Any, eta: Any) -> AnyArray:
+def _of_quaternion(error: AnyArray, eta: Any) -> AnyArray:
+    x, y, z = error
     return np.array([[eta, -z / 2, y / 2], [z / 2, eta, -x / 2], [-y / 2, x / 2, eta]])

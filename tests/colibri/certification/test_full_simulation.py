@@ -17,7 +17,8 @@ from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import QpStatus
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers
-from colibri.certification.report import fly_from
+from colibri.certification.flights import Conditions, Plan, fly
+from colibri.certification.lqr_attitude import LqrAttitude
 from colibri.common.jit import packed
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
 from colibri.common.types import Array
@@ -27,7 +28,7 @@ from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.vehicle.description import load_vehicle
 
 VEHICLE = load_vehicle("hummingbird")
-CERTIFICATE = Path(__file__).parent / "flight.json"
+CERTIFICATE = Path(__file__).parent / "lpv-mpc.json"
 CERTIFIED = certificates.read(CERTIFICATE, AttitudeNumbers).invariant
 RESONANCE_RAD_S = 28.0
 STEP_S = 0.001
@@ -97,9 +98,9 @@ def values(controller: LpvMpc, start: Array, disturbance: Callable[[int, Array],
 
 def largest_value(controller: LpvMpc, flights: int) -> float:
     """Return the largest V after the start of flights from the set's border."""
-    certified, rng = certificates.read(CERTIFICATE, AttitudeNumbers), np.random.default_rng(4)
-    largest = 0.0
-    for i, start in enumerate(fly_from(certified, flights, seed=4).states[0]):
+    rng, largest = np.random.default_rng(4), 0.0
+    certified = LqrAttitude(load_profile("flight").table("lpv-mpc"), VEHICLE, Conditions(0.01, 0.5))
+    for i, start in enumerate(fly(certified, CERTIFIED, Plan(flights, 0.0, seed=4)).states[0]):
         began, *later = values(controller, start, disturbances(i % 4, rng))
         assert began == pytest.approx(1.0)
         largest = max(largest, *later)
