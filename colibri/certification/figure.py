@@ -20,7 +20,7 @@ _RATE_NAMES = {P: "p (rad/s)", R: "r (rad/s)"}
 def draw(certificate: Certificate, flown: Flown, axes_names: tuple[str, ...], path: Path) -> None:
     """Draw both sets in three planes, with flights in them, and V over time; names are those of the three angles."""
     errors = zip((PHI, THETA, PSI), axes_names, strict=True)
-    names = _RATE_NAMES | {state: f"error, {name} (deg)" for state, name in errors}
+    names = _RATE_NAMES | {state: f"error {name} (deg)" for state, name in errors}
     figure = Figure(figsize=(8.6, 6.9), layout="constrained")
     axes = figure.subplots(2, 2)
     for ax, pair in zip(axes.flat, ((PHI, P), (PHI, THETA), (PSI, R)), strict=False):

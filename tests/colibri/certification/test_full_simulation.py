@@ -1,24 +1,31 @@
-"""The certified law in the whole plant: rotors, drag, battery and a disturbing moment, unlike the certificate's model.
+"""Certified laws in the whole plant: rotors, drag, battery and a disturbing moment, unlike the certificate's model.
 
-The law's own code decides: with every QP failing and its observer held at nothing, so that its LQR flies all the time;
-and as it flies, of which nothing is proven.
+The laws' own code decides: the LQR with every QP failing and its observer held at nothing, so that it flies all the
+time; and both as they fly, of which nothing is proven.
 """
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 import pytest
 
-from colibri.autopilot.control.interface import AttitudeDemand, Diagnostics, VehicleState
+from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Diagnostics, VehicleState
+from colibri.autopilot.control.lpv_mpc import law as lpv_mpc
 from colibri.autopilot.control.lpv_mpc.attitude_mpc import AttitudeMpc
 from colibri.autopilot.control.lpv_mpc.law import LpvMpc
+from colibri.autopilot.control.parts.vehicle_tracking import Tracked
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import QpStatus
+from colibri.autopilot.control.whole_lpv_mpc import law as whole_lpv_mpc
+from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpc
+from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan as QpPlan
 from colibri.certification import certificate as certificates
 from colibri.certification.attitude import AttitudeNumbers
-from colibri.certification.flights import Conditions, Plan, fly
+from colibri.certification.flights import AttitudeLaw, Conditions, Plan, fly
 from colibri.certification.lqr_attitude import LqrAttitude
+from colibri.certification.whole_attitude import WholeAttitude
 from colibri.common.jit import packed
 from colibri.common.rotations import euler_from_quaternion, quaternion_from_euler
 from colibri.common.types import Array
@@ -27,28 +34,103 @@ from colibri.plant.physics.integrators import fixed_step
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.vehicle.description import load_vehicle
 
-VEHICLE = load_vehicle("hummingbird")
-CERTIFICATE = Path(__file__).parent / "lpv-mpc.json"
-CERTIFIED = certificates.read(CERTIFICATE, AttitudeNumbers).invariant
+VEHICLE, CONDITIONS = load_vehicle("hummingbird"), Conditions(0.01, 0.5)
+HOVER_N = VEHICLE.body.mass_kg * VEHICLE.gravity_m_s2
+ALLOCATION = VEHICLE.allocation() * VEHICLE.rotors.max_speed**2
 RESONANCE_RAD_S = 28.0
 STEP_S = 0.001
 SAMPLES = 125
 
 
+def table(name: str) -> dict[str, Any]:
+    return load_profile("flight").table(name)
+
+
+class Case(Protocol):
+    """A certified law, and what its errors are in the plant."""
+
+    name: str
+    certified: AttitudeLaw
+
+    def attitude(self, angles: Array) -> tuple[float, float, float, float]:
+        """Return the quaternion of errors to a level attitude."""
+
+    def angles(self, attitude: tuple[float, float, float, float]) -> Array:
+        """Return the errors of a quaternion."""
+
+    def memory(self, tracked: Tracked, remembered: Array) -> Any:
+        """Return the memory of a law that has last commanded these moments."""
+
+    def remembered(self, memory: Any) -> Array:
+        """Return the moments that the law has last commanded."""
+
+
+class Lqr:
+    """That of `lpv-mpc`."""
+
+    name = "lpv-mpc"
+    certified: AttitudeLaw = LqrAttitude(table(name), VEHICLE, CONDITIONS)
+    begun = LpvMpc(table(name), VEHICLE, lambda: 0.0).initial(VEHICLE.hover_speed)
+
+    def attitude(self, angles: Array) -> tuple[float, float, float, float]:
+        return quaternion_from_euler(*angles.tolist())
+
+    def angles(self, attitude: tuple[float, float, float, float]) -> Array:
+        return np.array(euler_from_quaternion(attitude))
+
+    def memory(self, tracked: Tracked, remembered: Array) -> lpv_mpc.Memory:
+        return self.begun._replace(tracked=tracked, moments=remembered)
+
+    def remembered(self, memory: lpv_mpc.Memory) -> Array:
+        return memory.moments
+
+
+class Whole:
+    """The unconstrained law of `whole-lpv-mpc`."""
+
+    name = "whole-lpv-mpc"
+    certified: AttitudeLaw = WholeAttitude(table(name), VEHICLE, CONDITIONS)
+
+    def attitude(self, angles: Array) -> tuple[float, float, float, float]:
+        x, y, z = (0.5 * angles).tolist()
+        return float(np.sqrt(1.0 - x * x - y * y - z * z)), x, y, z
+
+    def angles(self, attitude: tuple[float, float, float, float]) -> Array:
+        errors: Array = 2.0 * np.copysign(1.0, attitude[0]) * np.array(attitude[1:])
+        return errors
+
+    def memory(self, tracked: Tracked, remembered: Array) -> whole_lpv_mpc.Memory:
+        commands, level = (np.linalg.solve(ALLOCATION, [HOVER_N, *moments]) for moments in (remembered, np.zeros(3)))
+        states = np.tile(np.concatenate([np.zeros(12), level]), (29, 1))
+        return whole_lpv_mpc.Memory(tracked, QpPlan(np.tile(commands, (28, 1)), states), 1, 0)
+
+    def remembered(self, memory: whole_lpv_mpc.Memory) -> Array:
+        assert memory.plan
+        moments: Array = ALLOCATION[1:] @ memory.plan.commands[memory.age]
+        return moments
+
+
+LQR, WHOLE = Lqr(), Whole()
+
+
+def invariant(case: Case) -> certificates.Entry:
+    return certificates.read(Path(__file__).parent / f"{case.name}.json", AttitudeNumbers).invariant
+
+
 def law() -> LpvMpc:
     """Return the law with observers that observe next to nothing, and an LQR that never ends."""
-    table = load_profile("flight").table("lpv-mpc")
-    observer = {**table["observer"], "max_moment_n_m": 1e-12, "max_acceleration_m_s2": 1e-12}
-    fallback = {**table["fallback"], "lqr_samples": 1000}
-    return LpvMpc({**table, "observer": observer, "fallback": fallback}, VEHICLE, lambda: 0.0)
+    numbers = table("lpv-mpc")
+    observer = {**numbers["observer"], "max_moment_n_m": 1e-12, "max_acceleration_m_s2": 1e-12}
+    fallback = {**numbers["fallback"], "lqr_samples": 1000}
+    return LpvMpc({**numbers, "observer": observer, "fallback": fallback}, VEHICLE, lambda: 0.0)
 
 
-def disturbances(kind: int, rng: np.random.Generator) -> Callable[[int, Array], Array]:
+def disturbances(entry: certificates.Entry, kind: int, rng: np.random.Generator) -> Callable[[int, Array], Array]:
     """Return the moment, N m, of a sample and its errors: constant, random, at the loop's resonance, or raising V most.
 
     All but the swinging one are as long as is allowed.
     """
-    numbers, P = CERTIFIED.numbers, CERTIFIED.proof.P
+    numbers, P = entry.numbers, entry.proof.P
 
     def along(vector: Array) -> Array:
         moment_n_m: Array = numbers.disturbance_n_m * vector / np.linalg.norm(vector)
@@ -63,45 +145,47 @@ def disturbances(kind: int, rng: np.random.Generator) -> Callable[[int, Array], 
     )[kind]
 
 
-def values(controller: LpvMpc, start: Array, disturbance: Callable[[int, Array], Array]) -> list[float]:
+def values(
+    case: Case,
+    entry: certificates.Entry,
+    controller: AttitudeController[Any],
+    start: Array,
+    disturbance: Callable[[int, Array], Array],
+) -> list[float]:
     """Return V at each sample of a flight that holds a level attitude, disturbed by what `disturbances` returns."""
     parameters = packed(parameters_of(VEHICLE, (0.0, 0.0, 0.0)))
-    inertia = np.array(VEHICLE.body.inertia_kg_m2)
-    allocation, hover_n = VEHICLE.allocation(), VEHICLE.body.mass_kg * VEHICLE.gravity_m_s2
-    squared = np.linalg.solve(allocation, [hover_n, *start[6:9]])
+    inertia, wrench = np.array(VEHICLE.body.inertia_kg_m2), np.array([HOVER_N, *start[6:9]])
+    speeds = np.sqrt(np.linalg.solve(ALLOCATION, wrench))
     x = np.zeros(18)
     x[3:6], x[8] = start[[1, 3, 5]], 100.0
-    x[9:13] = quaternion_from_euler(start[0], start[2], start[4])
-    x[13:17] = np.sqrt(squared)
-    memory = controller.initial(VEHICLE.hover_speed)
-    wrench = np.array([hover_n, *start[6:9]])
-    speeds = np.sqrt(squared) / VEHICLE.rotors.max_speed
-    tracked = memory.tracked._replace(speeds=speeds, wrench=wrench, mean_wrench=wrench)
-    memory = memory._replace(tracked=tracked, moments=start[9:].copy())
+    x[9:13] = case.attitude(start[[0, 2, 4]])
+    x[13:17] = speeds * VEHICLE.rotors.max_speed
+    tracked = controller.initial(VEHICLE.hover_speed).tracked
+    memory = case.memory(tracked._replace(speeds=speeds, wrench=wrench, mean_wrench=wrench), start[9:].copy())
     count = controller.preview.samples
-    demand = AttitudeDemand(np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, hover_n))
+    demand = AttitudeDemand(np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, HOVER_N))
     found = []
     for sample in range(SAMPLES):
-        euler = euler_from_quaternion(attitude_of(x.tolist()))
-        p, q, r = x[3:6].tolist()
-        z = np.array([euler[0], p, euler[1], q, euler[2], r, *memory.tracked.wrench[1:], *memory.moments])
-        found.append(float(z @ CERTIFIED.proof.P @ z))
+        attitude, (p, q, r) = attitude_of(x.tolist()), x[3:6].tolist()
+        z = np.zeros(12)
+        z[[0, 2, 4]], z[[1, 3, 5]] = case.angles(attitude), (p, q, r)
+        z[6:9], z[9:] = memory.tracked.wrench[1:], case.remembered(memory)
+        found.append(float(z @ entry.proof.P @ z))
         moment_n_m = disturbance(sample, z)
         u, v, w = x[:3].tolist()
-        state = VehicleState((0.0, 0.0, 100.0), (u, v, w), attitude_of(x.tolist()), euler, (p, q, r))
+        state = VehicleState((0.0, 0.0, 100.0), (u, v, w), attitude, euler_from_quaternion(attitude), (p, q, r))
         memory, decision = controller.step_attitude(memory, sample * 8000, state, demand)
-        for _ in range(round(CERTIFIED.numbers.interval_s / STEP_S)):
+        for _ in range(round(entry.numbers.interval_s / STEP_S)):
             x, _ = fixed_step(x, tuple(decision.rotor_speeds.tolist()), parameters, STEP_S)
             x[3:6] += STEP_S * moment_n_m / inertia
     return found
 
 
-def largest_value(controller: LpvMpc, flights: int) -> float:
+def largest_value(case: Case, controller: AttitudeController[Any], flights: int) -> float:
     """Return the largest V after the start of flights from the set's border."""
-    rng, largest = np.random.default_rng(4), 0.0
-    certified = LqrAttitude(load_profile("flight").table("lpv-mpc"), VEHICLE, Conditions(0.01, 0.5))
-    for i, start in enumerate(fly(certified, CERTIFIED, Plan(flights, 0.0, seed=4)).states[0]):
-        began, *later = values(controller, start, disturbances(i % 4, rng))
+    rng, largest, entry = np.random.default_rng(4), 0.0, invariant(case)
+    for i, start in enumerate(fly(case.certified, entry, Plan(flights, 0.0, seed=4)).states[0]):
+        began, *later = values(case, entry, controller, start, disturbances(entry, i % 4, rng))
         assert began == pytest.approx(1.0)
         largest = max(largest, *later)
     return largest
@@ -113,10 +197,14 @@ FLIGHTS = pytest.mark.parametrize("flights", [40, pytest.param(1000, marks=pytes
 @FLIGHTS
 def test_flights_of_the_whole_plant_stay_in_the_set(flights: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(AttitudeMpc, "plan", lambda *_: (None, Diagnostics(QpStatus.INFEASIBLE)))
-    assert largest_value(law(), flights) <= 1.0
+    assert largest_value(LQR, law(), flights) <= 1.0
 
 
 @FLIGHTS
-def test_so_do_those_of_the_law_as_it_flies(flights: int) -> None:
-    controller = LpvMpc(load_profile("flight").table("lpv-mpc"), VEHICLE, lambda: 0.0)
-    assert largest_value(controller, flights) <= 1.0
+def test_so_do_those_of_lpv_mpc_as_it_flies(flights: int) -> None:
+    assert largest_value(LQR, LpvMpc(table("lpv-mpc"), VEHICLE, lambda: 0.0), flights) <= 1.0
+
+
+@FLIGHTS
+def test_so_do_those_of_whole_lpv_mpc_as_it_flies(flights: int) -> None:
+    assert largest_value(WHOLE, WholeLpvMpc(table("whole-lpv-mpc"), VEHICLE, lambda: 0.0), flights) <= 1.0
