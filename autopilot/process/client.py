@@ -1,5 +1,7 @@
 """The autopilot's end of the link to a plant: frames received, answered, waited for."""
 
+from collections.abc import Callable
+from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -71,23 +73,26 @@ class Client:
             due_s = self._end.poll(perf_counter())
             for datagram in self._end.take_outbox():
                 self._link.send(datagram)
-            if step and self._log:
-                self._write(self._log, step)  # while the plant integrates
+            if step:
+                self._keep(partial(AutopilotLog.write, step=step))  # while the plant integrates
             if step and self._ground:
                 autopilot = self._ground.serve(perf_counter())
                 if self._ground.shut_down:
                     break
             self._report_changes()
+        self._keep(AutopilotLog.flush)
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 
-    def _write(self, log: AutopilotLog, step: Step) -> None:
-        """Log a step; whoever flies for ground stations flies on without a log that cannot be written.
+    def _keep(self, write: Callable[[AutopilotLog], None]) -> None:
+        """Write to the log; whoever flies for ground stations flies on without one that cannot be written.
 
         Raises:
             LogError: There are no ground stations, and it cannot be written.
         """
+        if self._log is None:
+            return
         try:
-            log.write(step)
+            write(self._log)
         except LogError as error:
             if self._ground is None:
                 raise

@@ -64,6 +64,7 @@ class AutopilotLog:
             vehicle = setup.vehicle_tables
             kinds = kinds_of(vehicle.sensors) if vehicle and vehicle.sensors else []
             self._checks = CsvLog(folder / "filter.csv", check_columns(kinds))
+        self._rows = [log for log in (self._decisions, self._estimates, self._checks) if log is not None]
 
     def write(self, step: Step) -> None:
         """Append a control sample; of a frame between two of them, only the check of the filter."""
@@ -73,7 +74,7 @@ class AutopilotLog:
             self._inputs.append(line(msgspec.structs.replace(self._setup, first_us=self._time_us)))
         if self._checks is not None and step.estimate is not None and step.estimate.check is not None:
             check = step.estimate.check
-            self._checks.write((check.time_us / 1e6, *check.state, *check.covariance, *check.nis, *check.accepted))
+            self._checks.add((check.time_us / 1e6, *check.state, *check.covariance, *check.nis, *check.accepted))
         if step.decision is None:
             return
         if self._estimates is not None and step.estimate is not None:
@@ -83,7 +84,7 @@ class AutopilotLog:
         times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
         time_s = step.command.time_us / 1e6
         figures = (*times_us, how.cost, how.slack, *how.active, step.delay_us, how.mass_kg, how.path_lag_s)
-        self._decisions.write((time_s, *step.decision.attitude_reference, *codes, *figures))
+        self._decisions.add((time_s, *step.decision.attitude_reference, *codes, *figures))
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
         """Record that the next frame is answered by a vehicle that begins with these parameters and this history."""
@@ -110,11 +111,19 @@ class AutopilotLog:
         if failed:
             raise failed
 
+    def flush(self) -> None:
+        """Write what waits.
+
+        Raises:
+            LogError: It cannot be written.
+        """
+        for log in self._rows:
+            log.flush()
+
     def close(self) -> None:
         """Close the files."""
-        for log in (self._inputs, self._decisions, self._estimates, self._checks):
-            if log is not None:
-                log.close()
+        for log in (self._inputs, *self._rows):
+            log.close()
 
     def _write_estimate(self, log: CsvLog, estimate: Estimate) -> None:
         frame = estimate.frame
@@ -122,4 +131,4 @@ class AutopilotLog:
         deviations = (*estimate.position_std_m, *estimate.velocity_std_m_s, *estimate.attitude_std_rad)
         biases = (*estimate.gyro_bias_rad_s, *estimate.accel_bias_m_s2)
         counts = (estimate.health.flags, sum(estimate.rejected.values()), estimate.resets)
-        log.write((frame.time_us / 1e6, *state, *deviations, *biases, *counts))
+        log.add((frame.time_us / 1e6, *state, *deviations, *biases, *counts))

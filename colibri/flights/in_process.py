@@ -67,6 +67,8 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None] = unseen) ->
                 log.write(step)
                 plant_logs.write_world(plant.world)
                 progress(plant.world.time_us / 1e6)
+            plant_logs.flush()
+            log.flush()
             wall_time_s = perf_counter() - began_s
     finally:
         plant_logs.close()

@@ -4,7 +4,7 @@ import struct
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from colibri.common.process.log_files import LogFile
+from colibri.common.process.log_files import BlockLog
 from colibri.mavlink.errors import MavlinkError
 from colibri.mavlink.wire.framing import frame_length
 
@@ -40,8 +40,8 @@ def decode(log: bytes) -> Iterator[Logged]:
         at = begin + length
 
 
-class TlogWriter(LogFile):
-    """A telemetry log that is written frame by frame."""
+class TlogWriter(BlockLog[Logged]):
+    """A telemetry log that is written block by block."""
 
     def write(self, time_us: int, frames: Iterable[bytes]) -> None:
         """Append frames, all of time `time_us`.
@@ -49,5 +49,9 @@ class TlogWriter(LogFile):
         Raises:
             LogError: They cannot be written.
         """
-        stamp = STAMP.pack(time_us)
-        self.append(b"".join([stamp + frame for frame in frames]))
+        for frame in frames:
+            self.add(Logged(time_us, frame))
+
+    def encode(self, records: list[Logged]) -> Iterable[bytes]:
+        """Return each frame behind its time."""
+        return (STAMP.pack(time_us) + frame for time_us, frame in records)

@@ -60,8 +60,10 @@ def _serve(
         silence.end(now_s)
         if log and end.world is not logged:
             logged = end.world
-            log.write(truth_row(logged))
+            log.add(truth_row(logged))
         progress.report(end.world.time_us / 1e6, now_s - began_s)
+    if log:
+        log.flush()
     figures: dict[str, Any] = {"steps": end.steps, "restarts": end.restarts, "dropped": dict(end.dropped)}
     report_end(status, end.world.time_us, began_s, f"ended {{}} after {end.steps} steps", **figures)
 

@@ -32,7 +32,7 @@ class PlantLogs:
 
     def write_world(self, world: World) -> None:
         """Append the truth."""
-        self._truth.write(truth_row(world))
+        self._truth.add(truth_row(world))
 
     def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
         """Append what was received and sent at simulated time `time_us`."""
@@ -42,6 +42,15 @@ class PlantLogs:
         """Append frames of simulated time `time_us`."""
         if frames:
             self._tlog.write(self._boot_unix_us + time_us, frames)
+
+    def flush(self) -> None:
+        """Write what waits.
+
+        Raises:
+            LogError: It cannot be written.
+        """
+        self._truth.flush()
+        self._tlog.flush()
 
     def close(self) -> None:
         """Close both."""

@@ -1,5 +1,6 @@
 """The plant on a link: in lockstep, or as hardware would be: following the wall clock, waiting for no answer."""
 
+from collections.abc import Callable
 from math import isfinite
 from time import perf_counter, sleep
 from typing import Any
@@ -87,6 +88,7 @@ class Server:
             frames += 1
             progress.report(plant.world.time_us / 1e6, perf_counter() - began_s)
         self._log(plant.world)
+        self._keep(PlantLogs.flush)
         figures: dict[str, Any] = {"frames": frames, "resent": self._end.resent, "dropped": dict(self._end.dropped)}
         text, own = self._own_figures()
         report_end(
@@ -133,18 +135,20 @@ class Server:
         return None
 
     def _log(self, world: World) -> None:
-        if self._logs and world is not self._logged:
-            try:
-                self._logs.write_world(world)
-            except LogError as error:
-                self._fly_on_without(error)
+        if world is not self._logged:
+            self._keep(lambda logs: logs.write_world(world))
         self._logged = world
 
-    def _fly_on_without(self, error: LogError) -> None:
-        """Report a log that cannot be written, and fly on if the flight has no end."""
-        if self._ends:
-            raise error
-        self._status.say("said", f"{error}; flying on")
+    def _keep(self, write: Callable[[PlantLogs], None]) -> None:
+        """Write to the logs; a flight that has no end goes on without one that cannot be written."""
+        if self._logs is None:
+            return
+        try:
+            write(self._logs)
+        except LogError as error:
+            if self._ends:
+                raise
+            self._status.say("said", f"{error}; flying on")
 
     def _receive(self, timeout_s: float) -> ActuatorCommand | None:
         received = self._link.receive(timeout_s)
@@ -158,11 +162,7 @@ class Server:
         sent = self._end.take_outbox()
         for outgoing in sent:
             self._link.send(outgoing.datagram, outgoing.address)
-        if self._logs:
-            try:
-                self._logs.write_traffic(self._time_us, self._end.received, sent)
-            except LogError as error:
-                self._fly_on_without(error)
+        self._keep(lambda logs: logs.write_traffic(self._time_us, self._end.received, sent))
         self._end.received.clear()
 
     def _wait_until(self, due_s: float) -> None:

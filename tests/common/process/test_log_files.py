@@ -18,18 +18,29 @@ from colibri.common.process.log_files import CsvLog, LogError
 def test_a_row_keeps_every_bit(tmp_path_factory: pytest.TempPathFactory, row: list[float]) -> None:
     folder = tmp_path_factory.mktemp("log")
     log = CsvLog(folder / "log.csv", ["x"] * len(row))
-    log.write(row)
-    _, line = (folder / "log.csv").read_text(encoding="utf-8").splitlines()
+    log.add(row)
     log.close()
+    _, line = (folder / "log.csv").read_text(encoding="utf-8").splitlines()
     assert [float(value).hex() for value in line.split(",")] == [float(value).hex() for value in row]
 
 
 def test_what_is_no_number_has_its_word_and_numpy_its_digits(tmp_path: Path) -> None:
     log = CsvLog(tmp_path / "log.csv", ("a", "b", "c", "d"))
-    log.write((nan, inf, -inf, 0.5))
-    log.write((np.float64(0.1), 2, 1e-5, -0.0))
-    assert (tmp_path / "log.csv").read_text(encoding="utf-8") == "a,b,c,d\nnan,inf,-inf,0.5\n0.1,2,0.00001,-0.0\n"
+    log.add((nan, inf, -inf, 0.5))
+    log.add((np.float64(0.1), 2, 1e-5, -0.0))
     log.close()
+    assert (tmp_path / "log.csv").read_text(encoding="utf-8") == "a,b,c,d\nnan,inf,-inf,0.5\n0.1,2,0.00001,-0.0\n"
+
+
+def test_rows_are_written_a_block_at_a_time(tmp_path: Path) -> None:
+    """Who is killed loses less than a block."""
+    path = tmp_path / "log.csv"
+    log = CsvLog(path, ("a",))
+    for row in range(2 * CsvLog.BLOCK + 3):
+        log.add((row,))
+    assert path.read_text(encoding="utf-8").splitlines() == ["a", *map(str, range(2 * CsvLog.BLOCK))]
+    log.close()
+    assert path.read_text(encoding="utf-8").splitlines() == ["a", *map(str, range(2 * CsvLog.BLOCK + 3))]
 
 
 @contextmanager
@@ -47,9 +58,10 @@ def test_on_a_full_disk_the_rows_before_stay_whole_and_it_is_said_once(tmp_path:
     path = tmp_path / "log.csv"
     log = CsvLog(path, ("a", "b"))
     with no_file_beyond(15):
-        log.write((1.25, 2.5))
+        log.add((1.25, 2.5))
+        log.add((3.75, 4.5))
         with pytest.raises(LogError, match=r"cannot go on writing .*log\.csv: File too large"):
-            log.write((3.75, 4.5))
-    log.write((5.0, 6.0))
+            log.flush()
+    log.add((5.0, 6.0))
     log.close()
     assert path.read_text(encoding="utf-8") == "a,b\n1.25,2.5\n"
