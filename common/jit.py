@@ -25,6 +25,7 @@ _NOWHERE = (
 )
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+_Tuple = TypeVar("_Tuple", bound=NamedTuple)
 
 
 def compiled(function: _Function) -> _Function:
@@ -52,8 +53,13 @@ def compiled_for(*signatures: str) -> Callable[[_Function], _Function]:
 
 
 def packed(parameters: NamedTuple) -> Packed:
-    """Return the record of `parameters`, (1,): one pointer to hand to a kernel instead of a hundred numbers."""
+    """Return the record of `parameters`, (1,): one pointer to hand to a kernel in place of many numbers and arrays."""
     return np.array([tuple(parameters)], dtype=_fields(parameters))
+
+
+def opened(record: Packed, kind: type[_Tuple]) -> _Tuple:
+    """Return the arrays of a record as the named tuple that was packed, in the record's memory."""
+    return kind(*(record[name][0] for name in kind._fields))
 
 
 def _fields(parameters: Any) -> list[tuple[str, Any, tuple[int, ...]]]:

@@ -27,7 +27,7 @@ from colibri.autopilot.control.whole_lpv_mpc.model import (
     VELOCITY,
 )
 from colibri.common.compiled_rotations import euler_from_quaternion, rotation_matrix
-from colibri.common.jit import Packed, compiled
+from colibri.common.jit import compiled
 from colibri.common.kernels import atan2
 from colibri.common.types import Array
 
@@ -95,16 +95,20 @@ class Target(NamedTuple):
     """What the motion is to follow; samples are from now to one past the horizon, n = N + 2.
 
     Attributes:
-        position, velocity: m and m/s, ENU, (n, 3).
+        position, velocity, acceleration: m, m/s, m/s², ENU, (n, 3).
+        forces: Of the thrust, N, ENU, (n, 3).
         attitudes: Body to earth, (n, 3, 3).
         yaw_rad: (n,), in any turn.
         rates: rad/s, FLU, at samples 1 to N, (N, 3).
         squared: Squared rotor speeds at samples 0 to N, (N + 1, 4).
         thrusts_n: U1, (n,).
+        end_squared: Squared rotor speeds at the end, (4,).
     """
 
     position: Array
     velocity: Array
+    acceleration: Array
+    forces: Array
     attitudes: Array
     yaw_rad: Array
     rates: Array
@@ -120,7 +124,7 @@ def cost(
     responses: Array,
     target: Target,
     corrections: Array,
-    packed: Packed,
+    problem: Problem,
     H: Array,
     f: Array,
 ) -> None:
@@ -128,7 +132,6 @@ def cost(
 
     `corrections` are that which flew last and then the nominal ones, (b + 1, 4).
     """
-    problem = packed[0]
     weights = problem.weights
     moved = responses.shape[2]
     inputs = moved // (problem.starts.shape[0] - 1)
@@ -288,9 +291,8 @@ def bound(commands: Array, limits: Array, corrections: Array, starts: Integers, 
 
 
 @compiled
-def exceeds(motion: Array, responses: Array, z: Array, packed: Packed) -> bool:
+def exceeds(motion: Array, responses: Array, z: Array, problem: Problem) -> bool:
     """Whether the plan that z, (4 b,), stands for goes beyond a soft limit at a step that is checked."""
-    problem = packed[0]
     rates, turned = np.empty(3), np.empty(2)
     for step in problem.checked:
         x, X = motion[step], responses[step]
@@ -311,9 +313,8 @@ def exceeds(motion: Array, responses: Array, z: Array, packed: Packed) -> bool:
 
 
 @compiled
-def limit_motion(motion: Array, responses: Array, packed: Packed, G: Array, h: Array) -> None:
+def limit_motion(motion: Array, responses: Array, problem: Problem, G: Array, h: Array) -> None:
     """Fill the soft rows of tilt and rates, (7 d, n) and (7 d,), each in parts of its limit."""
-    problem = packed[0]
     moved = responses.shape[2]
     count = 0
     G[:, :] = 0.0

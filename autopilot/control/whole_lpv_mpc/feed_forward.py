@@ -74,9 +74,7 @@ def follow(
     limits: ForceLimits,
     law: Packed,
     vehicle: Packed,
-    near: tuple[Array, Array, Array],
-    yaw_rad: Array,
-    out: Flat,
+    out: Packed,
 ) -> Array:
     """Fill what follows references at their times; return the force, N, ENU, (3,), along which thrust must point now.
 
@@ -87,14 +85,16 @@ def follow(
         limits: Of the force.
         law: The `Guidance`.
         vehicle: The `Model`.
-        near: Is filled with references that `approach` them.
-        yaw_rad: Is filled, (n,).
-        out: Is filled.
+        out: The `Target`; is filled, but for thrusts.
     """
     p, v, a, yaw = before_jump(references, law[0].interval_s)
-    yaw_rad[:] = yaw
+    target = out[0]
+    near = (target.position, target.velocity, target.acceleration)
+    target.yaw_rad[:] = yaw
     approach(rigid[:3], rigid[3:6], (p, v, a), law, near)
-    ask(near[1], near[2], yaw_rad, disturbance, limits, law[0].from_wrench, vehicle, out)
+    flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
+    ask(near[1], near[2], target.yaw_rad, disturbance, limits, law[0].from_wrench, vehicle, flat)
+    target.end_squared[:] = target.squared[-1]
     return demanded_force(rigid, near, disturbance, law, limits, vehicle)
 
 

@@ -258,7 +258,7 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
         """Plan, or fall back: return squared rotor speeds, the plan to go on with, its age, and how it came about."""
-        target, force, path = wanted
+        _, target, force, path = wanted
         along_n = dot(force, inputs.observed.rotation[:, 2].copy())
         if along_n < _RECOVER_BEYOND * norm(force) and not _planned(memory, inputs):
             return self._recover(inputs, force, Diagnostics())

@@ -12,13 +12,13 @@ from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
 from colibri.autopilot.control.whole_lpv_mpc import condensing, model, planning
-from colibri.autopilot.control.whole_lpv_mpc.condensing import Problem, Target, Weights
+from colibri.autopilot.control.whole_lpv_mpc.condensing import Problem, Weights
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Lag, Model
 from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, read_speeds, speed_effects
-from colibri.autopilot.control.whole_lpv_mpc.planning import Now, Workspace
+from colibri.autopilot.control.whole_lpv_mpc.planning import Kind, Now, Workspace
 from colibri.common.config import Count, Degrees, Positive, Table
 from colibri.common.elementary import cos, exp, square
-from colibri.common.jit import Packed, packed
+from colibri.common.jit import Packed, opened, packed
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -70,11 +70,10 @@ class Plan(NamedTuple):
     speeds: Array | None = None
 
 
-class _Kind(NamedTuple):
-    """QPs of one kind: what they share, their arrays, and the QP without and with soft limits."""
+class _Qps(NamedTuple):
+    """QPs of one kind: the `Kind`, and in its memory the QP without and with soft limits."""
 
-    problem: Packed
-    work: Workspace
+    kind: Packed
     free: Qp
     limited: Qp
 
@@ -126,8 +125,8 @@ class WholeMpc:
             levels,
         )
         self._on_clock, self._on_path, self._on_hold = (
-            _Kind(
-                packed(
+            _opened(
+                Kind(
                     Problem(
                         starts,
                         np.arange(settings.count_every, n + 1, settings.count_every),
@@ -138,11 +137,11 @@ class WholeMpc:
                         levels,
                         cos(radians(settings.max_tilt_deg)),
                         np.array(settings.max_rate_rad_s),
-                    )
-                ),
-                shared._replace(responses=np.zeros((n + 1, model.DEVIATIONS, inputs * blocks))),
-                _empty_qp(inputs * blocks, 0, 0, settings.slack_weight),
-                _empty_qp(inputs * blocks, condensing.SLACKS, rows, settings.slack_weight),
+                    ),
+                    shared._replace(responses=np.zeros((n + 1, model.DEVIATIONS, inputs * blocks))),
+                    _empty_qp(inputs * blocks, 0, 0, settings.slack_weight),
+                    _empty_qp(inputs * blocks, condensing.SLACKS, rows, settings.slack_weight),
+                )
             )
             for each, inputs in ((on_track, ROTORS), (on_track, ROTORS + 1), (on_hold, ROTORS))
         )
@@ -166,7 +165,7 @@ class WholeMpc:
         return S
 
     def plan(
-        self, now: Now, target: Target, last: Array | None, path: PathNow | None = None, *, on_track: bool = True
+        self, now: Now, target: Packed, last: Array | None, path: PathNow | None = None, *, on_track: bool = True
     ) -> tuple[Plan | None, Diagnostics]:
         """Plan from `now` towards `target`; no plan where the QP is not solved.
 
@@ -174,23 +173,23 @@ class WholeMpc:
 
         Args:
             now: What the plan begins with.
-            target: What it is to follow.
+            target: The `Target`.
             last: Commands of the last plan, from now on, (n, 4); None without one.
             path: The nominal speeds along the path, where they are free.
             on_track: Whether the place counts, or the attitude and the thrust.
         """
-        problem, work, free, limited = self._on_path if path else self._on_clock if on_track else self._on_hold
+        qps = self._on_path if path else self._on_clock if on_track else self._on_hold
         last = self._none if last is None else last
         if path is None:
-            planning.condense(now, target, last, self.model, problem, work, free)
+            planning.condense(now, target, last, self.model, qps.kind)
         else:
-            planning.condense_on_path(now, target, last, path, self._effects, self.model, problem, work, free)
+            planning.condense_on_path(now, target, last, path, self._effects, self.model, qps.kind)
         started_s = self._clock()
-        status, z, slack, soft = self.solve(free, limited, problem, work)
+        status, z, slack, soft = self.solve(*qps)
         solve_time_s = self._clock() - started_s
         if z is None:
             return None, Diagnostics(status, solve_time_s=solve_time_s)
-        commands, states, binding = planning.read(work, free, z, now.psi, problem)
+        commands, states, binding = planning.read(qps.kind, z, now.psi)
         diagnostics = Diagnostics(
             QpStatus.SOLVED,
             solve_time_s=solve_time_s,
@@ -202,24 +201,22 @@ class WholeMpc:
         speeds = None if path is None else read_speeds(path.speeds, self._effects.shares, z)
         return Plan(commands, states, speeds), diagnostics
 
-    def solve(
-        self, free: Qp, limited: Qp, problem: Packed, work: Workspace
-    ) -> tuple[QpStatus, Array | None, float, tuple[int, int]]:
+    def solve(self, kind: Packed, free: Qp, limited: Qp) -> tuple[QpStatus, Array | None, float, tuple[int, int]]:
         """Return how the QP ended, its corrections, the largest slack, and how many soft limits of tilt and rates bind.
 
         No solver is asked where the minimum within no limits is within the rotors'; soft limits are added where it, or
         the solver's, exceeds one.
         """
         minimum = np.empty(len(free.f))
-        is_free = planning.free_minimum(free, len(self.starts) - 1, minimum)
+        is_free = planning.is_free(kind, minimum)
         status, z = QpResult(QpStatus.SOLVED, minimum) if is_free else self._solver.solve(free)
-        if z is None or not condensing.exceeds(work.motion, work.responses, z, problem):
+        if z is None or not planning.is_beyond(kind, z):
             return status, z, 0.0, (0, 0)
-        planning.limit(work, free, problem, limited)
+        planning.limit(kind)
         status, z = self._solver.solve(limited)
         if z is None:
             return status, z, 0.0, (0, 0)
-        return status, z[: len(free.f)].copy(), max(z[len(free.f) :].tolist()), planning.count_active(limited, z)
+        return status, z[: len(free.f)].copy(), max(z[len(free.f) :].tolist()), planning.count_active(kind, z)
 
 
 def model_of(vehicle: Vehicle, interval_s: float) -> Model:
@@ -254,6 +251,11 @@ def lagging(starts: Array, lag: Lag) -> tuple[Array, Array]:
             means[block, step] = command + away * lag.left_mean
             levels[block, step + 1] = command + away * lag.left
     return means, levels
+
+
+def _opened(kind: Kind) -> _Qps:
+    record = packed(kind)
+    return _Qps(record, opened(record["qp"], Qp), opened(record["limited"], Qp))
 
 
 def _empty_qp(moved: int, slacks: int, rows: int, slack_weight: float) -> Qp:

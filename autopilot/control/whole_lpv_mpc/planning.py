@@ -12,9 +12,11 @@ from colibri.autopilot.control.qp import Qp
 from colibri.autopilot.control.whole_lpv_mpc.condensing import (
     MOTION_ROWS,
     Integers,
+    Problem,
     Target,
     bound,
     cost,
+    exceeds,
     limit_motion,
     read_plan,
 )
@@ -47,7 +49,7 @@ class Now(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Arrays that every plan fills again.
+    """Arrays that every plan fills again, but for the last two.
 
     Attributes:
         commands: Of the references, within the limits, (N, 4).
@@ -66,46 +68,60 @@ class Workspace(NamedTuple):
     levels: Array
 
 
+class Kind(NamedTuple):
+    """QPs of one kind.
+
+    Attributes:
+        problem: What they share.
+        work: Is filled by each.
+        qp: Within the rotors' limits alone.
+        limited: With the soft limits, too.
+    """
+
+    problem: Problem
+    work: Workspace
+    qp: Qp
+    limited: Qp
+
+
 @compiled
-def condense(now: Now, target: Target, last: Array, vehicle: Packed, packed: Packed, work: Workspace, qp: Qp) -> None:
+def condense(now: Now, target: Packed, last: Array, vehicle: Packed, kind: Packed) -> None:
     """Fill the QP within the rotors' limits.
 
     Args:
         now: Where the plan begins.
-        target: What it is to follow.
+        target: The `Target`.
         last: Commands of the last plan, from now on, (n, 4); (0, 4) without one.
         vehicle: The `Model`.
-        packed: The `Problem`.
-        work: Is filled.
-        qp: Is filled, but for G and h.
+        kind: The `Kind`; its `work` and `qp` are filled, but for G and h.
     """
-    _expect(now, target, last, vehicle, packed, work, qp)
-    cost(work.motion, work.speeds, work.responses, target, work.corrections, packed, qp.H, qp.f)
+    it = kind[0]
+    _expect(now, target[0], last, vehicle, it)
+    _price_errors(target[0], it)
 
 
 @compiled
 def condense_on_path(
-    now: Now,
-    target: Target,
-    last: Array,
-    path: PathNow,
-    effects: SpeedEffects,
-    vehicle: Packed,
-    packed: Packed,
-    work: Workspace,
-    qp: Qp,
+    now: Now, target: Packed, last: Array, path: PathNow, effects: SpeedEffects, vehicle: Packed, kind: Packed
 ) -> None:
     """Fill the QP in which the speed along the path is free, too; see `condense`."""
-    _expect(now, target, last, vehicle, packed, work, qp)
-    fill_slides(path, effects, work.responses)
-    cost(work.motion, work.speeds, work.responses, target, work.corrections, packed, qp.H, qp.f)
-    price(path, effects, packed[0].starts, qp)
+    it = kind[0]
+    _expect(now, target[0], last, vehicle, it)
+    fill_slides(path, effects, it.work.responses)
+    _price_errors(target[0], it)
+    price(path, effects, it.problem.starts, it.qp)
 
 
 @compiled
-def _expect(now: Now, target: Target, last: Array, vehicle: Packed, packed: Packed, work: Workspace, qp: Qp) -> None:
+def _price_errors(target: Target, kind: Kind) -> None:
+    work, qp = kind.work, kind.qp
+    cost(work.motion, work.speeds, work.responses, target, work.corrections, kind.problem, qp.H, qp.f)
+
+
+@compiled
+def _expect(now: Now, target: Target, last: Array, vehicle: Packed, kind: Kind) -> None:
     """Fill the nominal motion, how it responds, and the bounds."""
-    starts = packed[0].starts
+    starts, work, qp = kind.problem.starts, kind.work, kind.qp
     commands, corrections = work.commands, work.corrections
     lead(target.squared, vehicle[0].lag.left, now.limits, commands)
     corrections[:] = 0.0
@@ -153,6 +169,12 @@ def carry_over(last: Array, commands: Array, starts: Integers, corrections: Arra
                 planned = last[min(step, last.shape[0] - 1), rotor]
                 corrections[block + 1, rotor] += (planned - commands[step, rotor]) / steps
     corrections[0] = corrections[1]
+
+
+@compiled
+def is_free(kind: Packed, z: Array) -> bool:
+    """Write the `free_minimum` of the QP within the rotors' limits, (n,); return whether it is the solution."""
+    return free_minimum(kind[0].qp, kind[0].problem.starts.shape[0] - 1, z)
 
 
 @compiled
@@ -205,12 +227,19 @@ def free_minimum(qp: Qp, blocks: int, z: Array) -> bool:
 
 
 @compiled
-def read(work: Workspace, qp: Qp, z: Array, psi: float, packed: Packed) -> tuple[Array, Array, int]:
+def is_beyond(kind: Packed, z: Array) -> bool:
+    """Whether the plan that z, (n,), stands for goes beyond a soft limit at a step that is checked."""
+    it = kind[0]
+    return exceeds(it.work.motion, it.work.responses, z, it.problem)
+
+
+@compiled
+def read(kind: Packed, z: Array, psi: float) -> tuple[Array, Array, int]:
     """Return commands and states of the plan that z, (n,), stands for, see `Plan`, and how many bounds bind in it.
 
     `psi` is that now, unwrapped.
     """
-    starts = packed[0].starts
+    starts, work, qp = kind[0].problem.starts, kind[0].work, kind[0].qp
     corrections, commands = work.corrections[1:].copy(), np.empty_like(work.commands)
     inputs = z.shape[0] // corrections.shape[0]
     binding = 0
@@ -226,7 +255,7 @@ def read(work: Workspace, qp: Qp, z: Array, psi: float, packed: Packed) -> tuple
 
 
 @compiled
-def _correct(commands: Array, corrections: Array, starts: Array, out: Array) -> None:
+def _correct(commands: Array, corrections: Array, starts: Integers, out: Array) -> None:
     """Write commands, (N, 4), plus the correction of each one's block, (b, 4)."""
     for block in range(corrections.shape[0]):
         for step in range(starts[block], starts[block + 1]):
@@ -235,18 +264,20 @@ def _correct(commands: Array, corrections: Array, starts: Array, out: Array) -> 
 
 
 @compiled
-def limit(work: Workspace, free: Qp, packed: Packed, qp: Qp) -> None:
-    """Fill a QP that has the soft limits, too, from that which has not."""
+def limit(kind: Packed) -> None:
+    """Fill the QP that has the soft limits, too, from that which has not."""
+    it = kind[0]
+    free, qp = it.qp, it.limited
     moved = free.f.shape[0]
     qp.H[:moved, :moved] = free.H
     qp.f[:moved], qp.lower[:moved], qp.upper[:moved] = free.f, free.lower, free.upper
-    limit_motion(work.motion, work.responses, packed, qp.G, qp.h)
+    limit_motion(it.work.motion, it.work.responses, it.problem, qp.G, qp.h)
 
 
 @compiled
-def count_active(qp: Qp, z: Array) -> tuple[int, int]:
+def count_active(kind: Packed, z: Array) -> tuple[int, int]:
     """Return how many soft limits of tilt and of rates have nothing left at z, (n,)."""
-    tilts, rates = 0, 0
+    qp, tilts, rates = kind[0].limited, 0, 0
     for row in range(qp.h.shape[0]):
         left = qp.h[row]
         for k in range(z.shape[0]):

@@ -13,7 +13,7 @@ from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
 from colibri.autopilot.control.whole_lpv_mpc.mpc import WholeMpc
 from colibri.autopilot.control.whole_lpv_mpc.path import PathLimits, PathNow, PathSettings, carry_speeds, slide
 from colibri.autopilot.control.whole_lpv_mpc.planning import Now
-from colibri.common.jit import packed
+from colibri.common.jit import Packed, opened, packed
 from colibri.common.matrices import dot, norm
 from colibri.common.types import Array
 
@@ -25,11 +25,13 @@ class Wanted(NamedTuple):
 
     Attributes:
         target: At each sample.
+        record: The same, packed.
         force: Of the thrust now, N, ENU, (3,): where it must point.
         path: The nominal speeds along the path; None where they are not free.
     """
 
     target: Target
+    record: Packed
     force: Array
     path: PathNow | None = None
 
@@ -42,18 +44,22 @@ class TargetBuilder:
         self._guidance, self._path, self._mpc = guidance, path, mpc
         self._law = packed(guidance)
         self._samples = n = mpc.horizon + 2
-        self._near, self._flat = _motion(n), _flat(n)
-        self._on_clock = _target(self._near, self._flat, np.empty(n))
+        track, rates, commands = np.zeros((n, 3)), np.zeros((n - 2, 3)), np.zeros((n - 1, ROTORS))
+        attitudes, scalars = np.zeros((n, 3, 3)), np.zeros(n)
+        self._record = packed(
+            Target(track, track, track, track, attitudes, scalars, rates, commands, scalars, np.zeros(ROTORS))
+        )
+        self._target = it = opened(self._record, Target)
+        self._near, self._flat = (it.position, it.velocity, it.acceleration), _flat_of(it)
 
     def on_clock(self, now: Now, limits: ForceLimits, references: Horizon) -> Wanted:
         """Return what follows references at their times, until that of the next is asked for."""
-        n, target = self._samples, self._on_clock
+        n = self._samples
         p, v, a, yaw = references[0][:n], references[1][:n], references[2][:n], references[5][:n]
         force = feed_forward.follow(
-            now.rigid, (p, v, a, yaw), now.disturbance, limits, self._law, self._mpc.model, self._near, target.yaw_rad,
-            self._flat,
-        )  # fmt: skip
-        return Wanted(target, force)
+            now.rigid, (p, v, a, yaw), now.disturbance, limits, self._law, self._mpc.model, self._record
+        )
+        return Wanted(self._target, self._record, force)
 
     def on_path(self, now: Now, limits: ForceLimits, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
         """Return what follows references at the path times of the last plan.
@@ -77,18 +83,18 @@ class TargetBuilder:
         slide(references, 0.0, np.full(n, begin), h, steady, slopes)
         passed_s = slide(references, 0.0, speeds, h, nominal, slopes)
         slide(references, passed_s - 2.0 * h * end, np.full(3, end), h, ending, slopes[:3].copy())
-        near, flat, last_flat = _motion(n), _flat(n), _flat(3)
+        near, flat, last_flat, target = self._near, self._flat, _flat(3), self._target
         feed_forward.approach(now.rigid[:3], now.rigid[3:6], steady[:3], self._law, near)
         feed_forward.ask(near[1], near[2], steady[3], now.disturbance, limits, mpc.from_wrench, mpc.model, flat)
         feed_forward.approach(now.rigid[:3], now.rigid[3:6], nominal[:3], self._law, near)
         feed_forward.ask(*ending[1:], now.disturbance, limits, mpc.from_wrench, mpc.model, last_flat)
         flat.attitudes[-2], flat.rates[-1] = last_flat.attitudes[1], last_flat.rates[0]
-        target = _target(near, flat, nominal[3])._replace(end_squared=last_flat.squared[1].copy())
+        target.yaw_rad[:], target.end_squared[:] = nominal[3], last_flat.squared[1]
         distance_m = norm(nominal[0][0] - now.rigid[:3])
         part = 1.0 if distance_m <= guidance.max_error_m else guidance.max_error_m / distance_m
         bounds = PathLimits(path.min_speed, upper, path.reward, path.change)
         force = feed_forward.demanded_force(now.rigid, near, now.disturbance, self._law, limits, mpc.model)
-        return Wanted(target, force, PathNow(speeds, slopes, part, bounds))
+        return Wanted(target, self._record, force, PathNow(speeds, slopes, part, bounds))
 
     def _first_speed(self, now: Now, references: Horizon, upper: float) -> Array:
         """Return the speed along the path, (1,), at which the vehicle moves; the references' own where they stand."""
@@ -99,13 +105,13 @@ class TargetBuilder:
 
     def of_demand(self, now: Now, limits: ForceLimits, demand: AttitudeDemand) -> Wanted:
         """Return what follows a demanded attitude and a thrust, which is kept within what the rotors can make."""
-        n, flat = self._samples, _flat(self._samples)
+        n, flat, target = self._samples, self._flat, self._target
         angles, thrusts_n = demand.angles[:n], demand.thrust_n[:n]
         feed_forward.stand(angles, thrusts_n, limits, flat)
         feed_forward.turn(flat, now.disturbance.moment, self._mpc.from_wrench, self._mpc.model)
-        nowhere = np.zeros((n, 3))
-        target = _target((nowhere, nowhere, nowhere), flat, angles[:, 2].copy())
-        return Wanted(target._replace(thrusts_n=np.clip(thrusts_n, limits.min_n, limits.max_n)), flat.forces[0])
+        target.yaw_rad[:], target.end_squared[:] = angles[:, 2], flat.squared[-1]
+        target.thrusts_n[:] = np.clip(thrusts_n, limits.min_n, limits.max_n)
+        return Wanted(target, self._record, flat.forces[0].copy())
 
 
 def _motion(samples: int) -> tuple[Array, Array, Array]:
@@ -118,6 +124,5 @@ def _flat(samples: int) -> Flat:
     )
 
 
-def _target(near: tuple[Array, Array, Array], flat: Flat, yaw_rad: Array) -> Target:
-    thrusts_n = np.zeros(len(yaw_rad))
-    return Target(near[0], near[1], flat.attitudes, yaw_rad, flat.rates, flat.squared, thrusts_n, flat.squared[-1])
+def _flat_of(target: Target) -> Flat:
+    return Flat(target.forces, target.attitudes, target.rates, target.squared)

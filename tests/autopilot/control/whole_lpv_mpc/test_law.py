@@ -117,8 +117,8 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every QP fail, also those that need no solver."""
     monkeypatch.setattr(QpSolver, "solve", lambda *_: QpResult(QpStatus.TIME_OUT, None))
     monkeypatch.setattr(
-        "colibri.autopilot.control.whole_lpv_mpc.mpc.planning.free_minimum",
-        lambda qp, blocks, z: bool(qp.f.sum() * 0.0 * z[0] * blocks),
+        "colibri.autopilot.control.whole_lpv_mpc.mpc.planning.is_free",
+        lambda kind, z: bool(kind["qp"]["f"].sum() * 0.0 * z[0]),
     )
 
 
