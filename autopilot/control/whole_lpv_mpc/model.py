@@ -217,8 +217,10 @@ def _linearise(x: Array, to: Array, squared: Array, model: Model, out: Transitio
     p, q, r = 0.5 * (x[10] + to[10]), 0.5 * (x[11] + to[11]), 0.5 * (x[12] + to[12])
     thrust, momentum = 0.0, 0.0
     for i in range(ROTORS):
+        speed = sqrt(max(squared[i], 0.0))
         thrust += allocation[0, i] * squared[i]
-        momentum += model.momentum[i] * sqrt(max(squared[i], 0.0))
+        momentum += model.momentum[i] * speed
+        out.spin[i] = -0.5 * model.momentum[i] / (max(speed, _LEAST_SPEED) * inertia[2])
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
     V, W, G, D = out.V, out.W, out.G, out.drag
     W[0, 1], W[0, 2], W[1, 0], W[1, 2], W[2, 0], W[2, 1] = r, -q, -r, p, q, -p
@@ -236,9 +238,10 @@ def _linearise(x: Array, to: Array, squared: Array, model: Model, out: Transitio
         for j in range(3):
             unit = 1.0 if i == j else 0.0
             vw, vg, ww, wg, gg = 0.0, 0.0, 0.0, 0.0, 0.0
-            for k in range(3):
+            for k in range(2):
                 vw += V[i, k] * W[k, j]
                 vg += V[i, k] * G[k, j]
+            for k in range(3):
                 ww += W[i, k] * W[k, j]
                 wg += W[i, k] * G[k, j]
                 gg += G[i, k] * G[k, j]
@@ -249,20 +252,21 @@ def _linearise(x: Array, to: Array, squared: Array, model: Model, out: Transitio
             out.velocity_rate[i, j] = 0.5 * h * h * (V[i, j] + h / 3.0 * (vw + vg))
             out.position_rotation[i, j] = 0.5 * h * h * (V[i, j] + h / 3.0 * vw)
             out.position_rate[i, j] = h * h * h / 6.0 * V[i, j]
-    for rotor in range(ROTORS):
-        for i in range(3):
+    for i in range(3):
+        for rotor in range(ROTORS):
             force = R[i][2] * allocation[0, rotor] / airframe.mass_kg
             out.force[i, rotor], out.place[i, rotor] = h * force, 0.5 * h * h * force
             out.moment[i, rotor], out.turn[i, rotor] = 0.0, 0.0
         for j in range(3):
-            turning = allocation[1 + j, rotor] / inertia[j]
-            for i in range(3):
-                unit = 1.0 if i == j else 0.0
-                out.moment[i, rotor] += h * (unit + 0.5 * h * G[i, j]) * turning
-                out.turn[i, rotor] += 0.5 * h * h * (unit + h / 3.0 * (W[i, j] + G[i, j])) * turning
-                out.force[i, rotor] += h * h * h / 6.0 * V[i, j] * turning
-        speed = max(sqrt(max(squared[rotor], 0.0)), _LEAST_SPEED)
-        out.spin[rotor] = -0.5 * model.momentum[rotor] / (speed * iz)
+            unit = 1.0 if i == j else 0.0
+            moved = h * (unit + 0.5 * h * G[i, j])
+            turned = 0.5 * h * h * (unit + h / 3.0 * (W[i, j] + G[i, j]))
+            lifted = h * h * h / 6.0 * V[i, j]
+            for rotor in range(ROTORS):
+                turning = allocation[1 + j, rotor] / inertia[j]
+                out.moment[i, rotor] += moved * turning
+                out.turn[i, rotor] += turned * turning
+                out.force[i, rotor] += lifted * turning
 
 
 @compiled
