@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+from colibri.common.machine_code.private_folder import private_folder
+
 
 def use_writable_folders() -> None:
     """Have matplotlib keep settings and fonts in the private folder where it cannot in the home: it would say so."""
@@ -16,8 +18,6 @@ def use_writable_folders() -> None:
     folders = [Path(name) if name else folder for name, folder in zip(named, home, strict=False)]
     if folders and all(map(_can_be_written, folders)):
         return
-    from colibri.common.jit import private_folder  # which loads numba
-
     folder = private_folder()
     if folder is not None:
         os.environ["MPLCONFIGDIR"] = str(folder)

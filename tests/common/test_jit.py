@@ -9,11 +9,10 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from numba.core.caching import NullCache
 from numba.core.dispatcher import Dispatcher
 
 from colibri import autopilot, common, mavlink, plant
-from colibri.common.jit import files_of
+from colibri.common.machine_code.sources import files_of
 
 MODULES = [
     importlib.import_module(entry.name)
@@ -51,6 +50,63 @@ def doubled(x):
     return {factor} * x
 """
 
+KINDS = """
+import sys
+
+import numpy as np
+
+from colibri.common.jit import compiled
+
+
+@compiled
+def total(x):
+    return x.sum()
+
+
+@compiled
+def twice_total(x):
+    return 2.0 * total(x)
+
+
+@compiled
+def filled(x, y):
+    x[:] = y
+    return x
+
+
+@compiled
+def squared(A):
+    return A @ A
+
+
+@compiled
+def hashed(text):
+    return hash(text)
+
+
+@compiled
+def shown(x):
+    print("x =", x)
+
+
+if __name__ == "__main__":
+    front_end = "numba.np.arraymath"
+    x = np.arange(4.0)
+    total(x)
+    loaded = front_end in sys.modules
+    try:
+        filled(np.zeros(2), x)
+    except ValueError as error:
+        print(error)
+    print(*filled(np.zeros(4), x), *squared(np.ones((2, 2)))[0], hashed("colibri") == hash("colibri"))
+    shown(1.0)
+    kernels = (total, filled, squared, hashed, shown)
+    hits = [sum(kernel.stats.cache_hits.values()) for kernel in kernels]
+    if "caller" in sys.argv:
+        print(twice_total(x))
+    print("front end" if loaded else "machine code", *hits)
+"""
+
 
 def test_there_are_kernels_on_both_sides() -> None:
     assert {
@@ -64,7 +120,7 @@ def test_there_are_kernels_on_both_sides() -> None:
 def test_kernels_are_exact_and_kept_on_disk_and_call_others_by_name(kernel: Dispatcher) -> None:
     """By name and not through a module: so their files are known."""
     assert not kernel.targetoptions.get("fastmath", False)
-    assert not isinstance(vars(kernel)["_cache"], NullCache)
+    assert kernel.stats.cache_path is not None
     named = [kernel.py_func.__globals__.get(name) for name in kernel.py_func.__code__.co_names]
     assert {it.__name__ for it in named if isinstance(it, ModuleType)} <= {"numpy"}
 
@@ -74,13 +130,22 @@ def test_the_files_of_a_kernel_are_those_of_all_that_it_calls() -> None:
     assert names == {"integrators.py", "equations.py", "rotations.py"}
 
 
-def _run(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+def _run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run the caller, as a process of its own."""
     path = os.pathsep.join([str(folder), str(Path(common.__path__[0]).parents[1])])
     usual = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": ""}
-    command = [sys.executable, str(folder / "caller.py")]
+    command = [sys.executable, str(folder / "caller.py"), *words]
     done = {**os.environ, **usual, **environment}
     return subprocess.run(command, env=done, capture_output=True, text=True, check=True)
+
+
+def test_kernels_of_all_kinds_are_the_same_from_disk_and_most_need_no_front_end_of_numba(tmp_path: Path) -> None:
+    (tmp_path / "caller.py").write_text(KINDS)
+    first, second, third = (_run(tmp_path, *words).stdout.splitlines() for words in ((), (), ("caller",)))
+    said = ["cannot assign slice of shape (2,) from input of shape (4,)", "0.0 1.0 2.0 3.0 2.0 2.0 True", "x = 1.0"]
+    assert first == [*said, "front end 0 0 0 0 0"]
+    assert second == [*said, "machine code 1 1 1 1 1"]
+    assert third == [*said, "12.0", "machine code 1 1 1 1 1"]
 
 
 def _write(folder: Path, factor: float, argument: str = "Number") -> None:

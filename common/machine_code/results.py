@@ -1,0 +1,111 @@
+"""Results of compiling, as they are kept on disk: most so that they are loaded without numba's front end.
+
+Left to itself numba loads all that it compiles with, and SciPy, before it takes the first kernel from disk; and of
+each kernel it reads the intermediate code, too, which only the compilation of a caller needs.
+"""
+
+from functools import cache
+from typing import Any, NamedTuple
+
+from llvmlite.binding import address_of_symbol, parse_bitcode
+from numba.core.caching import CompileResultCacheImpl
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import compile_result
+from numba.core.environment import Environment
+from numba.core.runtime.nrt import rtsys
+
+_EMPTY = Environment({})
+
+
+class _Kept(NamedTuple):
+    """What is kept of a kernel that is loaded without numba's front end.
+
+    Attributes:
+        name: Of its code.
+        machine_code: What runs.
+        intermediate_code: What is compiled into callers.
+        defined: Names of its functions and globals.
+        needed: Names of what is not its own: of Python, of the C library, of numba's runtime.
+        environments: Names of those that it uses beside its own; they are empty.
+        description: Of its arguments and its result.
+        environment: The Python objects that it uses.
+        signature: The types.
+    """
+
+    name: str
+    machine_code: bytes
+    intermediate_code: bytes
+    defined: list[str]
+    needed: list[str]
+    environments: list[str]
+    description: Any
+    environment: Any
+    signature: Any
+
+
+class Results(CompileResultCacheImpl):
+    """What numba asks how a result is written and read."""
+
+    def reduce(self, cres: Any) -> Any:
+        """Return what is kept of a result: as numba does, where the result needs more than `_Kept` has."""
+        whole = super().reduce(cres)
+        (name, _, (machine_code, intermediate)), description, environment, signature, *others = whole
+        object_mode, lifted, _, reload_init, environments = others
+        module = cres.library._final_module  # noqa: SLF001
+        symbols = [it for it in (*module.functions, *module.global_variables) if not it.name.startswith("llvm.")]
+        needed = [it.name for it in symbols if it.is_declaration]
+        text = str(module)
+        used = [it for it in environments if it is not environment and text.count(it.env_name) > 1]
+        if object_mode or lifted or reload_init or any(it.consts for it in used):
+            return whole
+        defined = [it.name for it in symbols if not it.is_declaration]
+        names = [it.env_name for it in used]
+        code = (machine_code, intermediate, defined, needed, names)
+        return _Kept(name, *code, description, environment, signature)
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """Return a result from what is kept of it."""
+        if not isinstance(payload, _Kept):
+            target_context.refresh()
+            return super().rebuild(target_context, payload)
+        rtsys.initialize(target_context)
+        if not all(map(_is_loaded, payload.needed)):
+            target_context.refresh()
+        codegen = target_context.codegen()
+        library = _Library(codegen, payload)
+        entry_point = target_context.get_executable(library, payload.description, payload.environment)
+        for name in payload.environments:
+            codegen.set_env(name, _EMPTY)
+        return compile_result(
+            target_context=target_context,
+            typing_context=target_context.typing_context,
+            entry_point=entry_point,
+            signature=payload.signature,
+            objectmode=False,
+            fndesc=payload.description,
+            library=library,
+            environment=payload.environment,
+        )
+
+
+class _Library(JITCodeLibrary):
+    """The code of a kernel, from disk; its intermediate code is read when a caller is compiled."""
+
+    def __init__(self, codegen: Any, kept: _Kept) -> None:
+        super().__init__(codegen, kept.name)
+        self._intermediate_code = kept.intermediate_code
+        self.enable_object_caching()
+        self._set_compiled_object(kept.machine_code)
+        self._finalize_final_module()
+        codegen._engine._defined_symbols.update(kept.defined)  # noqa: SLF001
+
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None:
+            self._shared_module = parse_bitcode(self._intermediate_code)
+        return self._shared_module
+
+
+@cache
+def _is_loaded(name: str) -> bool:
+    """Return whether there is such a function or global in this process: LLVM ends it where one is missing."""
+    return address_of_symbol(name) is not None

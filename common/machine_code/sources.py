@@ -1,0 +1,30 @@
+"""The files that a kernel's machine code is made of, and their hashes."""
+
+from collections.abc import Callable
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+
+def files_of(function: Callable[..., Any]) -> set[str]:
+    """Return the files that a function's machine code is made of: its own, and those of what it calls by name."""
+    files: set[str] = set()
+    seen: set[Any] = set()
+    waiting: list[Any] = [function]
+    while waiting:
+        it = waiting.pop()
+        it = getattr(it, "py_func", it)
+        if not isinstance(it, FunctionType) or it in seen:
+            continue
+        seen.add(it)
+        files.add(it.__code__.co_filename)
+        waiting += [it.__globals__.get(name) for name in it.__code__.co_names]
+    return files
+
+
+@cache
+def hash_of(file: str) -> str:
+    """Return the hash of a file as it was when first asked for."""
+    return sha256(Path(file).read_bytes()).hexdigest()
