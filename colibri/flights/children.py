@@ -14,6 +14,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from select import select
 from typing import IO, Any
 
+from colibri.flights.forked import ForkedProcess, can_fork
+
 _LOOK_EVERY_S = 0.1
 _GRACE_S = 5.0
 
@@ -34,16 +36,22 @@ class Child:
         *,
         stdout: int | IO[bytes] = subprocess.PIPE,
         stderr: IO[bytes] | None = None,
+        fork: bool = False,
     ) -> None:
         """Start `python -P -m colibri.NAME` with `options`; it ends when this process does.
 
-        With -P modules of the working directory, which may have any name, shadow none of Python's.
+        With -P modules of the working directory, which may have any name, shadow none of Python's. `fork`: where this
+        process may be forked, that is done in place of it, to start with what is loaded here; its output is piped.
         """
-        command = [sys.executable, "-P", "-m", f"colibri.{name}", "--parent", str(os.getpid()), *options]
         self.name = name
-        self.process = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=stdout, stderr=stderr, process_group=0
-        )
+        self.process: subprocess.Popen[bytes] | ForkedProcess
+        if fork and can_fork():
+            self.process = ForkedProcess(name, options)
+        else:
+            command = [sys.executable, "-P", "-m", f"colibri.{name}", "--parent", str(os.getpid()), *options]
+            self.process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=stdout, stderr=stderr, process_group=0
+            )
         self.number = self.process.pid
         self._rest = b""
 

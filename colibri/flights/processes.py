@@ -41,7 +41,7 @@ def fly_processes(
     children: dict[str, Child] = {}
     compiled: dict[str, int] = {}
     try:
-        children["plant"] = Child("plant", _plant_options(plan))
+        children["plant"] = Child("plant", _plant_options(plan), fork=True)
         over = False
         while not over:
             over = any(child.code() is not None for child in children.values())
@@ -53,7 +53,7 @@ def fly_processes(
                     if event["event"] in _SHOWN:
                         say(event["text"])
                 elif event["event"] == "listening":
-                    children["autopilot"] = Child("autopilot", _autopilot_options(plan, event["url"]))
+                    children["autopilot"] = Child("autopilot", _autopilot_options(plan, event["url"]), fork=True)
                 elif event["event"] == "progress":
                     progress(event["sim_time_s"])
                 elif event["event"] == "ended":

@@ -11,9 +11,9 @@ import signal
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NoReturn
 
 from colibri.common.process.lifecycle import use_one_thread
+from colibri.flights.forked import fork
 
 _FLIGHTS = ({"feedback": "state"}, {"feedback": "sensors", "turbulence": "light"})
 
@@ -58,37 +58,11 @@ def _load() -> None:
 
 
 def _fork(package: str, log: str, *options: str) -> int:
-    fork_server = os.getpid()
-    pid = os.fork()
-    if pid:
-        return pid
+    out = os.open(log, os.O_WRONLY | os.O_APPEND)
     try:
-        out = os.open(log, os.O_WRONLY | os.O_APPEND)
-        nothing = os.open(os.devnull, os.O_RDONLY)
-        for to, of in ((0, nothing), (1, out), (2, out)):
-            os.dup2(of, to)
-        sys.argv = [package, "--parent", str(fork_server), *options]
-        _be(package)
+        return fork(package, options, out, out)
     finally:
-        os._exit(1)
-
-
-def _be(package: str) -> NoReturn:
-    """Be `colibri package`, to the end of this process."""
-    from colibri.autopilot.__main__ import main as autopilot
-    from colibri.plant.__main__ import main as plant
-
-    code = 1
-    try:
-        code = {"autopilot": autopilot, "plant": plant}[package]()
-    except SystemExit as error:
-        code = error.code if isinstance(error.code, int) else 1
-    except BaseException:
-        sys.excepthook(*sys.exc_info())
-    finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
+        os.close(out)
 
 
 def _code(pid: int, options: int) -> int | None:

@@ -11,6 +11,30 @@ import pytest
 
 from tools.harness.processes import wait_for
 
+FORKING = """
+import threading
+from colibri.flights.children import Child, end_children, how_it_ended
+from colibri.flights.forked import ForkedProcess
+
+def begun(*options):
+    child = Child("plant", ("--json", "--link", "udpin:127.0.0.1:0", *options), fork=True)
+    print("forked" if isinstance(child.process, ForkedProcess) else "anew", end=": ")
+    return child
+
+wrong = begun("--no-such-option")
+print(how_it_ended(wrong.process.wait()))
+for end in (Child.kill, lambda child: end_children([child])):
+    child = begun()
+    print(child.read()[0]["event"], end=", ")
+    end(child)
+    print(how_it_ended(child.code()))
+waiting = threading.Event()
+other = threading.Thread(target=waiting.wait)
+other.start()
+print(begun("--no-such-option").process.wait())
+waiting.set()
+"""
+
 
 def fly_slowly(out: Path) -> "subprocess.Popen[str]":
     command = [sys.executable, "-m", "colibri", "fly", "spiral", "--speed", "10", "--no-figures", "--out", str(out)]
@@ -52,7 +76,7 @@ def test_a_process_that_dies_ends_the_flight_in_words(tmp_path: Path, name: str)
     flight = fly_slowly(tmp_path)
     wait_for(lambda: has_flown(tmp_path), "the flight to begin")
     children = psutil.Process(flight.pid).children(recursive=True)
-    (victim,) = (child for child in children if name in child.cmdline()[3])
+    (victim,) = (child for child in children if child.name() == name)
     victim.send_signal(signal.SIGKILL)
     _, said = flight.communicate(timeout=60.0)
     assert flight.returncode == 1
@@ -68,6 +92,19 @@ def test_no_process_outlives_a_parent_that_was_killed(tmp_path: Path) -> None:
     flight.kill()
     flight.communicate()
     wait_for(lambda: not any(alive(child) for child in children), "both processes to end")
+
+
+def test_processes_are_forked_where_no_thread_can_be_lost_and_are_the_same() -> None:
+    command = [sys.executable, "-P", "-u", "-c", FORKING]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60.0)
+    assert done.stdout.splitlines() == [
+        "forked: ended with exit code 2",
+        "forked: listening, was killed by SIGKILL",
+        "forked: listening, ended with exit code 130",
+        "anew: 2",
+    ]
+    error = "colibri: error: unrecognized arguments: --no-such-option (see colibri plant --help)"
+    assert done.stderr.splitlines() == [error, error]
 
 
 @pytest.mark.parametrize("package", ["plant", "autopilot"])
