@@ -1,5 +1,6 @@
-"""Quadratic programs through qpsolvers; the one place that knows it. Every result is a value, never an exception."""
+"""Quadratic programs by DAQP, or through qpsolvers by any solver. Every result is a value, never an exception."""
 
+from collections.abc import Callable
 from enum import StrEnum
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,7 +22,8 @@ MAX_RESIDUAL = 1e-6
 
 MAX_ITERATIONS = 100_000
 
-
+_DAQP = "daqp"
+_UNBOUNDED = 1e30
 _NONE = np.empty(0)
 _PATTERNS = 64
 
@@ -69,7 +71,7 @@ class QpResult(NamedTuple):
 
 
 class QpSolver:
-    """One solver of qpsolvers, held to a tolerance."""
+    """One QP solver, held to a tolerance."""
 
     def __init__(self, name: str, tolerance: float, max_iterations: int = MAX_ITERATIONS) -> None:
         """Use solver `name`; those that work to a tolerance stop at `tolerance`, all at `max_iterations`.
@@ -78,40 +80,81 @@ class QpSolver:
             SolverError: There is no such solver, or it is not installed.
         """
         check_solver(name)
-        import qpsolvers  # slow to load, as is what is compiled: who only reads a result does without
+        from colibri.autopilot.control.qp_residual import residual  # compiled: who only reads a result does without
 
-        from colibri.autopilot.control.qp_residual import residual
-
-        self._qpsolvers = qpsolvers
         self._residual = residual
-        self._name = name
-        self._sparse = name in qpsolvers.sparse_solvers and name not in qpsolvers.dense_solvers
-        self._options = _options(name, tolerance, max_iterations)
+        options = _options(name, tolerance, max_iterations)
+        self._optimum: Callable[[Qp], _Optimum | None] = _Daqp(options) if name == _DAQP else _Qpsolvers(name, options)
         self.solve(Qp(np.eye(1), np.zeros(1), np.eye(1), np.ones(1)))  # loads what is loaded late, before any flight
 
     def solve(self, qp: Qp) -> QpResult:
         """Solve a QP."""
-        P, G = (_filled("P", qp.H), _filled("G", qp.G)) if self._sparse else (qp.H, qp.G)
         try:
-            solution = self._quietly(qp, P, G) if self._sparse else self._solution(qp, P, G)
-        except (self._qpsolvers.QPError, ArithmeticError, ValueError, RuntimeWarning):
+            optimum = self._optimum(qp)
+        except (ArithmeticError, ValueError, RuntimeWarning):
             return QpResult(QpStatus.NOT_ACCURATE, None)
-        if not solution.found or solution.x is None:
+        if optimum is None:
             return QpResult(why_none(qp), None)
-        x = np.array(solution.x, dtype=np.float64)  # of our own: some solvers give what cannot be written to
-        if self._residual(*qp, x, _some(solution.z), _some(solution.z_box)) > MAX_RESIDUAL:
+        x = np.array(optimum.x, dtype=np.float64)  # of our own: some solvers give what cannot be written to
+        if self._residual(*qp, x, _some(optimum.z), _some(optimum.z_box)) > MAX_RESIDUAL:
             return QpResult(QpStatus.NOT_ACCURATE, None)
         return QpResult(QpStatus.SOLVED, x)
+
+
+class _Optimum(NamedTuple):
+    """The solution, and the multipliers of rows and of bounds."""
+
+    x: Array
+    z: Array | None
+    z_box: Array | None
+
+
+class _Daqp:
+    """DAQP by its own interface, with what qpsolvers' asks of it: that loads all solvers, and SciPy."""
+
+    def __init__(self, options: dict[str, Any]) -> None:
+        import daqp
+
+        self._daqp = daqp
+        self._options = options
+
+    def __call__(self, qp: Qp) -> _Optimum | None:
+        bounds, rows = len(qp.upper), len(qp.h)
+        upper = np.concatenate((qp.upper, qp.h))
+        lower = np.full(bounds + rows, -_UNBOUNDED)
+        lower[:bounds] = qp.lower
+        kinds = np.zeros(bounds + rows, dtype=np.intc)
+        x, _, code, found = self._daqp.solve(qp.H, qp.f, qp.G, upper, lower, kinds, **self._options)
+        return _Optimum(x, found["lam"][bounds:], found["lam"][:bounds]) if code > 0 else None
+
+
+class _Qpsolvers:
+    """Any solver, by qpsolvers."""
+
+    def __init__(self, name: str, options: dict[str, Any]) -> None:
+        import qpsolvers
+
+        self._qpsolvers = qpsolvers
+        self._name = name
+        self._sparse = name in qpsolvers.sparse_solvers and name not in qpsolvers.dense_solvers
+        self._options = options
+
+    def __call__(self, qp: Qp) -> _Optimum | None:
+        try:
+            solution = self._quietly(qp) if self._sparse else self._solution(qp, qp.H, qp.G)
+        except self._qpsolvers.QPError as error:
+            raise ValueError(str(error)) from error
+        return _Optimum(solution.x, solution.z, solution.z_box) if solution.found and solution.x is not None else None
 
     def _solution(self, qp: Qp, P: Any, G: Any) -> Any:
         problem = self._qpsolvers.Problem(P, qp.f, G, qp.h, lb=_or_none(qp.lower), ub=_or_none(qp.upper))
         return self._qpsolvers.solve_problem(problem, self._name, **self._options)
 
-    def _quietly(self, qp: Qp, P: Any, G: Any) -> Any:
+    def _quietly(self, qp: Qp) -> Any:
         """Solve without a word: the sparse solvers' interfaces warn of what they do with their matrices."""
         with catch_warnings():
             simplefilter("ignore")
-            return self._solution(qp, P, G)
+            return self._solution(qp, _filled("P", qp.H), _filled("G", qp.G))
 
 
 def _some(vector: Array | None) -> Array:
@@ -149,6 +192,8 @@ def check_solver(name: str) -> None:
     Raises:
         SolverError: There is no such solver, or it is not installed.
     """
+    if name == _DAQP:  # as numpy is, always
+        return
     import qpsolvers
 
     if name in qpsolvers.available_solvers:

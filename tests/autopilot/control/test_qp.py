@@ -46,6 +46,21 @@ def test_rows_and_bounds_together(name: str) -> None:
     assert (G @ result.x).max() == pytest.approx(0.1, abs=1e-6)
 
 
+@pytest.mark.parametrize("bounded", [False, True])
+def test_daqp_by_itself_gives_the_bits_that_it_gives_through_qpsolvers(*, bounded: bool) -> None:
+    solver = QpSolver("daqp", TOLERANCE)
+    for seed in range(20):
+        H, f = random_qp(seed, 12)
+        G = np.random.default_rng(seed).normal(size=(8, 12))
+        bounds = (np.full(12, -0.2), np.full(12, 0.2)) if bounded else ()
+        result = solver.solve(Qp(H, f, G, np.full(8, 0.05), *bounds))
+        problem = qpsolvers.Problem(H, f, G, np.full(8, 0.05), None, None, *bounds)
+        solution = qpsolvers.solve_problem(problem, "daqp", iter_limit=100_000)
+        assert result.x is not None
+        assert solution.x is not None
+        assert result.x.tobytes() == solution.x.tobytes()
+
+
 def test_the_extra_and_the_profiles_solvers_are_installed() -> None:
     assert {*IN_SOLVERS_EXTRA, "clarabel", "daqp"} <= set(installed_solvers())
 
@@ -71,9 +86,9 @@ def test_a_solution_that_is_none_is_not_accurate(monkeypatch: pytest.MonkeyPatch
         return solution
 
     qp = in_a_box(*random_qp(0, 12), 100.0)
-    assert QpSolver("daqp", TOLERANCE).solve(qp).status is QpStatus.SOLVED
+    assert QpSolver("quadprog", TOLERANCE).solve(qp).status is QpStatus.SOLVED
     monkeypatch.setattr(qpsolvers, "solve_problem", sloppy)
-    assert QpSolver("daqp", TOLERANCE).solve(qp) == (QpStatus.NOT_ACCURATE, None)
+    assert QpSolver("quadprog", TOLERANCE).solve(qp) == (QpStatus.NOT_ACCURATE, None)
 
 
 @pytest.mark.parametrize("name", ["clarabel", "quadprog", "daqp", "piqp"])

@@ -107,6 +107,15 @@ def test_processes_are_forked_where_no_thread_can_be_lost_and_are_the_same() -> 
     assert done.stderr.splitlines() == [error, error]
 
 
+def test_a_flight_loads_neither_what_compiles_nor_other_solvers_nor_what_draws(tmp_path: Path) -> None:
+    words = ["fly", "hover", "--link", "memory", "--duration", "0.1", "--quiet", "--no-figures", "--out", str(tmp_path)]
+    heavy = {"numba.np.arraymath", "scipy.linalg", "scipy.sparse", "qpsolvers", "matplotlib", "rich"}
+    program = f"import sys\nfrom colibri.cli.main import main\nmain({words})\nprint({heavy} & set(sys.modules))"
+    for _ in range(2):  # in the first it may have to be compiled
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+
+
 @pytest.mark.parametrize("package", ["plant", "autopilot"])
 def test_a_process_whose_parent_was_gone_before_it_began_ends(package: str) -> None:
     gone = subprocess.Popen([sys.executable, "-c", ""])
