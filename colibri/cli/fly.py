@@ -5,6 +5,7 @@ from argparse import Namespace
 from colibri.analysis.limits import limit
 from colibri.cli.shared.options import add_flight_options, add_out, add_signing
 from colibri.common.process.arguments import ArgumentParser, speed
+from colibri.common.process.lifecycle import loading
 
 TRACK_HELP = (
     "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
@@ -56,6 +57,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Fly as the command line says; return the exit code."""
-    from colibri.cli.shared.fly_and_report import fly
+    with loading():
+        from colibri.cli.shared.fly_and_report import fly
 
     return fly(args)

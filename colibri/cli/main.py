@@ -19,6 +19,7 @@ from colibri.common.process.lifecycle import (
     end_quickly,
     escape_what_no_stream_encodes,
     fail,
+    loading,
     use_one_thread,
     use_safe_path,
 )
@@ -75,7 +76,8 @@ def main(argv: list[str] | None = None) -> int:
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that what was started is ended, too
     try:
-        args, unknown = _parser(given).parse_known_args(given)
+        with loading():
+            args, unknown = _parser(given).parse_known_args(given)
         if unknown:
             fail(f"unrecognized arguments: {' '.join(unknown)} (see colibri {args.command} --help)")
         use_writable_folders()

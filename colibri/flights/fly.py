@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from colibri.common.errors import InFlightError
 from colibri.common.process.failure_file import keep_failure
-from colibri.common.process.lifecycle import EXIT_FAILED
+from colibri.common.process.lifecycle import EXIT_FAILED, loading
 from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.flights.processes import FlightError, fly_processes
 from colibri.flights.provenance import write_provenance
@@ -27,8 +27,9 @@ def fly_plan(
     write_provenance(plan)
     if plan.link == "udp":
         return fly_processes(plan, progress, say, compiling)
-    from colibri.common.jit import on_compile
-    from colibri.flights.in_process import fly_locally
+    with loading():
+        from colibri.common.jit import on_compile
+        from colibri.flights.in_process import fly_locally
 
     on_compile(compiling)
     try:

@@ -14,7 +14,7 @@ from colibri.autopilot.process.logs import AutopilotLog
 from colibri.autopilot.process.options import delay_s
 from colibri.autopilot.process.recorded_inputs import Setup
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN
-from colibri.common.process.lifecycle import gc_frozen
+from colibri.common.process.lifecycle import gc_frozen, loading
 from colibri.common.types import Address
 from colibri.flights.plan import FlightPlan, Summary, unseen
 from colibri.mavlink.hil.feedback import Feedback
@@ -49,7 +49,8 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None] = unseen) ->
         SolverError: The solver cannot be used.
         IntegrationError: The state cannot be integrated any further.
     """
-    autopilot, plant = put_together(plan, perf_counter)
+    with loading():
+        autopilot, plant = put_together(plan, perf_counter)
     interval_us = plant.interval_us
     plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out, _setup(plan))
     exchange: Exchange = Direct(autopilot)

@@ -43,6 +43,18 @@ def nudge_m() -> float:
 
 
 @contextmanager
+def loading() -> Iterator[None]:
+    """Load modules, or what they are made into, without the garbage collector in between: what is loaded stays."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+@contextmanager
 def gc_frozen() -> Iterator[None]:
     """Keep the garbage collector from all that exists already: to look at it again and again costs a flight time.
 
