@@ -7,12 +7,12 @@ each kernel it reads the intermediate code, too, which only the compilation of a
 from functools import cache
 from typing import Any, NamedTuple
 
-from llvmlite.binding import address_of_symbol, parse_bitcode
+from llvmlite.binding import add_symbol, address_of_symbol, parse_bitcode
 from numba.core.caching import CompileResultCacheImpl
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import compile_result
 from numba.core.environment import Environment
-from numba.core.runtime.nrt import rtsys
+from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
 
 _EMPTY = Environment({})
 
@@ -68,7 +68,7 @@ class Results(CompileResultCacheImpl):
         if not isinstance(payload, _Kept):
             target_context.refresh()
             return super().rebuild(target_context, payload)
-        rtsys.initialize(target_context)
+        _name_runtime()
         if not all(map(_is_loaded, payload.needed)):
             target_context.refresh()
         codegen = target_context.codegen()
@@ -103,6 +103,13 @@ class _Library(JITCodeLibrary):
         if self._shared_module is None:
             self._shared_module = parse_bitcode(self._intermediate_code)
         return self._shared_module
+
+
+@cache
+def _name_runtime() -> None:
+    """Tell LLVM where numba's runtime is. Numba does it, too, and compiles what of it goes into kernels."""
+    for name, address in _nrt_python.c_helpers.items():
+        add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
 @cache
