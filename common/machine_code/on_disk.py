@@ -62,7 +62,7 @@ class _OnDisk(FunctionCache):
         files = map(hash_of, files_of(function) | {results.__file__})
         # The version is compared before the rest is read, which fails where it names a type that has gone since.
         version = (numba.__version__, llvmlite.__version__, *sorted(files))
-        self._cache_file._version = self._cache_file._source_stamp = version  # noqa: SLF001
+        self._cache_file._version = self._cache_file._source_stamp = self._impl.version = version  # noqa: SLF001
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         with self._guard_against_spurious_io_errors():

@@ -44,10 +44,31 @@ class _Kept(NamedTuple):
 
 
 class Results(CompileResultCacheImpl):
-    """What numba asks how a result is written and read."""
+    """What numba asks how a result is written and read.
+
+    Attributes:
+        version: Of all that a result is made of. It is kept beside each: two processes of two versions that write at
+            once leave the index of one and the result of the other.
+    """
+
+    version: tuple[str, ...] = ()
 
     def reduce(self, cres: Any) -> Any:
-        """Return what is kept of a result: as numba does, where the result needs more than `_Kept` has."""
+        """Return what is kept of a result, with its version."""
+        return self.version, self._kept(cres)
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        """Return a result from what is kept of it; None if that is of another version."""
+        if payload[0] != self.version:
+            return None
+        kept = payload[1]
+        if isinstance(kept, _Kept):
+            return _loaded(target_context, kept)
+        target_context.refresh()
+        return super().rebuild(target_context, kept)
+
+    def _kept(self, cres: Any) -> Any:
+        """Return what numba keeps, where a result needs more than `_Kept` has."""
         whole = super().reduce(cres)
         (name, _, (machine_code, intermediate)), description, environment, signature, *others = whole
         object_mode, lifted, _, reload_init, environments = others
@@ -63,29 +84,26 @@ class Results(CompileResultCacheImpl):
         code = (machine_code, intermediate, defined, needed, names)
         return _Kept(name, *code, description, environment, signature)
 
-    def rebuild(self, target_context: Any, payload: Any) -> Any:
-        """Return a result from what is kept of it."""
-        if not isinstance(payload, _Kept):
-            target_context.refresh()
-            return super().rebuild(target_context, payload)
-        _name_runtime()
-        if not all(map(_is_loaded, payload.needed)):
-            target_context.refresh()
-        codegen = target_context.codegen()
-        library = _Library(codegen, payload)
-        entry_point = target_context.get_executable(library, payload.description, payload.environment)
-        for name in payload.environments:
-            codegen.set_env(name, _EMPTY)
-        return compile_result(
-            target_context=target_context,
-            typing_context=target_context.typing_context,
-            entry_point=entry_point,
-            signature=payload.signature,
-            objectmode=False,
-            fndesc=payload.description,
-            library=library,
-            environment=payload.environment,
-        )
+
+def _loaded(target_context: Any, kept: _Kept) -> Any:
+    _name_runtime()
+    if not all(map(_is_loaded, kept.needed)):
+        target_context.refresh()
+    codegen = target_context.codegen()
+    library = _Library(codegen, kept)
+    entry_point = target_context.get_executable(library, kept.description, kept.environment)
+    for name in kept.environments:
+        codegen.set_env(name, _EMPTY)
+    return compile_result(
+        target_context=target_context,
+        typing_context=target_context.typing_context,
+        entry_point=entry_point,
+        signature=kept.signature,
+        objectmode=False,
+        fndesc=kept.description,
+        library=library,
+        environment=kept.environment,
+    )
 
 
 class _Library(JITCodeLibrary):
