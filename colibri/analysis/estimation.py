@@ -1,11 +1,14 @@
 """Estimation errors of a flight against the truth, and tracking errors by the estimate."""
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from colibri.analysis.consistency import NAVIGATION, Errors
-from colibri.analysis.recording import RecordingError, path_times, read_columns, read_csv
+from colibri.analysis.logs import Rows, at_times, read_blocks, read_columns, read_series
+from colibri.analysis.recording import RecordingError, path_times, read_lags
 from colibri.autopilot.estimation.measurements.table import KINDS
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.rotations import earth_from_body, euler_from_quaternion, nearest_turn, rotation_matrix
@@ -20,117 +23,111 @@ _COVARIANCE = slice(11, 56)
 
 
 class Estimation(NamedTuple):
-    """Errors of the estimate at every control sample, and of the filter ten times a second.
+    """Errors of the estimate at every control sample from some time on, and of the filter ten times a second.
 
     Attributes:
-        t: Time of each control sample, s, (n,).
-        position_m: Estimated less true, ENU, (n, 3).
-        attitude_rad: Roll, pitch and yaw, estimated less true, (n, 3).
+        position_m: Estimated less true, ENU, (3, n).
+        attitude_rad: Roll, pitch and yaw, estimated less true, (3, n).
         control_m: Distance of the estimate from the reference, (n,).
-        deviation: Standard deviations that the estimator claims: of position (m) and attitude (rad), (n, 6).
-        checked_s: Times of the filter, (m,).
-        nees: Its normalised estimation error squared at them: position, velocity and attitude together, (m,).
-        nis: Sums of the normalised innovations squared up to them, a column for each of `kinds`, (m, k).
-        accepted: How many innovations these are, (m, k).
+        nees: Normalised estimation error squared of the filter: position, velocity and attitude together, (m,).
+        nis: Sums of the normalised innovations squared up to then, a row for each of `kinds`, (k, m).
+        accepted: How many innovations these are, (k, m).
         kinds: What of `MEASURED` the vehicle has, k names.
     """
 
-    t: Array
     position_m: Array
     attitude_rad: Array
     control_m: Array
-    deviation: Array
-    checked_s: Array
     nees: Array
     nis: Array
     accepted: Array
     kinds: tuple[str, ...]
-
-    def after(self, start_s: float) -> "Estimation":
-        """Return what there is from `start_s` on."""
-        late, checked = self.t >= start_s, self.checked_s >= start_s
-        return self._replace(
-            t=self.t[late],
-            position_m=self.position_m[late],
-            attitude_rad=self.attitude_rad[late],
-            control_m=self.control_m[late],
-            deviation=self.deviation[late],
-            checked_s=self.checked_s[checked],
-            nees=self.nees[checked],
-            nis=self.nis[checked],
-            accepted=self.accepted[checked],
-        )
 
     def figures(self) -> dict[str, Any]:
         """Return the root mean squares that a report has, and mean NEES and NIS; None if it ended too early for them.
 
         NIS is given in parts of the number of numbers: 1 if the errors match the covariance.
         """
-        if not len(self.t):
+        if not len(self.control_m) or not len(self.nees):
             return dict.fromkeys(FIGURES)
-        horizontal = np.hypot(self.position_m[:, 0], self.position_m[:, 1])
-        angles = np.degrees(self.attitude_rad)
+        x, y, z = self.position_m
+        axes = zip(("roll", "pitch", "yaw"), self.attitude_rad, strict=True)
         values = (
             rms(self.control_m),
-            {"horizontal": rms(horizontal), "vertical": rms(self.position_m[:, 2])},
-            {name: rms(angles[:, axis]) for axis, name in enumerate(("roll", "pitch", "yaw"))},
+            {"horizontal": rms(np.hypot(x, y)), "vertical": rms(z)},
+            {name: rms(np.degrees(angles)) for name, angles in axes},
             float(self.nees.mean()),
             self._mean_nis(),
         )
         return dict(zip(FIGURES, values, strict=True))
 
     def _mean_nis(self) -> dict[str, dict[str, float | None]]:
-        sums, counts = self.nis[-1] - self.nis[0], self.accepted[-1] - self.accepted[0]
+        sums, counts = self.nis[:, -1] - self.nis[:, 0], self.accepted[:, -1] - self.accepted[:, 0]
         return {
             kind: {"mean": total / count / MEASURED[kind] if count > 0 else None, "innovations": max(int(count), 0)}
             for kind, total, count in zip(self.kinds, sums.tolist(), counts.tolist(), strict=True)
         }
 
 
-def read_estimation(plan: FlightPlan) -> Estimation:
-    """Compare a flight's `estimate.csv` and `filter.csv` with its `plant.csv`.
+class _Common(NamedTuple):
+    """Which rows of a log, (n,), and which of the plant's, (p,), are of the same instants."""
+
+    said: NDArray[np.bool_]
+    true: NDArray[np.bool_]
+
+
+def read_estimation(plan: FlightPlan, start_s: float) -> Estimation:
+    """Compare `estimate.csv` and `filter.csv` of a flight, from `start_s` on, with its `plant.csv`.
 
     Raises:
         RecordingError: Nothing was estimated.
     """
-    truth = read_csv(plan.out / "plant.csv")
-    said = _within(read_csv(plan.out / "estimate.csv"), truth)
-    if not len(said):
+    errors = _read_errors(plan, start_s)
+    if not errors.size and not _common(plan, "estimate.csv", -np.inf).said.any():
         raise RecordingError("the flight ended before there was an estimate")
-    real = _at(truth, said[:, 0])
-    off = said[:, 1:4] - real[:, 7:10]
-    angles = [
-        _angles_off(estimated, true)
-        for estimated, true in zip(said[:, 7:11].tolist(), real[:, 10:14].tolist(), strict=True)
-    ]
     columns = read_columns(plan.out / "filter.csv")
     kinds = tuple(kind for kind in MEASURED if f"nis_{kind}" in columns)
-    checks = _within(read_csv(plan.out / "filter.csv"), truth)
-    return Estimation(
-        t=said[:, 0],
-        position_m=off,
-        attitude_rad=np.array(angles),
-        control_m=np.linalg.norm(
-            said[:, 1:4] - position(plan.track, path_times(said[:, 0], read_csv(plan.out / "autopilot.csv"))), axis=1
-        ),
-        deviation=said[:, [14, 15, 16, 20, 21, 22]],
-        checked_s=checks[:, 0],
-        nees=np.array(
-            [_errors(check, real).nees() for check, real in zip(checks, _at(truth, checks[:, 0]), strict=True)]
-        ),
-        nis=checks[:, [columns.index(f"nis_{kind}") for kind in kinds]],
-        accepted=checks[:, [columns.index(f"believed_{kind}") for kind in kinds]],
-        kinds=kinds,
-    )
+    sums, counts = ([columns.index(f"{what}_{kind}") for kind in kinds] for what in ("nis", "believed"))
+    nees, nis, accepted = np.split(_read_checks(plan, start_s, [*sums, *counts]), [1, 1 + len(kinds)])
+    return Estimation(errors[:3], errors[3:6], errors[6], nees[0], nis, accepted, kinds)
 
 
-def _within(log: Array, truth: Array) -> Array:
-    """Return the rows of instants that the plant has logged."""
-    return log[np.isin(np.round(log[:, 0] * 1e6), np.round(truth[:, 0] * 1e6))]
+def _read_errors(plan: FlightPlan, start_s: float) -> Array:
+    """Return by how much each estimate is off in position and attitude, and how far off it tracks, (7, n)."""
+    common = _common(plan, "estimate.csv", start_s)
+    errors, lags, first = np.empty((7, np.count_nonzero(common.said))), read_lags(plan), 0
+    for said, true in _beside_truth(plan, "estimate.csv", common):
+        at = slice(first, first + len(said))
+        errors[:3, at] = (said[:, 1:4] - true[:, 7:10]).T
+        angles = zip(said[:, 7:11].tolist(), true[:, 10:14].tolist(), strict=True)
+        errors[3:6, at] = np.array([_angles_off(estimated, real) for estimated, real in angles]).T
+        reference = position(plan.track, path_times(said[:, 0], lags))
+        errors[6, at] = np.linalg.norm(said[:, 1:4] - reference, axis=1)
+        first = at.stop
+    return errors
 
 
-def _at(truth: Array, times_s: Array) -> Array:
-    return truth[np.searchsorted(np.round(truth[:, 0] * 1e6), np.round(times_s * 1e6))]
+def _read_checks(plan: FlightPlan, start_s: float, columns: list[int]) -> Array:
+    """Return of each check of the filter the normalised estimation error squared, and columns, (1 + columns, m)."""
+    parts = [np.empty((1 + len(columns), 0))]
+    for checks, truth in _beside_truth(plan, "filter.csv", _common(plan, "filter.csv", start_s)):
+        nees = [_errors(check, true).nees() for check, true in zip(checks, truth, strict=True)]
+        parts.append(np.vstack([nees, checks[:, columns].T]))
+    return np.concatenate(parts, axis=1)
+
+
+def _common(plan: FlightPlan, log: str, start_s: float) -> _Common:
+    """Return which rows of a log and which of the plant's are of the same instants, from `start_s` on."""
+    (said_s,), (true_s,) = (read_series(plan.out / name, 0) for name in (log, "plant.csv"))
+    late = said_s >= start_s
+    return _Common(late & at_times(said_s, true_s), at_times(true_s, said_s[late]))
+
+
+def _beside_truth(plan: FlightPlan, log: str, common: _Common) -> Iterator[tuple[Array, Array]]:
+    """Yield the rows of a log, and the plant's, of the instants that both have; in blocks, two arrays of as many."""
+    truth = Rows(plan.out / "plant.csv", common.true)
+    for said in read_blocks(plan.out / log, common.said):
+        yield said, truth.take(len(said))
 
 
 def _angles_off(estimated: list[float], true: list[float]) -> Vector:

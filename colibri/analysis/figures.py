@@ -1,35 +1,19 @@
 """The figures of a flight: what they show as data, and one function for each kind of plot."""
 
+import gc
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from colibri.analysis.recording import (
-    ATTITUDE_REFERENCE,
-    COLUMNS,
-    INPUT,
-    POSITION_REFERENCE,
-    ROTORS,
-    SETTLED_AFTER_S,
-    Recording,
-)
+from colibri.analysis.recording import INPUT, POSITION_REFERENCE, ROTORS, SETTLED_AFTER_S
 from colibri.analysis.report import length as in_metres
-from colibri.common.rotations import earth_from_body, quaternion_from_euler
-from colibri.common.types import Array
+from colibri.analysis.series.figure_series import ATTITUDE, POSITION, START_S, FigureSeries, Series
 from colibri.flights.plan import FlightPlan
-
-Series: TypeAlias = dict[str, Array]
-"""Name -> values, (n,); `t` holds their times, s."""
-
-POSITION = ("x", "y", "z")
-VELOCITY = ("vx", "vy", "vz")
-ATTITUDE = ("phi", "theta", "psi")
-START_S = 10.0
 
 GRID: dict[str, Any] = {"color": "#DDDDDD", "linewidth": 0.6}
 _WIDTH_IN, _DPI = 8.6, 150
@@ -95,40 +79,15 @@ class TimeFigure(NamedTuple):
     rows: tuple[tuple[Panel, ...], ...]
 
 
-def draw_flight(recording: Recording, plan: FlightPlan) -> list[Path]:
+def draw_flight(flown: FigureSeries, plan: FlightPlan) -> list[Path]:
     """Draw all figures of a flight as PNG into the plan's folder; return their paths."""
-    series = flight_series(recording, plan)
     flight = f"{shortened(plan.track_name)}, {plan.flown_by}"
-    paths = write_figure(draw_trajectory(series, f"{flight}: trajectory"), plan.out / "trajectory")
+    paths = write_figure(draw_trajectory(flown.in_space(), f"{flight}: trajectory"), plan.out / "trajectory")
+    series = flown.over_time()
     for figure in flight_figures(series, plan):
+        gc.collect()  # a figure is a net of circles, and its pixels take more than all that it shows
         paths += write_figure(draw_times(series, figure, f"{flight}: {figure.subject}"), plan.out / figure.name)
     return paths
-
-
-def flight_series(recording: Recording, plan: FlightPlan) -> Series:
-    """Return all that the figures show: the columns of the recording, angles in degrees, and what follows from them.
-
-    `vx` to `vz` are earth velocities, ENU, m/s, and `vx_ref` to `vz_ref` those of the reference; `ex` to `ez` are
-    errors, m, and `distance` their norm; `rms` is its RMS once settled, not a number before; `idle` and `fastest`
-    are the limits of the rotors.
-    """
-    series = {name: recording[name] for name in COLUMNS}
-    t, distance = series["t"], recording.position_error_m
-    series |= dict(zip(VELOCITY, _earth_velocity(recording).T, strict=True))
-    for axis, reference in zip(POSITION, POSITION_REFERENCE, strict=True):
-        series[f"v{axis}_ref"] = np.gradient(series[reference], t)
-        series[f"e{axis}"] = series[axis] - series[reference]
-    for angle in (*ATTITUDE, *ATTITUDE_REFERENCE):
-        series[angle] = np.degrees(series[angle])
-    settled = t >= SETTLED_AFTER_S
-    rms = np.sqrt(np.mean(distance[settled] ** 2)) if t[-1] > SETTLED_AFTER_S else np.nan
-    fastest = np.full_like(t, plan.plant_vehicle.rotors.max_speed)
-    return series | {
-        "distance": distance,
-        "rms": np.where(settled, rms, np.nan),
-        "idle": np.full_like(t, plan.plant_vehicle.rotors.idle_speed),
-        "fastest": fastest,
-    }
 
 
 def flight_figures(series: Series, plan: FlightPlan) -> tuple[TimeFigure, ...]:
@@ -200,11 +159,6 @@ def write_figure(figure: Figure, path: Path, formats: Iterable[str] = ("png",)) 
     for written in paths:
         figure.savefig(written)
     return paths
-
-
-def _earth_velocity(recording: Recording) -> Array:
-    rows = recording.columns((*ATTITUDE, "u", "v", "w")).tolist()
-    return np.array([earth_from_body(quaternion_from_euler(*row[:3]), (row[3], row[4], row[5])) for row in rows])
 
 
 def _rotor_panels(plan: FlightPlan) -> list[Panel]:

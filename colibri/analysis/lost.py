@@ -5,15 +5,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from colibri.analysis.recording import SETTLED_AFTER_S, Recording
-from colibri.common.types import Array
+from colibri.analysis.recording import SETTLED_AFTER_S
+from colibri.analysis.series.flight_series import FlightSeries
 from colibri.flights.plan import FlightPlan
 from colibri.plant.vehicle.description import Vehicle
 
 LOST_M = 5.0
 """A vehicle further off its reference once settled is lost."""
-_ABOVE_GROUND_M = 0.1
-"""A reference that is higher does not mean the vehicle to touch the ground."""
 _TOUCHED_S = 1.0
 """Touching the ground for so long below its reference it is lost, though it may leave it again."""
 _TURNING_S = 1.0
@@ -33,7 +31,7 @@ class Lost(NamedTuple):
     why: str
 
 
-def lost(plan: FlightPlan, recording: Recording) -> Lost | None:
+def lost(plan: FlightPlan, flight: FlightSeries) -> Lost | None:
     """Return why a vehicle was lost that flew until the end of its flight; None if it was not.
 
     It is if it lies or drags along the ground below its reference, if it ends upside down, or if it is further than
@@ -42,13 +40,13 @@ def lost(plan: FlightPlan, recording: Recording) -> Lost | None:
     """
     if plan.ground.links:
         return None
-    began = [at for at in (_grounded(plan, recording), _upside_down(recording), _far_off(recording)) if at is not None]
+    began = [at for at in (_grounded(flight), _upside_down(flight), _far_off(flight)) if at is not None]
     if not began:
         return None
     at = min(began)
-    off_m = recording.position_error_m
-    t, touches = recording["t"], _touches(plan.plant_vehicle, recording)
-    how = f"{off_m[at]:.1f} m off its track, tilted {tilt_deg(recording)[at]:.0f}°"
+    off_m, t, touches = flight.position_error_m, flight.t, flight.touches
+    tilt_deg = np.degrees(np.arccos(np.clip(flight.upright[at], -1.0, 1.0)))
+    how = f"{off_m[at]:.1f} m off its track, tilted {tilt_deg:.0f}°"
     later = f"; later up to {off_m[at:].max():.1f} m off"
     if touches[at]:
         return Lost(float(t[at]), f"on the ground, {how}{later}")
@@ -57,68 +55,43 @@ def lost(plan: FlightPlan, recording: Recording) -> Lost | None:
     return Lost(float(t[at]), f"in the air, {how}{later}{crash}")
 
 
-def ground_contact_s(vehicle: Vehicle, recording: Recording) -> float | None:
+def ground_contact_s(vehicle: Vehicle, flight: FlightSeries) -> float | None:
     """Return how long a vehicle touched the ground, s, after it had first left it; None where there is no ground."""
-    return None if vehicle.ground is None else _lasted_s(_touches_again(vehicle, recording), recording)
+    return None if vehicle.ground is None else _lasted_s(_touches_again(flight), flight)
 
 
-def tilt_deg(recording: Recording) -> Array:
-    """Return the angle between the body's z axis and the vertical, degrees, (n,)."""
-    angle: Array = np.degrees(np.arccos(np.clip(_up(recording)[:, 2], -1.0, 1.0)))
-    return angle
-
-
-def _up(recording: Recording) -> Array:
-    """Return the vertical in the body's frame, (n, 3)."""
-    phi, theta = recording["phi"], recording["theta"]
-    return np.stack([-np.sin(theta), np.sin(phi) * np.cos(theta), np.cos(phi) * np.cos(theta)], axis=1)
-
-
-def _touches(vehicle: Vehicle, recording: Recording) -> NDArray[np.bool_]:
-    """Return at which samples a foot or a rotor touches the ground, (n,)."""
-    if vehicle.ground is None:
-        return np.zeros(len(recording.table), dtype=np.bool_)
-    heights = recording["z"][:, None] + _up(recording) @ vehicle.ground.contacts_m(vehicle.rotors).T
-    touches: NDArray[np.bool_] = heights.min(axis=1) <= vehicle.ground_height_m
-    return touches
-
-
-def _touches_again(vehicle: Vehicle, recording: Recording) -> NDArray[np.bool_]:
+def _touches_again(flight: FlightSeries) -> NDArray[np.bool_]:
     """Return at which samples it touches the ground that it had left, (n,)."""
-    touches = _touches(vehicle, recording)
-    again: NDArray[np.bool_] = touches & np.logical_or.accumulate(~touches)
+    again: NDArray[np.bool_] = flight.touches & np.logical_or.accumulate(~flight.touches)
     return again
 
 
-def _lasted_s(holds: NDArray[np.bool_], recording: Recording) -> float:
-    t = recording["t"]
-    return float(np.diff(t, prepend=t[0])[holds].sum())
+def _lasted_s(holds: NDArray[np.bool_], flight: FlightSeries) -> float:
+    return float(np.diff(flight.t, prepend=flight.t[0])[holds].sum())
 
 
-def _grounded(plan: FlightPlan, recording: Recording) -> int | None:
+def _grounded(flight: FlightSeries) -> int | None:
     """Return the sample at which a vehicle came down that should be higher; the first if it never took off."""
-    touches = _touches(plan.plant_vehicle, recording)
-    high = recording["z_ref"] > _ABOVE_GROUND_M
-    if touches.all():
-        return 0 if high[-1] else None
-    down = _touches_again(plan.plant_vehicle, recording) & high
-    stays = bool(down[-1]) or _lasted_s(down, recording) > _TOUCHED_S or recording.position_error_m[-1] > LOST_M
+    if flight.touches.all():
+        return 0 if flight.aloft[-1] else None
+    down = _touches_again(flight) & flight.aloft
+    stays = bool(down[-1]) or _lasted_s(down, flight) > _TOUCHED_S or flight.position_error_m[-1] > LOST_M
     return int(np.argmax(down)) if down.any() and stays else None
 
 
-def _upside_down(recording: Recording) -> int | None:
+def _upside_down(flight: FlightSeries) -> int | None:
     """Return the sample since which a vehicle is upside down that began upright; one that did not may take a second."""
-    t, upright = recording["t"], _up(recording)[:, 2] >= 0.0
+    t, upright = flight.t, flight.upright >= 0.0
     if upright[-1] or not upright.any():
         return None
     since = int(np.flatnonzero(upright)[-1]) + 1
     return since if upright[0] or t[-1] - t[since] > _TURNING_S else None
 
 
-def _far_off(recording: Recording) -> int | None:
+def _far_off(flight: FlightSeries) -> int | None:
     """Return the sample since which a vehicle is too far off its reference when that counts; None if it never is."""
-    off_m = recording.position_error_m
-    settled = recording["t"] >= SETTLED_AFTER_S - _INSTANT_S
+    off_m = flight.position_error_m
+    settled = flight.t >= SETTLED_AFTER_S - _INSTANT_S
     far = off_m > (LOST_M if settled.any() else off_m[0] + LOST_M)
     judged = np.flatnonzero(far & settled) if settled.any() else np.flatnonzero(far[-1:]) + len(far) - 1
     if not len(judged):

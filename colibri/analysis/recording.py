@@ -1,17 +1,23 @@
 """What a flight left behind: the logs of plant and autopilot, joined into one row a control sample."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from hashlib import sha256
+from math import isnan
 from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from colibri.analysis.logs import Rows, at_times, read_blocks, read_series
 from colibri.autopilot.guidance.trajectories.tracks import position
 from colibri.common.errors import InFlightError
 from colibri.common.rotations import euler_from_quaternion, nearest_turn
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan
+from colibri.plant.vehicle.description import Vehicle
 
 STATE = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
 INPUT = ("U1", "U2", "U3", "U4")
@@ -34,20 +40,19 @@ class RecordingError(InFlightError):
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
-    """A flight, one row a control sample.
+class Samples:
+    """Consecutive control samples of a flight, one row each.
 
     Attributes:
-        table: Columns as in `COLUMNS`, (n, 27). Row k holds the state at its time and the inputs that led to it, with
-            the references they were computed for; row 0 the start.
-        qp_status: How each QP ended, as in `colibri.autopilot.control.interface.STATUS_CODES`, (m,).
+        table: Columns as in `COLUMNS`, (n, 27). A row holds the state at its time and the inputs that led to it, with
+            the references they were computed for; the first row of a flight the start.
+        qp_status: How each QP ended, as in `colibri.autopilot.control.interface.STATUS_CODES`, (m,). The m decisions
+            are those that led to the rows: one for each row but the first of a flight.
         fallback: What decided in its place, as in `colibri.autopilot.control.interface.FALLBACK_CODES`, (m,).
         solve_time_us: Time of each QP, (m,).
         control_step_us: Time of each control step, (m,).
         slack: By how much soft limits were planned to be exceeded, in parts of each, (m,).
         active: How many constraints of each kind were active, columns as in `interface.Active`, (m, 4).
-        path_lag_s: By which path time was last behind the clock; None for a control law that keeps to the clock.
-        trajectory_sha256: Hash of the plant's states at every frame, as float64.
     """
 
     table: Array
@@ -57,8 +62,6 @@ class Recording:
     control_step_us: Array
     slack: Array
     active: NDArray[np.int64]
-    path_lag_s: float | None
-    trajectory_sha256: str
 
     def __getitem__(self, column: str) -> Array:
         """Return one column, (n,)."""
@@ -75,89 +78,179 @@ class Recording:
         return error
 
 
+@dataclass(frozen=True, slots=True)
+class Recording(Samples):
+    """A whole flight in memory: at 125 Hz 0.04 MB a simulated second, and while it is read twice that.
+
+    Attributes:
+        path_lag_s: By which path time was last behind the clock; None for a control law that keeps to the clock.
+        trajectory_sha256: Hash of the plant's states at every frame, as float64.
+    """
+
+    path_lag_s: float | None
+    trajectory_sha256: str
+
+
+class Lags(NamedTuple):
+    """By which path time is behind the clock at the m decisions of a flight.
+
+    Attributes:
+        decided_s: Time of each, s, (m,).
+        lag_s: The lag then, s, (m,); not a number for a control law that keeps to the clock.
+    """
+
+    decided_s: Array
+    lag_s: Array
+
+    def first(self, count: int) -> "Lags":
+        """Return those of the first decisions."""
+        return Lags(self.decided_s[:count], self.lag_s[:count])
+
+
+class FlightReader:
+    """The logs of plant and autopilot, joined part by part: a flight of any length in some MB of memory.
+
+    Attributes:
+        plan: Of the flight.
+        samples: How many control samples there are, the start among them.
+        path_lag_s: As of a `Recording`.
+    """
+
+    def __init__(self, plan: FlightPlan) -> None:
+        """Read of the logs in the plan's folder what joins them: some 20 bytes a control sample.
+
+        Raises:
+            RecordingError: There is no complete control sample in them.
+        """
+        self.plan = plan
+        (plant_s,) = read_series(plan.out / "plant.csv", 0)
+        if not len(plant_s):
+            raise RecordingError("the flight ended before it began")
+        lags = read_lags(plan)
+        lags = lags.first(int(np.searchsorted(lags.decided_s, plant_s[-1])))
+        self._sampled = _at_samples(plant_s, lags.decided_s)
+        self.samples = int(np.count_nonzero(self._sampled))
+        self._lags = lags.first(max(self.samples - 1, 0))
+        if not len(self._lags.decided_s):
+            raise RecordingError("the flight ended before its first control sample: give it a longer --duration")
+        lag_s = float(self._lags.lag_s[-1])
+        self.path_lag_s = None if isnan(lag_s) else lag_s
+        self._states = sha256()
+
+    @property
+    def trajectory_sha256(self) -> str:
+        """As of a `Recording`, once all parts are read."""
+        return self._states.hexdigest()
+
+    def __iter__(self) -> Iterator[Samples]:
+        """Yield all control samples in their order, in parts of at least one."""
+        self._states = sha256()
+        decided = Rows(self.plan.out / "autopilot.csv")
+        frames, yaw_rad, begins = 0, self.plan.start_yaw_rad, True
+        for block in read_blocks(self.plan.out / "plant.csv"):
+            sampled = self._sampled[frames : frames + len(block)]  # frames that were logged since then do not count
+            frames += len(sampled)
+            self._states.update(block[: len(sampled), _PLANT_STATE].tobytes())
+            samples = block[: len(sampled)][sampled]
+            if len(samples):
+                part = self._part(samples, decided.take(len(samples) - begins), yaw_rad)
+                yaw_rad, begins = float(part["psi"][-1]), False
+                yield part
+
+    def _part(self, samples: Array, decisions: Array, yaw_rad: float) -> Samples:
+        """Join rows of the plant with the decisions that led to them, the last yaw before them being `yaw_rad`."""
+        start_reference = [0.0, 0.0, self.plan.start_yaw_rad]
+        begins = len(decisions) < len(samples)
+        columns = [
+            samples[:, :10],
+            _euler(samples[:, _PLANT_ATTITUDE], yaw_rad),
+            _inputs(self.plan.plant_vehicle, samples[:, _PLANT_ROTORS]),
+            np.vstack([start_reference, decisions[:, 1:4]]) if begins else decisions[:, 1:4],
+            samples[:, _PLANT_ROTORS],
+            position(self.plan.track, path_times(samples[:, 0], self._lags)),
+        ]
+        return Samples(
+            table=np.hstack(columns),
+            qp_status=decisions[:, 4].astype(np.int64),
+            fallback=decisions[:, 5].astype(np.int64),
+            solve_time_us=decisions[:, 6],
+            control_step_us=decisions[:, 7],
+            slack=decisions[:, 9],
+            active=decisions[:, 10:14].astype(np.int64),
+        )
+
+
 def read_recording(plan: FlightPlan) -> Recording:
-    """Join the logs in the plan's folder.
+    """Join the logs in the plan's folder, all in memory.
 
     Raises:
         RecordingError: There is no complete control sample in them.
     """
-    plant = read_csv(plan.out / "plant.csv")
-    autopilot = read_csv(plan.out / "autopilot.csv")
-    if not len(plant):
-        raise RecordingError("the flight ended before it began")
-    decisions = autopilot[: np.searchsorted(autopilot[:, 0], plant[-1, 0])]
-    samples = _at_samples(plant, decisions[:, 0])
-    decisions = decisions[: max(len(samples) - 1, 0)]
-    if not len(decisions):
-        raise RecordingError("the flight ended before its first control sample: give it a longer --duration")
-    return Recording(
-        table=_join(plan, samples, decisions),
-        qp_status=decisions[:, 4].astype(np.int64),
-        fallback=decisions[:, 5].astype(np.int64),
-        solve_time_us=decisions[:, 6],
-        control_step_us=decisions[:, 7],
-        slack=decisions[:, 9],
-        active=decisions[:, 10:14].astype(np.int64),
-        path_lag_s=None if np.isnan(decisions[-1, _LAG]) else float(decisions[-1, _LAG]),
-        trajectory_sha256=sha256(np.ascontiguousarray(plant[:, _PLANT_STATE]).tobytes()).hexdigest(),
-    )
+    reader = FlightReader(plan)
+    parts = list(reader)
+    whole = {each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Samples)}
+    return Recording(**whole, path_lag_s=reader.path_lag_s, trajectory_sha256=reader.trajectory_sha256)
 
 
-def path_times(times_s: Array, decisions: Array) -> Array:
-    """Return the path time at each time, s: it lags behind the clock as it did in the last of the decisions, (m, k)."""
-    rows = np.searchsorted(decisions[:, 0], times_s + _SAME_S) - 1
-    times: Array = times_s - np.nan_to_num(decisions[np.maximum(rows, 0), _LAG])
+def read_lags(plan: FlightPlan) -> Lags:
+    """Return by which path time was behind the clock at each decision of a flight."""
+    return Lags(*read_series(plan.out / "autopilot.csv", 0, _LAG))
+
+
+def path_times(times_s: Array, lags: Lags) -> Array:
+    """Return the path time at each of some times, s, (n,): it lags behind the clock as it did at the last decision."""
+    rows = np.searchsorted(lags.decided_s, times_s + _SAME_S) - 1
+    times: Array = times_s - np.nan_to_num(lags.lag_s[np.maximum(rows, 0)])
     return times
+
+
+class TableFile:
+    """A flight's table as CSV, written part by part; numbers keep every bit."""
+
+    def __init__(self, path: Path) -> None:
+        """Create the file, with the names of the columns."""
+        self._file = path.open("w", encoding="utf-8")
+        self._file.write(",".join(COLUMNS) + "\n")
+
+    def __enter__(self) -> Self:
+        """Return it, open."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def add(self, part: Samples) -> None:
+        """Append the rows of a part."""
+        self._file.writelines(",".join(map(repr, row)) + "\n" for row in part.table.tolist())
 
 
 def write_recording(recording: Recording, path: Path) -> None:
     """Write the table as CSV; numbers keep every bit."""
-    rows = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in recording.table.tolist())]
-    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    with TableFile(path) as table:
+        table.add(recording)
 
 
-def _at_samples(plant: Array, decided_s: Array) -> Array:
-    """Return the plant's rows at the times of the decisions, and one where the last of them has been held."""
-    held_s = decided_s[-1:] + (decided_s[1] - decided_s[0] if len(decided_s) > 1 else plant[-1, 0])
-    times_us = np.round(np.concatenate([decided_s, held_s]) * 1e6)
-    return plant[np.isin(np.round(plant[:, 0] * 1e6), times_us)]
+def _at_samples(plant_s: Array, decided_s: Array) -> NDArray[np.bool_]:
+    """Return which of the plant's times are those of decisions, or that until which the last of them has been held."""
+    held_s = decided_s[-1:] + (decided_s[1] - decided_s[0] if len(decided_s) > 1 else plant_s[-1])
+    return at_times(plant_s, np.concatenate([decided_s, held_s]))
 
 
-def _join(plan: FlightPlan, samples: Array, decisions: Array) -> Array:
-    squared = samples[:, _PLANT_ROTORS] ** 2
-    start_reference = [0.0, 0.0, plan.start_yaw_rad]
-    return np.hstack(
-        [
-            samples[:, :10],
-            _euler(samples[:, _PLANT_ATTITUDE], plan.start_yaw_rad),
-            squared @ plan.plant_vehicle.allocation().T,
-            np.vstack([start_reference, decisions[:, 1:4]]),
-            samples[:, _PLANT_ROTORS],
-            position(plan.track, path_times(samples[:, 0], decisions)),
-        ]
-    )
+def _inputs(vehicle: Vehicle, rotors: Array) -> Array:
+    """Return thrust and moments of rotor speeds (n, 4), (n, 4)."""
+    squared = rotors**2
+    if len(squared) == 1:  # a product with one row takes another way through BLAS, and its bits would be others
+        squared = np.vstack([squared, squared])
+    inputs: Array = squared @ vehicle.allocation().T
+    return inputs[: len(rotors)]
 
 
-def _euler(quaternions: Array, start_yaw_rad: float) -> Array:
-    """Return phi, theta and psi, (n, 3), psi by continuity from the start."""
+def _euler(quaternions: Array, yaw_rad: float) -> Array:
+    """Return phi, theta and psi, (n, 3), psi by continuity from `yaw_rad`."""
     angles = []
-    yaw = start_yaw_rad
     for qw, qx, qy, qz in quaternions.tolist():
         phi, theta, psi = euler_from_quaternion((qw, qx, qy, qz))
-        yaw = nearest_turn(psi, yaw)
-        angles.append((phi, theta, yaw))
+        yaw_rad = nearest_turn(psi, yaw_rad)
+        angles.append((phi, theta, yaw_rad))
     return np.array(angles)
-
-
-def read_columns(path: Path) -> list[str]:
-    """Return the names of a log's columns."""
-    with path.open(encoding="utf-8") as log:
-        return log.readline().rstrip("\n").split(",")
-
-
-def read_csv(path: Path) -> Array:
-    """Return the complete rows of a log; a process that was killed may leave half of one."""
-    header, *lines = path.read_text(encoding="utf-8").split("\n")
-    complete = [line for line in lines[:-1] if line.count(",") == header.count(",")]
-    values = [[float(value) for value in line.split(",")] for line in complete]
-    return np.array(values).reshape(len(values), header.count(",") + 1)

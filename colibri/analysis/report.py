@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from colibri.analysis.estimation import FIGURES, read_estimation, rms
 from colibri.analysis.lost import Lost, ground_contact_s
-from colibri.analysis.recording import INPUT, SETTLED_AFTER_S, Recording
-from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Active, Fallback
+from colibri.analysis.recording import SETTLED_AFTER_S
+from colibri.analysis.series.flight_series import FlightSeries
+from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fallback
 from colibri.autopilot.control.qp import QpStatus
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan, Summary
@@ -21,14 +22,14 @@ Report: TypeAlias = dict[str, Any]
 _SMALL_M = 0.01
 
 
-def report(plan: FlightPlan, summary: Summary | None, recording: Recording, lost: Lost | None) -> Report:
+def report(plan: FlightPlan, summary: Summary | None, flight: FlightSeries, lost: Lost | None) -> Report:
     """Return the figures of a flight; one that came to an early end has no summary.
 
     Errors are distances to the reference of the same instant, or of the path time then; effort is
     the RMS of the moment U2..U4, N m.
     """
     wall_time_s, frames, resent = summary or (None, None, None)
-    error, t = recording.position_error_m, recording["t"]
+    error, t = flight.position_error_m, flight.t
     sim_time_s = float(t[-1])
     settled = error[t >= SETTLED_AFTER_S]
     return {
@@ -51,7 +52,7 @@ def report(plan: FlightPlan, summary: Summary | None, recording: Recording, lost
         "sim_time_s": sim_time_s,
         "lost": None if lost is None else lost.why,
         "lost_at_s": None if lost is None else lost.at_s,
-        "ground_contact_s": ground_contact_s(plan.plant_vehicle, recording),
+        "ground_contact_s": ground_contact_s(plan.plant_vehicle, flight),
         "wall_time_s": wall_time_s,
         "real_time_factor": sim_time_s / wall_time_s if wall_time_s else None,
         "rmse_m": rms(error),
@@ -59,27 +60,25 @@ def report(plan: FlightPlan, summary: Summary | None, recording: Recording, lost
         "rmse_after_20s_m": rms(settled) if len(settled) else None,
         "max_error_after_20s_m": float(settled.max()) if len(settled) else None,
         **_estimation_figures(plan, settled),
-        "effort_n_m": rms(np.linalg.norm(recording.columns(INPUT[1:]), axis=1)),
-        "solve_time_us": _quantiles(recording.solve_time_us),
-        "control_step_us": _quantiles(recording.control_step_us),
+        "effort_n_m": rms(flight.moment_n_m),
+        "solve_time_us": _quantiles(flight.solve_time_us),
+        "control_step_us": _quantiles(flight.control_step_us),
         "frames": frames,
         "resent": resent,
-        "qp_failures": int(np.count_nonzero(recording.qp_status > STATUS_CODES[QpStatus.SOLVED])),
-        "qp_status": _counts(recording.qp_status, {str(status): STATUS_CODES[status] for status in QpStatus}),
-        "fallbacks": _counts(recording.fallback, {str(fallback): FALLBACK_CODES[fallback] for fallback in Fallback}),
-        "constrained_samples": dict(
-            zip(Active._fields, np.count_nonzero(recording.active, axis=0).tolist(), strict=True)
-        ),
-        "max_slack": float(recording.slack.max()),
-        "path_lag_s": recording.path_lag_s,
-        "trajectory_sha256": recording.trajectory_sha256,
+        "qp_failures": int(np.count_nonzero(flight.qp_status > STATUS_CODES[QpStatus.SOLVED])),
+        "qp_status": _counts(flight.qp_status, {str(status): STATUS_CODES[status] for status in QpStatus}),
+        "fallbacks": _counts(flight.fallback, {str(fallback): FALLBACK_CODES[fallback] for fallback in Fallback}),
+        "constrained_samples": flight.constrained._asdict(),
+        "max_slack": flight.max_slack,
+        "path_lag_s": flight.path_lag_s,
+        "trajectory_sha256": flight.trajectory_sha256,
     }
 
 
 def _estimation_figures(plan: FlightPlan, settled: Array) -> Report:
     """Return how far estimate and reference, estimate and truth are apart; without an estimator the former alone."""
     if plan.feedback is Feedback.SENSORS:
-        return read_estimation(plan).after(SETTLED_AFTER_S).figures()
+        return read_estimation(plan, SETTLED_AFTER_S).figures()
     return dict.fromkeys(FIGURES) | {FIGURES[0]: rms(settled) if len(settled) else None}
 
 
@@ -144,7 +143,7 @@ def length(metres: float) -> str:
     return f"{metres:.4f} m" if metres >= _SMALL_M else f"{1e3 * metres:.3f} mm"
 
 
-def _counts(codes: NDArray[np.int64], names: dict[str, int]) -> dict[str, int]:
+def _counts(codes: NDArray[np.int8], names: dict[str, int]) -> dict[str, int]:
     return {name: int(np.count_nonzero(codes == code)) for name, code in names.items()}
 
 

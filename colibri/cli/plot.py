@@ -17,13 +17,17 @@ def add_options(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Draw the figures of a flight from what is in its folder; return the exit code."""
     from colibri.analysis.figures import draw_flight
-    from colibri.analysis.recording import read_recording
+    from colibri.analysis.recording import FlightReader
+    from colibri.analysis.series.figure_series import FigureSeries
     from colibri.common.errors import Error
     from colibri.flights.provenance import plan_of
 
     try:
         plan = plan_of(args.folder)
-        paths = draw_flight(read_recording(plan), plan)
+        flown = FigureSeries(plan)
+        for part in FlightReader(plan):
+            flown.add(part)
+        paths = draw_flight(flown, plan)
     except Error as error:
         fail(f"{args.folder}: {error}" if str(args.folder) not in str(error) else str(error))
     except OSError as error:

@@ -10,18 +10,16 @@ from matplotlib.figure import Figure
 from colibri.analysis.figures import (
     ANGLES,
     INPUTS,
-    POSITION,
     Panel,
-    Series,
     TimeFigure,
     draw_times,
     draw_trajectory,
-    flight_series,
     followed,
     write_figure,
 )
 from colibri.analysis.outcome import keep_flight
 from colibri.analysis.parallel import side_by_side
+from colibri.analysis.series.figure_series import POSITION, FigureSeries, Series
 from colibri.common.process.lifecycle import fail
 from colibri.flights.folder import make_folder, prepare
 from colibri.flights.in_process import fly_locally
@@ -104,8 +102,9 @@ def draw(job: Job) -> list[Path]:
     folder = job.out / "flights" / job.flight.name
     prepare(folder)
     plan = FlightPlan.of_options(folder, track=job.flight.track, profile="thesis", controller=job.flight.controller)
-    recording, _ = keep_flight(plan, fly_locally(plan))
-    series = flight_series(recording, plan)
+    flown = FigureSeries(plan)
+    keep_flight(plan, fly_locally(plan), flown.add)
+    series = flown.over_time()
     paths = []
     for figure in job.figures:
         title = f"{figure.number}  {job.flight.title}: {KINDS[figure.kind].subject}"

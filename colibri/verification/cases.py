@@ -49,7 +49,7 @@ class Case(NamedTuple):
         if self.waypoints:
             _write(out / _WAYPOINTS_FILE, self.waypoints)
         plan = self.plan(out, **more, link=link)
-        _, figures = keep_flight(plan, fly_plan(plan))
+        figures = keep_flight(plan, fly_plan(plan))
         sha256: str = figures["trajectory_sha256"]
         return sha256
 

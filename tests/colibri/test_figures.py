@@ -15,17 +15,16 @@ from numpy.typing import NDArray
 from colibri.analysis.figures import (
     Curve,
     Panel,
-    Series,
     TimeFigure,
     draw_flight,
     draw_times,
     draw_trajectory,
     flight_figures,
-    flight_series,
     shortened,
     write_figure,
 )
 from colibri.analysis.recording import Recording, read_recording
+from colibri.analysis.series.figure_series import FigureSeries, Series
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
 from colibri.mavlink.hil.feedback import Feedback
@@ -40,6 +39,7 @@ DEGREES = 180.0 / np.pi
 
 class Flight(NamedTuple):
     recording: Recording
+    flown: FigureSeries
     plan: FlightPlan
     series: Series
     figures: dict[str, Figure]
@@ -76,9 +76,16 @@ def fly(out: Path, duration_s: float) -> Flight:
     plan = FlightPlan.from_arguments(Namespace(track="spiral", **arguments, **files, **world, **ground))
     fly_locally(plan)
     recording = read_recording(plan)
-    series = flight_series(recording, plan)
+    flown = figure_series(recording, plan)
+    series = flown.over_time()
     drawn = {figure.name: draw_times(series, figure, figure.subject) for figure in flight_figures(series, plan)}
-    return Flight(recording, plan, series, drawn)
+    return Flight(recording, flown, plan, series, drawn)
+
+
+def figure_series(recording: Recording, plan: FlightPlan) -> FigureSeries:
+    flown = FigureSeries(plan)
+    flown.add(recording)
+    return flown
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +114,7 @@ def drawn(line: Line2D) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def test_six_png_files_wide_enough_to_read(short: Flight) -> None:
-    paths = draw_flight(short.recording, short.plan)
+    paths = draw_flight(short.flown, short.plan)
     assert paths == [short.plan.out / name for name in NAMES]
     for path in paths:
         content = path.read_bytes()
@@ -164,7 +171,7 @@ def test_an_attitude_reference_is_held_up_to_its_row(short: Flight) -> None:
 def test_rotor_limits(short: Flight, vehicle: str) -> None:
     rotors = load_vehicle(vehicle).rotors
     plan = replace(short.plan, plant_vehicle=load_vehicle(vehicle))
-    series = flight_series(short.recording, plan)
+    series = figure_series(short.recording, plan).over_time()
     (figure,) = (figure for figure in flight_figures(series, plan) if figure.name == "rotors")
     for axes in draw_times(series, figure, "rotors").axes:
         limits = [set(drawn(line)[1]) for line in axes.lines if line.get_label() == "limits"]
@@ -194,7 +201,7 @@ def test_velocity_is_the_slope_of_position(long: Flight, axis: str) -> None:
 
 
 def test_trajectory(short: Flight) -> None:
-    figure = draw_trajectory(short.series, "trajectory")
+    figure = draw_trajectory(short.flown.in_space(), "trajectory")
     (axes,) = figure.axes
     lines: dict[str, Any] = {str(line.get_label()): line for line in axes.lines}
     position = short.recording.columns(("x", "y", "z"))

@@ -11,9 +11,11 @@ import pytest
 
 from colibri.analysis.limits import KEYS, Limit, exceeded
 from colibri.analysis.lost import ground_contact_s, lost
-from colibri.analysis.recording import COLUMNS, Recording
+from colibri.analysis.recording import COLUMNS, Samples
+from colibri.analysis.series.flight_series import FlightSeries
 from colibri.cli.main import main
 from colibri.flights.plan import FlightPlan, GroundAccess
+from colibri.plant.vehicle.description import load_vehicle
 from tools.harness.processes import fly
 
 VEHICLE = Path(__file__).parents[2] / "plant" / "vehicle" / "models" / "hummingbird.toml"
@@ -25,15 +27,17 @@ def plan(tmp_path: Path) -> FlightPlan:
     return FlightPlan.of_options(tmp_path, track="hover", profile="flight", link="memory")
 
 
-def flown(until_s: float = 30.0, **columns: Any) -> Recording:
+def flown(until_s: float = 30.0, **columns: Any) -> FlightSeries:
     """Return a hover at 2 m in which some columns are others."""
     t = T[until_s > T]
     table = np.zeros((len(t), len(COLUMNS)))
     for name, values in {"t": t, "z": 2.0, "z_ref": 2.0, **columns}.items():
         table[:, COLUMNS.index(name)] = values(t) if callable(values) else values
-    nothing = np.zeros(0)
+    nothing = np.zeros(len(t) - 1)
     codes = nothing.astype(np.int64)
-    return Recording(table, codes, codes, nothing, nothing, nothing, codes.reshape(0, 4), None, "")
+    series = FlightSeries(len(t), load_vehicle("hummingbird"))
+    series.add(Samples(table, codes, codes, nothing, nothing, nothing, np.zeros((len(t) - 1, 4), np.int64)))
+    return series
 
 
 def test_one_that_stays_at_its_reference_is_not_lost(plan: FlightPlan) -> None:
@@ -42,18 +46,18 @@ def test_one_that_stays_at_its_reference_is_not_lost(plan: FlightPlan) -> None:
 
 
 def test_one_that_comes_down_is_lost_when_it_does(plan: FlightPlan) -> None:
-    recording = flown(z=lambda t: np.maximum(0.0, 2.0 - 0.2 * np.maximum(0.0, t - 5.0)))
-    found = lost(plan, recording)
+    flight = flown(z=lambda t: np.maximum(0.0, 2.0 - 0.2 * np.maximum(0.0, t - 5.0)))
+    found = lost(plan, flight)
     assert found is not None
     assert found.at_s == pytest.approx(15.0, abs=0.02)
     assert found.why == "on the ground, 2.0 m off its track, tilted 0°; later up to 2.0 m off"
-    assert ground_contact_s(plan.plant_vehicle, recording) == pytest.approx(15.0, abs=0.02)
+    assert ground_contact_s(plan.plant_vehicle, flight) == pytest.approx(15.0, abs=0.02)
 
 
 def test_one_that_touches_the_ground_for_a_moment_and_flies_on_is_not_lost(plan: FlightPlan) -> None:
-    recording = flown(z=lambda t: np.where(abs(t - 5.0) < 0.3, 0.0, 2.0))
-    assert lost(plan, recording) is None
-    assert ground_contact_s(plan.plant_vehicle, recording) == pytest.approx(0.59, abs=0.02)
+    flight = flown(z=lambda t: np.where(abs(t - 5.0) < 0.3, 0.0, 2.0))
+    assert lost(plan, flight) is None
+    assert ground_contact_s(plan.plant_vehicle, flight) == pytest.approx(0.59, abs=0.02)
 
 
 def test_one_that_shall_land_may_touch_the_ground(plan: FlightPlan) -> None:
@@ -86,8 +90,8 @@ def test_one_that_drifts_away_is_lost_since_it_is_too_far(plan: FlightPlan) -> N
 def test_one_too_short_to_settle_is_lost_where_it_gets_further_away(
     plan: FlightPlan, speed_m_s: float, is_lost: bool
 ) -> None:
-    recording = flown(10.0, x=lambda t: 30.0 + speed_m_s * t)
-    assert (lost(plan, recording) is not None) is is_lost
+    flight = flown(10.0, x=lambda t: 30.0 + speed_m_s * t)
+    assert (lost(plan, flight) is not None) is is_lost
 
 
 def test_one_that_ground_stations_command_does_not_follow_its_track(plan: FlightPlan) -> None:

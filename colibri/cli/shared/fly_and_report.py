@@ -70,12 +70,14 @@ def _report(plan: FlightPlan, summary: Summary, *, figures: bool, quiet: bool) -
     """Keep what was flown and say how well it went; what does that is loaded only now, when something has flown."""
     from colibri.analysis.outcome import keep_flight
     from colibri.analysis.report import print_report
+    from colibri.analysis.series.figure_series import FigureSeries
 
-    recording, found = keep_flight(plan, summary)
+    flown = FigureSeries(plan)
+    found = keep_flight(plan, summary, *([flown.add] if figures else []))
     if figures:
         from colibri.analysis.figures import draw_flight
 
-        draw_flight(recording, plan)
+        draw_flight(flown, plan)
     if not quiet:
         print_report(found, plan.out, flown_by=plan.flown_by)
     return found

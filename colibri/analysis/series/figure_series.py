@@ -1,0 +1,106 @@
+"""What the figures of a flight show, as named series: all samples of a usual flight, of a long one what can be seen."""
+
+from typing import TypeAlias
+
+import numpy as np
+
+from colibri.analysis.recording import ATTITUDE_REFERENCE, COLUMNS, POSITION_REFERENCE, SETTLED_AFTER_S, Samples
+from colibri.analysis.series.reduction import EveryNth, Extremes
+from colibri.common.rotations import earth_from_body, quaternion_from_euler
+from colibri.common.types import Array
+from colibri.flights.plan import FlightPlan
+
+Series: TypeAlias = dict[str, Array]
+"""Name -> values, (n,); `t` holds their times, s."""
+
+POSITION = ("x", "y", "z")
+VELOCITY = ("vx", "vy", "vz")
+ATTITUDE = ("phi", "theta", "psi")
+START_S = 10.0
+"""So long a start is shown enlarged: none of its samples is left out."""
+MAX_POINTS = 1 << 14
+"""Of a series over time after the start: 130 s at 125 Hz, and always several for each pixel of a figure's width."""
+MAX_PATH_POINTS = 1 << 16
+"""Of a path in space: with those of an hour at 5 m/s², chords are off by less than a pixel."""
+
+_SLOPES = tuple(f"{name}_ref" for name in VELOCITY)
+_ERRORS = tuple(f"e{axis}" for axis in POSITION)
+_NAMES = (*COLUMNS, *VELOCITY, *_ERRORS, "distance", *_SLOPES)
+_T = _NAMES.index("t")
+_ANGLES = [_NAMES.index(name) for name in (*ATTITUDE, *ATTITUDE_REFERENCE)]
+_REFERENCES = [_NAMES.index(name) for name in POSITION_REFERENCE]
+_OF_REFERENCES = [_NAMES.index(name) for name in _SLOPES]
+
+
+class FigureSeries:
+    """Takes a flight part by part and keeps what its figures show: some MB, however long it is."""
+
+    def __init__(self, plan: FlightPlan) -> None:
+        """Take the flight of `plan`."""
+        self._rotors = plan.plant_vehicle.rotors
+        self._start: list[Array] = []
+        self._later = Extremes(len(_NAMES), MAX_POINTS)
+        self._path = EveryNth(len(POSITION) + len(POSITION_REFERENCE), MAX_PATH_POINTS)
+        self._newest: Array = np.empty((0, len(_NAMES)))
+        self._squares_m2 = 0.0
+        self._settled = 0
+
+    def add(self, part: Samples) -> None:
+        """Append the next samples."""
+        self._path.add(part.columns((*POSITION, *POSITION_REFERENCE)))
+        settled = part.position_error_m[part["t"] >= SETTLED_AFTER_S]
+        self._squares_m2 += float(np.sum(settled**2))
+        self._settled += len(settled)
+        # The slope at the newest sample needs the next one, and the one before.
+        known = len(self._newest)
+        rows = np.concatenate([self._newest, _rows(part)])
+        if len(rows) > 1:
+            rows[:, _OF_REFERENCES] = np.gradient(rows[:, _REFERENCES], rows[:, _T], axis=0)
+        self._keep(rows[max(known - 1, 0) : -1])
+        self._newest = rows[-2:].copy()
+
+    def over_time(self) -> Series:
+        """Return the columns of the flight, angles in degrees, and what follows from them.
+
+        `vx` to `vz` are earth velocities, ENU, m/s, and `vx_ref` to `vz_ref` those of the reference; `ex` to `ez` are
+        errors, m, and `distance` their norm; `rms` is its RMS once settled, not a number before; `idle` and `fastest`
+        are the limits of the rotors.
+        """
+        rows = np.concatenate([*self._start, self._later.points(), self._newest[-1:]])
+        series = dict(zip(_NAMES, np.ascontiguousarray(rows.T), strict=True))
+        t = series["t"]
+        rms = np.sqrt(self._squares_m2 / self._settled) if t[-1] > SETTLED_AFTER_S else np.nan
+        return series | {
+            "rms": np.where(t >= SETTLED_AFTER_S, rms, np.nan),
+            "idle": np.full_like(t, self._rotors.idle_speed),
+            "fastest": np.full_like(t, self._rotors.max_speed),
+        }
+
+    def in_space(self) -> Series:
+        """Return position and reference, of the same instants, without these."""
+        return dict(zip((*POSITION, *POSITION_REFERENCE), self._path.points().T, strict=True))
+
+    def _keep(self, rows: Array) -> None:
+        later = rows[:, _T] > START_S
+        self._start.append(rows[~later])
+        self._later.add(rows[later])
+
+
+def _rows(part: Samples) -> Array:
+    """Return the series of a part, columns as in `_NAMES`; the slopes of the reference are not numbers yet."""
+    position, reference = part.columns(POSITION), part.columns(POSITION_REFERENCE)
+    columns = [
+        part.table,
+        _earth_velocity(part),
+        position - reference,
+        part.position_error_m[:, None],
+        np.full_like(reference, np.nan),
+    ]
+    rows = np.hstack(columns)
+    rows[:, _ANGLES] = np.degrees(rows[:, _ANGLES])
+    return rows
+
+
+def _earth_velocity(part: Samples) -> Array:
+    rows = part.columns((*ATTITUDE, "u", "v", "w")).tolist()
+    return np.array([earth_from_body(quaternion_from_euler(*row[:3]), (row[3], row[4], row[5])) for row in rows])

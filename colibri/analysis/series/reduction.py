@@ -1,0 +1,78 @@
+"""Series reduced to what a figure can show: a flight of any length as some thousand points."""
+
+import numpy as np
+
+from colibri.common.types import Array
+
+
+class Extremes:
+    """Rows over time, of which the least and the largest in equal spans stay, once there are too many of them.
+
+    A span takes two points: of each column its extremes in the order in which they came. Drawn over time, as long as a
+    span is narrower than a pixel, they cover what all rows would.
+    """
+
+    def __init__(self, columns: int, most: int) -> None:
+        """Keep at most `most` points, a multiple of 4, and at least half as many once there were more rows."""
+        self._points: Array = np.empty((most, columns))
+        self._count = 0
+        self._span = 2
+        self._rest: Array = np.empty((0, columns))
+
+    def add(self, rows: Array) -> None:
+        """Append rows (n, columns)."""
+        self._rest = np.concatenate([self._rest, rows])
+        while len(self._rest) >= self._span:
+            if self._count == len(self._points):
+                self._halve()
+                continue
+            spans = min(len(self._rest) // self._span, (len(self._points) - self._count) // 2)
+            taken, self._rest = np.split(self._rest, [spans * self._span])
+            self._points[self._count : self._count + 2 * spans] = _extremes(taken, self._span)
+            self._count += 2 * spans
+
+    def points(self) -> Array:
+        """Return what is kept, (k, columns): all rows, or two points a span."""
+        rest = _extremes(self._rest, len(self._rest)) if len(self._rest) > 1 else self._rest
+        return np.concatenate([self._points[: self._count], rest])
+
+    def _halve(self) -> None:
+        """Make one span of every two."""
+        self._count //= 2
+        self._points[: self._count] = _extremes(self._points, 4)
+        self._span *= 2
+
+
+class EveryNth:
+    """Rows of which only every second, fourth, eighth stays, as there are too many of them; and the last."""
+
+    def __init__(self, columns: int, most: int) -> None:
+        """Keep at most `most` rows, and the last."""
+        self._most = most
+        self._kept: list[Array] = []
+        self._count = self._seen = 0
+        self._step = 1
+        self._last: Array = np.empty((0, columns))
+
+    def add(self, rows: Array) -> None:
+        """Append rows (n, columns), n > 0."""
+        self._last = rows[-1:].copy()
+        self._kept.append(rows[-self._seen % self._step :: self._step].copy())
+        self._count += len(self._kept[-1])
+        self._seen += len(rows)
+        while self._count > self._most:
+            self._kept = [np.concatenate(self._kept)[::2].copy()]
+            self._count = len(self._kept[0])
+            self._step *= 2
+
+    def points(self) -> Array:
+        """Return what is kept, (k, columns)."""
+        is_kept = (self._seen - 1) % self._step == 0
+        return np.concatenate([*self._kept, self._last[: 0 if is_kept else 1]])
+
+
+def _extremes(rows: Array, span: int) -> Array:
+    """Return least and largest of each `span` of n rows, by columns, the earlier first, (2 n / span, columns)."""
+    spans = rows.reshape(-1, span, rows.shape[1])
+    places = np.sort(np.stack([spans.argmin(axis=1), spans.argmax(axis=1)], axis=1), axis=1)
+    return np.take_along_axis(spans, places, axis=1).reshape(-1, rows.shape[1])
