@@ -219,7 +219,7 @@ def _flights(request: pytest.FixtureRequest, seed: int | None, stack: ExitStack)
     ground = request.config.getoption("--sitl-ground")
     with _in_one_line():
         setting = setting_of([*([{"ground": ground}] if ground else []), *_said(request.node, seed)])
-    flights = stack.enter_context(Flights(setting, _launcher(request.config)))
+    flights = stack.enter_context(Flights(setting, _launcher(request.config, stack)))
     request.node.stash[_FLIGHTS] = flights
     return flights
 
@@ -233,12 +233,18 @@ def _in_one_line() -> Iterator[None]:
         raise pytest.fail.Exception(str(error), pytrace=False) from None
 
 
-def _launcher(config: pytest.Config) -> Launcher | None:
-    """Return what starts the processes of this run, or of this worker; None where flights need none."""
+def _launcher(config: pytest.Config, stack: ExitStack) -> Launcher | None:
+    """Return what starts the processes of this run, or of this worker; None where flights need none.
+
+    As long as `stack`, this process and those keep to one core where there is a worker for each.
+    """
     if config.getoption("--sitl-link") == "memory":
         return None
-    from colibri.sitl.backends.launcher import launcher
+    from colibri.sitl.backends.launcher import launcher, one_core
 
+    xdist: dict[str, Any] = getattr(config, "workerinput", {})
+    worker = xdist.get("workerid", "").removeprefix("gw")
+    stack.enter_context(one_core(int(worker) if worker.isdecimal() else 0, xdist.get("workercount", 0)))
     if _LAUNCHER not in config.stash:
         config.stash[_LAUNCHER] = launcher(from_scratch=config.getoption("--sitl-from-scratch"))
     return config.stash[_LAUNCHER]

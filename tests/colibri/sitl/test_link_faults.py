@@ -10,7 +10,7 @@ import pytest
 
 from colibri.autopilot.commander.rules.modes import Mode
 from colibri.mavlink.hil.conductor import Gathering, Parcel, StepMessage, packets
-from colibri.sitl.backends.launcher import Forked, FromScratch, Launcher
+from colibri.sitl.backends.launcher import Forked, FromScratch, Launcher, one_core
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.backends.lockstep import SessionError
 from colibri.sitl.backends.setting import Setting
@@ -65,6 +65,19 @@ def test_the_same_flight_of_processes_from_scratch() -> None:
         sitl.run(0.2)
 
     assert flown(FromScratch(), hover, airborne=2.0) == flown(None, hover, airborne=2.0)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system binds no process to a core")
+def test_where_workers_take_up_all_cores_a_flight_keeps_to_one() -> None:
+    def cores_of(worker: int, workers: int) -> list[set[int]]:
+        with one_core(worker, workers), Flights(Setting(airborne=3.0), FromScratch()) as flights:
+            return [os.sched_getaffinity(process) for process in (0, *flights.begin().processes.values())]
+
+    before = sorted(os.sched_getaffinity(0))
+    last = len(before) - 1
+    assert cores_of(last, len(before)) == [{before[last]}] * 3
+    assert os.sched_getaffinity(0) == set(before)
+    assert cores_of(0, 0) == [set(before)] * 3
 
 
 @pytest.mark.parametrize("processes", [False, pytest.param(True, marks=pytest.mark.long)])
