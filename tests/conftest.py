@@ -1,5 +1,6 @@
 """The same verdict every time, on however slow a machine and from whatever shell."""
 
+import gc
 import signal
 
 from hypothesis import settings
@@ -13,3 +14,10 @@ use_one_thread()  # before numpy is loaded: two workers have a core each
 
 # A shell's background job ignores Ctrl-C, and so would every process that a test starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_finish() -> None:
+    """Keep the garbage collector from what five thousand tests load: it would look at it again and again."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 20)

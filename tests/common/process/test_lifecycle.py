@@ -1,4 +1,4 @@
-"""How a process loads, and how it ends."""
+"""How a process loads, flies and ends, as far as the garbage collector goes."""
 
 import gc
 import subprocess
@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from colibri.common.process.lifecycle import loading
+from colibri.common.process.lifecycle import gc_frozen, loading
 
 PROGRAM = """
 import atexit, gc
@@ -32,3 +32,11 @@ def test_no_garbage_is_looked_for_while_loading_and_afterwards_as_before(*, enab
         assert gc.isenabled() is enabled
     finally:
         gc.enable()
+
+
+def test_what_somebody_else_has_frozen_stays_frozen() -> None:
+    frozen = gc.get_freeze_count()
+    assert frozen > 0, "the tests themselves are"
+    with gc_frozen():
+        assert gc.get_freeze_count() <= frozen  # what is freed is counted no more
+    assert 0 < gc.get_freeze_count() <= frozen
