@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from random import Random
 from typing import Any
@@ -19,6 +21,7 @@ from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
 
 IN_WIND = {"wind": "3@270", "turbulence": "light", "seed": 3}
+CORES = "import os; print(*os.sched_getaffinity(0))"
 BAD = {"loss": 0.2, "duplicate": 0.1, "reorder": 0.1, "corrupt": 0.1, "jitter_s": 0.004}
 
 
@@ -68,16 +71,20 @@ def test_the_same_flight_of_processes_from_scratch() -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system binds no process to a core")
-def test_where_workers_take_up_all_cores_a_flight_keeps_to_one() -> None:
+def test_where_workers_take_up_all_cores_each_keeps_to_one_with_what_it_starts() -> None:
     def cores_of(worker: int, workers: int) -> list[set[int]]:
-        with one_core(worker, workers), Flights(Setting(airborne=3.0), FromScratch()) as flights:
-            return [os.sched_getaffinity(process) for process in (0, *flights.begin().processes.values())]
+        with one_core(worker, workers):
+            started = subprocess.run([sys.executable, "-c", CORES], capture_output=True, text=True, check=True)
+            return [os.sched_getaffinity(0), set(map(int, started.stdout.split()))]
 
-    before = sorted(os.sched_getaffinity(0))
-    last = len(before) - 1
-    assert cores_of(last, len(before)) == [{before[last]}] * 3
-    assert os.sched_getaffinity(0) == set(before)
-    assert cores_of(0, 0) == [set(before)] * 3
+    cores = sorted(os.sched_getaffinity(0))
+    last = len(cores) - 1
+    assert cores_of(last, len(cores)) == [{cores[last]}] * 2
+    assert cores_of(len(cores), 2 * len(cores)) == [{cores[0]}] * 2
+    assert os.sched_getaffinity(0) == set(cores)
+    assert cores_of(0, 0) == [set(cores)] * 2
+    if last:
+        assert cores_of(0, len(cores) + 1) == [set(cores)] * 2
 
 
 @pytest.mark.parametrize("processes", [False, pytest.param(True, marks=pytest.mark.long)])
