@@ -219,7 +219,7 @@ def left_after(law: AttitudeLaw, error: float) -> float:
     return float(np.abs(z[0, [0, 2, 4]]).max())
 
 
-@pytest.mark.parametrize(("scale", "grows"), [(0.5, False), (REFUSED, True)])
+@pytest.mark.parametrize(("scale", "grows"), [pytest.param(0.5, False, marks=pytest.mark.long), (REFUSED, True)])
 def test_what_is_refused_of_the_lqr_is_unstable_indeed(steep: str, scale: float, grows: bool) -> None:
     """An error far too small for what is not linear, where phi and theta are at the ends of their ranges."""
     law = LqrAttitude(load_profile(steep).table("lpv-mpc"), VEHICLE, CONDITIONS)

@@ -153,7 +153,7 @@ BAD_INPUT = {
     "command": ((), "the following arguments are required: TRACK"),
 }
 
-SEEN_BY_THE_AUTOPILOT = ("choice of a law", "extra", "no moves", "profile key", "solver")
+SEEN_BY_THE_AUTOPILOT = ("choice of a law", "extra", "no blocks", "profile key", "solver")
 """Over UDP its process has to be started for it; `controller` shows the same of such a one in seconds."""
 
 

@@ -127,8 +127,10 @@ def test_a_process_whose_parent_was_gone_before_it_began_ends(package: str) -> N
 
 @pytest.mark.parametrize(
     "options",
-    [("fly", "hover", "--link", "udp", "--no-figures"), ("compare", "--track", "hover")],
-    ids=["fly", "compare"],
+    [
+        pytest.param(("fly", "hover", "--link", "udp", "--no-figures"), id="fly"),
+        pytest.param(("compare", "--track", "hover"), id="compare", marks=pytest.mark.long),
+    ],
 )
 def test_files_of_the_working_directory_shadow_no_module(tmp_path: Path, options: tuple[str, ...]) -> None:
     for name in ("plant", "autopilot", "mavlink", "numpy", "signal", "json"):

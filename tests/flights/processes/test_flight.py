@@ -200,7 +200,7 @@ def check_upright_and_near(flown: list[Flown]) -> None:
     assert max(it.z_m.max() for it in flown) < 4.5
 
 
-@pytest.mark.parametrize("lap_s", [4.0, 1.0])
+@pytest.mark.parametrize("lap_s", [pytest.param(4.0, marks=pytest.mark.long), 1.0])
 def test_what_no_vehicle_can_follow_takes_it_to_its_limits(tmp_path: Path, lap_s: float) -> None:
     figures = fly(tmp_path, f"lemniscate:lap={lap_s}", "--link", "memory", "--duration", "10")
     assert figures["constrained_samples"]["rotors"] + figures["constrained_samples"]["rates"] > 0
