@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from colibri.common import InFlightError as InFlightError
     from colibri.common import Table as Table
     from colibri.common import read_settings as read_settings
+    from colibri.experiments import Flight as Flight
+    from colibri.experiments import fly as fly
     from colibri.flights import FlightPlan as FlightPlan
     from colibri.flights import fly_plan as fly_plan
     from colibri.mavlink import MavlinkError as MavlinkError

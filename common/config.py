@@ -1,6 +1,7 @@
 """Strict tables: what vehicle files, profiles and control laws are read into."""
 
 from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, TypeVar
@@ -57,9 +58,7 @@ def read_toml(path: Path, kind: type[T], error: type[Error]) -> T:
     except OSError as reason:
         raise error(f"{path}: {reason.strerror}") from reason
     except msgspec.ValidationError as reason:
-        what, _, where = str(reason).partition(" - at `$.")
-        key = where.rstrip("`")
-        raise error(f"{path}: {key}: {what}{_choices(kind, key)}" if key else f"{path}: {what}") from reason
+        raise error(f"{path}: {_in_words(reason, kind)}") from reason
     except UnicodeDecodeError as reason:
         line = reason.object.count(b"\n", 0, reason.start) + 1
         raise error(f"{path}: line {line}: is not UTF-8: save the file as that") from reason
@@ -115,6 +114,35 @@ def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:
     try:
         return msgspec.convert(dict(table), type=kind)
     except msgspec.ValidationError as reason:
-        what, _, where = str(reason).partition(" - at `$.")
-        key = where.rstrip("`")
-        raise SettingsError(f"{key}: {what}{_choices(kind, key)}" if key else what) from reason
+        raise SettingsError(_in_words(reason, kind)) from reason
+
+
+def replaced(table: T, key: str, value: Any, error: type[Error]) -> T:
+    """Return a structure with another value at a dotted key, `body.mass_kg` say, checked as strictly as a file.
+
+    Raises:
+        error: There is no such key, or it cannot have this value; names the key.
+    """
+    tree = msgspec.to_builtins(table)
+    *tables, last = key.split(".")
+    found, above = tree, ""
+    for name in (*tables, last):
+        choices = list(found) if isinstance(found, dict) else []
+        if name not in choices:
+            near = get_close_matches(name, choices, 1)
+            of = f" of {above}" if above else ""
+            hint = f"did you mean {near[0]}?" if near else f"keys{of} are {', '.join(choices) or 'none'}"
+            raise error(f"{key}: unknown key {name}: {hint}")
+        parent, found, above = found, found[name], f"{above}.{name}".lstrip(".")
+    parent[last] = value
+    try:
+        return msgspec.convert(tree, type=type(table))
+    except msgspec.ValidationError as reason:
+        raise error(_in_words(reason, type(table))) from reason
+
+
+def _in_words(reason: msgspec.ValidationError, kind: Any) -> str:
+    """Return which key is wrong, how, and what it may be."""
+    what, _, where = str(reason).partition(" - at `$.")
+    key = where.rstrip("`")
+    return f"{key}: {what}{_choices(kind, key)}" if key else what

@@ -23,6 +23,7 @@ from colibri.autopilot.control.profile import Profile, ProfileError
 from colibri.autopilot.control.registry import (
     BuildError,
     DecisionError,
+    Factory,
     LawError,
     check_answer,
     check_controller,
@@ -68,8 +69,10 @@ class ControlLoop:
         controls: Rotor speeds commanded now, in parts of the largest.
     """
 
-    def __init__(self, profile: Profile, vehicle: Vehicle, clock: Clock) -> None:
+    def __init__(self, profile: Profile, vehicle: Vehicle, clock: Clock, law: Factory | None = None) -> None:
         """Control `vehicle` as `profile` says; `clock` only measures, it decides nothing.
+
+        `law` makes the control law, in place of what is registered under its name.
 
         Raises:
             ControllerError: The profile's control law cannot be used.
@@ -77,7 +80,7 @@ class ControlLoop:
             SolverError: Its solver cannot be used.
         """
         self._name = profile.controller
-        self._controller = build_controller(profile, vehicle, clock)
+        self._controller = build_controller(profile, vehicle, clock, law)
         if isinstance(self._controller, CompiledController):
             self._controller.warm_up()
         self.vehicle = vehicle
@@ -262,15 +265,15 @@ def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:
     return 1000 * max(ms for ms in range(1, control_ms + 1) if control_ms % ms == 0 and ms <= wanted_ms)
 
 
-def build_controller(profile: Profile, vehicle: Vehicle, clock: Clock) -> Controller[Any]:
-    """Return the control law of a profile for a vehicle.
+def build_controller(profile: Profile, vehicle: Vehicle, clock: Clock, law: Factory | None = None) -> Controller[Any]:
+    """Return the control law of a profile for a vehicle; `law` makes it, or what is registered under its name.
 
     Raises:
         ControllerError: It cannot be used.
         ProfileError: Its table is wrong.
         SolverError: Its solver cannot be used.
     """
-    factory = load_controller(profile.controller)
+    factory = law or load_controller(profile.controller)
     try:
         controller = factory(profile.table(profile.controller), vehicle, clock)
     except SettingsError as error:

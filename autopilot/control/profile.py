@@ -7,7 +7,7 @@ import msgspec
 
 from colibri.autopilot.control.settings import ControlInterval
 from colibri.autopilot.errors import AutopilotError
-from colibri.common.config import Table, named_text, read_named, toml_names
+from colibri.common.config import Table, named_text, read_named, replaced, toml_names
 
 _FOLDER = Path(__file__).parents[1] / "profiles"
 
@@ -63,6 +63,26 @@ class Profile(ProfileTables, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     def table(self, controller: str) -> dict[str, Any]:
         """Return the numbers of a control law; none for one that the profile does not know."""
         return self.controllers.get(controller, {})
+
+    def replace(self, key: str, value: Any) -> "Profile":
+        """Return the profile with another value at a dotted key; the star behind its name tells it from this one.
+
+        `controllers.NAME` may be new: the numbers of a control law of one's own. What is in such a table is judged by
+        the law, when it is built.
+
+        Raises:
+            ProfileError: There is no such key, or it cannot have this value.
+        """
+        above, _, law = key.partition(".")
+        whole = above == "controllers" and law and "." not in law
+        changed = (
+            replaced(self, above, {**self.controllers, law: value}, ProfileError)
+            if whole
+            else replaced(self, key, value, ProfileError)
+        )
+        changed = msgspec.structs.replace(changed, name=f"{self.name.rstrip('*')}*", file="")
+        _check_frames(changed)
+        return changed
 
     def with_choices(self, controller: str | None, solver: str | None, delay_s: float | None = None) -> "Profile":
         """Return the profile with another control law, another QP solver in the table of that, and another delay.

@@ -6,6 +6,7 @@ from hashlib import sha256
 from importlib.metadata import EntryPoints, entry_points
 from importlib.util import find_spec
 from pathlib import Path
+from sys import modules
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -90,9 +91,19 @@ def origin_of(name: str) -> Origin:
     for entry in registered().select(name=name):
         package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else ""
         spec = find_spec(entry.module)
-        file = Path(spec.origin) if spec and spec.origin else None
-        return Origin(entry.value, package, sha256(file.read_bytes()).hexdigest() if file and file.is_file() else "")
+        return Origin(entry.value, package, _sha256(spec.origin if spec else None))
     raise ControllerError(f"unknown controller {name}: installed are {', '.join(controller_names())}")
+
+
+def origin_of_factory(law: Factory) -> Origin:
+    """Return where a control law comes from that was handed over, not registered."""
+    module = getattr(law, "__module__", "")
+    file = getattr(modules.get(module), "__file__", None)
+    return Origin(f"{module}:{getattr(law, '__qualname__', type(law).__qualname__)}", "", _sha256(file))
+
+
+def _sha256(file: str | None) -> str:
+    return sha256(Path(file).read_bytes()).hexdigest() if file and Path(file).is_file() else ""
 
 
 def check_controller(name: str, controller: object) -> None:

@@ -4,6 +4,7 @@ from colibri.autopilot.control.delay import DelayCompensation
 from colibri.autopilot.control.interface import Clock, Pace
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.registry import Factory
 from colibri.autopilot.core.step import Step, follows, nothing_known
 from colibri.autopilot.estimation.state_source import NewEstimator, StateSource
 from colibri.autopilot.guidance.landing_detector import Landing, is_below, is_clear, stands_at_first, watch
@@ -23,7 +24,14 @@ class Autopilot:
     """
 
     def __init__(
-        self, profile: Profile, vehicle: Vehicle, track: Track, clock: Clock, *, estimator: NewEstimator | None = None
+        self,
+        profile: Profile,
+        vehicle: Vehicle,
+        track: Track,
+        clock: Clock,
+        *,
+        estimator: NewEstimator | None = None,
+        law: Factory | None = None,
     ) -> None:
         """Fly `vehicle` along `track`; `clock` only measures, it decides nothing.
 
@@ -33,13 +41,14 @@ class Autopilot:
             track: What it flies, from time 0 on.
             clock: Seconds.
             estimator: Makes what turns frames of sensors into states; None: frames are states.
+            law: Makes the control law; None: as it is registered.
 
         Raises:
             ControllerError: The profile's control law cannot be used.
             ProfileError: Its table is wrong.
             SolverError: Its solver cannot be used.
         """
-        self._loop = ControlLoop(profile, vehicle, clock)
+        self._loop = ControlLoop(profile, vehicle, clock, law)
         self._delay = DelayCompensation(vehicle, profile.delay_s)
         self._planner = Planner(track, profile.references, self._loop.preview)
         self._start_speed = vehicle.speed_from_rpm(profile.simulation.rotor_speed_rpm)

@@ -1,7 +1,7 @@
 """The figures of a flight: what they show as data, and one function for each kind of plot."""
 
 import gc
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -81,13 +81,21 @@ class TimeFigure(NamedTuple):
 
 def draw_flight(flown: FigureSeries, plan: FlightPlan) -> list[Path]:
     """Draw all figures of a flight as PNG into the plan's folder; return their paths."""
+    paths = []
+    for name, figure in figures_of(flown, plan):
+        paths += write_figure(figure, plan.out / name)
+        del figure
+        gc.collect()  # a figure is a net of circles, and its pixels take more than all that it shows
+    return paths
+
+
+def figures_of(flown: FigureSeries, plan: FlightPlan) -> Iterator[tuple[str, Figure]]:
+    """Yield the name of each figure of a flight, and the figure, drawn when it is asked for."""
     flight = f"{shortened(plan.track_name)}, {plan.flown_by}"
-    paths = write_figure(draw_trajectory(flown.in_space(), f"{flight}: trajectory"), plan.out / "trajectory")
+    yield "trajectory", draw_trajectory(flown.in_space(), f"{flight}: trajectory")
     series = flown.over_time()
     for figure in flight_figures(series, plan):
-        gc.collect()  # a figure is a net of circles, and its pixels take more than all that it shows
-        paths += write_figure(draw_times(series, figure, f"{flight}: {figure.subject}"), plan.out / figure.name)
-    return paths
+        yield figure.name, draw_times(series, figure, f"{flight}: {figure.subject}")
 
 
 def flight_figures(series: Series, plan: FlightPlan) -> tuple[TimeFigure, ...]:

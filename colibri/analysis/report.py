@@ -93,15 +93,23 @@ def print_report(figures: Report, out: Path, *, flown_by: str | None = None) -> 
     from rich.markup import escape
     from rich.table import Table
 
+    title = escape(f"{figures['track']}, {flown_by or 'profile ' + figures['profile']}")
+    table = Table(title=title, show_header=False, title_justify="left")
+    for name, value in (report_rows(figures) | {"written to": str(out)}).items():
+        table.add_row(name, value)
+    Console().print(table)
+
+
+def report_rows(figures: Report) -> dict[str, str]:
+    """Return what of the report a person is shown, in words."""
+
     def times(name: str) -> str:
         return f"{figures[name]['p50']:.0f} / {figures[name]['p99']:.0f} µs"
 
     settled = figures["rmse_after_20s_m"]
     fallbacks = [f"{count} {name}" for name, count in figures["fallbacks"].items() if count]
-    title = escape(f"{figures['track']}, {flown_by or 'profile ' + figures['profile']}")
-    table = Table(title=title, show_header=False, title_justify="left")
     lost = {} if figures["lost"] is None else {f"lost at t = {figures['lost_at_s']:.2f} s": figures["lost"]}
-    rows = lost | {
+    return lost | {
         "position error, RMS": length(figures["rmse_m"]),
         f"position error, RMS after {SETTLED_AFTER_S:.0f} s": "-" if settled is None else length(settled),
         **_estimation_rows(figures),
@@ -115,11 +123,7 @@ def print_report(figures: Report, out: Path, *, flown_by: str | None = None) -> 
         "QPs not solved": f"{figures['qp_failures']}",
         "samples flown by a fallback": ", ".join(fallbacks) or "0",
         "trajectory": figures["trajectory_sha256"][:16],
-        "written to": str(out),
     }
-    for name, value in rows.items():
-        table.add_row(name, value)
-    Console().print(table)
 
 
 def _estimation_rows(figures: Report) -> dict[str, str]:

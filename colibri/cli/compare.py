@@ -2,8 +2,9 @@
 
 from argparse import ArgumentTypeError, Namespace
 
-from colibri.cli.shared.options import add_flight_options, add_out
+from colibri.cli.shared.options import add_out
 from colibri.common.process.arguments import ArgumentParser
+from colibri.experiments.options import add_flight_options
 
 
 def seeds(text: str) -> range:

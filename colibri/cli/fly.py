@@ -3,30 +3,16 @@
 from argparse import Namespace
 
 from colibri.analysis.limits import limit
-from colibri.cli.shared.options import add_flight_options, add_out, add_signing
-from colibri.common.process.arguments import ArgumentParser, speed
+from colibri.cli.shared.options import add_out, add_signing
+from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import loading
-
-TRACK_HELP = (
-    "the thesis's spiral, expanding-spiral, line, wave or crown; or, with options as KEY=VALUE[,KEY=VALUE...], "
-    "hover[:x=0,y=0,height=2,yaw=0], lemniscate[:size=4,height=3,lap=6,yaw=path|fixed], "
-    "circle[:radius=2,speed=2,height=2,yaw=path|fixed], waypoints:FILE[,speed=2|max,margin=0.1], "
-    "samples:FILE; m, s, degrees"
-)
+from colibri.experiments.options import add_plan_options
 
 
 def add_options(parser: ArgumentParser) -> None:
     """Add the options of `colibri fly`."""
+    add_plan_options(parser, link="udp")
     add = parser.add_argument
-    add("track", metavar="TRACK", help=TRACK_HELP)
-    add("--profile", default="flight", metavar="NAME", help="control profile name or .toml (default %(default)s)")
-    add("--controller", metavar="NAME", help="control law, also of another package (default: the profile's)")
-    add(
-        "--link",
-        default="udp",
-        choices=("udp", "memory", "direct"),
-        help="udp: two processes (default); memory: one process, same codec, same flight; direct: without the codec",
-    )
     add(
         "--gcs",
         action="append",
@@ -35,13 +21,6 @@ def add_options(parser: ArgumentParser) -> None:
         help="a ground station that may watch and command: udpout:, udpin:, tcp: or tcpin:HOST:PORT; may be repeated",
     )
     add_signing(add)
-    add(
-        "--speed",
-        type=speed,
-        metavar="N",
-        help="times real time, or max (default: max; 1 where a ground station is invited by --gcs)",
-    )
-    add_flight_options(parser)
     add_out(add, "out", "logs and figures")
     add(
         "--fail-above",

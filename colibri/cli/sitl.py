@@ -4,9 +4,10 @@ from argparse import Namespace
 from math import inf
 from pathlib import Path
 
-from colibri.cli.shared.options import add_feedback, add_signing
+from colibri.cli.shared.options import add_signing
 from colibri.common.earth.home import DEFAULT_HOME, home
 from colibri.common.process.arguments import ArgumentParser, natural, not_negative, positive, speed
+from colibri.experiments.options import add_feedback
 from colibri.plant.process.options import add_world_arguments
 
 
@@ -60,7 +61,7 @@ def add_options(parser: ArgumentParser) -> None:
     add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
     add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
     add_world_arguments(parser, start="standing at home")
-    add_feedback(add)
+    add_feedback(parser)
     add("--seed", type=natural, default=0, metavar="N", help="of everything random; each vehicle adds its number")
     add("--speed", type=speed, default=1.0, metavar="N", help="times real time, or max (default 1)")
     add("--duration", type=positive, default=inf, metavar="S", help="end after this simulated time (default: never)")

@@ -84,7 +84,7 @@ def put_together(plan: FlightPlan, clock: Clock) -> tuple[Autopilot, Plant]:
         ControllerError, ProfileError, SolverError: As `fly_locally`.
     """
     estimator = estimator_for(plan.feedback, plan.vehicle, DEFAULT_ORIGIN)
-    autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, clock, estimator=estimator)
+    autopilot = Autopilot(plan.profile, plan.vehicle, plan.track, clock, estimator=estimator, law=plan.law)
     integrator: Integrator = "rk4" if plan.integrator == "rk4" else "adaptive"
     starts = {plan.feedback: nudged(plan.start)}
     builder = PlantBuilder(plan, plan.plant_vehicle, starts, integrator=integrator)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.control.registry import Factory
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.autopilot.guidance.trajectories.planner import start_yaw
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, Track
@@ -84,6 +85,7 @@ class FlightPlan(WorldSetting):
         profile: The profile, with controller, solver and delay of the options.
         vehicle: The vehicle that the autopilot controls.
         plant_vehicle: The vehicle that the plant flies, its parts left out.
+        law: Makes the control law; None: as it is registered.
     """
 
     track_name: str
@@ -107,6 +109,7 @@ class FlightPlan(WorldSetting):
     profile: Profile
     vehicle: Vehicle
     plant_vehicle: Vehicle
+    law: Factory | None = None
 
     @classmethod
     def from_arguments(cls, args: argparse.Namespace) -> "FlightPlan":
@@ -130,7 +133,13 @@ class FlightPlan(WorldSetting):
 
     @classmethod
     def of_contents(
-        cls, args: argparse.Namespace, track_name: str, profile: Profile, vehicle: Vehicle, plant_vehicle: Vehicle
+        cls,
+        args: argparse.Namespace,
+        track_name: str,
+        profile: Profile,
+        vehicle: Vehicle,
+        plant_vehicle: Vehicle,
+        law: Factory | None = None,
     ) -> "FlightPlan":
         """Resolve a command line whose profile and vehicles were read already, its track being read by `track_name`.
 
@@ -174,6 +183,7 @@ class FlightPlan(WorldSetting):
             profile=profile,
             vehicle=vehicle,
             plant_vehicle=plant_vehicle,
+            law=law,
         )
 
     @classmethod

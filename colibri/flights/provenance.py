@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from colibri.autopilot.control.profile import Profile
-from colibri.autopilot.control.registry import Origin, origin_of
+from colibri.autopilot.control.registry import Origin, origin_of, origin_of_factory
 from colibri.autopilot.guidance.trajectories.loading import file_text, with_file
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import fail
@@ -106,7 +106,7 @@ def provenance_of(plan: FlightPlan) -> Provenance:
     contents: dict[str, Any] = {
         "options": options,
         "profile": plan.profile,
-        "law": origin_of(plan.profile.controller),
+        "law": origin_of_factory(plan.law) if plan.law else origin_of(plan.profile.controller),
         "vehicle": plan.vehicle,
         "plant_vehicle": plan.plant_vehicle,
         "track_file": file_text(plan.track_name),

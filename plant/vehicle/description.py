@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 import msgspec
 import numpy as np
 
-from colibri.common.config import NotNegative, Positive, Table, named_text, read_named, toml_names
+from colibri.common.config import NotNegative, Positive, Table, named_text, read_named, replaced, toml_names
 from colibri.common.elementary import square
 from colibri.common.types import Array, FourRotors
 from colibri.plant.errors import PlantError
@@ -185,6 +185,14 @@ class Vehicle(Table, frozen=True, kw_only=True):
         super().__post_init__()
         if self.hover_speed >= self.rotors.max_speed:
             raise ValueError(f"rotors.max_speed: hover needs {self.hover_speed:.0f} {self.rotors.speed_unit}")
+
+    def replace(self, key: str, value: Any) -> "Vehicle":
+        """Return the vehicle with another value at a dotted key, `body.mass_kg` say.
+
+        Raises:
+            VehicleError: There is no such key, or it cannot have this value.
+        """
+        return replaced(self, key, value, VehicleError)
 
     def without(self, parts: Iterable[str]) -> "Vehicle":
         """Return the vehicle with `parts` not modelled: of `rotor-lag`, `drag`, `ground`, `battery`.

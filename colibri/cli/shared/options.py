@@ -3,39 +3,6 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from colibri.autopilot.process.options import add_delay
-from colibri.common.process.arguments import ArgumentParser, natural, number, positive
-from colibri.mavlink.hil.feedback import Feedback, feedback
-from colibri.plant.process.options import add_world_arguments
-
-
-def add_feedback(add: Callable[..., object]) -> None:
-    """Add what the autopilot flies by."""
-    add(
-        "--feedback",
-        type=feedback,
-        default=Feedback.STATE,
-        metavar="state|sensors",
-        help="what the autopilot flies by: the true state (default), or what sensors measure",
-    )
-
-
-def add_flight_options(parser: ArgumentParser) -> None:
-    """Add what every command takes that flies: vehicles, solver, integrator, feedback, weather, chance, time."""
-    add = parser.add_argument
-    add("--seed", type=natural, default=0, metavar="N", help="seed of everything random (default %(default)s)")
-    add_feedback(add)
-    add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
-    add_delay(add)
-    add("--vehicle", metavar="NAME", help="vehicle name or .toml (default: the profile's)")
-    add("--plant-vehicle", metavar="NAME", help="another vehicle for the plant alone, to fly what was not planned for")
-    add("--floor", type=number, metavar="M", help="no track may lead below this height, m (default: the ground, 0)")
-    add("--integrator", choices=("rk4", "adaptive"), help="of the plant (default: the profile's)")
-    add_world_arguments(
-        parser, start="the profile's, and the track's first yaw", of_whom=" of the plant; the autopilot keeps its own"
-    )
-    add("--duration", type=positive, default=100.0, metavar="S", help="simulated time (default %(default)s)")
-
 
 def add_signing(add: Callable[..., object]) -> None:
     """Add the key of links, and leave to do without."""

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from colibri.autopilot.guidance.trajectories.registry import TrackError, track
 from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS, Track, position
-from colibri.cli.fly import TRACK_HELP
+from colibri.experiments.options import TRACK_HELP
 
 
 def test_the_five_of_the_thesis() -> None:

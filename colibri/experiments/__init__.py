@@ -1,0 +1,13 @@
+"""Flights from a script or a notebook: options as keywords, a flight as an object."""
+
+from typing import TYPE_CHECKING
+
+from colibri.common.lazy import public
+
+if TYPE_CHECKING:
+    from colibri.experiments.flight import Flight as Flight
+    from colibri.experiments.flight import fly as fly
+    from colibri.experiments.options import OptionError as OptionError
+    from colibri.experiments.table import Table as Table
+else:
+    __getattr__, __dir__ = public(__name__)

@@ -1,0 +1,41 @@
+"""Tables of a flight as NumPy has them: one structured array, a field a column."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from colibri.analysis.logs import read_blocks, read_columns
+from colibri.common.errors import Error
+
+
+class PandasError(Error):
+    """There is no pandas."""
+
+
+class Table(np.ndarray[Any, np.dtype[np.void]]):
+    """A structured array, (n,), of float64 by the names of its columns: `table["x"]`."""
+
+    def __getitem__(self, key: Any) -> Any:
+        """Return a column as an array of its own, and rows as a table."""
+        found = super().__getitem__(key)
+        return found.view(np.ndarray) if isinstance(found, Table) and found.dtype.names is None else found
+
+    def to_pandas(self) -> Any:
+        """Return the same as a pandas.DataFrame.
+
+        Raises:
+            PandasError: It is not installed.
+        """
+        try:
+            from pandas import DataFrame
+        except ImportError as error:
+            raise PandasError("to_pandas() needs pandas: pip install pandas") from error
+        return DataFrame({name: self[name] for name in self.dtype.names or ()})
+
+
+def read_table(path: Path) -> Table:
+    """Return the complete rows of a log."""
+    columns = read_columns(path)
+    rows = np.concatenate([np.empty((0, len(columns))), *read_blocks(path)])
+    return rows.view([(name, np.float64) for name in columns])[:, 0].view(Table)

@@ -1,0 +1,164 @@
+"""Flights from Python: the command's options as keywords, objects in place of names, and what a flight shows."""
+
+import gc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import colibri
+from colibri.analysis.recording import COLUMNS
+from colibri.cli.main import main
+
+HOVER = {"duration": 0.4, "start": {"x": 0.1, "z": 2.0}}
+
+
+class Hovers:
+    """A law that does nothing but carry the vehicle, `part` of it."""
+
+    control_interval_us = 10_000
+    preview = colibri.Preview(interval_us=10_000, samples=1)
+
+    def __init__(self, table: dict[str, float], vehicle: colibri.Vehicle, _clock: object) -> None:
+        self._speeds = np.full(4, vehicle.hover_speed * table.get("part", 1.0))
+
+    def initial(self, _rotor_speed: float) -> None:
+        return None
+
+    def step(self, _memory: None, _time_us: int, state: colibri.VehicleState, _references: object) -> Any:
+        return None, colibri.Decision(self._speeds, state.euler)
+
+
+@pytest.fixture(scope="module")
+def hover() -> colibri.Flight:
+    return colibri.fly("hover", **HOVER)
+
+
+def test_it_is_the_flight_of_the_command_line(hover: colibri.Flight, tmp_path: Path) -> None:
+    options = ["--duration", "0.4", "--start", "x=0.1,z=2", "--link", "memory", "--no-figures", "--quiet"]
+    assert main(["fly", "hover", *options, "--out", str(tmp_path)]) == 0
+    again = (tmp_path / "report.json").read_text(encoding="utf-8")
+    assert f'"{hover.sha256}"' in again
+    assert hover.lost is None
+
+
+def test_samples_and_frames_are_tables(hover: colibri.Flight) -> None:
+    assert hover.samples.dtype.names == COLUMNS
+    assert type(hover.samples["x"]) is np.ndarray
+    assert hover.samples["x"][0] == 0.1
+    assert hover.samples["t"] == pytest.approx(np.arange(51) * 0.008)
+    assert hover.frames["t"] == pytest.approx(np.arange(101) * 0.004)
+    assert hover.estimate is None
+
+
+def test_on_sensors_there_is_an_estimate() -> None:
+    flight = colibri.fly("hover", feedback="sensors", duration=1.5, seed=1)
+    assert flight.estimate is not None
+    assert flight.estimate["t"][-1] == pytest.approx(1.496)
+    assert flight.estimate["sd_z"].min() > 0.0
+
+
+def test_a_table_becomes_pandas_where_there_is_pandas(hover: colibri.Flight) -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = hover.samples.to_pandas()
+    assert isinstance(frame, pandas.DataFrame)
+    assert list(frame.columns) == list(COLUMNS)
+
+
+def test_without_pandas_one_line_says_so(hover: colibri.Flight, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
+    with pytest.raises(colibri.Error, match="pip install pandas"):
+        hover.samples.to_pandas()
+
+
+def test_nothing_stays_unless_it_is_saved(tmp_path: Path) -> None:
+    flight = colibri.fly("hover", duration=0.1)
+    folder = flight.plan.out
+    saved = flight.save(tmp_path / "kept")
+    assert {"flight.csv", "report.json", "flight.tlog", "provenance.json"} <= {path.name for path in saved.iterdir()}
+    with pytest.raises(colibri.Error, match="is not empty: choose another folder"):
+        flight.save(saved)
+    del flight
+    gc.collect()
+    assert not folder.exists()
+
+
+def test_profile_and_vehicles_are_changed_by_their_keys(hover: colibri.Flight) -> None:
+    heavier = colibri.load_vehicle("hummingbird").replace("body.mass_kg", 0.8)
+    profile = colibri.load_profile("flight").replace("controllers.whole-lpv-mpc.weights.rate", 0.02)
+    flight = colibri.fly("hover", profile=profile, plant_vehicle=heavier, **HOVER)
+    assert (flight.report["profile"], flight.plan.plant_vehicle.body.mass_kg) == ("flight*", 0.8)
+    assert flight.plan.vehicle.body.mass_kg == hover.plan.vehicle.body.mass_kg
+    assert flight.samples["z"][-1] < hover.samples["z"][-1] - 0.01
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("body.mas_kg", 1.0, "body.mas_kg: unknown key mas_kg: did you mean mass_kg?"),
+        ("body.mass_kg", -1.0, "body.mass_kg: Expected `float` > 0.0"),
+        ("body.inertia_kg_m2", [1.0, 1.0, 9.0], "body: inertia_kg_m2: no body has one moment of inertia above"),
+        ("rotors.speed_unit", "deg/s", "choose rad/s, rpm"),
+        ("wings", 2, "wings: unknown key wings: keys are"),
+    ],
+)
+def test_a_change_is_checked_as_a_file_is(key: str, value: Any, said: str) -> None:
+    with pytest.raises(colibri.Error) as refused:
+        colibri.load_vehicle("hummingbird").replace(key, value)
+    assert said in str(refused.value)
+
+
+def test_a_frame_interval_must_still_divide_the_control_interval() -> None:
+    with pytest.raises(colibri.Error, match="does not divide the control interval"):
+        colibri.load_profile("flight").replace("simulation.frame_interval_s", 0.003)
+
+
+def test_a_class_flies_without_an_entry_point() -> None:
+    profile = colibri.load_profile("flight").replace("controllers.Hovers", {"part": 0.5})
+    flight = colibri.fly("hover", profile=profile, controller=Hovers, **HOVER)
+    assert flight.report["controller"] == "Hovers"
+    assert flight.samples["omega1"][-1] == pytest.approx(0.5 * flight.plan.vehicle.hover_speed, rel=0.01)
+    kept = (flight.plan.out / "provenance.json").read_text(encoding="utf-8")
+    assert f'"{__name__}:Hovers"' in kept
+
+
+def test_what_it_raises_in_flight_is_raised_here() -> None:
+    class Fails(Hovers):
+        def step(self, *_: Any) -> Any:
+            raise ZeroDivisionError("by zero")
+
+    with pytest.raises(colibri.Error, match=r"controller Fails raised at t = 0\.000 s: ZeroDivisionError: by zero"):
+        colibri.fly("hover", controller=Fails, duration=0.1)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"durations": 22}, "unknown option durations: did you mean duration?"),
+        ({"colour": "red"}, "unknown option colour: choose controller, delay, duration"),
+        ({"wind": "much"}, "argument --wind: must be SPEED@FROM in m/s and degrees, 5@270 say, not much"),
+        ({"duration": -1}, "argument --duration: must be above zero, not -1"),
+        ({"start": {"height": 2.0}}, "argument --start: unknown key height: choose x, y, z"),
+        ({"profile": "fligt"}, "unknown profile fligt: choose flight, path"),
+        ({"vehicle": 3}, "expected a Vehicle or its name, not int"),
+        ({"controller": "their-law"}, "unknown controller their-law: installed are"),
+        ({"controller": Hovers, "link": "udp"}, "controller: over udp two processes fly"),
+    ],
+)
+def test_bad_options_are_refused_in_one_line(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(colibri.Error) as refused:
+        colibri.fly("hover", **options)
+    assert str(refused.value).startswith(said)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_figure_is_matplotlibs_and_a_notebook_shows_table_and_figure(hover: colibri.Flight) -> None:
+    (axes, *_) = hover.plot("position").axes
+    shown = [np.asarray(line.get_xdata()) for line in axes.lines]
+    assert any(np.array_equal(t, hover.samples["t"]) for t in shown)
+    with pytest.raises(colibri.Error, match="unknown figure speed: choose trajectory, position, attitude"):
+        hover.plot("speed")
+    page = hover._repr_html_()
+    assert "position error, RMS" in page
+    assert '<img src="data:image/png;base64,iVBOR' in page
