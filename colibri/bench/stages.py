@@ -93,7 +93,7 @@ def measured_flight(profile: Profile, folder: Path, duration_s: float) -> Flight
     every = max(1, round(duration_s * 1e6 / _control_interval_us(profile) / _QPS))
     seen, flying = 0, False
 
-    def keep_qp(_result: Any, qp: Qp, *_: Any) -> None:
+    def keep_qp(_result: Any, _kind: Any, qp: Qp, *_: Any) -> None:
         nonlocal seen
         if seen % every == 0:
             flight.qps.append(deepcopy(qp))
