@@ -11,6 +11,7 @@ from colibri.common.types import Array
 
 BLOCK_BYTES = 1 << 18
 """Of text: some seconds of a flight."""
+_AT_ONCE = 4096
 
 
 def read_columns(path: Path) -> list[str]:
@@ -43,14 +44,18 @@ def read_series(path: Path, *columns: int) -> list[Array]:
         rows = [line.split(b",", max(columns) + 1) for line in lines]
         for numbers, column in zip(series, columns, strict=True):
             numbers.extend([float(row[column]) for row in rows])
-    return [np.array(numbers) for numbers in series]
+    return [np.frombuffer(numbers) for numbers in series]
 
 
 def at_times(times_s: Array, instants_s: Array) -> NDArray[np.bool_]:
     """Return which of some times (n,) are, to the microsecond, among instants that are in their order, (n,)."""
-    instants_us = np.append(np.round(instants_s * 1e6), np.nan)
-    times_us = np.round(times_s * 1e6)
-    found: NDArray[np.bool_] = instants_us[np.searchsorted(instants_us[:-1], times_us)] == times_us
+    instants_us = np.append(instants_s, np.nan)
+    np.round(np.multiply(instants_us, 1e6, out=instants_us), out=instants_us)
+    found = np.empty(len(times_s), dtype=np.bool_)
+    for first in range(0, len(times_s), _AT_ONCE):
+        times_us = np.round(times_s[first : first + _AT_ONCE] * 1e6)
+        at = np.searchsorted(instants_us[:-1], times_us)
+        found[first : first + _AT_ONCE] = instants_us[at] == times_us
     return found
 
 

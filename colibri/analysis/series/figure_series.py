@@ -66,8 +66,7 @@ class FigureSeries:
         errors, m, and `distance` their norm; `rms` is its RMS once settled, not a number before; `idle` and `fastest`
         are the limits of the rotors.
         """
-        rows = np.concatenate([*self._start, self._later.points(), self._newest[-1:]])
-        series = dict(zip(_NAMES, np.ascontiguousarray(rows.T), strict=True))
+        series = _columns(_NAMES, [*self._start, *self._later.points(), self._newest[-1:]])
         t = series["t"]
         rms = np.sqrt(self._squares_m2 / self._settled) if t[-1] > SETTLED_AFTER_S else np.nan
         return series | {
@@ -78,12 +77,17 @@ class FigureSeries:
 
     def in_space(self) -> Series:
         """Return position and reference, of the same instants, without these."""
-        return dict(zip((*POSITION, *POSITION_REFERENCE), self._path.points().T, strict=True))
+        return _columns((*POSITION, *POSITION_REFERENCE), self._path.points())
 
     def _keep(self, rows: Array) -> None:
         later = rows[:, _T] > START_S
         self._start.append(rows[~later])
         self._later.add(rows[later])
+
+
+def _columns(names: tuple[str, ...], parts: list[Array]) -> Series:
+    """Return the columns of what is in parts, each for itself: all at once would be in memory twice."""
+    return {name: np.concatenate([part[:, column] for part in parts]) for column, name in enumerate(names)}
 
 
 def _rows(part: Samples) -> Array:

@@ -4,6 +4,8 @@ import numpy as np
 
 from colibri.common.types import Array
 
+_AT_ONCE = 1024
+
 
 class Extremes:
     """Rows over time, of which the least and the largest in equal spans stay, once there are too many of them.
@@ -31,15 +33,17 @@ class Extremes:
             self._points[self._count : self._count + 2 * spans] = _extremes(taken, self._span)
             self._count += 2 * spans
 
-    def points(self) -> Array:
-        """Return what is kept, (k, columns): all rows, or two points a span."""
+    def points(self) -> list[Array]:
+        """Return what is kept, parts of (k, columns): all rows, or two points a span."""
         rest = _extremes(self._rest, len(self._rest)) if len(self._rest) > 1 else self._rest
-        return np.concatenate([self._points[: self._count], rest])
+        return [self._points[: self._count], rest]
 
     def _halve(self) -> None:
-        """Make one span of every two."""
+        """Make one span of every two, some at a time: what that takes for a moment is several times the points."""
+        for first in range(0, self._count, _AT_ONCE):
+            points = self._points[first : first + _AT_ONCE]
+            self._points[first // 2 : (first + len(points)) // 2] = _extremes(points, 4)
         self._count //= 2
-        self._points[: self._count] = _extremes(self._points, 4)
         self._span *= 2
 
 
@@ -65,10 +69,10 @@ class EveryNth:
             self._count = len(self._kept[0])
             self._step *= 2
 
-    def points(self) -> Array:
-        """Return what is kept, (k, columns)."""
+    def points(self) -> list[Array]:
+        """Return what is kept, parts of (k, columns)."""
         is_kept = (self._seen - 1) % self._step == 0
-        return np.concatenate([*self._kept, self._last[: 0 if is_kept else 1]])
+        return [*self._kept, self._last[: 0 if is_kept else 1]]
 
 
 def _extremes(rows: Array, span: int) -> Array:

@@ -24,7 +24,7 @@ from colibri.mavlink.hil.feedback import Feedback
 
 ONE_ROW, SOME_ROWS, ALL_ROWS = 50, 10_000, 1 << 30
 SUMMARY = Summary(1.0, 1, 0)
-MAX_BYTES_A_SAMPLE = 120
+MAX_BYTES_A_SAMPLE = 100
 """A row of the table alone has 216, and its text 500."""
 
 

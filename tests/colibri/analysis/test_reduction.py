@@ -32,7 +32,7 @@ def reduced(kind: Any, rows: Array, most: int, part: int) -> Array:
     series = kind(rows.shape[1], most)
     for first in range(0, len(rows), part):
         series.add(rows[first : first + part])
-    points: Array = series.points()
+    points: Array = np.concatenate(series.points())
     return points
 
 
