@@ -22,10 +22,13 @@ def residual(
         lower: (n,), or (0,) for no bounds.
         upper: (n,), or (0,) for no bounds.
         x: The solution, (n,).
-        z: Multipliers of G x <= h, (m,), or (0,) where the solver gives none: then only feasibility counts.
+        z: Multipliers of G x <= h, (m,), or (0,) where the solver gives none.
         z_box: Multipliers of the bounds, (n,), negative at a lower one; or (0,).
+
+    Where there are not as many multipliers as constraints, only feasibility counts.
     """
     n, m = G.shape[1], G.shape[0]
+    has_multipliers = z.shape[0] == m and z_box.shape[0] >= lower.shape[0]
     missed, scale, total = 0.0, 1.0, 0.0
     gradient = f.copy()
     for i in range(n):
@@ -42,10 +45,10 @@ def residual(
         for k in range(n):
             excess += G[row, k] * x[k]
         missed = max(missed, excess)
-        if z.shape[0] > 0 and z[row] != 0.0:
+        if has_multipliers and z[row] != 0.0:
             for k in range(n):
                 gradient[k] += z[row] * G[row, k]
-    if z.shape[0] > 0:
+    if has_multipliers:
         for i in range(n):
             total += gradient[i]
             missed = max(missed, abs(gradient[i]) / scale)

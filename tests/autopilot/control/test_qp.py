@@ -1,5 +1,6 @@
 """QPs: optimal by the KKT conditions with every installed solver, and never an exception."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,11 @@ def random_qp(seed: int, n: int) -> tuple[Array, Array]:
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(n, n))
     return root @ root.T + np.eye(n), 5.0 * rng.normal(size=n)
+
+
+def bounded(H: Array, f: Array, bound: float) -> Qp:
+    n = len(f)
+    return Qp(H, f, np.empty((0, n)), np.empty(0), np.full(n, -bound), np.full(n, bound))
 
 
 def in_a_box(H: Array, f: Array, bound: float) -> Qp:
@@ -61,6 +67,17 @@ def test_daqp_by_itself_gives_the_bits_that_it_gives_through_qpsolvers(*, bounde
         assert result.x.tobytes() == solution.x.tobytes()
 
 
+@pytest.mark.parametrize("name", installed_solvers())
+def test_bounds_alone(name: str) -> None:
+    """No row: the point that is optimal by the gradient, which a bound's multiplier takes up."""
+    for seed in range(5):
+        H, f = random_qp(seed, 12)
+        status, x = QpSolver(name, TOLERANCE).solve(bounded(H, f, 0.05))
+        assert status is QpStatus.SOLVED
+        assert x is not None
+        assert np.clip(x - (H @ x + f), -0.05, 0.05) == pytest.approx(x, abs=1e-6)
+
+
 def test_the_extra_and_the_profiles_solvers_are_installed() -> None:
     assert {*IN_SOLVERS_EXTRA, "clarabel", "daqp"} <= set(installed_solvers())
 
@@ -76,8 +93,11 @@ def test_too_few_iterations_are_a_time_out(name: str) -> None:
     assert QpSolver(name, TOLERANCE, max_iterations=2).solve(qp) == (QpStatus.TIME_OUT, None)
 
 
+@pytest.mark.parametrize("limited", [in_a_box, bounded])
 @pytest.mark.parametrize("off", [1e-3, np.nan, np.inf])
-def test_a_solution_that_is_none_is_not_accurate(monkeypatch: pytest.MonkeyPatch, off: float) -> None:
+def test_a_solution_that_is_none_is_not_accurate(
+    monkeypatch: pytest.MonkeyPatch, off: float, limited: Callable[[Array, Array, float], Qp]
+) -> None:
     solve_problem = qpsolvers.solve_problem
 
     def sloppy(*args: Any, **options: Any) -> Any:
@@ -85,7 +105,7 @@ def test_a_solution_that_is_none_is_not_accurate(monkeypatch: pytest.MonkeyPatch
         solution.x = solution.x + off * np.eye(12)[3]
         return solution
 
-    qp = in_a_box(*random_qp(0, 12), 100.0)
+    qp = limited(*random_qp(0, 12), 100.0)
     assert QpSolver("quadprog", TOLERANCE).solve(qp).status is QpStatus.SOLVED
     monkeypatch.setattr(qpsolvers, "solve_problem", sloppy)
     assert QpSolver("quadprog", TOLERANCE).solve(qp) == (QpStatus.NOT_ACCURATE, None)
