@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from colibri.autopilot import load_profile as load_profile
     from colibri.autopilot import track as track
     from colibri.autopilot import track_names as track_names
+    from colibri.campaigns import CampaignError as CampaignError
+    from colibri.campaigns import CampaignResults as CampaignResults
+    from colibri.campaigns import campaign as campaign
     from colibri.common import Error as Error
     from colibri.common import InFlightError as InFlightError
     from colibri.common import Table as Table

@@ -120,25 +120,54 @@ def read_settings(table: Mapping[str, Any], kind: type[T]) -> T:
 def replaced(table: T, key: str, value: Any, error: type[Error]) -> T:
     """Return a structure with another value at a dotted key, `body.mass_kg` say, checked as strictly as a file.
 
+    A number in a key is a place in a list: `rotors.strength.0`.
+
     Raises:
         error: There is no such key, or it cannot have this value; names the key.
     """
-    tree = msgspec.to_builtins(table)
-    *tables, last = key.split(".")
-    found, above = tree, ""
-    for name in (*tables, last):
-        choices = list(found) if isinstance(found, dict) else []
-        if name not in choices:
-            near = get_close_matches(name, choices, 1)
-            of = f" of {above}" if above else ""
-            hint = f"did you mean {near[0]}?" if near else f"keys{of} are {', '.join(choices) or 'none'}"
-            raise error(f"{key}: unknown key {name}: {hint}")
-        parent, found, above = found, found[name], f"{above}.{name}".lstrip(".")
+    tree = _tree(table)
+    parent, last = _place(tree, key, error)
     parent[last] = value
     try:
         return msgspec.convert(tree, type=type(table))
     except msgspec.ValidationError as reason:
         raise error(_in_words(reason, type(table))) from reason
+
+
+def value_at(table: object, key: str, error: type[Error]) -> Any:
+    """Return what a structure has at a dotted key, as a file would have it.
+
+    Raises:
+        error: There is no such key.
+    """
+    parent, last = _place(_tree(table), key, error)
+    return parent[last]
+
+
+def _tree(table: object) -> Any:
+    """Return a structure as tables and lists that can be changed."""
+    return msgspec.msgpack.decode(msgspec.msgpack.encode(table))
+
+
+def _place(tree: Any, key: str, error: type[Error]) -> tuple[Any, Any]:
+    """Return the table or list of `tree` that has what a dotted key names, and its key or place there.
+
+    Raises:
+        error: There is no such key.
+    """
+    parent: Any = tree
+    last: Any = ""
+    found, above = tree, ""
+    for name in key.split("."):
+        places = found if isinstance(found, dict) else dict(enumerate(found)) if isinstance(found, list) else {}
+        choices = {str(place): place for place in places}
+        if name not in choices:
+            near = get_close_matches(name, choices, 1)
+            of = f" of {above}" if above else ""
+            hint = f"did you mean {near[0]}?" if near else f"keys{of} are {', '.join(choices) or 'none'}"
+            raise error(f"{key}: unknown key {name}: {hint}")
+        parent, found, above, last = found, places[choices[name]], f"{above}.{name}".lstrip("."), choices[name]
+    return parent, last
 
 
 def _in_words(reason: msgspec.ValidationError, kind: Any) -> str:

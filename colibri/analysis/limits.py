@@ -11,7 +11,7 @@ KEYS = (
     *(RMSE, "max_error_after_20s_m", "rmse_m", "max_error_m", "control_rmse_m"),
     *("estimation_rmse_m.horizontal", "estimation_rmse_m.vertical"),
     *("attitude_rmse_deg.roll", "attitude_rmse_deg.pitch", "attitude_rmse_deg.yaw", "nees_mean"),
-    *("ground_contact_s", "effort_n_m", "max_slack", "qp_failures", "fallbacks", "resent"),
+    *("max_tilt_deg", "ground_contact_s", "effort_n_m", "max_slack", "qp_failures", "fallbacks", "resent"),
     *("solve_time_us.p50", "solve_time_us.p99", "control_step_us.p50", "control_step_us.p99"),
 )
 """Numbers of `report.json` that may have a limit, a table before the dot; `fallbacks` is the sum of them."""
@@ -39,13 +39,17 @@ def exceeded(limits: Iterable[Limit], report: Mapping[str, Any]) -> list[str]:
     """Return in words each limit that a report exceeds, or of which it knows nothing."""
     found = []
     for key, value in limits:
-        flown: Any = report
-        for part in key.split("."):
-            flown = None if flown is None else flown[part]
-        if isinstance(flown, dict):
-            flown = sum(flown.values())
+        flown = of_report(report, key)
         if flown is None:
             found.append(f"{key} is not known of this flight, and shall not be above {value:g}")
         elif not flown <= value:
             found.append(f"{key} is {flown:.4g}, above {value:g}")
     return found
+
+
+def of_report(report: Mapping[str, Any], key: str) -> Any:
+    """Return the number of a report that a key names, a table before its dot, of a table their sum; None for none."""
+    found: Any = report
+    for part in key.split("."):
+        found = None if found is None else found[part]
+    return sum(found.values()) if isinstance(found, dict) else found

@@ -1,6 +1,7 @@
 """How well a flight went: `report.json`, and the table that a person reads."""
 
 import json
+from math import degrees
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -13,6 +14,7 @@ from colibri.analysis.recording import SETTLED_AFTER_S
 from colibri.analysis.series.flight_series import FlightSeries
 from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Fallback
 from colibri.autopilot.control.qp import QpStatus
+from colibri.common.elementary import acos
 from colibri.common.types import Array
 from colibri.flights.plan import FlightPlan, Summary
 from colibri.mavlink.hil.feedback import Feedback
@@ -60,6 +62,7 @@ def report(plan: FlightPlan, summary: Summary | None, flight: FlightSeries, lost
         "rmse_after_20s_m": rms(settled) if len(settled) else None,
         "max_error_after_20s_m": float(settled.max()) if len(settled) else None,
         **_estimation_figures(plan, settled),
+        "max_tilt_deg": degrees(acos(max(-1.0, min(1.0, float(flight.upright.min()))))),
         "effort_n_m": rms(flight.moment_n_m),
         "solve_time_us": _quantiles(flight.solve_time_us),
         "control_step_us": _quantiles(flight.control_step_us),

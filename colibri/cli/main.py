@@ -30,6 +30,7 @@ SUBCOMMANDS = {
     "sitl": "stand ready for ground stations: QGroundControl, MAVSDK, MAVProxy",
     "figures": "fly all that the thesis shows and draw its figures",
     "compare": "fly several controllers on several tracks, side by side",
+    "campaign": "fly every combination of factors, by many seeds, into one table",
     "study": "fly what shows how far profile flight reaches, and draw it",
     "certify": "prove what can be proven of a profile's attitude law",
     "bench": "measure how fast it flies",

@@ -28,7 +28,7 @@ from colibri.plant.vehicle.description import Vehicle, load_vehicle
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_BY_NAME = ("profile", "vehicle", "plant_vehicle", "controller")
+BY_NAME = ("profile", "vehicle", "plant_vehicle", "controller", "wind")
 """Options whose value may be an object in place of the name that the command line has."""
 
 T = TypeVar("T", Profile, Vehicle)
@@ -149,7 +149,7 @@ def plan_of(track: str, options: Mapping[str, Any], out: Path) -> FlightPlan:
     Raises:
         Error: There is no such option, or what it names cannot be flown.
     """
-    objects = {name: options[name] for name in _BY_NAME if not isinstance(options.get(name), str | None)}
+    objects = {name: options[name] for name in BY_NAME if not isinstance(options.get(name), str | None)}
     args = read_keywords(track, {name: value for name, value in options.items() if name not in objects})
     if objects and args.link == "udp":
         raise OptionError(
@@ -157,6 +157,7 @@ def plan_of(track: str, options: Mapping[str, Any], out: Path) -> FlightPlan:
         )
     law: Factory | None = objects.get("controller")
     args.controller = law_name(law) if law else args.controller
+    args.wind = objects.get("wind", args.wind)
     profile = _loaded(objects.get("profile"), args.profile, Profile, load_profile)
     profile = profile.with_choices(args.controller, args.solver, delay_s(args.delay))
     named = args.vehicle or profile.simulation.vehicle

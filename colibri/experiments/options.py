@@ -3,6 +3,7 @@
 from argparse import Namespace
 from collections.abc import Mapping
 from difflib import get_close_matches
+from functools import cache
 from typing import Any, NoReturn
 
 from colibri.autopilot.process.options import add_delay
@@ -76,6 +77,11 @@ def add_plan_options(parser: ArgumentParser, link: str) -> None:
     add_flight_options(parser)
 
 
+def option_names() -> list[str]:
+    """Return the names of the options of a flight, in alphabetical order; its track is one."""
+    return sorted(_defaults("spiral"))
+
+
 def read_keywords(track: str, keywords: Mapping[str, Any]) -> Namespace:
     """Return what the command line would read of the same options; in memory unless a link is named.
 
@@ -84,11 +90,20 @@ def read_keywords(track: str, keywords: Mapping[str, Any]) -> Namespace:
     Raises:
         OptionError: There is no such option, or it does not take this value.
     """
-    parser = _Keywords(prog="colibri.fly", add_help=False, allow_abbrev=False)
-    add_plan_options(parser, link="memory")
-    defaults = vars(parser.parse_args([track]))
+    defaults = _defaults(track)
     for name in keywords.keys() - defaults.keys():
         near = get_close_matches(name, defaults, 1)
         hint = f"did you mean {near[0]}?" if near else f"choose {', '.join(sorted(defaults.keys() - {'track'}))}"
         raise OptionError(f"unknown option {name}: {hint}")
-    return parser.parse_args([*options_of(**keywords), "--", track])
+    return _parser().parse_args([*options_of(**keywords), "--", track])
+
+
+def _defaults(track: str) -> dict[str, Any]:
+    return vars(_parser().parse_args(["--", track]))
+
+
+@cache
+def _parser() -> _Keywords:
+    parser = _Keywords(prog="colibri.fly", add_help=False, allow_abbrev=False)
+    add_plan_options(parser, link="memory")
+    return parser

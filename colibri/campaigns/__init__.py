@@ -1,0 +1,12 @@
+"""Flights by the thousand: which, flown by any engine, kept as they end, tabled and drawn."""
+
+from typing import TYPE_CHECKING
+
+from colibri.common.lazy import public
+
+if TYPE_CHECKING:
+    from colibri.campaigns.results import CampaignResults as CampaignResults
+    from colibri.campaigns.run import campaign as campaign
+    from colibri.campaigns.values import CampaignError as CampaignError
+else:
+    __getattr__, __dir__ = public(__name__)

@@ -1,0 +1,185 @@
+"""A campaign as data: what every flight has in common, what differs, by which seeds, and what is kept."""
+
+from collections.abc import Iterator, Mapping
+from itertools import islice, product
+from math import prod
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import msgspec
+from numpy.random import PCG64, Generator, SeedSequence
+
+from colibri.campaigns.factors import factor_name
+from colibri.campaigns.metrics import Metric, read_metrics, usual
+from colibri.campaigns.values import CampaignError, Draw, read_draw, read_values
+from colibri.common.config import read_toml
+from colibri.mavlink.hil.feedback import Feedback
+
+Logs: TypeAlias = Literal["none", "lost", "all"]
+OF_ALL = ("link",)
+"""Options that every flight of a campaign has alike."""
+_MAX_SEED = 2**63
+
+
+class CampaignTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What is in the file of a campaign; `colibri.campaign` has the same by keywords.
+
+    Attributes:
+        name: In titles.
+        seeds: Of everything random in a flight: one, several, or `1-20`; every combination is flown by each.
+        root_seed: Of the draws.
+        paired: Whether flights of the same seed have the same draws in every combination of the grid.
+        metrics: What is kept of each flight; None for the usual.
+        logs: Of which flights the logs are kept.
+        fly: Options of `colibri fly` that every flight has.
+        grid: Factors with several values; every combination is flown.
+        draw: Factors that are drawn anew for each flight.
+    """
+
+    name: str = "campaign"
+    seeds: Any = "0"
+    root_seed: int = 0
+    paired: bool = False
+    metrics: Any = None
+    logs: Logs = "none"
+    fly: dict[str, Any] = {}
+    grid: dict[str, Any] = {}
+    draw: dict[str, Any] = {}
+
+
+class Point(NamedTuple):
+    """One flight of a campaign.
+
+    Attributes:
+        flight: Its number, which is its place in the table.
+        seed: Of everything random.
+        factors: What differs from flight to flight, by name.
+    """
+
+    flight: int
+    seed: int
+    factors: dict[str, Any]
+
+
+class Campaign(NamedTuple):
+    """A campaign, read and checked for what can be checked without flying; attributes as of `CampaignTables`."""
+
+    name: str
+    seeds: tuple[int, ...]
+    root_seed: int
+    paired: bool
+    metrics: tuple[Metric, ...]
+    logs: Logs
+    fly: dict[str, Any]
+    grid: dict[str, tuple[Any, ...]]
+    draw: dict[str, Draw]
+
+    @property
+    def flights(self) -> int:
+        """How many flights it has."""
+        return len(self.seeds) * self.combinations
+
+    @property
+    def combinations(self) -> int:
+        """How many combinations its grid has."""
+        return prod(map(len, self.grid.values()))
+
+    @property
+    def factors(self) -> tuple[str, ...]:
+        """Names of what differs from flight to flight."""
+        return (*self.grid, *self.draw)
+
+    def points(self) -> Iterator[Point]:
+        """Return its flights: combination by combination, each by every seed."""
+        flight = 0
+        for values in product(*self.grid.values()):
+            combination = dict(zip(self.grid, values, strict=True))
+            for place, seed in enumerate(self.seeds):
+                yield Point(flight, seed, combination | self._drawn(place if self.paired else flight))
+                flight += 1
+
+    def samples(self) -> Iterator[Point]:
+        """Return flights in which each value of each factor is there once, with the first of the others."""
+        first = next(self.points())
+        yield first
+        for factor, values in self.grid.items():
+            ends = values if isinstance(values[0], str) else (values[0], values[-1])
+            for value in islice(ends, 1, None):
+                yield first._replace(factors=first.factors | {factor: value})
+        for factor, draw in self.draw.items():
+            for value in draw.typical:
+                yield first._replace(factors=first.factors | {factor: value})
+
+    def _drawn(self, stream: int) -> dict[str, Any]:
+        """Return what is drawn for a flight, each from the flight's own stream, in the order of the factors."""
+        if not self.draw:
+            return {}
+        chance = Generator(PCG64(SeedSequence(self.root_seed, spawn_key=(stream,))))
+        return {factor: draw.value(chance) for factor, draw in self.draw.items()}
+
+
+def read_campaign(path: Path) -> CampaignTables:
+    """Read the file of a campaign.
+
+    Raises:
+        CampaignError: It cannot be read, or has an unknown or impossible key.
+    """
+    tables = read_toml(path, CampaignTables, CampaignError)
+    return tables if tables.name != "campaign" else msgspec.structs.replace(tables, name=path.stem)
+
+
+def campaign_of(tables: CampaignTables) -> Campaign:
+    """Return the campaign of its tables.
+
+    Raises:
+        CampaignError: A factor or a metric that there is not, or a range that is none.
+    """
+    fly, grid, draw = _named(tables.fly, *OF_ALL), _named(tables.grid), _named(tables.draw)
+    twice = next((name for name in (*grid, *draw) if [*fly, *grid, *draw].count(name) > 1), None)
+    if twice is not None:
+        raise CampaignError(f"{twice} is said twice: keep it in one of fly, grid and draw")
+    if "track" not in (*fly, *grid, *draw):
+        raise CampaignError('no track: say which is flown, track = ["spiral"] in grid say')
+    if tables.root_seed < 0:
+        raise CampaignError(f"root_seed: must not be below zero, not {tables.root_seed}")
+    sensors = Feedback.SENSORS in map(str, (fly.get("feedback", ""), *_listed(grid.get("feedback", ""))))
+    return Campaign(
+        name=tables.name,
+        seeds=read_seeds(tables.seeds),
+        root_seed=tables.root_seed,
+        paired=tables.paired,
+        metrics=usual(sensors=sensors) if tables.metrics is None else read_metrics(tables.metrics),
+        logs=tables.logs,
+        fly=fly,
+        grid={name: read_values(name, values) for name, values in grid.items()},
+        draw={name: read_draw(name, given) for name, given in draw.items()},
+    )
+
+
+def read_seeds(given: Any) -> tuple[int, ...]:
+    """Return seeds by one, several, or `FIRST-LAST`.
+
+    Raises:
+        CampaignError: They are none.
+    """
+    first, dash, last = str(given).partition("-")
+    try:
+        if isinstance(given, str) and dash:
+            seeds = tuple(range(int(first), int(last) + 1))
+        else:
+            seeds = tuple(given) if isinstance(given, list | tuple | range) else (int(given),)
+    except ValueError:
+        seeds = ()
+    right = all(isinstance(seed, int) and 0 <= seed < _MAX_SEED for seed in seeds)
+    if not seeds or not right or len(set(seeds)) < len(seeds):
+        raise CampaignError(f"seeds: expected 1-20, a seed, or several different ones, not {given}")
+    return seeds
+
+
+def _named(given: Mapping[str, Any], *others: str) -> dict[str, Any]:
+    """Return factors, and `others` that are none, by their names in tables."""
+    return {name if name in others else factor_name(name): value for name, value in given.items()}
+
+
+def _listed(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, list | tuple) else [value]

@@ -1,0 +1,131 @@
+"""The engine of a cluster: Dask distributed, whose workers come and go."""
+
+from collections.abc import Callable, Generator, Iterable, Iterator
+from importlib.metadata import PackageNotFoundError, version
+from itertools import islice
+from time import perf_counter
+from typing import Any
+
+import cloudpickle
+
+from colibri.campaigns.engines.engine import Job, Killed, Result
+from colibri.campaigns.values import CampaignError
+
+_PACKAGE = "colibri-sitl"
+_CONNECT_S = 10.0
+_AHEAD = 3
+"""So many batches a core are handed out, so that none waits for the scheduler."""
+_BATCH_S = 2.0
+"""A batch takes about so long: below a second, the scheduler's 200 µs or so a task would begin to count."""
+_MAX_BATCH = 500
+
+
+class Cluster:
+    """A cluster of Dask.
+
+    A job whose worker goes is done by another. One that several workers went with is done alone, and given up if it
+    takes several more with it.
+    """
+
+    def __init__(self, client_or_address: Any, *, batch: int | None = None) -> None:
+        """Use a `distributed.Client`, or the scheduler at an address; `batch` jobs a task, None: by how long they take.
+
+        Raises:
+            CampaignError: Dask is not installed, the scheduler cannot be reached, or its workers have another colibri.
+        """
+        try:
+            from distributed import Client
+        except ImportError as error:
+            raise CampaignError(f"Dask is not installed: pip install {_PACKAGE}[campaign]") from error
+        self._batch = batch
+        self._ours = isinstance(client_or_address, str)
+        try:
+            self._client = Client(client_or_address, timeout=_CONNECT_S) if self._ours else client_or_address
+        except (OSError, ValueError) as error:  # a timeout is an OSError
+            words = " ".join(str(error).split()) or type(error).__name__
+            raise CampaignError(f"--dask {client_or_address}: no scheduler answers there: {words}") from error
+        found = self._client.run(_version)
+        others = sorted({f"{has or 'none'}" for has in found.values()} - {version(_PACKAGE)})
+        if others:
+            self.close()
+            raise CampaignError(f"--dask: workers have colibri {', '.join(others)}, this is {version(_PACKAGE)}")
+
+    def close(self) -> None:
+        """Leave the cluster, if it was not entered by somebody else."""
+        if self._ours:
+            self._client.close()
+
+    def each(
+        self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
+    ) -> Generator[tuple[Job, Result | Killed], None, None]:
+        """Return each job with its result, as they end; see `Engine`."""
+        from distributed import as_completed
+        from distributed.scheduler import KilledWorker
+
+        client = self._client
+        # A task, not data that is spread: whoever has it may go, and it is made again.
+        given = client.submit(cloudpickle.loads, cloudpickle.dumps((work, common)), pure=False)
+        left = iter(jobs)
+        waiting: dict[Any, list[Job]] = {}
+        ended = as_completed(with_results=False)
+        size = self._batch or 1
+        try:
+            while True:
+                for batch in self._batches(left, size, len(waiting)):
+                    self._hand_out(given, batch, waiting, ended)
+                if not waiting:
+                    return
+                future = next(ended)
+                batch = waiting.pop(future)
+                error = future.exception()
+                if isinstance(error, KilledWorker):
+                    if len(batch) == 1:
+                        yield batch[0], Killed()
+                    else:
+                        for job in batch:
+                            self._hand_out(given, [job], waiting, ended)
+                    continue
+                took_s, results = future.result()
+                if self._batch is None:
+                    size = max(1, min(_MAX_BATCH, round(_BATCH_S * len(batch) / max(took_s, 1e-6))))
+                del future
+                yield from zip(batch, results, strict=True)
+        finally:
+            client.cancel([given, *waiting], force=True)
+            self.close()
+
+    def _batches(self, left: Iterator[Job], size: int, waiting: int) -> Iterator[list[Job]]:
+        """Return as many batches as the cluster can do now beside those that are `waiting`."""
+        cores = sum(self._client.nthreads().values()) or 1
+        for _ in range(_AHEAD * cores - waiting):
+            batch = list(islice(left, size))
+            if not batch:
+                return
+            yield batch
+
+    def _hand_out(self, given: Any, batch: list[Job], waiting: dict[Any, list[Job]], ended: Any) -> None:
+        future = self._client.submit(_do, given, version(_PACKAGE), batch, pure=False)
+        waiting[future] = batch
+        ended.add(future)
+
+
+def _version() -> str | None:
+    """Return the version of colibri that a worker has."""
+    try:
+        return version(_PACKAGE)
+    except PackageNotFoundError:
+        return None
+
+
+def _do(given: tuple[Callable[[Any, Any], Any], Any], wanted: str, jobs: list[Any]) -> tuple[float, list[Any]]:
+    """Do a batch of jobs; return how long it took, s, and the results.
+
+    Raises:
+        CampaignError: This worker, come later than the others, has another version.
+    """
+    if version(_PACKAGE) != wanted:
+        raise CampaignError(f"--dask: a worker has colibri {version(_PACKAGE)}, the campaign is of {wanted}")
+    work, common = given
+    began_s = perf_counter()
+    results = [work(common, job) for job in jobs]
+    return perf_counter() - began_s, results

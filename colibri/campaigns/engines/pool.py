@@ -1,0 +1,100 @@
+"""The engine on this computer: a pool of processes of the standard library."""
+
+import os
+import signal
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import active_children, get_context, parent_process
+from threading import Thread
+from typing import Any
+
+import cloudpickle
+
+from colibri.campaigns.engines.engine import Job, Killed, Result
+
+_AHEAD = 2
+"""So many jobs a worker are handed out, so that none waits for the next."""
+
+
+class Pool:
+    """A pool of processes, which end with this one however it ends.
+
+    Which job it was that killed its worker nobody can say: a pool breaks as a whole. So those that were handed out are
+    done again, one by one; one that kills its worker then, too, is given up.
+    """
+
+    def __init__(self, workers: int | None = None) -> None:
+        """Have `workers` processes; None: one a core that this process may use."""
+        self._workers = workers or len(os.sched_getaffinity(0))
+
+    def each(
+        self, work: Callable[[Any, Job], Result], common: Any, jobs: Iterable[Job]
+    ) -> Generator[tuple[Job, Result | Killed], None, None]:
+        """Return each job with its result, as they end; see `Engine`."""
+        packed = cloudpickle.dumps((work, common))
+        left = iter(jobs)
+        while broken := (yield from self._done(packed, left, self._workers)):
+            for job in broken:
+                if (yield from self._done(packed, iter([job]), 1)):
+                    yield job, Killed()
+
+    def _done(self, packed: bytes, jobs: Iterator[Job], workers: int) -> Generator[tuple[Job, Any], None, list[Job]]:
+        """Yield jobs with their results until there are none, or the pool breaks; return those it broke with."""
+        others = set(active_children())
+        pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin, (packed,))
+        waiting: dict[Future[Any], Job] = {}
+        broken: list[Job] = []
+        try:
+            while not broken:
+                for job in jobs:
+                    try:
+                        waiting[pool.submit(_do, job)] = job
+                    except BrokenProcessPool:
+                        broken.append(job)
+                    if broken or len(waiting) >= _AHEAD * workers:
+                        break
+                if not waiting:
+                    break
+                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                    job = waiting.pop(future)
+                    if isinstance(future.exception(), BrokenProcessPool):
+                        broken.append(job)
+                    else:
+                        yield job, future.result()
+            for future, job in waiting.items():  # the pool broke: of the rest each has its result or never will
+                if isinstance(future.exception(), BrokenProcessPool):
+                    broken.append(job)
+                else:
+                    yield job, future.result()
+        except BaseException:
+            for child in set(active_children()) - others:
+                child.kill()
+            raise
+        finally:
+            pool.shutdown(cancel_futures=True)
+        return broken
+
+
+_given: tuple[Callable[[Any, Any], Any], Any]
+"""In a worker: what to do, and what all jobs have in common."""
+
+
+def _begin(packed: bytes) -> None:
+    """Prepare a worker: it is for its parent to be interrupted, and it does not outlive it."""
+    global _given
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, daemon=True).start()
+    _given = cloudpickle.loads(packed)
+
+
+def _do(job: Any) -> Any:
+    work, common = _given
+    return work(common, job)
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

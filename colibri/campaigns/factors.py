@@ -1,0 +1,81 @@
+"""Factors: options of `colibri fly`, and numbers of profile and vehicles by their dotted keys, set for one flight."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from colibri.autopilot.control.profile import Profile, ProfileError, ProfileTables
+from colibri.campaigns.metrics import hint
+from colibri.campaigns.values import CampaignError
+from colibri.common.config import value_at
+from colibri.experiments.options import option_names
+from colibri.plant.vehicle.description import Vehicle, VehicleError
+
+SCALED = "*"
+"""Ends a key whose value multiplies what the file has there, in place of standing for it."""
+_TABLES = ("profile", "vehicle", "plant-vehicle")
+_OF_A_PROFILE = tuple(f"{key}." for key in ProfileTables.__struct_fields__)
+_NOT_FACTORS = ("seed", "link", "speed", "signing_key")
+
+
+class Key(NamedTuple):
+    """A number of a file: of which table, where in it, and whether it is multiplied."""
+
+    table: str
+    key: str
+    scaled: bool
+
+
+def factor_name(given: str) -> str:
+    """Return the name of a factor as tables have it; a key of a profile may go without `profile.`.
+
+    Raises:
+        CampaignError: There is no such factor.
+    """
+    options = [name for name in option_names() if name not in _NOT_FACTORS]
+    name = given.replace("-", "_")
+    if name in options:
+        return name
+    if given.startswith(_OF_A_PROFILE):
+        return f"profile.{given}"
+    table, dot, rest = given.partition(".")
+    if dot and rest and table.replace("_", "-") in _TABLES:
+        return f"{table.replace('_', '-')}.{rest}"
+    if name == "seed":
+        raise CampaignError("seed is no factor: say which by seeds, 1-20 say")
+    if name in _NOT_FACTORS:
+        raise CampaignError(f"{given} is no factor: what a flight does is the same with any")
+    known = sorted({*options, *(f"{table}.KEY" for table in _TABLES)})
+    raise CampaignError(f"unknown factor {given}: {hint(name, known)}")
+
+
+def key_of(factor: str) -> Key | None:
+    """Return which number of a file a factor is; None for an option of the flight."""
+    table, dot, rest = factor.partition(".")
+    if not dot:
+        return None
+    return Key(table, rest.removesuffix(SCALED), rest.endswith(SCALED))
+
+
+def with_keys(factors: Mapping[str, Any], table: str, of: Profile | Vehicle) -> Any:
+    """Return a profile or a vehicle with those numbers changed that `factors` have for `table`, in their order.
+
+    Raises:
+        ProfileError, VehicleError: There is no such key, or it cannot have this value.
+    """
+    error = ProfileError if isinstance(of, Profile) else VehicleError
+    changed: Any = of
+    for factor, value in factors.items():
+        key = key_of(factor)
+        if key is not None and key.table == table:
+            to = _scaled(value_at(changed, key.key, error), value, factor) if key.scaled else value
+            changed = changed.replace(key.key, to)
+    return changed
+
+
+def _scaled(had: Any, by: Any, factor: str) -> Any:
+    """Return a number, or each of several, times `by`."""
+    if isinstance(had, list):
+        return [_scaled(each, by, factor) for each in had]
+    if isinstance(had, bool) or not isinstance(had, int | float) or not isinstance(by, int | float):
+        raise CampaignError(f"{factor}: {had} times {by} is no number: leave the {SCALED} out")
+    return had * by

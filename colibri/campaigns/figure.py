@@ -1,0 +1,211 @@
+"""The figure of a campaign: a distribution, a line over a factor, or a heat map over two, as its factors suggest."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from colibri.analysis.figures import AXES, GRID, TOP_IN, axes_grid, put_head, put_title, shortened
+from colibri.campaigns.flights import Verdict
+from colibri.campaigns.results import CampaignResults, is_number, wilson
+from colibri.common.types import Array
+
+_COLORS = (*(style.color for style in AXES), "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")
+_LOST = "#D00000"
+_CONTINUOUS = 3
+"""A factor with so many numbers is drawn along an axis."""
+_MAX_CURVES, _MAX_STRIPS, _MAX_DRAWN = len(_COLORS), 40, 3
+_CHARACTER_IN = 0.085
+_WIDE_SPREAD = 20.0
+"""Values that differ by such a factor are drawn on a logarithmic axis."""
+_PANEL_IN, _MAP_IN = 2.6, 3.4
+
+
+class _Group(NamedTuple):
+    """The flights of one combination, by their places; what it is called, and its numbers along the axes."""
+
+    name: str
+    at: tuple[float, ...]
+    places: list[int]
+
+
+def draw(results: CampaignResults, metric: str | None = None) -> Figure:
+    """Return the figure of a campaign for a metric; without one for the first that most flights have."""
+    name = metric or results.usual_metric
+    values = results.metric(name)
+    grid = results.campaign.grid
+    numeric = [key for key, each in grid.items() if len(each) >= _CONTINUOUS and all(map(is_number, each))]
+    drawn = [key for key in results.campaign.draw if results.factor(key).dtype.kind in "fi"][:_MAX_DRAWN]
+    if numeric:
+        axes_of = numeric[:2]
+        groups = _groups(results, axes_of)
+        if len(axes_of) == 2:
+            return _heat_map(results, name, values, axes_of, groups)
+        if len({group.name for group in groups}) <= _MAX_CURVES:
+            return _lines(results, name, values, axes_of[0], groups)
+    groups = _groups(results, [])
+    if drawn and len(groups) <= _MAX_CURVES:
+        return _scatter(results, name, values, drawn, groups)
+    return _strips(results, name, values, groups[:_MAX_STRIPS])
+
+
+def _groups(results: CampaignResults, along: Sequence[str]) -> list[_Group]:
+    """Return the combinations of the grid; their names have what is not `along` an axis."""
+    names = list(results.campaign.grid)
+    several = [name for name, values in results.campaign.grid.items() if len(values) > 1 and name not in along]
+    columns = {name: results.factor(name) for name in along}
+    return [
+        _Group(
+            ", ".join(shortened(combination[names.index(name)]) for name in several),
+            tuple(float(columns[name][places[0]]) for name in along),
+            places,
+        )
+        for combination, places in results.groups().items()
+    ]
+
+
+def _title(results: CampaignResults) -> str:
+    lost = sum(each.verdict.is_lost for each in results.flown)
+    return f"{results.campaign.name}: {len(results.flown)} flights, {lost} lost"
+
+
+def _flown(results: CampaignResults, values: Array, places: Sequence[int]) -> Array:
+    """Return the metric of those flights that came through and have it."""
+    found: Array = np.array([values[place] for place in places if results.flown[place].verdict is Verdict.FLOWN])
+    known: Array = found[np.isfinite(found)]
+    return known
+
+
+def _lines(results: CampaignResults, metric: str, values: Array, along: str, groups: Sequence[_Group]) -> Figure:
+    """Draw medians over a factor with what lies between the quantiles of 5 and 95 %, and the share lost below."""
+    figure, ((upper,), (lower,)) = axes_grid(2, 1, TOP_IN, row_in=_PANEL_IN)
+    names = list(dict.fromkeys(group.name for group in groups))
+    for name, color in zip(names, _COLORS, strict=False):
+        of_name = sorted((group for group in groups if group.name == name), key=lambda group: group.at)
+        through = [(group.at[0], _flown(results, values, group.places)) for group in of_name]
+        known = [(at, np.quantile(some, [0.05, 0.5, 0.95])) for at, some in through if len(some)]
+        if known:
+            at = [each for each, _ in known]
+            low, middle, high = np.transpose([quantiles for _, quantiles in known])
+            upper.fill_between(at, low, high, color=color, alpha=0.2, linewidth=0)
+            upper.plot(at, middle, "o-", color=color, markersize=3.5, linewidth=1.4, label=name)
+        shares = [results.lost(group.places)[:2] for group in of_name]
+        bounds = [wilson(*share) for share in shares]
+        at = [group.at[0] for group in of_name]
+        lower.fill_between(at, *np.transpose(bounds), color=color, alpha=0.2, linewidth=0)
+        lower.plot(at, [lost / of if of else np.nan for lost, of in shares], "o-", color=color, markersize=3.5)
+    upper.set_ylabel(f"{metric}\nmedian, 5 to 95 %")
+    _scale_values(upper, values)
+    lower.set_ylabel("share lost\nwith its 95 % interval")
+    lower.set_ylim(-0.03, 1.03)
+    lower.set_xlabel(along)
+    _scale_factor(lower, [group.at[0] for group in groups])
+    for axes in (upper, lower):
+        axes.grid(**GRID)
+    put_head(figure, _title(results), columns=min(len(names), 3))
+    return figure
+
+
+def _heat_map(
+    results: CampaignResults, metric: str, values: Array, along: Sequence[str], groups: Sequence[_Group]
+) -> Figure:
+    """Draw the median of a metric over two factors, a map a combination of the others; crosses where half are lost."""
+    names = list(dict.fromkeys(group.name for group in groups))[:_MAX_CURVES]
+    xs, ys = (sorted({group.at[axis] for group in groups}) for axis in (0, 1))
+    figure, grid = axes_grid(len(names), 1, 0.6, row_in=_MAP_IN, share=False)
+    figure.subplots_adjust(hspace=0.35)
+    for name, (axes,) in zip(names, grid, strict=True):
+        medians, lost = np.full((len(ys), len(xs)), np.nan), np.zeros((len(ys), len(xs)), dtype=bool)
+        for group in groups:
+            if group.name == name:
+                cell = ys.index(group.at[1]), xs.index(group.at[0])
+                some = _flown(results, values, group.places)
+                medians[cell] = np.median(some) if len(some) else np.nan
+                lost[cell] = 2 * results.lost(group.places)[0] > len(group.places)
+        image = axes.pcolormesh(np.arange(len(xs) + 1), np.arange(len(ys) + 1), medians, cmap="viridis")
+        figure.colorbar(image, ax=axes, label=f"{metric}, median")
+        crosses = np.argwhere(lost)
+        axes.plot(crosses[:, 1] + 0.5, crosses[:, 0] + 0.5, "x", color=_LOST, label="more than half lost")
+        for axis, numbers, label in ((axes.xaxis, xs, along[0]), (axes.yaxis, ys, along[1])):
+            axis.set_major_locator(MaxNLocator(10, integer=True))
+            shown = range(0, len(numbers), max(1, len(numbers) // 8))
+            axis.set_ticks([place + 0.5 for place in shown], [f"{numbers[place]:.4g}" for place in shown])
+            axis.set_label_text(label)
+        axes.set_title(name, fontsize="medium", loc="left")
+    note = "; crosses: more than half lost" if any(each.verdict.is_lost for each in results.flown) else ""
+    put_title(figure, _title(results) + note)
+    return figure
+
+
+def _scatter(
+    results: CampaignResults, metric: str, values: Array, drawn: Sequence[str], groups: Sequence[_Group]
+) -> Figure:
+    """Draw a metric over what was drawn, a dot a flight; flights that were lost at the upper edge."""
+    figure, grid = axes_grid(len(drawn), 1, TOP_IN, row_in=_PANEL_IN, share=False)
+    figure.subplots_adjust(hspace=0.3)
+    for factor, (axes,) in zip(drawn, grid, strict=True):
+        at = results.factor(factor).astype(np.float64)
+        for group, color in zip(groups, _COLORS, strict=False):
+            through = [place for place in group.places if results.flown[place].verdict is Verdict.FLOWN]
+            axes.plot(at[through], values[through], "o", color=color, markersize=4, alpha=0.6, mew=0, label=group.name)
+            lost = [place for place in group.places if results.flown[place].verdict.is_lost]
+            edge = axes.get_xaxis_transform()
+            if lost:
+                axes.plot(at[lost], [0.97] * len(lost), "x", color=color, markersize=5, transform=edge)
+        _scale_values(axes, values)
+        axes.set_ylabel(metric)
+        axes.set_xlabel(factor)
+        axes.grid(**GRID)
+    put_head(figure, _title(results), columns=min(len(groups) + 1, 3))
+    return figure
+
+
+def _strips(results: CampaignResults, metric: str, values: Array, groups: Sequence[_Group]) -> Figure:
+    """Draw a dot a flight, a row a combination, bars at the medians; how many were lost at the right."""
+    figure, ((axes,),) = axes_grid(1, 1, 0.6, row_in=0.35 + 0.34 * len(groups))
+    names = [group.name or results.campaign.name for group in groups]
+    left_in = 0.4 + _CHARACTER_IN * max(map(len, names))
+    figure.subplots_adjust(left=min(0.6, left_in / figure.get_figwidth()))
+    for place, group in enumerate(groups):
+        some = _flown(results, values, group.places)
+        color = _COLORS[place % len(_COLORS)]
+        axes.plot(some, np.full(len(some), -place), "o", color=color, markersize=3.5, alpha=0.45, markeredgewidth=0)
+        if len(some):
+            axes.plot([np.median(some)] * 2, [-place - 0.25, -place + 0.25], color="#000000", linewidth=2.0)
+        lost, _, refused = results.lost(group.places)
+        said = ", ".join(f"{count} {what}" for count, what in ((lost, "lost"), (refused, "refused")) if count)
+        axes.text(0.99, -place, said, transform=axes.get_yaxis_transform(), ha="right", va="center", color=_LOST)
+    axes.set_yticks([-place for place in range(len(groups))], names)
+    axes.set_ylim(-len(groups) + 0.4, 0.6)
+    if _is_wide(values):
+        axes.set_xscale("log")
+    axes.set_xlabel(f"{metric}; bars: medians")
+    axes.grid(axis="x", **GRID)
+    put_title(figure, _title(results))
+    return figure
+
+
+def _is_wide(values: Array) -> bool:
+    known = values[np.isfinite(values)]
+    return len(known) > 0 and float(known.min()) > 0.0 and float(known.max() / known.min()) > _WIDE_SPREAD
+
+
+def _scale_values(axes: Axes, values: Array) -> None:
+    if _is_wide(values):
+        axes.set_yscale("log")
+    else:
+        axes.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
+
+
+def _scale_factor(axes: Axes, at: Sequence[float]) -> None:
+    """Have an even axis for even ratios of a factor."""
+    numbers: Any = np.unique(at)
+    if (
+        len(numbers) > _CONTINUOUS
+        and numbers[0] > 0.0
+        and np.ptp(np.diff(np.log(numbers))) < 0.1 * np.ptp(np.diff(numbers))
+    ):
+        axes.set_xscale("log")

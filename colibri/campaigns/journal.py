@@ -1,0 +1,181 @@
+"""What a campaign keeps while it is flown: which it is, and each flight as soon as it has ended."""
+
+import os
+from collections.abc import Iterable
+from hashlib import sha256
+from importlib.metadata import version
+from inspect import getsource
+from pathlib import Path
+from typing import IO, Any, Self
+
+import msgspec
+
+from colibri.autopilot.control.registry import origin_of, origin_of_factory
+from colibri.campaigns.definition import Campaign
+from colibri.campaigns.flights import Common, Flown, Verdict, folder_of
+from colibri.campaigns.values import CampaignError, shown
+
+IDENTITY, JOURNAL = "campaign.json", "journal.jsonl"
+
+
+class _Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True, array_like=True):
+    """A line of the journal."""
+
+    flight: int
+    verdict: Verdict
+    why: str
+    metrics: tuple[float | None, ...]
+    sha256: str
+
+
+class Journal:
+    """The folder of a campaign that is being flown."""
+
+    def __init__(self, folder: Path, kept: dict[int, Flown]) -> None:
+        """Go on in `folder`, which has what was `kept`."""
+        self.kept = kept
+        self._folder = folder
+        self._file: IO[bytes] = (folder / JOURNAL).open("ab")
+
+    def add(self, flown: Iterable[Flown]) -> None:
+        """Keep flights, whatever happens next: what is kept of their folders first, then the lines that say so."""
+        lines = []
+        for each in flown:
+            _keep_files(self._folder / folder_of(each.flight), each)
+            line = _Kept(each.flight, each.verdict, each.why, each.metrics, each.sha256)
+            lines.append(msgspec.json.encode(line) + b"\n")
+        self._file.write(b"".join(lines))
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+    def __enter__(self) -> Self:
+        """Begin."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End."""
+        self._file.close()
+
+
+def open_journal(folder: Path, campaign: Campaign, common: Common, *, resume: bool) -> Journal:
+    """Return the journal of a campaign in a folder that is new, empty, or has this campaign and is to go on.
+
+    Raises:
+        CampaignError: The folder has something else.
+    """
+    identity = identity_of(campaign, common)
+    path = folder / IDENTITY
+    kept = _kept(folder) if path.exists() else {}
+    if path.exists():
+        _check_identity(path, identity, campaign, len(kept), resume=resume)
+    elif folder.exists() and any(folder.iterdir()):
+        raise CampaignError(f"--out {folder} is not empty, and has no campaign to go on with: choose another folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    if not path.exists():
+        _write_whole(path, msgspec.json.format(msgspec.json.encode(identity), indent=1) + b"\n")
+    return Journal(folder, kept)
+
+
+def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
+    """Return in plain data which campaign it is: all that its table depends on, files by their contents."""
+    laws = [*campaign.grid.get("controller", ()), *filter(None, [campaign.fly.get("controller")])]
+    contents = {
+        "profiles": common.profiles,
+        "vehicles": common.vehicles,
+        "winds": {name: repr(blows) for name, blows in common.winds.items()},
+        "track_files": common.track_files,
+        "laws": {shown(law): origin_of(law) if isinstance(law, str) else _origin(law) for law in laws},
+        "metrics": [_origin(metric.of) for metric in campaign.metrics if metric.of is not None],
+    }
+    return {
+        "colibri": version("colibri-sitl"),
+        "name": campaign.name,
+        "flights": campaign.flights,
+        "seeds": list(campaign.seeds),
+        "root_seed": campaign.root_seed,
+        "paired": campaign.paired,
+        "metrics": [metric.name for metric in campaign.metrics],
+        "logs": campaign.logs,
+        "fly": {name: shown(value) for name, value in campaign.fly.items()},
+        "grid": {name: list(map(shown, values)) for name, values in campaign.grid.items()},
+        "draw": {name: [type(draw).__name__, repr(draw)] for name, draw in campaign.draw.items()},
+        "contents": {name: _hash(content) for name, content in contents.items() if content},
+        "objects": _hash(_plain([campaign.fly, campaign.grid])),
+    }
+
+
+def _origin(law: Any) -> Any:
+    """Return where code comes from that was handed over, with its source where that can be read."""
+    try:
+        return [*origin_of_factory(law), getsource(law)]
+    except (OSError, TypeError):
+        return origin_of_factory(law)
+
+
+def _plain(value: Any) -> Any:
+    """Return profiles and vehicles by their contents, and what else has no plain form as tables show it."""
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return value if isinstance(value, msgspec.Struct | str | int | float | None) else shown(value)
+
+
+def _hash(content: Any) -> str:
+    return sha256(msgspec.json.encode(content, order="sorted")).hexdigest()
+
+
+def _check_identity(path: Path, now: dict[str, Any], campaign: Campaign, flown: int, *, resume: bool) -> None:
+    try:
+        was = msgspec.json.decode(path.read_bytes())
+    except (OSError, msgspec.DecodeError) as error:
+        raise CampaignError(f"cannot read {path}: {error}") from error
+    now = msgspec.json.decode(msgspec.json.encode(now))
+    if was != now:
+        differs = sorted(name for name in {*was, *now} if was.get(name) != now.get(name))
+        raise CampaignError(
+            f"--out {path.parent} has another campaign ({', '.join(differs)} differ): choose another folder"
+        )
+    if not resume:
+        raise CampaignError(
+            f"--out {path.parent} has {flown} of the {campaign.flights} flights of this campaign: "
+            "go on with --resume, or choose another folder"
+        )
+
+
+def _kept(folder: Path) -> dict[int, Flown]:
+    """Return the flights that a journal has; a last line that was cut off is cut off there, too."""
+    path = folder / JOURNAL
+    if not path.exists():
+        return {}
+    with path.open("r+b") as file:
+        content = file.read()
+        whole = content.rfind(b"\n") + 1
+        file.truncate(whole)
+    kept = {}
+    for number, line in enumerate(content[:whole].splitlines(), start=1):
+        try:
+            each = msgspec.json.decode(line, type=_Kept)
+        except msgspec.DecodeError as error:
+            raise CampaignError(
+                f"{path}: line {number}: {error}: remove the line, its flight is flown again"
+            ) from error
+        kept[each.flight] = Flown(each.flight, each.verdict, each.why, each.metrics, each.sha256)
+    return kept
+
+
+def _keep_files(folder: Path, flown: Flown) -> None:
+    if flown.files:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in flown.files.items():
+            (folder / name).write_bytes(content)
+
+
+def _write_whole(path: Path, content: bytes) -> None:
+    """Write a file that is there whole, or not at all, and stays."""
+    scratch = path.with_suffix(".new")
+    with scratch.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    scratch.replace(path)

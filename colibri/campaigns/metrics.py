@@ -1,0 +1,65 @@
+"""What is kept of each flight: numbers of its report, by their names there, or what functions make of a flight."""
+
+from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from colibri.analysis.limits import KEYS, of_report
+from colibri.campaigns.values import CampaignError
+
+if TYPE_CHECKING:
+    from colibri.experiments.flight import Flight
+
+NAMES = (*KEYS, "lost_at_s", "path_lag_s")
+_ALWAYS = ("rmse_after_20s_m", "max_error_after_20s_m", "rmse_m", "max_error_m", "max_tilt_deg", "effort_n_m")
+_ON_SENSORS = ("control_rmse_m", "estimation_rmse_m.horizontal", "estimation_rmse_m.vertical", "nees_mean")
+_OUTCOMES = ("qp_failures", "fallbacks", "lost_at_s")
+
+
+class Metric(NamedTuple):
+    """A column of the table.
+
+    Attributes:
+        name: Of the column.
+        of: Makes it of a flight; None where it is the number of that name in the report.
+    """
+
+    name: str
+    of: "Callable[[Flight], float] | None" = None
+
+    def value(self, flight: "Flight") -> float | None:
+        """Return the metric of a flight; None where that has none."""
+        found = of_report(flight.report, self.name) if self.of is None else self.of(flight)
+        return None if found is None else float(found)
+
+
+def usual(*, sensors: bool) -> tuple[Metric, ...]:
+    """Return the metrics of a campaign that names none: those that are the same whenever the flight is."""
+    return tuple(map(Metric, (*_ALWAYS, *(_ON_SENSORS if sensors else ()), *_OUTCOMES)))
+
+
+def read_metrics(given: Any) -> tuple[Metric, ...]:
+    """Return metrics by names of the report, by functions of a flight, or by names of such functions.
+
+    Raises:
+        CampaignError: There is no such metric.
+    """
+    if isinstance(given, Mapping):
+        return tuple(Metric(str(name), of) for name, of in given.items())
+    if isinstance(given, str) or callable(given):
+        given = given.split(",") if isinstance(given, str) else [given]
+    return tuple(map(_metric, given))
+
+
+def _metric(given: Any) -> Metric:
+    if callable(given):
+        return Metric(str(getattr(given, "__name__", type(given).__name__)), given)
+    if given not in NAMES:
+        raise CampaignError(f"unknown metric {given}: {hint(given, NAMES)}")
+    return Metric(given)
+
+
+def hint(given: Any, known: Sequence[str]) -> str:
+    """Return the end of a refusal: the nearest of what is known, and all of it."""
+    near = get_close_matches(str(given), known, 1)
+    return (f"did you mean {near[0]}? " if near else "") + f"choose {', '.join(known)}"

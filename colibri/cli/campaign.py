@@ -1,0 +1,75 @@
+"""`colibri campaign`: its options, and its call."""
+
+from argparse import SUPPRESS, Action, Namespace
+from pathlib import Path
+from typing import Any
+
+from colibri.cli.shared.options import add_out
+from colibri.common.process.arguments import ArgumentParser
+from colibri.common.process.lifecycle import loading
+from colibri.experiments.options import add_plan_options
+
+
+class _GivenOnly(ArgumentParser):
+    """Adds options to another parser that leave nothing where they are not given: a file may have them."""
+
+    def __init__(self, parser: ArgumentParser) -> None:
+        """Add to `parser`."""
+        super().__init__(add_help=False)
+        self._parser = parser
+
+    def add_argument(self, *names: Any, **options: Any) -> Action:
+        """Add an option, unless it is of a single flight alone."""
+        if names[0] in ("track", "--seed", "--speed"):
+            return super().add_argument(*names, **options)
+        said = str(options.pop("default", ""))
+        words = options.get("help", "").replace("%(default)s", said)
+        return self._parser.add_argument(*names, default=SUPPRESS, **(options | {"help": words}))
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options of `colibri campaign`."""
+    add = parser.add_argument
+    add("file", nargs="?", type=Path, metavar="FILE.toml", help="the campaign; options take precedence over it")
+    add("--track", dest="tracks", action="append", metavar="TRACK", help="a track; may be repeated: each is flown")
+    add(
+        "--set",
+        dest="settings",
+        action="append",
+        default=[],
+        metavar="KEY=VALUES",
+        help="a factor and its values, A,B,C or FIRST:LAST:COUNT: an option of a flight, or a number of profile., "
+        "vehicle. or plant-vehicle. by its dotted key; KEY* multiplies what the file has; may be repeated",
+    )
+    add(
+        "--draw",
+        dest="draws",
+        action="append",
+        default=[],
+        metavar="KEY=DISTRIBUTION",
+        help="a factor drawn anew for each flight: uniform:LOW:HIGH, log-uniform:LOW:HIGH, normal:MEAN:DEVIATION or "
+        "choice:A,B,C; may be repeated",
+    )
+    add("--seeds", default=SUPPRESS, metavar="FIRST-LAST", help="every combination is flown by each (default 0)")
+    add("--root-seed", type=int, default=SUPPRESS, metavar="N", help="of the draws (default 0)")
+    add("--name", default=SUPPRESS, help="in titles (default: the file's)")
+    add("--metrics", default=SUPPRESS, metavar="A,B", help="numbers of report.json to keep (default: the usual)")
+    add("--logs", default=SUPPRESS, choices=("none", "lost", "all"), help="of which flights to keep the logs (none)")
+    add("--workers", type=int, metavar="N", help="processes (default: one a core)")
+    add(
+        "--dask",
+        metavar="ADDRESS",
+        help="in their place the cluster whose Dask scheduler is there, tcp://HOST:8786 say",
+    )
+    add("--resume", action="store_true", help="go on with what --out has of this campaign")
+    add("--yes", action="store_true", help="also if it has more than a million flights")
+    add_plan_options(_GivenOnly(parser), link="memory")
+    add_out(add, "out/campaign", "table, summary, figure, and what it takes to go on")
+
+
+def run(args: Namespace) -> int:
+    """Fly a campaign as the command line says; return the exit code."""
+    with loading():
+        from colibri.cli.shared.fly_campaign import fly
+
+    return fly(args)

@@ -1,0 +1,153 @@
+"""`colibri campaign`: read what the command line adds to a file, fly, and say what came of it."""
+
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+from colibri.analysis.tables import print_table
+from colibri.campaigns.definition import OF_ALL, campaign_of
+from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.results import CampaignResults
+from colibri.campaigns.run import engine_of, fly_campaign, tables_of
+from colibri.campaigns.values import CampaignError
+from colibri.common.errors import Error
+from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, fail
+from colibri.experiments.options import option_names
+
+_SHOWN = 5
+_TABLES = ("name", "seeds", "root_seed", "metrics", "logs")
+
+
+class _Bar(Protocol):
+    """What shows how far a campaign is."""
+
+    def begun(self, kept: int) -> None:
+        """Begin with so many flights that there are already."""
+
+    def ended(self, flown: Flown) -> None:
+        """Count a flight."""
+
+
+def fly(args: Namespace) -> int:
+    """Fly a campaign as the command line says: of its file, if there is one, with what is given in place of the file's."""
+    try:
+        said = vars(args)
+        tables = {name: said[name] for name in _TABLES if name in said}
+        options = {name: said[name] for name in (*OF_ALL, *option_names()) if name in said}
+        given = tables | {"fly": options, "grid": _grid(args), "draw": dict(map(_draw, args.draws))}
+        planned = campaign_of(tables_of(args.file, given))
+        engine = engine_of(args.workers, args.dask)
+        with _progress(planned.name, planned.flights, quiet=args.quiet) as bar:
+            results = fly_campaign(
+                planned, engine, args.out, resume=args.resume, yes=args.yes, progress=bar.ended, begun=bar.begun
+            )
+    except KeyboardInterrupt:
+        fail(f"interrupted; what was flown is in {args.out}: go on with --resume", EXIT_INTERRUPTED)
+    except Error as error:
+        fail(str(error), EXIT_BAD_INPUT)
+    if not args.quiet:
+        _print(results, args)
+    return EXIT_FAILED if results.verdicts[Verdict.REFUSED] == len(results.flown) else 0
+
+
+def _grid(args: Namespace) -> dict[str, Any]:
+    tracks = {"track": args.tracks} if args.tracks else {}
+    return tracks | dict(map(_setting, args.settings))
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    """Read KEY=VALUES of the command line."""
+    key, values = _pair(text, "KEY=VALUES, body.mass_kg=0.6:0.8:5 say")
+    return key, values if values.count(":") == 2 else [_value(each) for each in values.split(",")]
+
+
+def _draw(text: str) -> tuple[str, Any]:
+    """Read KEY=DISTRIBUTION of the command line."""
+    key, drawn = _pair(text, "KEY=DISTRIBUTION, plant-vehicle.body.mass_kg=uniform:0.6:0.8 say")
+    name, _, rest = drawn.partition(":")
+    return key, {name: [_value(each) for each in rest.split("," if name == "choice" else ":")]}
+
+
+def _pair(text: str, expected: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not key or not equals or not value:
+        raise CampaignError(f"expected {expected}, not {text}")
+    return key, value
+
+
+def _value(text: str) -> Any:
+    """Return a number or a truth value, where a text is one."""
+    if text in ("true", "false"):
+        return text == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            pass
+    return text
+
+
+def _print(results: CampaignResults, args: Namespace) -> None:
+    counts = ", ".join(f"{count} {verdict}" for verdict, count in results.verdicts.items() if count)
+    headings, rows = results.summary()
+    metric = results.usual_metric
+    shown = [*results.campaign.grid, "flights", "lost", *(f"{metric}, {which}" for which in ("median", "5 %", "95 %"))]
+    cells = [tuple(_short(row[headings.index(name)]) for name in shown) for row in rows]
+    title = f"{results.campaign.name}: {counts}; written to {args.out}"
+    print_table(title, tuple(shown), cells, names=len(results.campaign.grid))
+    said: dict[str, int] = {}
+    for each in results.flown:
+        if each.why:
+            said[each.why] = said.get(each.why, 0) + 1
+    for why, times in list(said.items())[:_SHOWN]:
+        print(f"{times} ×: {why}")  # noqa: T201
+    if len(said) > _SHOWN:
+        print(f"and {len(said) - _SHOWN} other reasons: see flights.csv")  # noqa: T201
+
+
+def _short(cell: str) -> str:
+    try:
+        return f"{float(cell):.4g}"
+    except ValueError:
+        return cell
+
+
+@contextmanager
+def _progress(title: str, flights: int, *, quiet: bool) -> Iterator[_Bar]:
+    """Show on standard error how many were flown, how many a second, which share was lost, and the time left."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns: Sequence[Any] = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TextColumn("{task.fields[lost]}"),
+        TimeRemainingColumn(),
+    )
+    bar = Progress(*columns, console=console, disable=quiet or not console.is_terminal, speed_estimate_period=300.0)
+    task = bar.add_task(escape(title), total=flights, rate="", lost="", start=False)
+
+    class Bar:
+        flown = lost = 0
+
+        def begun(self, kept: int) -> None:
+            bar.start()
+            bar.start_task(task)
+            bar.update(task, completed=kept)
+
+        def ended(self, flown: Flown) -> None:
+            self.flown += 1
+            self.lost += flown.verdict.is_lost
+            elapsed_s = bar.tasks[task].elapsed or 0.0
+            rate = f"{self.flown / elapsed_s:.1f} flights/s" if elapsed_s else ""
+            bar.update(task, advance=1, rate=rate, lost=f"{100.0 * self.lost / self.flown:.1f} % lost")
+
+    try:
+        yield Bar()
+    finally:
+        bar.stop()
