@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from colibri.analysis.figures import AXES, GRID, TOP_IN, axes_grid, put_head, put_title, shortened
+from colibri.campaigns.flight_table import FlightTable, is_number, wilson
 from colibri.campaigns.flights import Verdict
-from colibri.campaigns.results import CampaignResults, is_number, wilson
 from colibri.common.types import Array
 
 _COLORS = (*(style.color for style in AXES), "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")
@@ -32,67 +32,67 @@ class _Group(NamedTuple):
     places: list[int]
 
 
-def draw(results: CampaignResults, metric: str | None = None) -> Figure:
+def draw(table: FlightTable, metric: str | None = None) -> Figure:
     """Return the figure of a campaign for a metric; without one for the first that most flights have."""
-    name = metric or results.usual_metric
-    values = results.metric(name)
-    grid = results.campaign.grid
+    name = metric or table.usual_metric
+    values = table.metric(name)
+    grid = table.campaign.grid
     numeric = [key for key, each in grid.items() if len(each) >= _CONTINUOUS and all(map(is_number, each))]
-    drawn = [key for key in results.campaign.draw if results.factor(key).dtype.kind in "fi"][:_MAX_DRAWN]
+    drawn = [key for key in table.campaign.draw if table.factor(key).dtype.kind in "fi"][:_MAX_DRAWN]
     if numeric:
         axes_of = numeric[:2]
-        groups = _groups(results, axes_of)
+        groups = _groups(table, axes_of)
         if len(axes_of) == 2:
-            return _heat_map(results, name, values, axes_of, groups)
+            return _heat_map(table, name, values, axes_of, groups)
         if len({group.name for group in groups}) <= _MAX_CURVES:
-            return _lines(results, name, values, axes_of[0], groups)
-    groups = _groups(results, [])
+            return _lines(table, name, values, axes_of[0], groups)
+    groups = _groups(table, [])
     if drawn and len(groups) <= _MAX_CURVES:
-        return _scatter(results, name, values, drawn, groups)
-    return _strips(results, name, values, groups[:_MAX_STRIPS])
+        return _scatter(table, name, values, drawn, groups)
+    return _strips(table, name, values, groups[:_MAX_STRIPS])
 
 
-def _groups(results: CampaignResults, along: Sequence[str]) -> list[_Group]:
+def _groups(table: FlightTable, along: Sequence[str]) -> list[_Group]:
     """Return the combinations of the grid; their names have what is not `along` an axis."""
-    names = list(results.campaign.grid)
-    several = [name for name, values in results.campaign.grid.items() if len(values) > 1 and name not in along]
-    columns = {name: results.factor(name) for name in along}
+    names = list(table.campaign.grid)
+    several = [name for name, values in table.campaign.grid.items() if len(values) > 1 and name not in along]
+    columns = {name: table.factor(name) for name in along}
     return [
         _Group(
             ", ".join(shortened(combination[names.index(name)]) for name in several),
             tuple(float(columns[name][places[0]]) for name in along),
             places,
         )
-        for combination, places in results.groups().items()
+        for combination, places in table.groups().items()
     ]
 
 
-def _title(results: CampaignResults) -> str:
-    lost = sum(each.verdict.is_lost for each in results.flown)
-    return f"{results.campaign.name}: {len(results.flown)} flights, {lost} lost"
+def _title(table: FlightTable) -> str:
+    lost = sum(each.verdict.is_lost for each in table.flown)
+    return f"{table.campaign.name}: {len(table.flown)} flights, {lost} lost"
 
 
-def _flown(results: CampaignResults, values: Array, places: Sequence[int]) -> Array:
+def _flown(table: FlightTable, values: Array, places: Sequence[int]) -> Array:
     """Return the metric of those flights that came through and have it."""
-    found: Array = np.array([values[place] for place in places if results.flown[place].verdict is Verdict.FLOWN])
+    found: Array = np.array([values[place] for place in places if table.flown[place].verdict is Verdict.FLOWN])
     known: Array = found[np.isfinite(found)]
     return known
 
 
-def _lines(results: CampaignResults, metric: str, values: Array, along: str, groups: Sequence[_Group]) -> Figure:
+def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: Sequence[_Group]) -> Figure:
     """Draw medians over a factor with what lies between the quantiles of 5 and 95 %, and the share lost below."""
     figure, ((upper,), (lower,)) = axes_grid(2, 1, TOP_IN, row_in=_PANEL_IN)
     names = list(dict.fromkeys(group.name for group in groups))
     for name, color in zip(names, _COLORS, strict=False):
         of_name = sorted((group for group in groups if group.name == name), key=lambda group: group.at)
-        through = [(group.at[0], _flown(results, values, group.places)) for group in of_name]
+        through = [(group.at[0], _flown(table, values, group.places)) for group in of_name]
         known = [(at, np.quantile(some, [0.05, 0.5, 0.95])) for at, some in through if len(some)]
         if known:
             at = [each for each, _ in known]
             low, middle, high = np.transpose([quantiles for _, quantiles in known])
             upper.fill_between(at, low, high, color=color, alpha=0.2, linewidth=0)
             upper.plot(at, middle, "o-", color=color, markersize=3.5, linewidth=1.4, label=name)
-        shares = [results.lost(group.places)[:2] for group in of_name]
+        shares = [table.lost(group.places)[:2] for group in of_name]
         bounds = [wilson(*share) for share in shares]
         at = [group.at[0] for group in of_name]
         lower.fill_between(at, *np.transpose(bounds), color=color, alpha=0.2, linewidth=0)
@@ -105,13 +105,11 @@ def _lines(results: CampaignResults, metric: str, values: Array, along: str, gro
     _scale_factor(lower, [group.at[0] for group in groups])
     for axes in (upper, lower):
         axes.grid(**GRID)
-    put_head(figure, _title(results), columns=min(len(names), 3))
+    put_head(figure, _title(table), columns=min(len(names), 3))
     return figure
 
 
-def _heat_map(
-    results: CampaignResults, metric: str, values: Array, along: Sequence[str], groups: Sequence[_Group]
-) -> Figure:
+def _heat_map(table: FlightTable, metric: str, values: Array, along: Sequence[str], groups: Sequence[_Group]) -> Figure:
     """Draw the median of a metric over two factors, a map a combination of the others; crosses where half are lost."""
     names = list(dict.fromkeys(group.name for group in groups))[:_MAX_CURVES]
     xs, ys = (sorted({group.at[axis] for group in groups}) for axis in (0, 1))
@@ -122,9 +120,9 @@ def _heat_map(
         for group in groups:
             if group.name == name:
                 cell = ys.index(group.at[1]), xs.index(group.at[0])
-                some = _flown(results, values, group.places)
+                some = _flown(table, values, group.places)
                 medians[cell] = np.median(some) if len(some) else np.nan
-                lost[cell] = 2 * results.lost(group.places)[0] > len(group.places)
+                lost[cell] = 2 * table.lost(group.places)[0] > len(group.places)
         image = axes.pcolormesh(np.arange(len(xs) + 1), np.arange(len(ys) + 1), medians, cmap="viridis")
         figure.colorbar(image, ax=axes, label=f"{metric}, median")
         crosses = np.argwhere(lost)
@@ -135,23 +133,21 @@ def _heat_map(
             axis.set_ticks([place + 0.5 for place in shown], [f"{numbers[place]:.4g}" for place in shown])
             axis.set_label_text(label)
         axes.set_title(name, fontsize="medium", loc="left")
-    note = "; crosses: more than half lost" if any(each.verdict.is_lost for each in results.flown) else ""
-    put_title(figure, _title(results) + note)
+    note = "; crosses: more than half lost" if any(each.verdict.is_lost for each in table.flown) else ""
+    put_title(figure, _title(table) + note)
     return figure
 
 
-def _scatter(
-    results: CampaignResults, metric: str, values: Array, drawn: Sequence[str], groups: Sequence[_Group]
-) -> Figure:
+def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str], groups: Sequence[_Group]) -> Figure:
     """Draw a metric over what was drawn, a dot a flight; flights that were lost at the upper edge."""
     figure, grid = axes_grid(len(drawn), 1, TOP_IN, row_in=_PANEL_IN, share=False)
     figure.subplots_adjust(hspace=0.3)
     for factor, (axes,) in zip(drawn, grid, strict=True):
-        at = results.factor(factor).astype(np.float64)
+        at = table.factor(factor).astype(np.float64)
         for group, color in zip(groups, _COLORS, strict=False):
-            through = [place for place in group.places if results.flown[place].verdict is Verdict.FLOWN]
+            through = [place for place in group.places if table.flown[place].verdict is Verdict.FLOWN]
             axes.plot(at[through], values[through], "o", color=color, markersize=4, alpha=0.6, mew=0, label=group.name)
-            lost = [place for place in group.places if results.flown[place].verdict.is_lost]
+            lost = [place for place in group.places if table.flown[place].verdict.is_lost]
             edge = axes.get_xaxis_transform()
             if lost:
                 axes.plot(at[lost], [0.97] * len(lost), "x", color=color, markersize=5, transform=edge)
@@ -159,23 +155,23 @@ def _scatter(
         axes.set_ylabel(metric)
         axes.set_xlabel(factor)
         axes.grid(**GRID)
-    put_head(figure, _title(results), columns=min(len(groups) + 1, 3))
+    put_head(figure, _title(table), columns=min(len(groups) + 1, 3))
     return figure
 
 
-def _strips(results: CampaignResults, metric: str, values: Array, groups: Sequence[_Group]) -> Figure:
+def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Group]) -> Figure:
     """Draw a dot a flight, a row a combination, bars at the medians; how many were lost at the right."""
     figure, ((axes,),) = axes_grid(1, 1, 0.6, row_in=0.35 + 0.34 * len(groups))
-    names = [group.name or results.campaign.name for group in groups]
+    names = [group.name or table.campaign.name for group in groups]
     left_in = 0.4 + _CHARACTER_IN * max(map(len, names))
     figure.subplots_adjust(left=min(0.6, left_in / figure.get_figwidth()))
     for place, group in enumerate(groups):
-        some = _flown(results, values, group.places)
+        some = _flown(table, values, group.places)
         color = _COLORS[place % len(_COLORS)]
         axes.plot(some, np.full(len(some), -place), "o", color=color, markersize=3.5, alpha=0.45, markeredgewidth=0)
         if len(some):
             axes.plot([np.median(some)] * 2, [-place - 0.25, -place + 0.25], color="#000000", linewidth=2.0)
-        lost, _, refused = results.lost(group.places)
+        lost, _, refused = table.lost(group.places)
         said = ", ".join(f"{count} {what}" for count, what in ((lost, "lost"), (refused, "refused")) if count)
         axes.text(0.99, -place, said, transform=axes.get_yaxis_transform(), ha="right", va="center", color=_LOST)
     axes.set_yticks([-place for place in range(len(groups))], names)
@@ -184,7 +180,7 @@ def _strips(results: CampaignResults, metric: str, values: Array, groups: Sequen
         axes.set_xscale("log")
     axes.set_xlabel(f"{metric}; bars: medians")
     axes.grid(axis="x", **GRID)
-    put_title(figure, _title(results))
+    put_title(figure, _title(table))
     return figure
 
 

@@ -30,7 +30,7 @@ class _Bar(Protocol):
 
 
 def fly(args: Namespace) -> int:
-    """Fly a campaign as the command line says: of its file, if there is one, with what is given in place of the file's."""
+    """Fly a campaign as the command line says; what it says takes precedence over the file."""
     try:
         said = vars(args)
         tables = {name: said[name] for name in _TABLES if name in said}

@@ -1,0 +1,174 @@
+"""The tables of a campaign: a row a flight, and a summary of each combination of its grid."""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from math import isnan, nan, sqrt
+from typing import Any
+
+import numpy as np
+
+from colibri.analysis.tables import Row
+from colibri.campaigns.definition import Campaign
+from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.values import CampaignError, shown
+from colibri.experiments.table import Table
+
+_NORMAL_95 = 1.959963984540054
+_QUANTILES = {"median": 0.5, "5 %": 0.05, "95 %": 0.95}
+
+
+class FlightTable:
+    """The flights of a campaign that were flown, in its order.
+
+    Attributes:
+        campaign: Which flights there are.
+        flown: What came of each that was flown.
+    """
+
+    def __init__(self, campaign: Campaign, flown: Mapping[int, Flown]) -> None:
+        """Be the results of those of a campaign's flights that were `flown`, by their places in the table."""
+        self.campaign = campaign
+        self.flown = [flown[flight] for flight in sorted(flown)]
+        self._points = {point.flight: point for point in campaign.points() if point.flight in flown}
+
+    @property
+    def headings(self) -> Row:
+        """Names of the table's columns."""
+        campaign = self.campaign
+        names = tuple(metric.name for metric in campaign.metrics)
+        return ("flight", *campaign.factors, "seed", *names, "verdict", "why", "trajectory_sha256")
+
+    def rows(self) -> list[Row]:
+        """Return the table: factors, metrics, verdict and hash of each flight; numbers with ten digits."""
+        return [self._row(each) for each in self.flown]
+
+    @cached_property
+    def flights(self) -> Table:
+        """The table as a structured array with a field a column: numbers as float64, nan for none; else texts."""
+        columns: dict[str, Any] = {"flight": [each.flight for each in self.flown]}
+        columns |= {name: self.factor(name) for name in self.campaign.factors}
+        columns["seed"] = [self._points[each.flight].seed for each in self.flown]
+        columns |= {metric.name: self.metric(metric.name) for metric in self.campaign.metrics}
+        columns["verdict"] = [str(each.verdict) for each in self.flown]
+        columns["why"] = [each.why for each in self.flown]
+        columns["trajectory_sha256"] = [each.sha256 for each in self.flown]
+        arrays = {name: np.asarray(values) for name, values in columns.items()}
+        table = np.empty(len(self.flown), dtype=[(name, array.dtype) for name, array in arrays.items()])
+        for name, array in arrays.items():
+            table[name] = array
+        return table.view(Table)
+
+    def to_pandas(self) -> Any:
+        """Return the table as a pandas.DataFrame.
+
+        Raises:
+            PandasError: It is not installed.
+        """
+        return self.flights.to_pandas()
+
+    def factor(self, name: str) -> np.ndarray[Any, Any]:
+        """Return a factor of each flight, (n,): numbers, or texts as tables have them."""
+        values = [self._points[each.flight].factors[name] for each in self.flown]
+        return np.array(values if all(map(is_number, values)) else list(map(shown, values)))
+
+    def metric(self, name: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Return a metric of each flight, (n,); nan where there is none.
+
+        Raises:
+            CampaignError: The campaign has kept no such metric.
+        """
+        names = [metric.name for metric in self.campaign.metrics]
+        if name not in names:
+            raise CampaignError(f"metric {name} was not kept: there are {', '.join(names)}")
+        place = names.index(name)
+        values = (each.metrics[place] for each in self.flown)
+        return np.array([nan if value is None else value for value in values], dtype=np.float64)
+
+    @property
+    def usual_metric(self) -> str:
+        """The first metric that most flights have."""
+        names = [metric.name for metric in self.campaign.metrics]
+        known = [int(np.isfinite(self.metric(name)).sum()) for name in names]
+        return names[int(np.argmax(known))]
+
+    @property
+    def verdicts(self) -> dict[Verdict, int]:
+        """How many flights ended with each verdict."""
+        return {verdict: sum(each.verdict is verdict for each in self.flown) for verdict in Verdict}
+
+    def groups(self) -> dict[tuple[Any, ...], list[int]]:
+        """Return for each combination of the grid the places, in `flown`, of its flights."""
+        found: dict[tuple[Any, ...], list[int]] = {}
+        for place, each in enumerate(self.flown):
+            factors = self._points[each.flight].factors
+            found.setdefault(tuple(shown(factors[name]) for name in self.campaign.grid), []).append(place)
+        return found
+
+    def summary(self) -> tuple[Row, list[Row]]:
+        """Return headings and rows: of each combination the share lost, and quantiles of what was flown."""
+        names = [metric.name for metric in self.campaign.metrics]
+        headings = (
+            *self.campaign.grid,
+            *("flights", "refused", "lost", "share lost", "share lost, low", "share lost, high"),
+            *(f"{name}, {which}" for name in names for which in (*_QUANTILES, "largest")),
+        )
+        values = {name: self.metric(name) for name in names}
+        rows = []
+        for combination, places in self.groups().items():
+            lost, of, refused = self.lost(places)
+            cells = [
+                str(len(places)),
+                str(refused),
+                str(lost),
+                *map(_cell, (lost / of if of else nan, *wilson(lost, of))),
+            ]
+            through = [place for place in places if self.flown[place].verdict is Verdict.FLOWN]
+            for name in names:
+                cells += _distribution(values[name][through])
+            rows.append((*combination, *cells))
+        return headings, rows
+
+    def lost(self, places: Sequence[int]) -> tuple[int, int, int]:
+        """Return how many of these flights were lost, of how many that were flown, and how many were refused."""
+        verdicts = [self.flown[place].verdict for place in places]
+        refused = verdicts.count(Verdict.REFUSED)
+        return sum(verdict.is_lost for verdict in verdicts), len(verdicts) - refused, refused
+
+    def _row(self, each: Flown) -> Row:
+        point = self._points[each.flight]
+        factors = (shown(point.factors[name]) for name in self.campaign.factors)
+        metrics = ("" if value is None else _cell(value) for value in each.metrics)
+        return (str(each.flight), *factors, str(point.seed), *metrics, str(each.verdict), each.why, each.sha256)
+
+
+def wilson(lost: int, of: int) -> tuple[float, float]:
+    """Return between which bounds a share lies with 95 % confidence; nothing is known of none.
+
+    E. B. Wilson, Probable Inference, the Law of Succession, and Statistical Inference, JASA 22, 1927.
+    """
+    if not of:
+        return 0.0, 1.0
+    share, z2 = lost / of, _NORMAL_95**2
+    middle = (share + z2 / (2 * of)) / (1.0 + z2 / of)
+    half = _NORMAL_95 * sqrt(share * (1.0 - share) / of + z2 / (4.0 * of * of)) / (1.0 + z2 / of)
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def is_number(value: Any) -> bool:
+    """Tell whether a factor's value is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _distribution(values: np.ndarray[Any, np.dtype[np.float64]]) -> list[str]:
+    """Return quantiles and the largest as cells; empty where no flight has the metric."""
+    known = values[~np.isnan(values)]
+    if not len(known):
+        return [""] * (len(_QUANTILES) + 1)
+    return [
+        *(_cell(float(value)) for value in np.quantile(known, list(_QUANTILES.values()))),
+        _cell(float(known.max())),
+    ]
+
+
+def _cell(value: float) -> str:
+    return "" if isnan(value) else f"{value:.10g}"
