@@ -168,7 +168,7 @@ def read_seeds(given: Any) -> tuple[int, ...]:
             seeds = tuple(range(int(first), int(last) + 1))
         else:
             seeds = tuple(given) if isinstance(given, list | tuple | range) else (int(given),)
-    except ValueError:
+    except (TypeError, ValueError):
         seeds = ()
     right = all(isinstance(seed, int) and 0 <= seed < _MAX_SEED for seed in seeds)
     if not seeds or not right or len(set(seeds)) < len(seeds):

@@ -39,7 +39,8 @@ SUBCOMMANDS = {
     "replay": "feed a recorded flight to the autopilot: are its answers the same?",
     "verify": "fly a fixed set of flights: is every bit the same, twice, or as it once was?",
 }
-"""What each does, by its name, which is also that of its file beside this one."""
+"""What each does, by its name, which is also that of its file beside this one; `_ROOMS` has those in rooms."""
+_ROOMS = dict.fromkeys(("campaign", "compare", "study", "figures"), "campaigns")
 _NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 
 
@@ -82,7 +83,7 @@ def main(argv: list[str] | None = None) -> int:
         if unknown:
             fail(f"unrecognized arguments: {' '.join(unknown)} (see colibri {args.command} --help)")
         use_writable_folders()
-        code = _subcommand(args.command).run(args)
+        code = subcommand(args.command).run(args)
         sys.stdout.flush()
         return code
     except Error as error:
@@ -125,11 +126,13 @@ def _parser(given: Sequence[str]) -> ArgumentParser:
     for name, what in SUBCOMMANDS.items():
         options = commands.add_parser(name, help=what)
         if name == asked:
-            _subcommand(name).add_options(options)
+            subcommand(name).add_options(options)
     for name, what in PROCESSES.items():
         commands.add_parser(name, help=what, add_help=False)
     return parser
 
 
-def _subcommand(name: str) -> Subcommand:
-    return cast(Subcommand, import_module(f"colibri.cli.{name}"))
+def subcommand(name: str) -> Subcommand:
+    """Return the file of a subcommand."""
+    room = f"colibri.cli.{_ROOMS[name]}" if name in _ROOMS else "colibri.cli"
+    return cast(Subcommand, import_module(f"{room}.{name.replace('-', '_')}"))

@@ -4,7 +4,7 @@ import argparse
 import sys
 
 from colibri.analysis.parallel import side_by_side
-from colibri.cli.compare import seeds
+from colibri.cli.campaigns.compare import seeds
 from tools.fuzz.jobs import HEADER, Job, fire
 
 

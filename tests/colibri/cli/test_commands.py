@@ -6,13 +6,12 @@ import resource
 import subprocess
 import sys
 from errno import ENOSPC
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
-from colibri.cli.main import SUBCOMMANDS, main
+from colibri.cli.main import SUBCOMMANDS, main, subcommand
 from colibri.cli.shared.processes import PROCESSES
 from colibri.flights.provenance import plan_of
 from tests.colibri.cli.commands import FLIGHT, VEHICLE, edited, exit_code
@@ -35,7 +34,7 @@ finally:
 def test_every_subcommand_has_options_and_a_call(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert exit_code([command, "--help"]) == 0
     assert capsys.readouterr().out.startswith(f"usage: colibri {command} ")
-    assert callable(import_module(f"colibri.cli.{command}").run)
+    assert callable(subcommand(command).run)
 
 
 def test_help_names_every_command_and_loads_nothing_that_is_large() -> None:

@@ -70,6 +70,6 @@ def add_options(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Fly a campaign as the command line says; return the exit code."""
     with loading():
-        from colibri.cli.shared.fly_campaign import fly
+        from colibri.cli.campaigns.fly_campaign import fly
 
     return fly(args)

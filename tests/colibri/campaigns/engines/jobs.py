@@ -1,0 +1,31 @@
+"""Jobs for engines, as workers import them."""
+
+import os
+import signal
+import sys
+from contextlib import closing
+from pathlib import Path
+from time import sleep
+
+from colibri.campaigns.engines.pool import Pool
+
+KILLS = -1
+
+
+def doubled(common: int, job: int) -> int:
+    """Return a job times what is common; some kill whoever does them."""
+    if job == KILLS:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return common * job
+
+
+def named(folder: str, job: int) -> None:
+    """Leave a file with the number of the process that does this, and take long."""
+    (Path(folder) / str(os.getpid())).touch()
+    sleep(600.0)
+    del job
+
+
+if __name__ == "__main__":
+    with closing(Pool(2).each(named, sys.argv[1], range(4))) as results:
+        list(results)

@@ -1,0 +1,155 @@
+"""Whole campaigns: the same table by any number of processes, and after any interruption."""
+
+import subprocess
+import sys
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+import psutil
+import pytest
+
+import colibri
+from colibri.campaigns.engines.engine import Killed
+from colibri.campaigns.flights import Flown
+from colibri.campaigns.journal import JOURNAL
+from colibri.campaigns.run import fly_campaign, tables_of
+from colibri.cli.main import main
+from tests.colibri.campaigns.support import MASS, SHORT, Here, planned, tables_in
+from tests.colibri.experiments.test_flight import Hovers
+
+PATIENCE_S = 120.0
+SEEDS = "0-39"
+OPTIONS = ["--track", "hover", "--seeds", SEEDS, "--draw", f"{MASS}=uniform:0.68:0.74", "--duration", "0.6", "--quiet"]
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
+    """The tables of the campaign that `OPTIONS` are, flown in this process."""
+    folder = tmp_path_factory.mktemp("expected") / "out"
+    campaign = planned(fly={"duration": 0.6}, seeds=SEEDS, draw={MASS: {"uniform": [0.68, 0.74]}})
+    fly_campaign(campaign, Here(), folder)
+    return tables_in(folder)
+
+
+def begin(out: Path, *options: str) -> subprocess.Popen[str]:
+    words = [sys.executable, "-m", "colibri", "campaign", *OPTIONS, *options, "--out", str(out)]
+    return subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+
+
+def rows(out: Path, least: int) -> int:
+    """Return how many rows are kept, when there are at least so many."""
+    until_s = monotonic() + PATIENCE_S
+    journal = out / JOURNAL
+    while (count := journal.read_bytes().count(b"\n") if journal.exists() else 0) < least:
+        assert monotonic() < until_s
+        sleep(0.005)
+    return count
+
+
+def test_it_is_interrupted_and_goes_on_though_a_worker_is_killed(tmp_path: Path, expected: tuple[str, str]) -> None:
+    out = tmp_path / "out"
+    with begin(out, "--workers", "1") as first:
+        rows(out, 3)
+        first.terminate()
+        _, said = first.communicate(timeout=PATIENCE_S)
+    assert first.returncode == 130
+    assert said == f"colibri: error: interrupted; what was flown is in {out}: go on with --resume\n"
+    kept = rows(out, 3)
+    assert kept < 40
+    assert len(tables_in(out)[0].splitlines()) == kept + 1
+    with begin(out, "--workers", "2", "--resume") as second:
+        rows(out, kept + 3)
+        flying = [child for child in psutil.Process(second.pid).children() if "spawn_main" in " ".join(child.cmdline())]
+        flying[0].kill()
+        assert second.wait(PATIENCE_S) == 0
+    assert tables_in(out) == expected
+
+
+def test_it_is_killed_and_goes_on(tmp_path: Path, expected: tuple[str, str]) -> None:
+    out = tmp_path / "out"
+    with begin(out, "--workers", "2") as first:
+        rows(out, 5)
+        first.kill()
+    with begin(out, "--workers", "2", "--resume") as second:
+        assert second.wait(PATIENCE_S) == 0
+    assert tables_in(out) == expected
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("least", range(0, 40, 2))
+def test_it_is_killed_at_any_instant_and_goes_on(tmp_path: Path, expected: tuple[str, str], least: int) -> None:
+    out = tmp_path / "out"
+    with begin(out, "--workers", "2") as first:
+        rows(out, least)
+        first.kill()
+    with begin(out, "--workers", "2", "--resume") as second:
+        assert second.wait(PATIENCE_S) == 0
+    assert tables_in(out) == expected
+
+
+def test_from_python_with_a_law_and_a_metric_of_one_s_own(tmp_path: Path) -> None:
+    part = "profile.controllers.Hovers.part"
+    profile = colibri.load_profile("flight").replace("controllers.Hovers", {"part": 1.0})
+    flown: list[Flown] = []
+    results = colibri.campaign(
+        fly=SHORT | {"track": "hover", "profile": profile, "controller": Hovers},
+        grid={part: [0.9, 1.0]},
+        metrics={"sunk": lambda flight: flight.samples["z"][0] - flight.samples["z"][-1]},
+        workers=1,
+        progress=flown.append,
+    )
+    assert [each.flight for each in flown] == [0, 1]
+    sunk = results.flights["sunk"]
+    assert sunk[0] > sunk[1] + 0.01
+    assert results.save(tmp_path / "kept") == tmp_path / "kept"
+    assert tables_in(tmp_path / "kept")[0].startswith(
+        f"flight,{part},seed,sunk,verdict,why,trajectory_sha256\n0,0.9,0,"
+    )
+
+
+def test_logs_are_kept_and_a_killed_flight_is_a_row(tmp_path: Path) -> None:
+    class Kills(Here):
+        def each(self, work: Any, common: Any, jobs: Any) -> Any:
+            for job, result in super().each(work, common, jobs):
+                yield job, Killed() if job.flight == 1 else result
+
+    results = fly_campaign(planned(seeds="0-1", logs="all"), Kills(), tmp_path / "out")
+    assert [str(each.verdict) for each in results.flown] == ["flown", "killed"]
+    assert (tmp_path / "out/flights/000000/flight.csv").exists()
+    assert not (tmp_path / "out/flights/000001").exists()
+    last = tables_in(tmp_path / "out")[0].splitlines()[-1]
+    assert ',killed,"the process that flew it was killed, and again when it flew this alone",' in last
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--track", "hover", "--set", "duration"], "expected KEY=VALUES, body.mass_kg=0.6:0.8:5 say, not duration"),
+        (["--track", "hover", "--set", "mass=3"], "unknown factor mass: "),
+        (["--track", "hover", "--draw", f"{MASS}=uniform:3"], f"{MASS}: uniform: expected [lowest, highest], not [3]"),
+        (["--track", "hover", "--draw", f"{MASS}=gauss:3"], f"{MASS}: expected one of uniform, log-uniform, normal,"),
+        (["--track", "hover", "--metrics", "rmse"], "unknown metric rmse: did you mean rmse_m?"),
+        (["--track", "hover", "--seeds", "3-1"], "seeds: expected 1-20, a seed, or several different ones, not 3-1"),
+        (["--track", "hover", "--workers", "0"], "workers: must be at least 1, not 0"),
+        (["--track", "hover", "--workers", "2", "--dask", "tcp://127.0.0.1:1"], "workers: a cluster has its own"),
+        (["--track", "hover", "--seeds", "1-1000001"], "1000001 flights are many: say --yes if you mean it"),
+        (["--track", "hovr"], "hovr"),
+        (["--profile", "flight"], "no track: say which is flown"),
+        (["there-is-none.toml"], "there-is-none.toml: No such file or directory"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(
+    options: list[str], said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["campaign", *options, "--out", str(tmp_path / "out")])
+    assert ended.value.code == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert said in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_unknown_keywords_are_refused() -> None:
+    with pytest.raises(colibri.Error, match="unknown option grids: did you mean grid"):
+        tables_of(None, {"grids": {}})

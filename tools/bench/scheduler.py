@@ -1,0 +1,62 @@
+"""How many tasks a second the scheduler of a cluster hands out, and how much memory it takes for them.
+
+`python -m tools.bench.scheduler [TASKS]`: a scheduler and two workers of many threads, and as jobs in place of flights
+a sleep of 10 ms, one a task.
+"""
+
+import subprocess
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter, sleep
+
+import psutil
+
+from colibri.campaigns.engines.cluster import Cluster
+
+PORT, WORKERS, THREADS = 18_786, 2, 64
+SLEEP_S = 0.01
+ALONE = ("--no-dashboard", "--host", "127.0.0.1")
+
+
+def sleeping(sleep_s: float, job: int) -> int:
+    """Sleep in place of a flight."""
+    sleep(sleep_s)
+    return job
+
+
+def main() -> None:
+    """Print tasks per second, and the scheduler's memory, every tenth of the way."""
+    tasks = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
+    address = f"tcp://127.0.0.1:{PORT}"
+    with ExitStack() as stack:
+        folder = stack.enter_context(TemporaryDirectory())
+
+        def start(*words: str) -> psutil.Process:
+            with Path(folder, "log.txt").open("ab") as log:
+                process = subprocess.Popen([sys.executable, "-m", "dask", *words, *ALONE], stdout=log, stderr=log)
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            return psutil.Process(process.pid)
+
+        scheduler = start("scheduler", "--port", str(PORT), "--no-jupyter")
+        for _ in range(WORKERS):
+            start("worker", address, "--nthreads", str(THREADS), "--no-nanny", "--local-directory", folder)
+        cluster = Cluster(address, batch=1)
+        began_s, used_s = perf_counter(), _cpu_s(scheduler)
+        for done, _ in enumerate(cluster.each(sleeping, SLEEP_S, range(tasks)), start=1):
+            if done % max(1, tasks // 10) == 0:
+                rate = done / (perf_counter() - began_s)
+                task_us = 1e6 * (_cpu_s(scheduler) - used_s) / done
+                memory_mb = scheduler.memory_info().rss / 1e6
+                print(f"{done} tasks: {rate:.0f} a second, {task_us:.0f} µs of the scheduler each, {memory_mb:.0f} MB")  # noqa: T201
+
+
+def _cpu_s(process: psutil.Process) -> float:
+    times = process.cpu_times()
+    return float(times.user + times.system)
+
+
+if __name__ == "__main__":
+    main()
