@@ -1,6 +1,7 @@
 """Control laws by name: found as entry points, made, and what they return checked."""
 
 from collections.abc import Callable, Mapping
+from difflib import get_close_matches
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import EntryPoints, entry_points
@@ -64,7 +65,14 @@ def load_controller(name: str) -> Factory:
         except (ImportError, AttributeError) as error:
             raise ControllerError(f"controller {name} ({entry.value}) cannot be loaded: {error}") from error
         return factory
-    raise ControllerError(f"unknown controller {name}: installed are {', '.join(controller_names())}")
+    raise _unknown(name)
+
+
+def _unknown(name: str) -> ControllerError:
+    """Return what says that there is no such control law, and which is of nearly that name."""
+    near = get_close_matches(name, controller_names(), 1)
+    hint = f"did you mean {near[0]}?" if near else f"installed are {', '.join(controller_names())}"
+    return ControllerError(f"unknown controller {name}: {hint}")
 
 
 class Origin(NamedTuple):
@@ -92,7 +100,7 @@ def origin_of(name: str) -> Origin:
         package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else ""
         spec = find_spec(entry.module)
         return Origin(entry.value, package, _sha256(spec.origin if spec else None))
-    raise ControllerError(f"unknown controller {name}: installed are {', '.join(controller_names())}")
+    raise _unknown(name)
 
 
 def origin_of_factory(law: Factory) -> Origin:
