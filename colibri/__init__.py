@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from colibri.common import InFlightError as InFlightError
     from colibri.common import Table as Table
     from colibri.common import read_settings as read_settings
+    from colibri.conformance import check_controller as check_controller
     from colibri.experiments import Flight as Flight
     from colibri.experiments import fly as fly
     from colibri.flights import FlightPlan as FlightPlan

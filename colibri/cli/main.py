@@ -32,6 +32,7 @@ SUBCOMMANDS = {
     "compare": "fly several controllers on several tracks, side by side",
     "campaign": "fly every combination of factors, by many seeds, into one table",
     "study": "fly what shows how far profile flight reaches, and draw it",
+    "check-controller": "try on a control law of your own what every one must satisfy",
     "certify": "prove what can be proven of a profile's attitude law",
     "bench": "measure how fast it flies",
     "plot": "draw the figures of a flight, however it ended",
@@ -40,7 +41,9 @@ SUBCOMMANDS = {
     "verify": "fly a fixed set of flights: is every bit the same, twice, or as it once was?",
 }
 """What each does, by its name, which is also that of its file beside this one; `_ROOMS` has those in rooms."""
-_ROOMS = dict.fromkeys(("campaign", "compare", "study", "figures"), "campaigns")
+_ROOMS = dict.fromkeys(("campaign", "compare", "study", "figures"), "campaigns") | dict.fromkeys(
+    ("certify", "check-controller"), "laws"
+)
 _NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 
 

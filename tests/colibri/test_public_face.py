@@ -13,8 +13,8 @@ import pytest
 
 FACES = (
     "colibri",
-    *("colibri.analysis", "colibri.autopilot", "colibri.campaigns", "colibri.common", "colibri.experiments"),
-    *("colibri.flights", "colibri.mavlink"),
+    *("colibri.analysis", "colibri.autopilot", "colibri.campaigns", "colibri.common", "colibri.conformance"),
+    *("colibri.experiments", "colibri.flights", "colibri.mavlink"),
     *("colibri.plant", "colibri.sitl"),
 )
 PACKAGES = (*FACES, "colibri.bench", "colibri.certification", "colibri.cli", "colibri.studies", "colibri.verification")

@@ -68,18 +68,6 @@ def test_each_keeps_the_interface(name: str) -> None:
     assert decision.rotor_speeds == pytest.approx(np.full(4, vehicle.hover_speed), rel=1e-9)
 
 
-@pytest.mark.parametrize("name", PROFILES)
-def test_the_same_inputs_give_the_same_decision(name: str) -> None:
-    """Memory is explicit: calls in between change nothing."""
-    controller = build(name)
-    memory = controller.initial(4000.0)
-    references = staying(controller.preview)
-    _, first = controller.step(memory, 0, hovering((0.5, -0.2, 0.1)), references)
-    controller.step(memory, 300_000, hovering((-3.0, 2.0, 1.0)), references)
-    _, again = controller.step(memory, 0, hovering((0.5, -0.2, 0.1)), references)
-    assert (first.rotor_speeds == again.rotor_speeds).all()
-
-
 @pytest.mark.parametrize("name", ["cascade", "global-lpv-mpc"])
 def test_an_mpc_shows_its_plan(name: str) -> None:
     controller = build(name)

@@ -27,6 +27,7 @@ from colibri.autopilot.control.lpv_mpc import prediction
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.ground.forecast import POINTS, Forecaster
+from colibri.conformance.interface_checks import OPTIONAL
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
 DOCS = Path(__file__).parents[3] / "docs" / "controllers.md"
@@ -220,8 +221,5 @@ def test_of_a_law_without_a_plan_the_references_are_shown() -> None:
 def test_the_page_names_what_a_law_may_have() -> None:
     rows = re.findall(r"^\| (`.*`) \|", DOCS.read_text(encoding="utf-8"), re.MULTILINE)
     words = " ".join(rows)
-    for name in (
-        *("step_attitude", "charge_ah", "with_charge", "mass_kg", "with_mass", "plan_columns"),
-        *("min_path_speed", "step_on_path", "path_speed", "lag_us", "with_lag"),
-    ):
+    for name in (member for protocol in OPTIONAL for member in protocol.members):
         assert f"`{name}" in words

@@ -13,7 +13,6 @@ from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.registry import track
 from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.rotations import nearest_turn
-from colibri.common.serialization import of_bytes, to_bytes
 from colibri.common.types import Vector
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.plant.physics.start import Start
@@ -143,16 +142,6 @@ def test_its_plan_is_what_it_flies() -> None:
     state = flight.state()
     assert predicted[11, :3] == pytest.approx(state.position_enu_m, abs=0.01)
     assert predicted[11, 6:9] == pytest.approx(state.euler, abs=0.1)
-
-
-def test_its_memory_is_plain_data_and_goes_on_bit_for_bit() -> None:
-    flight = Flight(HOVERING._replace(x=0.5))
-    flight.follow("hover:height=20", 0.1)
-    kept = of_bytes(Memory, to_bytes(flight.memory))
-    assert kept is not None
-    references = Planner(track("hover:height=20"), "by-formula", flight.law.preview).horizon(0)
-    ends = [law().step(memory, 0, flight.state(), references)[1].rotor_speeds for memory in (flight.memory, kept)]
-    assert ends[0].tobytes() == ends[1].tobytes()
 
 
 def test_what_the_battery_gives_bounds_its_commands() -> None:

@@ -1,0 +1,20 @@
+"""What a control law must satisfy, tried on it: its interface, its memory, its limits, its flights."""
+
+from typing import TYPE_CHECKING
+
+from colibri.common.lazy import public
+
+if TYPE_CHECKING:
+    from colibri.conformance.check import Conformance as Conformance
+    from colibri.conformance.check import check_controller as check_controller
+    from colibri.conformance.loop_flight import held as held
+    from colibri.conformance.loop_flight import restarted as restarted
+    from colibri.conformance.rebuild import rebuilt as rebuilt
+    from colibri.conformance.rows import Result as Result
+    from colibri.conformance.rows import Row as Row
+    from colibri.conformance.step_records import FlownStep as FlownStep
+    from colibri.conformance.step_records import flown_steps as flown_steps
+    from colibri.conformance.step_records import jumped as jumped
+    from colibri.conformance.subject import built as built
+else:
+    __getattr__, __dir__ = public(__name__)

@@ -1,0 +1,108 @@
+"""What a control law has: its rhythm, its references, and the members of the optional protocols, each group whole."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from colibri.autopilot.control.interface import Controller, Preview
+from colibri.autopilot.control.registry import BuildError, in_words
+from colibri.common.errors import Error
+from colibri.conformance.rows import Result, Row, judged
+from colibri.conformance.subject import Subject
+
+AREA = "interface"
+
+
+class Protocol(NamedTuple):
+    """An optional part of the interface: it is used only where all its members are there."""
+
+    what: str
+    members: tuple[str, ...]
+
+
+ATTITUDE = Protocol("an attitude and a thrust in place of a place", ("step_attitude",))
+CHARGE = Protocol("charge taken from the battery", ("charge_ah", "with_charge"))
+MASS = Protocol("mass estimated in flight", ("mass_kg", "with_mass"))
+PATH = Protocol("speed along the references", ("min_path_speed", "step_on_path", "path_speed", "lag_us", "with_lag"))
+PLAN = Protocol("plan of attitudes", ("plan_columns",))
+COMPILED = Protocol("compiled parts", ("warm_up",))
+OPTIONAL = (ATTITUDE, CHARGE, MASS, PATH, PLAN, COMPILED)
+"""In the order of docs/controllers.md."""
+
+
+def interface_checks(subject: Subject) -> Iterator[Row]:
+    """Yield what can be said of the law without a step."""
+    law = subject.build()
+    built = f"law = built({subject.of_law})"
+    see = subject.script(f"{built}; print(law.preview)", "built")
+    yield judged(AREA, "control_interval_us, preview", _rhythm_wrong(law), _rhythm(law), see)
+    speed, failure = _initial_wrong(subject, law)
+    see = subject.script(f"{built}; law.initial({speed!r})", "built")
+    yield judged(AREA, "initial at any rotor speed", failure, f"{len(_speeds(subject))} speeds", see)
+    see = subject.script(f"{built}; print(dir(law))", "built")
+    yield judged(AREA, "optional members in whole groups", _halves(law), _has(law), see)
+    yield _settings(subject)
+
+
+def has(law: Controller[Any], protocol: Protocol) -> bool:
+    """Whether a law has all members of an optional part of the interface."""
+    return all(hasattr(law, member) for member in protocol.members)
+
+
+def _rhythm(law: Controller[Any]) -> str:
+    return f"{law.control_interval_us / 1000:g} ms; {law.preview[1]} references"
+
+
+def _rhythm_wrong(law: Controller[Any]) -> str:
+    """Return what is wrong with the references that a law wants; its sample is judged where it is built."""
+    preview = law.preview
+    if not isinstance(preview, Preview):
+        return f"preview is {type(preview).__name__}, not Preview(interval_us, samples)"
+    interval_us, samples = preview
+    if not (isinstance(interval_us, int) and isinstance(samples, int) and interval_us > 0 and samples > 0):
+        return f"preview is {preview}: expected two whole numbers from 1 on"
+    return ""
+
+
+def _speeds(subject: Subject) -> list[float]:
+    """Return speeds that rotors may begin with: stopped, idle, in hover, fast and as fast as can be."""
+    rotors = subject.vehicle.rotors
+    return [0.0, rotors.idle_speed, subject.vehicle.hover_speed, 0.9 * rotors.max_speed, rotors.max_speed]
+
+
+def _initial_wrong(subject: Subject, law: Controller[Any]) -> tuple[float, str]:
+    """Return the first rotor speed at which `initial` raises, and what; 0 and nothing if at none."""
+    for speed in _speeds(subject):
+        try:
+            law.initial(speed)
+        except Exception as error:
+            return speed, f"initial({speed:g}) raised {in_words(error)}"
+    return 0.0, ""
+
+
+def _has(law: Controller[Any]) -> str:
+    return ", ".join(protocol.members[0] for protocol in OPTIONAL if has(law, protocol)) or "none"
+
+
+def _halves(law: Controller[Any]) -> str:
+    """Return which groups are not whole: what is there of them is never used."""
+    said = []
+    for protocol in OPTIONAL:
+        there = [member for member in protocol.members if hasattr(law, member)]
+        if there and len(there) < len(protocol.members):
+            missing = [member for member in protocol.members if member not in there]
+            said.append(f"{', '.join(there)} without {', '.join(missing)}")
+    return "; ".join(said)
+
+
+def _settings(subject: Subject) -> Row:
+    """Return whether the law reads its table strictly: a figure, since a law need not have a table."""
+    tried = "an unknown key in its table is refused"
+    name = subject.name
+    spoilt = {**subject.profile.table(name), "no_such_key": 1.0}
+    try:
+        subject.build(subject.profile.replace(f"controllers.{name}", spoilt))
+    except BuildError as error:
+        return Row(AREA, tried, Result.FIGURE, f"no: {error}")
+    except Error:
+        return Row(AREA, tried, Result.OK, "refused")
+    return Row(AREA, tried, Result.FIGURE, "no: read_settings reads it strictly")

@@ -1,0 +1,152 @@
+"""Finite and within limits: flights from random states, far from what a law is made for, and references that jump."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from colibri.autopilot.control.interface import Decision
+from colibri.autopilot.control.registry import DecisionError, check_rotor_speeds, in_words
+from colibri.common.errors import Error
+from colibri.common.types import Array
+from colibri.conformance.rows import Row, judged, not_applicable
+from colibri.conformance.step_records import FlownStep, fly_for_steps, jumped
+from colibri.conformance.subject import Subject
+
+AREA = "limits"
+_S, _SAMPLES = 0.4, 6
+"""So long each flight is, and at least so many samples."""
+_STARTS = 5
+Draw: TypeAlias = Callable[[np.random.Generator], dict[str, float]]
+
+
+class Kind(NamedTuple):
+    """Flights of one kind.
+
+    Attributes:
+        tried: What they are.
+        track: That is asked for.
+        draw: Returns a start.
+        needs_ground: Whether they are of a vehicle that has ground below.
+    """
+
+    tried: str
+    track: str
+    draw: Draw
+    needs_ground: bool = False
+
+
+def _direction(rng: np.random.Generator, length: float) -> Array:
+    direction = rng.normal(size=3)
+    scaled: Array = length * direction / np.linalg.norm(direction)
+    return scaled
+
+
+def _fast(rng: np.random.Generator) -> dict[str, float]:
+    vx, vy, vz = _direction(rng, rng.uniform(3.0, 12.0))
+    return {"z": 40.0, "vx": vx, "vy": vy, "vz": vz}
+
+
+def _upside_down(rng: np.random.Generator) -> dict[str, float]:
+    return {"z": 40.0, "phi": rng.uniform(150.0, 210.0), "theta": rng.uniform(-30.0, 30.0)}
+
+
+def _tumbling(rng: np.random.Generator) -> dict[str, float]:
+    (p, q, r), (phi, theta, psi) = _direction(rng, 10.0), rng.uniform(-180.0, 180.0, 3)
+    return {"z": 60.0, "phi": phi, "theta": theta / 2.0, "psi": psi, "p": p, "q": q, "r": r}
+
+
+def _far_away(rng: np.random.Generator) -> dict[str, float]:
+    x, y, _ = _direction(rng, rng.uniform(10.0, 60.0))
+    return {"x": x, "y": y, "z": rng.uniform(20.0, 60.0), "psi": rng.uniform(-180.0, 180.0)}
+
+
+def _near_the_ground(rng: np.random.Generator) -> dict[str, float]:
+    return {"z": rng.uniform(0.1, 0.4), "vz": rng.uniform(-2.0, 0.0), "phi": rng.uniform(-10.0, 10.0)}
+
+
+def _on_the_ground(rng: np.random.Generator) -> dict[str, float]:
+    return {"x": rng.uniform(-3.0, 3.0), "z": 0.0, "psi": rng.uniform(-180.0, 180.0), "rotors": 0.0}
+
+
+def _gentle(rng: np.random.Generator) -> dict[str, float]:
+    vx, vy, vz = _direction(rng, 1.0)
+    return {"z": 3.0, "phi": rng.uniform(-25.0, 25.0), "theta": rng.uniform(-25.0, 25.0), "vx": vx, "vy": vy, "vz": vz}
+
+
+KINDS = (
+    Kind("from about hover", "hover:height=3", _gentle),
+    Kind("fast, in any direction", "lemniscate:height=40", _fast),
+    Kind("upside down", "hover:height=40", _upside_down),
+    Kind("tumbling", "hover:height=60", _tumbling),
+    Kind("far from the reference", "circle:height=30,speed=4", _far_away),
+    Kind("near the ground, sinking", "hover:height=0.2", _near_the_ground, needs_ground=True),
+    Kind("standing on the ground", "hover:height=2", _on_the_ground, needs_ground=True),
+)
+
+
+def limit_checks(subject: Subject) -> Iterator[Row]:
+    """Yield what came of flights of each kind, and of steps whose references jump."""
+    seconds = max(_S, _SAMPLES * subject.build().control_interval_us * 1e-6)
+    calm: list[tuple[dict[str, Any], list[FlownStep]]] = []
+    for number, kind in enumerate(KINDS):
+        if kind.needs_ground and subject.vehicle.ground is None:
+            yield not_applicable(AREA, kind.tried, f"{subject.vehicle.name} has no ground")
+            continue
+        rng = np.random.default_rng((subject.seed, number))
+        count, failure, see = 0, "", ""
+        for _ in range(_STARTS):
+            drawn = {key: round(float(value), 3) for key, value in kind.draw(rng).items()}
+            options = {"start": subject.start(**drawn), "duration": seconds}
+            failure, steps = _failure(subject, kind.track, options)
+            count += len(steps)
+            if failure:
+                see = subject.command(kind.track, **options)
+                break
+            if number == 0:
+                calm.append((options, steps))
+        yield judged(AREA, kind.tried, failure, f"{count} steps of {_STARTS} flights", see)
+    yield _jumps(subject, calm)
+
+
+def out_of_limits(subject: Subject, decision: Decision) -> str:
+    """Return what no rotor, log or ground station can take of a decision; empty if nothing."""
+    speeds, attitude, plan = decision.rotor_speeds, decision.attitude_reference, decision.diagnostics.predicted
+    if not isinstance(speeds, np.ndarray) or speeds.shape != (4,) or not np.issubdtype(speeds.dtype, np.floating):
+        return f"rotor_speeds is no array of four floats: {speeds!r}"
+    try:
+        check_rotor_speeds(subject.name, speeds, subject.max_speed)
+    except DecisionError as error:
+        return str(error)
+    if len(attitude) != 3 or not all(np.isfinite(angle) for angle in attitude):
+        return f"attitude_reference is not three finite angles: {attitude!r}"
+    if plan is not None and not np.isfinite(plan).all():
+        return "diagnostics.predicted is not finite"
+    return ""
+
+
+def _failure(subject: Subject, track: str, options: dict[str, Any]) -> tuple[str, list[FlownStep]]:
+    """Fly; return what went wrong with the law's decisions, and its steps."""
+    try:
+        flown = fly_for_steps(subject, track, **options)
+    except Error as error:
+        return str(error), []
+    wrong = (out_of_limits(subject, step.decision) for step in flown.steps)
+    return flown.failure or next(filter(None, wrong), ""), flown.steps
+
+
+def _jumps(subject: Subject, flights: list[tuple[dict[str, Any], list[FlownStep]]]) -> Row:
+    """Return what came of each step of flights, with references that jump in it."""
+    tried, law, count = "references that jump, airborne or not", subject.build(), 0
+    for options, steps in flights:
+        for index, step in enumerate(steps):
+            seed = subject.seed + index
+            try:
+                failure = out_of_limits(subject, jumped(step, seed).again(law, step.memory)[1])
+            except Exception as error:
+                failure = in_words(error)
+            count += 1
+            if failure:
+                code = f"x = s[{index}]; print(jumped(x, {seed}).again(law, x.memory)[1])"
+                return judged(AREA, tried, failure, "", subject.snippet(code, KINDS[0].track, **options))
+    return judged(AREA, tried, "", f"{count} steps", "") if count else not_applicable(AREA, tried, "it took no step")

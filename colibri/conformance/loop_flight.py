@@ -1,0 +1,187 @@
+"""A control loop over the plant, to be stopped, begun anew and asked for attitudes in mid-flight."""
+
+from math import acos, degrees
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import AttitudeDemand, Decision, VehicleState
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.guidance.trajectories.planner import Planner
+from colibri.common.rotations import rotation_matrix
+from colibri.common.types import Array
+from colibri.conformance.subject import Subject
+from colibri.flights.plan import FlightPlan
+from colibri.mavlink.hil.state import ActuatorCommand
+from colibri.plant.physics.world import Physics, World, starting_world, state_frame
+
+
+class LoopFlight:
+    """One flight of a control law in calm air.
+
+    Attributes:
+        loop: The control loop that flies now.
+        world: The plant's world now.
+    """
+
+    def __init__(self, subject: Subject, plan: FlightPlan) -> None:
+        """Begin as `plan` does.
+
+        Raises:
+            Error: The law cannot be used.
+        """
+        self._subject, self._plan = subject, plan
+        self._physics = Physics(plan.plant_vehicle, "rk4")
+        self.world: World = starting_world(plan.start, plan.plant_vehicle)
+        self.loop = self.new_loop()
+        self._planner = Planner(plan.track, plan.profile.references, self.loop.preview)
+        self.loop.begin(self._subject.vehicle.hover_speed, plan.start_yaw_rad)
+
+    def new_loop(self) -> ControlLoop:
+        """Return another control loop with a law built anew, which has not begun."""
+        return ControlLoop(self._subject.profile, self._subject.vehicle, perf_counter, self._subject.law)
+
+    def fly(self, seconds: float) -> Array:
+        """Follow the track; return the distance to the reference at each control sample, m.
+
+        Raises:
+            InFlightError: The law fails, or the vehicle leaves what the model describes.
+        """
+        off_m = []
+        for _ in range(self._samples(seconds)):
+            state = self.loop.state(state_frame(self.world))
+            references = self._planner.horizon_at(self.world.time_us, self.loop.control_interval_us)
+            off_m.append(np.linalg.norm(references.position_enu_m[0] - state.position_enu_m))
+            self._go_on(self.loop.decide(self.world.time_us, state, references))
+        return np.array(off_m)
+
+    def hold(self, angles: tuple[float, float, float], thrust_n: float, seconds: float) -> VehicleState:
+        """Hold an attitude, rad, and a thrust; return the state at the end.
+
+        Raises:
+            InFlightError: As `fly`.
+        """
+        n = self.loop.preview.samples
+        demand = AttitudeDemand(np.tile(angles, (n, 1)), np.zeros((n, 3)), np.full(n, thrust_n))
+        for _ in range(self._samples(seconds)):
+            state = self.loop.state(state_frame(self.world))
+            self._go_on(self.loop.decide_attitude(self.world.time_us, state, demand))
+        return self.loop.state(state_frame(self.world))
+
+    @property
+    def tilt_deg(self) -> float:
+        """Between the vehicle's axis and the vertical."""
+        return degrees(acos(min(max(rotation_matrix(state_frame(self.world).attitude)[2][2], -1.0), 1.0)))
+
+    def _samples(self, seconds: float) -> int:
+        return round(seconds * 1e6) // self.loop.control_interval_us
+
+    def _go_on(self, _: Decision) -> None:
+        command = ActuatorCommand(self.world.time_us, self.loop.controls, armed=True)
+        self.world = self._physics.step(self.world, command, self.loop.control_interval_us)
+
+
+class Restarted(NamedTuple):
+    """A flight whose control loop was begun anew in its middle.
+
+    Attributes:
+        unbroken_m, off_m: Distance to the reference after that, m, (n,): had it not been, and as it was.
+        tilt_deg: At the end.
+        same: Whether both are the same flight, bit for bit.
+        is_plain: Whether the law's memory was plain data, which is kept.
+    """
+
+    unbroken_m: Array
+    off_m: Array
+    tilt_deg: float
+    same: bool
+    is_plain: bool
+
+
+BEFORE_S, AFTER_S, HELD_S = 1.0, 3.0, 1.5
+HOW = ("seamless", "anew", "blind")
+
+
+def restarted(
+    track: str,
+    *,
+    how: str,
+    controller: Any,
+    profile: Any = None,
+    vehicle: Any = None,
+    seed: int = 0,
+    before_s: float = BEFORE_S,
+    after_s: float = AFTER_S,
+    **options: Any,
+) -> Restarted:
+    """Fly, replace the control loop in mid-flight, and fly on.
+
+    Args:
+        track: What to fly.
+        how: `seamless`: from a checkpoint a moment ago; `anew`: from one too old to go on with, but for charge and
+            mass; `blind`: from nothing.
+        controller: Name or class, as `colibri.fly` takes it.
+        profile: Name, file or `Profile`; None: the one with numbers for the law.
+        vehicle: Name, file or `Vehicle`; None: the profile's.
+        seed: Of everything random.
+        before_s: Simulated time until then.
+        after_s: Simulated time after that.
+        options: Others of `colibri.fly`: start, say.
+
+    Raises:
+        InFlightError: The law fails, or the vehicle leaves what the model describes.
+    """
+    subject = Subject.of(controller, profile, vehicle, seed)
+    return restart(subject, how, subject.plan(track, **options), before_s, after_s)
+
+
+def restart(
+    subject: Subject, how: str, plan: FlightPlan, before_s: float = BEFORE_S, after_s: float = AFTER_S
+) -> Restarted:
+    """Do what `restarted` does, for a plan."""
+    flight = LoopFlight(subject, plan)
+    flight.fly(before_s)
+    kept, yaw_rad, world = flight.loop.record(), flight.loop.state(state_frame(flight.world)).euler[2], flight.world
+    unbroken_m, unbroken = flight.fly(after_s), flight.world
+    flight.loop, flight.world = flight.new_loop(), world
+    if how == "blind":
+        flight.loop.begin_in_flight(yaw_rad)
+    else:
+        flight.loop.resume(kept, seamless=how == "seamless")
+    off_m = flight.fly(after_s)
+    return Restarted(unbroken_m, off_m, flight.tilt_deg, flight.world.state == unbroken.state, bool(kept.memory))
+
+
+def held(
+    phi: float,
+    theta: float,
+    *,
+    thrust_n: float,
+    controller: Any,
+    profile: Any = None,
+    vehicle: Any = None,
+    seconds: float = HELD_S,
+) -> VehicleState:
+    """Have a law hold an attitude and a thrust, from hover on; return the state at the end.
+
+    Args:
+        phi: Roll, rad.
+        theta: Pitch, rad.
+        thrust_n: Thrust along the body's z axis, N.
+        controller: Name or class, as `colibri.fly` takes it.
+        profile: Name, file or `Profile`; None: the one with numbers for the law.
+        vehicle: Name, file or `Vehicle`; None: the profile's.
+        seconds: Simulated time.
+
+    Raises:
+        InFlightError: The law fails, or the vehicle leaves what the model describes.
+    """
+    return hold(Subject.of(controller, profile, vehicle, 0), phi, theta, thrust_n, seconds)
+
+
+def hold(subject: Subject, phi: float, theta: float, thrust_n: float, seconds: float) -> VehicleState:
+    """Do what `held` does, for a subject."""
+    flight = LoopFlight(subject, subject.plan("hover:height=60", start=subject.start(z=60.0)))
+    yaw_rad = flight.loop.state(state_frame(flight.world)).euler[2]
+    return flight.hold((phi, theta, yaw_rad), thrust_n, seconds)

@@ -1,0 +1,81 @@
+"""Restarts: the law begun anew in mid-flight, with its memory or without, and built anew from other numbers."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from colibri.analysis.lost import LOST_M
+from colibri.autopilot.control.interface import Controller
+from colibri.autopilot.control.registry import in_words
+from colibri.conformance.limit_checks import out_of_limits
+from colibri.conformance.loop_flight import HOW, restart
+from colibri.conformance.rebuild import rebuilds
+from colibri.conformance.rows import Row, judged, not_applicable
+from colibri.conformance.step_records import FlownStep, fly_for_steps
+from colibri.conformance.subject import Subject
+
+AREA = "restart"
+_TRACK = "circle:speed=1"
+_ON_IT = {"x": 2.0, "psi": 90.0, "vy": 1.0}
+_MAX_TILT_DEG = 45.0
+_STEPS = 3
+"""So many are taken with each number that is changed."""
+_TRIED = {
+    "seamless": "from its checkpoint, the same flight bit for bit",
+    "anew": "begun anew in flight, charge and mass kept",
+    "blind": "begun anew in flight, nothing kept",
+}
+
+
+def restart_checks(subject: Subject) -> Iterator[Row]:
+    """Yield what came of restarts."""
+    plan = subject.plan(_TRACK, start=subject.start(**_ON_IT))
+    for how in HOW:
+        failure, found = "", ""
+        try:
+            flown = restart(subject, how, plan)
+        except Exception as error:
+            failure = in_words(error)
+        else:
+            if how == "seamless" and not flown.is_plain:
+                yield not_applicable(AREA, _TRIED[how], "its memory is no plain data")
+                continue
+            found = f"at most {flown.off_m.max():.2g} m off (unbroken {flown.unbroken_m.max():.2g} m)"
+            if how == "seamless" and not flown.same:
+                failure = f"another flight, {found}: is its memory always of the type that initial returns?"
+            elif flown.off_m.max() > LOST_M or flown.tilt_deg > _MAX_TILT_DEG:
+                failure = f"{found}, tilted {flown.tilt_deg:.0f}° at its end"
+        code = f"print(restarted({subject.call(_TRACK, how=how, start=subject.start(**_ON_IT))}))"
+        yield judged(AREA, _TRIED[how], failure, found, subject.script(code, "restarted"))
+    yield _handed_over(subject)
+
+
+def _handed_over(subject: Subject) -> Row:
+    """Return what came of laws built from other numbers, each handed the memory that the first has."""
+    tried = "built from other numbers, handed the old memory"
+    options = {"start": subject.start(**_ON_IT), "duration": max(0.3, 6e-6 * subject.build().control_interval_us)}
+    steps = fly_for_steps(subject, _TRACK, **options).steps
+    if len(steps) < _STEPS:
+        return not_applicable(AREA, tried, "it took too few steps")
+    flown, refused = 0, 0
+    for key, value, law, raised in rebuilds(subject):
+        failure = raised if law is None else _fails(subject, law, steps[-_STEPS:])
+        flown, refused = flown + (law is not None), refused + (law is None)
+        if failure:
+            other = f"rebuilt({key!r}, {value!r}, {subject.of_law})"
+            code = f"other, m = {other}, s[-3].memory; print([m := a.again(other, m)[0] for a in s[-3:]])"
+            return judged(AREA, tried, f"{key} = {value:.6g}: {failure}", "", subject.snippet(code, _TRACK, **options))
+    return judged(AREA, tried, "", f"{flown} laws, each with a number 5 % higher; {refused} refused", "")
+
+
+def _fails(subject: Subject, law: Controller[Any], steps: list[FlownStep]) -> str:
+    """Return what is wrong with steps of a flight if a law takes them that is handed memory there."""
+    memory = steps[0].memory
+    try:
+        for step in steps:
+            memory, decision = step.again(law, memory)
+            wrong = out_of_limits(subject, decision)
+            if wrong:
+                return wrong
+    except Exception as error:
+        return in_words(error)
+    return ""

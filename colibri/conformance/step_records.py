@@ -1,0 +1,201 @@
+"""The steps of a flight as its control law took them, to be taken again: with the memory, the state, the references."""
+
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import replace
+from pickle import dumps
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import Clock, Controller, Decision, Horizon, VehicleState
+from colibri.autopilot.control.registry import DecisionError, check_answer, in_words
+from colibri.common.errors import Error, InFlightError
+from colibri.common.types import Array
+from colibri.conformance.subject import Subject
+from colibri.flights.in_process import Direct, put_together
+from colibri.plant.vehicle.description import Vehicle
+
+_STEPS = ("step", "step_on_path", "step_attitude")
+_MEMBERS = (
+    *("control_interval_us", "preview", "initial", *_STEPS),
+    *("charge_ah", "with_charge", "mass_kg", "with_mass", "plan_columns", "warm_up"),
+    *("min_path_speed", "path_speed", "lag_us", "with_lag"),
+)
+"""What the autopilot asks a control law for."""
+_JUMP_M, _JUMP_RAD = 5.0, 4.0
+
+
+class FlownStep(NamedTuple):
+    """One step of a control law.
+
+    Attributes:
+        method: Which was asked: `step`, or `step_on_path`.
+        memory: What it was given, the object itself.
+        pickled: The same as it was then; None where it cannot be pickled.
+        time_us: Simulated time.
+        state: The vehicle, a copy.
+        references: A copy.
+        changed: Whether the references that it was given were others afterwards.
+        decision: What it returned, the object itself.
+        rotor_speeds: Of the decision, as they were then.
+        took_s: Wall-clock time.
+    """
+
+    method: str
+    memory: Any
+    pickled: bytes | None
+    time_us: int
+    state: VehicleState
+    references: Horizon
+    changed: bool
+    decision: Decision
+    rotor_speeds: Array
+    took_s: float
+
+    def again(self, law: Controller[Any], memory: Any) -> tuple[Any, Decision]:
+        """Take the step by another law, or from another memory; return the next memory and the decision.
+
+        Raises:
+            Exception: Whatever the law raises.
+        """
+        try:
+            answer = getattr(law, self.method)(memory, self.time_us, self.state, copied(self.references))
+        except SystemExit as error:
+            raise DecisionError(f"raised {in_words(error)}") from error
+        check_answer(type(law).__name__, answer, self.time_us)
+        next_memory, decision = answer
+        return next_memory, decision
+
+
+class Flown(NamedTuple):
+    """A flight by its steps.
+
+    Attributes:
+        steps: All that the law took.
+        failure: What it raised, or decided that no rotor can follow; empty if it did not.
+        raised: The exception.
+    """
+
+    steps: list[FlownStep]
+    failure: str
+    raised: BaseException | None
+
+
+class Recorder:
+    """A control law that notes each step; it has the members of the law that it is made of, no more and no less."""
+
+    def __init__(self, law: Controller[Any]) -> None:
+        """Note the steps of `law`."""
+        self.steps: list[FlownStep] = []
+        for name in _MEMBERS:
+            if hasattr(law, name):
+                member = getattr(law, name)
+                setattr(self, name, self._noted(name, member) if name in _STEPS else member)
+
+    def _noted(self, method: str, take: Any) -> Any:
+        def step(memory: Any, time_us: int, state: VehicleState, references: Horizon) -> Any:
+            given, pickled = copied(references), pickled_or_none(memory)
+            began_s = perf_counter()
+            answer = take(memory, time_us, state, references)
+            took_s = perf_counter() - began_s
+            if isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[1], Decision):
+                changed = any(not np.array_equal(a, b) for a, b in zip(given, references, strict=True))
+                speeds = np.array(answer[1].rotor_speeds)
+                noted = FlownStep(method, memory, pickled, time_us, state, given, changed, answer[1], speeds, took_s)
+                self.steps.append(noted)
+            return answer
+
+        return step
+
+
+def fly_for_steps(subject: Subject, track: str, **options: Any) -> Flown:
+    """Fly, with the options of `colibri.fly`, until the flight ends or the law fails; return its steps.
+
+    Raises:
+        Error: It cannot be flown.
+    """
+    recorders: list[Recorder] = []
+
+    def law(table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> Controller[Any]:
+        recorders.append(Recorder(subject.law(table, vehicle, clock)))
+        recorded: Any = recorders[-1]
+        return recorded  # type: ignore[no-any-return]
+
+    plan = replace(subject.plan(track, **options), law=law)
+    try:
+        autopilot, plant = put_together(plan, perf_counter)
+    except Error:
+        raise
+    except Exception as error:  # of its warm_up
+        return Flown([], in_words(error), error)
+    exchange = Direct(autopilot)
+    try:
+        while plant.world.time_us + plant.interval_us <= plan.duration_s * 1e6:
+            _, command = exchange(plant)
+            plant.answer(command)
+    except DecisionError as error:
+        return Flown(recorders[0].steps, str(error), error)
+    except InFlightError:  # the plant's: the vehicle has left what the model describes
+        pass
+    return Flown(recorders[0].steps, "", None)
+
+
+def flown_steps(
+    track: str, *, controller: Any, profile: Any = None, vehicle: Any = None, seed: int = 0, **options: Any
+) -> tuple[Controller[Any], list[FlownStep]]:
+    """Fly a control law; return the law, built anew, and the steps of the flight.
+
+    Args:
+        track: What to fly.
+        controller: Name or class, as `colibri.fly` takes it.
+        profile: Name, file or `Profile`; None: the one with numbers for the law.
+        vehicle: Name, file or `Vehicle`; None: the profile's.
+        seed: Of everything random.
+        options: Others of `colibri.fly`: start, duration, wind.
+
+    Raises:
+        Error: It cannot be flown, or it failed in flight.
+    """
+    subject = Subject.of(controller, profile, vehicle, seed)
+    flown = fly_for_steps(subject, track, **options)
+    if flown.raised is not None:
+        raise flown.raised
+    return subject.build(), flown.steps
+
+
+def copied(references: Horizon) -> Horizon:
+    """Return references of its own."""
+    return Horizon(*(np.array(column) for column in references))
+
+
+def pickled_or_none(memory: Any) -> bytes | None:
+    """Return the memory of a control law, pickled; None where it cannot be."""
+    try:
+        return dumps(memory)
+    except Exception:
+        return None
+
+
+def own_copy(memory: Any) -> Any:
+    """Return a copy of the memory of a control law; where it cannot be copied, itself."""
+    try:
+        return deepcopy(memory)
+    except Exception:
+        return memory
+
+
+def jumped(step: FlownStep, seed: int) -> FlownStep:
+    """Return the step with references that have jumped, by metres and turns, from one of them on; and another ground.
+
+    Whether the vehicle is said to be airborne is turned round, too.
+    """
+    rng = np.random.default_rng(seed)
+    references = copied(step.references)
+    since = int(rng.integers(len(references.yaw_rad)))
+    references.position_enu_m[since:] += rng.normal(scale=_JUMP_M, size=3)
+    references.velocity_enu_m_s[since:] += rng.normal(scale=_JUMP_M, size=3)
+    references.acceleration_enu_m_s2[since:] += rng.normal(scale=_JUMP_M, size=3)
+    references.yaw_rad[since:] += rng.normal(scale=_JUMP_RAD)
+    return step._replace(references=references, state=step.state._replace(airborne=not step.state.airborne))
