@@ -123,7 +123,8 @@ def _heat_map(table: FlightTable, metric: str, values: Array, along: Sequence[st
                 some = _flown(table, values, group.places)
                 medians[cell] = np.median(some) if len(some) else np.nan
                 lost[cell] = 2 * table.lost(group.places)[0] > len(group.places)
-        image = axes.pcolormesh(np.arange(len(xs) + 1), np.arange(len(ys) + 1), medians, cmap="viridis")
+        edges = np.arange(len(xs) + 1), np.arange(len(ys) + 1)
+        image = axes.pcolormesh(*edges, medians, cmap="viridis", norm="log" if _is_wide(medians) else "linear")
         figure.colorbar(image, ax=axes, label=f"{metric}, median")
         crosses = np.argwhere(lost)
         axes.plot(crosses[:, 1] + 0.5, crosses[:, 0] + 0.5, "x", color=_LOST, label="more than half lost")
