@@ -39,8 +39,7 @@ def fork(package: str, options: Sequence[str], stdout: int, stderr: int) -> int:
         for each in (signal.SIGINT, signal.SIGTERM):
             signal.signal(each, signal.SIG_DFL)
         os.setpgid(0, 0)
-        if not sys.flags.safe_path:
-            del sys.path[0]  # as -P does: modules of the working directory shadow none that are still to be loaded
+        _use_safe_path()
         for to, of in ((0, os.open(os.devnull, os.O_RDONLY)), (1, stdout), (2, stderr)):
             os.dup2(of, to)
         sys.stdout, sys.stderr = (os.fdopen(it, "w", buffering=1, closefd=False) for it in (1, 2))
@@ -49,6 +48,18 @@ def fork(package: str, options: Sequence[str], stdout: int, stderr: int) -> int:
         _be(package, ["--parent", str(parent), *options])
     finally:
         os._exit(1)
+
+
+def _use_safe_path() -> None:
+    """Take off the path what -P leaves off: modules of the working directory shadow none that are still to be loaded.
+
+    It need not be the first any more: whoever flies from Python may have put folders before it.
+    """
+    if not sys.flags.safe_path:
+        unsafe = ("", os.getcwd(), os.path.dirname(os.path.abspath(sys.argv[0])))
+        place = next((place for place, folder in enumerate(sys.path) if folder in unsafe), None)
+        if place is not None:
+            del sys.path[place]
 
 
 def _be(package: str, options: Sequence[str]) -> NoReturn:
