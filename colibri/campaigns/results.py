@@ -4,14 +4,29 @@ from base64 import b64encode
 from html import escape
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from colibri.analysis.tables import comma_separated
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import folder_of
+from colibri.campaigns.values import CampaignError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def parquet_writer() -> tuple[Any, Any]:
+    """Return pyarrow, and its function that writes Parquet.
+
+    Raises:
+        CampaignError: It is not installed.
+    """
+    try:
+        import pyarrow
+        from pyarrow.parquet import write_table
+    except ImportError as error:
+        raise CampaignError("Parquet needs pyarrow: pip install colibri-sitl[parquet]") from error
+    return pyarrow, write_table
 
 
 class CampaignResults(FlightTable):
@@ -27,10 +42,18 @@ class CampaignResults(FlightTable):
 
         return draw(self, metric)
 
-    def save(self, folder: str | Path) -> Path:
-        """Write `flights.csv`, `summary.csv` and `campaign.png` into a folder, and return it."""
+    def save(self, folder: str | Path, *, parquet: bool = False) -> Path:
+        """Write `flights.csv`, `summary.csv` and `campaign.png` into a folder, and return it; `parquet`: that, too.
+
+        Raises:
+            CampaignError: There is nothing installed that writes Parquet.
+        """
         path = Path(folder)
         path.mkdir(parents=True, exist_ok=True)
+        if parquet:
+            arrow, write_parquet = parquet_writer()
+            columns = {name: self.flights[name] for name in self.headings}
+            write_parquet(arrow.table(columns), path / "flights.parquet")
         (path / "flights.csv").write_text(comma_separated(self.headings, self.rows()), encoding="utf-8")
         (path / "summary.csv").write_text(comma_separated(*self.summary()), encoding="utf-8")
         for each in self.flown:

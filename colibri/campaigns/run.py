@@ -14,7 +14,7 @@ from colibri.campaigns.factors import factor_name
 from colibri.campaigns.flights import Common, Flown, Verdict, check, common_of, fly_point
 from colibri.campaigns.journal import Journal, open_journal
 from colibri.campaigns.metrics import hint
-from colibri.campaigns.results import CampaignResults
+from colibri.campaigns.results import CampaignResults, parquet_writer
 from colibri.campaigns.values import CampaignError
 from colibri.common.process.folder_lock import FolderLock
 
@@ -30,6 +30,7 @@ def campaign(
     executor: Any = None,
     resume: bool = False,
     yes: bool = False,
+    parquet: bool = False,
     progress: Callable[[Flown], object] = lambda _flown: None,
     **tables: Any,
 ) -> CampaignResults:
@@ -43,6 +44,7 @@ def campaign(
         executor: In their place, a `distributed.Client` or the address of a scheduler of Dask.
         resume: Go on with what `out` has of this campaign.
         yes: Also if it has more than 10⁶ flights.
+        parquet: Write `flights.parquet`, too.
         progress: Is given each flight as it ends.
         tables: As in the file: `fly={"duration": 30}, grid={"track": ["spiral"]}, draw={...}, seeds="1-20"`, `metrics`,
             `logs`, `name`, `root_seed`, `paired`. Values may be what `colibri.fly` takes: profiles, vehicles, laws;
@@ -52,9 +54,9 @@ def campaign(
         Error: What the command line would say in one line.
     """
     planned = campaign_of(tables_of(file, tables))
-    return fly_campaign(
-        planned, engine_of(workers, executor), Path(out) if out else None, resume=resume, yes=yes, progress=progress
-    )
+    engine = engine_of(workers, executor)
+    folder = Path(out) if out else None
+    return fly_campaign(planned, engine, folder, resume=resume, yes=yes, parquet=parquet, progress=progress)
 
 
 def tables_of(file: str | Path | None, given: Mapping[str, Any]) -> CampaignTables:
@@ -107,6 +109,7 @@ def fly_campaign(
     *,
     resume: bool = False,
     yes: bool = False,
+    parquet: bool = False,
     progress: Callable[[Flown], object] = lambda _flown: None,
     begun: Callable[[int], object] = lambda _kept: None,
 ) -> CampaignResults:
@@ -119,6 +122,8 @@ def fly_campaign(
     """
     if planned.flights > MAX_UNASKED and not yes:
         raise CampaignError(f"{planned.flights} flights are many: say --yes if you mean it")
+    if parquet:
+        parquet_writer()
     common = common_of(planned)
     check(planned, common)
     if out is None:
@@ -132,7 +137,7 @@ def fly_campaign(
         try:
             return _fly(planned, common, engine, journal, progress)
         finally:
-            CampaignResults(planned, journal.kept).save(out)
+            CampaignResults(planned, journal.kept).save(out, parquet=parquet)
 
 
 def _fly(

@@ -62,6 +62,7 @@ def add_options(parser: ArgumentParser) -> None:
         help="in their place the cluster whose Dask scheduler is there, tcp://HOST:8786 say",
     )
     add("--resume", action="store_true", help="go on with what --out has of this campaign")
+    add("--parquet", action="store_true", help="write flights.parquet, too")
     add("--yes", action="store_true", help="also if it has more than a million flights")
     add_plan_options(_GivenOnly(parser), link="memory")
     add_out(add, "out/campaign", "table, summary, figure, and what it takes to go on")

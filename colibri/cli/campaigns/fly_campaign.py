@@ -39,9 +39,8 @@ def fly(args: Namespace) -> int:
         planned = campaign_of(tables_of(args.file, given))
         engine = engine_of(args.workers, args.dask)
         with _progress(planned.name, planned.flights, quiet=args.quiet) as bar:
-            results = fly_campaign(
-                planned, engine, args.out, resume=args.resume, yes=args.yes, progress=bar.ended, begun=bar.begun
-            )
+            asked = {name: getattr(args, name) for name in ("resume", "yes", "parquet")}
+            results = fly_campaign(planned, engine, args.out, **asked, progress=bar.ended, begun=bar.begun)
     except KeyboardInterrupt:
         fail(f"interrupted; what was flown is in {args.out}: go on with --resume", EXIT_INTERRUPTED)
     except Error as error:

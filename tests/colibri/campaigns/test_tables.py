@@ -1,6 +1,8 @@
 """The tables and figures of campaigns."""
 
 import csv
+import sys
+from importlib import import_module
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -12,8 +14,9 @@ from matplotlib.lines import Line2D
 from colibri.campaigns.flight_table import wilson
 from colibri.campaigns.flights import Flown, Verdict
 from colibri.campaigns.results import CampaignResults
+from colibri.campaigns.run import fly_campaign
 from colibri.campaigns.values import CampaignError
-from tests.colibri.campaigns.support import MASS, planned, results, tables_in
+from tests.colibri.campaigns.support import MASS, Here, planned, results, tables_in
 
 LATENCY, FLOOR = "latency", "floor"
 
@@ -58,6 +61,23 @@ def test_a_row_a_flight(tmp_path: Path) -> None:
     assert flown.flights["verdict"].tolist() == ["flown"] * 4
     assert np.isnan(flown.flights["lost_at_s"]).all()
     assert (tmp_path / "campaign.png").stat().st_size > 10_000
+
+
+def test_parquet_has_the_same_table(tmp_path: Path) -> None:
+    flown = made({1: Verdict.LOST}, seeds="1-3", grid={"track": ["hover"], LATENCY: [1.0, 2.0]})
+    flown.save(tmp_path, parquet=True)
+    read = import_module("pyarrow.parquet").read_table(tmp_path / "flights.parquet")
+    assert tuple(read.column_names) == flown.headings
+    assert read["rmse_m"].to_pylist() == flown.flights["rmse_m"].tolist()
+    assert read["verdict"].to_pylist()[:2] == ["flown", "lost"]
+    assert all(map(np.isnan, read["max_tilt_deg"].to_pylist()))
+
+
+def test_without_pyarrow_one_line_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(CampaignError, match=r"pip install colibri-sitl\[parquet\]"):
+        fly_campaign(planned(), Here(), tmp_path / "out", parquet=True)
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_summary_has_quantiles_of_what_came_through(tmp_path: Path) -> None:
