@@ -44,13 +44,16 @@ def main() -> None:
         for _ in range(WORKERS):
             start("worker", address, "--nthreads", str(THREADS), "--no-nanny", "--local-directory", folder)
         cluster = Cluster(address, batch=1)
-        began_s, used_s = perf_counter(), _cpu_s(scheduler)
+        here = psutil.Process()
+        began_s, used_s, used_here_s = perf_counter(), _cpu_s(scheduler), _cpu_s(here)
         for done, _ in enumerate(cluster.each(sleeping, SLEEP_S, range(tasks)), start=1):
             if done % max(1, tasks // 10) == 0:
                 rate = done / (perf_counter() - began_s)
                 task_us = 1e6 * (_cpu_s(scheduler) - used_s) / done
+                here_us = 1e6 * (_cpu_s(here) - used_here_s) / done
                 memory_mb = scheduler.memory_info().rss / 1e6
-                print(f"{done} tasks: {rate:.0f} a second, {task_us:.0f} µs of the scheduler each, {memory_mb:.0f} MB")  # noqa: T201
+                took = f"{task_us:.0f} µs of the scheduler and {here_us:.0f} µs here each, {memory_mb:.0f} MB"
+                print(f"{done} tasks: {rate:.0f} a second, {took}")  # noqa: T201
 
 
 def _cpu_s(process: psutil.Process) -> float:
