@@ -11,13 +11,15 @@ from numpy.random import PCG64, Generator, SeedSequence
 
 from colibri.campaigns.factors import factor_name
 from colibri.campaigns.metrics import Metric, read_metrics, usual
-from colibri.campaigns.values import CampaignError, Draw, read_draw, read_values
+from colibri.campaigns.values import CampaignError, Choice, Draw, Level, has_levels, read_draw, read_values
 from colibri.common.config import read_toml
+from colibri.experiments.options import option_names
 from colibri.mavlink.hil.feedback import Feedback
 
 Logs: TypeAlias = Literal["none", "lost", "all"]
 OF_ALL = ("link",)
 """Options that every flight of a campaign has alike."""
+_COLUMNS = ("flight", "seed", "verdict", "why", "trajectory_sha256")
 _MAX_SEED = 2**63
 
 
@@ -32,7 +34,8 @@ class CampaignTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
         metrics: What is kept of each flight; None for the usual.
         logs: Of which flights the logs are kept.
         fly: Options of `colibri fly` that every flight has.
-        grid: Factors with several values; every combination is flown.
+        grid: Factors with several values; every combination is flown. A factor of another name than an option's or a
+            key's has levels: tables by their names, each with what options and keys are set to together.
         draw: Factors that are drawn anew for each flight.
     """
 
@@ -54,11 +57,21 @@ class Point(NamedTuple):
         flight: Its number, which is its place in the table.
         seed: Of everything random.
         factors: What differs from flight to flight, by name.
+        folder: Where in the campaign's folder its logs go, if they are kept.
     """
 
     flight: int
     seed: int
     factors: dict[str, Any]
+    folder: str
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What options and keys are set to that differ from flight to flight."""
+        found: dict[str, Any] = {}
+        for name, value in self.factors.items():
+            found |= value.settings if isinstance(value, Level) else {name: value}
+        return found
 
 
 class Campaign(NamedTuple):
@@ -95,7 +108,8 @@ class Campaign(NamedTuple):
         for values in product(*self.grid.values()):
             combination = dict(zip(self.grid, values, strict=True))
             for place, seed in enumerate(self.seeds):
-                yield Point(flight, seed, combination | self._drawn(place if self.paired else flight))
+                factors = combination | self._drawn(place if self.paired else flight)
+                yield Point(flight, seed, factors, f"flights/{flight:06d}")
                 flight += 1
 
     def samples(self) -> Iterator[Point]:
@@ -103,12 +117,22 @@ class Campaign(NamedTuple):
         first = next(self.points())
         yield first
         for factor, values in self.grid.items():
-            ends = values if isinstance(values[0], str) else (values[0], values[-1])
+            ends = values if isinstance(values[0], str | Level) else (values[0], values[-1])
             for value in islice(ends, 1, None):
                 yield first._replace(factors=first.factors | {factor: value})
         for factor, draw in self.draw.items():
             for value in draw.typical:
                 yield first._replace(factors=first.factors | {factor: value})
+
+    def values(self, option: str) -> Iterator[Any]:
+        """Return all that an option is set to somewhere, its draws from ranges apart."""
+        draw = self.draw.get(option)
+        yield from (each[option] for each in (self.fly, *self._levels()) if option in each)
+        yield from self.grid.get(option, ())
+        yield from draw.values if isinstance(draw, Choice) else ()
+
+    def _levels(self) -> Iterator[dict[str, Any]]:
+        return (each.settings for values in self.grid.values() for each in values if isinstance(each, Level))
 
     def _drawn(self, stream: int) -> dict[str, Any]:
         """Return what is drawn for a flight, each from the flight's own stream, in the order of the factors."""
@@ -134,26 +158,24 @@ def campaign_of(tables: CampaignTables) -> Campaign:
     Raises:
         CampaignError: A factor or a metric that there is not, or a range that is none.
     """
-    fly, grid, draw = _named(tables.fly, *OF_ALL), _named(tables.grid), _named(tables.draw)
-    twice = next((name for name in (*grid, *draw) if [*fly, *grid, *draw].count(name) > 1), None)
-    if twice is not None:
-        raise CampaignError(f"{twice} is said twice: keep it in one of fly, grid and draw")
-    if "track" not in (*fly, *grid, *draw):
-        raise CampaignError('no track: say which is flown, track = ["spiral"] in grid say')
     if tables.root_seed < 0:
         raise CampaignError(f"root_seed: must not be below zero, not {tables.root_seed}")
-    sensors = Feedback.SENSORS in map(str, (fly.get("feedback", ""), *_listed(grid.get("feedback", ""))))
-    return Campaign(
+    planned = Campaign(
         name=tables.name,
         seeds=read_seeds(tables.seeds),
         root_seed=tables.root_seed,
         paired=tables.paired,
-        metrics=usual(sensors=sensors) if tables.metrics is None else read_metrics(tables.metrics),
+        metrics=() if tables.metrics is None else read_metrics(tables.metrics),
         logs=tables.logs,
-        fly=fly,
-        grid={name: read_values(name, values) for name, values in grid.items()},
-        draw={name: read_draw(name, given) for name, given in draw.items()},
+        fly=_named(tables.fly),
+        grid={name: _values(name, values) for name, values in _named(tables.grid).items()},
+        draw={name: read_draw(name, given) for name, given in _named(tables.draw).items()},
     )
+    _check_names(planned)
+    if tables.metrics is None:
+        sensors = Feedback.SENSORS in map(str, planned.values("feedback"))
+        return planned._replace(metrics=usual(sensors=sensors))
+    return planned
 
 
 def read_seeds(given: Any) -> tuple[int, ...]:
@@ -176,10 +198,36 @@ def read_seeds(given: Any) -> tuple[int, ...]:
     return seeds
 
 
-def _named(given: Mapping[str, Any], *others: str) -> dict[str, Any]:
-    """Return factors, and `others` that are none, by their names in tables."""
-    return {name if name in others else factor_name(name): value for name, value in given.items()}
+def name_in_tables(given: str, value: Any) -> str:
+    """Return the name of what `value` is given for: that of a factor, or of an option that all flights have alike.
+
+    Raises:
+        CampaignError: There is no such factor.
+    """
+    return given if given in OF_ALL or has_levels(value) else factor_name(given)
 
 
-def _listed(value: Any) -> list[Any]:
-    return list(value) if isinstance(value, list | tuple) else [value]
+def _named(given: Mapping[str, Any]) -> dict[str, Any]:
+    return {name_in_tables(name, value): value for name, value in given.items()}
+
+
+def _values(name: str, given: Any) -> tuple[Any, ...]:
+    """Return the values of a factor of the grid."""
+    if has_levels(given):
+        return tuple(Level(str(level), _named(settings)) for level, settings in given.items())
+    return read_values(name, given)
+
+
+def _check_names(planned: Campaign) -> None:
+    """Check that what is set is set in one place, that a track is among it, and that columns differ."""
+    said = [*planned.fly, *planned.draw]
+    for name, values in planned.grid.items():
+        levels = [each.settings for each in values if isinstance(each, Level)]
+        if levels and name in (*option_names(), *_COLUMNS, *(metric.name for metric in planned.metrics)):
+            raise CampaignError(f"{name}: a factor with levels needs a name of its own")
+        said += dict.fromkeys(key for settings in levels for key in settings) if levels else [name]
+    twice = next((name for name in said if said.count(name) > 1), None)
+    if twice is not None:
+        raise CampaignError(f"{twice} is said twice: keep it in one of fly, grid and draw")
+    if "track" not in said:
+        raise CampaignError('no track: say which is flown, track = ["spiral"] in grid say')

@@ -10,7 +10,6 @@ from matplotlib.ticker import MaxNLocator
 
 from colibri.analysis.figures import AXES, GRID, TOP_IN, axes_grid, put_head, put_title, shortened
 from colibri.campaigns.flight_table import FlightTable, is_number, wilson
-from colibri.campaigns.flights import Verdict
 from colibri.common.types import Array
 
 _COLORS = (*(style.color for style in AXES), "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")
@@ -74,7 +73,7 @@ def _title(table: FlightTable) -> str:
 
 def _flown(table: FlightTable, values: Array, places: Sequence[int]) -> Array:
     """Return the metric of those flights that came through and have it."""
-    found: Array = np.array([values[place] for place in places if table.flown[place].verdict is Verdict.FLOWN])
+    found: Array = values[table.through(places)]
     known: Array = found[np.isfinite(found)]
     return known
 
@@ -146,7 +145,7 @@ def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str
     for factor, (axes,) in zip(drawn, grid, strict=True):
         at = table.factor(factor).astype(np.float64)
         for group, color in zip(groups, _COLORS, strict=False):
-            through = [place for place in group.places if table.flown[place].verdict is Verdict.FLOWN]
+            through = table.through(group.places)
             axes.plot(at[through], values[through], "o", color=color, markersize=4, alpha=0.6, mew=0, label=group.name)
             lost = [place for place in group.places if table.flown[place].verdict.is_lost]
             edge = axes.get_xaxis_transform()

@@ -122,11 +122,14 @@ class FlightTable:
                 str(lost),
                 *map(_cell, (lost / of if of else nan, *wilson(lost, of))),
             ]
-            through = [place for place in places if self.flown[place].verdict is Verdict.FLOWN]
             for name in names:
-                cells += _distribution(values[name][through])
+                cells += _distribution(values[name][self.through(places)])
             rows.append((*combination, *cells))
         return headings, rows
+
+    def through(self, places: Sequence[int]) -> list[int]:
+        """Return which of these flights came through."""
+        return [place for place in places if self.flown[place].verdict is Verdict.FLOWN]
 
     def lost(self, places: Sequence[int]) -> tuple[int, int, int]:
         """Return how many of these flights were lost, of how many that were flown, and how many were refused."""

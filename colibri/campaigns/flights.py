@@ -1,7 +1,7 @@
 """One flight of a campaign, where it is flown: from its factors to its row."""
 
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Generator, Iterable, Mapping
+from contextlib import closing, suppress
 from enum import StrEnum
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,13 +12,15 @@ from colibri.autopilot.control.loop import build_controller
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.guidance.trajectories.loading import file_text, with_file
 from colibri.campaigns.definition import Campaign, Logs, Point
+from colibri.campaigns.engines.engine import Engine, Killed
 from colibri.campaigns.factors import key_of, with_keys
 from colibri.campaigns.metrics import Metric
-from colibri.campaigns.values import CampaignError, Choice
+from colibri.campaigns.values import CampaignError
 from colibri.common.errors import Error, ForeignError
 from colibri.common.process.failure_file import FAILURE
 from colibri.experiments.flight import Flight, plan_of
 from colibri.flights.plan import FlightPlan
+from colibri.flights.provenance import read_provenance
 from colibri.plant.process.options import wind
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
@@ -77,7 +79,8 @@ class Flown(NamedTuple):
         why: In a line; empty where it was flown.
         metrics: Those of the campaign; None for what this flight does not have.
         sha256: Of its trajectory; empty for none.
-        files: What is kept of its folder, by name.
+        files: What is kept of its logs, by their paths within the campaign's folder.
+        contents: Hash of all that it was made of, as in its provenance; empty where nothing flew.
     """
 
     flight: int
@@ -86,6 +89,7 @@ class Flown(NamedTuple):
     metrics: tuple[float | None, ...]
     sha256: str
     files: Mapping[str, bytes] = {}
+    contents: str = ""
 
 
 def common_of(campaign: Campaign) -> Common:
@@ -95,7 +99,7 @@ def common_of(campaign: Campaign) -> Common:
         Error: One of them cannot be read.
     """
     profiles = {name: load_profile(name) for name in _names(campaign, "profile", "flight")}
-    objects = [value for value in _values(campaign, "profile") if isinstance(value, Profile)]
+    objects = [value for value in campaign.values("profile") if isinstance(value, Profile)]
     usual = {profile.simulation.vehicle for profile in (*profiles.values(), *objects)}
     vehicles = {*_names(campaign, "vehicle"), *_names(campaign, "plant_vehicle"), *usual}
     files = {track: file_text(track) for track in _names(campaign, "track")}
@@ -110,16 +114,23 @@ def common_of(campaign: Campaign) -> Common:
     )
 
 
-def check(campaign: Campaign, common: Common) -> None:
-    """Plan flights in which each value of each factor is there once, and build their control laws.
+def check(points: Iterable[Point], common: Common) -> None:
+    """Plan flights, and build their control laws.
 
     Raises:
         Error: One of them cannot begin.
     """
-    for point in campaign.samples():
+    for point in points:
         with TemporaryDirectory(prefix="colibri-") as folder:
-            plan = _plan(common, point, Path(folder))
+            plan = plan_point(common, point, Path(folder))
             build_controller(plan.profile, plan.vehicle, lambda: 0.0, plan.law)
+
+
+def fly_points(points: Iterable[Point], common: Common, engine: Engine) -> Generator[Flown, None, None]:
+    """Return what comes of each flight, as they end."""
+    with closing(engine.each(fly_point, common, points)) as results:
+        for point, result in results:
+            yield _killed(point, common) if isinstance(result, Killed) else result
 
 
 def fly_point(common: Common, point: Point) -> Flown:
@@ -128,30 +139,30 @@ def fly_point(common: Common, point: Point) -> Flown:
     with TemporaryDirectory(prefix="colibri-") as scratch:
         folder = Path(scratch) / "flight"
         try:
-            plan = _plan(common, point, folder)
+            plan = plan_point(common, point, folder)
             outcome = fly_to_its_end(plan)
         except Error as error:
             why = str(error).replace(scratch, "")
             return Flown(point.flight, Verdict.REFUSED, why, nothing, "")
         verdict = Verdict.FAILED if outcome.failure else Verdict.LOST if outcome.lost else Verdict.FLOWN
         keep = common.logs == "all" or (common.logs == "lost" and verdict.is_lost)
-        files = _files(folder, folder.iterdir() if keep else [folder / FAILURE], folder_of(point.flight))
-        why = outcome.lost.replace(str(folder), folder_of(point.flight))
+        files = _files(folder, folder.iterdir() if keep else [folder / FAILURE], point.folder)
+        why = outcome.lost.replace(str(folder), point.folder)
+        contents = read_provenance(folder).sha256["all"]
         if outcome.report is None:
-            return Flown(point.flight, verdict, why, nothing, "", files)
+            return Flown(point.flight, verdict, why, nothing, "", files, contents)
         flight = Flight(plan, outcome.report)
         metrics = tuple(_metric(metric, flight) for metric in common.metrics)
-        return Flown(point.flight, verdict, why, metrics, flight.sha256, files)
+        return Flown(point.flight, verdict, why, metrics, flight.sha256, files, contents)
 
 
-def folder_of(index: int) -> str:
-    """Return the folder of what is kept of a flight, within that of its campaign."""
-    return f"flights/{index:06d}"
+def plan_point(common: Common, point: Point, out: Path) -> FlightPlan:
+    """Return the plan of a flight, from nothing but `common` and its factors; beside `out` it may leave a track's file.
 
-
-def _plan(common: Common, point: Point, out: Path) -> FlightPlan:
-    """Return the plan of a flight, from nothing but `common` and its factors."""
-    factors = common.fly | point.factors
+    Raises:
+        Error: It cannot begin.
+    """
+    factors = common.fly | point.settings
     options = {name: value for name, value in factors.items() if key_of(name) is None} | {"seed": point.seed}
     track = str(options.pop("track"))
     if options.get("link") == "udp":
@@ -174,21 +185,18 @@ def _plan(common: Common, point: Point, out: Path) -> FlightPlan:
     return plan_of(track, options, out)
 
 
+def _killed(point: Point, common: Common) -> Flown:
+    why = "the process that flew it was killed, and again when it flew this alone"
+    return Flown(point.flight, Verdict.KILLED, why, (None,) * len(common.metrics), "")
+
+
 def _object(given: Any, known: Mapping[str, Any]) -> Any:
     return known[given] if isinstance(given, str) else given
 
 
-def _values(campaign: Campaign, option: str) -> Iterable[Any]:
-    """Return all that an option is set to somewhere in a campaign."""
-    draw = campaign.draw.get(option)
-    drawn = draw.values if isinstance(draw, Choice) else ()
-    said = (campaign.fly[option],) if option in campaign.fly else ()
-    return (*said, *campaign.grid.get(option, ()), *drawn)
-
-
 def _names(campaign: Campaign, option: str, usual: str | None = None) -> list[str]:
-    """Return the names that an option is set to; where it is set to nothing, the usual one."""
-    values = list(_values(campaign, option)) or ([] if usual is None else [usual])
+    """Return the names that an option is set to, and the usual one, which those have that do not set it."""
+    values = [*campaign.values(option), usual]
     return [value for value in values if isinstance(value, str)]
 
 
@@ -204,5 +212,5 @@ def _files(folder: Path, wanted: Iterable[Path], called: str) -> dict[str, bytes
     found = {}
     for path in wanted:
         with suppress(FileNotFoundError):
-            found[path.name] = path.read_bytes().replace(str(folder).encode(), called.encode())
+            found[f"{called}/{path.name}"] = path.read_bytes().replace(str(folder).encode(), called.encode())
     return found

@@ -12,7 +12,7 @@ import msgspec
 
 from colibri.autopilot.control.registry import origin_of, origin_of_factory
 from colibri.campaigns.definition import Campaign
-from colibri.campaigns.flights import Common, Flown, Verdict, folder_of
+from colibri.campaigns.flights import Common, Flown, Verdict
 from colibri.campaigns.values import CampaignError, shown
 
 IDENTITY, JOURNAL = "campaign.json", "journal.jsonl"
@@ -26,23 +26,24 @@ class _Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True, array_like=
     why: str
     metrics: tuple[float | None, ...]
     sha256: str
+    contents: str = ""
 
 
 class Journal:
     """The folder of a campaign that is being flown."""
 
-    def __init__(self, folder: Path, kept: dict[int, Flown]) -> None:
-        """Go on in `folder`, which has what was `kept`."""
+    def __init__(self, folder: Path, kept: dict[int, Flown], file: str = JOURNAL) -> None:
+        """Go on in `folder`, which has what was `kept`, with lines in `file`."""
         self.kept = kept
         self._folder = folder
-        self._file: IO[bytes] = (folder / JOURNAL).open("ab")
+        self._file: IO[bytes] = (folder / file).open("ab")
 
     def add(self, flown: Iterable[Flown]) -> None:
         """Keep flights, whatever happens next: what is kept of their folders first, then the lines that say so."""
         lines = []
         for each in flown:
-            _keep_files(self._folder / folder_of(each.flight), each)
-            line = _Kept(each.flight, each.verdict, each.why, each.metrics, each.sha256)
+            keep_files(self._folder, each)
+            line = _Kept(each.flight, each.verdict, each.why, each.metrics, each.sha256, each.contents)
             lines.append(msgspec.json.encode(line) + b"\n")
         self._file.write(b"".join(lines))
         self._file.flush()
@@ -65,7 +66,7 @@ def open_journal(folder: Path, campaign: Campaign, common: Common, *, resume: bo
     """
     identity = identity_of(campaign, common)
     path = folder / IDENTITY
-    kept = _kept(folder) if path.exists() else {}
+    kept = {each.flight: each for each in read_journal(folder / JOURNAL)} if path.exists() else {}
     if path.exists():
         _check_identity(path, identity, campaign, len(kept), resume=resume)
     elif folder.exists() and any(folder.iterdir()):
@@ -78,7 +79,7 @@ def open_journal(folder: Path, campaign: Campaign, common: Common, *, resume: bo
 
 def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
     """Return in plain data which campaign it is: all that its table depends on, files by their contents."""
-    laws = [*campaign.grid.get("controller", ()), *filter(None, [campaign.fly.get("controller")])]
+    laws = list(filter(None, campaign.values("controller")))
     contents = {
         "profiles": common.profiles,
         "vehicles": common.vehicles,
@@ -143,16 +144,19 @@ def _check_identity(path: Path, now: dict[str, Any], campaign: Campaign, flown: 
         )
 
 
-def _kept(folder: Path) -> dict[int, Flown]:
-    """Return the flights that a journal has; a last line that was cut off is cut off there, too."""
-    path = folder / JOURNAL
+def read_journal(path: Path) -> list[Flown]:
+    """Return the flights that a journal has, in their order; a last line that was cut off is cut off there, too.
+
+    Raises:
+        CampaignError: A line is none of a journal.
+    """
     if not path.exists():
-        return {}
+        return []
     with path.open("r+b") as file:
         content = file.read()
         whole = content.rfind(b"\n") + 1
         file.truncate(whole)
-    kept = {}
+    kept = []
     for number, line in enumerate(content[:whole].splitlines(), start=1):
         try:
             each = msgspec.json.decode(line, type=_Kept)
@@ -160,15 +164,15 @@ def _kept(folder: Path) -> dict[int, Flown]:
             raise CampaignError(
                 f"{path}: line {number}: {error}: remove the line, its flight is flown again"
             ) from error
-        kept[each.flight] = Flown(each.flight, each.verdict, each.why, each.metrics, each.sha256)
+        kept.append(Flown(each.flight, each.verdict, each.why, each.metrics, each.sha256, contents=each.contents))
     return kept
 
 
-def _keep_files(folder: Path, flown: Flown) -> None:
-    if flown.files:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, content in flown.files.items():
-            (folder / name).write_bytes(content)
+def keep_files(folder: Path, flown: Flown) -> None:
+    """Write what is kept of a flight's logs to the folder of its campaign."""
+    for name, content in flown.files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
 
 
 def _write_whole(path: Path, content: bytes) -> None:

@@ -52,6 +52,8 @@ def read_metrics(given: Any) -> tuple[Metric, ...]:
 
 
 def _metric(given: Any) -> Metric:
+    if isinstance(given, Metric):
+        return given
     if callable(given):
         return Metric(str(getattr(given, "__name__", type(given).__name__)), given)
     if given not in NAMES:

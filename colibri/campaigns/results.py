@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from colibri.analysis.tables import comma_separated
 from colibri.campaigns.flight_table import FlightTable
-from colibri.campaigns.flights import folder_of
+from colibri.campaigns.journal import keep_files
 from colibri.campaigns.values import CampaignError
 
 if TYPE_CHECKING:
@@ -57,10 +57,7 @@ class CampaignResults(FlightTable):
         (path / "flights.csv").write_text(comma_separated(self.headings, self.rows()), encoding="utf-8")
         (path / "summary.csv").write_text(comma_separated(*self.summary()), encoding="utf-8")
         for each in self.flown:
-            for name, content in each.files.items():
-                kept = path / folder_of(each.flight)
-                kept.mkdir(parents=True, exist_ok=True)
-                (kept / name).write_bytes(content)
+            keep_files(path, each)
         if self.flown:
             self.plot().savefig(path / "campaign.png", dpi=150)
         return path

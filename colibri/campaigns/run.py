@@ -7,11 +7,10 @@ from typing import Any
 
 import msgspec
 
-from colibri.campaigns.definition import OF_ALL, Campaign, CampaignTables, Point, campaign_of, read_campaign
-from colibri.campaigns.engines.engine import Engine, Killed
+from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of, name_in_tables, read_campaign
+from colibri.campaigns.engines.engine import Engine
 from colibri.campaigns.engines.pool import Pool
-from colibri.campaigns.factors import factor_name
-from colibri.campaigns.flights import Common, Flown, Verdict, check, common_of, fly_point
+from colibri.campaigns.flights import Common, Flown, check, common_of, fly_points
 from colibri.campaigns.journal import Journal, open_journal
 from colibri.campaigns.metrics import hint
 from colibri.campaigns.results import CampaignResults, parquet_writer
@@ -70,14 +69,10 @@ def tables_of(file: str | Path | None, given: Mapping[str, Any]) -> CampaignTabl
     for name in given:
         if name not in known:
             raise CampaignError(f"unknown option {name}: {hint(name, known)}")
-    named = {factor_name(key) for table in _OF_FACTORS for key in given.get(table, {}) if key not in OF_ALL}
+    named = {name_in_tables(*each) for table in _OF_FACTORS for each in given.get(table, {}).items()}
     factors = {
         table: {
-            **{
-                key: value
-                for key, value in getattr(base, table).items()
-                if key in OF_ALL or factor_name(key) not in named
-            },
+            **{key: value for key, value in getattr(base, table).items() if name_in_tables(key, value) not in named},
             **given.get(table, {}),
         }
         for table in _OF_FACTORS
@@ -125,7 +120,7 @@ def fly_campaign(
     if parquet:
         parquet_writer()
     common = common_of(planned)
-    check(planned, common)
+    check(planned.samples(), common)
     if out is None:
         return _fly(planned, common, engine, None, progress)
     try:
@@ -150,16 +145,10 @@ def _fly(
     flown: dict[int, Flown] = {} if journal is None else journal.kept
     done = frozenset(flown)
     left = (point for point in planned.points() if point.flight not in done)
-    with closing(engine.each(fly_point, common, left)) as results:
-        for point, result in results:
-            each = _killed(point, common) if isinstance(result, Killed) else result
+    with closing(fly_points(left, common, engine)) as ended:
+        for each in ended:
             if journal is not None:
                 journal.add([each])
             flown[each.flight] = each if journal is None else each._replace(files={})
             progress(each)
     return CampaignResults(planned, flown)
-
-
-def _killed(point: Point, common: Common) -> Flown:
-    why = "the process that flew it was killed, and again when it flew this alone"
-    return Flown(point.flight, Verdict.KILLED, why, (None,) * len(common.metrics), "")

@@ -121,6 +121,18 @@ def read_draw(key: str, given: Any) -> Draw:
     return draw
 
 
+class Level(NamedTuple):
+    """A value of a factor of one's own: a name for what several options and keys are set to together."""
+
+    name: str
+    settings: dict[str, Any]
+
+
+def has_levels(given: Any) -> bool:
+    """Tell whether what a campaign has for a factor are levels: tables by their names."""
+    return isinstance(given, Mapping) and bool(given) and all(isinstance(each, Mapping) for each in given.values())
+
+
 def read_values(key: str, given: Any) -> tuple[Any, ...]:
     """Return the values that a campaign has for a factor: a list, `{ linspace = [2, 20, 10] }`, or `2:20:10`.
 
@@ -150,7 +162,7 @@ def shown(value: Any) -> str:
         return str(value).lower()
     if isinstance(value, Mapping):
         return ",".join(f"{key}={shown(each)}" for key, each in value.items())
-    if isinstance(value, list | tuple):
+    if isinstance(value, list | tuple) and not isinstance(value, Level):
         return " ".join(map(shown, value))
     return str(getattr(value, "__name__", None) or getattr(value, "name", None) or value)
 

@@ -1,6 +1,6 @@
 """The figure of many flights by chance: how their errors are distributed, track by track."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,27 +12,44 @@ from colibri.analysis.consistency import NAVIGATION, bounds
 from colibri.analysis.estimation import MEASURED
 from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_title, shortened, write_figure
 from colibri.analysis.recording import SETTLED_AFTER_S
-from colibri.studies.seed_log import INNOVATIONS, QUANTITIES, Flown
+from colibri.campaigns.flight_table import FlightTable
 
 _LABEL_IN = 0.8
 _MAX_DECADES = 12
 _NIS_COLORS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9")
+_TRUE = "rmse_after_20s_m"
 _PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
-    ("RMS (m)", {"control": ("#000000", "reference from estimate"), "true": ("#D55E00", "reference from truth")}),
-    ("RMS (m)", {"horizontal": ("#0072B2", "estimate, horizontal"), "vertical": ("#E69F00", "estimate, vertical")}),
-    ("RMS (°)", {"roll": ("#009E73", "roll"), "pitch": ("#56B4E9", "pitch"), "yaw": ("#CC79A7", "yaw")}),
+    (
+        "RMS (m)",
+        {"control_rmse_m": ("#000000", "reference from estimate"), _TRUE: ("#D55E00", "reference from truth")},
+    ),
+    (
+        "RMS (m)",
+        {
+            "estimation_rmse_m.horizontal": ("#0072B2", "estimate, horizontal"),
+            "estimation_rmse_m.vertical": ("#E69F00", "estimate, vertical"),
+        },
+    ),
+    (
+        "RMS (°)",
+        {
+            "attitude_rmse_deg.roll": ("#009E73", "roll"),
+            "attitude_rmse_deg.pitch": ("#56B4E9", "pitch"),
+            "attitude_rmse_deg.yaw": ("#CC79A7", "yaw"),
+        },
+    ),
 )
 
-_BY_TRUTH = ("RMS (m)", {"true": ("#000000", "off its reference")})
+_BY_TRUTH = ("RMS (m)", {_TRUE: ("#000000", "off its reference")})
 """Where the autopilot is told the truth, there is no other."""
 _CHARACTER_IN = 0.085
 """Of a row's name, at most."""
 
 
-def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
+def draw_seeds(table: FlightTable, out: Path) -> list[Path]:
     """Draw `seeds.png`: a dot a flight, a bar at the median; the mean NEES, and that of an honest filter."""
-    cases = list(dict.fromkeys((flown.contender, flown.track) for flown in flights))
-    estimated = not all(np.isnan(flown.values[2]) for flown in flights)
+    cases = table.groups()
+    estimated = not np.isnan(table.metric("estimation_rmse_m.horizontal")).all()
     panels = _PANELS if estimated else (_BY_TRUTH,)
     rows = len(panels) + 2 * estimated
     row_in = 0.35 + 0.42 * len(cases)
@@ -43,15 +60,15 @@ def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
     figure.subplots_adjust(left=left_in / figure.get_figwidth(), hspace=_LABEL_IN / row_in)
     for (axes,), (label, quantities) in zip(grid, panels, strict=False):
         for number, (quantity, (color, called)) in enumerate(quantities.items()):
-            _strips(axes, flights, cases, quantity, color, called, _shift(number, len(quantities)))
+            _strips(axes, table, quantity, color, called, _shift(number, len(quantities)))
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=_MAX_DECADES))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel(label, loc="right")
     if estimated:
-        _draw_nees(grid[-2][0], flights, cases)
-        _draw_nis(grid[-1][0], flights, cases)
+        _draw_nees(grid[-2][0], table)
+        _draw_nis(grid[-1][0], table)
     for (axes,) in grid:
         axes.set_yticks([-place for place in range(len(cases))], names)
         axes.set_ylim(-len(cases) + 0.45, 0.55)
@@ -60,7 +77,7 @@ def draw_seeds(flights: Sequence[Flown], out: Path) -> list[Path]:
         if axes.get_legend_handles_labels()[1]:
             where: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
             axes.legend(**where, ncols=len(MEASURED), frameon=False)
-    put_title(figure, f"{len(flights)} flights, errors after {SETTLED_AFTER_S:.0f} s; bars: medians")
+    put_title(figure, f"{len(table.flown)} flights, errors after {SETTLED_AFTER_S:.0f} s; bars: medians")
     return write_figure(figure, out / "seeds")
 
 
@@ -69,23 +86,24 @@ def _shift(number: int, of: int) -> float:
     return min(0.26, 0.85 / of) * (number - 0.5 * (of - 1))
 
 
-def _draw_nees(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, str]]) -> None:
+def _draw_nees(axes: Axes, table: FlightTable) -> None:
     """Draw the mean NEES of each flight, and where the mean of all belongs."""
-    _strips(axes, flights, cases, "nees", "#000000", "", 0.0, np.mean)
-    within = bounds(NAVIGATION, max(1, len(flights) // len(cases)))
+    _strips(axes, table, "nees_mean", "#000000", "", 0.0, np.mean)
+    within = bounds(NAVIGATION, len(table.campaign.seeds))
     axes.axvspan(*within, color="#D55E00", alpha=0.15, linewidth=0)
     axes.axvline(NAVIGATION, color="#D55E00", linewidth=1.2, label="right; shaded: 95 % of the means over flights")
     axes.set_xlabel("NEES of position, velocity and attitude, mean of a flight; bar: mean of all", loc="right")
 
 
-def _draw_nis(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, str]]) -> None:
+def _draw_nis(axes: Axes, table: FlightTable) -> None:
     """Draw the mean NIS of each flight in parts of how many numbers it has, and between which bounds 95 % belong."""
-    for number, (quantity, (kind, numbers)) in enumerate(zip(INNOVATIONS, MEASURED.items(), strict=True)):
+    for number, (kind, numbers) in enumerate(MEASURED.items()):
         shift = _shift(number, len(MEASURED))
-        _strips(axes, flights, cases, quantity, _NIS_COLORS[number % len(_NIS_COLORS)], kind, shift)
-        for place, case in enumerate(cases):
-            of_case = [flown for flown in flights if (flown.contender, flown.track) == case and not flown.lost]
-            innovations = max((flown.innovations[number] for flown in of_case), default=0)
+        _strips(axes, table, f"nis_mean.{kind}.mean", _NIS_COLORS[number % len(_NIS_COLORS)], kind, shift)
+        counts = table.metric(f"nis_mean.{kind}.innovations")
+        for place, flights in enumerate(table.groups().values()):
+            of_case = counts[table.through(flights)]
+            innovations = np.nan_to_num(of_case).max(initial=0.0)
             if innovations:
                 for bound in bounds(numbers * innovations, 1):
                     at = [bound / (numbers * innovations)] * 2
@@ -98,18 +116,16 @@ def _draw_nis(axes: Axes, flights: Sequence[Flown], cases: Sequence[tuple[str, s
 
 def _strips(
     axes: Axes,
-    flights: Sequence[Flown],
-    cases: Sequence[tuple[str, str]],
-    quantity: str,
+    table: FlightTable,
+    metric: str,
     color: str,
     called: str,
     shift: float,
     middle: Callable[[Any], Any] = np.median,
 ) -> None:
-    column = QUANTITIES.index(quantity)
-    for place, case in enumerate(cases):
-        of_case = [flown for flown in flights if (flown.contender, flown.track) == case]
-        values = np.array([flown.values[column] for flown in of_case if not flown.lost])
+    column = table.metric(metric)
+    for place, flights in enumerate(table.groups().values()):
+        values = column[table.through(flights)]
         values = values[np.isfinite(values)]
         if not len(values):
             continue
@@ -117,8 +133,8 @@ def _strips(
         axes.plot(values, at, "o", color=color, markersize=3, alpha=0.45, markeredgewidth=0, label=called)
         called = ""  # each label once
         axes.plot([middle(values)] * 2, [-place - shift - 0.12, -place - shift + 0.12], color=color, linewidth=2.2)
-        lost = len(of_case) - len(values)
-        if lost and quantity == "true":
+        lost = len(flights) - len(values)
+        if lost and metric == _TRUE:
             text = f"{lost} lost"
             axes.text(
                 0.99, -place, text, transform=axes.get_yaxis_transform(), ha="right", va="center", color="#D00000"

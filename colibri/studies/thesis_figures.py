@@ -18,8 +18,8 @@ from colibri.analysis.figures import (
     write_figure,
 )
 from colibri.analysis.outcome import keep_flight
-from colibri.analysis.parallel import side_by_side
 from colibri.analysis.series.figure_series import POSITION, FigureSeries, Series
+from colibri.campaigns.engines.progress import in_order
 from colibri.common.process.lifecycle import fail
 from colibri.flights.folder import make_folder, prepare
 from colibri.flights.in_process import fly_locally
@@ -81,7 +81,7 @@ def figures(args: argparse.Namespace) -> int:
     jobs = [
         Job(flight, tuple(figure for figure in wanted if figure.flight == flight.name), args.out) for flight in flights
     ]
-    written = side_by_side(draw, jobs, "figures", quiet=args.quiet, worth=lambda job: len(job.figures))
+    written = in_order(draw, jobs, "flights", quiet=args.quiet)
     if not args.quiet:
         from rich.console import Console
 

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from colibri.analysis.parallel import side_by_side
+from colibri.campaigns.engines.progress import in_order
 from colibri.cli.campaigns.compare import seeds
 from tools.fuzz.jobs import HEADER, Job, fire
 
@@ -19,7 +19,7 @@ def main() -> int:
     jobs = [Job(seed, args.datagrams, 0) for seed in args.seeds[: args.lockstep]]
     jobs += [Job(seed, 0, args.messages) for seed in args.seeds]
     _print([HEADER])
-    results = side_by_side(fire, jobs, "fuzzing", quiet=False, worth=sum, keep=lambda result: _print(result.lines))
+    results = in_order(fire, jobs, "fuzzing", quiet=False, keep=lambda result: _print(result.lines))
     failures = [failure for result in results for failure in result.failures]
     _print([f"FAILED: {failure}" for failure in failures] or [f"{len(jobs)} campaigns, and nothing failed"])
     return 1 if failures else 0

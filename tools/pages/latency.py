@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.analysis.figures import GRID
-from colibri.analysis.parallel import side_by_side
 from colibri.analysis.recording import Recording, read_recording
 from colibri.analysis.tables import markdown
+from colibri.campaigns.engines.progress import in_order
 from colibri.common.errors import InFlightError
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
@@ -178,7 +178,7 @@ def sweep(round_trips_ms: Sequence[float]) -> list[Point]:
     """Fly both cases by each law and way at each round trip."""
     points = [(law, way, ms) for law in LAWS for way in WAYS for ms in round_trips_ms]
     flights = [Flight(law, case, ms, told_ms(way, ms)) for law, way, ms in points for case in (STEP, LEMNISCATE)]
-    merits = side_by_side(fly, flights, "latency", quiet=False, worth=lambda _flight: 1)
+    merits = in_order(fly, flights, "latency", quiet=False)
     return [
         Point(*point, *pair) for point, pair in zip(points, zip(merits[::2], merits[1::2], strict=True), strict=True)
     ]

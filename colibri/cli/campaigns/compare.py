@@ -55,13 +55,16 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Compare as the command line says; return the exit code."""
+    from colibri.common.errors import Error
+    from colibri.common.process.lifecycle import fail
     from colibri.flights.folder import occupied
 
     with occupied(args.out):
         if args.seeds:
-            from colibri.studies.seeds import compare_seeds
-
-            return compare_seeds(args)
-        from colibri.studies.compare import compare
-
-        return compare(args)
+            from colibri.studies.seeds import compare_seeds as compare
+        else:
+            from colibri.studies.compare import compare
+        try:
+            return compare(args)
+        except Error as error:
+            fail(str(error))

@@ -1,0 +1,103 @@
+"""Flying what `colibri compare` asks for: a campaign whose flights are known again by what they are made of."""
+
+import argparse
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import msgspec
+
+from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
+from colibri.campaigns.definition import Campaign, CampaignTables, Logs, Point, campaign_of
+from colibri.campaigns.engines.pool import Pool
+from colibri.campaigns.engines.progress import with_bar
+from colibri.campaigns.flight_table import FlightTable
+from colibri.campaigns.flights import Common, Flown, check, common_of, fly_points, plan_point
+from colibri.campaigns.journal import Journal, read_journal
+from colibri.campaigns.metrics import Metric
+from colibri.campaigns.values import CampaignError, shown
+from colibri.flights.folder import make_folder, prepare
+from colibri.flights.plan import OPTIONS
+from colibri.flights.provenance import provenance_of
+from colibri.studies.contenders import DEFAULT_PROFILES, contenders_of, folder_of
+
+
+def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> FlightTable:
+    """Fly every contender along every track by every seed, but for what `--resume` finds; return what came of it.
+
+    `NAME-journal.jsonl` in the folder of the comparison has each flight as soon as it has ended.
+
+    Raises:
+        Error: A flight cannot begin, or what is there cannot be gone on with.
+    """
+    planned = _campaign(args, name, metrics, logs)
+    common = common_of(planned)
+    points = [point._replace(folder=_folder(point, by_seeds=bool(args.seeds))) for point in planned.points()]
+    check(points[:: len(planned.seeds)], common)
+    make_folder(args.out)
+    file = args.out / f"{name}-journal.jsonl"
+    if not args.resume:
+        file.unlink(missing_ok=True)
+    _check_settings(args.out / f"{name}-settings.json", planned, alike=args.resume and bool(args.seeds))
+    flown = _kept(file, points, common)
+    left = [point for point in points if point.flight not in flown]
+    if args.resume and not args.quiet:
+        print(f"--resume: {len(flown)} of {len(points)} flights were flown already, by the same contents")  # noqa: T201
+    for point in left if logs == "all" else ():
+        prepare(args.out / point.folder)
+    with Journal(args.out, flown, file.name) as journal, closing(fly_points(left, common, Pool())) as ended:
+        for each in with_bar(ended, "flights", len(left), quiet=args.quiet):
+            journal.add([each])
+            flown[each.flight] = each._replace(files={})
+    folders = {point.flight: point.folder for point in points}
+    for number, each in flown.items():
+        flown[number] = each._replace(why=each.why.replace(folders[number], str(args.out / folders[number])))
+    return FlightTable(planned, flown)
+
+
+def _campaign(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> Campaign:
+    """Return the campaign that a command line asks for; options as texts where they are objects."""
+    options = {option: getattr(args, option) for option in ("link", *OPTIONS) if option != "seed"}
+    tables = CampaignTables(
+        name=name,
+        seeds=args.seeds or args.seed,
+        fly=options | {"wind": args.wind and str(args.wind)},
+        grid={
+            "contender": contenders_of(args.profile or DEFAULT_PROFILES, args.controller),
+            "track": list(dict.fromkeys(args.track or THESIS_TRACKS)),
+        },
+        metrics=metrics,
+        logs=logs,
+    )
+    return campaign_of(tables)
+
+
+def _folder(point: Point, *, by_seeds: bool) -> str:
+    folder = f"flights/{folder_of(point.factors['contender'].name, point.factors['track'])}"
+    return f"{folder}-{point.seed}" if by_seeds else folder
+
+
+def _kept(file: Path, points: Sequence[Point], common: Common) -> dict[int, Flown]:
+    """Return those of the flights that a journal has with the same contents."""
+    kept = {each.contents: each for each in read_journal(file) if len(each.metrics) == len(common.metrics)}
+    found = {}
+    for point in points if kept else ():
+        with TemporaryDirectory(prefix="colibri-") as folder:
+            contents = provenance_of(plan_point(common, point, Path(folder) / "flight")).sha256["all"]
+        if contents in kept:
+            found[point.flight] = kept[contents]._replace(flight=point.flight)
+    return found
+
+
+def _check_settings(path: Path, planned: Campaign, *, alike: bool) -> None:
+    """Write what all flights have in common; where they must be `alike`, what is there already has to be the same."""
+    now = {name: shown(value) for name, value in planned.fly.items()}
+    if alike and path.exists():
+        was = msgspec.json.decode(path.read_bytes(), type=dict[str, str])
+        changed = ", ".join(f"{name}={was.get(name)}, now {now[name]}" for name in now if was.get(name) != now[name])
+        if changed:
+            raise CampaignError(
+                f"--resume: {path.parent} has flights by other settings ({changed}): give another --out"
+            )
+    path.write_bytes(msgspec.json.encode(now))
