@@ -4,34 +4,40 @@ A study is data: cases to fly, each with its place in the table, and what is mea
 """
 
 import argparse
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from math import isnan, pi, sqrt
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from matplotlib.figure import Figure
 
 from colibri.analysis.figures import write_figure
-from colibri.analysis.parallel import side_by_side
 from colibri.analysis.tables import Row, write_table
 from colibri.autopilot.control.interface import Fallback
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
+from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of
+from colibri.campaigns.engines.progress import in_order
+from colibri.campaigns.flights import common_of
 from colibri.common.process.lifecycle import fail
 from colibri.flights.folder import make_folder
-from colibri.plant.environment.weather import Weather, Wind
+from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import study_figures
 from colibri.studies.study_figures import Result
-from colibri.studies.study_flights import Flight, Flown, Perturbation, fly
+from colibri.studies.study_flights import Flown, fly
 
 FORMATS = ("png", "svg")
 LPV_MPC, WHOLE, ON_PATH, SE3, THESIS = "LPV-MPC", "whole LPV-MPC", "whole, on the path", "SE(3)", "thesis"
-_LAWS = {
-    THESIS: Flight("", profile="thesis"),
-    SE3: Flight("", controller="geometric-se3"),
-    LPV_MPC: Flight("", controller="lpv-mpc"),
-    WHOLE: Flight("", controller="whole-lpv-mpc"),
+Settings: TypeAlias = Mapping[str, Any]
+"""Options and keys of one flight, as a campaign has them."""
+_LAWS: dict[str, Settings] = {
+    THESIS: {"profile": "thesis"},
+    SE3: {"controller": "geometric-se3"},
+    LPV_MPC: {"controller": "lpv-mpc"},
+    WHOLE: {"controller": "whole-lpv-mpc"},
 }
-_ON_PATH = Flight("", profile="path")
+_ON_PATH: Settings = {"profile": "path"}
+_NO_BATTERY: Settings = {"vehicle": load_vehicle("hummingbird").without(["battery"])}
 SPIRAL, LEMNISCATE = "spiral", "lemniscate"
 
 _LEVEL_DEG = 10.0
@@ -52,7 +58,7 @@ class Case(NamedTuple):
 
     row: Row
     group: str
-    flight: Flight
+    flight: Settings
 
 
 class Study(NamedTuple):
@@ -109,12 +115,11 @@ MAX_ERROR = Measure("maximum (m)", unless_lost(lambda flown: flown.max_error_m))
 
 def _tracks() -> Iterable[Case]:
     for track in (*THESIS_TRACKS, LEMNISCATE):
-        for group, flight in _LAWS.items():
-            yield Case((track,), group, flight._replace(track=track))
+        for group, law in _LAWS.items():
+            yield Case((track,), group, {**law, "track": track})
 
 
-def _battery(without: tuple[str, ...]) -> str:
-    return "without" if without else "with"
+_BATTERY: dict[str, Settings] = {"with": {}, "without": _NO_BATTERY}
 
 
 def _speed() -> Iterable[Case]:
@@ -123,60 +128,71 @@ def _speed() -> Iterable[Case]:
     for lap_s in (9.0, 7.5, 6.0, 5.5, 5.0, 4.5, 4.25, 4.0, 3.75, 3.5, 3.0, 2.5, 2.0):
         along_m_s = _SIZE_M * 2.0 * pi / lap_s
         track = f"lemniscate:lap={lap_s:g},height=20"
-        start = (("y", 0.0), ("z", 20.0), ("vx", along_m_s), ("vy", along_m_s))
+        start = {"y": 0.0, "z": 20.0, "vx": along_m_s, "vy": along_m_s}
         for group, law in (_LAWS | {ON_PATH: _ON_PATH}).items():
-            for without in ((), ("battery",)):
-                flight = law._replace(track=track, without=() if group is THESIS else without, start=start)
-                yield Case((f"{lap_s:g}", f"{sqrt(2.0) * along_m_s:.2f}", _battery(without)), group, flight)
+            for battery, vehicle in _BATTERY.items():
+                flight = {**law, "track": track, "start": start, **({} if group is THESIS else vehicle)}
+                yield Case((f"{lap_s:g}", f"{sqrt(2.0) * along_m_s:.2f}", battery), group, flight)
 
 
-_STARTS: dict[str, tuple[tuple[str, float], ...]] = {
-    "inverted": (("phi", 170.0),),
-    "rolling": (("p", 10.0),),
-    "pitching": (("q", 10.0),),
-    "spinning": (("r", 10.0),),
-    "tumbling": (("p", 6.0), ("q", 6.0), ("r", 5.0)),
-    "inverted-tumbling": (("phi", 170.0), ("p", 6.0), ("q", 6.0), ("r", 5.0)),
+_STARTS: dict[str, dict[str, float]] = {
+    "inverted": {"phi": 170.0},
+    "rolling": {"p": 10.0},
+    "pitching": {"q": 10.0},
+    "spinning": {"r": 10.0},
+    "tumbling": {"p": 6.0, "q": 6.0, "r": 5.0},
+    "inverted-tumbling": {"phi": 170.0, "p": 6.0, "q": 6.0, "r": 5.0},
 }
 
 
 def _recovery() -> Iterable[Case]:
     for name, values in _STARTS.items():
-        text = ", ".join(f"φ = {value:g}°" if key == "phi" else f"{key} = {value:g} rad/s" for key, value in values)
-        start = (("y", 0.0), ("z", 20.0), *values)
+        text = ", ".join(f"φ = {value:g}°" if key == "phi" else f"{key} = {value:g} rad/s" for key, value in values.items())
+        flight = {"track": "hover:height=20", "start": {"y": 0.0, "z": 20.0, **values}, "duration": 20.0}
         for group in (LPV_MPC, WHOLE):
-            flight = _LAWS[group]._replace(track="hover:height=20", start=start, duration_s=20.0)
-            yield Case((name, text), group, flight)
+            yield Case((name, text), group, {**_LAWS[group], **flight})
 
 
-_WIND = Weather(Wind(5.0, 270.0))
-_UPSETS: dict[str, Flight] = {
-    "nominal": Flight(""),
-    "wind 5 m/s": Flight("", weather=_WIND),
-    "mass +20 %": Flight("", perturbation=Perturbation(mass=1.2)),
-    "mass −20 %": Flight("", perturbation=Perturbation(mass=0.8)),
-    "inertia +30 %": Flight("", perturbation=Perturbation(inertia=1.3)),
-    "inertia −30 %": Flight("", perturbation=Perturbation(inertia=0.7)),
-    "one rotor 15 % weak": Flight("", perturbation=Perturbation(front_rotor=0.85)),
-    "wind, mass +20 %, inertia +30 %, weak rotor": Flight("", perturbation=Perturbation(1.2, 1.3, 0.85), weather=_WIND),
+def _plant(mass: float = 1.0, inertia: float = 1.0, front_rotor: float = 1.0) -> Settings:
+    """Return a plant that differs by factors; without ground, for a lighter body would need a softer one."""
+    return {
+        "plant-vehicle.body.mass_kg*": mass,
+        "plant-vehicle.body.inertia_kg_m2*": inertia,
+        "plant-vehicle.rotors.strength.0*": front_rotor,
+        "without": ["ground"],
+    }
+
+
+_WIND: Settings = {"wind": "5@270"}
+_UPSETS: dict[str, Settings] = {
+    "nominal": {},
+    "wind 5 m/s": _WIND,
+    "mass +20 %": _plant(mass=1.2),
+    "mass −20 %": _plant(mass=0.8),
+    "inertia +30 %": _plant(inertia=1.3),
+    "inertia −30 %": _plant(inertia=0.7),
+    "one rotor 15 % weak": _plant(front_rotor=0.85),
+    "wind, mass +20 %, inertia +30 %, weak rotor": {**_plant(1.2, 1.3, 0.85), **_WIND},
 }
 
 
 def _robustness() -> Iterable[Case]:
-    for upset, flight in _UPSETS.items():
+    for upset, settings in _UPSETS.items():
         for track in (SPIRAL, LEMNISCATE):
             for group in (SE3, LPV_MPC, WHOLE):
-                controller = _LAWS[group].controller
-                yield Case((track, upset), group, flight._replace(track=track, controller=controller, duration_s=60.0))
+                yield Case((track, upset), group, {**_LAWS[group], **settings, "track": track, "duration": 60.0})
 
 
 def _limits() -> Iterable[Case]:
     slow = (600.0, (SPIRAL, LEMNISCATE, "lemniscate:lap=5"))
     for max_speed, tracks in ((838.0, (SPIRAL, "lemniscate:lap=5")), slow):
         for track in tracks:
-            for without in ((), ("battery",)):
-                flight = _LAWS[LPV_MPC]._replace(track=track, max_speed=max_speed, without=without, duration_s=40.0)
-                yield Case((track, f"{max_speed:g}", _battery(without)), "", flight)
+            flight = {**_LAWS[LPV_MPC], "track": track, "vehicle.rotors.max_speed": max_speed, "duration": 40.0}
+            for battery, vehicle in _BATTERY.items():
+                yield Case((track, f"{max_speed:g}", battery), "", {**flight, **vehicle})
+
+
+_SCHEDULING = "profile.controllers.lpv-mpc.attitude.scheduling"
 
 
 def _scheduling() -> Iterable[Case]:
@@ -184,7 +200,7 @@ def _scheduling() -> Iterable[Case]:
         for yaw in ("path", "fixed"):
             for scheduling in ("frozen", "along-plan"):
                 track = f"lemniscate:lap={lap_s:g},yaw={yaw}"
-                flight = _LAWS[LPV_MPC]._replace(track=track, scheduling=scheduling, duration_s=40.0)
+                flight = {**_LAWS[LPV_MPC], "track": track, _SCHEDULING: scheduling, "duration": 40.0}
                 yield Case((f"{lap_s:g}",), f"yaw {yaw}, {scheduling}", flight)
 
 
@@ -236,14 +252,23 @@ def study(args: argparse.Namespace) -> int:
     """Study as the command line says; return the exit code."""
     wanted = _wanted(args.names)
     make_folder(args.out)
-    flights = list(dict.fromkeys(case.flight for study in wanted for case in study.cases))
-    results = side_by_side(fly, flights, "flights", quiet=args.quiet, worth=lambda flight: round(flight.duration_s))
-    flown = dict(zip(flights, results, strict=True))
+    flights: list[Settings] = []
+    for case in (case for study in wanted for case in study.cases):
+        if case.flight not in flights:
+            flights.append(case.flight)
+    planned = campaign(flights)
+    flown = in_order(partial(fly, common_of(planned)), list(planned.points()), "flights", quiet=args.quiet)
     for one in wanted:
-        written = write(one, [flown[case.flight] for case in one.cases], args.out)
+        written = write(one, [flown[flights.index(case.flight)] for case in one.cases], args.out)
         if not args.quiet:
             _print(one, written)
     return 0
+
+
+def campaign(flights: Sequence[Settings]) -> Campaign:
+    """Return flights as a campaign: each is a level of its one factor."""
+    levels = {str(number): flight for number, flight in enumerate(flights)}
+    return campaign_of(CampaignTables(name="study", grid={"case": levels}))
 
 
 def write(study: Study, flown: Sequence[Flown], out: Path) -> list[Path]:

@@ -1,27 +1,24 @@
-"""One flight of a study: what it changes, how it is flown, and the figures of merit of what came of it."""
+"""One flight of a study: how it is flown, and the figures of merit of what came of it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isnan, nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from colibri.analysis.lost import LOST_M
 from colibri.analysis.recording import SETTLED_AFTER_S, Recording, read_recording
 from colibri.autopilot.control.interface import FALLBACK_CODES, Fallback
-from colibri.autopilot.control.profile import Profile
-from colibri.autopilot.guidance.trajectories.tracks import DURATION_S
+from colibri.campaigns.definition import Point
+from colibri.campaigns.flights import Common, plan_point
 from colibri.common.errors import InFlightError
 from colibri.common.types import Array
+from colibri.flights.folder import prepare
 from colibri.flights.in_process import fly_locally
 from colibri.flights.plan import FlightPlan
-from colibri.plant.environment.weather import NO_WEATHER, Weather
 from colibri.plant.process.logs import TRUTH_COLUMNS
-from colibri.plant.vehicle.description import Vehicle
 
 _AWAY_M = 200.0
 _GROUNDED_M = 0.1
@@ -29,90 +26,17 @@ _GROUNDED_M = 0.1
 _SAMPLE_TIME_S = 1e-6
 
 
-class Perturbation(NamedTuple):
-    """Factors by which the plant's vehicle differs from the autopilot's model.
-
-    Attributes:
-        mass: On the mass.
-        inertia: On Ix, Iy and Iz.
-        front_rotor: On thrust and torque of the front rotor.
-    """
-
-    mass: float = 1.0
-    inertia: float = 1.0
-    front_rotor: float = 1.0
-
-    def of(self, vehicle: Vehicle) -> Vehicle:
-        """Return `vehicle` perturbed, and where it is, without ground: a lighter body would need a softer one."""
-        if self == Perturbation():
-            return vehicle
-        ix, iy, iz = (self.inertia * axis for axis in vehicle.body.inertia_kg_m2)
-        body = msgspec.structs.replace(
-            vehicle.body, mass_kg=self.mass * vehicle.body.mass_kg, inertia_kg_m2=(ix, iy, iz)
-        )
-        front, *others = vehicle.rotors.strength
-        rotors = msgspec.structs.replace(vehicle.rotors, strength=(self.front_rotor * front, *others))
-        return msgspec.structs.replace(vehicle, body=body, rotors=rotors, ground=None)
-
-
-class Flight(NamedTuple):
-    """A flight of a study; equal ones are flown once.
-
-    Attributes:
-        track: The track, with its options.
-        profile: Profile by name.
-        controller: Control law; None for the profile's.
-        scheduling: Of the attitude LPV-MPC; None for the profile's.
-        perturbation: Of the plant's vehicle.
-        without: Parts left out of the vehicle of plant and autopilot, as in `Vehicle.without`.
-        max_speed: Largest rotor speed of plant and autopilot, in the vehicle's unit; None for the vehicle's.
-        weather: Wind, gusts, turbulence.
-        start: Keys and values as in `colibri.plant.physics.start.Start`, in place of the profile's.
-        duration_s: Simulated time.
-    """
-
-    track: str
-    profile: str = "flight"
-    controller: str | None = None
-    scheduling: str | None = None
-    perturbation: Perturbation = Perturbation()
-    without: tuple[str, ...] = ()
-    max_speed: float | None = None
-    weather: Weather = NO_WEATHER
-    start: tuple[tuple[str, float], ...] = ()
-    duration_s: float = DURATION_S
-
-    def plan(self, out: Path) -> FlightPlan:
-        """Return the flight as a plan that leaves its logs in `out`."""
-        plan = FlightPlan.of_options(
-            out, track=self.track, profile=self.profile, controller=self.controller, link="memory"
-        )
-        vehicle = _limited(plan.vehicle, self.max_speed).without(self.without)
-        return replace(
-            plan,
-            profile=_scheduled(plan.profile, self.scheduling),
-            vehicle=vehicle,
-            plant_vehicle=self.perturbation.of(vehicle),
-            without=self.without,
-            **self.weather._asdict(),
-            start=plan.start._replace(**dict(self.start)),
-            duration_s=self.duration_s,
-        )
-
-
 @dataclass(frozen=True, slots=True)
 class Flown:
     """A flight that was flown.
 
     Attributes:
-        flight: The flight.
         recording: What it left behind.
         rotor_limits: Least rotor speed, and the largest that the battery allows at each sample, (n,), both in the
             vehicle's unit.
         failure: Why it ended early; None if it did not.
     """
 
-    flight: Flight
     recording: Recording
     rotor_limits: tuple[float, Array]
     failure: str | None
@@ -180,10 +104,11 @@ class Flown:
         return float(self.t[first]) if first < len(values) else nan
 
 
-def fly(flight: Flight) -> Flown:
-    """Fly in memory and return what came of it, also when it ended early; leave no files."""
+def fly(common: Common, point: Point) -> Flown:
+    """Fly a flight of a campaign and return what came of it, also when it ended early; leave no files."""
     with TemporaryDirectory(prefix="colibri-") as folder:
-        plan = flight.plan(Path(folder))
+        plan = plan_point(common, point, Path(folder) / "flight")
+        prepare(plan.out)
         failure = None
         try:
             fly_locally(plan)
@@ -191,7 +116,7 @@ def fly(flight: Flight) -> Flown:
             failure = str(error)
         recording = read_recording(plan)
         limits = (plan.vehicle.rotors.idle_speed, _top_speed(plan, recording["t"]))
-        return Flown(flight, recording, limits, failure)
+        return Flown(recording, limits, failure)
 
 
 def _top_speed(plan: FlightPlan, t: Array) -> Array:
@@ -204,17 +129,3 @@ def _top_speed(plan: FlightPlan, t: Array) -> Array:
     voltage_v[0] = vehicle.battery.full_voltage_v  # not known before the first step
     speed: Array = vehicle.rotors.max_speed * np.interp(t, time_s, voltage_v) / vehicle.battery.full_voltage_v
     return speed
-
-
-def _limited(vehicle: Vehicle, max_speed: float | None) -> Vehicle:
-    if max_speed is None:
-        return vehicle
-    return msgspec.structs.replace(vehicle, rotors=msgspec.structs.replace(vehicle.rotors, max_speed=max_speed))
-
-
-def _scheduled(profile: Profile, scheduling: str | None) -> Profile:
-    if scheduling is None:
-        return profile
-    table = profile.table(profile.controller)
-    changed: dict[str, Any] = {**table, "attitude": {**table["attitude"], "scheduling": scheduling}}
-    return msgspec.structs.replace(profile, controllers={**profile.controllers, profile.controller: changed})

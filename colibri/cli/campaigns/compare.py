@@ -60,11 +60,13 @@ def run(args: Namespace) -> int:
     from colibri.flights.folder import occupied
 
     with occupied(args.out):
-        if args.seeds:
-            from colibri.studies.seeds import compare_seeds as compare
-        else:
-            from colibri.studies.compare import compare
         try:
+            if args.seeds:
+                from colibri.studies.seeds import compare_seeds
+
+                return compare_seeds(args)
+            from colibri.studies.compare import compare
+
             return compare(args)
         except Error as error:
             fail(str(error))
