@@ -147,10 +147,11 @@ _STARTS: dict[str, dict[str, float]] = {
 
 def _recovery() -> Iterable[Case]:
     for name, values in _STARTS.items():
-        text = ", ".join(f"φ = {value:g}°" if key == "phi" else f"{key} = {value:g} rad/s" for key, value in values.items())
+        texts = (f"φ = {value:g}°" if key == "phi" else f"{key} = {value:g} rad/s" for key, value in values.items())
+        row = (name, ", ".join(texts))
         flight = {"track": "hover:height=20", "start": {"y": 0.0, "z": 20.0, **values}, "duration": 20.0}
         for group in (LPV_MPC, WHOLE):
-            yield Case((name, text), group, {**_LAWS[group], **flight})
+            yield Case(row, group, {**_LAWS[group], **flight})
 
 
 def _plant(mass: float = 1.0, inertia: float = 1.0, front_rotor: float = 1.0) -> Settings:

@@ -13,12 +13,13 @@ from colibri.autopilot.control.interface import Decision, Preview
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS
+from colibri.campaigns.engines.pool import Pool
 from colibri.cli.main import main
 from colibri.plant.vehicle.description import Vehicle
-from colibri.studies import compare
 from colibri.studies.compare import COLUMNS
 from colibri.studies.contenders import contenders_of, folder_name
 from colibri.studies.thesis_figures import FIGURES
+from tests.colibri.engines import in_this_process
 
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "flight.toml"
 INSTALLED = "cascade, geometric-se3, global-lpv-mpc, lpv-mpc, whole-lpv-mpc"
@@ -112,14 +113,16 @@ def test_a_copied_profile_has_a_name_of_its_own(tmp_path: Path) -> None:
     copies = (written(tmp_path, "t2.toml"), written(tmp_path, "flight.toml"))
     assert [load_profile(copy).name for copy in copies] == ["t2", "flight.toml"]
     named = written(tmp_path, "t3.toml", 'name = "flight"', 'name = "mine"')
-    assert [
-        each.name for each in contenders_of(["flight", *copies, named, f"{copies[0]}:geometric-se3", copies[0]])
-    ] == [*("flight", "t2", "flight.toml", "mine", "t2:geometric-se3")]
-    twin = written(tmp_path / "b", "t2.toml")
-    assert [each.name for each in contenders_of([copies[0], twin, named])] == [copies[0], twin, "mine"]
-    assert [each.name for each in contenders_of(["se3", "thesis:cascade"], ["lpv-mpc", "geometric-se3"])] == [
-        *("se3:lpv-mpc", "se3:geometric-se3", "thesis:cascade")
+    assert list(contenders_of(["flight", *copies, named, f"{copies[0]}:geometric-se3", copies[0]])) == [
+        *("flight", "t2", "flight.toml", "mine", "t2:geometric-se3")
     ]
+    twin = written(tmp_path / "b", "t2.toml")
+    assert list(contenders_of([copies[0], twin, named])) == [copies[0], twin, "mine"]
+    assert contenders_of(["se3", "thesis:cascade"], ["lpv-mpc", "geometric-se3"]) == {
+        "se3:lpv-mpc": {"profile": "se3", "controller": "lpv-mpc"},
+        "se3:geometric-se3": {"profile": "se3", "controller": "geometric-se3"},
+        "thesis:cascade": {"profile": "thesis", "controller": "cascade"},
+    }
 
 
 def test_a_profile_by_its_path_flies_within_out_and_is_called_by_its_name(
@@ -171,7 +174,7 @@ class Raises:
 def test_a_comparison_goes_on_after_a_lost_flight_and_says_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(compare, "side_by_side", lambda work, jobs, *_, **__: [work(job) for job in jobs])
+    monkeypatch.setattr(Pool, "each", in_this_process)
     laws = {"geometric-se3": Raises, "whole-lpv-mpc": load_controller("whole-lpv-mpc")}
     monkeypatch.setattr(loop, "load_controller", laws.__getitem__)
     options = ["--profile", "flight:geometric-se3", "--profile", "flight", "--track", "hover", "--duration", "0.5"]

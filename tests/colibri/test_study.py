@@ -1,27 +1,47 @@
 """`colibri study`: what it flies, its tables and figures, and what bad input gets."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from math import isnan
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from colibri.analysis.recording import COLUMNS, read_recording
+import colibri
+from colibri.analysis.recording import COLUMNS
+from colibri.campaigns.engines.pool import Pool
+from colibri.campaigns.flights import common_of, plan_point
 from colibri.cli.main import main
-from colibri.flights.in_process import fly_locally
-from colibri.plant.environment.weather import Weather, Wind
+from colibri.flights.plan import FlightPlan
 from colibri.plant.vehicle.description import load_vehicle
-from colibri.studies.studies import FORMATS, STUDIES, Case, Measure, Study, table, write
-from colibri.studies.study_flights import Flight, Flown, Perturbation, fly
+from colibri.studies.studies import FORMATS, STUDIES, Case, Measure, Settings, Study, campaign, table, write
+from colibri.studies.study_flights import Flown, fly
+from tests.colibri.engines import in_this_process
 
+SHORT: Settings = {"track": "hover:height=20", "start": {"z": 20.0, "phi": 170.0}, "duration": 0.8}
 NAMES = ["tracks", "speed", "recovery", "robustness", "limits", "scheduling"]
 
 
 @pytest.fixture(scope="module")
 def short() -> Flown:
-    return fly(Flight("hover:height=20", start=(("z", 20.0), ("phi", 170.0)), duration_s=0.8))
+    planned = campaign([SHORT])
+    return fly(common_of(planned), next(planned.points()))
+
+
+def plans(flights: Sequence[Settings], folder: Path) -> list[FlightPlan]:
+    """Return flights of studies as they are planned."""
+    planned = campaign(flights)
+    common = common_of(planned)
+    return [plan_point(common, point, folder) for point in planned.points()]
+
+
+def plan_of(**settings: Any) -> FlightPlan:
+    """Return a flight of a study as it is planned."""
+    (plan,) = plans([settings], Path())
+    return plan
 
 
 def moved(flown: Flown, *, to_t_s: float, by_m: float) -> Flown:
@@ -47,42 +67,51 @@ def test_every_case_has_a_cell_of_its_own_and_can_be_flown(name: str, tmp_path: 
     cases = of_name(name).cases
     assert len({(case.row, case.group) for case in cases}) == len(cases)
     assert len({case.row for case in cases}) * len({case.group for case in cases}) == len(cases)
-    for flight in {case.flight for case in cases}:
-        assert flight.plan(tmp_path).duration_s == flight.duration_s
+    flights = [case.flight for case in cases]
+    for flight, plan in zip(flights, plans(flights, tmp_path), strict=True):
+        assert plan.duration_s == flight.get("duration", 100.0)
+        assert plan.track_name == flight["track"]
 
 
-def test_a_flight_changes_what_it_says_and_nothing_else(tmp_path: Path) -> None:
-    plain = Flight("spiral", controller="lpv-mpc").plan(tmp_path)
-    weather = Weather(Wind(5.0, 270.0), turbulence="light", seed=3)
-    flight = Flight(
-        "spiral", controller="lpv-mpc", weather=weather, start=(("phi", 170.0),), scheduling="frozen", duration_s=3.0
-    )
-    changed = flight.plan(tmp_path)
-    assert (changed.weather, changed.start, changed.duration_s) == (weather, plain.start._replace(phi=170.0), 3.0)
-    assert changed.profile.table("lpv-mpc")["attitude"]["scheduling"] == "frozen"
+def case(study: str, row: tuple[str, ...], group: str) -> Settings:
+    (found,) = [each.flight for each in of_name(study).cases if (each.row, each.group) == (row, group)]
+    return found
+
+
+def test_a_flight_changes_what_it_says_and_nothing_else() -> None:
+    plain = plan_of(**case("scheduling", ("10",), "yaw path, along-plan"))
+    frozen = plan_of(**case("scheduling", ("10",), "yaw path, frozen"))
+    assert frozen.profile.table("lpv-mpc")["attitude"]["scheduling"] == "frozen"
     assert plain.profile.table("lpv-mpc")["attitude"]["scheduling"] == "along-plan"
-    assert (changed.vehicle, changed.plant_vehicle) == (plain.vehicle, plain.plant_vehicle)
-    assert changed.link == "memory"
+    assert (frozen.vehicle, frozen.plant_vehicle, frozen.start) == (plain.vehicle, plain.plant_vehicle, plain.start)
+    start = plan_of(**case("recovery", ("inverted", "φ = 170°"), "LPV-MPC")).start
+    assert start == plan_of(track="hover:height=20").start._replace(y=0.0, z=20.0, phi=170.0)
+    windy = plan_of(**case("robustness", ("spiral", "wind 5 m/s"), "LPV-MPC"))
+    assert str(windy.weather.wind) == "5.0@270.0"
+    assert windy.plant_vehicle == windy.vehicle
+    assert {windy.link, plain.link} == {"memory"}
 
 
-def test_a_perturbation_is_the_plants_alone(tmp_path: Path) -> None:
+def test_a_perturbation_is_the_plants_alone() -> None:
     nominal = load_vehicle("hummingbird")
-    plan = Flight("spiral", perturbation=Perturbation(mass=1.2, inertia=1.3, front_rotor=0.85)).plan(tmp_path)
+    row = ("spiral", "wind, mass +20 %, inertia +30 %, weak rotor")
+    plan = plan_of(**case("robustness", row, "LPV-MPC"))
     assert plan.vehicle == nominal
     assert plan.plant_vehicle.body.mass_kg == pytest.approx(1.2 * nominal.body.mass_kg)
     assert plan.plant_vehicle.body.inertia_kg_m2 == pytest.approx([1.3 * i for i in nominal.body.inertia_kg_m2])
     assert plan.plant_vehicle.rotors.strength == (0.85, 1.0, 1.0, 1.0)
+    assert plan.plant_vehicle.ground is None
 
 
-def test_a_limit_is_both_sides(tmp_path: Path) -> None:
-    plan = Flight("spiral", max_speed=600.0).plan(tmp_path)
+def test_a_limit_is_both_sides() -> None:
+    plan = plan_of(**case("limits", ("spiral", "600", "without"), ""))
     assert plan.vehicle.rotors.max_speed == plan.plant_vehicle.rotors.max_speed == 600.0
+    assert plan.vehicle.battery is plan.plant_vehicle.battery is None
 
 
-def test_a_flight_is_that_of_the_command_line(short: Flown, tmp_path: Path) -> None:
-    plan = short.flight.plan(tmp_path)
-    fly_locally(plan)
-    assert read_recording(plan).trajectory_sha256 == short.recording.trajectory_sha256
+def test_a_flight_is_that_of_the_command_line(short: Flown) -> None:
+    track, options = str(SHORT["track"]), {name: value for name, value in SHORT.items() if name != "track"}
+    assert colibri.fly(track, **options).sha256 == short.recording.trajectory_sha256
 
 
 def test_figures_of_merit(short: Flown) -> None:
@@ -113,9 +142,9 @@ def test_the_time_from_which_a_bound_holds(short: Flown) -> None:
 
 
 def test_a_table_has_a_row_for_each_name_and_columns_for_each_group(short: Flown) -> None:
-    measures = (Measure("one", lambda _flown: "1"), Measure("two", lambda flown: flown.flight.track))
-    cases = tuple(Case((row,), group, Flight(row + group)) for row in "ab" for group in ("g", "h"))
-    flown = [replace(short, flight=case.flight) for case in cases]
+    measures = (Measure("one", lambda _flown: "1"), Measure("two", lambda flown: flown.failure or ""))
+    cases = tuple(Case((row,), group, {"track": row + group}) for row in "ab" for group in ("g", "h"))
+    flown = [replace(short, failure=case.flight["track"]) for case in cases]
     headings, rows = table(Study("", ("name",), measures, cases, lambda _results: {}), flown)
     assert headings == ("name", "g: one", "g: two", "h: one", "h: two")
     assert rows == [("a", "1", "ag", "1", "ah"), ("b", "1", "bg", "1", "bh")]
@@ -124,7 +153,7 @@ def test_a_table_has_a_row_for_each_name_and_columns_for_each_group(short: Flown
 @pytest.mark.parametrize("name", NAMES)
 def test_figures_and_tables_are_written(name: str, short: Flown, tmp_path: Path) -> None:
     study = of_name(name)
-    flown = [moved(replace(short, flight=case.flight), to_t_s=30.0, by_m=0.1) for case in study.cases]
+    flown = [moved(short, to_t_s=30.0, by_m=0.1)] * len(study.cases)
     flown[0] = replace(flown[0], failure="lost")
     written = {path.name for path in write(study, flown, tmp_path)}
     figures = written - {f"{name}.md", f"{name}.csv"}
@@ -151,14 +180,18 @@ def test_an_unknown_study_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixt
     assert capsys.readouterr().err == f"colibri: error: there is no study flips: choose {', '.join(NAMES)}\n"
 
 
-_LEVEL = Flight("hover:height=20", start=(("x", 0.0), ("y", 0.0), ("z", 20.0), ("r", 10.0)), duration_s=0.4)
+_LEVEL: Settings = {
+    "track": "hover:height=20",
+    "start": {"x": 0.0, "y": 0.0, "z": 20.0, "r": 10.0},
+    "duration": 0.4,
+}
 """Its height changes by a hundredth of a millimetre."""
 
 
 def test_a_study_from_the_command_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    flown = {"6": Flight("lemniscate:lap=6", duration_s=0.4), "level": _LEVEL}
+    flown = {"6": {"track": "lemniscate:lap=6", "duration": 0.4}, "level": _LEVEL}
     cases = tuple(Case((name, ""), "", flight) for name, flight in flown.items())
     brief = of_name("recovery")._replace(cases=cases)
     monkeypatch.setattr("colibri.studies.studies.STUDIES", (brief,))
@@ -170,3 +203,20 @@ def test_a_study_from_the_command_line(
     assert not re.search(r"<!-- .*[+]", level), "an offset of the axis"
     lines = (tmp_path / "recovery.csv").read_text(encoding="utf-8").splitlines()
     assert [line.split(",")[0] for line in lines] == ["start", *flown]
+
+
+def test_a_flight_of_two_studies_is_flown_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[object] = []
+
+    def counted(pool: Pool, work: Any, common: Any, jobs: Any) -> Any:
+        for each in in_this_process(pool, work, common, jobs):
+            done.append(each)
+            yield each
+
+    cases = tuple(Case((name, ""), "", _LEVEL) for name in ("one", "two"))
+    brief = of_name("recovery")._replace(cases=cases)
+    monkeypatch.setattr("colibri.studies.studies.STUDIES", (brief, brief._replace(name="again")))
+    monkeypatch.setattr(Pool, "each", counted)
+    assert main(["study", "--quiet", "--out", str(tmp_path)]) == 0
+    assert len(done) == 1
+    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "recovery.csv").read_bytes()
