@@ -1,6 +1,6 @@
 """A campaign as data: what every flight has in common, what differs, by which seeds, and what is kept."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice, product
 from math import prod
 from pathlib import Path
@@ -167,7 +167,7 @@ def campaign_of(tables: CampaignTables) -> Campaign:
         paired=tables.paired,
         metrics=() if tables.metrics is None else read_metrics(tables.metrics),
         logs=tables.logs,
-        fly=_named(tables.fly),
+        fly=_named(tables.fly, *OF_ALL),
         grid={name: _values(name, values) for name, values in _named(tables.grid).items()},
         draw={name: read_draw(name, given) for name, given in _named(tables.draw).items()},
     )
@@ -198,17 +198,17 @@ def read_seeds(given: Any) -> tuple[int, ...]:
     return seeds
 
 
-def name_in_tables(given: str, value: Any) -> str:
-    """Return the name of what `value` is given for: that of a factor, or of an option that all flights have alike.
+def name_in_tables(given: str, value: Any, others: Sequence[str] = OF_ALL) -> str:
+    """Return the name of what `value` is given for: that of a factor, or one of `others` that are none.
 
     Raises:
         CampaignError: There is no such factor.
     """
-    return given if given in OF_ALL or has_levels(value) else factor_name(given)
+    return given if given in others or has_levels(value) else factor_name(given)
 
 
-def _named(given: Mapping[str, Any]) -> dict[str, Any]:
-    return {name_in_tables(name, value): value for name, value in given.items()}
+def _named(given: Mapping[str, Any], *others: str) -> dict[str, Any]:
+    return {name_in_tables(name, value, others): value for name, value in given.items()}
 
 
 def _values(name: str, given: Any) -> tuple[Any, ...]:

@@ -25,7 +25,7 @@ class Metric(NamedTuple):
     """
 
     name: str
-    of: "Callable[[Flight], float] | None" = None
+    of: "Callable[[Flight], float | None] | None" = None
 
     def value(self, flight: "Flight") -> float | None:
         """Return the metric of a flight; None where that has none."""

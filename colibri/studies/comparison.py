@@ -39,7 +39,8 @@ def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric
     file = args.out / f"{name}-journal.jsonl"
     if not args.resume:
         file.unlink(missing_ok=True)
-    _check_settings(args.out / f"{name}-settings.json", planned, alike=args.resume and bool(args.seeds))
+    if args.seeds:
+        _keep_settings(args.out / f"{name}-settings.json", planned, resume=args.resume)
     flown = _kept(file, points, common)
     left = [point for point in points if point.flight not in flown]
     if args.resume and not args.quiet:
@@ -90,11 +91,14 @@ def _kept(file: Path, points: Sequence[Point], common: Common) -> dict[int, Flow
     return found
 
 
-def _check_settings(path: Path, planned: Campaign, *, alike: bool) -> None:
-    """Write what all flights have in common; where they must be `alike`, what is there already has to be the same."""
+def _keep_settings(path: Path, planned: Campaign, *, resume: bool) -> None:
+    """Write what all flights have in common; to resume, what is there already has to be the same."""
     now = {name: shown(value) for name, value in planned.fly.items()}
-    if alike and path.exists():
-        was = msgspec.json.decode(path.read_bytes(), type=dict[str, str])
+    if resume and path.exists():
+        try:
+            was = msgspec.json.decode(path.read_bytes(), type=dict[str, str])
+        except msgspec.DecodeError as error:
+            raise CampaignError(f"cannot read {path}: {error}; leave --resume out") from error
         changed = ", ".join(f"{name}={was.get(name)}, now {now[name]}" for name in now if was.get(name) != now[name])
         if changed:
             raise CampaignError(

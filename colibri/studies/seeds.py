@@ -42,8 +42,8 @@ METRICS = (
     *map(Metric, (*_ERRORS, NEES)),
     *(_of_innovations(kind, figure) for kind in MEASURED for figure in ("mean", "innovations")),
 )
-"""After 20 s: root mean squares of one flight, m and degrees; the mean NEES; of each kind of measurement the mean NIS in
-parts of how many numbers it has, and of how many innovations."""
+"""After 20 s: root mean squares of one flight, m and degrees; the mean NEES; of each kind of measurement the mean NIS
+in parts of how many numbers it has, and of how many innovations."""
 
 
 def compare_seeds(args: argparse.Namespace) -> int:

@@ -19,7 +19,7 @@ from colibri.plant.vehicle.description import Vehicle
 from colibri.studies.compare import COLUMNS
 from colibri.studies.contenders import contenders_of, folder_name
 from colibri.studies.thesis_figures import FIGURES
-from tests.colibri.engines import in_this_process
+from tests.colibri.campaigns.support import Here
 
 PROFILE = Path(__file__).parents[2] / "autopilot" / "profiles" / "flight.toml"
 INSTALLED = "cascade, geometric-se3, global-lpv-mpc, lpv-mpc, whole-lpv-mpc"
@@ -174,7 +174,7 @@ class Raises:
 def test_a_comparison_goes_on_after_a_lost_flight_and_says_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(Pool, "each", in_this_process)
+    monkeypatch.setattr(Pool, "each", Here().each)
     laws = {"geometric-se3": Raises, "whole-lpv-mpc": load_controller("whole-lpv-mpc")}
     monkeypatch.setattr(loop, "load_controller", laws.__getitem__)
     options = ["--profile", "flight:geometric-se3", "--profile", "flight", "--track", "hover", "--duration", "0.5"]

@@ -18,7 +18,7 @@ from colibri.cli.main import main
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import seed_figures
 from colibri.studies.seeds import METRICS
-from tests.colibri.engines import in_this_process
+from tests.colibri.campaigns.support import Here
 
 _SENSORS = load_vehicle("hummingbird").sensors
 assert _SENSORS is not None
@@ -72,7 +72,7 @@ def test_what_is_there_is_not_flown_again(
         assert not list(jobs)
         yield from ()
 
-    monkeypatch.setattr(Pool, "each", in_this_process)
+    monkeypatch.setattr(Pool, "each", Here().each)
     assert main([*command, "--quiet", "--seeds", "1-2"]) == 0
     flown = (tmp_path / "seeds-flights.csv").read_text(encoding="utf-8")
     journal = (tmp_path / "seeds-journal.jsonl").read_bytes()
@@ -150,7 +150,7 @@ def test_what_changed_since_is_flown_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A profile's contents count, not its name; the options are the same."""
-    monkeypatch.setattr(Pool, "each", in_this_process)
+    monkeypatch.setattr(Pool, "each", Here().each)
     profile, out = tmp_path / "mine.toml", tmp_path / "out"
     assert main(["show", "profile", "flight"]) == 0
     text = capsys.readouterr().out

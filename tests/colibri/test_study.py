@@ -19,7 +19,7 @@ from colibri.flights.plan import FlightPlan
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies.studies import FORMATS, STUDIES, Case, Measure, Settings, Study, campaign, table, write
 from colibri.studies.study_flights import Flown, fly
-from tests.colibri.engines import in_this_process
+from tests.colibri.campaigns.support import Here
 
 SHORT: Settings = {"track": "hover:height=20", "start": {"z": 20.0, "phi": 170.0}, "duration": 0.8}
 NAMES = ["tracks", "speed", "recovery", "robustness", "limits", "scheduling"]
@@ -208,8 +208,8 @@ def test_a_study_from_the_command_line(
 def test_a_flight_of_two_studies_is_flown_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     done: list[object] = []
 
-    def counted(pool: Pool, work: Any, common: Any, jobs: Any) -> Any:
-        for each in in_this_process(pool, work, common, jobs):
+    def counted(_pool: Pool, work: Any, common: Any, jobs: Any) -> Any:
+        for each in Here().each(work, common, jobs):
             done.append(each)
             yield each
 
