@@ -2,6 +2,7 @@
 
 from collections.abc import Generator, Iterable, Mapping
 from contextlib import closing, suppress
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -146,7 +147,8 @@ def fly_point(common: Common, point: Point) -> Flown:
             return Flown(point.flight, Verdict.REFUSED, why, nothing, "")
         verdict = Verdict.FAILED if outcome.failure else Verdict.LOST if outcome.lost else Verdict.FLOWN
         keep = common.logs == "all" or (common.logs == "lost" and verdict.is_lost)
-        files = _files(folder, folder.iterdir() if keep else [folder / FAILURE], point.folder)
+        called = {str(folder): point.folder, plan.track_name: str((common.fly | point.settings)["track"])}
+        files = _files(folder.iterdir() if keep else [folder / FAILURE], point.folder, called)
         why = outcome.lost.replace(str(folder), point.folder)
         contents = read_provenance(folder).sha256["all"]
         if outcome.report is None:
@@ -170,19 +172,22 @@ def plan_point(common: Common, point: Point, out: Path) -> FlightPlan:
         if changed is not None:
             raise CampaignError(f"{changed}: over udp two processes fly, which know files: leave link out")
         return plan_of(track, options, out)
-    profile = _object(options.get("profile") or "flight", common.profiles)
-    vehicle = _object(options.get("vehicle") or profile.simulation.vehicle, common.vehicles)
-    plant_vehicle = _object(options["plant_vehicle"], common.vehicles) if options.get("plant_vehicle") else None
-    profile, vehicle = with_keys(factors, "profile", profile), with_keys(factors, "vehicle", vehicle)
-    options |= {"profile": profile, "vehicle": vehicle}
-    options["plant_vehicle"] = with_keys(factors, "plant-vehicle", plant_vehicle or vehicle)
+    called = {"profile": options.get("profile") or "flight"}
+    profile = _object(called["profile"], common.profiles)
+    called["vehicle"] = options.get("vehicle") or profile.simulation.vehicle
+    called["plant_vehicle"] = options.get("plant_vehicle") or called["vehicle"]
+    vehicle = with_keys(factors, "vehicle", _object(called["vehicle"], common.vehicles))
+    plant_vehicle = _object(called["plant_vehicle"], common.vehicles) if options.get("plant_vehicle") else vehicle
+    options |= {"profile": with_keys(factors, "profile", profile), "vehicle": vehicle}
+    options["plant_vehicle"] = with_keys(factors, "plant-vehicle", plant_vehicle)
     if options.get("wind") in common.winds:
         options["wind"] = common.winds[options["wind"]]
     if track in common.track_files:
         file = out.with_name("track.csv")
         file.write_text(common.track_files[track], encoding="utf-8")
         track = with_file(track, file)
-    return plan_of(track, options, out)
+    names = {f"{option}_name": name for option, name in called.items() if isinstance(name, str)}
+    return replace(plan_of(track, options, out), **names)
 
 
 def _killed(point: Point, common: Common) -> Flown:
@@ -207,10 +212,13 @@ def _metric(metric: Metric, flight: Flight) -> float | None:
         raise MetricError(f"metric {metric.name} raised {type(error).__name__}: {error}") from error
 
 
-def _files(folder: Path, wanted: Iterable[Path], called: str) -> dict[str, bytes]:
-    """Return what is in files that there are; where text says where it lies, it says where it will lie."""
+def _files(wanted: Iterable[Path], folder: str, called: Mapping[str, str]) -> dict[str, bytes]:
+    """Return what is in files that there are, as it will lie in `folder`; places are called as they are known there."""
     found = {}
     for path in wanted:
         with suppress(FileNotFoundError):
-            found[f"{called}/{path.name}"] = path.read_bytes().replace(str(folder).encode(), called.encode())
+            content = path.read_bytes()
+            for here, there in called.items():
+                content = content.replace(here.encode(), there.encode())
+            found[f"{folder}/{path.name}"] = content
     return found
