@@ -11,7 +11,7 @@ from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of, 
 from colibri.campaigns.engines.engine import Engine
 from colibri.campaigns.engines.pool import Pool
 from colibri.campaigns.flights import Common, Flown, check, common_of, fly_points
-from colibri.campaigns.journal import Journal, open_journal
+from colibri.campaigns.journal import JOURNAL, Journal, open_journal, read_journal
 from colibri.campaigns.metrics import hint
 from colibri.campaigns.results import CampaignResults, parquet_writer
 from colibri.campaigns.values import CampaignError
@@ -132,7 +132,8 @@ def fly_campaign(
         try:
             return _fly(planned, common, engine, journal, progress)
         finally:
-            CampaignResults(planned, journal.kept).save(out, parquet=parquet)
+            kept = {each.flight: each for each in read_journal(out / JOURNAL)}
+            CampaignResults(planned, kept).save(out, parquet=parquet)
 
 
 def _fly(
