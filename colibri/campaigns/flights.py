@@ -186,7 +186,7 @@ def plan_point(common: Common, point: Point, out: Path) -> FlightPlan:
         file = out.with_name("track.csv")
         file.write_text(common.track_files[track], encoding="utf-8")
         track = with_file(track, file)
-    names = {f"{option}_name": name for option, name in called.items() if isinstance(name, str)}
+    names: dict[str, Any] = {f"{option}_name": name for option, name in called.items() if isinstance(name, str)}
     return replace(plan_of(track, options, out), **names)
 
 

@@ -3,7 +3,9 @@
 import csv
 import json
 import struct
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,8 @@ from colibri.autopilot.control.interface import Decision, Preview
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.guidance.trajectories.tracks import OPTIONS, THESIS_TRACKS
+from colibri.campaigns.definition import Point
+from colibri.campaigns.engines.engine import Killed
 from colibri.campaigns.engines.pool import Pool
 from colibri.cli.main import main
 from colibri.plant.vehicle.description import Vehicle
@@ -185,6 +189,26 @@ def test_a_comparison_goes_on_after_a_lost_flight_and_says_why(
     assert "in step" in Path(lost["why"].removeprefix(why)).read_text(encoding="utf-8")
     assert fine["why"] == ""
     assert f"flight:geometric-se3, hover: lost at t = 0.20 s: {why}" in capsys.readouterr().out
+
+
+def test_a_flight_that_kills_its_process_is_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def kills(_pool: Pool, work: Any, common: Any, jobs: Iterable[Point]) -> Iterator[tuple[Point, Any]]:
+        for job in jobs:
+            yield job, Killed() if job.settings["profile"] == "se3" else work(common, job)
+
+    monkeypatch.setattr(Pool, "each", kills)
+    command = ["compare", "--profile", "se3", "--profile", "flight", "--track", "hover", "--duration", "0.5"]
+    assert main([*command, "--out", str(tmp_path)]) == 1
+    lost, fine = csv.reader((tmp_path / "compare.csv").read_text(encoding="utf-8").splitlines()[1:])
+    assert lost[:8] == ["se3", "hover", *["-"] * 5, "0"]
+    assert lost[8] == "the process that flew it was killed, and again when it flew this alone"
+    assert fine[7:] == ["", ""]
+    monkeypatch.setattr(Pool, "each", Here().each)
+    capsys.readouterr()
+    assert main([*command, "--out", str(tmp_path), "--resume"]) == 0
+    assert "--resume: 1 of 2 flights were flown already, by the same contents\n" in capsys.readouterr().out
 
 
 def test_a_law_that_cannot_be_built_is_found_before_anything_flies(
