@@ -200,9 +200,9 @@ def _object(given: Any, known: Mapping[str, Any]) -> Any:
 
 
 def _names(campaign: Campaign, option: str, usual: str | None = None) -> list[str]:
-    """Return the names that an option is set to, and the usual one, which those have that do not set it."""
-    values = [*campaign.values(option), usual]
-    return [value for value in values if isinstance(value, str)]
+    """Return the names that an option is set to, and the usual one where flights may leave it out."""
+    always = option in (*campaign.fly, *campaign.grid, *campaign.draw)
+    return [value for value in (*campaign.values(option), None if always else usual) if isinstance(value, str)]
 
 
 def _metric(metric: Metric, flight: Flight) -> float | None:
