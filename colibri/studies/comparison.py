@@ -36,25 +36,19 @@ def fly_comparison(args: argparse.Namespace, name: str, metrics: Sequence[Metric
     points = [point._replace(folder=_folder(point, by_seeds=bool(args.seeds))) for point in planned.points()]
     check(points[:: len(planned.seeds)], common)
     make_folder(args.out)
-    file = args.out / f"{name}-journal.jsonl"
-    if not args.resume:
-        file.unlink(missing_ok=True)
     if args.seeds:
         _keep_settings(args.out / f"{name}-settings.json", planned, resume=args.resume)
-    flown = _kept(file, points, common)
-    left = [point for point in points if point.flight not in flown]
+    journal = args.out / f"{name}-journal.jsonl"
+    if not args.resume:
+        journal.unlink(missing_ok=True)
+    flown = _kept(journal, points, common)
     if args.resume and not args.quiet:
         print(f"--resume: {len(flown)} of {len(points)} flights were flown already, by the same contents")  # noqa: T201
-    for point in left if logs == "all" else ():
-        prepare(args.out / point.folder)
-    with Journal(args.out, flown, file.name) as journal, closing(fly_points(left, common, Pool())) as ended:
-        for each in with_bar(ended, "flights", len(left), quiet=args.quiet):
-            journal.add([each])
-            flown[each.flight] = each._replace(files={})
-    folders = {point.flight: point.folder for point in points}
-    for number, each in flown.items():
-        flown[number] = each._replace(why=each.why.replace(folders[number], str(args.out / folders[number])))
-    return FlightTable(planned, flown)
+    left = [point for point in points if point.flight not in flown]
+    with Journal(args.out, flown, journal.name) as kept:
+        _fly(left, common, kept, args)
+    found = {point.flight: _in_folder(flown[point.flight], point.folder, args.out) for point in points}
+    return FlightTable(planned, found)
 
 
 def _campaign(args: argparse.Namespace, name: str, metrics: Sequence[Metric], logs: Logs) -> Campaign:
@@ -77,6 +71,21 @@ def _campaign(args: argparse.Namespace, name: str, metrics: Sequence[Metric], lo
 def _folder(point: Point, *, by_seeds: bool) -> str:
     folder = f"flights/{folder_of(point.factors['contender'].name, point.factors['track'])}"
     return f"{folder}-{point.seed}" if by_seeds else folder
+
+
+def _fly(points: Sequence[Point], common: Common, journal: Journal, args: argparse.Namespace) -> None:
+    """Fly, with a bar, and keep what comes of it."""
+    for point in points if common.logs == "all" else ():
+        prepare(args.out / point.folder)
+    with closing(fly_points(points, common, Pool())) as ended:
+        for each in with_bar(ended, "flights", len(points), quiet=args.quiet):
+            journal.add([each])
+            journal.kept[each.flight] = each._replace(files={})
+
+
+def _in_folder(flown: Flown, folder: str, out: Path) -> Flown:
+    """Return a flight that says where its folder lies, with `out` before it."""
+    return flown._replace(why=flown.why.replace(folder, str(out / folder)))
 
 
 def _kept(file: Path, points: Sequence[Point], common: Common) -> dict[int, Flown]:
