@@ -27,6 +27,14 @@ def compiled(function: _Function) -> _Function:
     return cast(_Function, _kernel(function))
 
 
+def inlined(function: _Function) -> _Function:
+    """Compile a function as a part of every kernel that calls it.
+
+    There the shapes of a record's arrays are known, and that no two of them overlap: loops over several are vectorised.
+    """
+    return cast(_Function, _kernel(function, forceinline=True))
+
+
 def compiled_for(*signatures: str) -> Callable[[_Function], _Function]:
     """Return `compiled` for arguments of these types alone, at once: whatever else can be is converted to them."""
 
@@ -79,7 +87,7 @@ class _Compiling(Listener):
         pass
 
 
-def _kernel(function: Callable[..., Any]) -> Any:
-    kernel: Any = njit(error_model="numpy")(function)
+def _kernel(function: Callable[..., Any], **options: bool) -> Any:
+    kernel: Any = njit(error_model="numpy", **options)(function)
     kernel._cache = MachineCode(function)  # noqa: SLF001
     return kernel

@@ -7,7 +7,7 @@ A command is what the references ask for plus a correction that a block of steps
 nominal motion, whose corrections are those of the last plan. With b blocks the kernels take and fill:
 
     motion, speeds   nominal, (N + 1, 13) and (N + 1, 4), of `model.roll_out`
-    responses        of `model.respond`, (N + 1, 12, 4 b)
+    responses        of `deviations.respond`, (N + 1, 12, 4 b)
     H, f, lower, upper, G, h    (n, n), (n,), (n,), (n,), (m, n), (m,), with n = 4 b, or 4 b + 2 with slacks
 """
 
@@ -17,15 +17,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from colibri.autopilot.control.whole_lpv_mpc.deviations import DEVIATIONS, POSITION, RATE, ROTATION, VELOCITY
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import rate_between
-from colibri.autopilot.control.whole_lpv_mpc.model import (
-    DEVIATIONS,
-    POSITION,
-    RATE,
-    ROTATION,
-    ROTORS,
-    VELOCITY,
-)
+from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
 from colibri.common.compiled_rotations import euler_from_quaternion, rotation_matrix
 from colibri.common.jit import compiled
 from colibri.common.kernels import atan2

@@ -11,7 +11,7 @@ from colibri.autopilot.control.parts.riccati import lqr
 from colibri.autopilot.control.qp import Qp, QpResult, QpSolver, QpStatus
 from colibri.autopilot.control.vehicle_model.airframe import airframe_of
 from colibri.autopilot.control.vehicle_model.mixer import exact_inverse
-from colibri.autopilot.control.whole_lpv_mpc import condensing, model, planning
+from colibri.autopilot.control.whole_lpv_mpc import condensing, deviations, model, planning
 from colibri.autopilot.control.whole_lpv_mpc.condensing import Problem, Weights
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Lag, Model
 from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, read_speeds, speed_effects
@@ -120,6 +120,7 @@ class WholeMpc:
             np.empty((blocks + 1, ROTORS)),
             np.empty((n + 1, model.RIGID)),
             np.empty((n + 1, ROTORS)),
+            deviations.empty_transition(n),
             np.empty(0),
             means,
             levels,
@@ -138,7 +139,7 @@ class WholeMpc:
                         cos(radians(settings.max_tilt_deg)),
                         np.array(settings.max_rate_rad_s),
                     ),
-                    shared._replace(responses=np.zeros((n + 1, model.DEVIATIONS, inputs * blocks))),
+                    shared._replace(responses=np.zeros((n + 1, deviations.DEVIATIONS, inputs * blocks))),
                     _empty_qp(inputs * blocks, 0, 0, settings.slack_weight),
                     _empty_qp(inputs * blocks, condensing.SLACKS, rows, settings.slack_weight),
                 )
@@ -149,13 +150,13 @@ class WholeMpc:
 
     def _terminal(self, weights: Weights, count_every: int, thrust_n: float) -> Array:
         """Return S, (16, 16): the cost of the LQR that goes on level at `thrust_n` after the horizon."""
-        A, B = model.hover_transition(thrust_n, self.model)
+        A, B = deviations.hover_transition(thrust_n, self.model)
         Q = np.zeros((condensing.STATES, condensing.STATES))
         of_axes = [weights.position] * 3 + [weights.velocity] * 3 + [weights.tilt] * 2 + [weights.heading]
         np.fill_diagonal(Q, np.array([*of_axes, *([weights.rate] * 3), 0.0, 0.0, 0.0, 0.0]) / count_every)
         thrust = np.array(self.model["allocation"][0, 0])
         Q[12:, 12:] += weights.thrust / count_every * thrust[:, None] * thrust
-        kept = slice(0, None) if weights.position > 0.0 else slice(model.ROTATION, None)
+        kept = slice(0, None) if weights.position > 0.0 else slice(deviations.ROTATION, None)
         S = np.zeros_like(Q)
         cost, _ = lqr(
             np.ascontiguousarray(A[kept, kept]), np.ascontiguousarray(B[kept]), np.ascontiguousarray(Q[kept, kept]),

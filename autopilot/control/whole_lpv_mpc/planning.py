@@ -20,8 +20,9 @@ from colibri.autopilot.control.whole_lpv_mpc.condensing import (
     limit_motion,
     read_plan,
 )
+from colibri.autopilot.control.whole_lpv_mpc.deviations import Transition, respond
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import lead
-from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance, respond, roll_out
+from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance, roll_out
 from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
 from colibri.common.jit import Packed, compiled
 from colibri.common.types import Array
@@ -55,14 +56,16 @@ class Workspace(NamedTuple):
         commands: Of the references, within the limits, (N, 4).
         corrections: Nominal, of what flew last and of each block, (b + 1, 4).
         motion, speeds: Nominal, (N + 1, 13) and (N + 1, 4).
+        transition: Of the deviations.
         responses: (N + 1, 12, 4 b).
-        means, levels: Of `model.respond`, (b, N) and (b, N + 1).
+        means, levels: Of `deviations.respond`, (b, N) and (b, N + 1).
     """
 
     commands: Array
     corrections: Array
     motion: Array
     speeds: Array
+    transition: Transition
     responses: Array
     means: Array
     levels: Array
@@ -132,7 +135,7 @@ def _expect(now: Now, target: Target, last: Array, vehicle: Packed, kind: Kind) 
     nominal = np.empty_like(commands)
     _correct(commands, corrections[1:], starts, nominal)
     roll_out(now.rigid, now.squared, nominal, now.disturbance, vehicle, work.motion, work.speeds)
-    respond(work.motion, work.speeds, work.means, work.levels, vehicle, work.responses)
+    respond(work.motion, work.speeds, work.means, work.levels, vehicle, work.transition, work.responses)
 
 
 @compiled

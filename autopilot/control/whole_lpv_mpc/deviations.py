@@ -1,0 +1,259 @@
+"""How the whole vehicle deviates from its nominal motion, as compiled kernels.
+
+About the nominal motion the deviations are linear, with the model's matrices at the middle of each step; their 12
+states are
+
+    [position, m, ENU; velocity, m/s, ENU; rotation vector, rad, FLU; body rates, rad/s, FLU]
+
+and the rotors' squared speeds, in parts of the vehicle's largest, drive them.
+
+The last index of every array is that of what is computed side by side, steps or columns of the response: a loop over it
+is vectorised where all arrays are of one record.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.whole_lpv_mpc.model import LEAST_SPEED, RIGID, ROTORS, Model
+from colibri.common.compiled_rotations import rotation_matrix
+from colibri.common.jit import Packed, compiled, inlined
+from colibri.common.types import Array
+
+DEVIATIONS = 12
+POSITION, VELOCITY, ROTATION, RATE = 0, 3, 6, 9
+
+
+class Transition(NamedTuple):
+    """Every step of the deviations, by its blocks that are not known beforehand: (3, 3, N), or (3, 4, N) of the rotors.
+
+    Attributes:
+        drag: Of velocity on velocity, beyond the unit matrix.
+        velocity_rotation, velocity_rate: Of rotation and rates on velocity.
+        position_rotation, position_rate: The same on position.
+        rotation, rotation_rate: Of rotation and rates on rotation.
+        rate: Of rates on rates.
+        force, place: Of the mean squared speeds over the step on velocity and position.
+        moment, turn: The same on rates and rotation.
+        spin: Of the change of squared speeds over the step on the rate r, (4, N).
+        up: The body's z axis, ENU, (3, N).
+        V, W, G: Derivatives that all are made of: of velocity and rotation by rotation, and of rates by rates.
+        VW, VG, WW, WG, GG: Their products.
+    """
+
+    drag: Array
+    velocity_rotation: Array
+    velocity_rate: Array
+    position_rotation: Array
+    position_rate: Array
+    rotation: Array
+    rotation_rate: Array
+    rate: Array
+    force: Array
+    place: Array
+    moment: Array
+    turn: Array
+    spin: Array
+    up: Array
+    V: Array
+    W: Array
+    G: Array
+    VW: Array
+    VG: Array
+    WW: Array
+    WG: Array
+    GG: Array
+
+
+def empty_transition(steps: int) -> Transition:
+    """Return the arrays of so many steps."""
+    nine, twelve = [np.zeros((3, 3, steps)) for _ in range(16)], [np.zeros((3, ROTORS, steps)) for _ in range(4)]
+    return Transition(*nine[:8], *twelve, np.zeros((ROTORS, steps)), np.zeros((3, steps)), *nine[8:])
+
+
+@inlined
+def _linearise(motion: Array, speeds: Array, model: Model, out: Transition) -> None:
+    """Fill the transitions of a nominal motion, (N + 1, 13), with squared rotor speeds, (N + 1, 4).
+
+    Taylor's series to the third power of the step, its matrices those of the step's middle.
+    """
+    _differentiate(motion, speeds, model, out)
+    V, W, G, VW, VG, WW, WG, GG = out.V, out.W, out.G, out.VW, out.VG, out.WW, out.WG, out.GG
+    _multiply(V, W, VW)
+    _multiply(V, G, VG)
+    _multiply(W, W, WW)
+    _multiply(W, G, WG)
+    _multiply(G, G, GG)
+    h = model.interval_s
+    for i in range(3):
+        for j in range(3):
+            unit = 1.0 if i == j else 0.0
+            for n in range(W.shape[2]):
+                v, w, g, vw, ww, gg = V[i, j, n], W[i, j, n], G[i, j, n], VW[i, j, n], WW[i, j, n], GG[i, j, n]
+                wg = WG[i, j, n]
+                out.rotation[i, j, n] = unit + h * (w + 0.5 * h * ww)
+                out.rotation_rate[i, j, n] = h * (unit + 0.5 * h * (w + g) + h * h / 6.0 * (ww + wg + gg))
+                out.rate[i, j, n] = unit + h * (g + 0.5 * h * gg)
+                out.velocity_rotation[i, j, n] = h * (v + 0.5 * h * vw)
+                out.velocity_rate[i, j, n] = 0.5 * h * h * (v + h / 3.0 * (vw + VG[i, j, n]))
+                out.position_rotation[i, j, n] = 0.5 * h * h * (v + h / 3.0 * vw)
+                out.position_rate[i, j, n] = h * h * h / 6.0 * v
+    _drive(model, out)
+
+
+@inlined
+def _differentiate(motion: Array, speeds: Array, model: Model, out: Transition) -> None:
+    """Fill V, W, G, drag, spin and up at the middle of each step."""
+    airframe, inertia, allocation, h = model.airframe, model.inertia, model.allocation, model.interval_s
+    ix, iy, iz = inertia[0], inertia[1], inertia[2]
+    V, W, G = out.V, out.W, out.G
+    for n in range(W.shape[2]):
+        x, to = motion[n], motion[n + 1]
+        qw, qx, qy, qz = x[6] + to[6], x[7] + to[7], x[8] + to[8], x[9] + to[9]
+        length = sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
+        R = rotation_matrix((qw / length, qx / length, qy / length, qz / length))
+        p, q, r = 0.5 * (x[10] + to[10]), 0.5 * (x[11] + to[11]), 0.5 * (x[12] + to[12])
+        thrust, momentum = 0.0, 0.0
+        for i in range(ROTORS):
+            squared = 0.5 * (speeds[n, i] + speeds[n + 1, i])
+            speed = sqrt(max(squared, 0.0))
+            thrust += allocation[0, i] * squared
+            momentum += model.momentum[i] * speed
+            out.spin[i, n] = -0.5 * model.momentum[i] / (max(speed, LEAST_SPEED) * iz)
+        W[0, 1, n], W[0, 2, n], W[1, 0, n], W[1, 2, n], W[2, 0, n], W[2, 1, n] = r, -q, -r, p, q, -p
+        G[0, 1, n], G[0, 2, n] = ((iy - iz) * r - momentum) / ix, (iy - iz) * q / ix
+        G[1, 0, n], G[1, 2, n] = ((iz - ix) * r + momentum) / iy, (iz - ix) * p / iy
+        G[2, 0, n], G[2, 1, n] = (ix - iy) * q / iz, (ix - iy) * p / iz
+        across = airframe.drag_xy + airframe.rotor_drag * sqrt(max(thrust, 0.0))
+        for i in range(3):
+            out.up[i, n] = R[i][2]
+            V[i, 0, n], V[i, 1, n] = -thrust / airframe.mass_kg * R[i][1], thrust / airframe.mass_kg * R[i][0]
+            for j in range(3):
+                along = R[i][2] * R[j][2]
+                unit = 1.0 if i == j else 0.0
+                out.drag[i, j, n] = -h * (across * (unit - along) + airframe.drag_z * along) / airframe.mass_kg
+
+
+@inlined
+def _multiply(A: Array, B: Array, product: Array) -> None:
+    """Write A B of every step, (3, 3, N)."""
+    for i in range(3):
+        for j in range(3):
+            for n in range(product.shape[2]):
+                product[i, j, n] = 0.0 + A[i, 0, n] * B[0, j, n] + A[i, 1, n] * B[1, j, n] + A[i, 2, n] * B[2, j, n]
+
+
+@inlined
+def _drive(model: Model, out: Transition) -> None:
+    """Fill what the rotors do."""
+    inertia, allocation, h = model.inertia, model.allocation, model.interval_s
+    for i in range(3):
+        for rotor in range(ROTORS):
+            thrust = allocation[0, rotor]
+            for n in range(out.up.shape[1]):
+                force = out.up[i, n] * thrust / model.airframe.mass_kg
+                out.force[i, rotor, n], out.place[i, rotor, n] = h * force, 0.5 * h * h * force
+                out.moment[i, rotor, n], out.turn[i, rotor, n] = 0.0, 0.0
+            for j in range(3):
+                unit = 1.0 if i == j else 0.0
+                turning = allocation[1 + j, rotor] / inertia[j]
+                for n in range(out.up.shape[1]):
+                    w, g = out.W[i, j, n], out.G[i, j, n]
+                    out.moment[i, rotor, n] += h * (unit + 0.5 * h * g) * turning
+                    out.turn[i, rotor, n] += 0.5 * h * h * (unit + h / 3.0 * (w + g)) * turning
+                    out.force[i, rotor, n] += h * h * h / 6.0 * out.V[i, j, n] * turning
+
+
+@inlined
+def respond(
+    motion: Array, speeds: Array, means: Array, levels: Array, packed: Packed, T: Transition, responses: Array
+) -> None:
+    """Write how the motion deviates for a unit change of one rotor's command held for one block.
+
+    Args:
+        motion: Nominal, (N + 1, 13).
+        speeds: Nominal squared rotor speeds, (N + 1, 4).
+        means: Of each block, the mean squared speed over each step that its unit change leads to, (b, N).
+        levels: The same at the beginning of each step and after the last, (b, N + 1).
+        packed: The `Model`.
+        T: Is filled.
+        responses: Is filled, (N + 1, 12, 4 b); column 4 j + i is rotor i in block j.
+    """
+    model = packed[0]
+    inputs = responses.shape[2] // means.shape[0]
+    responses[0] = 0.0
+    _linearise(motion, speeds, model, T)
+    for step in range(motion.shape[0] - 1):
+        blocks = 0
+        while blocks < means.shape[0] and means[blocks, step] != 0.0:
+            blocks += 1
+        used = inputs * blocks
+        _advance(responses, step, T, model.interval_s, used)
+        X = responses[step + 1]
+        for block in range(blocks):
+            mean, change = means[block, step], levels[block, step + 1] - levels[block, step]
+            for rotor in range(ROTORS):
+                column = inputs * block + rotor
+                for i in range(3):
+                    X[POSITION + i, column] += T.place[i, rotor, step] * mean
+                    X[VELOCITY + i, column] += T.force[i, rotor, step] * mean
+                    X[ROTATION + i, column] += T.turn[i, rotor, step] * mean
+                    X[RATE + i, column] += T.moment[i, rotor, step] * mean
+                X[RATE + 2, column] += T.spin[rotor, step] * change
+        X[:, used:] = 0.0
+
+
+@inlined
+def _advance(X: Array, n: int, T: Transition, h: float, used: int) -> None:
+    """Write the first columns of X, (N + 1, 12, 4 b), after step n."""
+    for i in range(3):
+        pr0, pr1, pr2 = T.position_rotation[i, 0, n], T.position_rotation[i, 1, n], T.position_rotation[i, 2, n]
+        pw0, pw1, pw2 = T.position_rate[i, 0, n], T.position_rate[i, 1, n], T.position_rate[i, 2, n]
+        d0, d1, d2 = T.drag[i, 0, n], T.drag[i, 1, n], T.drag[i, 2, n]
+        vr0, vr1, vr2 = T.velocity_rotation[i, 0, n], T.velocity_rotation[i, 1, n], T.velocity_rotation[i, 2, n]
+        vw0, vw1, vw2 = T.velocity_rate[i, 0, n], T.velocity_rate[i, 1, n], T.velocity_rate[i, 2, n]
+        rr0, rr1, rr2 = T.rotation[i, 0, n], T.rotation[i, 1, n], T.rotation[i, 2, n]
+        rw0, rw1, rw2 = T.rotation_rate[i, 0, n], T.rotation_rate[i, 1, n], T.rotation_rate[i, 2, n]
+        ww0, ww1, ww2 = T.rate[i, 0, n], T.rate[i, 1, n], T.rate[i, 2, n]
+        for c in range(used):
+            v0, v1, v2 = X[n, VELOCITY, c], X[n, VELOCITY + 1, c], X[n, VELOCITY + 2, c]
+            r0, r1, r2 = X[n, ROTATION, c], X[n, ROTATION + 1, c], X[n, ROTATION + 2, c]
+            w0, w1, w2 = X[n, RATE, c], X[n, RATE + 1, c], X[n, RATE + 2, c]
+            place, fall = X[n, POSITION + i, c] + h * X[n, VELOCITY + i, c], X[n, VELOCITY + i, c]
+            X[n + 1, POSITION + i, c] = place + (pr0 * r0 + pw0 * w0) + (pr1 * r1 + pw1 * w1) + (pr2 * r2 + pw2 * w2)
+            fall += d0 * v0 + vr0 * r0 + vw0 * w0
+            fall += d1 * v1 + vr1 * r1 + vw1 * w1
+            X[n + 1, VELOCITY + i, c] = fall + (d2 * v2 + vr2 * r2 + vw2 * w2)
+            X[n + 1, ROTATION + i, c] = 0.0 + (rr0 * r0 + rw0 * w0) + (rr1 * r1 + rw1 * w1) + (rr2 * r2 + rw2 * w2)
+            X[n + 1, RATE + i, c] = 0.0 + ww0 * w0 + ww1 * w1 + ww2 * w2
+
+
+@compiled
+def _hover(thrust_n: float, packed: Packed, T: Transition, X: Array) -> None:
+    """Fill the transition of one step level at a thrust, and in X, (2, 12, 12), what becomes of each deviation."""
+    model = packed[0]
+    level, squared = np.zeros((2, RIGID)), np.empty((2, ROTORS))
+    level[:, 6] = 1.0
+    total = 0.0
+    for i in range(ROTORS):
+        total += model.allocation[0, i]
+    squared[:] = thrust_n / total
+    _linearise(level, squared, model, T)
+    X[0] = np.eye(DEVIATIONS)
+    _advance(X, 0, T, model.interval_s, DEVIATIONS)
+
+
+def hover_transition(thrust_n: float, packed: Packed) -> tuple[Array, Array]:
+    """Return A, (16, 16), and B, (16, 4), of one step of deviations and squared rotor speeds, level at a thrust."""
+    T, X = empty_transition(1), np.empty((2, DEVIATIONS, DEVIATIONS))
+    _hover(thrust_n, packed, T, X)
+    lag, n = packed[0]["lag"], DEVIATIONS + ROTORS
+    A, B = np.zeros((n, n)), np.zeros((n, ROTORS))
+    A[:DEVIATIONS, :DEVIATIONS] = X[1]
+    effects = np.concatenate([part[:, :, 0] for part in (T.place, T.force, T.turn, T.moment)])
+    A[:DEVIATIONS, DEVIATIONS:], B[:DEVIATIONS] = effects * lag["left_mean"], effects * (1.0 - lag["left_mean"])
+    A[RATE + 2, DEVIATIONS:] += T.spin[:, 0] * (lag["left"] - 1.0)
+    B[RATE + 2] += T.spin[:, 0] * (1.0 - lag["left"])
+    A[DEVIATIONS:, DEVIATIONS:], B[DEVIATIONS:] = lag["left"] * np.eye(ROTORS), (1.0 - lag["left"]) * np.eye(ROTORS)
+    return A, B
