@@ -21,7 +21,7 @@ from colibri.autopilot.control.whole_lpv_mpc.deviations import DEVIATIONS, POSIT
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import rate_between
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
 from colibri.common.compiled_rotations import euler_from_quaternion, rotation_matrix
-from colibri.common.jit import compiled
+from colibri.common.jit import compiled, inlined
 from colibri.common.kernels import atan2
 from colibri.common.types import Array
 
@@ -111,7 +111,7 @@ class Target(NamedTuple):
     end_squared: Array
 
 
-@compiled
+@inlined
 def cost(
     motion: Array,
     speeds: Array,
@@ -126,33 +126,18 @@ def cost(
 
     `corrections` are that which flew last and then the nominal ones, (b + 1, 4).
     """
-    weights = problem.weights
     moved = responses.shape[2]
     inputs = moved // (problem.starts.shape[0] - 1)
     H[:, :] = 0.0
     f[:] = 0.0
     row = np.empty(moved)
     for step in problem.counted:
-        X, x = responses[step], motion[step]
         used = inputs * _blocks(problem.starts, step)
-        for i in range(3):
-            if weights.position > 0.0:
-                _add(weights.position, x[POSITION + i] - target.position[step, i], X[POSITION + i], used, H, f)
-                _add(weights.velocity, x[VELOCITY + i] - target.velocity[step, i], X[VELOCITY + i], used, H, f)
-            _add(weights.rate, x[10 + i] - target.rates[step - 1, i], X[RATE + i], used, H, f)
-        _add_attitude(step, x, speeds[step], X, target, problem, used, row, H, f)
+        _add_motion(motion, responses, step, target, problem.weights, used, row, H, f)
+        if problem.weights.tilt > 0.0 or problem.weights.thrust > 0.0:
+            _add_demand(motion[step], speeds[step], responses[step], step, target, problem, used, row, H, f)
     _add_terminal(motion[-1], speeds[-1], responses[-1], target, problem, H, f)
-    for block in range(problem.starts.shape[0] - 1):
-        weight = weights.first if block == 0 else weights.next
-        for rotor in range(ROTORS):
-            here = inputs * block + rotor
-            change = weight * (corrections[block + 1, rotor] - corrections[block, rotor])
-            H[here, here] += weight
-            f[here] += change
-            if block > 0:
-                H[here - inputs, here - inputs] += weight
-                H[here, here - inputs] -= weight
-                f[here - inputs] -= change
+    _add_changes(corrections, problem, inputs, H, f)
     for k in range(moved):
         for i in range(k):
             H[i, k] = H[k, i]
@@ -167,6 +152,58 @@ def _blocks(starts: Integers, step: int) -> int:
     return blocks
 
 
+@inlined
+def _add_motion(
+    motion: Array, responses: Array, n: int, target: Target, weights: Weights, used: int, row: Array, H: Array, f: Array
+) -> None:
+    """Add ½ weight (error + row z)² of place, velocity, rates and heading at step n, to the lower triangle of H.
+
+    All rows are added in one loop: it takes as long to bring an element of H as to add one of them to it.
+    """
+    on_place, on_velocity, on_rate, on_heading = weights.position, weights.velocity, weights.rate, weights.heading
+    x, X = motion[n], responses[n]
+    p0, p1, p2 = x[0] - target.position[n, 0], x[1] - target.position[n, 1], x[2] - target.position[n, 2]
+    v0, v1, v2 = x[3] - target.velocity[n, 0], x[4] - target.velocity[n, 1], x[5] - target.velocity[n, 2]
+    w0, w1, w2 = x[10] - target.rates[n - 1, 0], x[11] - target.rates[n - 1, 1], x[12] - target.rates[n - 1, 2]
+    R = rotation_matrix((x[6], x[7], x[8], x[9]))
+    cos_pitch = max(sqrt(R[2][1] * R[2][1] + R[2][2] * R[2][2]), 1e-9)
+    s, c = R[2][1] / cos_pitch, R[2][2] / cos_pitch
+    heading = cos_pitch * _nearest(atan2(R[1][0], R[0][0]) - target.yaw_rad[n])
+    for k in range(used):
+        row[k] = s * X[ROTATION + 1, k] + c * X[ROTATION + 2, k]
+    for k in range(used):
+        P0, P1, P2 = on_place * X[POSITION, k], on_place * X[POSITION + 1, k], on_place * X[POSITION + 2, k]
+        V0, V1, V2 = on_velocity * X[VELOCITY, k], on_velocity * X[VELOCITY + 1, k], on_velocity * X[VELOCITY + 2, k]
+        W0, W1, W2 = on_rate * X[RATE, k], on_rate * X[RATE + 1, k], on_rate * X[RATE + 2, k]
+        turned = on_heading * row[k]
+        first = f[k] + p0 * P0 + v0 * V0 + w0 * W0
+        second = first + p1 * P1 + v1 * V1 + w1 * W1
+        f[k] = second + p2 * P2 + v2 * V2 + w2 * W2 + heading * turned
+        for i in range(k + 1):
+            first = H[k, i] + P0 * X[POSITION, i] + V0 * X[VELOCITY, i] + W0 * X[RATE, i]
+            second = first + P1 * X[POSITION + 1, i] + V1 * X[VELOCITY + 1, i] + W1 * X[RATE + 1, i]
+            third = second + P2 * X[POSITION + 2, i] + V2 * X[VELOCITY + 2, i] + W2 * X[RATE + 2, i]
+            H[k, i] = third + turned * row[i]
+
+
+@compiled
+def _add_demand(
+    x: Array, squared: Array, X: Array, step: int, target: Target, problem: Problem, used: int, row: Array, H: Array,
+    f: Array,
+) -> None:  # fmt: skip
+    """Add the errors of a demanded tilt and thrust at a step."""
+    weights = problem.weights
+    away = _rotation_error(target.attitudes[step], rotation_matrix((x[6], x[7], x[8], x[9])))
+    for i in range(2):
+        _add(weights.tilt, away[i], X[ROTATION + i], used, H, f)
+    thrust = -target.thrusts_n[step]
+    for rotor in range(ROTORS):
+        thrust += problem.allocation[rotor] * squared[rotor]
+    for k in range(used):
+        row[k] = problem.allocation[k % ROTORS] * problem.levels[k // ROTORS, step]
+    _add(weights.thrust, thrust, row, used, H, f)
+
+
 @compiled
 def _add(weight: float, error: float, row: Array, used: int, H: Array, f: Array) -> None:
     """Add ½ weight (error + row z)², to the lower triangle of H."""
@@ -175,41 +212,6 @@ def _add(weight: float, error: float, row: Array, used: int, H: Array, f: Array)
         f[k] += error * weighted
         for i in range(k + 1):
             H[k, i] += weighted * row[i]
-
-
-@compiled
-def _add_attitude(
-    step: int,
-    x: Array,
-    squared: Array,
-    X: Array,
-    target: Target,
-    problem: Problem,
-    used: int,
-    row: Array,
-    H: Array,
-    f: Array,
-) -> None:
-    """Add the errors of heading, and of a demanded tilt and thrust."""
-    weights = problem.weights
-    R = rotation_matrix((x[6], x[7], x[8], x[9]))
-    cos_pitch = max(sqrt(R[2][1] * R[2][1] + R[2][2] * R[2][2]), 1e-9)
-    s, c = R[2][1] / cos_pitch, R[2][2] / cos_pitch
-    error = _nearest(atan2(R[1][0], R[0][0]) - target.yaw_rad[step])
-    for k in range(used):
-        row[k] = s * X[ROTATION + 1, k] + c * X[ROTATION + 2, k]
-    _add(weights.heading, cos_pitch * error, row, used, H, f)
-    if weights.tilt > 0.0:
-        away = _rotation_error(target.attitudes[step], R)
-        for i in range(2):
-            _add(weights.tilt, away[i], X[ROTATION + i], used, H, f)
-    if weights.thrust > 0.0:
-        thrust = -target.thrusts_n[step]
-        for rotor in range(ROTORS):
-            thrust += problem.allocation[rotor] * squared[rotor]
-        for k in range(used):
-            row[k] = problem.allocation[k % ROTORS] * problem.levels[k // ROTORS, step]
-        _add(weights.thrust, thrust, row, used, H, f)
 
 
 @compiled
@@ -226,7 +228,7 @@ def _rotation_error(wanted: Array, R: tuple[tuple[float, float, float], ...]) ->
     return error
 
 
-@compiled
+@inlined
 def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: Problem, H: Array, f: Array) -> None:
     """Add ½ eᵀ S e of the error at the end, in the body axes there."""
     steps, moved = target.rates.shape[0], X.shape[1]
@@ -264,6 +266,22 @@ def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: P
             f[k] += E[i, k] * total
             for j in range(k + 1):
                 H[k, j] += E[i, k] * weighted[j]
+
+
+@compiled
+def _add_changes(corrections: Array, problem: Problem, inputs: int, H: Array, f: Array) -> None:
+    """Add what corrections cost that differ from the last plan's, and from the ones before."""
+    for block in range(problem.starts.shape[0] - 1):
+        weight = problem.weights.first if block == 0 else problem.weights.next
+        for rotor in range(ROTORS):
+            here = inputs * block + rotor
+            change = weight * (corrections[block + 1, rotor] - corrections[block, rotor])
+            H[here, here] += weight
+            f[here] += change
+            if block > 0:
+                H[here - inputs, here - inputs] += weight
+                H[here, here - inputs] -= weight
+                f[here - inputs] -= change
 
 
 @compiled

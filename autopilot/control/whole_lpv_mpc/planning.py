@@ -24,7 +24,7 @@ from colibri.autopilot.control.whole_lpv_mpc.deviations import Transition, respo
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import lead
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance, roll_out
 from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
-from colibri.common.jit import Packed, compiled
+from colibri.common.jit import Packed, compiled, inlined
 from colibri.common.types import Array
 
 _BINDING = 1e-9
@@ -115,13 +115,13 @@ def condense_on_path(
     price(path, effects, it.problem.starts, it.qp)
 
 
-@compiled
+@inlined
 def _price_errors(target: Target, kind: Kind) -> None:
     work, qp = kind.work, kind.qp
     cost(work.motion, work.speeds, work.responses, target, work.corrections, kind.problem, qp.H, qp.f)
 
 
-@compiled
+@inlined
 def _expect(now: Now, target: Target, last: Array, vehicle: Packed, kind: Kind) -> None:
     """Fill the nominal motion, how it responds, and the bounds."""
     starts, work, qp = kind.problem.starts, kind.work, kind.qp
