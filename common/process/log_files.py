@@ -14,6 +14,8 @@ from colibri.common.process.lifecycle import fail
 
 _NUMBERS = msgspec.json.Encoder(enc_hook=float)
 """The shortest digits that keep every bit, as `str` has them, in a tenth of its time; but no word for nan and inf."""
+_OF_NULL = b"n"
+"""What nan and inf are encoded as begins with it, and no number has it."""
 
 
 class LogError(InFlightError):
@@ -78,6 +80,14 @@ class BlockLog(LogFile, ABC, Generic[_Record]):
             LogError: They cannot be written.
         """
         self._waiting.append(record)
+        self._flush_block()
+
+    def extend(self, records: Iterable[_Record]) -> None:
+        """Append records as `add` does."""
+        self._waiting.extend(records)
+        self._flush_block()
+
+    def _flush_block(self) -> None:
         if len(self._waiting) >= self.BLOCK:
             self.flush()
 
@@ -115,6 +125,9 @@ class CsvLog(BlockLog[Sequence[float]]):
 
     def encode(self, records: list[Sequence[float]]) -> Iterable[bytes]:
         """Return the line of each row."""
-        lines = _NUMBERS.encode(records)[2:-2].split(b"],[")
-        for row, line in zip(records, lines, strict=True):
-            yield (",".join(map(str, row)).encode() if b"null" in line else line) + b"\n"
+        block = _NUMBERS.encode_lines(records)
+        lines = [line[1:-1] + b"\n" for line in block.split(b"\n")[:-1]]
+        if _OF_NULL in block:
+            words = (",".join(map(str, row)).encode() + b"\n" for row in records)
+            lines = [word if _OF_NULL in line else line for word, line in zip(words, lines, strict=True)]
+        return lines

@@ -40,7 +40,7 @@ def decode(log: bytes) -> Iterator[Logged]:
         at = begin + length
 
 
-class TlogWriter(BlockLog[Logged]):
+class TlogWriter(BlockLog[tuple[int, bytes]]):
     """A telemetry log that is written block by block."""
 
     def write(self, time_us: int, frames: Iterable[bytes]) -> None:
@@ -49,9 +49,8 @@ class TlogWriter(BlockLog[Logged]):
         Raises:
             LogError: They cannot be written.
         """
-        for frame in frames:
-            self.add(Logged(time_us, frame))
+        self.extend([(time_us, frame) for frame in frames])
 
-    def encode(self, records: list[Logged]) -> Iterable[bytes]:
+    def encode(self, records: list[tuple[int, bytes]]) -> Iterable[bytes]:
         """Return each frame behind its time."""
-        return (STAMP.pack(time_us) + frame for time_us, frame in records)
+        return [STAMP.pack(time_us) + frame for time_us, frame in records]

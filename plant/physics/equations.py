@@ -6,7 +6,7 @@ in FLU, position m in ENU, and the unit quaternion that turns FLU into ENU.
 """
 
 from collections.abc import Sequence
-from math import inf, sqrt
+from math import inf, isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -235,6 +235,19 @@ def close(x: Array, parameters: Packed) -> float:
     for i in range(13, 17):
         x[i] = min(max(x[i], 0.0), parameters[0].top_speed)
     return battery((x[13], x[14], x[15], x[16]), x[17], parameters[0])[0]
+
+
+@compiled
+def close_attitude(x: Array) -> bool:
+    """Scale the attitude of x, (18,), to unit length, in place; return whether all of x is finite."""
+    qw, qx, qy, qz = x[9], x[10], x[11], x[12]
+    norm = sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
+    for i in range(9, 13):
+        x[i] /= norm
+    for i in range(x.size):
+        if not isfinite(x[i]):
+            return False
+    return True
 
 
 def attitude_of(state: Sequence[float]) -> Quaternion:

@@ -6,14 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.common.jit import packed
-from colibri.common.rotations import earth_from_body, normalized
+from colibri.common.rotations import earth_from_body
 from colibri.common.types import Array, FourRotors, Vector
 from colibri.mavlink.hil.plant_status import PlantBattery
 from colibri.mavlink.hil.state import ActuatorCommand, StateFrame
 from colibri.plant.environment.air import CALM, Air
 from colibri.plant.environment.turbulence import Eddies
 from colibri.plant.environment.weather import NO_WEATHER, Weather, Wind
-from colibri.plant.physics.equations import CHARGE, ROTORS, attitude_of, specific_force
+from colibri.plant.physics.equations import CHARGE, ROTORS, STATE, attitude_of, close_attitude, specific_force
 from colibri.plant.physics.integrators import Integrator, solver
 from colibri.plant.physics.parameters import parameters_of
 from colibri.plant.physics.start import IntegrationError, Start, check_start
@@ -24,6 +24,7 @@ State = tuple[float, ...]
 _STANDING: FourRotors = (0.0, 0.0, 0.0, 0.0)
 _LEVEL: State = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _MOMENT_S = 1e-3
+_RIGID = len(STATE)
 
 
 class World(NamedTuple):
@@ -76,7 +77,9 @@ class Physics:
         self._as_built = self._parameters.copy()
         self._power: list[float] = self._parameters["power"][0].tolist()
         self._held: list[float | None] | None = None
-        self._integrate(np.array((*_LEVEL, *_STANDING, 0.0)), _STANDING, self._parameters, _MOMENT_S)
+        self._end: tuple[World | None, Array] = (None, np.array((*_LEVEL, *_STANDING, 0.0)))
+        self._integrate(self._end[1], _STANDING, self._parameters, _MOMENT_S)
+        close_attitude(self._end[1])
 
     def step(self, world: World, command: ActuatorCommand, duration_us: int) -> World:
         """Advance by `duration_us` with the rotors commanded to `command`.
@@ -85,19 +88,21 @@ class Physics:
             IntegrationError: The state cannot be integrated any further.
         """
         self._feel_wind(world)
-        x, voltage_v = self._integrate(_vector(world), self._target(command), self._parameters, duration_us * 1e-6)
-        end = x.tolist()
-        if not all(map(isfinite, end)):
+        x, voltage_v = self._integrate(self._vector(world), self._target(command), self._parameters, duration_us * 1e-6)
+        if not close_attitude(x):
             when = f"at t = {world.time_us / 1e6:.3f} s"
             raise IntegrationError(f"the state has left what the model describes {when}: it is no longer finite")
-        state = (*end[:9], *normalized(attitude_of(end)))
+        end = x.tolist()
+        state = tuple(end[:_RIGID])
         voltage_v = nan if self._battery is None else voltage_v
         time_us = world.time_us + duration_us
         wind, eddies = self._air.steady, None
         if wind is None:
             velocity = earth_from_body(attitude_of(state), (end[0], end[1], end[2]))
             wind, eddies = self._air.go_on(world.eddies, time_us, end[8], velocity, duration_us)
-        return World(time_us, state, tuple(end[ROTORS]), end[CHARGE], voltage_v, wind, eddies)
+        after = World(time_us, state, tuple(end[ROTORS]), end[CHARGE], voltage_v, wind, eddies)
+        self._end = (after, x)
+        return after
 
     def specific_force(self, world: World) -> Vector:
         """Return what an ideal accelerometer at the centre of mass measures, m/s² in FLU: (0, 0, g) at rest and level.
@@ -105,16 +110,15 @@ class Physics:
         Rotors without lag turn as they did up to now.
         """
         self._feel_wind(world)
-        force: Vector = specific_force(_vector(world), self._parameters)
+        force: Vector = specific_force(self._vector(world), self._parameters)
         return force
 
     def battery(self, world: World) -> PlantBattery | None:
         """Return what the battery gives; None without one."""
         if self._battery is None:
             return None
-        power_w = 0.0
-        for at_one_w, speed in zip(self._power, world.rotor_speeds, strict=True):
-            power_w += at_one_w * speed * speed * speed
+        (a, b, c, d), (i, j, k, m) = self._power, world.rotor_speeds
+        power_w = a * i * i * i + b * j * j * j + c * k * k * k + d * m * m * m
         voltage_v = world.voltage_v if isfinite(world.voltage_v) else self._battery.full_voltage_v
         left = max(0.0, 1.0 - world.charge_used_ah / self._battery.capacity_ah)
         return PlantBattery(voltage_v, power_w / voltage_v, world.charge_used_ah, left)
@@ -145,6 +149,11 @@ class Physics:
         """Have a payload at the centre of mass: it adds to the mass, and to no moment of inertia."""
         self._parameters["mass_kg"] = self._as_built["mass_kg"] + mass_kg
 
+    def _vector(self, world: World) -> Array:
+        """Return x of the equations: that which the world was made of, where it is the last one."""
+        last, x = self._end
+        return x if world is last else np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
+
     def _feel_wind(self, world: World) -> None:
         if self._air.steady is None:
             self._wind[:] = world.wind_enu_m_s
@@ -163,10 +172,6 @@ class Physics:
             return target
         a, b, c, d = (free if held is None else held for free, held in zip(target, self._held, strict=True))
         return (a, b, c, d)
-
-
-def _vector(world: World) -> Array:
-    return np.array((*world.state, *world.rotor_speeds, world.charge_used_ah))
 
 
 def state_frame(world: World) -> StateFrame:

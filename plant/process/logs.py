@@ -36,7 +36,10 @@ class PlantLogs:
 
     def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
         """Append what was received and sent at simulated time `time_us`."""
-        self.write_frames(time_us, [*received, *(frame for outgoing in sent for frame in outgoing.frames)])
+        frames = received.copy()
+        for outgoing in sent:
+            frames += outgoing.frames
+        self.write_frames(time_us, frames)
 
     def write_frames(self, time_us: int, frames: list[bytes]) -> None:
         """Append frames of simulated time `time_us`."""

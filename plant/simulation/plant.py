@@ -87,7 +87,9 @@ class Plant:
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
         """Go on to the next frame, with the answer to this one and with faults that happen now."""
-        self.inject(faults)
+        self._results = ()
+        if faults:
+            self.inject(faults)
         self.arrive(self.world.time_us, command)
         self.go_on()
 
