@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from itertools import accumulate
+from math import inf
 from pathlib import Path
 from typing import Generic, Literal, TypeVar
 
@@ -14,8 +15,8 @@ from colibri.common.process.lifecycle import fail
 
 _NUMBERS = msgspec.json.Encoder(enc_hook=float)
 """The shortest digits that keep every bit, as `str` has them, in a tenth of its time; but no word for nan and inf."""
-_OF_NULL = b"n"
-"""What nan and inf are encoded as begins with it, and no number has it."""
+_NULL = b"null"
+"""What nan and inf are encoded as, which have no word there."""
 
 
 class LogError(InFlightError):
@@ -126,8 +127,14 @@ class CsvLog(BlockLog[Sequence[float]]):
     def encode(self, records: list[Sequence[float]]) -> Iterable[bytes]:
         """Return the line of each row."""
         block = _NUMBERS.encode_lines(records)
-        lines = [line[1:-1] + b"\n" for line in block.split(b"\n")[:-1]]
-        if _OF_NULL in block:
-            words = (",".join(map(str, row)).encode() + b"\n" for row in records)
-            lines = [word if _OF_NULL in line else line for word, line in zip(words, lines, strict=True)]
+        if _NULL[:1] not in block:  # no number has that letter
+            return _parted(block)
+        lines = _parted(block.replace(_NULL, b"nan"))
+        for at in [at for at, row in enumerate(records) if inf in row or -inf in row]:
+            lines[at] = ",".join(map(str, records[at])).encode() + b"\n"
         return lines
+
+
+def _parted(block: bytes) -> list[bytes]:
+    """Return the lines of a block, without their brackets."""
+    return [line[1:-1] + b"\n" for line in block.split(b"\n")[:-1]]

@@ -1,11 +1,11 @@
-"""The whole vehicle over a horizon: its nominal motion against the plant's equations, its deviations against it."""
+"""The whole vehicle over a horizon: its nominal motion against the plant's equations."""
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from colibri.autopilot.control.whole_lpv_mpc import model
-from colibri.autopilot.control.whole_lpv_mpc.model import DEVIATIONS, RIGID, ROTORS, Disturbance, Model
+from colibri.autopilot.control.whole_lpv_mpc.model import RIGID, ROTORS, Disturbance, Model
 from colibri.autopilot.control.whole_lpv_mpc.mpc import lagging, model_of
 from colibri.common.jit import packed
 from colibri.common.rotations import quaternion_from_euler, rotation_matrix
@@ -75,33 +75,6 @@ def test_squared_speeds_follow_as_one_linear_lag_and_spinning_up_turns_the_body_
     spin = rotors.inertia_kg_m2 * rotors.max_speed * 2.0 * (np.sqrt(speeds[-1, 0]) - np.sqrt(speeds[-1, 1]))
     dragged = -2.0 * torque * 0.2 * (STEPS * INTERVAL_S - 0.025 * (1.0 - left))
     assert motion[-1, 12] == pytest.approx((dragged - spin) / HUMMINGBIRD.body.inertia_kg_m2[2], rel=1e-3)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_deviations_are_the_motions_derivative(seed: int) -> None:
-    """Against differences of rollouts, block by block and rotor by rotor: within the order of Taylor's series."""
-    numbers = model_of(HUMMINGBIRD, INTERVAL_S)
-    means, levels = lagging(STARTS, numbers.lag)
-    rigid, squared, commands = start(seed)
-    commands[:] = commands[0]
-    motion, speeds = rolled(HUMMINGBIRD, rigid, squared, commands)
-    responses = np.full((STEPS + 1, DEVIATIONS, ROTORS * (len(STARTS) - 1)), np.nan)
-    model.respond(motion, speeds, means, levels, packed(numbers), responses)
-    step = 1e-4
-    for column in range(responses.shape[2]):
-        block, rotor = divmod(column, ROTORS)
-        ends = []
-        for sign in (1.0, -1.0):
-            changed = commands.copy()
-            changed[STARTS[block] : STARTS[block + 1], rotor] += sign * step
-            ends.append(rolled(HUMMINGBIRD, rigid, squared, changed)[0][-1])
-        difference = (ends[0] - ends[1]) / (2.0 * step)
-        R = np.array(rotation_matrix(tuple(motion[-1, 6:10])))
-        before, after = (np.array(rotation_matrix(tuple(end[6:10]))) for end in ends)
-        skew = R.T @ (before - after) / (2.0 * step)
-        turned = [skew[2, 1], skew[0, 2], skew[1, 0]]
-        expected = np.concatenate([difference[:6], turned, difference[10:]])
-        assert responses[-1, :, column] == pytest.approx(expected, rel=0.03, abs=0.03 * np.abs(expected[9:]).max())
 
 
 def test_rotors_without_lag_have_what_they_are_commanded() -> None:
