@@ -54,8 +54,16 @@ def packed(parameters: NamedTuple) -> Packed:
 
 
 def opened(record: Packed, kind: type[_Tuple]) -> _Tuple:
-    """Return the arrays of a record as the named tuple that was packed, in the record's memory."""
-    return kind(*(record[name][0] for name in kind._fields))
+    """Return the arrays of a record as the named tuple that was packed, in the record's memory.
+
+    What is a record in it is the tuple of its arrays.
+    """
+    return kind._make(_opened(record[name]) for name in kind._fields)
+
+
+def _opened(field: Packed) -> Any:
+    names = field.dtype.names
+    return field[0] if names is None else tuple(_opened(field[name]) for name in names)
 
 
 def _fields(parameters: Any) -> list[tuple[str, Any, tuple[int, ...]]]:

@@ -55,7 +55,7 @@ class Stage(NamedTuple):
 
 CONTROL_STEP = Stage("control step", Autopilot, "step")
 STAGES = (
-    Stage("estimate", VehicleTracker, "estimate"),
+    Stage("estimate", VehicleTracker, "observe"),
     Stage("references", TargetBuilder, "on_clock"),
     Stage("condense", planning, "condense"),
     Stage("QP", WholeMpc, "solve"),

@@ -168,8 +168,7 @@ class LpvMpc(TrackingLaw[Memory]):
         thrust_n, *moments_n_m = tracked.wrench.tolist()
         x = np.array((phi, p, theta, q, psi, r, *moments_n_m))
         momentum = dot(tracker.momentum, tracked.speeds)
-        max_speed = tracker.battery.max_speed_now(tracked.charge_ah, tracked.speeds)
-        _, measured, estimate, mass_kg = observed
+        _, _, measured, estimate, mass_kg, max_speed, _ = observed
         now = InitialState(x, memory.moments, estimate[9:], momentum, max_speed)
         motion = Motion(np.array(state.position_enu_m), measured[:3], measured[6:], float(psi), thrust_n, mass_kg)
         return LawInputs(observed, now, motion)
@@ -177,7 +176,7 @@ class LpvMpc(TrackingLaw[Memory]):
     def _decide(self, memory: Memory, inputs: LawInputs, setpoint: Setpoint) -> tuple[Memory, Decision]:
         squared, moments, plan, age, diagnostics = self._choose(memory, inputs, setpoint)
         observed = inputs.observed
-        commands, tracked = self.tracker.actuate(memory.tracked, observed, squared, inputs.now.max_speed)
+        commands, tracked = self.tracker.actuate(memory.tracked, observed, squared)
         phi, theta, psi = setpoint.target.angles[0].tolist()
         how = diagnostics._replace(mass_kg=observed.mass_kg)
         return Memory(tracked, moments, plan, age), Decision(commands, (phi, theta, psi), how)

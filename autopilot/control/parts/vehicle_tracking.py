@@ -6,18 +6,25 @@ import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Horizon, VehicleState
 from colibri.autopilot.control.vehicle_model import disturbance_observer, rotor_lag
-from colibri.autopilot.control.vehicle_model.battery import BatteryModel
-from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings, observer_of
+from colibri.autopilot.control.vehicle_model.battery import BatteryModel, charged, terminal
+from colibri.autopilot.control.vehicle_model.disturbance_observer import (
+    ESTIMATES,
+    MEASURED,
+    ObserverSettings,
+    observer_of,
+)
 from colibri.autopilot.control.vehicle_model.mass import MassSettings, follow_mass, mass_model
+from colibri.autopilot.control.vehicle_model.rotor_lag import Rotors
+from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.elementary import square
-from colibri.common.jit import packed
+from colibri.common.jit import Packed, compiled, packed
 from colibri.common.matrices import dot, matvec
-from colibri.common.rotations import rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
 _LEVEL, _UPSIDE_DOWN = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
 _ZERO = (0.0, 0.0, 0.0)
+_NOTHING = np.empty(0)
 
 
 class Tracked(NamedTuple):
@@ -45,15 +52,21 @@ class Observed(NamedTuple):
     """What is known of the vehicle now.
 
     Attributes:
+        rigid: Position and velocity, ENU; quaternion wxyz, FLU to ENU; body rates, FLU: (13,).
         rotation: Body to earth, (3, 3).
         measured, estimate: Of the observer, (9,) and (12,).
         mass_kg: That the vehicle moves like.
+        max_speed: That a rotor can reach while all keep their power, in parts of the largest.
+        current_a: Of the battery.
     """
 
+    rigid: Array
     rotation: Array
     measured: Array
     estimate: Array
     mass_kg: float
+    max_speed: float
+    current_a: float
 
 
 class VehicleTracker:
@@ -79,6 +92,7 @@ class VehicleTracker:
         self.inertia = observing.inertia
         self._interval_s = interval_s
         self._observer, self._mass = packed(observing), packed(mass_model(mass, vehicle, interval_s))
+        self._rotors = packed(Rotors(self.lag, self.allocation))
 
     def initial(self, rotor_speed: float) -> Tracked:
         """Return what is remembered of a vehicle whose rotors all turn at `rotor_speed` (its unit)."""
@@ -88,40 +102,91 @@ class VehicleTracker:
 
     def observe(self, tracked: Tracked, state: VehicleState) -> Observed:
         """Return what is known of the vehicle in this state."""
-        rotation = np.array(rotation_matrix(state.attitude))
-        measured = np.array([*state.velocity_enu_m_s, *state.rate_flu_rad_s, *rotation[:, 2].tolist()])
-        estimate, mass_kg = self.estimate(tracked, measured), tracked.mass_kg
-        if state.airborne:
-            mass_kg = follow_mass(mass_kg, estimate[6:], measured[6:], float(tracked.wrench[0]), self._mass)
-        return Observed(rotation, measured, estimate, mass_kg)
-
-    def estimate(self, tracked: Tracked, measured: Array) -> Array:
-        """Return the observer's estimate, (12,), with the measurement `measured`, (9,)."""
-        if tracked.measured is None:
-            return disturbance_observer.first_estimate(measured)
-        return disturbance_observer.observe(
-            tracked.estimate,
-            tracked.measured,
-            measured,
+        before, attitude = tracked.measured, state.attitude
+        rigid = np.array((*state.position_enu_m, *state.velocity_enu_m_s, *attitude, *state.rate_flu_rad_s))
+        rotation, measured, estimate = np.empty((3, 3)), np.empty(MEASURED), np.empty(ESTIMATES)
+        known = (rigid, rotation, measured, estimate)
+        mass_kg, max_speed, current_a = look(
+            rigid,
+            tracked.speeds,
+            tracked.wrench,
             tracked.mean_wrench,
-            dot(self.momentum, tracked.speeds),
+            _NOTHING if before is None else before,
+            tracked.estimate,
             tracked.mass_kg,
+            state.airborne,
+            self.battery.open_voltage_v(tracked.charge_ah),
+            self.momentum,
             self._observer,
+            self._mass,
+            self.battery.numbers,
+            rotation,
+            measured,
+            estimate,
         )
+        return Observed(*known, mass_kg, max_speed, current_a)
 
-    def actuate(self, tracked: Tracked, observed: Observed, squared: Array, max_speed: float) -> tuple[Array, Tracked]:
+    def actuate(self, tracked: Tracked, observed: Observed, squared: Array) -> tuple[Array, Tracked]:
         """Return rotor commands, in the vehicle's unit, (4,), and what is remembered a sample later.
 
-        `squared` are the squared speeds that the plan commands, (4,), and `max_speed` that which a rotor can reach, in
-        parts of the largest.
+        `squared` are the squared speeds that the plan commands, (4,).
         """
-        commands, speeds, wrench, mean_wrench = rotor_lag.actuate(
-            tracked.speeds, squared, self.lag, max_speed, self.allocation
-        )
-        charge_ah = self.battery.charge_after(tracked.charge_ah, tracked.speeds, self._interval_s)
-        _, measured, estimate, mass_kg = observed
+        _, _, measured, estimate, mass_kg, max_speed, current_a = observed
+        actuated = np.empty((4, 4))
+        rotor_lag.actuate(tracked.speeds, squared, max_speed, self._rotors, actuated)
+        commands, speeds, wrench, mean_wrench = actuated
+        charge_ah = charged(tracked.charge_ah, current_a, self._interval_s)
         after = Tracked(speeds, wrench, mean_wrench, measured, estimate, charge_ah, mass_kg)
         return commands * self.vehicle.rotors.max_speed, after
+
+
+@compiled
+def look(
+    rigid: Array,
+    speeds: Array,
+    wrench: Array,
+    mean_wrench: Array,
+    before: Array,
+    estimate_before: Array,
+    mass_kg: float,
+    airborne: bool,
+    open_v: float,
+    momentum: Array,
+    observer: Packed,
+    mass: Packed,
+    battery: Packed,
+    rotation: Array,
+    measured: Array,
+    estimate: Array,
+) -> tuple[float, float, float]:
+    """Fill `rotation`, `measured` and `estimate` of `Observed`; return its mass, largest speed and current.
+
+    Args:
+        rigid: Of `Observed`.
+        speeds, wrench, mean_wrench, mass_kg: Of `Tracked`.
+        before, estimate_before: What was measured a sample ago, (9,), or (0,) before the first; and the estimate then.
+        airborne: Whether nothing but air and rotors acts.
+        open_v: Voltage of the battery without load.
+        momentum: Angular momentum of each rotor at the largest speed, along body z, N m s, (4,).
+        observer, mass, battery: `Observer`, `MassModel` and `BatteryNumbers`, packed.
+        rotation, measured, estimate: Are filled.
+    """
+    R = rotation_matrix((rigid[6], rigid[7], rigid[8], rigid[9]))
+    for i in range(3):
+        measured[i], measured[3 + i], measured[6 + i] = rigid[3 + i], rigid[10 + i], R[i][2]
+        for j in range(3):
+            rotation[i, j] = R[i][j]
+    if before.shape[0] > 0:
+        h = dot(momentum, speeds)
+        estimate[:] = disturbance_observer.observe(
+            estimate_before, before, measured, mean_wrench, h, mass_kg, observer
+        )
+    else:
+        estimate[:6], estimate[6:] = measured[:6], 0.0
+    if airborne:
+        mass_kg = follow_mass(mass_kg, estimate[6:], measured[6:], wrench[0], mass)
+    voltage_v, current_a = terminal(open_v, speeds, battery)
+    return mass_kg, voltage_v / battery[0].full_voltage_v, current_a
 
 
 class TrackingMemory(Protocol):

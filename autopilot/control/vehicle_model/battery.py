@@ -5,10 +5,10 @@ charge taken, and the rotors' top speed in proportion to V.
 """
 
 from math import sqrt
+from typing import NamedTuple
 
 from colibri.common.elementary import square
-from colibri.common.jit import compiled
-from colibri.common.matrices import dot
+from colibri.common.jit import Packed, compiled, packed
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Battery, Vehicle
 
@@ -26,8 +26,24 @@ def estimated(model_ah: float, reported_ah: float, vehicle: Vehicle) -> float:
     return reported_ah if abs(reported_ah - model_ah) > _APART * vehicle.battery.capacity_ah else model_ah
 
 
+class BatteryNumbers(NamedTuple):
+    """What kernels take of a battery, beside its open voltage; the defaults are those of a vehicle that has none.
+
+    Attributes:
+        full_power_w: Of a rotor at its largest speed.
+    """
+
+    full_power_w: float = 0.0
+    full_voltage_v: float = 1.0
+    resistance_ohm: float = 0.0
+
+
 class BatteryModel:
-    """The battery of one vehicle; one that has none never tires."""
+    """The battery of one vehicle; one that has none never tires.
+
+    Attributes:
+        numbers: Its `BatteryNumbers`, packed.
+    """
 
     def __init__(self, vehicle: Vehicle) -> None:
         """Follow the battery of `vehicle`."""
@@ -36,21 +52,29 @@ class BatteryModel:
         efficiency = vehicle.battery.efficiency if vehicle.battery else 1.0
         self._full_power_w = drag_torque * vehicle.rad_s_per_speed_unit * vehicle.rotors.max_speed / efficiency
         self._max_speeds: dict[int, float] = {}
+        numbers = BatteryNumbers()
         if self._battery:
             self._step_ah = self._battery.capacity_ah / _INTERVALS
+            numbers = BatteryNumbers(
+                self._full_power_w, self._battery.full_voltage_v, self._battery.resistance_ohm
+            )
+        self.numbers = packed(numbers)
 
     def charge_after(self, charge_ah: float, speeds: Array, duration_s: float) -> float:
         """Return the charge taken, Ah, after `duration_s` at rotor speeds (4,), parts of the largest."""
         _, current_a = self.terminal(charge_ah, speeds)
-        return charge_ah + current_a * duration_s / _SECONDS_PER_HOUR
+        return charged(charge_ah, current_a, duration_s)
+
+    def open_voltage_v(self, charge_ah: float) -> float:
+        """Return the voltage without load once `charge_ah` is taken; 1 without a battery."""
+        return 1.0 if self._battery is None else open_voltage_v(self._battery, charge_ah)
 
     def terminal(self, charge_ah: float, speeds: Array) -> tuple[float, float]:
         """Return the terminal voltage, V, and the current, A, at rotor speeds (4,), parts of the largest; 0 without."""
         if self._battery is None:
             return 0.0, 0.0
-        power_w = self._full_power_w * dot(speeds * speeds, speeds)
-        voltage_v = _voltage_v(self._battery, charge_ah, power_w)
-        return voltage_v, power_w / voltage_v
+        at_terminal: tuple[float, float] = terminal(open_voltage_v(self._battery, charge_ah), speeds, self.numbers)
+        return at_terminal
 
     def max_speed_now(self, charge_ah: float, speeds: Array) -> float:
         """Return the speed that a rotor can reach while all keep the power of `speeds`, (4,); parts of the largest."""
@@ -63,12 +87,7 @@ class BatteryModel:
 
         Squared speeds are in parts of the largest; those expected, (n, 4), stay after the last.
         """
-        if self._battery is None:
-            limits[:] = 1.0
-            return
-        battery = self._battery
-        open_v, full_v = open_voltage_v(battery, charge_ah), battery.full_voltage_v
-        _fill_limits(expected, self._full_power_w, open_v, battery.resistance_ohm, full_v, limits)
+        fill_limits(expected, self.open_voltage_v(charge_ah), self.numbers, limits)
 
     def max_common_speed(self, charge_ah: float) -> float:
         """Return the speed that all rotors can keep up together once `charge_ah` is taken, in parts of the largest."""
@@ -92,9 +111,15 @@ class BatteryModel:
         for _ in range(_BISECTIONS):
             speed = 0.5 * (low + high)
             power_w = 4.0 * self._full_power_w * speed * speed * speed
-            enough = _voltage_v(battery, charge_ah, power_w) >= speed * battery.full_voltage_v
+            voltage_v = loaded_voltage_v(open_voltage_v(battery, charge_ah), power_w, battery.resistance_ohm)
+            enough = voltage_v >= speed * battery.full_voltage_v
             low, high = (speed, high) if enough else (low, speed)
         return low
+
+
+def charged(charge_ah: float, current_a: float, duration_s: float) -> float:
+    """Return the charge taken, Ah, after `duration_s` at a current."""
+    return charge_ah + current_a * duration_s / _SECONDS_PER_HOUR
 
 
 def open_voltage_v(battery: Battery, charge_ah: float) -> float:
@@ -103,23 +128,34 @@ def open_voltage_v(battery: Battery, charge_ah: float) -> float:
     return battery.full_voltage_v + (battery.empty_voltage_v - battery.full_voltage_v) * used
 
 
-def _voltage_v(battery: Battery, charge_ah: float, power_w: float) -> float:
+@compiled
+def loaded_voltage_v(open_v: float, power_w: float, resistance_ohm: float) -> float:
     """Return the terminal voltage at which `power_w` is drawn: V² - V0 V + R P = 0, but at least half of V0."""
-    open_v = open_voltage_v(battery, charge_ah)
-    return 0.5 * (open_v + sqrt(max(0.0, open_v * open_v - 4.0 * battery.resistance_ohm * power_w)))
+    return 0.5 * (open_v + sqrt(max(0.0, open_v * open_v - 4.0 * resistance_ohm * power_w)))
 
 
 @compiled
-def _fill_limits(
-    expected: Array, full_power_w: float, open_v: float, resistance_ohm: float, full_v: float, limits: Array
-) -> None:
+def terminal(open_v: float, speeds: Array, packed: Packed) -> tuple[float, float]:
+    """Return the terminal voltage, V, and the current, A, at rotor speeds (4,); `packed` is the `BatteryNumbers`."""
+    cubes = 0.0
+    for speed in speeds:
+        cubes += speed * speed * speed
+    power_w = packed[0].full_power_w * cubes
+    voltage_v = loaded_voltage_v(open_v, power_w, packed[0].resistance_ohm)
+    return voltage_v, power_w / voltage_v
+
+
+@compiled
+def fill_limits(expected: Array, open_v: float, packed: Packed, limits: Array) -> None:
+    """Fill what `BatteryModel.limit_squared` does; `packed` is the `BatteryNumbers`."""
+    numbers = packed[0]
     for n in range(limits.shape[0]):
         if n < expected.shape[0]:
             power_w = 0.0
             for rotor in range(expected.shape[1]):
                 squared = min(max(expected[n, rotor], 0.0), 1.0)
-                power_w += full_power_w * squared * sqrt(squared)
-            voltage_v = 0.5 * (open_v + sqrt(max(0.0, open_v * open_v - 4.0 * resistance_ohm * power_w)))
-            limits[n] = voltage_v / full_v * (voltage_v / full_v)
+                power_w += numbers.full_power_w * squared * sqrt(squared)
+            part = loaded_voltage_v(open_v, power_w, numbers.resistance_ohm) / numbers.full_voltage_v
+            limits[n] = part * part
         else:
             limits[n] = limits[n - 1]

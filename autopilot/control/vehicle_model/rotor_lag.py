@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from colibri.common.jit import compiled
+from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import exp
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
@@ -30,6 +30,18 @@ class RotorLag(NamedTuple):
     down: float
     planned: float
     min_speed: float
+
+
+class Rotors(NamedTuple):
+    """The rotors of a vehicle.
+
+    Attributes:
+        lag: Over a control sample.
+        allocation: From squared speeds to U1 (N), U2, U3, U4 (N m), (4, 4).
+    """
+
+    lag: RotorLag
+    allocation: Array
 
 
 def rotor_lag(vehicle: Vehicle, interval_s: float) -> RotorLag:
@@ -64,18 +76,17 @@ def lead(speeds: Array, squared_commands: Array, lag: RotorLag, max_speed: float
 
 
 @compiled
-def actuate(
-    speeds: Array, squared_commands: Array, lag: RotorLag, max_speed: float, allocation: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Return commands as `lead` does, speeds and wrench a sample later, and the mean wrench until then, (4,) each.
+def actuate(speeds: Array, squared_commands: Array, max_speed: float, packed: Packed, out: Array) -> None:
+    """Write commands as `lead` does, speeds and wrench a sample later, and the mean wrench until then, (4, 4).
 
-    `allocation` is from squared speeds to U1 (N), U2, U3, U4 (N m), (4, 4).
+    `packed` are the `Rotors`.
     """
-    commands = lead(speeds, squared_commands, lag, max_speed)
-    after = follow(speeds, commands, lag)
-    wrench, mean = np.zeros(allocation.shape[0]), np.zeros(allocation.shape[0])
+    lag, allocation = packed[0].lag, packed[0].allocation
+    commands, after, wrench, mean = out[0], out[1], out[2], out[3]
+    commands[:] = lead(speeds, squared_commands, lag, max_speed)
+    after[:] = follow(speeds, commands, lag)
+    wrench[:], mean[:] = 0.0, 0.0
     for row in range(allocation.shape[0]):
         for i in range(speeds.shape[0]):
             wrench[row] += allocation[row, i] * after[i] * after[i]
             mean[row] += 0.5 * allocation[row, i] * (speeds[i] * speeds[i] + after[i] * after[i])
-    return commands, after, wrench, mean

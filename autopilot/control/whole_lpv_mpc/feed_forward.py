@@ -68,27 +68,19 @@ class Flat(NamedTuple):
 
 @compiled
 def follow(
-    rigid: Array,
-    references: tuple[Array, Array, Array, Array],
-    disturbance: Disturbance,
-    limits: ForceLimits,
-    law: Packed,
-    vehicle: Packed,
-    out: Packed,
+    now: Packed, references: tuple[Array, Array, Array, Array], law: Packed, vehicle: Packed, out: Packed
 ) -> Array:
     """Fill what follows references at their times; return the force, N, ENU, (3,), along which thrust must point now.
 
     Args:
-        rigid: State, see `model.RIGID`, (13,).
+        now: The vehicle, `planning.Now`.
         references: Of position, velocity and acceleration, ENU, (n, 3) each, and of yaw, rad, (n,).
-        disturbance: On the vehicle.
-        limits: Of the force.
         law: The `Guidance`.
         vehicle: The `Model`.
         out: The `Target`; is filled, but for thrusts.
     """
     p, v, a, yaw = before_jump(references, law[0].interval_s)
-    target = out[0]
+    rigid, disturbance, limits, target = now[0].rigid, now[0].disturbance, now[0].force, out[0]
     near = (target.position, target.velocity, target.acceleration)
     target.yaw_rad[:] = yaw
     approach(rigid[:3], rigid[3:6], (p, v, a), law, near)

@@ -26,14 +26,16 @@ from colibri.autopilot.control.qp import QpSolver
 from colibri.autopilot.control.settings import ControlInterval, QpSettings, interval_us
 from colibri.autopilot.control.vehicle_model.disturbance_observer import ObserverSettings
 from colibri.autopilot.control.vehicle_model.mass import MassSettings
+from colibri.autopilot.control.whole_lpv_mpc import planning
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Guidance
-from colibri.autopilot.control.whole_lpv_mpc.model import Disturbance
+from colibri.autopilot.control.whole_lpv_mpc.model import RIGID, ROTORS, Disturbance
 from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan, PlanSettings, WeightSettings, WholeMpc
 from colibri.autopilot.control.whole_lpv_mpc.path import PathSettings
 from colibri.autopilot.control.whole_lpv_mpc.planning import Now
 from colibri.autopilot.control.whole_lpv_mpc.targets import TargetBuilder, Wanted
 from colibri.common.config import Count, Degrees, Negative, Positive, Table, read_settings
 from colibri.common.elementary import cos, square, tan
+from colibri.common.jit import Packed, opened, packed
 from colibri.common.kernels import asin, atan2
 from colibri.common.matrices import dot, matvec, norm
 from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotation_matrix
@@ -48,6 +50,9 @@ _SHARES, _ALWAYS, _LIMITED_STEPS = 3.0, 0.5, 3
 """At first, no rotor has more than so many shares of the thrust that must point along its axis, or than such a part of
 its share in hover: where little thrust is to be made, moments must not make much of it. A vehicle that stands, and does
 not know it, would be tipped over by the moments that it takes for a disturbance."""
+
+
+_NO_DISTURBANCE = Disturbance(np.zeros(3), np.zeros(3))
 
 
 class GuidanceSettings(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -108,13 +113,15 @@ class Inputs(NamedTuple):
 
     Attributes:
         observed: Of the vehicle.
-        now: For the plan.
-        limits: Of the force.
+        psi: Yaw, rad, unwrapped.
+        now: For the plan: of the arrays in `record`, which each decision fills again.
+        record: The same, packed.
     """
 
     observed: Observed
+    psi: float
     now: Now
-    limits: ForceLimits
+    record: Packed
 
 
 class WholeLpvMpc(TrackingLaw[Memory]):
@@ -161,8 +168,16 @@ class WholeLpvMpc(TrackingLaw[Memory]):
             self._mpc.from_wrench,
         )
         self._targets = TargetBuilder(guidance, settings.path, self._mpc)
-        self._tilt_tangent = tan(radians(settings.guidance.max_tilt_deg))
-        self._min_up_n = settings.guidance.min_thrust * self._hover_squared * self._span_n
+        self._min_squared = square(self.tracker.lag.min_speed)
+        min_n = self._span_n * self._min_squared
+        min_up_n = max(settings.guidance.min_thrust * self._hover_squared * self._span_n, min_n)
+        tilt_tangent = tan(radians(settings.guidance.max_tilt_deg))
+        self._force = ForceLimits(tilt_tangent, min_n, min_n, min_up_n)
+        limits = np.empty((self._mpc.horizon, 2))
+        self._now = packed(Now(np.empty(RIGID), np.empty(ROTORS), _NO_DISTURBANCE, limits, self._force))
+        arrays = opened(self._now, Now)
+        self._arrays = arrays._replace(disturbance=Disturbance(*arrays.disturbance))
+        self._model_kg = self._mpc.model["airframe"]["mass_kg"]
         self._turn = recovery.TurnGains(
             settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s
         )
@@ -188,7 +203,7 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         """Decide the rotor speeds to hold until the next control sample."""
         del time_us
         inputs = self._inputs(memory, state)
-        return self._decide(memory, inputs, self._targets.on_clock(inputs.now, inputs.limits, references))
+        return self._decide(memory, inputs, self._targets.on_clock(inputs.record, references))
 
     def step_on_path(
         self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
@@ -198,7 +213,7 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         inputs = self._inputs(memory, state)
         kept = memory.plan.speeds if memory.plan else None
         last = None if kept is None else kept[memory.age :]
-        wanted = self._targets.on_path(inputs.now, inputs.limits, references, last, memory.lag_us * 1e-6)
+        wanted = self._targets.on_path(inputs.now, references, last, memory.lag_us * 1e-6)
         return self._decide(memory, inputs, wanted)
 
     def step_attitude(
@@ -207,40 +222,41 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         """Decide the same for an attitude and a thrust, which is kept within what the rotors can make."""
         del time_us
         inputs = self._inputs(memory, state)
-        wanted = self._targets.of_demand(inputs.now, inputs.limits, demand)
+        wanted = self._targets.of_demand(inputs.now, demand)
         return self._decide(memory, inputs, wanted, on_track=False)
 
     def _inputs(self, memory: Memory, state: VehicleState) -> Inputs:
         tracked, battery = memory.tracked, self.tracker.battery
         observed = self.tracker.observe(tracked, state)
-        self._mpc.model["airframe"]["mass_kg"] = observed.mass_kg
-        squared = tracked.speeds * tracked.speeds
-        rigid = np.array([*state.position_enu_m, *state.velocity_enu_m_s, *state.attitude, *state.rate_flu_rad_s])
-        min_squared = square(self.tracker.lag.min_speed)
-        limits = np.empty((self._mpc.horizon, 2))
-        limits[:, 0] = min_squared
-        expected = memory.plan.states[memory.age :, 12:] if memory.plan else squared[None, :]
-        battery.limit_squared(tracked.charge_ah, expected, limits[:, 1])
-        disturbance = Disturbance(observed.estimate[6:9], observed.estimate[9:])
-        now = Now(rigid, float(state.euler[2]), squared, disturbance, limits)
-        max_squared = square(battery.max_common_speed(tracked.charge_ah))
-        min_n, max_n = self._span_n * min_squared, self._span_n * max_squared
-        force = ForceLimits(self._tilt_tangent, min_n, max_n, max(self._min_up_n, min_n))
-        return Inputs(observed, now, force)
+        self._model_kg[0] = observed.mass_kg
+        expected = memory.plan.states[memory.age :, 12:] if memory.plan else (tracked.speeds * tracked.speeds)[None, :]
+        max_n = self._span_n * square(battery.max_common_speed(tracked.charge_ah))
+        planning.begin(
+            observed.rigid,
+            tracked.speeds,
+            observed.estimate,
+            expected,
+            self._min_squared,
+            battery.open_voltage_v(tracked.charge_ah),
+            max_n,
+            battery.numbers,
+            self._now,
+        )
+        now = self._arrays._replace(force=self._force._replace(max_n=max_n))
+        return Inputs(observed, float(state.euler[2]), now, self._now)
 
     def _decide(
         self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool = True
     ) -> tuple[Memory, Decision]:
         squared, plan, age, diagnostics = self._choose(memory, inputs, wanted, on_track=on_track)
         tracked, observed = memory.tracked, inputs.observed
-        max_speed = self.tracker.battery.max_speed_now(tracked.charge_ah, tracked.speeds)
-        commands, after = self.tracker.actuate(tracked, observed, squared, max_speed)
+        commands, after = self.tracker.actuate(tracked, observed, squared)
         lag_us = self._lag_us(memory.lag_us, plan, age) if wanted.path else 0
         R = wanted.target.attitudes[0]
         angles = (
             atan2(R[2, 1], R[2, 2]),
             -asin(min(max(R[2, 0], -1.0), 1.0)),
-            nearest_turn(float(wanted.target.yaw_rad[0]), inputs.now.psi),
+            nearest_turn(float(wanted.target.yaw_rad[0]), inputs.psi),
         )
         how = diagnostics._replace(mass_kg=observed.mass_kg)
         if wanted.path:
@@ -259,14 +275,14 @@ class WholeLpvMpc(TrackingLaw[Memory]):
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
         """Plan, or fall back: return squared rotor speeds, the plan to go on with, its age, and how it came about."""
         _, target, force, path = wanted
-        along_n = dot(force, inputs.observed.rotation[:, 2].copy())
+        along_n = dot(force, inputs.observed.measured[6:])
         if along_n < _RECOVER_BEYOND * norm(force) and not _planned(memory, inputs):
             return self._recover(inputs, force, Diagnostics())
         most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
         at_first = inputs.now.limits[:_LIMITED_STEPS, 1]
         np.minimum(at_first, most, out=at_first)
         last = memory.plan.commands[memory.age :] if memory.plan else None
-        plan, diagnostics = self._mpc.plan(inputs.now, target, last, path, on_track=on_track)
+        plan, diagnostics = self._mpc.plan(inputs.record, target, last, inputs.psi, path, on_track=on_track)
         if plan is not None:
             return plan.commands[0], plan, 1, diagnostics
         if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._mpc.horizon - 1):

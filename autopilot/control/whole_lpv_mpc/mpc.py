@@ -15,7 +15,7 @@ from colibri.autopilot.control.whole_lpv_mpc import condensing, deviations, mode
 from colibri.autopilot.control.whole_lpv_mpc.condensing import Problem, Weights
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Lag, Model
 from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, read_speeds, speed_effects
-from colibri.autopilot.control.whole_lpv_mpc.planning import Kind, Now, Workspace
+from colibri.autopilot.control.whole_lpv_mpc.planning import Kind, Workspace
 from colibri.common.config import Count, Degrees, Positive, Table
 from colibri.common.elementary import cos, exp, square
 from colibri.common.jit import Packed, opened, packed
@@ -166,16 +166,24 @@ class WholeMpc:
         return S
 
     def plan(
-        self, now: Now, target: Packed, last: Array | None, path: PathNow | None = None, *, on_track: bool = True
+        self,
+        now: Packed,
+        target: Packed,
+        last: Array | None,
+        psi: float,
+        path: PathNow | None = None,
+        *,
+        on_track: bool = True,
     ) -> tuple[Plan | None, Diagnostics]:
         """Plan from `now` towards `target`; no plan where the QP is not solved.
 
         Where the plan within the rotors' limits alone exceeds a soft limit, a second one has these, too.
 
         Args:
-            now: What the plan begins with.
+            now: The `Now` that the plan begins with.
             target: The `Target`.
             last: Commands of the last plan, from now on, (n, 4); None without one.
+            psi: Yaw now, rad, unwrapped.
             path: The nominal speeds along the path, where they are free.
             on_track: Whether the place counts, or the attitude and the thrust.
         """
@@ -190,7 +198,7 @@ class WholeMpc:
         solve_time_s = self._clock() - started_s
         if z is None:
             return None, Diagnostics(status, solve_time_s=solve_time_s)
-        commands, states, binding = planning.read(qps.kind, z, now.psi)
+        commands, states, binding = planning.read(qps.kind, z, psi)
         diagnostics = Diagnostics(
             QpStatus.SOLVED,
             solve_time_s=solve_time_s,

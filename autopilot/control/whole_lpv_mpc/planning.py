@@ -8,7 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.qp import Qp
+from colibri.autopilot.control.vehicle_model.battery import fill_limits
 from colibri.autopilot.control.whole_lpv_mpc.condensing import (
     MOTION_ROWS,
     Integers,
@@ -36,17 +38,17 @@ class Now(NamedTuple):
 
     Attributes:
         rigid: State, see `model.RIGID`, (13,).
-        psi: Yaw, rad, unwrapped.
         squared: Squared rotor speeds, (4,).
         disturbance: That the model does not explain.
         limits: Least and largest squared speed of each step, (N, 2).
+        force: Limits of the force that references may ask for.
     """
 
     rigid: Array
-    psi: float
     squared: Array
     disturbance: Disturbance
     limits: Array
+    force: ForceLimits
 
 
 class Workspace(NamedTuple):
@@ -88,28 +90,63 @@ class Kind(NamedTuple):
 
 
 @compiled
-def condense(now: Now, target: Packed, last: Array, vehicle: Packed, kind: Packed) -> None:
+def begin(
+    rigid: Array,
+    speeds: Array,
+    estimate: Array,
+    expected: Array,
+    least: float,
+    open_v: float,
+    max_n: float,
+    battery: Packed,
+    now: Packed,
+) -> None:
+    """Fill where a plan begins.
+
+    Args:
+        rigid, estimate: Of `Observed`.
+        speeds: Rotor speeds, parts of the largest, (4,).
+        expected: Squared speeds expected, (n, 4): their power leaves so much voltage, and the last's what is left then.
+        least: Squared speed of rotors that idle.
+        open_v: Voltage of the battery without load.
+        max_n: Largest thrust.
+        battery: `BatteryNumbers`, packed.
+        now: The `Now`; is filled, but for the other limits of the force.
+    """
+    it = now[0]
+    it.rigid[:] = rigid
+    for i in range(ROTORS):
+        it.squared[i] = speeds[i] * speeds[i]
+    for i in range(3):
+        it.disturbance.acceleration[i], it.disturbance.moment[i] = estimate[6 + i], estimate[9 + i]
+    it.limits[:, 0] = least
+    fill_limits(expected, open_v, battery, it.limits[:, 1])
+    it.force.max_n = max_n
+
+
+@compiled
+def condense(now: Packed, target: Packed, last: Array, vehicle: Packed, kind: Packed) -> None:
     """Fill the QP within the rotors' limits.
 
     Args:
-        now: Where the plan begins.
+        now: The `Now`, where the plan begins.
         target: The `Target`.
         last: Commands of the last plan, from now on, (n, 4); (0, 4) without one.
         vehicle: The `Model`.
         kind: The `Kind`; its `work` and `qp` are filled, but for G and h.
     """
     it = kind[0]
-    _expect(now, target[0], last, vehicle, it)
+    _expect(now[0], target[0], last, vehicle, it)
     _price_errors(target[0], it)
 
 
 @compiled
 def condense_on_path(
-    now: Now, target: Packed, last: Array, path: PathNow, effects: SpeedEffects, vehicle: Packed, kind: Packed
+    now: Packed, target: Packed, last: Array, path: PathNow, effects: SpeedEffects, vehicle: Packed, kind: Packed
 ) -> None:
     """Fill the QP in which the speed along the path is free, too; see `condense`."""
     it = kind[0]
-    _expect(now, target[0], last, vehicle, it)
+    _expect(now[0], target[0], last, vehicle, it)
     fill_slides(path, effects, it.work.responses)
     _price_errors(target[0], it)
     price(path, effects, it.problem.starts, it.qp)

@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeDemand, Horizon
-from colibri.autopilot.control.parts.thrust_force import ForceLimits
 from colibri.autopilot.control.whole_lpv_mpc import feed_forward
 from colibri.autopilot.control.whole_lpv_mpc.condensing import Target
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import Flat, Guidance
@@ -52,28 +51,26 @@ class TargetBuilder:
         self._target = it = opened(self._record, Target)
         self._near, self._flat = (it.position, it.velocity, it.acceleration), _flat_of(it)
 
-    def on_clock(self, now: Now, limits: ForceLimits, references: Horizon) -> Wanted:
-        """Return what follows references at their times, until that of the next is asked for."""
+    def on_clock(self, now: Packed, references: Horizon) -> Wanted:
+        """Return what follows references at their times, until that of the next is asked for; `now` is the `Now`."""
         n = self._samples
-        p, v, a, yaw = references[0][:n], references[1][:n], references[2][:n], references[5][:n]
-        force = feed_forward.follow(
-            now.rigid, (p, v, a, yaw), now.disturbance, limits, self._law, self._mpc.model, self._record
-        )
+        near = (references[0][:n], references[1][:n], references[2][:n], references[5][:n])
+        force = feed_forward.follow(now, near, self._law, self._mpc.model, self._record)
         return Wanted(self._target, self._record, force)
 
-    def on_path(self, now: Now, limits: ForceLimits, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
+    def on_path(self, now: Now, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
         """Return what follows references at the path times of the last plan.
 
         What the rotors are asked for beforehand is that of the speed now, held; at the end, that of the speed there.
 
         Args:
             now: Where the plan begins.
-            limits: Of the force.
             references: From path time on.
             last: Speeds of the last plan from now on, (k,); None without one: then it begins at the vehicle's.
             lag_s: By which path time is behind the clock.
         """
         n, h, guidance, mpc, path = self._samples, self._guidance.interval_s, self._guidance, self._mpc, self._path
+        limits = now.force
         upper = min(path.max_speed, 1.0 + lag_s / (mpc.horizon * h))
         speeds, slopes = np.empty(n), np.empty((n, 6))
         last = self._first_speed(now, references, upper) if last is None else last
@@ -103,9 +100,9 @@ class TargetBuilder:
         speed = dot(velocity, along) / squared if squared > _STILL_M_S * _STILL_M_S else 1.0
         return np.array([min(max(speed, self._path.min_speed), upper)])
 
-    def of_demand(self, now: Now, limits: ForceLimits, demand: AttitudeDemand) -> Wanted:
+    def of_demand(self, now: Now, demand: AttitudeDemand) -> Wanted:
         """Return what follows a demanded attitude and a thrust, which is kept within what the rotors can make."""
-        n, flat, target = self._samples, self._flat, self._target
+        n, flat, target, limits = self._samples, self._flat, self._target, now.force
         angles, thrusts_n = demand.angles[:n], demand.thrust_n[:n]
         feed_forward.stand(angles, thrusts_n, limits, flat)
         feed_forward.turn(flat, now.disturbance.moment, self._mpc.from_wrench, self._mpc.model)
