@@ -95,7 +95,7 @@ class _Compiling(Listener):
         pass
 
 
-def _kernel(function: Callable[..., Any], **options: bool) -> Any:
-    kernel: Any = njit(error_model="numpy", **options)(function)
+def _kernel(function: Callable[..., Any], *, forceinline: bool = False) -> Any:
+    kernel: Any = njit(error_model="numpy", forceinline=forceinline)(function)
     kernel._cache = MachineCode(function)  # noqa: SLF001
     return kernel

@@ -17,8 +17,8 @@ import numpy as np
 from colibri.autopilot.control.interface import AttitudeDemand, VehicleState
 from colibri.autopilot.control.lpv_mpc.prediction import ANGLES, INPUTS, M1, M3, RATES, STATES
 from colibri.autopilot.control.qp import QpSolver
-from colibri.autopilot.control.whole_lpv_mpc.law import Memory, WholeLpvMpc, WholeLpvMpcSettings
 from colibri.autopilot.control.whole_lpv_mpc.deviations import DEVIATIONS, ROTATION
+from colibri.autopilot.control.whole_lpv_mpc.law import Memory, WholeLpvMpc, WholeLpvMpcSettings
 from colibri.autopilot.control.whole_lpv_mpc.mpc import Plan, WholeMpc
 from colibri.certification.attitude import MIRRORS, AttitudeNumbers, Kinematic, attitude_loop
 from colibri.certification.certificate import Entry

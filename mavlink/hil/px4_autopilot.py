@@ -112,8 +112,7 @@ class FlierEnd:
         time_us = frame.time_us - self._zero_us
         fix, self._fix = self._fix, None
         groups = frame.updated & _EVERYTHING
-        return replace(
-            frame,
+        return frame._replace(
             time_us=time_us,
             updated=groups or int(_EVERYTHING),
             gps=None if fix is None else replace(fix, time_us=time_us),

@@ -1,4 +1,4 @@
-"""What sensors send the autopilot: dataclasses in SI, ENU/FLU, and the messages of PX4's simulator interface.
+"""What sensors send the autopilot: tuples in SI, ENU/FLU, and the messages of PX4's simulator interface.
 
 HIL_SENSOR has what is measured on board; its `fields_updated` has the groups that are new. HIL_GPS comes at its own
 rate, and is of the past; each other message of a sensor's own is a row of `OWN_MESSAGES`. Units and frames are those
@@ -87,8 +87,7 @@ class Distance(NamedTuple):
     field_of_view_rad: float
 
 
-@dataclass(frozen=True, slots=True)
-class SensorFrame:
+class SensorFrame(NamedTuple):
     """What is measured on board at one instant of simulated time, and what GPS has sent since the frame before.
 
     A group that `updated` leaves out holds its last value, or zeros.
@@ -183,8 +182,8 @@ def _measured(numbers: Sequence[Any], **own: Any) -> SensorFrame:
         frd_from_flu((xacc, yacc, zacc)),
         frd_from_flu((xgyro, ygyro, zgyro)),
         frd_from_flu((xmag, ymag, zmag)),
-        pressure_pa=hpa * 100.0,
-        temperature_c=temperature_c,
+        hpa * 100.0,
+        temperature_c,
         **own,
     )
 

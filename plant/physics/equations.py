@@ -244,10 +244,10 @@ def close_attitude(x: Array) -> bool:
     norm = sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
     for i in range(9, 13):
         x[i] /= norm
+    is_finite = True
     for i in range(x.size):
-        if not isfinite(x[i]):
-            return False
-    return True
+        is_finite &= isfinite(x[i])
+    return is_finite
 
 
 def attitude_of(state: Sequence[float]) -> Quaternion:

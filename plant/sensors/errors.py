@@ -1,10 +1,16 @@
 """How sensors err: processes driven by a stream of standard normal numbers, exact at any interval."""
 
 from collections.abc import Iterator
+from itertools import islice
 from math import sqrt
+
+import numpy as np
 
 from colibri.common.kernels import exp
 from colibri.common.types import Vector
+
+_DRAWN = 128
+"""Samples whose errors are drawn at once."""
 
 
 class GaussMarkov:
@@ -31,6 +37,9 @@ class Triad:
     """Three axes of white noise on a bias that walks at random, sampled at an interval, cut at the sensor's range.
 
     White noise is that of a mean over the interval, density / √interval (IEEE Std 952, annex C).
+
+    Attributes:
+        bias: As it is switched on.
     """
 
     def __init__(
@@ -46,20 +55,25 @@ class Triad:
             interval_s: Between two samples.
             chance: Standard normal numbers.
         """
-        self._noise = density / sqrt(interval_s)
-        self._walk = walk * sqrt(interval_s)
         self._limit = limit
-        self._chance = chance
         self.bias: Vector = (turn_on * next(chance), turn_on * next(chance), turn_on * next(chance))
+        self._errors = _errors(self.bias, walk * sqrt(interval_s), density / sqrt(interval_s), chance)
 
     def measure(self, truth: Vector) -> Vector:
         """Return the sample of `truth`, one interval after the one before."""
-        chance, noise, walk, limit = self._chance, self._noise, self._walk, self._limit
-        x = self.bias[0] + walk * next(chance)
-        y = self.bias[1] + walk * next(chance)
-        z = self.bias[2] + walk * next(chance)
-        self.bias = (x, y, z)
-        x += truth[0] + noise * next(chance)
-        y += truth[1] + noise * next(chance)
-        z += truth[2] + noise * next(chance)
+        limit = self._limit
+        bx, by, bz, dx, dy, dz = next(self._errors)
+        x, y, z = bx + (truth[0] + dx), by + (truth[1] + dy), bz + (truth[2] + dz)
+        if -limit <= x <= limit and -limit <= y <= limit and -limit <= z <= limit:
+            return (x, y, z)
         return (min(max(x, -limit), limit), min(max(y, -limit), limit), min(max(z, -limit), limit))
+
+
+def _errors(bias: Vector, walk: float, noise: float, chance: Iterator[float]) -> Iterator[list[float]]:
+    """Yield, for each sample after `bias`, the bias and white noise, of each axis; many samples are drawn at once."""
+    last = np.array(bias)
+    while True:
+        drawn = np.array(list(islice(chance, 6 * _DRAWN))).reshape(_DRAWN, 6)
+        biases = np.add.accumulate(np.concatenate([last[None], walk * drawn[:, :3]]))[1:]
+        last = biases[-1]
+        yield from np.concatenate([biases, noise * drawn[:, 3:]], axis=1).tolist()

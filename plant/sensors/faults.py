@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 from colibri.common.types import Vector
@@ -101,4 +100,4 @@ class SensorFaults:
             if value is not None:
                 updated |= row.group
             changes[row.field] = getattr(before, row.field) if value is None and row.group else value
-        return replace(frame, updated=updated, **changes)
+        return frame._replace(updated=updated, **changes)

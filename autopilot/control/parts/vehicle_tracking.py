@@ -161,15 +161,10 @@ def look(
 ) -> tuple[float, float, float]:
     """Fill `rotation`, `measured` and `estimate` of `Observed`; return its mass, largest speed and current.
 
-    Args:
-        rigid: Of `Observed`.
-        speeds, wrench, mean_wrench, mass_kg: Of `Tracked`.
-        before, estimate_before: What was measured a sample ago, (9,), or (0,) before the first; and the estimate then.
-        airborne: Whether nothing but air and rotors acts.
-        open_v: Voltage of the battery without load.
-        momentum: Angular momentum of each rotor at the largest speed, along body z, N m s, (4,).
-        observer, mass, battery: `Observer`, `MassModel` and `BatteryNumbers`, packed.
-        rotation, measured, estimate: Are filled.
+    `rigid` is of `Observed`, too. Of `Tracked` are speeds, wrenches, mass, what was measured `before`, (9,), or (0,)
+    before the first, and the estimate then. `airborne` is a vehicle on which nothing but air and rotors acts, `open_v`
+    its battery's voltage without load, `momentum` of the tracker. `Observer`, `MassModel` and `BatteryNumbers` are
+    packed.
     """
     R = rotation_matrix((rigid[6], rigid[7], rigid[8], rigid[9]))
     for i in range(3):
@@ -178,9 +173,7 @@ def look(
             rotation[i, j] = R[i][j]
     if before.shape[0] > 0:
         h = dot(momentum, speeds)
-        estimate[:] = disturbance_observer.observe(
-            estimate_before, before, measured, mean_wrench, h, mass_kg, observer
-        )
+        estimate[:] = disturbance_observer.observe(estimate_before, before, measured, mean_wrench, h, mass_kg, observer)
     else:
         estimate[:6], estimate[6:] = measured[:6], 0.0
     if airborne:

@@ -55,9 +55,7 @@ class BatteryModel:
         numbers = BatteryNumbers()
         if self._battery:
             self._step_ah = self._battery.capacity_ah / _INTERVALS
-            numbers = BatteryNumbers(
-                self._full_power_w, self._battery.full_voltage_v, self._battery.resistance_ohm
-            )
+            numbers = BatteryNumbers(self._full_power_w, self._battery.full_voltage_v, self._battery.resistance_ohm)
         self.numbers = packed(numbers)
 
     def charge_after(self, charge_ah: float, speeds: Array, duration_s: float) -> float:

@@ -69,7 +69,7 @@ class Transition(NamedTuple):
 def empty_transition(steps: int) -> Transition:
     """Return the arrays of so many steps."""
     nine, twelve = [np.zeros((3, 3, steps)) for _ in range(16)], [np.zeros((3, ROTORS, steps)) for _ in range(4)]
-    return Transition(*nine[:8], *twelve, np.zeros((ROTORS, steps)), np.zeros((3, steps)), *nine[8:])
+    return Transition._make([*nine[:8], *twelve, np.zeros((ROTORS, steps)), np.zeros((3, steps)), *nine[8:]])
 
 
 @inlined

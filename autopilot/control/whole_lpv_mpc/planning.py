@@ -101,17 +101,18 @@ def begin(
     battery: Packed,
     now: Packed,
 ) -> None:
-    """Fill where a plan begins.
+    """Fill `now`, the `Now`, where a plan begins, but for the other limits of the force.
 
     Args:
-        rigid, estimate: Of `Observed`.
+        rigid: Of `Observed`.
         speeds: Rotor speeds, parts of the largest, (4,).
-        expected: Squared speeds expected, (n, 4): their power leaves so much voltage, and the last's what is left then.
+        estimate: Of `Observed`.
+        expected: Squared speeds expected from now on, (n, 4): the power that they take limits those that can be had.
         least: Squared speed of rotors that idle.
         open_v: Voltage of the battery without load.
         max_n: Largest thrust.
         battery: `BatteryNumbers`, packed.
-        now: The `Now`; is filled, but for the other limits of the force.
+        now: Is filled.
     """
     it = now[0]
     it.rigid[:] = rigid

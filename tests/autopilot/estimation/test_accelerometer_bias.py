@@ -28,11 +28,11 @@ def fails(change: Callable[[SensorFrame, float], SensorFrame]) -> Callable[[Sens
 
 
 def felt(bias: Vector) -> Callable[[SensorFrame, float], SensorFrame]:
-    return fails(lambda frame, _: replace(frame, specific_force_flu_m_s2=plus(frame.specific_force_flu_m_s2, bias)))
+    return fails(lambda frame, _: frame._replace(specific_force_flu_m_s2=plus(frame.specific_force_flu_m_s2, bias)))
 
 
 def told(lie: GpsLie) -> Callable[[SensorFrame, float], SensorFrame]:
-    return fails(lambda frame, t: frame if frame.gps is None else replace(frame, gps=lie(frame.gps, t)))
+    return fails(lambda frame, t: frame if frame.gps is None else frame._replace(gps=lie(frame.gps, t)))
 
 
 @pytest.mark.parametrize("path", [source.circle, pytest.param(source.hover, marks=pytest.mark.long)])
@@ -98,7 +98,7 @@ def test_nor_is_one_that_is_late(late_s: float) -> None:
             return frame
         before = fixes[frame.time_us - round(late_s * 1e6)]
         assert before is not None
-        return replace(frame, gps=replace(before, time_us=frame.time_us))
+        return frame._replace(gps=replace(before, time_us=frame.time_us))
 
     of = known(estimates(flight.frames, late))
     assert of[-1].health.gps_glitch
@@ -107,7 +107,7 @@ def test_nor_is_one_that_is_late(late_s: float) -> None:
 
 def test_nor_is_a_gyroscope_that_errs() -> None:
     def turning(frame: SensorFrame, _: float) -> SensorFrame:
-        return replace(frame, rate_flu_rad_s=plus(frame.rate_flu_rad_s, (0.0, 0.06, 0.0)))
+        return frame._replace(rate_flu_rad_s=plus(frame.rate_flu_rad_s, (0.0, 0.06, 0.0)))
 
     of = known(estimates(recorded(source.hover, 6, 22.0).frames, fails(turning)))
     assert any(one.health.gps_glitch for one in of)
@@ -121,7 +121,7 @@ def test_nor_is_a_knock(knock: Vector) -> None:
     def knocked(frame: SensorFrame, t: float) -> SensorFrame:
         if t >= 1.5 * INTERVAL_US * 1e-6:
             return frame
-        return replace(frame, specific_force_flu_m_s2=plus(frame.specific_force_flu_m_s2, knock))
+        return frame._replace(specific_force_flu_m_s2=plus(frame.specific_force_flu_m_s2, knock))
 
     of = known(estimates(recorded(source.hover, 7, 19.0).frames, fails(knocked)))
     assert any(one.health.gps_glitch for one in of)

@@ -84,13 +84,13 @@ def test_it_begins_after_a_second_of_rest_with_a_fix() -> None:
 
 def test_it_does_not_begin_without_a_fix() -> None:
     frames = recorded(source.climb, 1, 3.0).frames
-    assert not known(estimates(frames, lambda frame, _: replace(frame, gps=None)))
+    assert not known(estimates(frames, lambda frame, _: frame._replace(gps=None)))
 
 
 def test_it_does_not_begin_while_it_is_shaken() -> None:
     def shaken(frame: SensorFrame, t: float) -> SensorFrame:
         x, y, z = frame.specific_force_flu_m_s2
-        return replace(frame, specific_force_flu_m_s2=(x + 2.0 * np.sin(40.0 * t), y, z)) if t < 2.0 else frame
+        return frame._replace(specific_force_flu_m_s2=(x + 2.0 * np.sin(40.0 * t), y, z)) if t < 2.0 else frame
 
     first = known(estimates(recorded(source.climb, 1, 4.0).frames, shaken))[0]
     assert first.frame.time_us > 2_900_000
@@ -99,7 +99,7 @@ def test_it_does_not_begin_while_it_is_shaken() -> None:
 def test_it_does_not_begin_while_it_is_turned() -> None:
     def turned(frame: SensorFrame, _: float) -> SensorFrame:
         p, q, r = frame.rate_flu_rad_s
-        return replace(frame, rate_flu_rad_s=(p, q, r + 0.5))
+        return frame._replace(rate_flu_rad_s=(p, q, r + 0.5))
 
     assert not known(estimates(recorded(source.climb, 1, 3.0).frames, turned))
 
@@ -167,7 +167,7 @@ def test_a_glitch_is_not_followed() -> None:
         if frame.gps is None or not 10.0 <= t < 15.0:
             return frame
         east = geodetic_of((50.0, 0.0, 0.0), frame.gps.place)
-        return replace(frame, gps=replace(frame.gps, place=east))
+        return frame._replace(gps=replace(frame.gps, place=east))
 
     flight = recorded(source.hover, 8, 20.0)
     of = estimates(flight.frames, glitch)
@@ -185,7 +185,7 @@ def test_what_gps_says_for_long_is_believed_without_a_jump() -> None:
     def elsewhere(frame: SensorFrame, t: float) -> SensorFrame:
         if frame.gps is None or t < 10.0:
             return frame
-        return replace(frame, gps=replace(frame.gps, place=geodetic_of((5.0, 0.0, 0.0), frame.gps.place)))
+        return frame._replace(gps=replace(frame.gps, place=geodetic_of((5.0, 0.0, 0.0), frame.gps.place)))
 
     of = estimates(recorded(source.hover, 8, 32.0).frames, elsewhere)
     last = of[-1]
@@ -214,7 +214,7 @@ def test_an_impossible_fix_is_counted(change: dict[str, object], reason: Reason)
     def spoilt(frame: SensorFrame, t: float) -> SensorFrame:
         if frame.gps is None or t < 3.0:
             return frame
-        return replace(frame, gps=replace(frame.gps, **change))  # type: ignore[arg-type]
+        return frame._replace(gps=replace(frame.gps, **change))  # type: ignore[arg-type]
 
     last = estimates(recorded(source.hover, 4, 5.0).frames, spoilt)[-1]
     assert last is not None
@@ -228,7 +228,7 @@ def test_an_impossible_fix_is_counted(change: dict[str, object], reason: Reason)
 def test_a_magnet_nearby_does_not_turn_it() -> None:
     def magnet(frame: SensorFrame, t: float) -> SensorFrame:
         x, y, z = frame.magnetic_field_flu_gauss
-        return replace(frame, magnetic_field_flu_gauss=(x, y + 0.3, z)) if t >= 8.0 else frame
+        return frame._replace(magnetic_field_flu_gauss=(x, y + 0.3, z)) if t >= 8.0 else frame
 
     flight = recorded(source.hover, 2, 30.0)
     of = estimates(flight.frames, magnet)
@@ -246,7 +246,7 @@ def test_a_magnet_nearby_does_not_turn_it() -> None:
 
 def test_a_barometer_that_jumps_does_not_lift_it() -> None:
     def jump(frame: SensorFrame, t: float) -> SensorFrame:
-        return replace(frame, pressure_pa=frame.pressure_pa - 300.0) if t >= 10.0 else frame
+        return frame._replace(pressure_pa=frame.pressure_pa - 300.0) if t >= 10.0 else frame
 
     flight = recorded(source.hover, 2, 25.0)
     of = estimates(flight.frames, jump)
@@ -262,7 +262,7 @@ def test_a_barometer_that_jumps_does_not_lift_it() -> None:
 
 def test_a_stuck_barometer_is_seen() -> None:
     def stuck(frame: SensorFrame, t: float) -> SensorFrame:
-        return replace(frame, pressure_pa=95000.0) if t >= 6.0 else frame
+        return frame._replace(pressure_pa=95000.0) if t >= 6.0 else frame
 
     flight = recorded(source.climb, 2, 14.0)
     of = estimates(flight.frames, stuck)
@@ -281,7 +281,7 @@ def test_a_moment_of_nonsense_from_the_inertial_sensors_is_bridged(bad: float) -
     def nonsense(frame: SensorFrame, t: float) -> SensorFrame:
         if not 12.0 <= t < 12.02:
             return frame
-        return replace(frame, rate_flu_rad_s=(bad, 0.0, 0.0), specific_force_flu_m_s2=(0.0, 0.0, bad))
+        return frame._replace(rate_flu_rad_s=(bad, 0.0, 0.0), specific_force_flu_m_s2=(0.0, 0.0, bad))
 
     flight = recorded(source.circle, 2, 20.0)
     of = estimates(flight.frames, nonsense)
@@ -291,7 +291,7 @@ def test_a_moment_of_nonsense_from_the_inertial_sensors_is_bridged(bad: float) -
 @pytest.mark.parametrize("axes", ["rate_flu_rad_s", "specific_force_flu_m_s2"])
 def test_a_frozen_inertial_sensor_is_told(axes: str) -> None:
     def frozen(frame: SensorFrame, t: float) -> SensorFrame:
-        return replace(frame, **{axes: (0.01, 0.02, 0.03)}) if t >= 5.0 else frame  # type: ignore[arg-type]
+        return frame._replace(**{axes: (0.01, 0.02, 0.03)}) if t >= 5.0 else frame  # type: ignore[arg-type]
 
     of = estimates(recorded(source.hover, 2, 7.0).frames, frozen)
     last = of[-1]
@@ -318,7 +318,7 @@ def test_repeated_and_backward_frames_change_nothing() -> None:
 
 def test_one_frame_from_far_ahead_is_a_stray() -> None:
     frames = recorded(source.circle, 6, 10.0).frames
-    of = estimates([*frames[:1000], replace(frames[1000], time_us=1 << 60), *frames[1000:]])
+    of = estimates([*frames[:1000], frames[1000]._replace(time_us=1 << 60), *frames[1000:]])
     assert of[1001] is not None
     assert all(one is not None for one in of[1000:])
 
@@ -344,7 +344,7 @@ def test_lost_frames_are_crossed() -> None:
 
 def test_a_sensor_that_has_nothing_new_is_not_measured_again() -> None:
     def everything(frame: SensorFrame, _: float) -> SensorFrame:
-        return replace(frame, updated=0x1FFF)
+        return frame._replace(updated=0x1FFF)
 
     held: list[SensorFrame] = []
     for frame in recorded(source.hover, 2, 5.0).frames:
@@ -352,8 +352,7 @@ def test_a_sensor_that_has_nothing_new_is_not_measured_again() -> None:
         field = frame if frame.has(Updated.MAGNETOMETER) else last
         pressure = frame if frame.has(Updated.BAROMETER) else last
         held.append(
-            replace(
-                frame,
+            frame._replace(
                 magnetic_field_flu_gauss=field.magnetic_field_flu_gauss,
                 pressure_pa=pressure.pressure_pa,
             )
@@ -365,7 +364,7 @@ def test_a_sensor_that_has_nothing_new_is_not_measured_again() -> None:
 
 def test_without_a_magnetometer_it_does_not_begin() -> None:
     frames = [
-        replace(frame, updated=frame.updated & ~int(Updated.MAGNETOMETER))
+        frame._replace(updated=frame.updated & ~int(Updated.MAGNETOMETER))
         for frame in recorded(source.climb, 1, 3.0).frames
     ]
     assert not known(estimates(frames))

@@ -59,7 +59,7 @@ class HostileSensors(RuleBasedStateMachine):
         lap_us = self.at // len(_FRAMES) * len(_FRAMES) * source.INTERVAL_US + self.ahead_us
         self.at += 1
         gps = frame.gps and replace(frame.gps, time_us=frame.gps.time_us + lap_us)
-        return replace(frame, time_us=frame.time_us + lap_us, gps=gps)
+        return frame._replace(time_us=frame.time_us + lap_us, gps=gps)
 
     @rule(count=st.integers(1, 100))
     def fly(self, count: int) -> None:
@@ -78,8 +78,7 @@ class HostileSensors(RuleBasedStateMachine):
         for _ in range(count):
             frame = self.next_frame()
             self.feed(
-                replace(
-                    frame,
+                frame._replace(
                     specific_force_flu_m_s2=force or frame.specific_force_flu_m_s2,
                     rate_flu_rad_s=rate or frame.rate_flu_rad_s,
                     magnetic_field_flu_gauss=field or frame.magnetic_field_flu_gauss,
@@ -91,12 +90,12 @@ class HostileSensors(RuleBasedStateMachine):
     @rule(fix=FIXES, now=st.booleans())
     def tell_any_fix(self, fix: GpsFix, now: bool) -> None:
         frame = self.next_frame()
-        self.feed(replace(frame, gps=replace(fix, time_us=frame.time_us) if now else fix))
+        self.feed(frame._replace(gps=replace(fix, time_us=frame.time_us) if now else fix))
 
     @rule(time_us=TIMES, count=st.integers(1, 40))
     def tell_any_time(self, time_us: int, count: int) -> None:
         for k in range(count):
-            self.feed(replace(_FRAMES[self.at % len(_FRAMES)], time_us=time_us + k * source.INTERVAL_US))
+            self.feed(_FRAMES[self.at % len(_FRAMES)]._replace(time_us=time_us + k * source.INTERVAL_US))
 
     @rule(frames=st.integers(1, 300))
     def lose_frames(self, frames: int) -> None:
@@ -149,6 +148,6 @@ def test_a_long_flight_in_the_dark_stays_positive() -> None:
     for _ in range(150):
         for _ in range(len(_FRAMES) // 4):
             frame = machine.next_frame()
-            machine.feed(replace(frame, updated=0x3F, gps=None))
+            machine.feed(frame._replace(updated=0x3F, gps=None))
         machine.all_is_finite()
         machine.covariance_is_positive()

@@ -1,7 +1,5 @@
 """A sudden bias of the gyroscope is found, and nothing that looks like one is taken for it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -26,14 +24,14 @@ PATHS = [source.circle, pytest.param(source.hover, marks=LONG)]
 
 def turned(bias: Vector, drift: Vector = (0.0, 0.0, 0.0)) -> Change:
     """Have the gyroscope be off by a bias, rad/s, that drifts, rad/s²."""
-    return fails(lambda frame, t: replace(frame, rate_flu_rad_s=plus(plus(frame.rate_flu_rad_s, bias), drift, t)))
+    return fails(lambda frame, t: frame._replace(rate_flu_rad_s=plus(plus(frame.rate_flu_rad_s, bias), drift, t)))
 
 
 def magnetised(iron: Vector, drift: Vector = (0.0, 0.0, 0.0)) -> Change:
     """Put a field beside the magnetometer, gauss, that grows, gauss/s."""
     return fails(
-        lambda frame, t: replace(
-            frame, magnetic_field_flu_gauss=plus(plus(frame.magnetic_field_flu_gauss, iron), drift, t)
+        lambda frame, t: frame._replace(
+            magnetic_field_flu_gauss=plus(plus(frame.magnetic_field_flu_gauss, iron), drift, t)
         )
     )
 

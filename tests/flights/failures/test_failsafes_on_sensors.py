@@ -72,7 +72,7 @@ def test_gps_that_says_zero_moves_nobody_to_zero(monkeypatch: pytest.MonkeyPatch
 
     def nowhere(frame: Frame) -> Frame:
         assert isinstance(frame, SensorFrame)
-        return frame if frame.gps is None else replace(frame, gps=replace(frame.gps, place=Geodetic(0.0, 0.0, 0.0)))
+        return frame if frame.gps is None else frame._replace(gps=replace(frame.gps, place=Geodetic(0.0, 0.0, 0.0)))
 
     between(monkeypatch, flight, nowhere)
     for _ in range(100):
@@ -87,7 +87,7 @@ def test_no_gyroscope_is_no_attitude_and_the_rotors_stop(monkeypatch: pytest.Mon
 
     def blind(frame: Frame) -> Frame:
         assert isinstance(frame, SensorFrame)
-        return replace(frame, updated=frame.updated & ~Updated.GYROSCOPE)
+        return frame._replace(updated=frame.updated & ~Updated.GYROSCOPE)
 
     between(monkeypatch, flight, blind)
     assert flight.wait_until(lambda: not flight.armed, within=2.0) == pytest.approx(0.52, abs=0.05)

@@ -55,6 +55,7 @@ def through_the_wire(frame: SensorFrame) -> SensorFrame:
         st.floats(0.0, 2e5),
         reals(100.0),
         FIXES | st.none(),
+        st.none(),
     )
 )
 def test_round_trip(frame: SensorFrame) -> None:

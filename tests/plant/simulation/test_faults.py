@@ -79,7 +79,7 @@ WELL = told()
 def without(frame: SensorFrame, unit: int) -> SensorFrame:
     """Return a frame without what a sensor tells."""
     blank: Any = {FIELDS[unit]: None if unit == GPS else 0.0, "updated": frame.updated & ~GROUPS[unit]}
-    return replace(frame, **blank)
+    return frame._replace(**blank)
 
 
 def of(frame: SensorFrame, unit: int) -> Any:

@@ -7,8 +7,8 @@ from colibri.autopilot.control.interface import Horizon, Preview
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import Qp, QpSolver
 from colibri.autopilot.control.whole_lpv_mpc import path, planning
-from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpc
 from colibri.autopilot.control.whole_lpv_mpc.deviations import DEVIATIONS, POSITION, VELOCITY
+from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpc
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
 from colibri.autopilot.control.whole_lpv_mpc.path import PathLimits, PathNow
 from colibri.autopilot.guidance.trajectories.planner import Planner
