@@ -5,12 +5,13 @@ from typing import NamedTuple, Protocol, Self, TypeVar
 import numpy as np
 
 from colibri.autopilot.control.interface import AttitudeController, AttitudeDemand, Horizon, VehicleState
-from colibri.autopilot.control.vehicle_model import disturbance_observer, rotor_lag
+from colibri.autopilot.control.vehicle_model import rotor_lag
 from colibri.autopilot.control.vehicle_model.battery import BatteryModel, charged, terminal
 from colibri.autopilot.control.vehicle_model.disturbance_observer import (
     ESTIMATES,
     MEASURED,
     ObserverSettings,
+    observe,
     observer_of,
 )
 from colibri.autopilot.control.vehicle_model.mass import MassSettings, follow_mass, mass_model
@@ -97,7 +98,7 @@ class VehicleTracker:
     def initial(self, rotor_speed: float) -> Tracked:
         """Return what is remembered of a vehicle whose rotors all turn at `rotor_speed` (its unit)."""
         speeds = np.full(4, rotor_speed / self.vehicle.rotors.max_speed)
-        wrench, estimate = matvec(self.allocation, speeds * speeds), np.zeros(disturbance_observer.ESTIMATES)
+        wrench, estimate = matvec(self.allocation, speeds * speeds), np.zeros(ESTIMATES)
         return Tracked(speeds, wrench, wrench, None, estimate, 0.0, self.vehicle.body.mass_kg)
 
     def observe(self, tracked: Tracked, state: VehicleState) -> Observed:
@@ -173,7 +174,7 @@ def look(
             rotation[i, j] = R[i][j]
     if before.shape[0] > 0:
         h = dot(momentum, speeds)
-        estimate[:] = disturbance_observer.observe(estimate_before, before, measured, mean_wrench, h, mass_kg, observer)
+        estimate[:] = observe(estimate_before, before, measured, mean_wrench, h, mass_kg, observer)
     else:
         estimate[:6], estimate[6:] = measured[:6], 0.0
     if airborne:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
-from colibri.common.jit import Packed, compiled
+from colibri.common.jit import Packed, inlined
 from colibri.common.types import Array
 
 ROTORS = 4
@@ -66,13 +66,37 @@ class Disturbance(NamedTuple):
     moment: Array
 
 
-@compiled
+class Drive(NamedTuple):
+    """What the rotors do at the beginning, the middle and the end of each step, (3, N).
+
+    Attributes:
+        thrust, roll, pitch, yaw: U1, N, and U2, U3, U4, N m.
+        momentum, spin_up: Angular momentum along body z, N m s, and its rate, N m.
+        halfway: Squared rotor speeds in the middle of each step, (N, 4).
+    """
+
+    thrust: Array
+    roll: Array
+    pitch: Array
+    yaw: Array
+    momentum: Array
+    spin_up: Array
+    halfway: Array
+
+
+def empty_drive(steps: int) -> Drive:
+    """Return the arrays of so many steps."""
+    return Drive._make([*(np.zeros((3, steps)) for _ in range(6)), np.zeros((steps, ROTORS))])
+
+
+@inlined
 def roll_out(
     rigid: Array,
     squared: Array,
     commands: Array,
     disturbance: Disturbance,
     packed: Packed,
+    drive: Drive,
     motion: Array,
     speeds: Array,
 ) -> None:
@@ -84,32 +108,35 @@ def roll_out(
         commands: Squared speeds commanded at each step, (N, 4).
         disturbance: On the vehicle.
         packed: The `Model`.
+        drive: Is filled.
         motion: Is filled with the state now and after each step, (N + 1, 13).
         speeds: Is filled with the squared rotor speeds at the same times, (N + 1, 4).
     """
     model = packed[0]
     lag, h = model.lag, model.interval_s
-    half, after = np.empty(ROTORS), np.empty(ROTORS)
-    k1, k2, k3, k4, at = np.empty(RIGID), np.empty(RIGID), np.empty(RIGID), np.empty(RIGID), np.empty(RIGID)
     motion[0] = rigid
     speeds[0] = squared
     for step in range(commands.shape[0]):
-        x, before, command = motion[step], speeds[step], commands[step]
         for i in range(ROTORS):
-            away = before[i] - command[i]
-            half[i] = command[i] + away * lag.left_half
-            after[i] = command[i] + away * lag.left
-        begin = after if lag.rate_1_s == 0.0 else before
-        _write_rates(x, begin, command, disturbance, model, k1)
+            away = speeds[step, i] - commands[step, i]
+            drive.halfway[step, i] = commands[step, i] + away * lag.left_half
+            speeds[step + 1, i] = commands[step, i] + away * lag.left
+    _turn(speeds[1:] if lag.rate_1_s == 0.0 else speeds[:-1], commands, model, 0, drive)
+    _turn(drive.halfway, commands, model, 1, drive)
+    _turn(speeds[1:], commands, model, 2, drive)
+    k1, k2, k3, k4, at = np.empty(RIGID), np.empty(RIGID), np.empty(RIGID), np.empty(RIGID), np.empty(RIGID)
+    for step in range(commands.shape[0]):
+        x = motion[step]
+        _write_rates(x, drive, 0, step, disturbance, model, k1)
         for i in range(RIGID):
             at[i] = x[i] + 0.5 * h * k1[i]
-        _write_rates(at, half, command, disturbance, model, k2)
+        _write_rates(at, drive, 1, step, disturbance, model, k2)
         for i in range(RIGID):
             at[i] = x[i] + 0.5 * h * k2[i]
-        _write_rates(at, half, command, disturbance, model, k3)
+        _write_rates(at, drive, 1, step, disturbance, model, k3)
         for i in range(RIGID):
             at[i] = x[i] + h * k3[i]
-        _write_rates(at, after, command, disturbance, model, k4)
+        _write_rates(at, drive, 2, step, disturbance, model, k4)
         to = motion[step + 1]
         for i in range(RIGID):
             to[i] = x[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
@@ -117,26 +144,35 @@ def roll_out(
         length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
         for i in range(4):
             q[i] /= length
-        speeds[step + 1] = after
 
 
-@compiled
+@inlined
+def _turn(squared: Array, commands: Array, model: Model, part: int, out: Drive) -> None:
+    """Fill what rotors do that turn at `squared` in a part of each step, (N, 4), and are commanded to `commands`."""
+    allocation, rate_1_s = model.allocation, model.lag.rate_1_s
+    for n in range(commands.shape[0]):
+        thrust, roll, pitch, yaw = 0.0, 0.0, 0.0, 0.0
+        momentum, spin_up = 0.0, 0.0
+        for i in range(ROTORS):
+            s = max(squared[n, i], 0.0)
+            speed = max(sqrt(s), LEAST_SPEED)
+            thrust += allocation[0, i] * s
+            roll += allocation[1, i] * s
+            pitch += allocation[2, i] * s
+            yaw += allocation[3, i] * s
+            momentum += model.momentum[i] * speed
+            spin_up += model.momentum[i] * 0.5 * (commands[n, i] - s) * rate_1_s / speed
+        out.thrust[part, n], out.roll[part, n], out.pitch[part, n], out.yaw[part, n] = thrust, roll, pitch, yaw
+        out.momentum[part, n], out.spin_up[part, n] = momentum, spin_up
+
+
+@inlined
 def _write_rates(
-    x: Array, squared: Array, command: Array, disturbance: Disturbance, model: Model, rates: Array
+    x: Array, drive: Drive, part: int, n: int, disturbance: Disturbance, model: Model, rates: Array
 ) -> None:
-    """Write dx/dt of the rigid body, (13,), whose rotors, (4,), turn at `squared` and are commanded to `command`."""
-    airframe, inertia, allocation = model.airframe, model.inertia, model.allocation
-    thrust, roll, pitch, yaw = 0.0, 0.0, 0.0, 0.0
-    momentum, spin_up = 0.0, 0.0
-    for i in range(ROTORS):
-        s = max(squared[i], 0.0)
-        speed = max(sqrt(s), LEAST_SPEED)
-        thrust += allocation[0, i] * s
-        roll += allocation[1, i] * s
-        pitch += allocation[2, i] * s
-        yaw += allocation[3, i] * s
-        momentum += model.momentum[i] * speed
-        spin_up += model.momentum[i] * 0.5 * (command[i] - s) * model.lag.rate_1_s / speed
+    """Write dx/dt of the rigid body, (13,), in a part of step n."""
+    airframe, inertia = model.airframe, model.inertia
+    thrust, momentum = drive.thrust[part, n], drive.momentum[part, n]
     qw, qx, qy, qz = x[6], x[7], x[8], x[9]
     p, q, r = x[10], x[11], x[12]
     up = (2.0 * (qx * qz + qw * qy), 2.0 * (qy * qz - qw * qx), 1.0 - 2.0 * (qx * qx + qy * qy))
@@ -150,6 +186,6 @@ def _write_rates(
     rates[8] = 0.5 * (qw * q + qz * p - qx * r)
     rates[9] = 0.5 * (qw * r + qx * q - qy * p)
     ix, iy, iz = inertia[0], inertia[1], inertia[2]
-    rates[10] = (roll + disturbance.moment[0] + (iy - iz) * q * r - momentum * q) / ix
-    rates[11] = (pitch + disturbance.moment[1] + (iz - ix) * p * r + momentum * p) / iy
-    rates[12] = (yaw + disturbance.moment[2] + (ix - iy) * p * q - spin_up) / iz
+    rates[10] = (drive.roll[part, n] + disturbance.moment[0] + (iy - iz) * q * r - momentum * q) / ix
+    rates[11] = (drive.pitch[part, n] + disturbance.moment[1] + (iz - ix) * p * r + momentum * p) / iy
+    rates[12] = (drive.yaw[part, n] + disturbance.moment[2] + (ix - iy) * p * q - drive.spin_up[part, n]) / iz

@@ -120,6 +120,7 @@ class WholeMpc:
             np.empty((blocks + 1, ROTORS)),
             np.empty((n + 1, model.RIGID)),
             np.empty((n + 1, ROTORS)),
+            model.empty_drive(n),
             deviations.empty_transition(n),
             np.empty(0),
             means,

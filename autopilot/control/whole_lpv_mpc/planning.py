@@ -24,7 +24,7 @@ from colibri.autopilot.control.whole_lpv_mpc.condensing import (
 )
 from colibri.autopilot.control.whole_lpv_mpc.deviations import Transition, respond
 from colibri.autopilot.control.whole_lpv_mpc.feed_forward import lead
-from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance, roll_out
+from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance, Drive, roll_out
 from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
 from colibri.common.jit import Packed, compiled, inlined
 from colibri.common.types import Array
@@ -58,6 +58,7 @@ class Workspace(NamedTuple):
         commands: Of the references, within the limits, (N, 4).
         corrections: Nominal, of what flew last and of each block, (b + 1, 4).
         motion, speeds: Nominal, (N + 1, 13) and (N + 1, 4).
+        drive: Of the nominal motion.
         transition: Of the deviations.
         responses: (N + 1, 12, 4 b).
         means, levels: Of `deviations.respond`, (b, N) and (b, N + 1).
@@ -67,6 +68,7 @@ class Workspace(NamedTuple):
     corrections: Array
     motion: Array
     speeds: Array
+    drive: Drive
     transition: Transition
     responses: Array
     means: Array
@@ -172,7 +174,7 @@ def _expect(now: Now, target: Target, last: Array, vehicle: Packed, kind: Kind) 
     bound(commands, now.limits, corrections[1:], starts, qp.lower, qp.upper)
     nominal = np.empty_like(commands)
     _correct(commands, corrections[1:], starts, nominal)
-    roll_out(now.rigid, now.squared, nominal, now.disturbance, vehicle, work.motion, work.speeds)
+    roll_out(now.rigid, now.squared, nominal, now.disturbance, vehicle, work.drive, work.motion, work.speeds)
     respond(work.motion, work.speeds, work.means, work.levels, vehicle, work.transition, work.responses)
 
 

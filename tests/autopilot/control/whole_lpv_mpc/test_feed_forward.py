@@ -63,7 +63,8 @@ def test_what_a_circle_asks_for_flies_the_circle(disturbance: Disturbance) -> No
     rate = 2.0 * asked.rates[0] - asked.rates[1]
     rigid = np.concatenate([p[0], v[0], quaternion_from_euler(phi, theta, psi), rate])
     motion, speeds = np.empty((STEPS + 1, RIGID)), np.empty((STEPS + 1, ROTORS))
-    model.roll_out(rigid, asked.squared[0], commands, disturbance, PACKED, motion, speeds)
+    drive = model.empty_drive(STEPS)
+    model.roll_out(rigid, asked.squared[0], commands, disturbance, PACKED, drive, motion, speeds)
     assert np.abs(motion[:, :3] - p[:-1]).max() < 2e-3
     assert np.abs(motion[:, 3:6] - v[:-1]).max() < 0.03
     assert np.abs(motion[1:, 10:] - asked.rates).max() < 0.05

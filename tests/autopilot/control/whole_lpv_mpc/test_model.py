@@ -36,7 +36,8 @@ def start(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def rolled(vehicle: Vehicle, rigid: np.ndarray, squared: np.ndarray, commands: np.ndarray) -> tuple[np.ndarray, ...]:
     motion, speeds = np.empty((STEPS + 1, RIGID)), np.empty((STEPS + 1, ROTORS))
-    model.roll_out(rigid, squared, commands, CALM, packed(model_of(vehicle, INTERVAL_S)), motion, speeds)
+    numbers, drive = packed(model_of(vehicle, INTERVAL_S)), model.empty_drive(STEPS)
+    model.roll_out(rigid, squared, commands, CALM, numbers, drive, motion, speeds)
     return motion, speeds
 
 
