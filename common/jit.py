@@ -1,6 +1,7 @@
 """Numerical kernels: how they are compiled."""
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any, Literal, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
@@ -82,12 +83,18 @@ def _layout(parameters: Any) -> np.dtype[np.void]:
     formats, offsets, end = [], [], 0
     for value in parameters:
         part = _layout(value) if hasattr(value, "_fields") else np.dtype(getattr(value, "dtype", np.float64))
-        whole = np.dtype((part, np.shape(value))) if part.names is None else part
+        whole = part if part.names else np.dtype((part, np.shape(value)))
         unit = _LINE if whole.itemsize >= _LINE else part.alignment
         offsets.append(-(-end // unit) * unit)
         formats.append(whole)
         end = offsets[-1] + whole.itemsize
-    return np.dtype({"names": parameters._fields, "formats": formats, "offsets": offsets, "itemsize": -(-end // 8) * 8})
+    return _one_of_its_kind(np.dtype({"names": parameters._fields, "formats": formats, "offsets": offsets}))
+
+
+@cache
+def _one_of_its_kind(layout: np.dtype[np.void]) -> np.dtype[np.void]:
+    """Return the first type that equals this: a kernel takes three times as long to recognise another."""
+    return layout
 
 
 def on_compile(report: Callable[[int], None]) -> None:

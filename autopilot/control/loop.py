@@ -251,9 +251,9 @@ class ControlLoop:
         return LawError(f"controller {self._name} raised at t = {time_us / 1e6:.3f} s: {in_words(error)}")
 
     def _command(self, rotor_speeds: Array, time_us: int | None = None) -> None:
-        check_rotor_speeds(self._name, rotor_speeds, self.vehicle.rotors.max_speed, time_us)
-        c1, c2, c3, c4 = (rotor_speeds / self.vehicle.rotors.max_speed).tolist()
-        self.controls = (c1, c2, c3, c4)
+        maximum = self.vehicle.rotors.max_speed
+        a, b, c, d = check_rotor_speeds(self._name, rotor_speeds, maximum, time_us)
+        self.controls = (a / maximum, b / maximum, c / maximum, d / maximum)
 
 
 def _frame_interval_us(profile: Profile, control_interval_us: int) -> int:

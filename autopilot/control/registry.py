@@ -15,7 +15,7 @@ import numpy as np
 from colibri.autopilot.control.interface import Clock, Controller, Decision
 from colibri.autopilot.errors import AutopilotError
 from colibri.common.errors import Error, ForeignError, InFlightError
-from colibri.common.types import Array
+from colibri.common.types import Array, FourRotors
 from colibri.plant.vehicle.description import Vehicle
 
 GROUP = "colibri.controllers"
@@ -149,15 +149,18 @@ def check_answer(name: str, answer: object, time_us: int) -> None:
     )
 
 
-def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float, time_us: int | None = None) -> None:
-    """Check that rotors can follow a decision, of the simulated time `time_us` if it is of a flight.
+def check_rotor_speeds(name: str, rotor_speeds: Array, max_speed: float, time_us: int | None = None) -> FourRotors:
+    """Return the rotor speeds of a decision, of the simulated time `time_us` if it is of a flight.
 
     Raises:
-        DecisionError: They cannot.
+        DecisionError: Rotors cannot follow it.
     """
     speeds = np.asarray(rotor_speeds).tolist()
-    if not isinstance(speeds, list) or len(speeds) != 4 or not all(0.0 <= speed <= max_speed for speed in speeds):
-        when = "" if time_us is None else f" at t = {time_us / 1e6:.3f} s"
-        raise DecisionError(
-            f"controller {name} gave rotor speeds {rotor_speeds}{when}: expected four from 0 to {max_speed:g}"
-        )
+    if isinstance(speeds, list) and len(speeds) == 4:
+        a, b, c, d = speeds
+        if 0.0 <= a <= max_speed and 0.0 <= b <= max_speed and 0.0 <= c <= max_speed and 0.0 <= d <= max_speed:
+            return (a, b, c, d)
+    when = "" if time_us is None else f" at t = {time_us / 1e6:.3f} s"
+    raise DecisionError(
+        f"controller {name} gave rotor speeds {rotor_speeds}{when}: expected four from 0 to {max_speed:g}"
+    )

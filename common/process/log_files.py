@@ -81,14 +81,12 @@ class BlockLog(LogFile, ABC, Generic[_Record]):
             LogError: They cannot be written.
         """
         self._waiting.append(record)
-        self._flush_block()
+        if len(self._waiting) >= self.BLOCK:
+            self.flush()
 
     def extend(self, records: Iterable[_Record]) -> None:
         """Append records as `add` does."""
-        self._waiting.extend(records)
-        self._flush_block()
-
-    def _flush_block(self) -> None:
+        self._waiting += records
         if len(self._waiting) >= self.BLOCK:
             self.flush()
 

@@ -3,10 +3,9 @@
 Anything that a receiver could not fly on (not finite, out of range, halves of different frames) decodes to None.
 """
 
-from math import isfinite
+from math import isfinite, sqrt
 from typing import NamedTuple
 
-from colibri.common.rotations import normalized
 from colibri.common.types import FourRotors, Quaternion, Vector
 from colibri.mavlink.wire.dialect import MODE_ARMED, MODE_CUSTOM, MODE_HIL, Codec, Message
 from colibri.mavlink.wire.fixed_frames import FixedFrame
@@ -90,14 +89,15 @@ def _state(
 ) -> StateFrame | None:
     """Return the frame of the fields of both messages; single floats all, whose sum is finite if each of them is."""
     all_finite = isfinite(rollspeed + pitchspeed + yawspeed + x + y + z + vx + vy + vz)
-    is_unit = abs(q1 * q1 + q2 * q2 + q3 * q3 + q4 * q4 - 1.0) < _UNIT_NORM_TOLERANCE
-    if attitude_ms != position_ms or not all_finite or not is_unit:
+    squared = q1 * q1 + q2 * q2 + q3 * q3 + q4 * q4
+    if attitude_ms != position_ms or not all_finite or not abs(squared - 1.0) < _UNIT_NORM_TOLERANCE:
         return None
+    norm = sqrt(squared)
     return StateFrame(
         attitude_ms * 1000,
         ned_from_enu((x, y, z)),
         ned_from_enu((vx, vy, vz)),
-        ned_frd_from_enu_flu(normalized((q1, q2, q3, q4))),
+        ned_frd_from_enu_flu((q1 / norm, q2 / norm, q3 / norm, q4 / norm)),
         frd_from_flu((rollspeed, pitchspeed, yawspeed)),
     )
 

@@ -1,6 +1,7 @@
 """Two ways to go on by a frame: fixed-step Runge-Kutta 4, and adaptive Dormand-Prince 5(4), over one compiled f(x)."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from math import ceil, sqrt
 from typing import Literal, TypeAlias
 
@@ -42,8 +43,12 @@ _TOO_SMALL = 1e-14
 
 def fixed_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:
     """Integrate by Runge-Kutta 4 in equal steps of at most `RK4_STEP_S`."""
-    steps = max(1, ceil(duration_s / RK4_STEP_S - _ROUNDING))
-    return runge_kutta_4(x, target, parameters, duration_s, steps)
+    return runge_kutta_4(x, target, parameters, duration_s, _steps(duration_s))
+
+
+@lru_cache(maxsize=64)
+def _steps(duration_s: float) -> int:
+    return max(1, ceil(duration_s / RK4_STEP_S - _ROUNDING))
 
 
 def adaptive_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:

@@ -176,6 +176,6 @@ class Physics:
 
 def state_frame(world: World) -> StateFrame:
     """Return the frame of state feedback of a world."""
-    u, v, w, p, q, r, x, y, z = world.state[:9]
-    attitude = attitude_of(world.state)
+    u, v, w, p, q, r, x, y, z, qw, qx, qy, qz = world.state
+    attitude = (qw, qx, qy, qz)
     return StateFrame(world.time_us, (x, y, z), earth_from_body(attitude, (u, v, w)), attitude, (p, q, r))

@@ -36,15 +36,13 @@ class PlantLogs:
 
     def write_traffic(self, time_us: int, received: list[bytes], sent: list[Outgoing]) -> None:
         """Append what was received and sent at simulated time `time_us`."""
-        frames = received.copy()
         for outgoing in sent:
-            frames += outgoing.frames
-        self.write_frames(time_us, frames)
+            received = [*received, *outgoing.frames]
+        self.write_frames(time_us, received)
 
     def write_frames(self, time_us: int, frames: list[bytes]) -> None:
         """Append frames of simulated time `time_us`."""
-        if frames:
-            self._tlog.write(self._boot_unix_us + time_us, frames)
+        self._tlog.write(self._boot_unix_us + time_us, frames)
 
     def flush(self) -> None:
         """Write what waits.

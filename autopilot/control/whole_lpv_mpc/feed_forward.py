@@ -68,18 +68,28 @@ class Flat(NamedTuple):
 
 @compiled
 def follow(
-    now: Packed, references: tuple[Array, Array, Array, Array], law: Packed, vehicle: Packed, out: Packed
+    now: Packed,
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+    yaw_rad: Array,
+    law: Packed,
+    vehicle: Packed,
+    out: Packed,
 ) -> Array:
     """Fill what follows references at their times; return the force, N, ENU, (3,), along which thrust must point now.
 
     Args:
         now: The vehicle, `planning.Now`.
-        references: Of position, velocity and acceleration, ENU, (n, 3) each, and of yaw, rad, (n,).
+        position: Of the references, as all that follows, ENU, (n, 3).
+        velocity: ENU, (n, 3).
+        acceleration: ENU, (n, 3).
+        yaw_rad: (n,).
         law: The `Guidance`.
         vehicle: The `Model`.
         out: The `Target`; is filled, but for thrusts.
     """
-    p, v, a, yaw = before_jump(references, law[0].interval_s)
+    p, v, a, yaw = before_jump((position, velocity, acceleration, yaw_rad), law[0].interval_s)
     rigid, disturbance, limits, target = now[0].rigid, now[0].disturbance, now[0].force, out[0]
     near = (target.position, target.velocity, target.acceleration)
     target.yaw_rad[:] = yaw

@@ -1,7 +1,7 @@
 """The whole-vehicle LPV-MPC as a control law: references, observers, battery and fallbacks about one plan."""
 
 from collections.abc import Mapping
-from math import ceil, radians
+from math import ceil, nan, radians
 from typing import Annotated, Any, NamedTuple
 
 import msgspec
@@ -258,9 +258,8 @@ class WholeLpvMpc(TrackingLaw[Memory]):
             -asin(min(max(R[2, 0], -1.0), 1.0)),
             nearest_turn(float(wanted.target.yaw_rad[0]), inputs.psi),
         )
-        how = diagnostics._replace(mass_kg=observed.mass_kg)
-        if wanted.path:
-            how = how._replace(path_lag_s=memory.lag_us * 1e-6)
+        path_lag_s = memory.lag_us * 1e-6 if wanted.path else nan
+        how = diagnostics._replace(mass_kg=observed.mass_kg, path_lag_s=path_lag_s)
         return Memory(after, plan, age, lag_us), Decision(commands, angles, how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:

@@ -54,8 +54,8 @@ class TargetBuilder:
     def on_clock(self, now: Packed, references: Horizon) -> Wanted:
         """Return what follows references at their times, until that of the next is asked for; `now` is the `Now`."""
         n = self._samples
-        near = (references[0][:n], references[1][:n], references[2][:n], references[5][:n])
-        force = feed_forward.follow(now, near, self._law, self._mpc.model, self._record)
+        p, v, a, yaw = references[0][:n], references[1][:n], references[2][:n], references[5][:n]
+        force = feed_forward.follow(now, p, v, a, yaw, self._law, self._mpc.model, self._record)
         return Wanted(self._target, self._record, force)
 
     def on_path(self, now: Now, references: Horizon, last: Array | None, lag_s: float) -> Wanted:

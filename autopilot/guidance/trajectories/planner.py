@@ -48,7 +48,7 @@ class Planner:
         if block != self._block:
             self._block, self.table = block, self._tabulate(block)
         ahead = slice(first, first + self.preview.samples)
-        return Horizon(*(column[ahead] for column in self.table))
+        return Horizon._make([column[ahead] for column in self.table])
 
     def horizon_at(self, time_us: int, grid_us: int) -> Horizon:
         """Return the same for a time between two instants that are `grid_us` apart: each reference carried on."""
