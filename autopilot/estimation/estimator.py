@@ -288,6 +288,7 @@ class Estimator:
         ahead = len(buffer.waiting)
         look_ahead(filter_.x, filter_.P, buffer.samples, buffer.first, ahead, self._gravity, self._now)
         e, n, u, ve, vn, vu, qw, qx, qy, qz, *sigma = self._now.tolist()
+        se, sn, su, sve, svn, svu, roll, pitch, yaw = sigma
         if not isfinite(sum(sigma) + e + n + u + qw) or not abs(ve) + abs(vn) + abs(vu) < _MAX_SPEED_M_S:
             self._restart()
             return None
@@ -297,7 +298,6 @@ class Estimator:
         self._output_smoothing.give_in(since_us * 1e-6)
         bx, by, bz, ax, ay, az = filter_.x[10:16].tolist()
         p, q, r = self._reading.rate if self._reading.rate_good else (bx, by, bz)
-        position, velocity, attitude = sigma[:3], sigma[3:6], sigma[6:9]
         if self._tests is None:
             self._tests, self._resets = filter_.tests, filter_.resets
         self._estimate = Estimate(
@@ -308,9 +308,9 @@ class Estimator:
                 (qw, qx, qy, qz),
                 (p - bx, q - by, r - bz),
             ),
-            (position[0], position[1], position[2]),
-            (velocity[0], velocity[1], velocity[2]),
-            (attitude[0], attitude[1], attitude[2]),
+            (se, sn, su),
+            (sve, svn, svu),
+            (roll, pitch, yaw),
             (bx, by, bz),
             (ax, ay, az),
             self._health(now_us, sigma),

@@ -72,6 +72,7 @@ class SensorFaults:
         rows = [] if parts is None else [row for row in ROWS if is_fitted(row, parts)]
         self._readings = {row.unit: (row, Reading(row, chances[row.unit])) for row in rows}
         self.units = frozenset(self._readings)
+        self._own = [row.field for row in rows if not row.group]
         self._reported: SensorFrame | None = None
         self._last: dict[str, Any] = {}
         self._any = False
@@ -87,9 +88,9 @@ class SensorFaults:
         """Return the frame that is sent for a frame; each is the next one."""
         reported = self._changed(frame, self._reported or frame) if self._any else frame
         self._reported = reported
-        for row, _ in self._readings.values():
-            if not row.group and (value := getattr(reported, row.field)) is not None:
-                self._last[row.field] = value
+        for field in self._own:
+            if (value := getattr(reported, field)) is not None:
+                self._last[field] = value
         return reported
 
     def _changed(self, frame: SensorFrame, before: SensorFrame) -> SensorFrame:
