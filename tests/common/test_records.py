@@ -1,0 +1,78 @@
+"""Records: named tuples of numbers, arrays and further named tuples, as kernels take them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.common.jit import compiled, inlined, opened, packed
+
+LINE = 64
+
+
+class Inner(NamedTuple):
+    weight: float
+    rows: np.ndarray
+    counts: np.ndarray
+
+
+class Outer(NamedTuple):
+    first: float
+    inner: Inner
+    few: np.ndarray
+    many: np.ndarray
+
+
+def outer() -> Outer:
+    return Outer(0.5, Inner(2.0, np.arange(30.0).reshape(5, 6), np.arange(9)), np.array([1.0, 2.0]), np.arange(100.0))
+
+
+def test_a_record_has_the_numbers_that_were_packed_in_memory_of_its_own() -> None:
+    given = outer()
+    record = packed(given)
+    it = opened(record, Outer)
+    given.many[:] = 0.0
+    assert it.first == 0.5
+    assert it.few.tolist() == [1.0, 2.0]
+    assert it.many.tolist() == list(range(100))
+    inner = Inner(*it.inner)
+    assert inner.rows.tolist() == given.inner.rows.tolist()
+    assert inner.counts.dtype == np.int64
+    it.many[3], inner.rows[1, 2] = -1.0, -2.0
+    assert record["many"][0, 3] == -1.0
+    assert record["inner"]["rows"][0, 1, 2] == -2.0
+
+
+def test_large_arrays_begin_with_a_line_of_the_cache() -> None:
+    for _ in range(5):
+        it = opened(packed(outer()), Outer)
+        assert it.many.ctypes.data % LINE == 0
+        assert Inner(*it.inner).rows.ctypes.data % LINE == 0
+
+
+def test_records_of_one_kind_have_one_type() -> None:
+    """Kernels tell types by identity, or slowly."""
+    one, other = packed(outer()), packed(outer())
+    assert one.dtype is other.dtype
+    assert one.dtype is not packed(outer()._replace(few=np.zeros(3))).dtype
+
+
+@inlined
+def _double(values: np.ndarray) -> None:
+    for i in range(values.shape[0]):
+        values[i] *= 2.0
+
+
+@compiled
+def _total(record: np.ndarray) -> float:
+    it = record[0]
+    _double(it.many)
+    total: float = it.first + it.inner.weight * it.inner.rows[4, 5]
+    for value in it.many:
+        total += value
+    return total
+
+
+def test_a_kernel_reads_and_writes_a_record_and_so_does_what_is_a_part_of_it() -> None:
+    record = packed(outer())
+    assert _total(record) == 0.5 + 2.0 * 29.0 + 2.0 * sum(range(100))
+    assert opened(record, Outer).many[7] == 14.0
