@@ -36,12 +36,14 @@ def watch(
     Such a vehicle sinks where its thrust carries half of it, and would fall faster and faster: the ground holds one
     whose climb does not change.
     """
+    if not sinks:
+        return Landing(), False
     climb_m_s = state.velocity_enu_m_s[2]
     if drifts:
         still, for_us = abs(climb_m_s - landing.climb_m_s) < _STILL_M_S, _DRIFTING_FOR_US
     else:
         still, for_us = max(map(abs, state.velocity_enu_m_s)) < _STILL_M_S, _FOR_US
-    if not sinks or max(map(abs, state.rate_flu_rad_s)) >= _LEVEL_RAD_S:
+    if max(map(abs, state.rate_flu_rad_s)) >= _LEVEL_RAD_S:
         return Landing(), False
     if landing.since_us is None or not still:
         return (Landing(now_us, climb_m_s) if still or drifts else Landing()), False

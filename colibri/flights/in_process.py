@@ -56,12 +56,13 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None] = unseen) ->
     exchange: Exchange = Direct(autopilot)
     if plan.link == "memory":
         exchange = InMemory(autopilot, interval_us, plan.feedback, plant_logs)
+    end_us, is_paced = plan.duration_s * 1e6, isfinite(plan.speed)
     try:
         plant_logs.write_world(plant.world)
         with gc_frozen():
             began_s = perf_counter()
-            while plant.world.time_us + interval_us <= plan.duration_s * 1e6:
-                if isfinite(plan.speed):
+            while plant.world.time_us + interval_us <= end_us:
+                if is_paced:
                     sleep(max(0.0, began_s + plant.world.time_us / 1e6 / plan.speed - perf_counter()))
                 step, command = exchange(plant)
                 plant.answer(command)

@@ -350,18 +350,22 @@ def limit_motion(motion: Array, responses: Array, problem: Problem, G: Array, h:
         count += MOTION_ROWS
 
 
-@compiled
+@inlined
 def read_plan(motion: Array, speeds: Array, responses: Array, z: Array, levels: Array, psi: float) -> Array:
     """Return the states that z, (4 b,), leads to, (N + 1, 16), see `PREDICTED`; psi is unwrapped from `psi` on."""
     steps, inputs = motion.shape[0], responses.shape[2] // levels.shape[0]
     states, change = np.empty((steps, PREDICTED)), np.empty(DEVIATIONS)
     for step in range(steps):
         x, X, state = motion[step], responses[step], states[step]
-        change[:] = 0.0
-        for block in range(levels.shape[0]):
-            for k in range(inputs * block, inputs * block + ROTORS):
-                for i in range(DEVIATIONS):  # twelve sums side by side: none waits for another
-                    change[i] += X[i, k] * z[k]
+        for part in range(0, DEVIATIONS, 4):
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            for block in range(levels.shape[0]):
+                for k in range(inputs * block, inputs * block + ROTORS):  # four sums: none waits for another
+                    a += X[part, k] * z[k]
+                    b += X[part + 1, k] * z[k]
+                    c += X[part + 2, k] * z[k]
+                    d += X[part + 3, k] * z[k]
+            change[part], change[part + 1], change[part + 2], change[part + 3] = a, b, c, d
         for i in range(6):
             state[i] = x[i] + change[i]
         a, b, c = 0.5 * change[ROTATION], 0.5 * change[ROTATION + 1], 0.5 * change[ROTATION + 2]
