@@ -7,7 +7,7 @@ import numpy as np
 
 from colibri.autopilot.estimation.eskf_predict import SAMPLE
 from colibri.autopilot.estimation.measurements.instrument import Value
-from colibri.autopilot.estimation.sensing.inertial import Reading, write_sample
+from colibri.autopilot.estimation.sensing.inertial import Reading, sample_between
 from colibri.common.types import Array
 
 _BRIDGED_S = 0.1
@@ -42,10 +42,10 @@ class DelayBuffer:
 
     def put(self, before: Reading, after: Reading, interval_s: float, measured: Waiting) -> None:
         """Add the sample between two readings, and what was measured at its end."""
-        bridged = interval_s <= _BRIDGED_S
-        blind = not (bridged and before[2] and after[2]), not (bridged and before[3] and after[3])
+        if interval_s > _BRIDGED_S:
+            before = before._replace(force_good=False, rate_good=False)
         last = (self.first + len(self.waiting)) % len(self.samples)
-        write_sample(self.samples[last], interval_s, before[:2], after[:2], blind)
+        self.samples[last] = sample_between(before, after, interval_s)
         self.waiting.append(measured)
 
     def take(self) -> Waiting:

@@ -5,10 +5,12 @@ from typing import NamedTuple
 
 from colibri.autopilot.estimation.sensing.plausibility import Watch
 from colibri.autopilot.estimation.sensing.rejection import Rejected, Source
-from colibri.common.jit import compiled
-from colibri.common.types import Array, Vector
+from colibri.common.types import Vector
 from colibri.mavlink.hil.sensors import SensorFrame, Updated
 from colibri.plant.vehicle.sensors import Sensors
+
+Sample = tuple[float, ...]
+"""`eskf_predict.SAMPLE`: interval, mean specific force, mean rate, and whether either is unknown."""
 
 _BEYOND_RANGE = 1.01
 """The bits of the wire and of a converter may lie a little above the range."""
@@ -63,21 +65,18 @@ class Inertial:
         return Reading(self._force.value, self._rate.value, force_good, rate_good)
 
 
-@compiled
-def write_sample(
-    sample: Array,
-    interval_s: float,
-    before: tuple[Vector, Vector],
-    now: tuple[Vector, Vector],
-    blind: tuple[bool, bool],
-) -> None:
-    """Write the sample from one frame to the next, `eskf_predict.SAMPLE`, by the trapezoidal rule.
-
-    `before` and `now` are force and rate; each of them may be `blind` in between.
-    """
-    (ax, ay, az), (ap, aq, ar) = before
-    (bx, by, bz), (bp, bq, br) = now
-    sample[0] = interval_s
-    sample[1], sample[2], sample[3] = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz)
-    sample[4], sample[5], sample[6] = 0.5 * (ap + bp), 0.5 * (aq + bq), 0.5 * (ar + br)
-    sample[7], sample[8] = 1.0 if blind[0] else 0.0, 1.0 if blind[1] else 0.0
+def sample_between(before: Reading, now: Reading, interval_s: float) -> Sample:
+    """Return the sample from one frame to the next, by the trapezoidal rule."""
+    (ax, ay, az), (bx, by, bz) = before.force, now.force
+    (ap, aq, ar), (bp, bq, br) = before.rate, now.rate
+    return (
+        interval_s,
+        0.5 * (ax + bx),
+        0.5 * (ay + by),
+        0.5 * (az + bz),
+        0.5 * (ap + bp),
+        0.5 * (aq + bq),
+        0.5 * (ar + br),
+        0.0 if before.force_good and now.force_good else 1.0,
+        0.0 if before.rate_good and now.rate_good else 1.0,
+    )
