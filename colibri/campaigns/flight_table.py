@@ -154,7 +154,10 @@ def wilson(lost: int, of: int) -> tuple[float, float]:
     share, z2 = lost / of, _NORMAL_95**2
     middle = (share + z2 / (2 * of)) / (1.0 + z2 / of)
     half = _NORMAL_95 * sqrt(share * (1.0 - share) / of + z2 / (4.0 * of * of)) / (1.0 + z2 / of)
-    return max(0.0, middle - half), min(1.0, middle + half)
+    return (
+        middle - half if lost else 0.0,
+        middle + half if lost < of else 1.0,
+    )  # to the last bit where it is none or all
 
 
 def is_number(value: Any) -> bool:
