@@ -48,5 +48,8 @@ if TYPE_CHECKING:
     from colibri.plant import vehicle_names as vehicle_names
     from colibri.sitl import Sitl as Sitl
     from colibri.sitl import SitlError as SitlError
+    from colibri.tuning import TuningError as TuningError
+    from colibri.tuning import TuningResults as TuningResults
+    from colibri.tuning import tune as tune
 else:
     __getattr__, __dir__ = public(__name__)

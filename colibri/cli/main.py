@@ -31,6 +31,7 @@ SUBCOMMANDS = {
     "figures": "fly all that the thesis shows and draw its figures",
     "compare": "fly several controllers on several tracks, side by side",
     "campaign": "fly every combination of factors, by many seeds, into one table",
+    "tune": "find better numbers of a profile, and what they are worth on seeds never seen",
     "study": "fly what shows how far profile flight reaches, and draw it",
     "check-controller": "try on a control law of your own what every one must satisfy",
     "certify": "prove what can be proven of a profile's attitude law",

@@ -1,0 +1,127 @@
+"""`colibri tune`: its options, its call, how far it is, and what came of it."""
+
+from argparse import SUPPRESS, Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from colibri.cli.shared.options import add_out
+from colibri.common.errors import Error
+from colibri.common.process.arguments import ArgumentParser
+from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_INTERRUPTED, fail, loading
+
+if TYPE_CHECKING:
+    from colibri.tuning.results import TuningResults
+    from colibri.tuning.run import Watcher
+
+_TABLES = ("name", "seeds", "check_seeds", "root_seed", "trials", "prune_after")
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options of `colibri tune`."""
+    add = parser.add_argument
+    add("file", type=Path, metavar="FILE.toml", help="the tuning; options take precedence over it")
+    add("--trials", type=int, default=SUPPRESS, metavar="N", help="how many, the profile as it is among them")
+    add("--seeds", default=SUPPRESS, metavar="FIRST-LAST", help="by which each trial flies")
+    add("--check-seeds", default=SUPPRESS, metavar="FIRST-LAST", help="by which the best is checked; no trial flies them")
+    add("--root-seed", type=int, default=SUPPRESS, metavar="N", help="of what is tried, and of draws")
+    add("--prune-after", type=int, default=SUPPRESS, metavar="N", help="seeds between two judgements of a trial; 0: none")
+    add("--name", default=SUPPRESS, help="in titles (default: the file's)")
+    add("--workers", type=int, metavar="N", help="processes (default: one a core)")
+    add(
+        "--dask",
+        metavar="ADDRESS",
+        help="in their place the cluster whose Dask scheduler is there, tcp://HOST:8786 say",
+    )
+    add("--resume", action="store_true", help="go on with what --out has of this tuning, or join those who are at it")
+    add_out(add, "out/tune", "profile, tables, figures, and what it takes to go on")
+
+
+def run(args: Namespace) -> int:
+    """Tune as the command line says; return the exit code."""
+    with loading():
+        from colibri.tuning.run import tune
+
+    given = {name: value for name, value in vars(args).items() if name in _TABLES}
+    try:
+        with _progress(args.name if "name" in args else args.file.stem, quiet=args.quiet) as watcher:
+            results = tune(
+                args.file,
+                out=args.out,
+                workers=args.workers,
+                executor=args.dask,
+                resume=args.resume,
+                watcher=watcher,
+                **given,
+            )
+    except KeyboardInterrupt:
+        fail(f"interrupted; what was tried is in {args.out}: go on with --resume", EXIT_INTERRUPTED)
+    except Error as error:
+        fail(str(error), EXIT_BAD_INPUT)
+    if not args.quiet:
+        _print(results, args.out)
+    return 0
+
+
+@contextmanager
+def _progress(title: str, *, quiet: bool) -> "Iterator[Watcher]":
+    """Show on standard error how many trials have ended, how good the best is, and the flights."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from colibri.tuning.run import Watcher
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[said]}"), TimeElapsedColumn())
+    bar = Progress(*columns, console=console, disable=quiet or not console.is_terminal)
+    task = bar.add_task(escape(title), total=None, said="")
+
+    class Bar(Watcher):
+        flights = 0
+        trials = ""
+
+        def began(self, trials: int) -> None:
+            bar.update(task, total=trials)
+
+        def flown(self, _flown: object) -> None:
+            self.flights += 1
+            bar.update(task, said=f"{self.trials}{self.flights} flights")
+
+        def ended(self, trials: int, first: float, best: float) -> None:
+            self.trials = f"trial {trials}, {first:.4g} as it is, {best:.4g} best, "
+            bar.update(task, completed=trials)
+
+        def checking(self, flights: int) -> None:
+            self.flights, self.trials = 0, f"check, of {flights}: "
+
+    with bar:
+        yield Bar()
+
+
+def _print(results: "TuningResults", out: Path) -> None:
+    from colibri.analysis.tables import print_table
+
+    names = [objective.name for objective in results.tuning.objectives]
+    first, best = results.trials[0], results.best
+    flights = sum(trial.flights for trial in results.trials)
+    pruned = sum(trial.pruned for trial in results.trials)
+    title = f"{results.tuning.campaign.name}: {len(results.trials)} trials ({pruned} pruned), {flights} flights; see {out}"
+    rows = [(name, f"{a:.4g}", f"{b:.4g}") for name, a, b in zip(names, first.values, best.values, strict=True)]
+    rows += [(name, str(first.params[name]), str(best.params[name])) for name in results.tuning.space]
+    print_table(title, ("", "as it is", f"trial {best.number}"), rows, names=1)
+    if results.verdict:
+        shown = [
+            (each.what, each.where, f"{each.before:.4g}", f"{each.after:.4g}", _percent(each.change), said)
+            for each in results.verdict
+            for said in [f"{_percent(each.low)} to {_percent(each.high)}"]
+        ]
+        headings = ("by seeds never seen", "flights of", "before", "after", "change", "with 95 %")
+        print_table("", headings, shown, names=2)
+    elif not best.number:
+        print("no trial was better than the profile as it is")  # noqa: T201
+
+
+def _percent(part: float) -> str:
+    return f"{100.0 * part:+.1f} %"

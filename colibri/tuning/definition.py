@@ -1,0 +1,251 @@
+"""A tuning as data: which numbers of a profile, within which ranges, by which flights, towards which objectives."""
+
+from collections.abc import Mapping
+from math import ceil
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+
+from colibri.autopilot.control.profile import Profile, ProfileError, profile_text
+from colibri.campaigns.definition import Campaign, CampaignTables, Point, campaign_of, read_seeds
+from colibri.campaigns.factors import factor_name, key_of, with_keys
+from colibri.campaigns.flights import Common, check, common_of
+from colibri.campaigns.metrics import hint
+from colibri.common.config import read_toml, value_at
+from colibri.common.errors import Error
+from colibri.tuning.objectives import Objective, metrics_of, read_objectives
+from colibri.tuning.space import Range, TuningError, as_flown, as_optuna, check_holds, read_range
+
+_OF_PARTS = ("fly", "grid", "draw", "tune")
+_LEAST_SEEDS = 3
+
+
+class TuningTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What is in the file of a tuning; `colibri.tune` has the same by keywords.
+
+    Attributes:
+        name: In titles.
+        seeds: By which each trial flies every combination of the grid.
+        check_seeds: By which the best is flown beside the profile as it is; None: not at all.
+        root_seed: Of what is tried, and of the draws.
+        trials: How many, the profile as it is among them.
+        prune_after: Seeds after which, again and again, a trial may end that is clearly worse than the best; 0: never;
+            None: a quarter of them, but three at least.
+        metrics: What is shown of the flights beside the objectives; None for the usual.
+        fly: Options of `colibri fly` that every flight has.
+        grid: Factors with several values; every combination is flown.
+        draw: Factors that are drawn anew for each flight; every trial has the same draws.
+        tune: Numbers of the profile, and their ranges.
+        objectives: Metrics that are to become small, and how they are pooled over a trial's flights.
+    """
+
+    name: str = "tuning"
+    seeds: Any = "0-7"
+    check_seeds: Any = None
+    root_seed: int = 0
+    trials: int = 50
+    prune_after: int | None = None
+    metrics: Any = None
+    fly: dict[str, Any] = {}
+    grid: dict[str, Any] = {}
+    draw: dict[str, Any] = {}
+    tune: dict[str, Any] = {}
+    objectives: dict[str, Any] = {}
+
+
+class Tuning(NamedTuple):
+    """A tuning, read and checked.
+
+    Attributes:
+        campaign: What each trial flies.
+        common: What its flights need.
+        check_seeds: Those that no trial flies; none for no verdict.
+        trials: How many.
+        prune_after: Seeds between two judgements; 0 for none.
+        space: Ranges by the names of the numbers.
+        objectives: What is to become small.
+        base: The profile as it is.
+        text: Its file; None for a profile that has none.
+    """
+
+    campaign: Campaign
+    common: Common
+    check_seeds: tuple[int, ...]
+    trials: int
+    prune_after: int
+    space: dict[str, Range]
+    objectives: tuple[Objective, ...]
+    base: Profile
+    text: str | None
+
+    @property
+    def begins(self) -> dict[str, Any]:
+        """What the profile as it is has, as Optuna has it."""
+        return {name: as_optuna(values, _had(self.base, name)) for name, values in self.space.items()}
+
+    def tuned(self, params: Mapping[str, Any]) -> Profile:
+        """Return the profile with the numbers of a trial.
+
+        Raises:
+            ProfileError: They cannot be together.
+        """
+        profile: Profile = with_keys(self.flown(params), "profile", self.base)
+        return profile
+
+    def flown(self, params: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the numbers of a trial as factors of a flight."""
+        return {name: as_flown(self.space[name], value) for name, value in params.items()}
+
+    def steps(self) -> list[list[Point]]:
+        """Return what a trial flies, step by step: of several seeds each, every combination."""
+        seeds = self.campaign.seeds
+        by_seed: dict[int, list[Point]] = {seed: [] for seed in seeds}
+        for point in self.campaign.points():
+            by_seed[point.seed].append(point)
+        size = self.prune_after or len(seeds)
+        return [
+            [point for seed in seeds[first : first + size] for point in by_seed[seed]]
+            for first in range(0, len(seeds), size)
+        ]
+
+
+def tables_of(file: str | Path | None, given: Mapping[str, Any]) -> TuningTables:
+    """Return the tables of a file with what is `given` in place of its own, factor by factor.
+
+    Raises:
+        TuningError: The file cannot be read, or there is no such table.
+    """
+    path = None if file is None else Path(file)
+    base = TuningTables() if path is None else read_toml(path, TuningTables, TuningError)
+    known = TuningTables.__struct_fields__
+    for name in given:
+        if name not in known:
+            raise TuningError(f"unknown option {name}: {hint(name, known)}")
+    merged = {part: {**getattr(base, part), **given.get(part, {})} for part in _OF_PARTS}
+    named = {"name": path.stem} if path is not None and base.name == "tuning" else {}
+    return msgspec.structs.replace(base, **(named | dict(given) | merged))
+
+
+def tuning_of(tables: TuningTables) -> Tuning:
+    """Return the tuning of its tables, all of whose ranges can be flown.
+
+    Raises:
+        Error: A number, a range or a metric that there is not, or what can never be flown.
+    """
+    space = _space(tables)
+    campaign = campaign_of(
+        CampaignTables(
+            name=tables.name,
+            seeds=tables.seeds,
+            root_seed=tables.root_seed,
+            metrics=tables.metrics,
+            fly=tables.fly,
+            grid=tables.grid,
+            draw=tables.draw,
+        )
+    )
+    _check_factors(campaign, space)
+    objectives = read_objectives(tables.objectives, campaign.metrics)
+    campaign = campaign._replace(metrics=metrics_of(objectives, campaign.metrics))
+    common = common_of(campaign)
+    given = campaign.fly.get("profile") or "flight"
+    base = common.profiles[given] if isinstance(given, str) else given
+    for name, values in space.items():
+        check_holds(name, values, _had(base, name))
+    tuning = Tuning(
+        campaign=campaign,
+        common=common,
+        check_seeds=_check_seeds(tables.check_seeds, campaign.seeds),
+        trials=_at_least(tables.trials, 2, "trials"),
+        prune_after=_prune_after(tables.prune_after, len(campaign.seeds), len(objectives)),
+        space=space,
+        objectives=objectives,
+        base=base,
+        text=_text(given),
+    )
+    _check_ends(tuning)
+    return tuning
+
+
+def _space(tables: TuningTables) -> dict[str, Range]:
+    space = {}
+    for given, values in tables.tune.items():
+        name = factor_name(given)
+        key = key_of(name)
+        if key is None or key.table != "profile":
+            raise TuningError(f"tune: {given} is no number of a profile: controllers.LAW.KEY say")
+        space[name] = read_range(name, values)
+    if not space:
+        raise TuningError('tune: say which numbers, "controllers.LAW.KEY" = { uniform = [2, 20] } say')
+    return space
+
+
+def _had(base: Profile, name: str) -> Any:
+    """Return what a profile has for a number; one that is multiplied is multiplied by one."""
+    key = key_of(name)
+    if key is None:
+        raise KeyError(name)
+    had = value_at(base, key.key, ProfileError)
+    return 1.0 if key.scaled else had
+
+
+def _check_factors(campaign: Campaign, space: Mapping[str, Range]) -> None:
+    plain = {name.rstrip("*") for name in (*campaign.fly, *campaign.factors)}
+    twice = next((name for name in space if name.rstrip("*") in plain), None)
+    if twice is not None:
+        raise TuningError(f"{twice} is said twice: what is tuned is not in fly, grid or draw")
+    if "profile" in campaign.factors:
+        raise TuningError("profile: one is tuned: say which in fly")
+    if campaign.fly.get("link") == "udp":
+        raise TuningError("link: over udp two processes fly, which know files: leave link out")
+
+
+def _check_seeds(given: Any, seeds: tuple[int, ...]) -> tuple[int, ...]:
+    if given is None:
+        return ()
+    try:
+        checked = read_seeds(given)
+    except Error as error:
+        raise TuningError(f"check_{error}") from error
+    seen = sorted({*checked} & {*seeds})
+    if seen:
+        raise TuningError(f"check_seeds: {seen[0]} is among seeds: tuning must never have seen those it is checked by")
+    return checked
+
+
+def _prune_after(given: int | None, seeds: int, objectives: int) -> int:
+    if given is None:
+        after = max(_LEAST_SEEDS, ceil(seeds / 4)) if objectives == 1 else 0
+        return after if after < seeds else 0
+    if objectives > 1 and given:
+        raise TuningError("prune_after: with several objectives no trial is worse before its end: leave it out")
+    return _at_least(given, 0, "prune_after")
+
+
+def _at_least(value: int, least: int, called: str) -> int:
+    if value < least:
+        raise TuningError(f"{called}: must be at least {least}, not {value}")
+    return value
+
+
+def _text(given: Any) -> str | None:
+    if not isinstance(given, str):
+        return None
+    return Path(given).read_text(encoding="utf-8") if given.endswith(".toml") else profile_text(given)
+
+
+def _check_ends(tuning: Tuning) -> None:
+    """Plan the flights of the profile as it is, and one with each end of each range."""
+    campaign, common = tuning.campaign, tuning.common
+    check(campaign, common)
+    first = campaign._replace(grid={name: values[:1] for name, values in campaign.grid.items()}, draw={})
+    drawn = {name: draw.typical[0] for name, draw in campaign.draw.items()}
+    for name, values in tuning.space.items():
+        for value in values.typical:
+            try:
+                check(first, common._replace(fly={**common.fly, **drawn, name: value}))
+            except Error as error:
+                raise TuningError(f"{name} = {value}: {error}") from error
+
+

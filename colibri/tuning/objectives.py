@@ -1,0 +1,116 @@
+"""What is to become small: metrics of flights, pooled over all of a trial; lost flights count."""
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.metrics import NAMES, Metric, hint, read_metrics
+from colibri.common.types import Array
+from colibri.tuning.space import TuningError
+
+SHARE_LOST = "share_lost"
+LOST_COUNTS = 10.0
+"""A lost flight counts as so many times the largest of the flights with the profile as it is."""
+_POOLINGS = ("mean", "rms", "median", "largest")
+_NOT_SMALL = ("lost_at_s",)
+
+
+class Objective(NamedTuple):
+    """A metric, and how it is pooled over flights; the smaller, the better.
+
+    Attributes:
+        metric: Its name, or `share_lost`.
+        quantile: The part of flights that are not worse; None for another pooling.
+        pooling: What that is called.
+    """
+
+    metric: str
+    pooling: str = "mean"
+    quantile: float | None = None
+
+    @property
+    def name(self) -> str:
+        """What tables and figures call it."""
+        if self.metric == SHARE_LOST:
+            return SHARE_LOST
+        return f"{self.metric}, {self.pooling if self.quantile is None else f'quantile {self.quantile:g}'}"
+
+    def of_flights(self, flown: Sequence[Flown], metrics: Sequence[Metric], worst: float) -> Array:
+        """Return what each flight counts, (n,): at most `worst`, and that where it was lost or has no such metric."""
+        if self.metric == SHARE_LOST:
+            return np.array([float(each.verdict is not Verdict.FLOWN) for each in flown])
+        place = [metric.name for metric in metrics].index(self.metric)
+        return np.array([min(_known(each, place, worst), worst) for each in flown])
+
+    def worst(self, flown: Sequence[Flown], metrics: Sequence[Metric]) -> float:
+        """Return what a lost flight counts, by the flights with the profile as it is.
+
+        Raises:
+            TuningError: None of them came through, or one that did has no such metric.
+        """
+        if self.metric == SHARE_LOST:
+            return 1.0
+        place = [metric.name for metric in metrics].index(self.metric)
+        through = [each for each in flown if each.verdict is Verdict.FLOWN]
+        if not through:
+            raise TuningError(f"no flight of the profile as it is came through: {flown[0].why}")
+        values = [each.metrics[place] for each in through]
+        if any(value is None or not isfinite(value) for value in values):
+            raise TuningError(f"{self.metric} is not known of every flight: fly for longer, or choose another objective")
+        return LOST_COUNTS * (max(value for value in values if value is not None) or 1.0)
+
+    def pooled(self, values: Array, axis: int = -1) -> Any:
+        """Return one number of many flights along an axis."""
+        if self.quantile is not None:
+            return np.quantile(values, self.quantile, axis=axis)
+        if self.pooling == "rms":
+            return np.sqrt(np.mean(np.square(values), axis=axis))
+        pool: Any = {"mean": np.mean, "median": np.median, "largest": np.max}[self.pooling]
+        return pool(values, axis=axis)
+
+
+def _known(flown: Flown, place: int, otherwise: float) -> float:
+    value = flown.metrics[place]
+    return value if flown.verdict is Verdict.FLOWN and value is not None and isfinite(value) else otherwise
+
+
+def read_objectives(given: Mapping[str, Any], metrics: Sequence[Metric]) -> tuple[Objective, ...]:
+    """Return the objectives of a tuning, `{ rmse_m = "mean" }` say; `metrics` has those of one's own.
+
+    Raises:
+        TuningError: There is no such metric, or no such pooling.
+    """
+    if not given:
+        raise TuningError('objectives: say what is to become small, rmse_after_20s_m = "mean" say')
+    return tuple(_objective(name, pooling, metrics) for name, pooling in given.items())
+
+
+def _objective(name: str, pooling: Any, metrics: Sequence[Metric]) -> Objective:
+    known = tuple(dict.fromkeys((*(metric.name for metric in metrics), *NAMES, SHARE_LOST)))
+    if name in _NOT_SMALL:
+        raise TuningError(f"objectives: {name} is none that is to become small: choose {SHARE_LOST}")
+    if name not in known:
+        raise TuningError(f"objectives: unknown metric {name}: {hint(name, known)}")
+    if name == SHARE_LOST:
+        if pooling != "mean":
+            raise TuningError(f'objectives: {SHARE_LOST} is a mean: write {SHARE_LOST} = "mean"')
+        return Objective(SHARE_LOST)
+    if isinstance(pooling, Mapping) and list(pooling) == ["quantile"]:
+        part = pooling["quantile"]
+        if isinstance(part, bool) or not isinstance(part, int | float) or not 0.0 <= part <= 1.0:
+            raise TuningError(f"objectives: {name}: quantile: expected 0 to 1, not {part}")
+        return Objective(name, "quantile", float(part))
+    if pooling not in _POOLINGS:
+        raise TuningError(f"objectives: {name}: choose {', '.join(_POOLINGS)} or {{ quantile = 0.9 }}, not {pooling}")
+    return Objective(name, pooling)
+
+
+def metrics_of(objectives: Sequence[Objective], metrics: Sequence[Metric]) -> tuple[Metric, ...]:
+    """Return what is kept of each flight: what the objectives need, then the other `metrics`."""
+    names = {metric.name: metric for metric in metrics}
+    needed = [each.metric for each in objectives if each.metric != SHARE_LOST]
+    found = {name: names.get(name) or read_metrics([name])[0] for name in needed}
+    return tuple((found | {name: metric for name, metric in names.items() if name not in found}).values())

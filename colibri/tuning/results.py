@@ -1,0 +1,177 @@
+"""What came of a tuning: its trials, the profile, what that is worth, and the folder that has them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from colibri.analysis.tables import Row, comma_separated
+from colibri.autopilot.control.profile import Profile
+from colibri.campaigns.results import CampaignResults
+from colibri.campaigns.values import shown
+from colibri.tuning.definition import Tuning
+from colibri.tuning.profile_file import profile_file
+from colibri.tuning.trials import Ended
+from colibri.tuning.verdict import HEADINGS, Compared, better, compare
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PROFILE = "profile.toml"
+
+
+class TuningResults:
+    """What came of a tuning, as `colibri.tune` returns it.
+
+    Attributes:
+        tuning: What was tuned.
+        trials: That have ended, by their numbers; the first is the profile as it is.
+        best: Of them the chosen one: with the least objective; of several objectives, on their Pareto front the
+            nearest to the least of each, in parts of the front's ranges.
+        front: Those that no other beats in one objective without being worse in another.
+        importances: For each objective, by its name, how much each number matters for being among the best trials, as parts
+            of one (PED-ANOVA); empty below eight trials.
+        profile: The tuned one.
+        checked: Both profiles' flights by seeds that tuning never saw; None where there are none.
+        verdict: What they came to, before and after; empty where there are none.
+    """
+
+    def __init__(self, tuning: Tuning, trials: Sequence[Ended], importances: Sequence[dict[str, float]]) -> None:
+        """Choose among the trials of a tuning."""
+        self.tuning = tuning
+        self.trials = list(trials)
+        names = [objective.name for objective in tuning.objectives]
+        self.importances = dict(zip(names, importances, strict=False))
+        self.front = _front([trial for trial in self.trials if not trial.pruned])
+        self.best = _chosen(self.front)
+        self.profile: Profile = tuning.tuned(self.best.params)
+        self.checked: CampaignResults | None = None
+        self.verdict: list[Compared] = []
+
+    def with_check(self, checked: CampaignResults) -> "TuningResults":
+        """Add the flights by seeds that tuning never saw."""
+        self.checked = checked
+        self.verdict = compare(self.tuning, checked)
+        return self
+
+    @property
+    def is_better(self) -> bool:
+        """Whether one objective is better with 95 % confidence by seeds that tuning never saw, and none is worse."""
+        return better(self.verdict)
+
+    @property
+    def profile_text(self) -> str:
+        """The file of the tuned profile, which says where it comes from."""
+        return self.file_of(self.best)
+
+    def file_of(self, trial: Ended) -> str:
+        """Return the file of the profile of a trial."""
+        from importlib.metadata import version
+
+        tuning, first = self.tuning, self.trials[0]
+        campaign = tuning.campaign
+        flown = ", ".join(f"{name} {shown(value)}" for name, value in {**campaign.fly, **campaign.grid}.items())
+        drawn = ", ".join(campaign.draw)
+        values = zip(tuning.objectives, first.values, trial.values, strict=True)
+        origin = [
+            f"Profile {tuning.base.name}, tuned by `colibri tune` {version('colibri-sitl')}: trial {trial.number} of "
+            f"{len(self.trials)} of {campaign.name}.",
+            f"Flown: {flown}; seeds {_span(campaign.seeds)}{'; drawn: ' + drawn if drawn else ''}.",
+            *(f"{objective.name}: {before:.4g} before, {after:.4g} after." for objective, before, after in values),
+        ]
+        profile = tuning.tuned(trial.params)
+        return profile_file(tuning.base, tuning.text, profile, list(tuning.space), origin)
+
+    @property
+    def headings(self) -> Row:
+        """Names of the columns of the table of trials."""
+        objectives = (objective.name for objective in self.tuning.objectives)
+        return ("trial", "state", "flights", "lost", *objectives, *self.tuning.space)
+
+    def rows(self) -> list[Row]:
+        """Return the table of trials: chosen, on the Pareto front, pruned or flown; numbers with ten digits."""
+        return [
+            (
+                str(trial.number),
+                self._state(trial),
+                str(trial.flights),
+                str(trial.lost),
+                *(f"{value:.10g}" for value in trial.values),
+                *(str(trial.params[name]) for name in self.tuning.space),
+            )
+            for trial in self.trials
+        ]
+
+    def plot(self, what: str = "importance") -> "Figure":
+        """Return a figure: importance, slices, history or, with several objectives, pareto.
+
+        Raises:
+            KeyError: There is none of that name.
+        """
+        return dict(self._figures())[what]
+
+    def save(self, folder: str | Path) -> Path:
+        """Write profile, tables and figures into a folder, and return it."""
+        path = Path(folder)
+        path.mkdir(parents=True, exist_ok=True)
+        (path / PROFILE).write_text(self.profile_text, encoding="utf-8")
+        (path / "trials.csv").write_text(comma_separated(self.headings, self.rows()), encoding="utf-8")
+        if len(self.tuning.objectives) > 1:
+            (path / "pareto").mkdir(exist_ok=True)
+            for trial in self.front:
+                (path / "pareto" / f"trial-{trial.number}.toml").write_text(self.file_of(trial), encoding="utf-8")
+        if self.verdict:
+            rows = [each.row for each in self.verdict]
+            (path / "verdict.csv").write_text(comma_separated(HEADINGS, rows), encoding="utf-8")
+        for name, figure in self._figures():
+            figure.savefig(path / f"{name}.png")
+        return path
+
+    def _state(self, trial: Ended) -> str:
+        if trial is self.best:
+            return "chosen"
+        if trial.pruned:
+            return "pruned"
+        return "front" if len(self.tuning.objectives) > 1 and trial in self.front else "flown"
+
+    def _figures(self) -> "list[tuple[str, Figure]]":
+        from colibri.tuning.figures import draw_history, draw_importance, draw_pareto, draw_slices
+
+        tuning, trials, best = self.tuning, self.trials, self.best
+        names = [objective.name for objective in tuning.objectives]
+        title = f"{tuning.campaign.name}: {len(trials)} trials"
+        found = [("history", draw_history(title, names, trials, best))]
+        found.append(("slices", draw_slices(title, tuning.space, names[0], trials, best)))
+        if self.importances:
+            found.append(("importance", draw_importance(title, self.importances)))
+        if len(names) > 1:
+            found.append(("pareto", draw_pareto(title, names, trials, self.front, best)))
+        return found
+
+
+def _front(trials: Sequence[Ended]) -> list[Ended]:
+    """Return those trials that no other beats; of equal ones the first."""
+    front: list[Ended] = []
+    for trial in sorted(trials, key=lambda trial: (trial.values, trial.number)):
+        if not any(all(a <= b for a, b in zip(other.values, trial.values, strict=True)) for other in front):
+            front.append(trial)
+    return sorted(front, key=lambda trial: trial.number)
+
+
+def _chosen(front: Sequence[Ended]) -> Ended:
+    """Return that of a front which is nearest to the least of each objective, in parts of the front's ranges."""
+    least = [min(values) for values in zip(*(trial.values for trial in front), strict=True)]
+    most = [max(values) for values in zip(*(trial.values for trial in front), strict=True)]
+
+    def distance(trial: Ended) -> float:
+        ranges = zip(trial.values, least, most, strict=True)
+        return sum(((value - low) / (high - low)) ** 2 for value, low, high in ranges if high > low)
+
+    return min(front, key=distance)
+
+
+def _span(seeds: Sequence[int]) -> str:
+    if len(seeds) > 1 and list(seeds) == list(range(seeds[0], seeds[-1] + 1)):
+        return f"{seeds[0]}-{seeds[-1]}"
+    return " ".join(map(str, seeds))
+
+

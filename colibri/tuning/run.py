@@ -1,0 +1,166 @@
+"""`colibri.tune`: trial by trial, alone or beside other processes, then the verdict by seeds that tuning never saw."""
+
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import msgspec
+
+from colibri.campaigns.engines.engine import Engine
+from colibri.campaigns.flights import Flown
+from colibri.campaigns.journal import identity_of
+from colibri.campaigns.run import engine_of, fly_campaign
+from colibri.tuning.definition import Tuning, tables_of, tuning_of
+from colibri.tuning.file_lock import FileLock
+from colibri.tuning.flying import Flights, fly_trial, scale_kept
+from colibri.tuning.profile_file import tuned_name
+from colibri.tuning.results import TuningResults
+from colibri.tuning.space import TuningError
+from colibri.tuning.trials import Trials, require_optuna
+from colibri.tuning.verdict import check_campaign
+
+IDENTITY = "tuning.json"
+
+
+class Watcher:
+    """What is told how far a tuning is; nothing is done with it here."""
+
+    def began(self, trials: int) -> None:
+        """So many trials there shall be."""
+
+    def flown(self, flown: Flown) -> None:
+        """A flight has ended."""
+
+    def ended(self, trials: int, first: float, best: float) -> None:
+        """So many trials have ended; the first objective with the profile as it is, and its least until now."""
+
+    def checking(self, flights: int) -> None:
+        """All trials have ended, and so many flights are flown by seeds that they never saw."""
+
+
+def tune(
+    file: str | Path | None = None,
+    *,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    executor: Any = None,
+    resume: bool = False,
+    watcher: Watcher | None = None,
+    **tables: Any,
+) -> TuningResults:
+    """Tune numbers of a profile and return what came of it.
+
+    Args:
+        file: TOML file of the tuning; keywords take precedence over what is in it.
+        out: Folder for profile, tables, figures, and what it takes to go on; None: nothing is written.
+        workers: Processes; None: one a core. From a script, call this under `if __name__ == "__main__":`, for they
+            load the script, too.
+        executor: In their place, a `distributed.Client` or the address of a scheduler of Dask.
+        resume: Go on with what `out` has of this tuning, or join the processes that are at it.
+        watcher: Is told how far it is.
+        tables: As in the file: `tune={"controllers.LAW.KEY": {"uniform": [2, 20]}}, objectives={"rmse_m": "mean"},
+            fly={...}, grid={...}, draw={...}, seeds="1-8", check_seeds="101-150"`, `trials`, `prune_after`, `metrics`,
+            `name`, `root_seed`. Values may be what `colibri.fly` takes; metrics may be functions of a `Flight`.
+
+    Raises:
+        Error: What the command line would say in one line.
+    """
+    require_optuna()
+    tuning = tuning_of(tables_of(file, tables))
+    if out is not None:
+        return fly_tuning(tuning, lambda: engine_of(workers, executor), Path(out), resume=resume, watcher=watcher)
+    with TemporaryDirectory(prefix="colibri-") as folder:
+        return fly_tuning(
+            tuning, lambda: engine_of(workers, executor), Path(folder) / "tune", watcher=watcher, keep=False
+        )
+
+
+def fly_tuning(
+    tuning: Tuning,
+    engine: Callable[[], Engine],
+    out: Path,
+    *,
+    resume: bool = False,
+    watcher: Watcher | None = None,
+    keep: bool = True,
+) -> TuningResults:
+    """Fly those trials of a tuning that `out` does not have yet, and write what came of it; see `tune`.
+
+    Raises:
+        Error: It cannot be flown, or `out` has something else.
+    """
+    told = watcher or Watcher()
+    first_engine = engine()
+    _open(out, tuning, resume=resume)
+    with Trials(out, tuning) as trials:
+        _fly_trials(tuning, trials, first_engine, told)
+        results = TuningResults(tuning, trials.ended, trials.importances())
+        with FileLock(out / "locks" / "results"):
+            if tuning.check_seeds and results.best.number:
+                results.with_check(_check(tuning, results, engine(), out, told))
+            if keep:
+                results.save(out)
+    return results
+
+
+def _fly_trials(tuning: Tuning, trials: Trials, engine: Engine, told: Watcher) -> None:
+    """Fly until all trials have ended."""
+    told.began(tuning.trials)
+    with Flights(engine, tuning.common) as flights:
+        while (begun := trials.ask()) is not None:
+            ended = trials.ended
+            scale = scale_kept(ended[0]) if begun.number else None
+            best = min((trial.values[0] for trial in ended), default=0.0)
+            trials.tell(begun, fly_trial(tuning, begun, flights, scale, best, told.flown))
+            values = [trial.values[0] for trial in trials.ended]
+            told.ended(len(values), values[0], min(values))
+
+
+def _check(tuning: Tuning, results: TuningResults, engine: Engine, out: Path, told: Watcher) -> Any:
+    """Fly the profile as it is, and the tuned one, by seeds that tuning never saw; go on with what there is of that."""
+    after = msgspec.structs.replace(results.profile, name=tuned_name(tuning.base))
+    campaign = check_campaign(tuning, tuning.base, after)
+    told.checking(campaign.flights)
+    folder = out / "check" / f"trial-{results.best.number}"
+    return fly_campaign(campaign, engine, folder, resume=True, yes=True, progress=told.flown)
+
+
+def _open(out: Path, tuning: Tuning, *, resume: bool) -> None:
+    """Make `out` the folder of this tuning, or go on with it.
+
+    Raises:
+        TuningError: It has something else, or is not to go on.
+    """
+    path = out / IDENTITY
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with FileLock(out):
+            if not path.exists():
+                if any(out.iterdir()):
+                    raise TuningError(f"--out {out} is not empty, and has no tuning to go on with: choose another folder")
+                path.write_bytes(msgspec.json.format(msgspec.json.encode(_identity(tuning)), indent=1) + b"\n")
+                return
+            was = msgspec.json.decode(path.read_bytes())
+    except (OSError, msgspec.DecodeError) as error:
+        raise TuningError(f"cannot use --out {out}: {error}") from error
+    now = msgspec.json.decode(msgspec.json.encode(_identity(tuning)))
+    if was != now:
+        differs = sorted(name for name in {*was, *now} if was.get(name) != now.get(name))
+        raise TuningError(f"--out {out} has another tuning ({', '.join(differs)} differ): choose another folder")
+    if not resume:
+        raise TuningError(f"--out {out} has this tuning already: go on with --resume, or choose another folder")
+
+
+def _identity(tuning: Tuning) -> dict[str, Any]:
+    """Return in plain data which tuning it is; it may go on with more trials, and be checked by other seeds."""
+    return {
+        **identity_of(tuning.campaign, tuning.common),
+        "colibri": version("colibri-sitl"),
+        "optuna": version("optuna"),
+        "prune_after": tuning.prune_after,
+        "tune": {name: [type(values).__name__, repr(values)] for name, values in tuning.space.items()},
+        "objectives": [objective.name for objective in tuning.objectives],
+    }
+

@@ -1,0 +1,99 @@
+"""Which values of a number are tried: ranges, evenly or by their logarithm, integers, choices."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+from colibri.campaigns.values import Choice, LogUniform, Uniform, read_draw, shown
+from colibri.common.errors import Error
+
+_KINDS = ("uniform", "log-uniform", "integers", "choice")
+_DIGITS = 4
+
+
+class TuningError(Error):
+    """A tuning that cannot be done; the message names the key."""
+
+
+class Integers(NamedTuple):
+    """Whole numbers from `low` to `high`, both included."""
+
+    low: int
+    high: int
+
+    @property
+    def typical(self) -> tuple[int, ...]:
+        """The ends."""
+        return self
+
+
+Range: TypeAlias = Uniform | LogUniform | Integers | Choice
+
+
+def read_range(key: str, given: Any) -> Range:
+    """Return the range that a tuning has for a number, `{ log-uniform = [2, 20] }` say.
+
+    Raises:
+        Error: It is none.
+    """
+    kind = next(iter(given)) if isinstance(given, dict) and len(given) == 1 else None
+    if kind not in _KINDS:
+        raise TuningError(f"{key}: expected one of {', '.join(_KINDS)}, as in {{ uniform = [2, 20] }}, not {given}")
+    if kind != "integers":
+        read = read_draw(key, given)
+        if not isinstance(read, Uniform | LogUniform | Choice):
+            raise TypeError(read)
+        if isinstance(read, Choice) and len(read.values) < 2:
+            raise TuningError(f"{key}: choice: one value leaves nothing to choose")
+        return read
+    span = given[kind]
+    if not isinstance(span, Sequence) or len(span) != 2 or any(type(end) is not int for end in span):
+        raise TuningError(f"{key}: integers: expected [lowest, highest], not {span}")
+    if span[0] >= span[1]:
+        raise TuningError(f"{key}: integers: {span[0]} to {span[1]} is no range")
+    return Integers(*span)
+
+
+def check_holds(key: str, values: Range, value: Any) -> None:
+    """Check that a profile's own value, where tuning begins, is in its range.
+
+    Raises:
+        TuningError: It is not.
+    """
+    if isinstance(values, Choice):
+        if value not in values.values:
+            raise TuningError(f"{key}: the profile has {shown(value)}: put it among {', '.join(map(shown, values[0]))}")
+        return
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TuningError(f"{key}: the profile has {shown(value)}, no number: tune a place in it, {key}.0 say")
+    if not values.low <= value <= values.high:
+        raise TuningError(f"{key}: the profile has {value:g}, not within {values.low:g} to {values.high:g}: widen that")
+
+
+def distribution(values: Range) -> Any:
+    """Return a range as Optuna has it; choices by the names that tables have."""
+    from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
+
+    if isinstance(values, Choice):
+        return CategoricalDistribution(list(map(shown, values.values)))
+    if isinstance(values, Integers):
+        return IntDistribution(*values)
+    return FloatDistribution(*values, log=isinstance(values, LogUniform))
+
+
+def as_tried(values: Range, value: Any) -> Any:
+    """Return a value of Optuna's as it is tried: a number with four digits, that one may read and write."""
+    if not isinstance(values, Uniform | LogUniform):
+        return value
+    return min(max(float(f"{value:.{_DIGITS}g}"), values.low), values.high)
+
+
+def as_optuna(values: Range, value: Any) -> Any:
+    """Return a profile's value as Optuna has it."""
+    return shown(value) if isinstance(values, Choice) else value
+
+
+def as_flown(values: Range, value: Any) -> Any:
+    """Return what a profile has for a value that was tried."""
+    if isinstance(values, Choice):
+        return next(each for each in values.values if shown(each) == value)
+    return value

@@ -1,0 +1,166 @@
+"""What a tuned profile is worth: flown beside the one it was made of, by seeds that tuning never saw, in pairs."""
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.random import PCG64, Generator, SeedSequence
+
+from colibri.analysis.tables import Row
+from colibri.campaigns.definition import Campaign
+from colibri.campaigns.flight_table import FlightTable
+from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.values import shown
+from colibri.common.types import Array
+from colibri.tuning.objectives import SHARE_LOST, Objective
+
+if TYPE_CHECKING:
+    from colibri.autopilot.control.profile import Profile
+    from colibri.tuning.definition import Tuning
+
+HEADINGS: Row = ("what", "flights of", "seeds", "before", "after", "change", "change, low", "change, high")
+_RESAMPLES = 10_000
+_CONFIDENCE = (0.025, 0.975)
+_STREAM = 1
+"""Of the root seed, for the bootstrap."""
+
+
+class Compared(NamedTuple):
+    """One number before and after, over the flights of all combinations or of one.
+
+    Attributes:
+        what: The objective, or a metric that was kept beside them.
+        where: The combination; `all` for all.
+        seeds: How many.
+        before: With the profile as it is.
+        after: With the tuned one.
+        change: After over before, less one; of a share, or where it was zero before, the difference.
+        low: Between this and `high` the change lies with 95 % confidence: bootstrap over seeds, in pairs.
+        high: See there.
+        is_objective: Whether it was tuned for.
+    """
+
+    what: str
+    where: str
+    seeds: int
+    before: float
+    after: float
+    change: float
+    low: float
+    high: float
+    is_objective: bool
+
+    @property
+    def row(self) -> Row:
+        """Itself as a row of a table."""
+        numbers = (self.before, self.after, self.change, self.low, self.high)
+        return (self.what, self.where, str(self.seeds), *(f"{number:.6g}" for number in numbers))
+
+
+def check_campaign(tuning: "Tuning", before: "Profile", after: "Profile") -> Campaign:
+    """Return the campaign in which both profiles fly the same by seeds, and draws, that tuning never saw."""
+    campaign = tuning.campaign
+    return campaign._replace(
+        name=f"{campaign.name}: check",
+        seeds=tuning.check_seeds,
+        root_seed=campaign.root_seed + 1,
+        paired=True,
+        fly={name: value for name, value in campaign.fly.items() if name != "profile"},
+        grid={"profile": (before, after), **campaign.grid},
+    )
+
+
+def compare(tuning: "Tuning", table: FlightTable) -> list[Compared]:
+    """Return each objective, and each other metric, before and after."""
+    pairs = _Pairs(table)
+    others = [metric.name for metric in table.campaign.metrics]
+    wanted = {objective.metric for objective in tuning.objectives}
+    means = [Objective(name) for name in others if name not in wanted]
+    means += [] if SHARE_LOST in wanted else [Objective(SHARE_LOST)]
+    found = [each for objective in tuning.objectives for each in pairs.compared(objective, is_objective=True)]
+    return found + [each for objective in means for each in pairs.compared(objective, is_objective=False)]
+
+
+class _Pairs:
+    """The flights of both profiles by combination and seed."""
+
+    def __init__(self, table: FlightTable) -> None:
+        """Sort the flights of a check."""
+        self._campaign = table.campaign
+        self._seeds = len(table.campaign.seeds)
+        combinations = table.campaign.combinations // 2
+        flown = np.empty(len(table.flown), dtype=object)
+        flown[:] = table.flown
+        self._flown = flown.reshape(2, combinations, self._seeds)
+        points = list(table.campaign.points())[: combinations * self._seeds : self._seeds]
+        several = [name for name, values in table.campaign.grid.items() if len(values) > 1 and name != "profile"]
+        self._names = [", ".join(shown(point.factors[name]) for name in several) for point in points]
+
+    def compared(self, objective: Objective, *, is_objective: bool) -> Iterator[Compared]:
+        """Return one number over all combinations and, where there are several, over each; none where it is unknown."""
+        counts = self._counts(objective, penalised=is_objective)
+        if counts is None:
+            return
+        for where, some in (("all", counts), *zip(self._names, np.moveaxis(counts, 1, 0), strict=True)):
+            if where == "all" or len(self._names) > 1:
+                yield _compared(objective, where, some.reshape(2, -1, self._seeds), is_objective=is_objective)
+
+    def _counts(self, objective: Objective, *, penalised: bool) -> Array | None:
+        """Return what each flight counts, (2, combinations, seeds); None where that is unknown of one.
+
+        Where it was not tuned for, flights that were lost are left out, with their pairs, as nan.
+        """
+        metrics = self._campaign.metrics
+        if penalised or objective.metric == SHARE_LOST:
+            worst = objective.worst(self._listed(0), metrics)
+            return np.array([objective.of_flights(self._listed(of), metrics, worst) for of in (0, 1)]).reshape(
+                self._flown.shape
+            )
+        place = [metric.name for metric in metrics].index(objective.metric)
+        values = np.array([_value(each, place) for of in (0, 1) for each in self._listed(of)])
+        found: Array = values.reshape(self._flown.shape)
+        found[:, np.isnan(found).any(axis=0)] = np.nan
+        return None if np.isnan(found).all() else found
+
+    def _listed(self, of: int) -> list[Flown]:
+        return list(self._flown[of].ravel())
+
+
+def _value(flown: Flown, place: int) -> float:
+    value = flown.metrics[place]
+    return value if flown.verdict is Verdict.FLOWN and value is not None else np.nan
+
+
+def _compared(objective: Objective, where: str, counts: Array, *, is_objective: bool) -> Compared:
+    """Compare what flights count, (2, combinations, seeds)."""
+    whole = np.moveaxis(counts, -1, 1)  # (2, seeds, combinations)
+    chance = Generator(PCG64(SeedSequence(0, spawn_key=(_STREAM,))))
+    places = chance.integers(whole.shape[1], size=(_RESAMPLES, whole.shape[1]))
+    before, after = (_pooled(objective, each.reshape(1, -1))[0] for each in whole)
+    resampled = [_pooled(objective, each[places].reshape(_RESAMPLES, -1)) for each in whole]
+    low, high = np.nanquantile(_change(objective, *resampled), _CONFIDENCE)
+    change = _change(objective, np.array([before]), np.array([after]))[0]
+    seeds = whole.shape[1]
+    numbers = (float(before), float(after), float(change), float(low), float(high))
+    return Compared(objective.name, where, seeds, *numbers, is_objective)
+
+
+def _pooled(objective: Objective, counts: Array) -> Array:
+    """Return one number a row of flights, without those that are nan."""
+    if not np.isnan(counts).any():
+        pooled: Array = objective.pooled(counts)
+        return pooled
+    return np.array([objective.pooled(row[~np.isnan(row)]) if not np.isnan(row).all() else np.nan for row in counts])
+
+
+def _change(objective: Objective, before: Array, after: Array) -> Array:
+    difference: Array = after - before
+    if objective.metric == SHARE_LOST or (before == 0.0).any():
+        return difference
+    return difference / before
+
+
+def better(compared: Sequence[Compared]) -> bool:
+    """Tell whether one objective is better with 95 % confidence over all flights, and none is worse."""
+    found = [each for each in compared if each.is_objective and each.where == "all"]
+    return any(each.high < 0.0 for each in found) and not any(each.low > 0.0 for each in found)
