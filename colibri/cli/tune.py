@@ -14,6 +14,7 @@ from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_INTERRUPTED, f
 if TYPE_CHECKING:
     from colibri.tuning.results import TuningResults
     from colibri.tuning.run import Watcher
+    from colibri.tuning.verdict import Compared
 
 _TABLES = ("name", "seeds", "check_seeds", "root_seed", "trials", "prune_after")
 
@@ -24,9 +25,20 @@ def add_options(parser: ArgumentParser) -> None:
     add("file", type=Path, metavar="FILE.toml", help="the tuning; options take precedence over it")
     add("--trials", type=int, default=SUPPRESS, metavar="N", help="how many, the profile as it is among them")
     add("--seeds", default=SUPPRESS, metavar="FIRST-LAST", help="by which each trial flies")
-    add("--check-seeds", default=SUPPRESS, metavar="FIRST-LAST", help="by which the best is checked; no trial flies them")
+    add(
+        "--check-seeds",
+        default=SUPPRESS,
+        metavar="FIRST-LAST",
+        help="by which no trial flies: the check",
+    )
     add("--root-seed", type=int, default=SUPPRESS, metavar="N", help="of what is tried, and of draws")
-    add("--prune-after", type=int, default=SUPPRESS, metavar="N", help="seeds between two judgements of a trial; 0: none")
+    add(
+        "--prune-after",
+        type=int,
+        default=SUPPRESS,
+        metavar="N",
+        help="seeds between judgements of a trial; 0: none",
+    )
     add("--name", default=SUPPRESS, help="in titles (default: the file's)")
     add("--workers", type=int, metavar="N", help="processes (default: one a core)")
     add(
@@ -102,25 +114,38 @@ def _progress(title: str, *, quiet: bool) -> "Iterator[Watcher]":
 
 def _print(results: "TuningResults", out: Path) -> None:
     from colibri.analysis.tables import print_table
+    from colibri.tuning.verdict import ALL
 
     names = [objective.name for objective in results.tuning.objectives]
     first, best = results.trials[0], results.best
     flights = sum(trial.flights for trial in results.trials)
     pruned = sum(trial.pruned for trial in results.trials)
-    title = f"{results.tuning.campaign.name}: {len(results.trials)} trials ({pruned} pruned), {flights} flights; see {out}"
+    title = (
+        f"{results.tuning.campaign.name}: {len(results.trials)} trials ({pruned} pruned), {flights} flights, in {out}"
+    )
     rows = [(name, f"{a:.4g}", f"{b:.4g}") for name, a, b in zip(names, first.values, best.values, strict=True)]
     rows += [(name, str(first.params[name]), str(best.params[name])) for name in results.tuning.space]
     print_table(title, ("", "as it is", f"trial {best.number}"), rows, names=1)
+    if not best.number:
+        print("no trial was better than the profile as it is")  # noqa: T201
     if results.verdict:
         shown = [
-            (each.what, each.where, f"{each.before:.4g}", f"{each.after:.4g}", _percent(each.change), said)
+            (*each.row[:2], f"{each.before:.4g}", f"{each.after:.4g}", _percent(each.change), _interval(each))
             for each in results.verdict
-            for said in [f"{_percent(each.low)} to {_percent(each.high)}"]
+            if each.is_objective or each.where == ALL
         ]
-        headings = ("by seeds never seen", "flights of", "before", "after", "change", "with 95 %")
-        print_table("", headings, shown, names=2)
-    elif not best.number:
-        print("no trial was better than the profile as it is")  # noqa: T201
+        title = f"{len(results.tuning.check_seeds)} seeds that no trial has flown: {_said(results)}"
+        print_table(title, ("", "flights of", "before", "after", "change", "with 95 %"), shown, names=2)
+
+
+def _said(results: "TuningResults") -> str:
+    if results.is_better:
+        return "better"
+    return "worse" if any(each.low > 0.0 for each in results.verdict if each.is_objective) else "no better"
+
+
+def _interval(each: "Compared") -> str:
+    return f"{_percent(each.low)} to {_percent(each.high)}"
 
 
 def _percent(part: float) -> str:

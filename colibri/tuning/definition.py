@@ -247,5 +247,3 @@ def _check_ends(tuning: Tuning) -> None:
                 check(first, common._replace(fly={**common.fly, **drawn, name: value}))
             except Error as error:
                 raise TuningError(f"{name} = {value}: {error}") from error
-
-

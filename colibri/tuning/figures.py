@@ -133,8 +133,8 @@ def _dots(
             axes.plot(at, values, "o", color=color, markersize=4.5, alpha=0.7, markeredgewidth=0, label=label)
     axes.plot(along(first), first.values[place], "D", color=_AS_IT_IS, markersize=6, label="profile as it is")
     axes.plot(along(best), best.values[place], "*", color=_BEST, markersize=11, label="chosen")
-    values = np.array([trial.values[place] for trial in trials])
-    if values.min() > 0.0 and values.max() / values.min() > _WIDE_SPREAD:
+    all_values = [trial.values[place] for trial in trials]
+    if min(all_values) > 0.0 and max(all_values) / min(all_values) > _WIDE_SPREAD:
         axes.set_yscale("log")
     else:
         axes.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
@@ -142,4 +142,3 @@ def _dots(
 
 def _at(values: Range, value: Any) -> float:
     return [shown(each) for each in values.values].index(value) if isinstance(values, Choice) else float(value)
-

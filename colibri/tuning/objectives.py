@@ -59,7 +59,7 @@ class Objective(NamedTuple):
             raise TuningError(f"no flight of the profile as it is came through: {flown[0].why}")
         values = [each.metrics[place] for each in through]
         if any(value is None or not isfinite(value) for value in values):
-            raise TuningError(f"{self.metric} is not known of every flight: fly for longer, or choose another objective")
+            raise TuningError(f"{self.metric} is not known of every flight: fly longer, or choose another objective")
         return LOST_COUNTS * (max(value for value in values if value is not None) or 1.0)
 
     def pooled(self, values: Array, axis: int = -1) -> Any:

@@ -8,9 +8,6 @@ import msgspec
 from colibri.autopilot.control.profile import Profile, ProfileError, ProfileTables
 from colibri.campaigns.factors import key_of
 from colibri.common.config import value_at
-from colibri.tuning.space import TuningError
-
-_PACKAGE = "colibri-sitl"
 
 
 def profile_file(base: Profile, text: str | None, tuned: Profile, factors: Sequence[str], origin: Sequence[str]) -> str:
@@ -22,14 +19,9 @@ def profile_file(base: Profile, text: str | None, tuned: Profile, factors: Seque
         tuned: The profile with other numbers.
         factors: Which of them are others.
         origin: Where it comes from, in lines of a comment.
-
-    Raises:
-        TuningError: tomlkit is not installed.
     """
-    try:
-        import tomlkit
-    except ImportError as error:
-        raise TuningError(f"tomlkit is not installed: pip install {_PACKAGE}[tune]") from error
+    import tomlkit
+
     document: Any = tomlkit.parse(text) if text is not None else tomlkit.parse(tomlkit.dumps(_tables(base)))
     name = tuned_name(base)
     if "name" in document:
@@ -66,8 +58,13 @@ def _set(document: Any, key: str, value: Any) -> None:
 
 def _tables(profile: Profile) -> Mapping[str, Any]:
     """Return what a profile's file would have."""
-    plain: dict[str, Any] = msgspec.to_builtins(profile)
-    return {key: plain[key] for key in ProfileTables.__struct_fields__ if plain[key] is not None}
+    plain = msgspec.to_builtins(profile)
+    return {key: _given(plain[key]) for key in ProfileTables.__struct_fields__ if plain[key] is not None}
+
+
+def _given(value: Any) -> Any:
+    """Return a table without what is None, which TOML does not have."""
+    return {key: _given(each) for key, each in value.items() if each is not None} if isinstance(value, dict) else value
 
 
 def _check(written: str, tuned: Profile, name: str) -> None:

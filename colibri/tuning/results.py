@@ -28,8 +28,8 @@ class TuningResults:
         best: Of them the chosen one: with the least objective; of several objectives, on their Pareto front the
             nearest to the least of each, in parts of the front's ranges.
         front: Those that no other beats in one objective without being worse in another.
-        importances: For each objective, by its name, how much each number matters for being among the best trials, as parts
-            of one (PED-ANOVA); empty below eight trials.
+        importances: For each objective, by its name, how much each number matters for being among the best trials, as
+            parts of one (PED-ANOVA); empty below eight trials.
         profile: The tuned one.
         checked: Both profiles' flights by seeds that tuning never saw; None where there are none.
         verdict: What they came to, before and after; empty where there are none.
@@ -164,7 +164,8 @@ def _chosen(front: Sequence[Ended]) -> Ended:
 
     def distance(trial: Ended) -> float:
         ranges = zip(trial.values, least, most, strict=True)
-        return sum(((value - low) / (high - low)) ** 2 for value, low, high in ranges if high > low)
+        parts = [(value - low) / (high - low) for value, low, high in ranges if high > low]
+        return sum((part * part for part in parts), 0.0)
 
     return min(front, key=distance)
 
@@ -173,5 +174,3 @@ def _span(seeds: Sequence[int]) -> str:
     if len(seeds) > 1 and list(seeds) == list(range(seeds[0], seeds[-1] + 1)):
         return f"{seeds[0]}-{seeds[-1]}"
     return " ".join(map(str, seeds))
-
-

@@ -138,9 +138,11 @@ def _open(out: Path, tuning: Tuning, *, resume: bool) -> None:
         out.mkdir(parents=True, exist_ok=True)
         with FileLock(out):
             if not path.exists():
-                if any(out.iterdir()):
-                    raise TuningError(f"--out {out} is not empty, and has no tuning to go on with: choose another folder")
-                path.write_bytes(msgspec.json.format(msgspec.json.encode(_identity(tuning)), indent=1) + b"\n")
+                if any(entry.name != f"{path.stem}.new" for entry in out.iterdir()):
+                    raise TuningError(f"--out {out} is not empty, and has no tuning in it: choose another folder")
+                scratch = path.with_suffix(".new")
+                scratch.write_bytes(msgspec.json.format(msgspec.json.encode(_identity(tuning)), indent=1) + b"\n")
+                scratch.replace(path)
                 return
             was = msgspec.json.decode(path.read_bytes())
     except (OSError, msgspec.DecodeError) as error:
@@ -163,4 +165,3 @@ def _identity(tuning: Tuning) -> dict[str, Any]:
         "tune": {name: [type(values).__name__, repr(values)] for name, values in tuning.space.items()},
         "objectives": [objective.name for objective in tuning.objectives],
     }
-

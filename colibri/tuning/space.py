@@ -61,7 +61,9 @@ def check_holds(key: str, values: Range, value: Any) -> None:
     """
     if isinstance(values, Choice):
         if value not in values.values:
-            raise TuningError(f"{key}: the profile has {shown(value)}: put it among {', '.join(map(shown, values[0]))}")
+            raise TuningError(
+                f"{key}: the profile has {shown(value)}: put it among {', '.join(map(shown, values.values))}"
+            )
         return
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise TuningError(f"{key}: the profile has {shown(value)}, no number: tune a place in it, {key}.0 say")
@@ -77,7 +79,7 @@ def distribution(values: Range) -> Any:
         return CategoricalDistribution(list(map(shown, values.values)))
     if isinstance(values, Integers):
         return IntDistribution(*values)
-    return FloatDistribution(*values, log=isinstance(values, LogUniform))
+    return FloatDistribution(values.low, values.high, log=isinstance(values, LogUniform))
 
 
 def as_tried(values: Range, value: Any) -> Any:

@@ -60,8 +60,9 @@ class Begun(NamedTuple):
 class Trials:
     """The trials of a tuning in a folder, shared by all processes that are at it.
 
-    A process has a place, by a lock that ends with it, so that the others know of which trials there will be no end. What the next trial tries follows from the trials that ended, its number and the root
-    seed: a process that goes on after another's end goes on as that would have.
+    A process has a place, by a lock that ends with it, so that the others know which trials nobody flies any more. What
+    the next trial tries follows from the trials that have ended, its number and the root seed: a process that goes on
+    after another's end goes on as that would have.
     """
 
     def __init__(self, folder: Path, tuning: "Tuning") -> None:
@@ -200,15 +201,16 @@ class Trials:
 
 
 def require_optuna() -> Any:
-    """Return Optuna.
+    """Return Optuna, and have tomlkit at hand.
 
     Raises:
-        TuningError: It is not installed.
+        TuningError: One of them is not installed.
     """
     try:
         import optuna
+        import tomlkit  # noqa: F401
     except ImportError as error:
-        raise TuningError(f"Optuna is not installed: pip install {_PACKAGE}[tune]") from error
+        raise TuningError(f"{error.name} is not installed: pip install {_PACKAGE}[tune]") from error
     return optuna
 
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from colibri.tuning.definition import Tuning
 
 HEADINGS: Row = ("what", "flights of", "seeds", "before", "after", "change", "change, low", "change, high")
+ALL = "all"
+"""Combinations of the grid."""
 _RESAMPLES = 10_000
 _CONFIDENCE = (0.025, 0.975)
 _STREAM = 1
@@ -101,8 +103,8 @@ class _Pairs:
         counts = self._counts(objective, penalised=is_objective)
         if counts is None:
             return
-        for where, some in (("all", counts), *zip(self._names, np.moveaxis(counts, 1, 0), strict=True)):
-            if where == "all" or len(self._names) > 1:
+        for where, some in ((ALL, counts), *zip(self._names, np.moveaxis(counts, 1, 0), strict=True)):
+            if where == ALL or len(self._names) > 1:
                 yield _compared(objective, where, some.reshape(2, -1, self._seeds), is_objective=is_objective)
 
     def _counts(self, objective: Objective, *, penalised: bool) -> Array | None:
@@ -162,5 +164,5 @@ def _change(objective: Objective, before: Array, after: Array) -> Array:
 
 def better(compared: Sequence[Compared]) -> bool:
     """Tell whether one objective is better with 95 % confidence over all flights, and none is worse."""
-    found = [each for each in compared if each.is_objective and each.where == "all"]
+    found = [each for each in compared if each.is_objective and each.where == ALL]
     return any(each.high < 0.0 for each in found) and not any(each.low > 0.0 for each in found)

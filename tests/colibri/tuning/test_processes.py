@@ -1,0 +1,95 @@
+"""A tuning that is killed, and one that two processes are at."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from time import monotonic, sleep
+
+import pytest
+
+from colibri.tuning.trials import JOURNAL
+from tests.colibri.tuning.support import WEIGHTS, files_in, tuned
+
+PATIENCE_S = 120.0
+TRIALS = 14
+FILE = f"""
+name = "short"
+trials = {TRIALS}
+seeds = "1-4"
+prune_after = 0
+metrics = ["rmse_m"]
+[fly]
+duration = 0.2
+start = {{ x = 0.1, z = 2.0 }}
+turbulence = "moderate"
+[grid]
+track = ["hover"]
+[tune]
+"{WEIGHTS}.position" = {{ log-uniform = [1, 1000] }}
+"{WEIGHTS}.rate" = {{ log-uniform = [0.001, 1.0] }}
+[objectives]
+rmse_m = "mean"
+"""
+
+
+def begin(folder: Path, *options: str) -> subprocess.Popen[str]:
+    file = folder / "short.toml"
+    file.write_text(FILE, encoding="utf-8")
+    words = [sys.executable, "-m", "colibri", "tune", str(file), "--workers", "1", "--quiet", "--out"]
+    return subprocess.Popen([*words, str(folder / "out"), *options], stderr=subprocess.PIPE, text=True)
+
+
+def wait_for(folder: Path, words: str, least: int) -> None:
+    """Wait until the journal has as many lines with these words."""
+    until_s = monotonic() + PATIENCE_S
+    journal = folder / "out" / JOURNAL
+    while not journal.exists() or journal.read_text(encoding="utf-8").count(words) < least:
+        assert monotonic() < until_s
+        sleep(0.005)
+
+
+def test_it_is_killed_and_goes_on_as_if_it_had_not_been(tmp_path: Path) -> None:
+    with begin(tmp_path) as first:
+        wait_for(tmp_path, '"pruned"', 5)
+        first.kill()
+    with begin(tmp_path, "--resume") as second:
+        _, said = second.communicate(timeout=PATIENCE_S)
+    assert (second.returncode, said) == (0, "")
+    tuned(tmp_path / "expected", trials=TRIALS)
+    assert files_in(tmp_path / "out") == files_in(tmp_path / "expected")
+
+
+def test_a_second_process_joins(tmp_path: Path) -> None:
+    with begin(tmp_path) as first:
+        wait_for(tmp_path, '"pruned"', 1)
+        with begin(tmp_path, "--resume") as second:
+            assert (first.wait(PATIENCE_S), second.wait(PATIENCE_S)) == (0, 0)
+    logs = [json.loads(line) for line in (tmp_path / "out" / JOURNAL).read_text(encoding="utf-8").splitlines()]
+    by = [each["user_attr"]["process"] for each in logs if "process" in each.get("user_attr", {})]
+    assert len(by) == TRIALS
+    assert set(by) == {0, 1}
+    rows = (tmp_path / "out" / "trials.csv").read_text(encoding="utf-8").splitlines()[1:]
+    assert [int(row.split(",")[0]) for row in rows] == list(range(TRIALS))
+
+
+def test_it_is_interrupted_and_says_how_to_go_on(tmp_path: Path) -> None:
+    with begin(tmp_path) as first:
+        wait_for(tmp_path, '"pruned"', 1)
+        first.terminate()
+        _, said = first.communicate(timeout=PATIENCE_S)
+    assert first.returncode == 130
+    out = tmp_path / "out"
+    assert said == f"colibri: error: interrupted; what was tried is in {out}: go on with --resume\n"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("least", range(20))
+def test_it_is_killed_at_any_instant_and_goes_on(tmp_path: Path, least: int) -> None:
+    tuned(tmp_path / "expected", trials=TRIALS)
+    with begin(tmp_path) as first:
+        wait_for(tmp_path, "\n", 3 * least)
+        first.kill()
+    with begin(tmp_path, "--resume") as second:
+        assert second.wait(PATIENCE_S) == 0
+    assert files_in(tmp_path / "out") == files_in(tmp_path / "expected")

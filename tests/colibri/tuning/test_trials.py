@@ -1,0 +1,99 @@
+"""Trials in a journal: the same whoever goes on with them."""
+
+from pathlib import Path
+
+import pytest
+
+from colibri.tuning.trials import JOURNAL, Begun, Ended, Trials
+from tests.colibri.tuning.support import POSITION, RATE, planned
+
+
+def end(trials: Trials, begun: Begun) -> None:
+    """End a trial with a value that follows from what it tried."""
+    value = abs(begun.params[POSITION] - 300.0) + begun.params[RATE]
+    trials.tell(begun, Ended(begun.number, (value,), begun.params, 4, 0, False, {}))
+
+
+def all_of(folder: Path, trials: int = 14) -> list[Ended]:
+    with Trials(folder, planned(trials=trials)) as shared:
+        while (begun := shared.ask()) is not None:
+            end(shared, begun)
+        return shared.ended
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> list[Ended]:
+    """What comes of 14 trials by one process."""
+    return all_of(tmp_path_factory.mktemp("expected"))
+
+
+def plain(trials: list[Ended]) -> list[tuple[object, ...]]:
+    return [(trial.number, trial.values, trial.params) for trial in trials]
+
+
+def test_the_first_is_the_profile_as_it_is_and_others_have_four_digits(expected: list[Ended]) -> None:
+    assert expected[0].params == {POSITION: 100.0, RATE: 0.015}
+    for trial in expected:
+        assert all(value == float(f"{value:.4g}") for value in trial.params.values())
+    assert len({trial.params[POSITION] for trial in expected}) == 14
+
+
+def test_a_root_seed_is_another_tuning(tmp_path: Path, expected: list[Ended]) -> None:
+    with Trials(tmp_path, planned(root_seed=1)) as shared:
+        for trial in expected[:2]:
+            begun = shared.ask()
+            assert begun is not None
+            assert begun.number == trial.number
+            assert (begun.params == trial.params) is (begun.number == 0)
+            end(shared, begun)
+
+
+@pytest.mark.parametrize("cut", range(1, 30, 4))
+def test_after_the_end_of_a_process_another_goes_on_as_that_would_have(
+    cut: int, tmp_path: Path, expected: list[Ended]
+) -> None:
+    with Trials(tmp_path, planned(trials=14)) as shared:
+        for _ in range(11):
+            begun = shared.ask()
+            assert begun is not None
+            end(shared, begun)
+        shared.ask()
+    journal = tmp_path / JOURNAL
+    lines = journal.read_bytes().splitlines(keepends=True)
+    kept = b"".join(lines[: len(lines) - cut])
+    journal.write_bytes(kept + lines[len(lines) - cut][: 3 * cut])  # killed while it wrote
+    assert plain(all_of(tmp_path)) == plain(expected)
+
+
+def test_more_trials_go_on_where_it_ended(tmp_path: Path, expected: list[Ended]) -> None:
+    assert plain(all_of(tmp_path, 9)) == plain(expected[:9])
+    assert plain(all_of(tmp_path)) == plain(expected)
+
+
+def test_who_is_alive_keeps_its_trial_and_who_is_not_does_not(tmp_path: Path) -> None:
+    tuning = planned(trials=3)
+    with Trials(tmp_path, tuning) as one, Trials(tmp_path, tuning) as other:
+        first = one.ask()
+        assert first is not None
+        end(one, first)
+        mine, theirs = one.ask(), other.ask()
+        assert mine is not None
+        assert theirs is not None
+        assert (mine.number, theirs.number) == (1, 2)
+        assert mine.params != theirs.params
+        end(other, theirs)
+        one.__exit__()
+        again = other.ask()
+        assert again is not None
+        assert again.number == 1
+        end(other, again)
+        assert other.ask() is None
+        assert [trial.number for trial in other.ended] == [0, 1, 2]
+
+
+def test_importances_tell_what_matters(tmp_path: Path) -> None:
+    all_of(tmp_path, 30)
+    with Trials(tmp_path, planned(trials=30)) as shared:
+        (parts,) = shared.importances()
+    assert sum(parts.values()) == pytest.approx(1.0)
+    assert parts[POSITION] > 0.7

@@ -1,0 +1,80 @@
+"""Before and after, in pairs."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import colibri
+from colibri.campaigns.flight_table import FlightTable
+from colibri.campaigns.flights import Flown, Verdict
+from colibri.tuning.verdict import Compared, better, check_campaign, compare
+from tests.colibri.tuning.support import WEIGHTS, planned
+
+SEEDS = 40
+TRACKS = {"grid": {"track": ["hover", "spiral"]}}
+
+
+def compared(after: Any, lost_after: int = 0, **tables: Any) -> list[Compared]:
+    """Compare flights whose error differs from seed to seed and track to track, and is multiplied by `after`."""
+    tuning = planned(**({"check_seeds": f"101-{100 + SEEDS}"} | TRACKS | tables))
+    before = colibri.load_profile("flight")
+    campaign = check_campaign(tuning, before, before.replace(f"{WEIGHTS}.position", 200.0))
+    chance = np.random.default_rng(1)
+    errors = chance.uniform(0.1, 1.0, (2, SEEDS)) * np.array([[1.0], [5.0]])
+    values = np.concatenate([errors.ravel(), (errors * after).ravel()])
+    lost = range(2 * SEEDS, 2 * SEEDS + lost_after)
+    flown = {
+        flight: Flown(flight, Verdict.LOST if flight in lost else Verdict.FLOWN, "", (float(value),), "")
+        for flight, value in enumerate(values)
+    }
+    return compare(tuning, FlightTable(campaign, flown))
+
+
+def test_pairs_show_what_the_spread_of_seeds_would_hide() -> None:
+    noise = np.random.default_rng(2).normal(0.9, 0.02, (2, SEEDS))
+    overall, hover, spiral = compared(noise)[:3]
+    assert [overall.where, hover.where, spiral.where] == ["all", "hover", "spiral"]
+    for each in (overall, hover, spiral):
+        assert each.after / each.before - 1.0 == pytest.approx(each.change)
+        assert each.low < each.change < each.high
+        assert each.change == pytest.approx(-0.1, abs=0.01)
+        assert each.high - each.low < 0.03
+    assert better([overall])
+
+
+def test_what_is_noise_is_no_better() -> None:
+    noise = np.random.default_rng(3).normal(1.0, 0.3, (2, SEEDS))
+    (overall, *_) = compared(noise)
+    assert overall.low < 0.0 < overall.high
+    assert not better([overall])
+    assert not better(compared(1.1))
+
+
+def test_worse_in_one_objective_is_not_better() -> None:
+    both: dict[str, Any] = {"objectives": {"rmse_m": "mean", "share_lost": "mean"}}
+    found = compared(0.5, lost_after=20, **both)
+    lost = next(each for each in found if each.what == "share_lost")
+    assert (lost.before, lost.after, lost.change) == (0.0, 0.25, 0.25)
+    assert lost.low > 0.0
+    assert not better(found)
+    assert better(compared(0.5, **both))
+
+
+def test_lost_flights_count_where_it_was_tuned_for_and_are_left_out_elsewhere() -> None:
+    tuned_for = compared(0.5, lost_after=2)[0]
+    beside = next(each for each in compared(0.5, 2, objectives={"share_lost": "mean"}) if each.what == "rmse_m, mean")
+    assert tuned_for.after > 0.5 * tuned_for.before
+    assert beside.change == pytest.approx(-0.5)
+
+
+def test_the_check_has_other_seeds_other_draws_and_the_same_for_both() -> None:
+    mass = "plant-vehicle.body.mass_kg"
+    tuning = planned(check_seeds="11-14", draw={mass: {"uniform": [0.68, 0.74]}}, **TRACKS)
+    profile = colibri.load_profile("flight")
+    points = list(check_campaign(tuning, profile, profile).points())
+    assert len(points) == 2 * 2 * 4
+    before, after = points[:8], points[8:]
+    assert [(each.seed, each.factors[mass]) for each in before] == [(each.seed, each.factors[mass]) for each in after]
+    assert not {each.factors[mass] for each in before} & {each.factors[mass] for each in tuning.campaign.points()}
+    assert not {each.seed for each in before} & {each.seed for each in tuning.campaign.points()}
