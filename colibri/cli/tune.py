@@ -114,7 +114,6 @@ def _progress(title: str, *, quiet: bool) -> "Iterator[Watcher]":
 
 def _print(results: "TuningResults", out: Path) -> None:
     from colibri.analysis.tables import print_table
-    from colibri.tuning.verdict import ALL
 
     names = [objective.name for objective in results.tuning.objectives]
     first, best = results.trials[0], results.best
@@ -132,7 +131,7 @@ def _print(results: "TuningResults", out: Path) -> None:
         shown = [
             (*each.row[:2], f"{each.before:.4g}", f"{each.after:.4g}", _percent(each.change), _interval(each))
             for each in results.verdict
-            if each.is_objective or each.where == ALL
+            if each.is_objective or each.is_overall
         ]
         title = f"{len(results.tuning.check_seeds)} seeds that no trial has flown: {_said(results)}"
         print_table(title, ("", "flights of", "before", "after", "change", "with 95 %"), shown, names=2)
@@ -141,7 +140,11 @@ def _print(results: "TuningResults", out: Path) -> None:
 def _said(results: "TuningResults") -> str:
     if results.is_better:
         return "better"
-    return "worse" if any(each.low > 0.0 for each in results.verdict if each.is_objective) else "no better"
+    objectives = [each for each in results.verdict if each.is_objective and each.is_overall]
+    worse = any(each.low > 0.0 for each in objectives)
+    if worse and any(each.high < 0.0 for each in objectives):
+        return "one objective for another"
+    return "worse" if worse else "no better"
 
 
 def _interval(each: "Compared") -> str:

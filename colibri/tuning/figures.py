@@ -98,7 +98,7 @@ def draw_history(title: str, objectives: Sequence[str], trials: Sequence[Ended],
 def draw_pareto(
     title: str, objectives: Sequence[str], trials: Sequence[Ended], front: Sequence[Ended], best: Ended
 ) -> Figure:
-    """Return each further objective over the first, a dot a trial; those that none beats in all are joined."""
+    """Return each further objective over the first, a dot a trial; the Pareto front is joined."""
     figure, grid = axes_grid(len(objectives) - 1, 1, TOP_IN, row_in=3.6, share=False)
     joined = sorted(front, key=lambda trial: trial.values)
     for place, (objective, (axes,)) in enumerate(zip(objectives[1:], grid, strict=True), start=1):
@@ -125,7 +125,7 @@ def _dots(
     first = trials[0]
     strong = [trial for trial in trials if not trial.pruned and (front is None or trial in front)]
     weak = [trial for trial in trials if trial not in strong]
-    said = "pruned: what they would probably have come to" if front is None else "beaten in all objectives by another"
+    said = "pruned: what they would probably have come to" if front is None else "dominated"
     for some, color, label in ((weak, _PRUNED, said), (strong, _TRIED, "trial" if front is None else "Pareto front")):
         if some:
             at = [along(trial) for trial in some]

@@ -53,6 +53,11 @@ class Compared(NamedTuple):
     is_objective: bool
 
     @property
+    def is_overall(self) -> bool:
+        """Whether it is over the flights of all combinations."""
+        return self.where == ALL
+
+    @property
     def row(self) -> Row:
         """Itself as a row of a table."""
         numbers = (self.before, self.after, self.change, self.low, self.high)
@@ -164,5 +169,5 @@ def _change(objective: Objective, before: Array, after: Array) -> Array:
 
 def better(compared: Sequence[Compared]) -> bool:
     """Tell whether one objective is better with 95 % confidence over all flights, and none is worse."""
-    found = [each for each in compared if each.is_objective and each.where == ALL]
+    found = [each for each in compared if each.is_objective and each.is_overall]
     return any(each.high < 0.0 for each in found) and not any(each.low > 0.0 for each in found)
