@@ -15,7 +15,7 @@ FACES = (
     "colibri",
     *("colibri.analysis", "colibri.autopilot", "colibri.campaigns", "colibri.common", "colibri.conformance"),
     *("colibri.experiments", "colibri.flights", "colibri.mavlink"),
-    *("colibri.plant", "colibri.sitl"),
+    *("colibri.plant", "colibri.sitl", "colibri.tuning"),
 )
 PACKAGES = (*FACES, "colibri.bench", "colibri.certification", "colibri.cli", "colibri.studies", "colibri.verification")
 MAX_IMPORT_MS = 50.0
