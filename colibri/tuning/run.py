@@ -156,11 +156,12 @@ def _open(out: Path, tuning: Tuning, *, resume: bool) -> None:
 
 
 def _identity(tuning: Tuning) -> dict[str, Any]:
-    """Return in plain data which tuning it is; it may go on with more trials, and be checked by other seeds."""
+    """Return in plain data which tuning it is; it may go on with more trials."""
     return {
         **identity_of(tuning.campaign, tuning.common),
         "colibri": version("colibri-sitl"),
         "optuna": version("optuna"),
+        "check_seeds": list(tuning.check_seeds),
         "prune_after": tuning.prune_after,
         "tune": {name: [type(values).__name__, repr(values)] for name, values in tuning.space.items()},
         "objectives": [objective.name for objective in tuning.objectives],

@@ -97,7 +97,7 @@ def test_it_goes_on_and_nothing_changes(results: TuningResults, folder: Path) ->
 
 
 def test_a_folder_with_something_else_is_left_alone(folder: Path, results: TuningResults, tmp_path: Path) -> None:
-    given: dict[str, Any] = {"trials": 9, "grid": {"track": ["hover", "hover:height=2.2"]}}
+    given: dict[str, Any] = {"trials": 9, "check_seeds": "11-13", "grid": {"track": ["hover", "hover:height=2.2"]}}
     with pytest.raises(colibri.Error, match="has this tuning already: go on with --resume, or choose another folder"):
         tuned(folder, **given)
     with pytest.raises(colibri.Error, match=r"has another tuning \(root_seed differ\): choose another folder"):
