@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from colibri.analysis.figures import AXES, GRID, TOP_IN, axes_grid, put_head, round_ticks
 from colibri.campaigns.values import Choice, LogUniform, shown
@@ -18,6 +19,7 @@ _CHARACTER_IN = 0.085
 _BAR_IN, _PANEL_IN = 0.32, 1.9
 _WIDE_SPREAD = 20.0
 _COLUMNS = 2
+_MANY_DECADES = 300.0
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:
@@ -66,7 +68,7 @@ def draw_slices(
         values = space[name]
         _dots(axes, trials, best, lambda trial, of=name, within=values: _at(within, trial.params[of]), place)
         if isinstance(values, LogUniform):
-            axes.set_xscale("log")
+            _scale_by_ratios(axes)
         elif isinstance(values, Choice):
             axes.set_xticks(range(len(values.values)), [shown(each) for each in values.values])
         axes.set_xlabel(short[name])
@@ -125,7 +127,7 @@ def _dots(
     first = trials[0]
     strong = [trial for trial in trials if not trial.pruned and (front is None or trial in front)]
     weak = [trial for trial in trials if trial not in strong]
-    said = "pruned: what they would probably have come to" if front is None else "dominated"
+    said = "pruned, as expected by then" if front is None else "dominated"
     for some, color, label in ((weak, _PRUNED, said), (strong, _TRIED, "trial" if front is None else "Pareto front")):
         if some:
             at = [along(trial) for trial in some]
@@ -138,6 +140,15 @@ def _dots(
         axes.set_yscale("log")
     else:
         axes.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
+
+
+def _scale_by_ratios(axes: Axes) -> None:
+    """Have an even axis for even ratios, with few plain numbers."""
+    axes.set_xscale("log")
+    low, high = axes.get_xlim()
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0) if high < _MANY_DECADES * low else (1.0,)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _at(values: Range, value: Any) -> float:

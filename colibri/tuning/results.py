@@ -120,11 +120,15 @@ class TuningResults:
             for trial in self.front:
                 (path / "pareto" / f"trial-{trial.number}.toml").write_text(self.file_of(trial), encoding="utf-8")
         if self.verdict:
-            rows = [each.row for each in self.verdict]
-            (path / "verdict.csv").write_text(comma_separated(HEADINGS, rows), encoding="utf-8")
+            self.save_verdict(path)
         for name, figure in self._figures():
             figure.savefig(path / f"{name}.png")
         return path
+
+    def save_verdict(self, folder: Path) -> None:
+        """Write `verdict.csv` into a folder."""
+        rows = [each.row for each in self.verdict]
+        (folder / "verdict.csv").write_text(comma_separated(HEADINGS, rows), encoding="utf-8")
 
     def _state(self, trial: Ended) -> str:
         if trial is self.best:

@@ -98,10 +98,12 @@ def fly_tuning(
         _fly_trials(tuning, trials, first_engine, told)
         results = TuningResults(tuning, trials.ended, trials.importances())
         with FileLock(out / "locks" / "results"):
-            if tuning.check_seeds and results.best.number:
-                results.with_check(_check(tuning, results, engine(), out, told))
             if keep:
                 results.save(out)
+            if tuning.check_seeds and results.best.number:
+                results.with_check(_check(tuning, results, engine(), out, told))
+                if keep:
+                    results.save_verdict(out)
     return results
 
 
