@@ -238,12 +238,12 @@ def _text(given: Any) -> str | None:
 def _check_ends(tuning: Tuning) -> None:
     """Plan the flights of the profile as it is, and one with each end of each range."""
     campaign, common = tuning.campaign, tuning.common
-    check(campaign, common)
+    check(campaign.samples(), common)
     first = campaign._replace(grid={name: values[:1] for name, values in campaign.grid.items()}, draw={})
     drawn = {name: draw.typical[0] for name, draw in campaign.draw.items()}
     for name, values in tuning.space.items():
         for value in values.typical:
             try:
-                check(first, common._replace(fly={**common.fly, **drawn, name: value}))
+                check(first.samples(), common._replace(fly={**common.fly, **drawn, name: value}))
             except Error as error:
                 raise TuningError(f"{name} = {value}: {error}") from error
