@@ -10,6 +10,7 @@ from colibri.common.process.lifecycle import fail
 from colibri.mavlink.links.open import open_ground_link, open_link
 from colibri.mavlink.links.startup import begin, report_compiling
 from colibri.plant.process.options import add_world_arguments
+from colibri.plant.process.reports import awaiting
 
 DEFAULT_LINKS = {
     "colibri": "udpin:127.0.0.1:14560",
@@ -79,13 +80,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     url = args.link or DEFAULT_LINKS[args.serve]
     if args.serve == "px4":
         link_to_px4, status, stop = begin("plant", url, args, open_ground_link)
-        status.say("listening", f"waiting for PX4 on {link_to_px4.url}", url=link_to_px4.url)
+        event = "listening" if link_to_px4.target is None else "calling"
+        status.say(event, awaiting("PX4", link_to_px4), url=link_to_px4.url)
         report_compiling(status)
         from colibri.plant.process.px4_server import run as serve_px4
 
         return serve_px4(args, link_to_px4, status, stop)
     link, status, stop = begin("plant", url, args, open_link)
-    status.say("listening", f"waiting for an autopilot on {link.url}", url=link.url)
+    if link.target is not None:
+        fail(f"{url}: the plant calls PX4 alone; others call it: give --link udpin:HOST:PORT")
+    whom = "ArduPilot" if args.serve == "ardupilot-json" else "an autopilot"
+    status.say("listening", awaiting(whom, link), url=link.url)
     report_compiling(status)
     if args.serve == "ardupilot-json":
         from colibri.plant.process.ardupilot_server import run

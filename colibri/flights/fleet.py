@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from math import isfinite
-from pathlib import Path
 from time import perf_counter, time
 
 from colibri.autopilot.control.profile import load_profile
@@ -13,6 +12,7 @@ from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.earth.home import HomePlace
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, Stop, fail
+from colibri.common.process.log_files import set_aside
 from colibri.flights.children import Child, end_children, events_of, how_it_ended
 from colibri.flights.command_lines import options_of, plant_options
 from colibri.flights.fleet_status import StatusLines
@@ -235,9 +235,4 @@ def start_again(member: Member, args: argparse.Namespace, lines: StatusLines) ->
 def _set_aside(member: Member, args: argparse.Namespace, names: Sequence[str]) -> None:
     """Give logs of processes that have died names of their own: autopilot.csv becomes autopilot-1.csv."""
     for name in names if args.out else ():
-        path: Path = args.out / str(member.instance) / name
-        number = 1
-        while (aside := path.with_stem(f"{path.stem}-{number}")).exists():
-            number += 1
-        if path.exists():
-            path.rename(aside)
+        set_aside(args.out / str(member.instance) / name)

@@ -23,6 +23,28 @@ class LogError(InFlightError):
     """A log that cannot be written any further; the message names its file."""
 
 
+def set_aside(*paths: Path) -> None:
+    """Give logs that are over a name of their own, so that others can begin: plant.csv becomes plant-1.csv.
+
+    All get the same number, the first that none of them has had; what is not there is passed over.
+
+    Raises:
+        LogError: One cannot be renamed.
+    """
+    number = 1
+    while any(_numbered(path, number).exists() for path in paths):
+        number += 1
+    for path in filter(Path.exists, paths):
+        try:
+            path.rename(_numbered(path, number))
+        except OSError as error:
+            raise LogError(f"cannot rename {path}: {error.strerror}") from error
+
+
+def _numbered(path: Path, number: int) -> Path:
+    return path.with_stem(f"{path.stem}-{number}")
+
+
 class LogFile:
     """A file of records, each of which gets into it whole or not at all, in their order."""
 

@@ -16,6 +16,8 @@ OUTPUT_BYTES = 1 << 18
 CONNECTIONS = 16
 """Clients that a server has at once; further ones are turned away."""
 RECONNECT_AFTER_S = 1.0
+ACCEPT_EVERY_S = 0.1
+"""How often a server that has clients and is polled without a pause looks for others: each look is a system call."""
 _CHUNK_BYTES = 4096
 _CHUNKS_AT_ONCE = 16
 """So that whoever sends without a pause cannot hold the process up."""
@@ -87,6 +89,7 @@ class TcpServer(Endpoint):
         sock.setblocking(False)
         self._socket = sock
         self._connections: dict[Address, Connection] = {}
+        self._accept_at_s = 0.0
 
     def send(self, datagram: bytes, address: Address | None = None) -> None:
         """Send whole frames to the client at `address`, or to all; nothing if there is none."""
@@ -97,7 +100,8 @@ class TcpServer(Endpoint):
 
     def receive_now(self) -> list[tuple[bytes, Address]]:
         """Return the frames that have come, and from which client each."""
-        self._accept()
+        if not self._connections or perf_counter() >= self._accept_at_s:
+            self._accept()
         received = [
             (frame, connection.address)
             for connection in self._connections.values()
@@ -109,7 +113,8 @@ class TcpServer(Endpoint):
     def wait(self, timeout_s: float) -> None:
         """Sleep until somebody has come, gone or sent something, but no longer than `timeout_s`."""
         sockets = [self._socket.fileno(), *(connection.fileno() for connection in self._connections.values())]
-        select.select(sockets, [], [], timeout_s)
+        if self._socket.fileno() in select.select(sockets, [], [], timeout_s)[0]:
+            self._accept_at_s = 0.0
 
     def close(self) -> None:
         """Close every connection and stop waiting."""
@@ -123,6 +128,7 @@ class TcpServer(Endpoint):
             try:
                 sock, address = self._socket.accept()
             except OSError:  # nobody, gone again, or no descriptors left
+                self._accept_at_s = perf_counter() + ACCEPT_EVERY_S
                 return
             connection = _established(sock, address) if len(self._connections) < CONNECTIONS else None
             if connection is None:

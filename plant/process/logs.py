@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
-from colibri.common.process.log_files import CsvLog
+from colibri.common.process.log_files import CsvLog, set_aside
 from colibri.mavlink.hil.lockstep_plant import Outgoing
 from colibri.mavlink.wire.tlog import TlogWriter
 from colibri.plant.physics.equations import STATE
 from colibri.plant.physics.world import World
 
+TRUTH, TRAFFIC = "plant.csv", "flight.tlog"
 WIND_COLUMNS = ("wind_east", "wind_north", "wind_up")
 TRUTH_COLUMNS = ("t", *STATE, "omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah", *WIND_COLUMNS)
 
@@ -21,14 +22,30 @@ def truth_row(world: World) -> tuple[float, ...]:
 class PlantLogs:
     """What the plant writes: the truth at every frame, and every MAVLink frame."""
 
-    def __init__(self, folder: Path, boot_unix_us: int = 0) -> None:
-        """Create `plant.csv` and `flight.tlog` in `folder`; `boot_unix_us`: Unix time at simulated time 0.
+    def __init__(self, folder: Path, boot_unix_us: int = 0, *, speaks_mavlink: bool = True) -> None:
+        """Create `plant.csv` in `folder`, and `flight.tlog` where the plant `speaks_mavlink`.
 
-        Without it the times of `flight.tlog` are simulated.
+        `boot_unix_us` is the Unix time at simulated time 0; without it the times of `flight.tlog` are simulated.
         """
         self._boot_unix_us = boot_unix_us
-        self._truth = CsvLog(folder / "plant.csv", TRUTH_COLUMNS)
-        self._tlog = TlogWriter(folder / "flight.tlog")
+        self._speaks_mavlink = speaks_mavlink
+        self._folder = folder
+        self._open()
+
+    def _open(self) -> None:
+        self._truth = CsvLog(self._folder / TRUTH, TRUTH_COLUMNS)
+        self._tlog = TlogWriter(self._folder / TRAFFIC) if self._speaks_mavlink else None
+
+    def begin_again(self) -> None:
+        """Begin the files of another flight; those of the last one become `plant-1.csv` and `flight-1.tlog`, and so on.
+
+        Raises:
+            LogError: The last one's cannot be written or renamed.
+        """
+        self.flush()
+        self.close()
+        set_aside(self._folder / TRUTH, self._folder / TRAFFIC)
+        self._open()
 
     def write_world(self, world: World) -> None:
         """Append the truth."""
@@ -42,7 +59,8 @@ class PlantLogs:
 
     def write_frames(self, time_us: int, frames: list[bytes]) -> None:
         """Append frames of simulated time `time_us`."""
-        self._tlog.write(self._boot_unix_us + time_us, frames)
+        if self._tlog:
+            self._tlog.write(self._boot_unix_us + time_us, frames)
 
     def flush(self) -> None:
         """Write what waits.
@@ -50,10 +68,10 @@ class PlantLogs:
         Raises:
             LogError: It cannot be written.
         """
-        self._truth.flush()
-        self._tlog.flush()
+        for log in filter(None, (self._truth, self._tlog)):
+            log.flush()
 
     def close(self) -> None:
-        """Close both."""
-        self._truth.close()
-        self._tlog.close()
+        """Close all."""
+        for log in filter(None, (self._truth, self._tlog)):
+            log.close()

@@ -18,7 +18,7 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.options import nudged
-from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, closing, report_end
+from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, awaiting, closing, report_end
 from colibri.plant.process.server import Pace
 from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
@@ -62,6 +62,7 @@ class Simulator:
         self._link, self._status, self._stop = link, status, stop
         self._end = SimulatorEnd(system_id=args.system_id)
         self._logs = PlantLogs(args.out, args.boot_unix_us) if args.out else None
+        self._logged_calls = 1
         self._time_us = 0
 
     def serve(self) -> None:
@@ -100,6 +101,10 @@ class Simulator:
         figures: dict[str, Any] = {"frames": frames, "resent": self._end.resent, "dropped": dict(self._end.dropped)}
         event, text = ("gone", "PX4 has gone") if gone else ("ended", "ended")
         text = f"{text} {{}} after {frames} frames"
+        if gone:
+            text += f"; {awaiting('PX4', self._link)}"
+        if self._logs:
+            self._logs.flush()
         report_end(self._status, world.time_us, began_s, text, event=event, **figures)
         return not gone
 
@@ -154,6 +159,9 @@ class Simulator:
         self._send()
 
     def _send(self) -> None:
+        if self._logs and self._end.calls > self._logged_calls:  # another flight: what is logged from here on is its
+            self._logs.begin_again()
+            self._logged_calls, self._time_us = self._end.calls, 0
         for frames, address in self._end.take_outbox():
             self._link.send(b"".join(frames), address)
             if self._logs:

@@ -10,6 +10,7 @@ from colibri.common.errors import Error
 from colibri.common.process.failure_file import keep_failure
 from colibri.common.process.lifecycle import EXIT_FAILED, fail, gc_frozen
 from colibri.common.process.status import Status
+from colibri.mavlink.links.link import GroundLink
 
 MAX_WAIT_S = 0.1
 """Longest wait between two looks at whether the process shall end."""
@@ -22,6 +23,11 @@ class Closable(Protocol):
 
     def close(self) -> None:
         """Close it."""
+
+
+def awaiting(whom: str, link: GroundLink) -> str:
+    """Return in words how a plant on `link` comes to speak with an autopilot: it waits for it, or calls it."""
+    return f"waiting for {whom} on {link.url}" if link.target is None else f"calling {whom} at {link.url}"
 
 
 @contextmanager
@@ -68,9 +74,16 @@ class Silence:
 
 
 def report_end(
-    status: Status, time_us: int, began_s: float, text: str, *, event: str = "ended", **figures: Any
+    status: Status,
+    time_us: int,
+    began_s: float,
+    text: str,
+    *,
+    event: str = "ended",
+    ended_s: float | None = None,
+    **figures: Any,
 ) -> None:
-    """Report the end of a flight at simulated time `time_us` that began at `began_s` by the wall clock."""
+    """Report the end of a flight at simulated time `time_us`, from `began_s` to `ended_s`, or now, by the wall clock."""
     time_s = time_us / 1e6
-    wall_time_s = perf_counter() - began_s
+    wall_time_s = (perf_counter() if ended_s is None else ended_s) - began_s
     status.say(event, text.format(f"at t = {time_s:.3f} s"), sim_time_s=time_s, wall_time_s=wall_time_s, **figures)

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from colibri.common.process.log_files import CsvLog, LogError
+from colibri.common.process.log_files import CsvLog, LogError, set_aside
 
 
 @given(row=st.lists(st.floats() | st.integers(-9, 9), min_size=1, max_size=5))
@@ -65,3 +65,18 @@ def test_on_a_full_disk_the_rows_before_stay_whole_and_it_is_said_once(tmp_path:
     log.add((5.0, 6.0))
     log.close()
     assert path.read_text(encoding="utf-8") == "a,b\n1.25,2.5\n"
+
+
+def test_logs_that_are_over_get_one_number_that_none_of_them_has_had(tmp_path: Path) -> None:
+    names = ("plant.csv", "flight.tlog")
+    for name in (*names, "flight-1.tlog"):
+        (tmp_path / name).write_text(name, encoding="utf-8")
+    set_aside(*(tmp_path / name for name in names), tmp_path / "not-there.csv")
+    (tmp_path / "plant.csv").write_text("again", encoding="utf-8")
+    set_aside(*(tmp_path / name for name in names))
+    assert {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()} == {
+        "flight-1.tlog": "flight-1.tlog",
+        "flight-2.tlog": "flight.tlog",
+        "plant-2.csv": "plant.csv",
+        "plant-3.csv": "again",
+    }

@@ -202,6 +202,60 @@ def test_a_client_waits_before_it_calls_again(server: GroundLink) -> None:
             assert again.receive_now() == []
 
 
+class Listener(socket.socket):
+    """A listening socket that counts how often a connection is asked for."""
+
+    asked = 0
+
+    def accept(self) -> tuple[socket.socket, Address]:
+        """Count, and accept."""
+        self.asked += 1
+        return super().accept()
+
+
+def test_a_server_with_clients_looks_for_others_now_and_then_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A look costs a system call and an exception: at each of the polls between two frames it would cost most of all."""
+    now_s = [10.0]
+    monkeypatch.setattr(tcp, "perf_counter", lambda: now_s[0])
+    listener = Listener(socket.AF_INET, socket.SOCK_STREAM)
+    listener.bind(("127.0.0.1", 0))
+    listener.listen()
+    with closing(tcp.TcpServer(listener, f"tcpin:127.0.0.1:{listener.getsockname()[1]}")) as server:
+        with caller(server) as one:
+            one.sendall(HEARTBEAT)
+            awaited(server.receive_now)
+            asked = listener.asked
+            for _ in range(1000):
+                server.receive_now()
+            assert listener.asked == asked
+            with caller(server) as two:
+                assert server.take_opened() == [one.getsockname()]
+                now_s[0] += tcp.ACCEPT_EVERY_S
+                assert awaited(lambda: server.receive_now() or server.take_opened()) == [two.getsockname()]
+        closed: list[Address] = []
+
+        def both_gone() -> bool:
+            server.receive_now()
+            closed.extend(server.take_closed())
+            return len(closed) == 2
+
+        assert awaited(both_gone)
+        asked = listener.asked
+        server.receive_now()
+        assert listener.asked > asked  # nobody is there: whoever comes is served at once
+
+
+def test_a_server_that_sleeps_is_woken_by_another_client_and_serves_it_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tcp, "perf_counter", lambda: 10.0)
+    with closing(open_ground_link("tcpin:127.0.0.1:0")) as server, caller(server) as one:
+        one.sendall(HEARTBEAT)
+        awaited(server.receive_now)
+        with caller(server) as two:
+            server.wait(5.0)
+            server.receive_now()
+            assert server.take_opened() == [one.getsockname(), two.getsockname()]
+
+
 def test_too_many_clients_are_turned_away(server: GroundLink, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tcp, "CONNECTIONS", 2)
     with caller(server) as one, caller(server) as two, caller(server) as three:

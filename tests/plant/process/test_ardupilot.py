@@ -202,6 +202,19 @@ def test_the_process_answers_whoever_asks_and_keeps_what_was_flown(plant: Proces
     assert float(rows[-1].split(",")[0]) == 0.75
 
 
+@pytest.mark.parametrize("whom", ["colibri", "ardupilot-json"])
+def test_a_plant_that_is_to_call_whoever_calls_it_says_so(whom: str, tmp_path: Path) -> None:
+    """It would wait for ever on a port that nobody knows."""
+    process = Process(tmp_path, "plant", "--serve", whom, "--link", "udpout:127.0.0.1:9002")
+    with running(process):
+        assert process.wait() == 2
+    assert (
+        process.errors()
+        .splitlines()[-1]
+        .endswith("udpout:127.0.0.1:9002: the plant calls PX4 alone; others call it: give --link udpin:HOST:PORT")
+    )
+
+
 def test_a_vehicle_that_ardupilot_cannot_fly_is_one_line(tmp_path: Path) -> None:
     text = (Path(__file__).parents[3] / "plant" / "vehicle" / "models" / "hummingbird.toml").read_text(encoding="utf-8")
     places = "[[0.171, 0.0], [0.0, -0.171], [-0.171, 0.0], [0.0, 0.171]]"

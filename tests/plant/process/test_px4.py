@@ -1,7 +1,7 @@
 """PX4's simulator interface: the conversation, and a flight through it over TCP and UDP."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -17,12 +17,13 @@ from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.links.link import GroundLink, receive_soon
 from colibri.mavlink.links.open import open_ground_link
 from colibri.mavlink.wire.dialect import Codec
+from colibri.mavlink.wire.tlog import decode
 from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, starting_world, state_frame
 from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.vehicle.description import load_vehicle
 from tests.plant.process.px4 import Px4, serve
-from tools.harness.processes import GIVE_UP_AFTER_S, Process, running, wait_for
+from tools.harness.processes import GIVE_UP_AFTER_S, Process, rows, running, wait_for
 
 PX4, OTHER = ("127.0.0.1", 4561), ("127.0.0.1", 4562)
 STOPPED = Motors((0.0,) * 4, armed=False)
@@ -217,19 +218,34 @@ def test_a_px4_takes_off_and_hovers_over_tcp_and_so_does_the_next(tmp_path: Path
             times = [message.fields.time_usec for message in px4.messages if message.name == "HIL_SENSOR"]
             assert set(np.diff(times)) == {FRAME_US}
             assert len(px4.fixes) == pytest.approx(15 * 20, abs=10)
+        assert process.events("gone")[1]["text"].endswith(f"; waiting for PX4 on {url.replace('tcp', 'tcpin')}")
         process.process.terminate()
         assert process.wait() == 130
-    assert (tmp_path / "out" / "flight.tlog").stat().st_size > 100_000
+    for name in ("plant-1.csv", "plant.csv"):  # a flight has a file of its own
+        flown_s = rows(tmp_path / "out" / name)["t"]
+        assert (flown_s[0], flown_s[-1]) == (0.004, pytest.approx(15.0, abs=0.1))
+        assert set(np.diff(np.round(flown_s * 1e6))) == {FRAME_US}
+    for name in ("flight-1.tlog", "flight.tlog"):
+        logged = list(decode((tmp_path / "out" / name).read_bytes()))
+        assert np.diff([each.time_us for each in logged]).min() >= 0
+        names = [message.name for each in logged for message in Codec(1, 1).decode(each.frame)]
+        assert {"COMMAND_LONG", "HEARTBEAT"} <= set(names[: len(Px4().hello())])
+        assert names.count("HIL_SENSOR") == pytest.approx(15 * 250, abs=25)
+    assert len(list((tmp_path / "out").iterdir())) == 4
 
 
 def test_a_px4_that_waits_to_be_called_is_called_over_udp(tmp_path: Path) -> None:
-    px4, link = Px4(), open_ground_link("udpin:127.0.0.1:0")
-    with plant(tmp_path, link.url.replace("udpin", "udpout")):
-        called = receive_soon(link, GIVE_UP_AFTER_S)
-        for datagram in px4.hello():
-            link.send(datagram, called[0][1])
-        serve(px4, link, lambda: px4.sensors > 500, "frames")
-    link.close()
+    px4 = Px4()
+    with closing(open_ground_link("udpin:127.0.0.1:0")) as link:
+        url = link.url.replace("udpin", "udpout")
+        with plant(tmp_path, url) as process:
+            calling = process.wait_for("calling")
+            assert (calling["url"], calling["text"]) == (url, f"calling PX4 at {url}")
+            assert process.events("listening") == []
+            called = receive_soon(link, GIVE_UP_AFTER_S)
+            for datagram in px4.hello():
+                link.send(datagram, called[0][1])
+            serve(px4, link, lambda: px4.sensors > 500, "frames")
 
 
 def _connected(link: GroundLink) -> bool:

@@ -1,0 +1,111 @@
+"""What the plant's process keeps and reports of one ArduPilot after the other, by a link and a clock of the test's."""
+
+import json
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from colibri.common.process.lifecycle import Stop
+from colibri.common.process.status import Status
+from colibri.common.types import Address
+from colibri.mavlink.links.udp import UdpLink
+from colibri.plant.physics.start import Start
+from colibri.plant.physics.world import Physics, starting_world
+from colibri.plant.process import ardupilot_server
+from colibri.plant.process.ardupilot import ArduPilotEnd
+from colibri.plant.process.ardupilot_server import ArduPilotServer
+from colibri.plant.process.logs import PlantLogs
+from colibri.plant.vehicle.description import load_vehicle
+from tests.plant.process.ardupilot import request
+from tools.harness.processes import rows
+
+SENDER = ("127.0.0.1", 50000)
+VEHICLE = load_vehicle("hummingbird")
+
+
+class Script:
+    """A link over which requests come at given times of the wall clock; it is that clock, and the end of the process."""
+
+    def __init__(self, requests: list[tuple[float, bytes]]) -> None:
+        """Begin at 100 s."""
+        self._requests = requests
+        self.now_s = 100.0
+        self.sent: list[bytes] = []
+
+    def __bool__(self) -> bool:
+        """Whether all has come."""
+        return not self._requests
+
+    def receive(self, timeout_s: float) -> tuple[bytes, Address] | None:
+        """Return the next request, when its time has come."""
+        at_s, datagram = self._requests[0]
+        if at_s > self.now_s + timeout_s:
+            self.now_s += timeout_s
+            return None
+        self.now_s = at_s
+        del self._requests[0]
+        return datagram, SENDER
+
+    def receive_now(self) -> list[tuple[bytes, Address]]:
+        """Return nothing: requests come one by one."""
+        return []
+
+    def send(self, datagram: bytes, _address: Address) -> None:
+        """Keep a reply."""
+        self.sent.append(datagram)
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return tmp_path / "out"
+
+
+def served(
+    requests: list[tuple[float, bytes]], out: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> list[dict[str, Any]]:
+    """Serve what is requested; return the events that were said."""
+    script, number = Script(requests), len(requests)
+    monkeypatch.setattr(ardupilot_server, "perf_counter", lambda: script.now_s)
+    end = ArduPilotEnd(
+        Physics(VEHICLE, "rk4"), starting_world(Start(), VEHICLE), VEHICLE.rotors.numbering(), VEHICLE.rotors
+    )
+    link, stop, logs = cast(UdpLink, script), cast(Stop, script), PlantLogs(out, speaks_mavlink=False)
+    ArduPilotServer(end, link, Status("plant", as_json=True), stop, logs).serve(duration_s=100.0)
+    logs.close()
+    assert len(script.sent) == number
+    return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+
+def flight(began_s: float, steps: int, every_s: float) -> list[tuple[float, bytes]]:
+    return [(began_s + every_s * count, request(count)) for count in range(steps)]
+
+
+def test_each_ardupilot_has_a_wall_clock_and_steps_of_its_own(
+    out: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The first takes 2 s for 1 s, and is gone; a minute later the second takes half a second for one."""
+    events = served(flight(110.0, 401, 0.005) + flight(170.0, 401, 0.00125), out, monkeypatch, capsys)
+    gone, ended = (event for event in events if event["event"] in ("gone", "ended"))
+    assert (gone["event"], gone["steps"], gone["sim_time_s"]) == ("gone", 401, 1.0025)
+    assert gone["wall_time_s"] == pytest.approx(2.0)
+    assert (ended["event"], ended["steps"], ended["sim_time_s"], ended["restarts"]) == ("ended", 401, 1.0025, 1)
+    assert ended["wall_time_s"] == pytest.approx(0.5)
+    progress = [event for event in events if event["event"] == "progress"]
+    times_real = [event["sim_time_s"] / event["wall_time_s"] for event in progress]
+    assert (min(times_real), max(times_real)) == (pytest.approx(0.5, rel=0.05), pytest.approx(2.0, rel=0.05))
+    assert len(progress) > 15  # every 0.1 s of either
+    assert [event["text"] for event in events if event["event"] == "silence"] == [
+        "no request at t = 1.002 s, waiting for ArduPilot"
+    ]
+
+
+def test_each_ardupilot_has_a_file_of_its_own(
+    out: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    requests = flight(110.0, 20, 0.0025) + flight(120.0, 30, 0.0025) + flight(130.0, 40, 0.0025)
+    served(requests, out, monkeypatch, capsys)
+    assert sorted(path.name for path in out.iterdir()) == ["plant-1.csv", "plant-2.csv", "plant.csv"]
+    for name, steps in {"plant-1.csv": 20, "plant-2.csv": 30, "plant.csv": 40}.items():
+        assert rows(out / name)["t"] == pytest.approx(0.0025 * np.arange(1, steps + 1))
