@@ -38,12 +38,15 @@ SUBCOMMANDS = {
     "bench": "measure how fast it flies",
     "plot": "draw the figures of a flight, however it ended",
     "show": "print the file of a profile or vehicle, to copy and change",
+    "vehicle": "write a vehicle as parameters of PX4 or ArduPilot",
     "replay": "feed a recorded flight to the autopilot: are its answers the same?",
     "verify": "fly a fixed set of flights: is every bit the same, twice, or as it once was?",
 }
 """What each does, by its name, which is also that of its file beside this one; `_ROOMS` has those in rooms."""
-_ROOMS = dict.fromkeys(("campaign", "compare", "study", "figures"), "campaigns") | dict.fromkeys(
-    ("certify", "check-controller"), "laws"
+_ROOMS = (
+    dict.fromkeys(("campaign", "compare", "study", "figures"), "campaigns")
+    | dict.fromkeys(("certify", "check-controller"), "laws")
+    | dict.fromkeys(("show", "vehicle"), "descriptions")
 )
 _NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 

@@ -15,8 +15,9 @@ from colibri.plant.physics.world import Physics, starting_world
 from colibri.plant.process.ardupilot import ArduPilotEnd
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.options import nudged
-from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, closing, report_end
+from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, all_parameters_by, closing, report_end
 from colibri.plant.vehicle.description import load_vehicle
+from colibri.plant.vehicle.parameter_files import ardupilot_thrust_curve
 
 
 def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> int:
@@ -29,14 +30,37 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     except Error as error:
         fail(str(error))
     frame_type = motors.ardupilot_frame_type
-    expo = 1 if vehicle.rotors.control == "speed" else 0
-    text = f"{vehicle.name} is FRAME_CLASS 1, FRAME_TYPE {frame_type}, MOT_THST_EXPO {expo}"
+    _, expo = ardupilot_thrust_curve(vehicle.rotors)
+    text = f"{vehicle.name} is FRAME_CLASS 1, FRAME_TYPE {frame_type}, MOT_THST_EXPO {expo:.3g}"
+    text = f"{text}; {all_parameters_by(args.vehicle, 'ardupilot')}"
     status.say("frame", text, frame_class=1, frame_type=frame_type, thrust_expo=expo)
     end = ArduPilotEnd(Physics(vehicle, args.integrator, weather), start, motors, vehicle.rotors)
     logs = PlantLogs(args.out, speaks_mavlink=False) if args.out else None
     with closing(link, logs):
         ArduPilotServer(end, link, status, stop, logs).serve(duration_s=args.duration)
     return EXIT_INTERRUPTED if stop else 0
+
+
+class _Flight:
+    """One ArduPilot's flight.
+
+    Attributes:
+        began_s: When its first request came, by the wall clock.
+        answered_s: When its last one was answered.
+        steps: Requests that have advanced the world.
+    """
+
+    def __init__(self, now_s: float, status: Status) -> None:
+        """Begin now; progress is reported through `status`."""
+        self.began_s = self.answered_s = now_s
+        self.steps = 0
+        self._progress = Progress(status)
+
+    def answered(self, time_us: int, now_s: float, steps: int) -> None:
+        """Count a request, answered now, that has advanced the world by `steps` to `time_us`."""
+        self.answered_s = now_s
+        self.steps += steps
+        self._progress.report(time_us / 1e6, now_s - self.began_s)
 
 
 class ArduPilotServer:
@@ -46,7 +70,7 @@ class ArduPilotServer:
         """Answer on `link` by `end` until `stop`."""
         self._end, self._link, self._status, self._stop, self._logs = end, link, status, stop, logs
         self._silence = Silence(status, SILENT_AFTER_S, "ArduPilot asks again", perf_counter())
-        self._begin(perf_counter())
+        self._flight = _Flight(perf_counter(), status)
 
     def serve(self, *, duration_s: float) -> None:
         """Answer until a flight is `duration_s` long, or a signal ends it.
@@ -71,35 +95,29 @@ class ArduPilotServer:
         once: ArduPilot would take the second reply for that to its next request, and so fly a step late for good.
         """
         for datagram, sender in dict.fromkeys([received, *self._link.receive_now()]):
-            flown, restarts, began = self._end.world, self._end.restarts, self._end.peer is not None
+            before, restarts, begins = self._end.world, self._end.restarts, self._end.peer is None
             reply = self._end.receive(datagram, sender, now_s)
             if reply is None:
                 continue
             self._link.send(reply, sender)
             self._silence.end(now_s)
             if self._end.restarts > restarts:
-                self._report(flown.time_us, "gone", "ArduPilot has begun again")
+                self._report(before.time_us, "gone", "ArduPilot has begun again, the flight before ended")
                 if self._logs:
                     self._logs.begin_again()
-            if self._end.restarts > restarts or not began:
-                self._begin(now_s)
-            if self._logs and self._end.world is not flown:
+                begins = True
+            if begins:
+                self._flight = _Flight(now_s, self._status)
+            advanced = self._end.world is not before
+            if self._logs and advanced:
                 self._logs.write_world(self._end.world)
-            self._steps += self._end.world is not flown
-            self._answered_s = now_s
-            self._progress.report(self._end.world.time_us / 1e6, now_s - self._began_s)
-
-    def _begin(self, now_s: float) -> None:
-        """Count steps and the wall clock's time of a flight from now on."""
-        self._began_s = self._answered_s = now_s
-        self._steps = 0
-        self._progress = Progress(self._status)
+            self._flight.answered(self._end.world.time_us, now_s, int(advanced))
 
     def _report(self, time_us: int, event: str, text: str) -> None:
-        """Report the end of a flight, whose last answer was its end."""
+        """Report the end of a flight: that is when it was answered last."""
         if self._logs:
             self._logs.flush()
-        steps = self._steps
-        figures: dict[str, Any] = {"steps": steps, "restarts": self._end.restarts, "dropped": dict(self._end.dropped)}
-        text = f"{text} {{}} after {steps} steps"
-        report_end(self._status, time_us, self._began_s, text, event=event, ended_s=self._answered_s, **figures)
+        flight, end = self._flight, self._end
+        figures: dict[str, Any] = {"steps": flight.steps, "restarts": end.restarts, "dropped": dict(end.dropped)}
+        text = f"{text} {{}} after {flight.steps} steps"
+        report_end(self._status, time_us, flight.began_s, text, event=event, ended_s=flight.answered_s, **figures)

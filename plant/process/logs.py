@@ -68,10 +68,12 @@ class PlantLogs:
         Raises:
             LogError: It cannot be written.
         """
-        for log in filter(None, (self._truth, self._tlog)):
-            log.flush()
+        self._truth.flush()
+        if self._tlog:
+            self._tlog.flush()
 
     def close(self) -> None:
         """Close all."""
-        for log in filter(None, (self._truth, self._tlog)):
-            log.close()
+        self._truth.close()
+        if self._tlog:
+            self._tlog.close()

@@ -18,10 +18,19 @@ from colibri.plant.physics.start import Start
 from colibri.plant.physics.world import Physics, World, starting_world, state_frame
 from colibri.plant.process.logs import PlantLogs
 from colibri.plant.process.options import nudged
-from colibri.plant.process.reports import MAX_WAIT_S, SILENT_AFTER_S, Silence, awaiting, closing, report_end
+from colibri.plant.process.reports import (
+    MAX_WAIT_S,
+    SILENT_AFTER_S,
+    Silence,
+    all_parameters_by,
+    awaiting,
+    closing,
+    report_end,
+)
 from colibri.plant.process.server import Pace
 from colibri.plant.sensors.suite import SensorSuite
 from colibri.plant.vehicle.description import VehicleError, load_vehicle
+from colibri.plant.vehicle.parameter_files import px4_gps_delay_ms
 
 
 def run(args: argparse.Namespace, link: GroundLink, status: Status, stop: Stop) -> int:
@@ -51,6 +60,9 @@ class Simulator:
         vehicle = load_vehicle(args.vehicle).without(args.without)
         if vehicle.sensors is None:
             raise VehicleError(f"{vehicle.name} has no sensors: PX4 flies a vehicle with a table sensors")
+        delay_ms = px4_gps_delay_ms(vehicle)
+        text = f"{vehicle.name}'s GPS is {delay_ms} ms late, SENS_GPS0_DELAY {delay_ms}"
+        status.say("sensors", f"{text}; {all_parameters_by(args.vehicle, 'px4')}", gps_delay_ms=delay_ms)
         self._sensors = vehicle.sensors
         self._rotors, self._order = vehicle.rotors, vehicle.rotors.numbering()
         self._gravity_m_s2 = vehicle.gravity_m_s2

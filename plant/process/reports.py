@@ -1,5 +1,6 @@
 """What every server of the plant reports, and how it ends: silence of the autopilot, the end of a flight, errors."""
 
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,6 +29,11 @@ class Closable(Protocol):
 def awaiting(whom: str, link: GroundLink) -> str:
     """Return in words how a plant on `link` comes to speak with an autopilot: it waits for it, or calls it."""
     return f"waiting for {whom} on {link.url}" if link.target is None else f"calling {whom} at {link.url}"
+
+
+def all_parameters_by(vehicle: str, whom: str) -> str:
+    """Return in words which command writes all parameters by which another autopilot flies a vehicle."""
+    return f"all of it by: colibri vehicle {shlex.quote(vehicle)} --for {whom}"
 
 
 @contextmanager
@@ -83,7 +89,7 @@ def report_end(
     ended_s: float | None = None,
     **figures: Any,
 ) -> None:
-    """Report the end of a flight at simulated time `time_us`, from `began_s` to `ended_s`, or now, by the wall clock."""
+    """Report the end of a flight at simulated time `time_us`; by the wall clock from `began_s` to `ended_s`, or now."""
     time_s = time_us / 1e6
     wall_time_s = (perf_counter() if ended_s is None else ended_s) - began_s
     status.say(event, text.format(f"at t = {time_s:.3f} s"), sim_time_s=time_s, wall_time_s=wall_time_s, **figures)

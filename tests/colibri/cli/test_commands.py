@@ -5,6 +5,7 @@ import os
 import resource
 import subprocess
 import sys
+from collections.abc import Callable
 from errno import ENOSPC
 from importlib.metadata import version
 from pathlib import Path
@@ -71,6 +72,47 @@ def test_a_file_of_colibris_own_is_shown_to_be_copied(
     assert capsys.readouterr().out == file.read_text(encoding="utf-8")
     assert exit_code(["show", what, "nobody"]) == 2
     assert capsys.readouterr().err.startswith(f"colibri: error: unknown {what} nobody: choose ")
+
+
+@pytest.mark.parametrize("whom", ["px4", "ardupilot"])
+def test_a_vehicle_is_written_as_parameters_of_another_autopilot(
+    whom: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert exit_code(["vehicle", "hummingbird", "--for", whom]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith(f"# AscTec Hummingbird, by colibri vehicle hummingbird --for {whom}\n")
+    out = tmp_path / "new" / "vehicle.params"
+    heavier = edited(VEHICLE, "mass_kg = 0.698", "mass_kg = 0.8")(tmp_path)
+    assert exit_code(["vehicle", heavier, "--for", whom, "--out", str(out)]) == 0
+    assert capsys.readouterr().out == ""
+    written = out.read_text(encoding="utf-8")
+    assert written.splitlines()[0].endswith(f" --for {whom}")
+    pairs = zip(printed.splitlines()[1:], written.splitlines()[1:], strict=True)
+    (changed,) = (before for before, after in pairs if before != after)
+    assert "_HOVER" in changed
+
+
+@pytest.mark.parametrize("whom", ["px4", "ardupilot"])
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("dragonfly", "unknown vehicle dragonfly: choose "),
+        (edited(VEHICLE, "max_speed = 838.0", "max_speed = 500.0"), "AscTec Hummingbird: hover thrust is 0.9"),
+    ],
+)
+def test_a_vehicle_that_has_no_such_parameters_gets_one_line(
+    name: str | Callable[[Path], str], why: str, whom: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    vehicle = name if isinstance(name, str) else name(tmp_path)
+    assert exit_code(["vehicle", vehicle, "--for", whom, "--out", str(tmp_path / "out")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"colibri: error: {why}")
+    assert not (tmp_path / "out").exists()
+
+
+def test_parameters_that_cannot_be_written_get_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code(["vehicle", "iris", "--for", "px4", "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == f"colibri: error: cannot write {tmp_path}: Is a directory\n"
 
 
 def test_figures_are_drawn_of_what_a_flight_left(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -214,7 +214,7 @@ class Listener(socket.socket):
 
 
 def test_a_server_with_clients_looks_for_others_now_and_then_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A look costs a system call and an exception: at each of the polls between two frames it would cost most of all."""
+    """A look costs a system call and an exception: too much for each of the polls between two frames."""
     now_s = [10.0]
     monkeypatch.setattr(tcp, "perf_counter", lambda: now_s[0])
     listener = Listener(socket.AF_INET, socket.SOCK_STREAM)

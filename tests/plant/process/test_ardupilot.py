@@ -183,7 +183,9 @@ def plant(tmp_path: Path) -> Iterator[Process]:
 @begins_as_recorded
 def test_the_process_answers_whoever_asks_and_keeps_what_was_flown(plant: Process, tmp_path: Path) -> None:
     with closing(open_link(plant.wait_for("listening")["url"].replace("udpin", "udpout"))) as link:
-        assert plant.wait_for("frame")["frame_type"] == 6
+        frame = plant.wait_for("frame")
+        assert (frame["frame_type"], frame["thrust_expo"]) == (6, pytest.approx(0.739, abs=1e-3))
+        assert frame["text"].endswith("; all of it by: colibri vehicle hummingbird --for ardupilot")
         end, told = standing(), None
         for count in range(300):
             sent = request(count, pulses(told, TARGET_NED_M) if told else (1000,) * 4)

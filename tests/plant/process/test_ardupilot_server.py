@@ -26,7 +26,7 @@ VEHICLE = load_vehicle("hummingbird")
 
 
 class Script:
-    """A link over which requests come at given times of the wall clock; it is that clock, and the end of the process."""
+    """A link over which requests come at given times of the wall clock; it is that clock, and the process's end."""
 
     def __init__(self, requests: list[tuple[float, bytes]]) -> None:
         """Begin at 100 s."""

@@ -207,6 +207,9 @@ def flown(px4: Px4, link: GroundLink) -> None:
 def test_a_px4_takes_off_and_hovers_over_tcp_and_so_does_the_next(tmp_path: Path) -> None:
     with plant(tmp_path, "tcpin:127.0.0.1:0") as process:
         url = process.wait_for("listening")["url"].replace("tcpin", "tcp")
+        sensors = process.wait_for("sensors")
+        assert sensors["gps_delay_ms"] == 200
+        assert "SENS_GPS0_DELAY 200; all of it by: colibri vehicle jmavsim --for px4" in sensors["text"]
         for number in (1, 2):
             px4, link = Px4(), open_ground_link(url)
             wait_for(partial(_connected, link), "a connection")
