@@ -7,7 +7,7 @@ waypoint on the same spot. Altitude is not projected: z is the height above the 
 from math import degrees, hypot, isfinite, radians
 from typing import NamedTuple
 
-from colibri.common.kernels import acos, asin, atan2, cos, sin
+from colibri.common.elementary import acos, asin, atan2, cos, sin
 from colibri.common.types import Vector
 
 EARTH_RADIUS_M = 6371000.0
