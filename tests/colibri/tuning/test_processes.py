@@ -12,7 +12,7 @@ from colibri.tuning.trials import JOURNAL
 from tests.colibri.tuning.support import WEIGHTS, files_in, tuned
 
 PATIENCE_S = 120.0
-TRIALS = 14
+TRIALS = 12
 FILE = f"""
 name = "short"
 trials = {TRIALS}
