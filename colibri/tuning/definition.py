@@ -191,11 +191,12 @@ def _had(base: Profile, name: str) -> Any:
 
 
 def _check_factors(campaign: Campaign, space: Mapping[str, Range]) -> None:
-    plain = {name.rstrip("*") for name in (*campaign.fly, *campaign.factors)}
+    varied = {name for point in campaign.samples() for name in point.settings}
+    plain = {name.rstrip("*") for name in (*campaign.fly, *varied)}
     twice = next((name for name in space if name.rstrip("*") in plain), None)
     if twice is not None:
         raise TuningError(f"{twice} is said twice: what is tuned is not in fly, grid or draw")
-    if "profile" in campaign.factors:
+    if "profile" in varied:
         raise TuningError("profile: one is tuned: say which in fly")
     if campaign.fly.get("link") == "udp":
         raise TuningError("link: over udp two processes fly, which know files: leave link out")

@@ -2,13 +2,14 @@
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
 from colibri.campaigns.definition import Point
-from colibri.campaigns.engines.engine import Engine, Killed
-from colibri.campaigns.flights import Common, Flown, Verdict, fly_point
+from colibri.campaigns.engines.engine import Engine
+from colibri.campaigns.flights import Common, Flown, Verdict, fly_points
 from colibri.common.types import Array
 from colibri.tuning.space import TuningError
 from colibri.tuning.trials import Begun, Ended
@@ -37,22 +38,13 @@ class Flights:
     def __init__(self, engine: Engine, common: Common) -> None:
         """Fly by `engine`; the factors of each flight hold beside what is in `common`."""
         self._left: deque[Point] = deque()
-        self._flown = engine.each(fly_point, common, self)
-        self._metrics = len(common.metrics)
+        self._flown = fly_points(self, common, engine)
 
     def fly(self, points: Sequence[Point]) -> list[Flown]:
         """Return what comes of flights, in their order."""
         self._left.extend(points)
-        found = {}
-        for _ in points:
-            point, flown = next(self._flown)
-            killed = Flown(point.flight, Verdict.KILLED, "the process that flew it was killed", self._nothing, "")
-            found[point.flight] = killed if isinstance(flown, Killed) else flown
+        found = {flown.flight: flown for flown in islice(self._flown, len(points))}
         return [found[point.flight] for point in points]
-
-    @property
-    def _nothing(self) -> tuple[None, ...]:
-        return (None,) * self._metrics
 
     def __iter__(self) -> Self:
         """Be what an engine takes its jobs from, again and again: more come when what it was given has ended."""

@@ -38,6 +38,14 @@ def range_of(**given: Any) -> dict[str, Any]:
         ),
         ({"fly": TABLES["fly"] | {f"{WEIGHTS}.rate": 0.02}}, f"{RATE} is said twice: what is tuned is not in"),
         ({"grid": {"track": ["hover"], "profile": ["flight", "thesis"]}}, "profile: one is tuned: say which in fly"),
+        (
+            {"grid": {"track": ["hover"], "law": {"own": {"profile": "thesis"}}}},
+            "profile: one is tuned: say which in fly",
+        ),
+        (
+            {"grid": {"track": ["hover"], "law": {"own": {f"{WEIGHTS}.rate": 1}}}},
+            f"{RATE} is said twice: what is tuned",
+        ),
         ({"fly": TABLES["fly"] | {"link": "udp"}}, "link: over udp two processes fly, which know files"),
         ({"grid": {}}, "no track: say which is flown"),
         ({"objectives": {}}, "objectives: say what is to become small"),
