@@ -1,14 +1,13 @@
 """Strict tables: what vehicle files, profiles and control laws are read into."""
 
 from collections.abc import Iterator, Mapping
-from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, TypeVar
 
 import msgspec
 
-from colibri.common.errors import Error
+from colibri.common.errors import Error, nearest
 
 Positive: TypeAlias = Annotated[float, msgspec.Meta(gt=0.0)]
 NotNegative: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0)]
@@ -162,9 +161,8 @@ def _place(tree: Any, key: str, error: type[Error]) -> tuple[Any, Any]:
         places = found if isinstance(found, dict) else dict(enumerate(found)) if isinstance(found, list) else {}
         choices = {str(place): place for place in places}
         if name not in choices:
-            near = get_close_matches(name, choices, 1)
             of = f" of {above}" if above else ""
-            hint = f"did you mean {near[0]}?" if near else f"keys{of} are {', '.join(choices) or 'none'}"
+            hint = nearest(name, choices) or f"keys{of} are {', '.join(choices) or 'none'}"
             raise error(f"{key}: unknown key {name}: {hint}")
         parent, found, above, last = found, places[choices[name]], f"{above}.{name}".lstrip("."), choices[name]
     return parent, last

@@ -1,4 +1,6 @@
-"""The base of every error that a user may see."""
+"""The base of every error that a user may see, and what its message says of a name that is unknown."""
+
+from collections.abc import Iterable
 
 
 class Error(Exception):
@@ -15,3 +17,11 @@ class ForeignError(Error):
 
 class InFlightError(Error):
     """A flight that was begun and came to no end, in whichever package; what was logged is there."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return the question whether the nearest of the known names was meant; empty where none is near."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, list(known), 1)
+    return f"did you mean {near[0]}?" if near else ""

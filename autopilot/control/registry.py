@@ -1,7 +1,6 @@
 """Control laws by name: found as entry points, made, and what they return checked."""
 
 from collections.abc import Callable, Mapping
-from difflib import get_close_matches
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import EntryPoints, entry_points
@@ -14,7 +13,7 @@ import numpy as np
 
 from colibri.autopilot.control.interface import Clock, Controller, Decision
 from colibri.autopilot.errors import AutopilotError
-from colibri.common.errors import Error, ForeignError, InFlightError
+from colibri.common.errors import Error, ForeignError, InFlightError, nearest
 from colibri.common.types import Array, FourRotors
 from colibri.plant.vehicle.description import Vehicle
 
@@ -70,8 +69,8 @@ def load_controller(name: str) -> Factory:
 
 def _unknown(name: str) -> ControllerError:
     """Return what says that there is no such control law, and which is of nearly that name."""
-    near = get_close_matches(name, controller_names(), 1)
-    hint = f"did you mean {near[0]}?" if near else f"installed are {', '.join(controller_names())}"
+    known = controller_names()
+    hint = nearest(name, known) or f"installed are {', '.join(known)}"
     return ControllerError(f"unknown controller {name}: {hint}")
 
 

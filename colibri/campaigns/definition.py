@@ -1,5 +1,6 @@
 """A campaign as data: what every flight has in common, what differs, by which seeds, and what is kept."""
 
+from argparse import ArgumentTypeError
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice, product
 from math import prod
@@ -13,6 +14,7 @@ from colibri.campaigns.factors import factor_name
 from colibri.campaigns.metrics import Metric, read_metrics, usual
 from colibri.campaigns.values import CampaignError, Choice, Draw, Level, has_levels, read_draw, read_values
 from colibri.common.config import read_toml
+from colibri.common.process.arguments import seeds
 from colibri.experiments.options import option_names
 from colibri.mavlink.hil.feedback import Feedback
 
@@ -184,18 +186,14 @@ def read_seeds(given: Any) -> tuple[int, ...]:
     Raises:
         CampaignError: They are none.
     """
-    first, dash, last = str(given).partition("-")
     try:
-        if isinstance(given, str) and dash:
-            seeds = tuple(range(int(first), int(last) + 1))
-        else:
-            seeds = tuple(given) if isinstance(given, list | tuple | range) else (int(given),)
-    except (TypeError, ValueError):
-        seeds = ()
-    right = all(isinstance(seed, int) and 0 <= seed < _MAX_SEED for seed in seeds)
-    if not seeds or not right or len(set(seeds)) < len(seeds):
+        read = tuple(given) if isinstance(given, list | tuple | range) else tuple(seeds(str(given)))
+    except ArgumentTypeError:
+        read = ()
+    right = all(isinstance(seed, int) and 0 <= seed < _MAX_SEED for seed in read)
+    if not read or not right or len(set(read)) < len(read):
         raise CampaignError(f"seeds: expected 1-20, a seed, or several different ones, not {given}")
-    return seeds
+    return read
 
 
 def name_in_tables(given: str, value: Any, others: Sequence[str] = OF_ALL) -> str:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from colibri.autopilot.control.profile import Profile, ProfileError, ProfileTables
 from colibri.campaigns.metrics import hint
-from colibri.campaigns.values import CampaignError
+from colibri.campaigns.values import CampaignError, is_number
 from colibri.common.config import value_at
 from colibri.experiments.options import option_names
 from colibri.plant.vehicle.description import Vehicle, VehicleError
@@ -76,6 +76,6 @@ def _scaled(had: Any, by: Any, factor: str) -> Any:
     """Return a number, or each of several, times `by`."""
     if isinstance(had, list):
         return [_scaled(each, by, factor) for each in had]
-    if isinstance(had, bool) or not isinstance(had, int | float) or not isinstance(by, int | float):
+    if not (is_number(had) and is_number(by)):
         raise CampaignError(f"{factor}: {had} times {by} is no number: leave the {SCALED} out")
     return had * by

@@ -10,7 +10,7 @@ import numpy as np
 from colibri.analysis.tables import Row
 from colibri.campaigns.definition import Campaign
 from colibri.campaigns.flights import Flown, Verdict
-from colibri.campaigns.values import CampaignError, shown
+from colibri.campaigns.values import CampaignError, is_number, shown
 from colibri.experiments.table import Table
 
 _NORMAL_95 = 1.959963984540054
@@ -158,11 +158,6 @@ def wilson(lost: int, of: int) -> tuple[float, float]:
         middle - half if lost else 0.0,
         middle + half if lost < of else 1.0,
     )  # to the last bit where it is none or all
-
-
-def is_number(value: Any) -> bool:
-    """Tell whether a factor's value is a number."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _distribution(values: np.ndarray[Any, np.dtype[np.float64]]) -> list[str]:

@@ -1,11 +1,11 @@
 """What is kept of each flight: numbers of its report, by their names there, or what functions make of a flight."""
 
 from collections.abc import Callable, Mapping, Sequence
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from colibri.analysis.limits import KEYS, of_report
 from colibri.campaigns.values import CampaignError
+from colibri.common.errors import nearest
 
 if TYPE_CHECKING:
     from colibri.experiments.flight import Flight
@@ -63,5 +63,4 @@ def _metric(given: Any) -> Metric:
 
 def hint(given: Any, known: Sequence[str]) -> str:
     """Return the end of a refusal: the nearest of what is known, and all of it."""
-    near = get_close_matches(str(given), known, 1)
-    return (f"did you mean {near[0]}? " if near else "") + f"choose {', '.join(known)}"
+    return f"{nearest(str(given), known)} choose {', '.join(known)}".lstrip()

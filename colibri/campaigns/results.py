@@ -1,8 +1,5 @@
 """What came of a campaign: its tables, their figure, and the folder that has them."""
 
-from base64 import b64encode
-from html import escape
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +7,7 @@ from colibri.analysis.tables import comma_separated
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.journal import keep_files
 from colibri.campaigns.values import CampaignError
+from colibri.experiments.notebook import figure_html, table_html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,9 +63,4 @@ class CampaignResults(FlightTable):
     def _repr_html_(self) -> str:
         """Return the summary and the figure, as a notebook shows them."""
         headings, rows = self.summary()
-        cells = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in (headings, *rows)]
-        table = "".join(f"<tr>{row}</tr>" for row in cells)
-        png = BytesIO()
-        self.plot().savefig(png, format="png", dpi=80)
-        picture = b64encode(png.getvalue()).decode()
-        return f'<b>{escape(self.campaign.name)}</b><table>{table}</table><img src="data:image/png;base64,{picture}">'
+        return table_html(self.campaign.name, (headings, *rows)) + figure_html(self.plot())

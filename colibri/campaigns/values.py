@@ -106,7 +106,7 @@ def read_draw(key: str, given: Any) -> Draw:
     name, values = _only(key, given, _DISTRIBUTIONS)
     if name == "choice":
         return Choice(read_values(key, values))
-    if not isinstance(values, Sequence) or len(values) != 2 or not all(map(_is_number, values)):
+    if not isinstance(values, Sequence) or len(values) != 2 or not all(map(is_number, values)):
         what = "[mean, standard deviation]" if name == "normal" else "[lowest, highest]"
         raise CampaignError(f"{key}: {name}: expected {what}, not {values}")
     first, second = map(float, values)
@@ -179,7 +179,7 @@ def _only(key: str, given: Any, known: Sequence[str]) -> tuple[str, Any]:
 
 def _span(key: str, name: str, span: Any) -> tuple[float, ...]:
     """Return numbers from the first to the last, at even distances or even ratios."""
-    if not isinstance(span, Sequence) or len(span) != 3 or not all(map(_is_number, span)):
+    if not isinstance(span, Sequence) or len(span) != 3 or not all(map(is_number, span)):
         raise CampaignError(f"{key}: {name}: expected [first, last, how many], not {span}")
     first, last, count = float(span[0]), float(span[1]), float(span[2])
     if not count.is_integer() or not 2 <= count <= MAX_SPAN or first == last:
@@ -194,7 +194,8 @@ def _span(key: str, name: str, span: Any) -> tuple[float, ...]:
     return tuple(float(f"{elementary.exp(each):.12g}") for each in exponents)
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Tell whether a value is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 

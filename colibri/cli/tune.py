@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from colibri.cli.shared.options import add_out
+from colibri.cli.shared.options import add_engine, add_out
 from colibri.common.errors import Error
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_INTERRUPTED, fail, loading
@@ -40,12 +40,7 @@ def add_options(parser: ArgumentParser) -> None:
         help="seeds between judgements of a trial; 0: none",
     )
     add("--name", default=SUPPRESS, help="in titles (default: the file's)")
-    add("--workers", type=int, metavar="N", help="processes (default: one a core)")
-    add(
-        "--dask",
-        metavar="ADDRESS",
-        help="in their place the cluster whose Dask scheduler is there, tcp://HOST:8786 say",
-    )
+    add_engine(add)
     add("--resume", action="store_true", help="go on with what --out has of this tuning, or join those who are at it")
     add_out(add, "out/tune", "profile, tables, figures, and what it takes to go on")
 

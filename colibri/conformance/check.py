@@ -16,6 +16,7 @@ from colibri.conformance.optional_checks import optional_checks
 from colibri.conformance.restart_checks import restart_checks
 from colibri.conformance.rows import Check, Result, Row
 from colibri.conformance.subject import Subject
+from colibri.experiments.notebook import table_html
 
 CHECKS: dict[str, Check] = {
     "interface": interface_checks,
@@ -77,8 +78,7 @@ class Conformance:
 
     def _repr_html_(self) -> str:
         """Return the table as a notebook shows it."""
-        rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in _cells(row))}</tr>" for row in self.rows)
-        return f"<b>{escape(self.title)}</b><table>{rows}</table><pre>{escape(self.failures)}</pre>"
+        return table_html(self.title, map(_cells, self.rows)) + f"<pre>{escape(self.failures)}</pre>"
 
 
 def check_controller(

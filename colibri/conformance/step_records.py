@@ -174,7 +174,7 @@ def pickled_or_none(memory: Any) -> bytes | None:
     """Return the memory of a control law, pickled; None where it cannot be."""
     try:
         return dumps(memory)
-    except Exception:
+    except Exception:  # whatever the memory's own `__reduce__` raises: that it cannot be kept is what is found
         return None
 
 
@@ -182,7 +182,7 @@ def own_copy(memory: Any) -> Any:
     """Return a copy of the memory of a control law; where it cannot be copied, itself."""
     try:
         return deepcopy(memory)
-    except Exception:
+    except Exception:  # whatever its own `__deepcopy__` raises: the check of the pickle says so
         return memory
 
 

@@ -1,10 +1,7 @@
 """`colibri.fly`: one flight from Python, and what came of it as an object."""
 
-from base64 import b64encode
 from collections.abc import Mapping
 from functools import cached_property
-from html import escape
-from io import BytesIO
 from pathlib import Path
 from shutil import copytree, rmtree
 from tempfile import mkdtemp
@@ -18,6 +15,7 @@ from colibri.analysis.series.figure_series import FigureSeries
 from colibri.autopilot.control.profile import Profile, load_profile
 from colibri.autopilot.control.registry import Factory
 from colibri.autopilot.process.options import delay_s
+from colibri.experiments.notebook import figure_html, table_html
 from colibri.experiments.options import OptionError, read_keywords
 from colibri.experiments.table import Table, read_table
 from colibri.flights.fly import fly_plan
@@ -110,14 +108,8 @@ class Flight:
 
     def _repr_html_(self) -> str:
         """Return the report as a table, and the error over time, as a notebook shows them."""
-        rows = "".join(
-            f"<tr><td>{escape(k)}</td><td>{escape(v)}</td></tr>" for k, v in report_rows(self.report).items()
-        )
-        png = BytesIO()
-        self.plot().savefig(png, format="png", dpi=80)
-        picture = b64encode(png.getvalue()).decode()
-        title = escape(f"{self.plan.track_name}, {self.plan.flown_by}")
-        return f'<b>{title}</b><table>{rows}</table><img src="data:image/png;base64,{picture}">'
+        title = f"{self.plan.track_name}, {self.plan.flown_by}"
+        return table_html(title, report_rows(self.report).items()) + figure_html(self.plot())
 
 
 def fly(track: str, **options: Any) -> Flight:

@@ -2,12 +2,11 @@
 
 from argparse import Namespace
 from collections.abc import Mapping
-from difflib import get_close_matches
 from functools import cache
 from typing import Any, NoReturn
 
 from colibri.autopilot.process.options import add_delay
-from colibri.common.errors import Error
+from colibri.common.errors import Error, nearest
 from colibri.common.process.arguments import ArgumentParser, natural, number, positive, speed
 from colibri.flights.command_lines import options_of
 from colibri.mavlink.hil.feedback import Feedback, feedback
@@ -92,8 +91,7 @@ def read_keywords(track: str, keywords: Mapping[str, Any]) -> Namespace:
     """
     defaults = _defaults(track)
     for name in keywords.keys() - defaults.keys():
-        near = get_close_matches(name, defaults, 1)
-        hint = f"did you mean {near[0]}?" if near else f"choose {', '.join(sorted(defaults.keys() - {'track'}))}"
+        hint = nearest(name, defaults) or f"choose {', '.join(sorted(defaults.keys() - {'track'}))}"
         raise OptionError(f"unknown option {name}: {hint}")
     return _parser().parse_args([*options_of(**keywords), "--", track])
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from colibri.campaigns.flights import Flown, Verdict
 from colibri.campaigns.metrics import NAMES, Metric, hint, read_metrics
+from colibri.campaigns.values import is_number
 from colibri.common.types import Array
 from colibri.tuning.space import TuningError
 
@@ -100,7 +101,7 @@ def _objective(name: str, pooling: Any, metrics: Sequence[Metric]) -> Objective:
         return Objective(SHARE_LOST)
     if isinstance(pooling, Mapping) and list(pooling) == ["quantile"]:
         part = pooling["quantile"]
-        if isinstance(part, bool) or not isinstance(part, int | float) or not 0.0 <= part <= 1.0:
+        if not is_number(part) or not 0.0 <= part <= 1.0:
             raise TuningError(f"objectives: {name}: quantile: expected 0 to 1, not {part}")
         return Objective(name, "quantile", float(part))
     if pooling not in _POOLINGS:

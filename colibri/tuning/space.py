@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
 
-from colibri.campaigns.values import Choice, LogUniform, Uniform, read_draw, shown
+from colibri.campaigns.values import Choice, LogUniform, Uniform, is_number, read_draw, shown
 from colibri.common.errors import Error
 
 _KINDS = ("uniform", "log-uniform", "integers", "choice")
@@ -65,7 +65,7 @@ def check_holds(key: str, values: Range, value: Any) -> None:
                 f"{key}: the profile has {shown(value)}: put it among {', '.join(map(shown, values.values))}"
             )
         return
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if not is_number(value):
         raise TuningError(f"{key}: the profile has {shown(value)}, no number: tune a place in it, {key}.0 say")
     if not values.low <= value <= values.high:
         raise TuningError(f"{key}: the profile has {value:g}, not within {values.low:g} to {values.high:g}: widen that")

@@ -72,7 +72,7 @@ class Results(CompileResultCacheImpl):
         whole = super().reduce(cres)
         (name, _, (machine_code, intermediate)), description, environment, signature, *others = whole
         object_mode, lifted, _, reload_init, environments = others
-        module = cres.library._final_module  # noqa: SLF001
+        module = parse_bitcode(intermediate)
         symbols = [it for it in (*module.functions, *module.global_variables) if not it.name.startswith("llvm.")]
         needed = [it.name for it in symbols if it.is_declaration]
         text = str(module)

@@ -70,6 +70,18 @@ def speed(text: str) -> float:
     return inf if text == "max" else positive(text)
 
 
+def seeds(text: str) -> range:
+    """Read FIRST-LAST, or one seed, of the command line."""
+    first, dash, last = text.partition("-")
+    try:
+        chosen = range(int(first), int(last if dash else first) + 1)
+    except ValueError:
+        chosen = range(0)
+    if not chosen:
+        raise ArgumentTypeError(f"expected FIRST-LAST, 1-50 say, not {text}")
+    return chosen
+
+
 def add_common_arguments(parser: ArgumentParser, log: str) -> None:
     """Add the options that both processes have; `log` names what `--out` writes."""
     add = parser.add_argument

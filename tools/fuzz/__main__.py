@@ -4,7 +4,7 @@ import argparse
 import sys
 
 from colibri.campaigns.engines.progress import in_order
-from colibri.cli.campaigns.compare import seeds
+from colibri.common.process.arguments import seeds
 from tools.fuzz.jobs import HEADER, Job, fire
 
 

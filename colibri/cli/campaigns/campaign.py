@@ -4,7 +4,7 @@ from argparse import SUPPRESS, Action, Namespace
 from pathlib import Path
 from typing import Any
 
-from colibri.cli.shared.options import add_out
+from colibri.cli.shared.options import add_engine, add_out
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import loading
 from colibri.experiments.options import add_plan_options
@@ -55,12 +55,7 @@ def add_options(parser: ArgumentParser) -> None:
     add("--name", default=SUPPRESS, help="in titles (default: the file's)")
     add("--metrics", default=SUPPRESS, metavar="A,B", help="numbers of report.json to keep (default: the usual)")
     add("--logs", default=SUPPRESS, choices=("none", "lost", "all"), help="of which flights to keep the logs (none)")
-    add("--workers", type=int, metavar="N", help="processes (default: one a core)")
-    add(
-        "--dask",
-        metavar="ADDRESS",
-        help="in their place the cluster whose Dask scheduler is there, tcp://HOST:8786 say",
-    )
+    add_engine(add)
     add("--resume", action="store_true", help="go on with what --out has of this campaign")
     add("--parquet", action="store_true", help="write flights.parquet, too")
     add("--yes", action="store_true", help="also if it has more than a million flights")

@@ -1,22 +1,10 @@
 """`colibri compare`: its options, and its call."""
 
-from argparse import ArgumentTypeError, Namespace
+from argparse import Namespace
 
 from colibri.cli.shared.options import add_out
-from colibri.common.process.arguments import ArgumentParser
+from colibri.common.process.arguments import ArgumentParser, seeds
 from colibri.experiments.options import add_flight_options
-
-
-def seeds(text: str) -> range:
-    """Read FIRST-LAST of the command line."""
-    first, _, last = text.partition("-")
-    try:
-        chosen = range(int(first), int(last or first) + 1)
-    except ValueError:
-        chosen = range(0)
-    if not chosen:
-        raise ArgumentTypeError(f"expected FIRST-LAST, 1-50 say, not {text}")
-    return chosen
 
 
 def add_options(parser: ArgumentParser) -> None:

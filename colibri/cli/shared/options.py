@@ -10,6 +10,16 @@ def add_signing(add: Callable[..., object]) -> None:
     add("--insecure", action="store_true", help="let links leave this computer without a key")
 
 
+def add_engine(add: Callable[..., object]) -> None:
+    """Add what flies many flights: processes of this computer, or a cluster."""
+    add("--workers", type=int, metavar="N", help="processes (default: one a core)")
+    add(
+        "--dask",
+        metavar="ADDRESS",
+        help="in their place the cluster whose Dask scheduler is there, tcp://HOST:8786 say",
+    )
+
+
 def add_out(add: Callable[..., object], folder: str, what: str) -> None:
     """Add the folder that takes `what`, `folder` where it is not named, and leave to be quiet."""
     add("--out", type=Path, default=Path(folder), metavar="DIR", help=f"folder for {what} (default %(default)s)")
