@@ -137,6 +137,7 @@ class Diagnostics(NamedTuple):
         planned_squared: Squared rotor speeds that the plan commands at each step, in parts of the largest, (N, 4).
         mass_kg: Mass that the vehicle moves like under its thrust; nan for a control law that estimates none.
         path_lag_s: By which the law's path time was behind the clock; nan for a control law that keeps to the clock.
+        qp_iterations: That the QP's solver took, 0 where none was asked; nan if there was no QP, or it does not say.
     """
 
     qp_status: QpStatus | None = None
@@ -149,6 +150,7 @@ class Diagnostics(NamedTuple):
     planned_squared: Array | None = None
     mass_kg: float = nan
     path_lag_s: float = nan
+    qp_iterations: float = nan
 
 
 class Decision(NamedTuple):

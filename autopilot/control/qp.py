@@ -1,8 +1,9 @@
 """Quadratic programs by DAQP, or through qpsolvers by any solver. Every result is a value, never an exception."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import StrEnum
 from functools import cache, lru_cache
+from math import nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 from warnings import catch_warnings, simplefilter
 
@@ -64,10 +65,17 @@ class Qp(NamedTuple):
 
 
 class QpResult(NamedTuple):
-    """The solution (n,), or None with the status that says why there is none."""
+    """What came of a QP.
+
+    Attributes:
+        status: How it ended.
+        x: The solution, (n,), or None.
+        iterations: That the solver took, the same wherever the QP is the same; nan where it does not say.
+    """
 
     status: QpStatus
     x: Array | None
+    iterations: float = nan
 
 
 class QpSolver:
@@ -84,7 +92,7 @@ class QpSolver:
 
         self._residual = residual
         options = _options(name, tolerance, max_iterations)
-        self._optimum: Callable[[Qp], _Optimum | None] = _Daqp(options) if name == _DAQP else _Qpsolvers(name, options)
+        self._optimum: Callable[[Qp], _Optimum] = _Daqp(options) if name == _DAQP else _Qpsolvers(name, options)
         self.solve(Qp(np.eye(1), np.zeros(1), np.eye(1), np.ones(1)))  # loads what is loaded late, before any flight
 
     def solve(self, qp: Qp) -> QpResult:
@@ -93,20 +101,21 @@ class QpSolver:
             optimum = self._optimum(qp)
         except (ArithmeticError, ValueError, RuntimeWarning):
             return QpResult(QpStatus.NOT_ACCURATE, None)
-        if optimum is None:
-            return QpResult(why_none(qp), None)
+        if optimum.x is None:
+            return QpResult(why_none(qp), None, optimum.iterations)
         x = np.array(optimum.x, dtype=np.float64)  # of our own: some solvers give what cannot be written to
         if self._residual(*qp, x, _some(optimum.z), _some(optimum.z_box)) > MAX_RESIDUAL:
-            return QpResult(QpStatus.NOT_ACCURATE, None)
-        return QpResult(QpStatus.SOLVED, x)
+            return QpResult(QpStatus.NOT_ACCURATE, None, optimum.iterations)
+        return QpResult(QpStatus.SOLVED, x, optimum.iterations)
 
 
 class _Optimum(NamedTuple):
-    """The solution, and the multipliers of rows and of bounds."""
+    """The solution, None if none was found; the multipliers of rows and of bounds; and how many iterations it took."""
 
-    x: Array
+    x: Array | None
     z: Array | None
     z_box: Array | None
+    iterations: float
 
 
 class _Daqp:
@@ -118,14 +127,15 @@ class _Daqp:
         self._daqp = daqp
         self._options = options
 
-    def __call__(self, qp: Qp) -> _Optimum | None:
+    def __call__(self, qp: Qp) -> _Optimum:
         bounds, rows = len(qp.upper), len(qp.h)
         upper = np.concatenate((qp.upper, qp.h))
         lower = np.full(bounds + rows, -_UNBOUNDED)
         lower[:bounds] = qp.lower
         kinds = np.zeros(bounds + rows, dtype=np.intc)
         x, _, code, found = self._daqp.solve(qp.H, qp.f, qp.G, upper, lower, kinds, **self._options)
-        return _Optimum(x, found["lam"][bounds:], found["lam"][:bounds]) if code > 0 else None
+        multipliers = found["lam"]
+        return _Optimum(x if code > 0 else None, multipliers[bounds:], multipliers[:bounds], found["iterations"])
 
 
 class _Qpsolvers:
@@ -139,12 +149,13 @@ class _Qpsolvers:
         self._sparse = name in qpsolvers.sparse_solvers and name not in qpsolvers.dense_solvers
         self._options = options
 
-    def __call__(self, qp: Qp) -> _Optimum | None:
+    def __call__(self, qp: Qp) -> _Optimum:
         try:
             solution = self._quietly(qp) if self._sparse else self._solution(qp, qp.H, qp.G)
         except self._qpsolvers.QPError as error:
             raise ValueError(str(error)) from error
-        return _Optimum(solution.x, solution.z, solution.z_box) if solution.found and solution.x is not None else None
+        x = solution.x if solution.found else None
+        return _Optimum(x, solution.z, solution.z_box, _iterations(solution.extras))
 
     def _solution(self, qp: Qp, P: Any, G: Any) -> Any:
         problem = self._qpsolvers.Problem(P, qp.f, G, qp.h, lb=_or_none(qp.lower), ub=_or_none(qp.upper))
@@ -155,6 +166,13 @@ class _Qpsolvers:
         with catch_warnings():
             simplefilter("ignore")
             return self._solution(qp, _filled("P", qp.H), _filled("G", qp.G))
+
+
+def _iterations(extras: Mapping[str, Any]) -> float:
+    """Return the iterations out of what a solver says beside its solution; nan if it does not say."""
+    if "iterations" in extras:  # quadprog's: of constraints added, and of constraints dropped
+        return float(sum(extras["iterations"]))
+    return float(getattr(extras.get("info"), "iter", extras.get("iter", nan)))
 
 
 def _some(vector: Array | None) -> Array:

@@ -26,6 +26,7 @@ DECISION_COLUMNS = (
     "delay_us",
     "mass_kg",
     "path_lag_s",
+    "qp_iterations",
 )
 
 ESTIMATE_COLUMNS = (
@@ -83,8 +84,8 @@ class AutopilotLog:
         codes = (STATUS_CODES[how.qp_status], FALLBACK_CODES[how.fallback])
         times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
         time_s = step.command.time_us / 1e6
-        figures = (*times_us, how.cost, how.slack, *how.active, step.delay_us, how.mass_kg, how.path_lag_s)
-        self._decisions.add((time_s, *step.decision.attitude_reference, *codes, *figures))
+        counts = (how.cost, how.slack, *how.active, step.delay_us, how.mass_kg, how.path_lag_s, how.qp_iterations)
+        self._decisions.add((time_s, *step.decision.attitude_reference, *codes, *times_us, *counts))
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
         """Record that the next frame is answered by a vehicle that begins with these parameters and this history."""

@@ -12,6 +12,7 @@ KEYS = (
     *("estimation_rmse_m.horizontal", "estimation_rmse_m.vertical"),
     *("attitude_rmse_deg.roll", "attitude_rmse_deg.pitch", "attitude_rmse_deg.yaw", "nees_mean"),
     *("max_tilt_deg", "ground_contact_s", "effort_n_m", "max_slack", "qp_failures", "fallbacks", "resent"),
+    *("qp_iterations.mean", "qp_iterations.p99", "qp_iterations.max"),
     *("solve_time_us.p50", "solve_time_us.p99", "control_step_us.p50", "control_step_us.p99"),
 )
 """Numbers of `report.json` that may have a limit, a table before the dot; `fallbacks` is the sum of them."""

@@ -53,6 +53,7 @@ class Samples:
         control_step_us: Time of each control step, (m,).
         slack: By how much soft limits were planned to be exceeded, in parts of each, (m,).
         active: How many constraints of each kind were active, columns as in `interface.Active`, (m, 4).
+        qp_iterations: That each QP's solver took; nan where there was none, or it does not say, (m,).
     """
 
     table: Array
@@ -62,6 +63,7 @@ class Samples:
     control_step_us: Array
     slack: Array
     active: NDArray[np.int64]
+    qp_iterations: Array
 
     def __getitem__(self, column: str) -> Array:
         """Return one column, (n,)."""
@@ -177,6 +179,7 @@ class FlightReader:
             control_step_us=decisions[:, 7],
             slack=decisions[:, 9],
             active=decisions[:, 10:14].astype(np.int64),
+            qp_iterations=decisions[:, 17],
         )
 
 

@@ -66,6 +66,7 @@ def report(plan: FlightPlan, summary: Summary | None, flight: FlightSeries, lost
         "effort_n_m": rms(flight.moment_n_m),
         "solve_time_us": _quantiles(flight.solve_time_us),
         "control_step_us": _quantiles(flight.control_step_us),
+        "qp_iterations": _iterations(flight.qp_iterations),
         "frames": frames,
         "resent": resent,
         "qp_failures": int(np.count_nonzero(flight.qp_status > STATUS_CODES[QpStatus.SOLVED])),
@@ -152,6 +153,12 @@ def length(metres: float) -> str:
 
 def _counts(codes: NDArray[np.int8], names: dict[str, int]) -> dict[str, int]:
     return {name: int(np.count_nonzero(codes == code)) for name, code in names.items()}
+
+
+def _iterations(taken: NDArray[np.float32]) -> dict[str, float] | None:
+    """Return the mean and quantiles of how many iterations QPs took; None where none is known."""
+    known = taken[~np.isnan(taken)].astype(np.float64)
+    return {"mean": float(known.mean()), **_quantiles(known)} if len(known) else None
 
 
 def _quantiles(values: Array) -> dict[str, float]:

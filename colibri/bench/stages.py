@@ -154,7 +154,7 @@ def solver_figures(profile: Profile, name: str, qps: Sequence[Qp]) -> Figures:
     times_us, solved = [], 0
     for qp in qps:
         began_s = perf_counter()
-        status, _ = solver.solve(qp)
+        status = solver.solve(qp).status
         times_us.append((perf_counter() - began_s) * 1e6)
         solved += status is QpStatus.SOLVED
     return {**summary(times_us), "solved": solved / len(qps)}

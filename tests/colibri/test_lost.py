@@ -36,7 +36,7 @@ def flown(until_s: float = 30.0, **columns: Any) -> FlightSeries:
     nothing = np.zeros(len(t) - 1)
     codes = nothing.astype(np.int64)
     series = FlightSeries(len(t), load_vehicle("hummingbird"))
-    series.add(Samples(table, codes, codes, nothing, nothing, nothing, np.zeros((len(t) - 1, 4), np.int64)))
+    series.add(Samples(table, codes, codes, nothing, nothing, nothing, np.zeros((len(t) - 1, 4), np.int64), nothing))
     return series
 
 

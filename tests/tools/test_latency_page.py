@@ -17,7 +17,7 @@ def recording(x: float = 0.0, phi: float = 0.0, until_s: float = STEP.duration_s
     table[90:, COLUMNS.index("phi")] = phi
     none = np.zeros(99)
     counts = none.astype(np.int64)
-    return Recording(table, counts, counts, none, none, none, np.zeros((99, 4), np.int64), None, "")
+    return Recording(table, counts, counts, none, none, none, np.zeros((99, 4), np.int64), none, None, "")
 
 
 def test_a_flight_that_is_off_or_ends_early_or_upside_down_is_lost() -> None:

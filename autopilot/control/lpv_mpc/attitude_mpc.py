@@ -148,11 +148,12 @@ class AttitudeMpc:
         """Plan from the responses predicted last."""
         qp = self.condense(now, target)
         started_s = self._clock()
-        status, z = self._solver.solve(qp)
+        status, z, iterations = self._solver.solve(qp)
         solve_time_s = self._clock() - started_s
         if z is None:
-            return None, Diagnostics(status, solve_time_s=solve_time_s)
-        return self.read(now, target, qp, z, solve_time_s)
+            return None, Diagnostics(status, solve_time_s=solve_time_s, qp_iterations=iterations)
+        plan, diagnostics = self.read(now, target, qp, z, solve_time_s)
+        return plan, diagnostics._replace(qp_iterations=iterations)
 
     def predict(self, now: InitialState, ahead: Array | None) -> None:
         """Predict the responses, scheduled along the last plan if there is one."""

@@ -110,15 +110,18 @@ def solve(qp: CondensedQp, bound: Array, solver: QpSolver, clock: Clock) -> Solu
     horizon = len(qp.f) // m
     max_increment = np.concatenate([bound] * horizon)
     started_s = clock()
-    status, increments = solver.solve(Qp(qp.H, qp.f, box(len(qp.f)), np.concatenate([max_increment, max_increment])))
+    status, increments, iterations = solver.solve(
+        Qp(qp.H, qp.f, box(len(qp.f)), np.concatenate([max_increment, max_increment]))
+    )
     solve_time_s = clock() - started_s
     if increments is None:
-        return Solution(np.zeros(m), Diagnostics(status, solve_time_s=solve_time_s))
+        return Solution(np.zeros(m), Diagnostics(status, solve_time_s=solve_time_s, qp_iterations=iterations))
     diagnostics = Diagnostics(
         status,
         solve_time_s=solve_time_s,
         cost=dot(increments, 0.5 * matvec(qp.H, increments) + qp.f),
         active=Active(increments=int(np.count_nonzero(np.abs(increments) > (1.0 - _BINDING) * max_increment))),
         predicted=(qp.free + matvec(qp.Gamma, increments)).reshape(horizon, -1),
+        qp_iterations=iterations,
     )
     return Solution(increments[:m], diagnostics)

@@ -70,6 +70,24 @@ class Plan(NamedTuple):
     speeds: Array | None = None
 
 
+class Corrections(NamedTuple):
+    """How a QP ended.
+
+    Attributes:
+        status: Of the last one that was solved.
+        z: Corrections of the last commands, (n,); None where there are none.
+        iterations: That solvers took; 0 where none was asked.
+        slack: By how much soft limits are exceeded, in parts of each: the largest.
+        binding: How many soft limits of tilt and of rates bind.
+    """
+
+    status: QpStatus
+    z: Array | None
+    iterations: float
+    slack: float = 0.0
+    binding: tuple[int, int] = (0, 0)
+
+
 class _Qps(NamedTuple):
     """QPs of one kind: the `Kind`, and in its memory the QP without and with soft limits."""
 
@@ -195,10 +213,10 @@ class WholeMpc:
         else:
             planning.condense_on_path(now, target, last, path, self._effects, self.model, qps.kind)
         started_s = self._clock()
-        status, z, slack, soft = self.solve(*qps)
+        status, z, iterations, slack, soft = self.solve(*qps)
         solve_time_s = self._clock() - started_s
         if z is None:
-            return None, Diagnostics(status, solve_time_s=solve_time_s)
+            return None, Diagnostics(status, solve_time_s=solve_time_s, qp_iterations=iterations)
         commands, states, binding = planning.read(qps.kind, z, psi)
         diagnostics = Diagnostics(
             QpStatus.SOLVED,
@@ -207,26 +225,29 @@ class WholeMpc:
             slack=slack,
             predicted=states,
             planned_squared=commands,
+            qp_iterations=iterations,
         )
         speeds = None if path is None else read_speeds(path.speeds, self._effects.shares, z)
         return Plan(commands, states, speeds), diagnostics
 
-    def solve(self, kind: Packed, free: Qp, limited: Qp) -> tuple[QpStatus, Array | None, float, tuple[int, int]]:
-        """Return how the QP ended, its corrections, the largest slack, and how many soft limits of tilt and rates bind.
+    def solve(self, kind: Packed, free: Qp, limited: Qp) -> Corrections:
+        """Return the corrections of the last commands that cost least.
 
         No solver is asked where the minimum within no limits is within the rotors'; soft limits are added where it, or
         the solver's, exceeds one.
         """
         minimum = np.empty(len(free.f))
         is_free = planning.is_free(kind, minimum)
-        status, z = QpResult(QpStatus.SOLVED, minimum) if is_free else self._solver.solve(free)
+        status, z, iterations = QpResult(QpStatus.SOLVED, minimum, 0) if is_free else self._solver.solve(free)
         if z is None or not planning.is_beyond(kind, z):
-            return status, z, 0.0, (0, 0)
+            return Corrections(status, z, iterations)
         planning.limit(kind)
-        status, z = self._solver.solve(limited)
+        status, z, more = self._solver.solve(limited)
+        iterations += more
         if z is None:
-            return status, z, 0.0, (0, 0)
-        return status, z[: len(free.f)].copy(), max(z[len(free.f) :].tolist()), planning.count_active(kind, z)
+            return Corrections(status, z, iterations)
+        slack, soft = max(z[len(free.f) :].tolist()), planning.count_active(kind, z)
+        return Corrections(status, z[: len(free.f)].copy(), iterations, slack, soft)
 
 
 def model_of(vehicle: Vehicle, interval_s: float) -> Model:

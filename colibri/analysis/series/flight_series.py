@@ -26,6 +26,7 @@ class FlightSeries:
         aloft: At which the reference is above the ground, (n,).
         solve_time_us: Time of each QP, (m,).
         control_step_us: Time of each control step, (m,).
+        qp_iterations: That each QP's solver took; nan where there was none, or it does not say, (m,).
         qp_status: How each QP ended, as in `interface.STATUS_CODES`, (m,).
         fallback: What decided in its place, as in `interface.FALLBACK_CODES`, (m,).
         constrained: At how many samples constraints of each kind were active.
@@ -39,6 +40,7 @@ class FlightSeries:
         numbers = np.empty((6, samples))  # in one piece, which the system gets back as soon as the flight is judged
         self.t, self.position_error_m, self.moment_n_m, self.upright = numbers[:4]
         self.solve_time_us, self.control_step_us = numbers[4:, 1:]
+        self.qp_iterations = np.empty(samples - 1, dtype=np.float32)  # exact: a QP takes 100,000 at most
         self.touches, self.aloft = np.empty((2, samples), dtype=np.bool_)
         self.qp_status, self.fallback = np.empty((2, samples - 1), dtype=np.int8)
         self.constrained = Active(*np.zeros(len(Active._fields), dtype=np.int64).tolist())
@@ -62,6 +64,7 @@ class FlightSeries:
         at = slice(self._decisions, self._decisions + len(part.slack))
         self.solve_time_us[at] = part.solve_time_us
         self.control_step_us[at] = part.control_step_us
+        self.qp_iterations[at] = part.qp_iterations
         self.qp_status[at] = part.qp_status
         self.fallback[at] = part.fallback
         self._decisions = at.stop

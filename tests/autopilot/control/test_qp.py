@@ -1,6 +1,7 @@
 """QPs: optimal by the KKT conditions with every installed solver, and never an exception."""
 
 from collections.abc import Callable
+from math import isnan
 from typing import Any
 
 import numpy as np
@@ -72,10 +73,23 @@ def test_bounds_alone(name: str) -> None:
     """No row: the point that is optimal by the gradient, which a bound's multiplier takes up."""
     for seed in range(5):
         H, f = random_qp(seed, 12)
-        status, x = QpSolver(name, TOLERANCE).solve(bounded(H, f, 0.05))
+        status, x, _ = QpSolver(name, TOLERANCE).solve(bounded(H, f, 0.05))
         assert status is QpStatus.SOLVED
         assert x is not None
         assert np.clip(x - (H @ x + f), -0.05, 0.05) == pytest.approx(x, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["daqp", "osqp", "piqp", "proxqp", "quadprog", "scs"])
+def test_iterations_are_counted_and_grow_with_what_binds(name: str) -> None:
+    H, f = random_qp(0, 12)
+    easy, hard = (QpSolver(name, TOLERANCE).solve(in_a_box(H, f, bound)) for bound in (100.0, 0.05))
+    assert 0 < easy.iterations < hard.iterations
+    assert hard.iterations == QpSolver(name, TOLERANCE).solve(in_a_box(H, f, 0.05)).iterations
+
+
+@pytest.mark.parametrize("name", ["clarabel", "highs"])
+def test_iterations_that_a_solver_does_not_say_are_unknown(name: str) -> None:
+    assert isnan(QpSolver(name, TOLERANCE).solve(in_a_box(*random_qp(0, 12), 0.05)).iterations)
 
 
 def test_the_extra_and_the_profiles_solvers_are_installed() -> None:
@@ -84,13 +98,13 @@ def test_the_extra_and_the_profiles_solvers_are_installed() -> None:
 
 @pytest.mark.parametrize("name", ["clarabel", "daqp", "quadprog", "piqp"])
 def test_an_empty_box_is_infeasible(name: str) -> None:
-    assert QpSolver(name, TOLERANCE).solve(in_a_box(*random_qp(0, 6), -1.0)) == (QpStatus.INFEASIBLE, None)
+    assert QpSolver(name, TOLERANCE).solve(in_a_box(*random_qp(0, 6), -1.0))[:2] == (QpStatus.INFEASIBLE, None)
 
 
 @pytest.mark.parametrize("name", ["clarabel", "daqp", "piqp", "osqp"])
 def test_too_few_iterations_are_a_time_out(name: str) -> None:
     qp = in_a_box(*random_qp(0, 12), 0.05)
-    assert QpSolver(name, TOLERANCE, max_iterations=2).solve(qp) == (QpStatus.TIME_OUT, None)
+    assert QpSolver(name, TOLERANCE, max_iterations=2).solve(qp)[:2] == (QpStatus.TIME_OUT, None)
 
 
 @pytest.mark.parametrize("limited", [in_a_box, bounded])
@@ -108,7 +122,7 @@ def test_a_solution_that_is_none_is_not_accurate(
     qp = limited(*random_qp(0, 12), 100.0)
     assert QpSolver("quadprog", TOLERANCE).solve(qp).status is QpStatus.SOLVED
     monkeypatch.setattr(qpsolvers, "solve_problem", sloppy)
-    assert QpSolver("quadprog", TOLERANCE).solve(qp) == (QpStatus.NOT_ACCURATE, None)
+    assert QpSolver("quadprog", TOLERANCE).solve(qp)[:2] == (QpStatus.NOT_ACCURATE, None)
 
 
 @pytest.mark.parametrize("name", ["clarabel", "quadprog", "daqp", "piqp"])
@@ -117,7 +131,7 @@ def test_nan_is_a_value(name: str, spoilt: str) -> None:
     H, f = random_qp(0, 6)
     (H if spoilt == "H" else f).flat[0] = np.nan
     result = QpSolver(name, TOLERANCE).solve(in_a_box(H, f, 1.0))
-    assert result == (QpStatus.NOT_ACCURATE, None)
+    assert result[:2] == (QpStatus.NOT_ACCURATE, None)
 
 
 def test_an_unknown_solver_lists_the_installed_ones() -> None:

@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+import colibri
 from colibri.campaigns.flights import Verdict
 from colibri.campaigns.metrics import Metric
 from colibri.tuning.objectives import Objective, metrics_of, read_objectives
@@ -64,3 +65,15 @@ def test_what_objectives_need_is_kept_and_one_may_be_a_function() -> None:
     kept = metrics_of(objectives, own)
     assert [metric.name for metric in kept] == ["effort_n_m", "sunk", "rmse_m"]
     assert kept[1].of is sunk
+
+
+def test_the_solvers_work_is_an_objective_that_no_clock_measures() -> None:
+    hover = {"duration": 0.3, "start": {"x": 0.4, "z": 2.0}}
+    (metric,) = metrics_of(read_objectives({"qp_iterations.mean": "mean"}, ()), ())
+    worked, again, without = (
+        metric.value(colibri.fly("hover", **hover, **law)) for law in ({}, {}, {"controller": "geometric-se3"})
+    )
+    assert worked == again
+    assert worked is not None
+    assert worked > 0.0
+    assert without is None
