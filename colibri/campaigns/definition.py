@@ -5,15 +5,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice, product
 from math import prod
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 from numpy.random import PCG64, Generator, SeedSequence
 
 from colibri.campaigns.factors import factor_name
-from colibri.campaigns.metrics import Metric, read_metrics, usual
-from colibri.campaigns.values import CampaignError, Choice, Draw, Level, has_levels, read_draw, read_values
-from colibri.common.config import read_toml
+from colibri.campaigns.metrics import Metric, hint, read_metrics, usual
+from colibri.campaigns.values import CampaignError, Choice, Draw, Level, has_levels, is_number, read_draw, read_values
+from colibri.common.config import read_settings, read_toml
 from colibri.common.process.arguments import seeds
 from colibri.experiments.options import option_names
 from colibri.mavlink.hil.feedback import Feedback
@@ -21,35 +21,47 @@ from colibri.mavlink.hil.feedback import Feedback
 Logs: TypeAlias = Literal["none", "lost", "all"]
 OF_ALL = ("link",)
 """Options that every flight of a campaign has alike."""
-_COLUMNS = ("flight", "seed", "verdict", "why", "trajectory_sha256")
 _MAX_SEED = 2**63
 
 
-class CampaignTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What is in the file of a campaign; `colibri.campaign` has the same by keywords.
+class FlightTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What every file of many flights has.
 
     Attributes:
+        FACTORS: Which of its tables have factors.
         name: In titles.
         seeds: Of everything random in a flight: one, several, or `1-20`; every combination is flown by each.
         root_seed: Of the draws.
-        paired: Whether flights of the same seed have the same draws in every combination of the grid.
         metrics: What is kept of each flight; None for the usual.
-        logs: Of which flights the logs are kept.
         fly: Options of `colibri fly` that every flight has.
         grid: Factors with several values; every combination is flown. A factor of another name than an option's or a
             key's has levels: tables by their names, each with what options and keys are set to together.
         draw: Factors that are drawn anew for each flight.
     """
 
+    FACTORS: ClassVar[tuple[str, ...]] = ("fly", "grid", "draw")
     name: str = "campaign"
     seeds: Any = "0"
     root_seed: int = 0
-    paired: bool = False
     metrics: Any = None
-    logs: Logs = "none"
     fly: dict[str, Any] = {}
     grid: dict[str, Any] = {}
     draw: dict[str, Any] = {}
+
+
+Tables = TypeVar("Tables", bound=FlightTables)
+
+
+class CampaignTables(FlightTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What is in the file of a campaign; `colibri.campaign` has the same by keywords.
+
+    Attributes:
+        paired: Whether flights of the same seed have the same draws in every combination of the grid.
+        logs: Of which flights the logs are kept.
+    """
+
+    paired: bool = False
+    logs: Logs = "none"
 
 
 class Point(NamedTuple):
@@ -104,6 +116,12 @@ class Campaign(NamedTuple):
         """Names of what differs from flight to flight."""
         return (*self.grid, *self.draw)
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns of its table."""
+        metrics = (metric.name for metric in self.metrics)
+        return ("flight", *self.factors, "seed", *metrics, "verdict", "why", "trajectory_sha256")
+
     def points(self) -> Iterator[Point]:
         """Return its flights: combination by combination, each by every seed."""
         flight = 0
@@ -115,11 +133,11 @@ class Campaign(NamedTuple):
                 flight += 1
 
     def samples(self) -> Iterator[Point]:
-        """Return flights in which each value of each factor is there once, with the first of the others."""
+        """Return flights that have each value of each factor, of numbers the ends, with the first of the others."""
         first = next(self.points())
         yield first
         for factor, values in self.grid.items():
-            ends = values if isinstance(values[0], str | Level) else (values[0], values[-1])
+            ends = (values[0], values[-1]) if all(map(is_number, values)) else values
             for value in islice(ends, 1, None):
                 yield first._replace(factors=first.factors | {factor: value})
         for factor, draw in self.draw.items():
@@ -144,14 +162,30 @@ class Campaign(NamedTuple):
         return {factor: draw.value(chance) for factor, draw in self.draw.items()}
 
 
-def read_campaign(path: Path) -> CampaignTables:
-    """Read the file of a campaign.
+def tables_of(kind: type[Tables], file: str | Path | None, given: Mapping[str, Any]) -> Tables:
+    """Return the tables of a file with what is `given` in place of its own, factor by factor.
+
+    A file that has no name is called by its own.
 
     Raises:
-        CampaignError: It cannot be read, or has an unknown or impossible key.
+        Error: The file cannot be read, or a table is unknown or impossible.
     """
-    tables = read_toml(path, CampaignTables, CampaignError)
-    return tables if tables.name != "campaign" else msgspec.structs.replace(tables, name=path.stem)
+    base = kind() if file is None else read_toml(Path(file), kind, CampaignError)
+    known = kind.__struct_fields__
+    for name in given:
+        if name not in known:
+            raise CampaignError(f"unknown option {name}: {hint(name, known)}")
+    read_settings(given, kind)
+    named = {name_in_tables(*each) for table in kind.FACTORS for each in given.get(table, {}).items()}
+    changed = dict(given) | {
+        table: {
+            **{key: value for key, value in getattr(base, table).items() if name_in_tables(key, value) not in named},
+            **given.get(table, {}),
+        }
+        for table in kind.FACTORS
+    }
+    called = {} if file is None or base.name != kind().name else {"name": Path(file).stem}
+    return msgspec.structs.replace(base, **(called | changed))
 
 
 def campaign_of(tables: CampaignTables) -> Campaign:
@@ -173,10 +207,10 @@ def campaign_of(tables: CampaignTables) -> Campaign:
         grid={name: _values(name, values) for name, values in _named(tables.grid).items()},
         draw={name: read_draw(name, given) for name, given in _named(tables.draw).items()},
     )
-    _check_names(planned)
     if tables.metrics is None:
         sensors = Feedback.SENSORS in map(str, planned.values("feedback"))
-        return planned._replace(metrics=usual(sensors=sensors))
+        planned = planned._replace(metrics=usual(sensors=sensors))
+    _check_names(planned)
     return planned
 
 
@@ -221,11 +255,12 @@ def _check_names(planned: Campaign) -> None:
     said = [*planned.fly, *planned.draw]
     for name, values in planned.grid.items():
         levels = [each.settings for each in values if isinstance(each, Level)]
-        if levels and name in (*option_names(), *_COLUMNS, *(metric.name for metric in planned.metrics)):
+        if levels and name in option_names():
             raise CampaignError(f"{name}: a factor with levels needs a name of its own")
         said += dict.fromkeys(key for settings in levels for key in settings) if levels else [name]
-    twice = next((name for name in said if said.count(name) > 1), None)
-    if twice is not None:
+    for twice in (name for name in said if said.count(name) > 1):
         raise CampaignError(f"{twice} is said twice: keep it in one of fly, grid and draw")
+    for twice in (name for name in planned.columns if planned.columns.count(name) > 1):
+        raise CampaignError(f"{twice}: the table would have two columns of that name: choose another")
     if "track" not in said:
         raise CampaignError('no track: say which is flown, track = ["spiral"] in grid say')

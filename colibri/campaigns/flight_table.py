@@ -34,9 +34,7 @@ class FlightTable:
     @property
     def headings(self) -> Row:
         """Names of the table's columns."""
-        campaign = self.campaign
-        names = tuple(metric.name for metric in campaign.metrics)
-        return ("flight", *campaign.factors, "seed", *names, "verdict", "why", "trajectory_sha256")
+        return self.campaign.columns
 
     def rows(self) -> list[Row]:
         """Return the table: factors, metrics, verdict and hash of each flight; numbers with ten digits."""

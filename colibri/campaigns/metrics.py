@@ -1,6 +1,7 @@
 """What is kept of each flight: numbers of its report, by their names there, or what functions make of a flight."""
 
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from colibri.analysis.limits import KEYS, of_report
@@ -28,9 +29,9 @@ class Metric(NamedTuple):
     of: "Callable[[Flight], float | None] | None" = None
 
     def value(self, flight: "Flight") -> float | None:
-        """Return the metric of a flight; None where that has none."""
+        """Return the metric of a flight; None where that has none, or none that is finite."""
         found = of_report(flight.report, self.name) if self.of is None else self.of(flight)
-        return None if found is None else float(found)
+        return None if found is None or not isfinite(found) else float(found)
 
 
 def usual(*, sensors: bool) -> tuple[Metric, ...]:
@@ -48,6 +49,8 @@ def read_metrics(given: Any) -> tuple[Metric, ...]:
         return tuple(Metric(str(name), of) for name, of in given.items())
     if isinstance(given, str) or callable(given):
         given = given.split(",") if isinstance(given, str) else [given]
+    if not given:
+        raise CampaignError(f"metrics: name at least one: {', '.join(NAMES)}")
     return tuple(map(_metric, given))
 
 

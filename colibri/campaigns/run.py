@@ -1,24 +1,20 @@
 """`colibri.campaign`: all flights of a campaign, by any engine, kept as they end."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
-from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of, name_in_tables, read_campaign
+from colibri.campaigns.definition import Campaign, CampaignTables, campaign_of, tables_of
 from colibri.campaigns.engines.engine import Engine
 from colibri.campaigns.engines.pool import Pool
 from colibri.campaigns.flights import Common, Flown, check, common_of, fly_points
 from colibri.campaigns.journal import JOURNAL, Journal, open_journal, read_journal
-from colibri.campaigns.metrics import hint
 from colibri.campaigns.results import CampaignResults, parquet_writer
 from colibri.campaigns.values import CampaignError
 from colibri.common.process.folder_lock import FolderLock
 
 MAX_UNASKED = 1_000_000
-_OF_FACTORS = ("fly", "grid", "draw")
 
 
 def campaign(
@@ -52,32 +48,10 @@ def campaign(
     Raises:
         Error: What the command line would say in one line.
     """
-    planned = campaign_of(tables_of(file, tables))
+    planned = campaign_of(tables_of(CampaignTables, file, tables))
     engine = engine_of(workers, executor)
     folder = Path(out) if out else None
     return fly_campaign(planned, engine, folder, resume=resume, yes=yes, parquet=parquet, progress=progress)
-
-
-def tables_of(file: str | Path | None, given: Mapping[str, Any]) -> CampaignTables:
-    """Return the tables of a file with what is `given` in place of its own, option by option.
-
-    Raises:
-        CampaignError: The file cannot be read, or there is no such table.
-    """
-    base = CampaignTables() if file is None else read_campaign(Path(file))
-    known = CampaignTables.__struct_fields__
-    for name in given:
-        if name not in known:
-            raise CampaignError(f"unknown option {name}: {hint(name, known)}")
-    named = {name_in_tables(*each) for table in _OF_FACTORS for each in given.get(table, {}).items()}
-    factors = {
-        table: {
-            **{key: value for key, value in getattr(base, table).items() if name_in_tables(key, value) not in named},
-            **given.get(table, {}),
-        }
-        for table in _OF_FACTORS
-    }
-    return msgspec.structs.replace(base, **(dict(given) | factors))
 
 
 def engine_of(workers: int | None, executor: Any) -> Engine:

@@ -1,5 +1,6 @@
 """What a factor is set to: each of several values, or a draw from a distribution."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any, NamedTuple, Protocol
@@ -10,7 +11,7 @@ from numpy.random import Generator
 from colibri.common import elementary
 from colibri.common.errors import Error
 
-MAX_SPAN = 1_000_000
+_MAX_SPAN = 1_000_000
 
 
 class CampaignError(Error):
@@ -147,9 +148,7 @@ def read_values(key: str, given: Any) -> tuple[Any, ...]:
     values = tuple(given) if isinstance(given, list | tuple | range) else (given,)
     if not values:
         raise CampaignError(f"{key}: no values: give at least one")
-    names = [shown(value) for value in values]
-    twice = next((name for name in names if names.count(name) > 1), None) if len(names) < MAX_SPAN else None
-    if twice is not None:
+    for twice in (name for name, count in Counter(map(shown, values)).items() if count > 1):
         raise CampaignError(f"{key}: {twice} is there twice")
     return values
 
@@ -182,7 +181,7 @@ def _span(key: str, name: str, span: Any) -> tuple[float, ...]:
     if not isinstance(span, Sequence) or len(span) != 3 or not all(map(is_number, span)):
         raise CampaignError(f"{key}: {name}: expected [first, last, how many], not {span}")
     first, last, count = float(span[0]), float(span[1]), float(span[2])
-    if not count.is_integer() or not 2 <= count <= MAX_SPAN or first == last:
+    if not count.is_integer() or not 2 <= count <= _MAX_SPAN or first == last:
         raise CampaignError(
             f"{key}: {first:g}:{last:g}:{count:g} is no range: give first, last and how many, 2:20:10 say"
         )

@@ -3,55 +3,44 @@
 from collections.abc import Mapping
 from math import ceil
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import msgspec
 
 from colibri.autopilot.control.profile import Profile, ProfileError, profile_text
-from colibri.campaigns.definition import Campaign, CampaignTables, Point, campaign_of, read_seeds
+from colibri.campaigns.definition import Campaign, CampaignTables, FlightTables, Point, campaign_of, read_seeds
 from colibri.campaigns.factors import factor_name, key_of, with_keys
 from colibri.campaigns.flights import Common, check, common_of
-from colibri.campaigns.metrics import hint
-from colibri.common.config import read_toml, value_at
+from colibri.common.config import value_at
 from colibri.common.errors import Error
 from colibri.tuning.objectives import Objective, metrics_of, read_objectives
 from colibri.tuning.space import Range, TuningError, as_flown, as_optuna, check_holds, read_range
 
-_OF_PARTS = ("fly", "grid", "draw", "tune")
 _LEAST_SEEDS = 3
 
 
-class TuningTables(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class TuningTables(FlightTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What is in the file of a tuning; `colibri.tune` has the same by keywords.
 
+    Seeds, draws and the grid are those of every trial; metrics are shown beside the objectives.
+
     Attributes:
-        name: In titles.
-        seeds: By which each trial flies every combination of the grid.
         check_seeds: By which the best is flown beside the profile as it is; None: not at all.
-        root_seed: Of what is tried, and of the draws.
         trials: How many, the profile as it is among them.
         prune_after: Seeds after which, again and again, a trial may end that is clearly worse than the best; 0: never;
             None: a quarter of them, but three at least.
-        metrics: What is shown of the flights beside the objectives; None for the usual.
-        fly: Options of `colibri fly` that every flight has.
-        grid: Factors with several values; every combination is flown.
-        draw: Factors that are drawn anew for each flight; every trial has the same draws.
         tune: Numbers of the profile, and their ranges.
         objectives: Metrics that are to become small, and how they are pooled over a trial's flights.
     """
 
+    FACTORS: ClassVar[tuple[str, ...]] = (*FlightTables.FACTORS, "tune")
     name: str = "tuning"
     seeds: Any = "0-7"
     check_seeds: Any = None
-    root_seed: int = 0
     trials: int = 50
     prune_after: int | None = None
-    metrics: Any = None
-    fly: dict[str, Any] = {}
-    grid: dict[str, Any] = {}
-    draw: dict[str, Any] = {}
-    tune: dict[str, Any] = {}
-    objectives: dict[str, Any] = {}
+    tune: dict[str, Any] = msgspec.field(default_factory=dict)
+    objectives: dict[str, Any] = msgspec.field(default_factory=dict)
 
 
 class Tuning(NamedTuple):
@@ -110,23 +99,6 @@ class Tuning(NamedTuple):
         ]
 
 
-def tables_of(file: str | Path | None, given: Mapping[str, Any]) -> TuningTables:
-    """Return the tables of a file with what is `given` in place of its own, factor by factor.
-
-    Raises:
-        TuningError: The file cannot be read, or there is no such table.
-    """
-    path = None if file is None else Path(file)
-    base = TuningTables() if path is None else read_toml(path, TuningTables, TuningError)
-    known = TuningTables.__struct_fields__
-    for name in given:
-        if name not in known:
-            raise TuningError(f"unknown option {name}: {hint(name, known)}")
-    merged = {part: {**getattr(base, part), **given.get(part, {})} for part in _OF_PARTS}
-    named = {"name": path.stem} if path is not None and base.name == "tuning" else {}
-    return msgspec.structs.replace(base, **(named | dict(given) | merged))
-
-
 def tuning_of(tables: TuningTables) -> Tuning:
     """Return the tuning of its tables, all of whose ranges can be flown.
 
@@ -135,15 +107,7 @@ def tuning_of(tables: TuningTables) -> Tuning:
     """
     space = _space(tables)
     campaign = campaign_of(
-        CampaignTables(
-            name=tables.name,
-            seeds=tables.seeds,
-            root_seed=tables.root_seed,
-            metrics=tables.metrics,
-            fly=tables.fly,
-            grid=tables.grid,
-            draw=tables.draw,
-        )
+        CampaignTables(**{table: getattr(tables, table) for table in FlightTables.__struct_fields__})
     )
     _check_factors(campaign, space)
     objectives = read_objectives(tables.objectives, campaign.metrics)

@@ -8,11 +8,12 @@ from typing import Any
 
 import msgspec
 
+from colibri.campaigns.definition import tables_of
 from colibri.campaigns.engines.engine import Engine
 from colibri.campaigns.flights import Flown
 from colibri.campaigns.journal import identity_of
 from colibri.campaigns.run import engine_of, fly_campaign
-from colibri.tuning.definition import Tuning, tables_of, tuning_of
+from colibri.tuning.definition import Tuning, TuningTables, tuning_of
 from colibri.tuning.file_lock import FileLock
 from colibri.tuning.flying import Flights, fly_trial, scale_kept
 from colibri.tuning.profile_file import tuned_name
@@ -68,7 +69,7 @@ def tune(
         Error: What the command line would say in one line.
     """
     require_optuna()
-    tuning = tuning_of(tables_of(file, tables))
+    tuning = tuning_of(tables_of(TuningTables, file, tables))
     if out is not None:
         return fly_tuning(tuning, lambda: engine_of(workers, executor), Path(out), resume=resume, watcher=watcher)
     with TemporaryDirectory(prefix="colibri-") as folder:

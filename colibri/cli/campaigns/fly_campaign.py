@@ -6,10 +6,10 @@ from contextlib import contextmanager
 from typing import Any, Protocol
 
 from colibri.analysis.tables import print_table
-from colibri.campaigns.definition import OF_ALL, campaign_of
+from colibri.campaigns.definition import OF_ALL, CampaignTables, campaign_of, tables_of
 from colibri.campaigns.flights import Flown, Verdict
 from colibri.campaigns.results import CampaignResults
-from colibri.campaigns.run import engine_of, fly_campaign, tables_of
+from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.campaigns.values import CampaignError
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, fail
@@ -36,7 +36,7 @@ def fly(args: Namespace) -> int:
         tables = {name: said[name] for name in _TABLES if name in said}
         options = {name: said[name] for name in (*OF_ALL, *option_names()) if name in said}
         given = tables | {"fly": options, "grid": _grid(args), "draw": dict(map(_draw, args.draws))}
-        planned = campaign_of(tables_of(args.file, given))
+        planned = campaign_of(tables_of(CampaignTables, args.file, given))
         engine = engine_of(args.workers, args.dask)
         with _progress(planned.name, planned.flights, quiet=args.quiet) as bar:
             asked = {name: getattr(args, name) for name in ("resume", "yes", "parquet")}

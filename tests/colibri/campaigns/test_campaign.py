@@ -10,10 +10,11 @@ import psutil
 import pytest
 
 import colibri
+from colibri.campaigns.definition import CampaignTables, tables_of
 from colibri.campaigns.engines.engine import Killed
 from colibri.campaigns.flights import Flown
 from colibri.campaigns.journal import JOURNAL
-from colibri.campaigns.run import fly_campaign, tables_of
+from colibri.campaigns.run import fly_campaign
 from colibri.cli.main import main
 from tests.colibri.campaigns.support import MASS, SHORT, Here, planned, tables_in
 from tests.colibri.experiments.test_flight import Hovers
@@ -152,4 +153,4 @@ def test_bad_input_is_refused_in_one_line(
 
 def test_unknown_keywords_are_refused() -> None:
     with pytest.raises(colibri.Error, match="unknown option grids: did you mean grid"):
-        tables_of(None, {"grids": {}})
+        tables_of(CampaignTables, None, {"grids": {}})

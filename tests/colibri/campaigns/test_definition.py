@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from colibri.campaigns.definition import campaign_of, read_campaign, read_seeds
-from colibri.campaigns.run import tables_of
+import colibri
+from colibri.campaigns.definition import CampaignTables, campaign_of, read_seeds, tables_of
 from colibri.campaigns.values import CampaignError
 from tests.colibri.campaigns.support import DRAWN, MASS, planned
 
@@ -28,7 +28,7 @@ controller = ["lpv-mpc", "geometric-se3"]
 def test_a_file_is_every_combination_by_every_seed(tmp_path: Path) -> None:
     path = tmp_path / "mass.toml"
     path.write_text(FILE, encoding="utf-8")
-    campaign = campaign_of(read_campaign(path))
+    campaign = campaign_of(tables_of(CampaignTables, path, {}))
     assert (campaign.name, campaign.flights, campaign.combinations) == ("mass", 80, 4)
     points = list(campaign.points())
     assert [point.flight for point in points] == list(range(80))
@@ -42,7 +42,7 @@ def test_a_file_is_every_combination_by_every_seed(tmp_path: Path) -> None:
 def test_a_file_without_a_name_is_called_by_its_own(tmp_path: Path) -> None:
     path = tmp_path / "heavy.toml"
     path.write_text(FILE.replace('name = "mass"', ""), encoding="utf-8")
-    assert read_campaign(path).name == "heavy"
+    assert tables_of(CampaignTables, path, {}).name == "heavy"
 
 
 def test_each_flight_has_draws_of_its_own_stream() -> None:
@@ -69,7 +69,7 @@ def test_paired_draws_are_those_of_the_seed() -> None:
 def test_a_factor_takes_the_place_of_what_the_file_has(tmp_path: Path) -> None:
     path = tmp_path / "mass.toml"
     path.write_text(FILE, encoding="utf-8")
-    tables = tables_of(path, {"fly": {"duration": 5}, "grid": {MASS: [0.7, 0.75]}, "seeds": 3})
+    tables = tables_of(CampaignTables, path, {"fly": {"duration": 5}, "grid": {MASS: [0.7, 0.75]}, "seeds": 3})
     campaign = campaign_of(tables)
     assert campaign.fly == {"duration": 5, "turbulence": "light"}
     assert (list(campaign.grid), campaign.draw, campaign.seeds) == (["track", "controller", MASS], {}, (3,))
@@ -87,6 +87,19 @@ def test_samples_have_each_value_once() -> None:
     assert {point.factors["track"] for point in points} == {"hover", "spiral", "line"}
     assert {point.factors["latency"] for point in points} == {0.0, 9.0}
     assert {0.68, 0.74} < {point.factors[MASS] for point in points}
+
+
+def test_samples_have_each_object() -> None:
+    profiles = [colibri.load_profile(name) for name in ("flight", "thesis", "se3")]
+    points = list(planned(grid={"track": ["hover"], "profile": profiles}).samples())
+    assert [point.factors["profile"].name for point in points] == ["flight", "thesis", "se3"]
+
+
+@pytest.mark.parametrize("given", [{"logs": "lots"}, {"root_seed": "1"}, {"paired": 1}, {"grid": None}])
+def test_keywords_are_as_strict_as_a_file(given: dict[str, Any]) -> None:
+    with pytest.raises(colibri.Error, match=next(iter(given))) as refused:
+        tables_of(CampaignTables, None, given)
+    assert "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize(("given", "seeds"), [("1-3", (1, 2, 3)), (7, (7,)), ("7", (7,)), ([4, 2], (4, 2))])
@@ -111,6 +124,10 @@ def test_what_is_no_seed_is_refused(given: Any) -> None:
         ({"grid": {}}, "no track: say which is flown"),
         ({"fly": {"track": "hover"}}, "track is said twice: keep it in one of fly, grid and draw"),
         ({"metrics": ["rmse"]}, "unknown metric rmse: did you mean rmse_m? choose rmse_after_20s_m,"),
+        ({"metrics": []}, "metrics: name at least one: rmse_after_20s_m,"),
+        ({"metrics": ["rmse_m", "rmse_m"]}, "rmse_m: the table would have two columns of that name: choose another"),
+        ({"metrics": {"seed": len}}, "seed: the table would have two columns"),
+        ({"grid": {"track": ["hover"], "rmse_m": {"one": {}}}}, "rmse_m: the table would have two columns"),
         ({"root_seed": -1}, "root_seed: must not be below zero, not -1"),
     ],
 )
@@ -124,4 +141,4 @@ def test_a_file_with_an_unknown_table_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "mass.toml"
     path.write_text(FILE + "[gird]\n", encoding="utf-8")
     with pytest.raises(CampaignError, match=r"mass.toml: Object contains unknown field `gird`"):
-        read_campaign(path)
+        tables_of(CampaignTables, path, {})

@@ -1,6 +1,7 @@
 """One flight of a campaign: its factors take effect, and whatever comes of it is a row."""
 
 import pickle
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -132,6 +133,11 @@ def test_what_can_never_be_flown_is_refused_beforehand(tables: dict[str, Any], s
     with pytest.raises(colibri.Error) as refused:
         check(campaign.samples(), common_of(campaign))
     assert said in str(refused.value)
+
+
+def test_a_metric_that_is_not_finite_is_none_as_it_would_be_after_going_on() -> None:
+    (row,) = flown(metrics={"nan": lambda _: nan, "inf": lambda _: inf})
+    assert row.metrics == (None, None)
 
 
 def test_a_metric_that_raises_ends_the_campaign_in_one_line() -> None:

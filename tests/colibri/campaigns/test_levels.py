@@ -5,11 +5,10 @@ from typing import Any
 
 import pytest
 
-from colibri.campaigns.definition import campaign_of, read_campaign
+from colibri.campaigns.definition import CampaignTables, campaign_of, tables_of
 from colibri.campaigns.flights import check, common_of, plan_point
 from colibri.campaigns.journal import identity_of
 from colibri.campaigns.metrics import usual
-from colibri.campaigns.run import tables_of
 from colibri.campaigns.values import CampaignError
 from colibri.common.errors import Error
 from colibri.plant.vehicle.description import load_vehicle
@@ -34,7 +33,7 @@ HEAVY = {"plant": {"nominal": {}, "heavy": {f"{MASS}*": 1.2}}}
 def test_each_level_sets_what_it_names_and_nothing_else(tmp_path: Path) -> None:
     file = tmp_path / "levels.toml"
     file.write_text(FILE, encoding="utf-8")
-    campaign = campaign_of(read_campaign(file))
+    campaign = campaign_of(tables_of(CampaignTables, file, {}))
     assert campaign.factors == ("track", "contender", "plant")
     assert campaign.flights == 8
     points = list(campaign.points())
@@ -80,9 +79,9 @@ def test_every_level_is_tried_before_anything_flies(level: str) -> None:
 def test_what_a_file_has_as_levels_can_be_replaced(tmp_path: Path) -> None:
     file = tmp_path / "levels.toml"
     file.write_text(FILE, encoding="utf-8")
-    tables = tables_of(file, {"grid": {"plant": {"light": {MASS: 0.6}}}})
+    tables = tables_of(CampaignTables, file, {"grid": {"plant": {"light": {MASS: 0.6}}}})
     assert tables.grid["plant"] == {"light": {MASS: 0.6}}
-    assert tables.grid["contender"] == read_campaign(file).grid["contender"]
+    assert tables.grid["contender"] == tables_of(CampaignTables, file, {}).grid["contender"]
 
 
 @pytest.mark.parametrize(
@@ -90,7 +89,10 @@ def test_what_a_file_has_as_levels_can_be_replaced(tmp_path: Path) -> None:
     [
         ({"grid": {"track": ["hover"], "plant": {"heavy": {"mass": 1.0}}}}, "unknown factor mass: "),
         ({"grid": {"track": {"one": {"profile": "se3"}}}}, "track: a factor with levels needs a name of its own"),
-        ({"grid": {"track": ["hover"], "verdict": {"one": {}}}}, "verdict: a factor with levels needs a name"),
+        (
+            {"grid": {"track": ["hover"], "verdict": {"one": {}}}},
+            "verdict: the table would have two columns of that name",
+        ),
         ({"grid": {"track": ["hover"], "plant": {"one": {"duration": 1.0}}}}, "duration is said twice"),
         ({"grid": {"track": ["hover"], "a": {"x": {MASS: 1}}, "b": {"x": {MASS: 2}}}}, f"{MASS} is said twice"),
         ({"grid": {"plant": {"one": {"link": "memory"}}}}, "link is no factor"),

@@ -23,6 +23,10 @@ def test_spans_are_even_in_distance_or_ratio() -> None:
     assert read_values("key", 3) == (3,)
 
 
+def test_a_list_may_be_long() -> None:
+    assert len(read_values("key", range(200_000))) == 200_000
+
+
 def test_uniform_fills_its_range_evenly() -> None:
     values = drawn({"uniform": [0.6, 0.8]})
     assert 0.6 <= min(values) < 0.601

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 import colibri
-from colibri.tuning.definition import tables_of
+from colibri.campaigns.definition import tables_of
+from colibri.tuning.definition import TuningTables
 from tests.colibri.tuning.support import POSITION, RATE, TABLES, WEIGHTS, planned
 
 TRACKS = {"grid": {"track": ["hover", "spiral"]}}
@@ -107,11 +108,13 @@ def test_it_begins_with_the_profile_as_it_is() -> None:
 def test_keywords_take_precedence_over_the_file(tmp_path: Path) -> None:
     file = tmp_path / "gusts.toml"
     file.write_text('trials = 7\nseeds = "1-2"\n[fly]\nduration = 3\nturbulence = "light"\n', encoding="utf-8")
-    tables = tables_of(file, {"trials": 9, "fly": {"duration": 5}})
+    tables = tables_of(TuningTables, file, {"trials": 9, "fly": {"duration": 5}})
     assert (tables.name, tables.trials, tables.seeds) == ("gusts", 9, "1-2")
     assert tables.fly == {"duration": 5, "turbulence": "light"}
+    grid = tables_of(TuningTables, file, {"grid": {"turbulence": ["light", "severe"]}})
+    assert (grid.fly, grid.grid) == ({"duration": 3}, {"turbulence": ["light", "severe"]})
     with pytest.raises(colibri.Error, match="unknown option trails: did you mean trials"):
-        tables_of(file, {"trails": 9})
+        tables_of(TuningTables, file, {"trails": 9})
     file.write_text("trails = 7\n", encoding="utf-8")
     with pytest.raises(colibri.Error, match=r"gusts.toml: .*trails"):
-        tables_of(file, {})
+        tables_of(TuningTables, file, {})
