@@ -1,7 +1,7 @@
 """What a campaign keeps while it is flown: which it is, and each flight as soon as it has ended."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from hashlib import sha256
 from importlib.metadata import version
 from inspect import getsource
@@ -64,17 +64,42 @@ def open_journal(folder: Path, campaign: Campaign, common: Common, *, resume: bo
     Raises:
         CampaignError: The folder has something else.
     """
-    identity = identity_of(campaign, common)
-    path = folder / IDENTITY
-    kept = {each.flight: each for each in read_journal(folder / JOURNAL)} if path.exists() else {}
-    if path.exists():
-        _check_identity(path, identity, campaign, len(kept), resume=resume)
-    elif folder.exists() and any(folder.iterdir()):
-        raise CampaignError(f"--out {folder} is not empty, and has no campaign to go on with: choose another folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    if not path.exists():
-        _write_whole(path, msgspec.json.format(msgspec.json.encode(identity), indent=1) + b"\n")
+    there = claim(folder / IDENTITY, identity_of(campaign, common), "campaign")
+    kept = {each.flight: each for each in read_journal(folder / JOURNAL)}
+    if there and not resume:
+        raise CampaignError(
+            f"--out {folder} has {len(kept)} of the {campaign.flights} flights of this campaign: "
+            "go on with --resume, or choose another folder"
+        )
     return Journal(folder, kept)
+
+
+def claim(path: Path, identity: Mapping[str, Any], called: str) -> bool:
+    """Make a folder that of one campaign, or tuning, by the file that has its identity; return whether it was already.
+
+    Raises:
+        CampaignError: It has something else.
+    """
+    folder, scratch = path.parent, path.with_suffix(".new")
+    now = msgspec.json.encode(identity)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not path.exists():
+            if any(entry != scratch for entry in folder.iterdir()):
+                raise CampaignError(f"--out {folder} is not empty, and has no {called} in it: choose another folder")
+            with scratch.open("wb") as file:
+                file.write(msgspec.json.format(now, indent=1) + b"\n")
+                file.flush()
+                os.fsync(file.fileno())
+            scratch.replace(path)
+            return False
+        was, wanted = (msgspec.json.decode(content) for content in (path.read_bytes(), now))
+    except (OSError, msgspec.DecodeError) as error:
+        raise CampaignError(f"cannot use --out {folder}: {error}") from error
+    if was != wanted:
+        differs = ", ".join(sorted(name for name in {*was, *wanted} if was.get(name) != wanted.get(name)))
+        raise CampaignError(f"--out {folder} has another {called} ({differs} differ): choose another folder")
+    return True
 
 
 def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
@@ -126,24 +151,6 @@ def _hash(content: Any) -> str:
     return sha256(msgspec.json.encode(content, order="sorted")).hexdigest()
 
 
-def _check_identity(path: Path, now: dict[str, Any], campaign: Campaign, flown: int, *, resume: bool) -> None:
-    try:
-        was = msgspec.json.decode(path.read_bytes())
-    except (OSError, msgspec.DecodeError) as error:
-        raise CampaignError(f"cannot read {path}: {error}") from error
-    now = msgspec.json.decode(msgspec.json.encode(now))
-    if was != now:
-        differs = sorted(name for name in {*was, *now} if was.get(name) != now.get(name))
-        raise CampaignError(
-            f"--out {path.parent} has another campaign ({', '.join(differs)} differ): choose another folder"
-        )
-    if not resume:
-        raise CampaignError(
-            f"--out {path.parent} has {flown} of the {campaign.flights} flights of this campaign: "
-            "go on with --resume, or choose another folder"
-        )
-
-
 def read_journal(path: Path) -> list[Flown]:
     """Return the flights that a journal has, in their order; a last line that was cut off is cut off there, too.
 
@@ -173,13 +180,3 @@ def keep_files(folder: Path, flown: Flown) -> None:
     for name, content in flown.files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
-
-
-def _write_whole(path: Path, content: bytes) -> None:
-    """Write a file that is there whole, or not at all, and stays."""
-    scratch = path.with_suffix(".new")
-    with scratch.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    scratch.replace(path)

@@ -11,7 +11,7 @@ import msgspec
 from colibri.campaigns.definition import tables_of
 from colibri.campaigns.engines.engine import Engine
 from colibri.campaigns.flights import Flown
-from colibri.campaigns.journal import identity_of
+from colibri.campaigns.journal import claim, identity_of
 from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.tuning.definition import Tuning, TuningTables, tuning_of
 from colibri.tuning.file_lock import FileLock
@@ -136,25 +136,13 @@ def _open(out: Path, tuning: Tuning, *, resume: bool) -> None:
     Raises:
         TuningError: It has something else, or is not to go on.
     """
-    path = out / IDENTITY
     try:
         out.mkdir(parents=True, exist_ok=True)
         with FileLock(out):
-            if not path.exists():
-                if any(entry.name != f"{path.stem}.new" for entry in out.iterdir()):
-                    raise TuningError(f"--out {out} is not empty, and has no tuning in it: choose another folder")
-                scratch = path.with_suffix(".new")
-                scratch.write_bytes(msgspec.json.format(msgspec.json.encode(_identity(tuning)), indent=1) + b"\n")
-                scratch.replace(path)
-                return
-            was = msgspec.json.decode(path.read_bytes())
-    except (OSError, msgspec.DecodeError) as error:
+            there = claim(out / IDENTITY, _identity(tuning), "tuning")
+    except OSError as error:
         raise TuningError(f"cannot use --out {out}: {error}") from error
-    now = msgspec.json.decode(msgspec.json.encode(_identity(tuning)))
-    if was != now:
-        differs = sorted(name for name in {*was, *now} if was.get(name) != now.get(name))
-        raise TuningError(f"--out {out} has another tuning ({', '.join(differs)} differ): choose another folder")
-    if not resume:
+    if there and not resume:
         raise TuningError(f"--out {out} has this tuning already: go on with --resume, or choose another folder")
 
 
@@ -162,7 +150,6 @@ def _identity(tuning: Tuning) -> dict[str, Any]:
     """Return in plain data which tuning it is; it may go on with more trials."""
     return {
         **identity_of(tuning.campaign, tuning.common),
-        "colibri": version("colibri-sitl"),
         "optuna": version("optuna"),
         "check_seeds": list(tuning.check_seeds),
         "prune_after": tuning.prune_after,

@@ -86,5 +86,18 @@ def test_a_file_that_changed_is_another_campaign(tmp_path: Path) -> None:
 
 def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("", encoding="utf-8")
-    with pytest.raises(CampaignError, match="is not empty, and has no campaign to go on with: choose another folder"):
+    with pytest.raises(CampaignError, match="is not empty, and has no campaign in it: choose another folder"):
         opened(tmp_path)
+
+
+def test_a_folder_that_was_not_begun_to_its_end_is_begun_again(tmp_path: Path) -> None:
+    (tmp_path / "campaign.new").write_bytes(b'{"name": "cam')
+    with opened(tmp_path) as journal:
+        assert not journal.kept
+    assert {path.name for path in tmp_path.iterdir()} == {"campaign.json", JOURNAL}
+
+
+def test_an_identity_that_cannot_be_read_is_one_line(begun: Path) -> None:
+    (begun / "campaign.json").write_bytes(b"{")
+    with pytest.raises(CampaignError, match=r"cannot use --out .*out: .*truncated"):
+        opened(begun)
