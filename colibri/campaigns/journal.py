@@ -10,7 +10,8 @@ from typing import IO, Any, Self
 
 import msgspec
 
-from colibri.autopilot.control.registry import origin_of, origin_of_factory
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.registry import controller_names, origin_of, origin_of_factory
 from colibri.campaigns.definition import Campaign
 from colibri.campaigns.flights import Common, Flown, Verdict
 from colibri.campaigns.values import CampaignError, shown
@@ -104,7 +105,9 @@ def claim(path: Path, identity: Mapping[str, Any], called: str) -> bool:
 
 def identity_of(campaign: Campaign, common: Common) -> dict[str, Any]:
     """Return in plain data which campaign it is: all that its table depends on, files by their contents."""
-    laws = list(filter(None, campaign.values("controller")))
+    objects = (value for value in campaign.values("profile") if isinstance(value, Profile))
+    own = {profile.controller for profile in (*common.profiles.values(), *objects)}
+    laws = [*filter(None, campaign.values("controller")), *own.intersection(controller_names())]
     contents = {
         "profiles": common.profiles,
         "vehicles": common.vehicles,

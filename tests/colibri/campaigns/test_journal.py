@@ -5,10 +5,11 @@ from typing import Any
 
 import pytest
 
+import colibri
 from colibri.campaigns.flights import common_of
 from colibri.campaigns.journal import JOURNAL, Journal, open_journal
 from colibri.campaigns.values import CampaignError
-from tests.colibri.campaigns.support import MASS, flown, planned
+from tests.colibri.campaigns.support import MASS, SHORT, flown, planned
 
 GRID: dict[str, Any] = {"track": ["hover"], MASS: [0.7, 0.71]}
 
@@ -82,6 +83,17 @@ def test_a_file_that_changed_is_another_campaign(tmp_path: Path) -> None:
     track.write_text("t,x,y,z\n0,0,0,2\n5,2,0,2\n", encoding="utf-8")
     with pytest.raises(CampaignError, match=r"has another campaign \(contents differ\)"):
         opened(tmp_path / "out", grid=grid)
+
+
+@pytest.mark.parametrize("profile", ["flight", colibri.load_profile("flight")])
+def test_the_law_of_a_profile_that_changed_is_another_campaign(
+    profile: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fly = SHORT | {"profile": profile}
+    opened(tmp_path / "out", fly=fly).__exit__()
+    monkeypatch.setattr("colibri.campaigns.journal.origin_of", lambda name: (name, "their-laws 2.0", ""))
+    with pytest.raises(CampaignError, match=r"has another campaign \(contents differ\)"):
+        opened(tmp_path / "out", fly=fly)
 
 
 def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:
