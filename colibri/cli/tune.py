@@ -14,7 +14,6 @@ from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_INTERRUPTED, f
 if TYPE_CHECKING:
     from colibri.tuning.results import TuningResults
     from colibri.tuning.run import Watcher
-    from colibri.tuning.verdict import Compared
 
 _TABLES = ("name", "seeds", "check_seeds", "root_seed", "trials", "prune_after")
 
@@ -124,7 +123,7 @@ def _print(results: "TuningResults", out: Path) -> None:
         print("no trial was better than the profile as it is")  # noqa: T201
     if results.verdict:
         shown = [
-            (*each.row[:2], f"{each.before:.4g}", f"{each.after:.4g}", _percent(each.change), _interval(each))
+            (*each.row[:2], f"{each.before:.4g}", f"{each.after:.4g}", *each.changes)
             for each in results.verdict
             if each.is_objective or each.is_overall
         ]
@@ -140,11 +139,3 @@ def _said(results: "TuningResults") -> str:
     if worse and any(each.high < 0.0 for each in objectives):
         return "one objective for another"
     return "worse" if worse else "no better"
-
-
-def _interval(each: "Compared") -> str:
-    return f"{_percent(each.low)} to {_percent(each.high)}"
-
-
-def _percent(part: float) -> str:
-    return f"{100.0 * part:+.1f} %"

@@ -1,7 +1,6 @@
 """What is to become small: metrics of flights, pooled over all of a trial; lost flights count."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,7 +49,7 @@ class Objective(NamedTuple):
         """Return what a lost flight counts, by the flights with the profile as it is.
 
         Raises:
-            TuningError: None of them came through, or one that did has no such metric.
+            TuningError: None of them came through, or one that did has no such metric, or one below zero.
         """
         if self.metric == SHARE_LOST:
             return 1.0
@@ -58,10 +57,12 @@ class Objective(NamedTuple):
         through = [each for each in flown if each.verdict is Verdict.FLOWN]
         if not through:
             raise TuningError(f"no flight of the profile as it is came through: {flown[0].why}")
-        values = [each.metrics[place] for each in through]
-        if any(value is None or not isfinite(value) for value in values):
+        values = [value for each in through if (value := each.metrics[place]) is not None]
+        if len(values) < len(through):
             raise TuningError(f"{self.metric} is not known of every flight: fly longer, or choose another objective")
-        return LOST_COUNTS * (max(value for value in values if value is not None) or 1.0)
+        if min(values) < 0.0:
+            raise TuningError(f"{self.metric} is {min(values):g} in a flight: an objective must not be below zero")
+        return LOST_COUNTS * (max(values) or 1.0)
 
     def pooled(self, values: Array, axis: int = -1) -> Any:
         """Return one number of many flights along an axis."""
@@ -75,7 +76,7 @@ class Objective(NamedTuple):
 
 def _known(flown: Flown, place: int, otherwise: float) -> float:
     value = flown.metrics[place]
-    return value if flown.verdict is Verdict.FLOWN and value is not None and isfinite(value) else otherwise
+    return value if flown.verdict is Verdict.FLOWN and value is not None else otherwise
 
 
 def read_objectives(given: Mapping[str, Any], metrics: Sequence[Metric]) -> tuple[Objective, ...]:

@@ -24,7 +24,7 @@ ALL = "all"
 _RESAMPLES = 10_000
 _CONFIDENCE = (0.025, 0.975)
 _STREAM = 1
-"""Of the root seed, for the bootstrap."""
+"""Of the seed 0: what the bootstrap resamples by."""
 
 
 class Compared(NamedTuple):
@@ -36,9 +36,10 @@ class Compared(NamedTuple):
         seeds: How many.
         before: With the profile as it is.
         after: With the tuned one.
-        change: After over before, less one; of a share, or where it was zero before, the difference.
+        change: In parts of `before`; of a share, or where that is zero by some of the resampled seeds, the difference.
         low: Between this and `high` the change lies with 95 % confidence: bootstrap over seeds, in pairs.
         high: See there.
+        is_relative: Whether `change` is in parts.
         is_objective: Whether it was tuned for.
     """
 
@@ -50,12 +51,21 @@ class Compared(NamedTuple):
     change: float
     low: float
     high: float
+    is_relative: bool
     is_objective: bool
 
     @property
     def is_overall(self) -> bool:
         """Whether it is over the flights of all combinations."""
         return self.where == ALL
+
+    @property
+    def changes(self) -> Row:
+        """The change and its interval, in words: in percent, but for the difference of what is no share."""
+        percent = self.is_relative or self.what == SHARE_LOST
+        numbers = (self.change, self.low, self.high)
+        change, low, high = (f"{100.0 * x:+.1f} %" if percent else f"{x:+.4g}" for x in numbers)
+        return change, f"{low} to {high}"
 
     @property
     def row(self) -> Row:
@@ -106,16 +116,15 @@ class _Pairs:
     def compared(self, objective: Objective, *, is_objective: bool) -> Iterator[Compared]:
         """Return one number over all combinations and, where there are several, over each; none where it is unknown."""
         counts = self._counts(objective, penalised=is_objective)
-        if counts is None:
-            return
-        for where, some in ((ALL, counts), *zip(self._names, np.moveaxis(counts, 1, 0), strict=True)):
-            if where == ALL or len(self._names) > 1:
+        each = zip(self._names, np.moveaxis(counts, 1, 0), strict=True) if len(self._names) > 1 else ()
+        for where, some in ((ALL, counts), *each):
+            if not np.isnan(some).all():
                 yield _compared(objective, where, some.reshape(2, -1, self._seeds), is_objective=is_objective)
 
-    def _counts(self, objective: Objective, *, penalised: bool) -> Array | None:
-        """Return what each flight counts, (2, combinations, seeds); None where that is unknown of one.
+    def _counts(self, objective: Objective, *, penalised: bool) -> Array:
+        """Return what each flight counts, (2, combinations, seeds).
 
-        Where it was not tuned for, flights that were lost are left out, with their pairs, as nan.
+        Where it was not tuned for, flights that were lost or have no such metric are nan, and so are their pairs.
         """
         metrics = self._campaign.metrics
         if penalised or objective.metric == SHARE_LOST:
@@ -127,7 +136,7 @@ class _Pairs:
         values = np.array([_value(each, place) for of in (0, 1) for each in self._listed(of)])
         found: Array = values.reshape(self._flown.shape)
         found[:, np.isnan(found).any(axis=0)] = np.nan
-        return None if np.isnan(found).all() else found
+        return found
 
     def _listed(self, of: int) -> list[Flown]:
         return list(self._flown[of].ravel())
@@ -139,17 +148,17 @@ def _value(flown: Flown, place: int) -> float:
 
 
 def _compared(objective: Objective, where: str, counts: Array, *, is_objective: bool) -> Compared:
-    """Compare what flights count, (2, combinations, seeds)."""
+    """Compare what flights count, (2, combinations, seeds): as they are, then by resampled seeds."""
     whole = np.moveaxis(counts, -1, 1)  # (2, seeds, combinations)
-    chance = Generator(PCG64(SeedSequence(0, spawn_key=(_STREAM,))))
-    places = chance.integers(whole.shape[1], size=(_RESAMPLES, whole.shape[1]))
-    before, after = (_pooled(objective, each.reshape(1, -1))[0] for each in whole)
-    resampled = [_pooled(objective, each[places].reshape(_RESAMPLES, -1)) for each in whole]
-    low, high = np.nanquantile(_change(objective, *resampled), _CONFIDENCE)
-    change = _change(objective, np.array([before]), np.array([after]))[0]
     seeds = whole.shape[1]
-    numbers = (float(before), float(after), float(change), float(low), float(high))
-    return Compared(objective.name, where, seeds, *numbers, is_objective)
+    chance = Generator(PCG64(SeedSequence(0, spawn_key=(_STREAM,))))
+    places = np.vstack((np.arange(seeds), chance.integers(seeds, size=(_RESAMPLES, seeds))))
+    before, after = (_pooled(objective, each[places].reshape(len(places), -1)) for each in whole)
+    relative = objective.metric != SHARE_LOST and bool((before != 0.0).all())
+    change = (after - before) / (np.abs(before) if relative else 1.0)
+    low, high = np.nanquantile(change[1:], _CONFIDENCE)
+    numbers = (float(before[0]), float(after[0]), float(change[0]), float(low), float(high))
+    return Compared(objective.name, where, seeds, *numbers, relative, is_objective)
 
 
 def _pooled(objective: Objective, counts: Array) -> Array:
@@ -158,13 +167,6 @@ def _pooled(objective: Objective, counts: Array) -> Array:
         pooled: Array = objective.pooled(counts)
         return pooled
     return np.array([objective.pooled(row[~np.isnan(row)]) if not np.isnan(row).all() else np.nan for row in counts])
-
-
-def _change(objective: Objective, before: Array, after: Array) -> Array:
-    difference: Array = after - before
-    if objective.metric == SHARE_LOST or (before == 0.0).any():
-        return difference
-    return difference / before
 
 
 def better(compared: Sequence[Compared]) -> bool:

@@ -13,15 +13,16 @@ from tests.colibri.tuning.support import WEIGHTS, planned
 
 SEEDS = 40
 TRACKS = {"grid": {"track": ["hover", "spiral"]}}
+BESIDE: dict[str, Any] = {"objectives": {"share_lost": "mean"}}
 
 
-def compared(after: Any, lost_after: int = 0, **tables: Any) -> list[Compared]:
-    """Compare flights whose error differs from seed to seed and track to track, and is multiplied by `after`."""
+def compared(after: Any, lost_after: int = 0, before: Any = 1.0, **tables: Any) -> list[Compared]:
+    """Compare flights whose error differs from seed to seed and track to track, times `before`, and times `after`."""
     tuning = planned(**({"check_seeds": f"101-{100 + SEEDS}"} | TRACKS | tables))
-    before = colibri.load_profile("flight")
-    campaign = check_campaign(tuning, before, before.replace(f"{WEIGHTS}.position", 200.0))
+    profile = colibri.load_profile("flight")
+    campaign = check_campaign(tuning, profile, profile.replace(f"{WEIGHTS}.position", 200.0))
     chance = np.random.default_rng(1)
-    errors = chance.uniform(0.1, 1.0, (2, SEEDS)) * np.array([[1.0], [5.0]])
+    errors = chance.uniform(0.1, 1.0, (2, SEEDS)) * np.array([[1.0], [5.0]]) * before
     values = np.concatenate([errors.ravel(), (errors * after).ravel()])
     lost = range(2 * SEEDS, 2 * SEEDS + lost_after)
     flown = {
@@ -63,9 +64,31 @@ def test_worse_in_one_objective_is_not_better() -> None:
 
 def test_lost_flights_count_where_it_was_tuned_for_and_are_left_out_elsewhere() -> None:
     tuned_for = compared(0.5, lost_after=2)[0]
-    beside = next(each for each in compared(0.5, 2, objectives={"share_lost": "mean"}) if each.what == "rmse_m, mean")
+    beside = next(each for each in compared(0.5, 2, **BESIDE) if each.what == "rmse_m, mean")
     assert tuned_for.after > 0.5 * tuned_for.before
     assert beside.change == pytest.approx(-0.5)
+
+
+def test_what_is_rare_and_its_interval_are_in_the_same_unit() -> None:
+    """Most of the resampled seeds have some, a few have none."""
+    rare = np.zeros((2, SEEDS))
+    rare[:, 0] = 50.0
+    (overall, *_) = compared(0.5, before=rare)
+    assert overall.change == pytest.approx(overall.after - overall.before)
+    assert overall.low < overall.change < overall.high == 0.0
+    assert overall.changes == ("-1.233", "-3.7 to +0")
+
+
+def test_a_metric_below_zero_rises_where_its_change_is_above_zero() -> None:
+    beside = next(each for each in compared(0.5, before=-1.0, **BESIDE) if each.what == "rmse_m, mean")
+    assert beside.after > beside.before
+    assert beside.change == pytest.approx(0.5)
+
+
+def test_a_combination_of_which_nothing_is_known_has_no_row() -> None:
+    found = compared(0.5, lost_after=SEEDS, **BESIDE)
+    assert [each.where for each in found if each.what == "rmse_m, mean"] == ["all", "spiral"]
+    assert [each.where for each in found if each.what == "share_lost"] == ["all", "hover", "spiral"]
 
 
 def test_the_check_has_other_seeds_other_draws_and_the_same_for_both() -> None:
