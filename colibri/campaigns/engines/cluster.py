@@ -1,7 +1,7 @@
 """The engine of a cluster: Dask distributed, whose workers come and go."""
 
 from collections.abc import Callable, Generator, Iterable, Iterator
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from itertools import islice, takewhile
 from time import perf_counter
 from typing import Any
@@ -45,8 +45,9 @@ class Cluster:
         except (OSError, ValueError) as error:  # a timeout is an OSError
             words = " ".join(str(error).split()) or type(error).__name__
             raise CampaignError(f"--dask {client_or_address}: no scheduler answers there: {words}") from error
-        found = self._client.run(_version)
-        others = sorted({f"{has or 'none'}" for has in found.values()} - {version(_PACKAGE)})
+        # A function of the standard library: a worker without colibri could not load one of ours.
+        found = self._client.run(version, _PACKAGE, on_error="return").values()
+        others = sorted({has if isinstance(has, str) else "none" for has in found} - {version(_PACKAGE)})
         if others:
             self.close()
             raise CampaignError(f"--dask: workers have colibri {', '.join(others)}, this is {version(_PACKAGE)}")
@@ -109,14 +110,6 @@ class Cluster:
             futures = self._client.map(_do, batches, given=given, wanted=version(_PACKAGE), pure=False)
             waiting.update(zip(futures, batches, strict=True))
             ended.update(futures)
-
-
-def _version() -> str | None:
-    """Return the version of colibri that a worker has."""
-    try:
-        return version(_PACKAGE)
-    except PackageNotFoundError:
-        return None
 
 
 def _do(jobs: list[Any], given: tuple[Callable[[Any, Any], Any], Any], wanted: str) -> tuple[float, list[Any]]:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
@@ -83,8 +84,10 @@ def test_workers_with_another_version_are_refused() -> None:
     class Client:
         """What answers in place of a cluster."""
 
-        def run(self, _function: Any) -> dict[str, str | None]:
-            return {"tcp://10.0.0.1:1": "0.0.9", "tcp://10.0.0.2:1": None}
+        def run(self, function: Any, *_: str, on_error: str) -> dict[str, str | Exception]:
+            assert function.__module__.split(".")[0] != "colibri", "a worker may not have it"
+            assert on_error == "return"
+            return {"tcp://10.0.0.1:1": "0.0.9", "tcp://10.0.0.2:1": PackageNotFoundError()}
 
     with pytest.raises(CampaignError, match=r"--dask: workers have colibri 0.0.9, none, this is 0\.\d+\.\d+"):
         Cluster(Client())
