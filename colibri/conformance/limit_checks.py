@@ -111,17 +111,18 @@ def limit_checks(subject: Subject) -> Iterator[Row]:
 
 def out_of_limits(subject: Subject, decision: Decision) -> str:
     """Return what no rotor, log or ground station can take of a decision; empty if nothing."""
-    speeds, attitude, plan = decision.rotor_speeds, decision.attitude_reference, decision.diagnostics.predicted
+    speeds = decision.rotor_speeds
     if not isinstance(speeds, np.ndarray) or speeds.shape != (4,) or not np.issubdtype(speeds.dtype, np.floating):
         return f"rotor_speeds is no array of four floats: {speeds!r}"
     try:
         check_rotor_speeds(subject.name, speeds, subject.max_speed)
-    except DecisionError as error:
-        return str(error)
-    if len(attitude) != 3 or not all(np.isfinite(angle) for angle in attitude):
-        return f"attitude_reference is not three finite angles: {attitude!r}"
-    if plan is not None and not np.isfinite(plan).all():
-        return "diagnostics.predicted is not finite"
+        angles, plan = np.array(decision.attitude_reference, dtype=float), decision.diagnostics.predicted
+        if plan is not None and not np.isfinite(plan).all():
+            return "diagnostics.predicted is not finite"
+    except (DecisionError, AttributeError, TypeError, ValueError) as error:
+        return in_words(error)
+    if angles.shape != (3,) or not np.isfinite(angles).all():
+        return f"attitude_reference is not three finite angles: {decision.attitude_reference!r}"
     return ""
 
 

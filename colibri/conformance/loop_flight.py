@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from colibri.autopilot.control.interface import AttitudeDemand, Decision, VehicleState
+from colibri.autopilot.control.interface import AttitudeDemand, VehicleState
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.common.rotations import rotation_matrix
@@ -53,7 +53,8 @@ class LoopFlight:
             state = self.loop.state(state_frame(self.world))
             references = self._planner.horizon_at(self.world.time_us, self.loop.control_interval_us)
             off_m.append(np.linalg.norm(references.position_enu_m[0] - state.position_enu_m))
-            self._go_on(self.loop.decide(self.world.time_us, state, references))
+            self.loop.decide(self.world.time_us, state, references)
+            self._go_on()
         return np.array(off_m)
 
     def hold(self, angles: tuple[float, float, float], thrust_n: float, seconds: float) -> VehicleState:
@@ -66,7 +67,8 @@ class LoopFlight:
         demand = AttitudeDemand(np.tile(angles, (n, 1)), np.zeros((n, 3)), np.full(n, thrust_n))
         for _ in range(self._samples(seconds)):
             state = self.loop.state(state_frame(self.world))
-            self._go_on(self.loop.decide_attitude(self.world.time_us, state, demand))
+            self.loop.decide_attitude(self.world.time_us, state, demand)
+            self._go_on()
         return self.loop.state(state_frame(self.world))
 
     @property
@@ -77,7 +79,7 @@ class LoopFlight:
     def _samples(self, seconds: float) -> int:
         return round(seconds * 1e6) // self.loop.control_interval_us
 
-    def _go_on(self, _: Decision) -> None:
+    def _go_on(self) -> None:
         command = ActuatorCommand(self.world.time_us, self.loop.controls, armed=True)
         self.world = self._physics.step(self.world, command, self.loop.control_interval_us)
 

@@ -54,7 +54,8 @@ def memory_checks(subject: Subject) -> Iterator[Row]:
     failure = f"it writes to them, at step {changed[0]} first" if changed else ""
     see = subject.snippet("print([k for k, a in enumerate(s) if a.changed])", _TRACK, **options)
     yield judged(AREA, "references left as they are", failure, count, see)
-    late = [k for k, step in enumerate(steps) if step.rotor_speeds.tobytes() != step.decision.rotor_speeds.tobytes()]
+    now = (np.array(step.decision.rotor_speeds) for step in steps)
+    late = any(step.rotor_speeds.tobytes() != speeds.tobytes() for step, speeds in zip(steps, now, strict=True))
     failure = "it overwrites the rotor speeds that it has returned: return an array of their own" if late else ""
     see = subject.snippet("print(s[0].rotor_speeds.tolist(), s[0].decision.rotor_speeds.tolist())", _TRACK, **options)
     yield judged(AREA, "decisions left as they were", failure, count, see)

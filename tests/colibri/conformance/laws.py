@@ -133,6 +133,30 @@ class TooFast(Good):
         return memory, decision._replace(rotor_speeds=decision.rotor_speeds * (3.0 if off_m > 5.0 else 1.0))
 
 
+class Listed(Good):
+    """Returns rotor speeds as a list."""
+
+    def step(self, *args: Any) -> tuple[Any, Any]:
+        memory, decision = super().step(*args)
+        return memory, decision._replace(rotor_speeds=decision.rotor_speeds.tolist())
+
+
+class NoAngles(Good):
+    """Says no attitude."""
+
+    def step(self, *args: Any) -> tuple[Any, Any]:
+        memory, decision = super().step(*args)
+        return memory, decision._replace(attitude_reference=None)
+
+
+class NoDiagnostics(Good):
+    """Says nothing of how it decided."""
+
+    def step(self, *args: Any) -> tuple[Any, Any]:
+        memory, decision = super().step(*args)
+        return memory, decision._replace(diagnostics=None)
+
+
 class Drifting(Good):
     """Holds another place than it is told."""
 

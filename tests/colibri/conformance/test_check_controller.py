@@ -84,6 +84,19 @@ def test_each_bad_law_is_caught_by_its_check(law: type[laws.Good]) -> None:
         assert law.__name__ in row.see
 
 
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        (laws.Listed, "rotor_speeds is no array of four floats: ["),
+        (laws.NoAngles, "attitude_reference is not three finite angles: None"),
+        (laws.NoDiagnostics, "AttributeError: 'NoneType' object has no attribute 'predicted'"),
+    ],
+)
+def test_a_decision_of_other_types_is_a_failure_and_no_traceback(law: type[laws.Good], said: str) -> None:
+    found = colibri.check_controller(law, only=["memory", "limits"])
+    assert {row.found[: len(said)] for row in found.failed if row.area == "limits"} == {said}
+
+
 def test_a_law_that_decides_by_chance_is_caught_and_one_that_is_built_otherwise() -> None:
     assert "the same step twice" in {row.tried for row in tried(laws.Random, "memory").failed}
     caught = {row.tried for row in tried(laws.BuiltOtherwise, "memory").failed}
