@@ -1,6 +1,6 @@
 """The figure of a campaign: a distribution, a line over a factor, or a heat map over two, as its factors suggest."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,12 +13,13 @@ from colibri.campaigns.flight_table import FlightTable, wilson
 from colibri.campaigns.values import is_number
 from colibri.common.types import Array
 
-_COLORS = (*(style.color for style in AXES), "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")
+COLORS = (*(style.color for style in AXES), "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")
 _LOST = "#D00000"
 _CONTINUOUS = 3
 """A factor with so many numbers is drawn along an axis."""
-_MAX_CURVES, _MAX_STRIPS, _MAX_DRAWN = len(_COLORS), 40, 3
+_MAX_CURVES, _MAX_STRIPS, _MAX_DRAWN = len(COLORS), 40, 3
 _CHARACTER_IN = 0.085
+"""Of a row's name, at most."""
 _WIDE_SPREAD = 20.0
 """Values that differ by such a factor are drawn on a logarithmic axis."""
 _PANEL_IN, _MAP_IN = 2.6, 3.4
@@ -83,7 +84,7 @@ def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: S
     """Draw medians over a factor with what lies between the quantiles of 5 and 95 %, and the share lost below."""
     figure, ((upper,), (lower,)) = axes_grid(2, 1, TOP_IN, row_in=_PANEL_IN)
     names = list(dict.fromkeys(group.name for group in groups))
-    for name, color in zip(names, _COLORS, strict=False):
+    for name, color in zip(names, COLORS, strict=False):
         of_name = sorted((group for group in groups if group.name == name), key=lambda group: group.at)
         through = [(group.at[0], _flown(table, values, group.places)) for group in of_name]
         known = [(at, np.quantile(some, [0.05, 0.5, 0.95])) for at, some in through if len(some)]
@@ -98,7 +99,7 @@ def _lines(table: FlightTable, metric: str, values: Array, along: str, groups: S
         lower.fill_between(at, *np.transpose(bounds), color=color, alpha=0.2, linewidth=0)
         lower.plot(at, [lost / of if of else np.nan for lost, of in shares], "o-", color=color, markersize=3.5)
     upper.set_ylabel(f"{metric}\nmedian, 5 to 95 %")
-    _scale_values(upper, values)
+    scale_values(upper, values)
     lower.set_ylabel("share lost\nwith its 95 % interval")
     lower.set_ylim(-0.03, 1.03)
     lower.set_xlabel(along)
@@ -145,14 +146,14 @@ def _scatter(table: FlightTable, metric: str, values: Array, drawn: Sequence[str
     figure.subplots_adjust(hspace=0.3)
     for factor, (axes,) in zip(drawn, grid, strict=True):
         at = table.factor(factor).astype(np.float64)
-        for group, color in zip(groups, _COLORS, strict=False):
+        for group, color in zip(groups, COLORS, strict=False):
             through = table.through(group.places)
             axes.plot(at[through], values[through], "o", color=color, markersize=4, alpha=0.6, mew=0, label=group.name)
             lost = [place for place in group.places if table.flown[place].verdict.is_lost]
             edge = axes.get_xaxis_transform()
             if lost:
                 axes.plot(at[lost], [0.97] * len(lost), "x", color=color, markersize=5, transform=edge)
-        _scale_values(axes, values)
+        scale_values(axes, values)
         axes.set_ylabel(metric)
         axes.set_xlabel(factor)
         axes.grid(**GRID)
@@ -164,11 +165,10 @@ def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Gr
     """Draw a dot a flight, a row a combination, bars at the medians; how many were lost at the right."""
     figure, ((axes,),) = axes_grid(1, 1, 0.6, row_in=0.35 + 0.34 * len(groups))
     names = [group.name or table.campaign.name for group in groups]
-    left_in = 0.4 + _CHARACTER_IN * max(map(len, names))
-    figure.subplots_adjust(left=min(0.6, left_in / figure.get_figwidth()))
+    make_room_for_names(figure, names)
     for place, group in enumerate(groups):
         some = _flown(table, values, group.places)
-        color = _COLORS[place % len(_COLORS)]
+        color = COLORS[place % len(COLORS)]
         axes.plot(some, np.full(len(some), -place), "o", color=color, markersize=3.5, alpha=0.45, markeredgewidth=0)
         if len(some):
             axes.plot([np.median(some)] * 2, [-place - 0.25, -place + 0.25], color="#000000", linewidth=2.0)
@@ -185,12 +185,19 @@ def _strips(table: FlightTable, metric: str, values: Array, groups: Sequence[_Gr
     return figure
 
 
+def make_room_for_names(figure: Figure, names: Iterable[str]) -> None:
+    """Leave room for the names of rows, left of the axes."""
+    left_in = 0.3 + _CHARACTER_IN * max(map(len, names))
+    figure.subplots_adjust(left=min(0.6, left_in / figure.get_figwidth()))
+
+
 def _is_wide(values: Array) -> bool:
     known = values[np.isfinite(values)]
     return len(known) > 0 and float(known.min()) > 0.0 and float(known.max() / known.min()) > _WIDE_SPREAD
 
 
-def _scale_values(axes: Axes, values: Array) -> None:
+def scale_values(axes: Axes, values: Array) -> None:
+    """Have an even vertical axis for even ratios, where values differ by large ones."""
     if _is_wide(values):
         axes.set_yscale("log")
     else:

@@ -12,6 +12,7 @@ from colibri.analysis.consistency import NAVIGATION, bounds
 from colibri.analysis.estimation import MEASURED
 from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_title, shortened, write_figure
 from colibri.analysis.recording import SETTLED_AFTER_S
+from colibri.campaigns.figure import make_room_for_names
 from colibri.campaigns.flight_table import FlightTable
 
 _LABEL_IN = 0.8
@@ -42,8 +43,6 @@ _PANELS: tuple[tuple[str, dict[str, tuple[str, str]]], ...] = (
 
 _BY_TRUTH = ("RMS (m)", {_TRUE: ("#000000", "off its reference")})
 """Where the autopilot is told the truth, there is no other."""
-_CHARACTER_IN = 0.085
-"""Of a row's name, at most."""
 
 
 def draw_seeds(table: FlightTable, out: Path) -> list[Path]:
@@ -56,8 +55,8 @@ def draw_seeds(table: FlightTable, out: Path) -> list[Path]:
     figure, grid = axes_grid(rows, 1, TOP_IN, row_in=row_in + _LABEL_IN, share=False)
     several = len({contender for contender, _ in cases}) > 1
     names = [shortened(f"{track}, {contender}" if several else track) for contender, track in cases]
-    left_in = 0.3 + _CHARACTER_IN * max(map(len, names))
-    figure.subplots_adjust(left=left_in / figure.get_figwidth(), hspace=_LABEL_IN / row_in)
+    make_room_for_names(figure, names)
+    figure.subplots_adjust(hspace=_LABEL_IN / row_in)
     for (axes,), (label, quantities) in zip(grid, panels, strict=False):
         for number, (quantity, (color, called)) in enumerate(quantities.items()):
             _strips(axes, table, quantity, color, called, _shift(number, len(quantities)))

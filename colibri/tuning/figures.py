@@ -8,16 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from colibri.analysis.figures import AXES, GRID, TOP_IN, axes_grid, put_head, round_ticks
+from colibri.analysis.figures import GRID, TOP_IN, axes_grid, put_head, round_ticks
+from colibri.campaigns.figure import COLORS, make_room_for_names, scale_values
 from colibri.campaigns.values import Choice, LogUniform, shown
 from colibri.tuning.space import Range
 from colibri.tuning.trials import Ended
 
 _TRIED, _PRUNED, _BEST, _AS_IT_IS = "#0072B2", "#999999", "#D55E00", "#000000"
-_COLORS = (*(style.color for style in AXES), "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#999933")
-_CHARACTER_IN = 0.085
 _BAR_IN, _PANEL_IN = 0.32, 1.9
-_WIDE_SPREAD = 20.0
 _COLUMNS = 2
 _MANY_DECADES = 300.0
 
@@ -37,13 +35,12 @@ def draw_importance(title: str, importances: Mapping[str, Mapping[str, float]]) 
     names = sorted(first, key=lambda name: -first[name])
     figure, ((axes,),) = axes_grid(1, 1, TOP_IN, row_in=0.3 + _BAR_IN * len(names) * len(importances))
     short = short_names(names)
-    left_in = 0.3 + _CHARACTER_IN * max(map(len, short.values()))
-    figure.subplots_adjust(left=min(0.6, left_in / figure.get_figwidth()))
+    make_room_for_names(figure, short.values())
     height = 0.8 / len(importances)
     for place, (objective, parts) in enumerate(importances.items()):
         at = -np.arange(len(names)) + 0.4 - height * (place + 0.5)
         widths = [100.0 * parts[name] for name in names]
-        bars = axes.barh(at, widths, height, color=_COLORS[place % len(_COLORS)], label=objective)
+        bars = axes.barh(at, widths, height, color=COLORS[place % len(COLORS)], label=objective)
         axes.bar_label(bars, fmt="%.0f %%", padding=3)
     axes.set_yticks(-np.arange(len(names)), [short[name] for name in names])
     axes.set_xlim(0.0, 1.12 * max(100.0 * max(parts.values()) for parts in importances.values()) or 1.0)
@@ -54,10 +51,8 @@ def draw_importance(title: str, importances: Mapping[str, Mapping[str, float]]) 
     return figure
 
 
-def draw_slices(
-    title: str, space: Mapping[str, Range], objective: str, trials: Sequence[Ended], best: Ended, place: int = 0
-) -> Figure:
-    """Return an objective over each number, a dot a trial; the profile as it is, and the best, stand out."""
+def draw_slices(title: str, space: Mapping[str, Range], objective: str, trials: Sequence[Ended], best: Ended) -> Figure:
+    """Return the first objective over each number, a dot a trial; the profile as it is, and the best, stand out."""
     names = list(space)
     rows = -(-len(names) // _COLUMNS)
     figure, grid = axes_grid(rows, _COLUMNS, TOP_IN, row_in=_PANEL_IN, share=False)
@@ -66,7 +61,7 @@ def draw_slices(
     short = short_names(names)
     for name, axes in zip(names, cells, strict=False):
         values = space[name]
-        _dots(axes, trials, best, lambda trial, of=name, within=values: _at(within, trial.params[of]), place)
+        _dots(axes, trials, best, lambda trial, of=name, within=values: _at(within, trial.params[of]), 0)
         if isinstance(values, LogUniform):
             _scale_by_ratios(axes)
         elif isinstance(values, Choice):
@@ -135,11 +130,7 @@ def _dots(
             axes.plot(at, values, "o", color=color, markersize=4.5, alpha=0.7, markeredgewidth=0, label=label)
     axes.plot(along(first), first.values[place], "D", color=_AS_IT_IS, markersize=6, label="profile as it is")
     axes.plot(along(best), best.values[place], "*", color=_BEST, markersize=11, label="chosen")
-    all_values = [trial.values[place] for trial in trials]
-    if min(all_values) > 0.0 and max(all_values) / min(all_values) > _WIDE_SPREAD:
-        axes.set_yscale("log")
-    else:
-        axes.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
+    scale_values(axes, np.array([trial.values[place] for trial in trials]))
 
 
 def _scale_by_ratios(axes: Axes) -> None:
