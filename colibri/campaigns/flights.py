@@ -80,8 +80,8 @@ class Flown(NamedTuple):
         why: In a line; empty where it was flown.
         metrics: Those of the campaign; None for what this flight does not have.
         sha256: Of its trajectory; empty for none.
-        files: What is kept of its logs, by their paths within the campaign's folder.
         contents: Hash of all that it was made of, as in its provenance; empty where nothing flew.
+        files: What is kept of its logs, by their paths within the campaign's folder.
     """
 
     flight: int
@@ -89,8 +89,8 @@ class Flown(NamedTuple):
     why: str
     metrics: tuple[float | None, ...]
     sha256: str
-    files: Mapping[str, bytes] = {}
     contents: str = ""
+    files: Mapping[str, bytes] = {}
 
 
 def common_of(campaign: Campaign) -> Common:
@@ -152,10 +152,10 @@ def fly_point(common: Common, point: Point) -> Flown:
         why = outcome.lost.replace(str(folder), point.folder)
         contents = read_provenance(folder).sha256["all"]
         if outcome.report is None:
-            return Flown(point.flight, verdict, why, nothing, "", files, contents)
+            return Flown(point.flight, verdict, why, nothing, "", contents, files)
         flight = Flight(plan, outcome.report)
         metrics = tuple(_metric(metric, flight) for metric in common.metrics)
-        return Flown(point.flight, verdict, why, metrics, flight.sha256, files, contents)
+        return Flown(point.flight, verdict, why, metrics, flight.sha256, contents, files)
 
 
 def plan_point(common: Common, point: Point, out: Path) -> FlightPlan:

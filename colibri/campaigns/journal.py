@@ -1,7 +1,7 @@
 """What a campaign keeps while it is flown: which it is, and each flight as soon as it has ended."""
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from hashlib import sha256
 from importlib.metadata import version
 from inspect import getsource
@@ -13,21 +13,10 @@ import msgspec
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import controller_names, origin_of, origin_of_factory
 from colibri.campaigns.definition import Campaign
-from colibri.campaigns.flights import Common, Flown, Verdict
+from colibri.campaigns.flights import Common, Flown
 from colibri.campaigns.values import CampaignError, shown
 
 IDENTITY, JOURNAL = "campaign.json", "journal.jsonl"
-
-
-class _Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True, array_like=True):
-    """A line of the journal."""
-
-    flight: int
-    verdict: Verdict
-    why: str
-    metrics: tuple[float | None, ...]
-    sha256: str
-    contents: str = ""
 
 
 class Journal:
@@ -39,16 +28,14 @@ class Journal:
         self._folder = folder
         self._file: IO[bytes] = (folder / file).open("ab")
 
-    def add(self, flown: Iterable[Flown]) -> None:
-        """Keep flights, whatever happens next: what is kept of their folders first, then the lines that say so."""
-        lines = []
-        for each in flown:
-            keep_files(self._folder, each)
-            line = _Kept(each.flight, each.verdict, each.why, each.metrics, each.sha256, each.contents)
-            lines.append(msgspec.json.encode(line) + b"\n")
-        self._file.write(b"".join(lines))
+    def add(self, flown: Flown) -> None:
+        """Keep a flight, whatever happens next: what is kept of its logs first, then the line that says so."""
+        keep_files(self._folder, flown)
+        kept = flown._replace(files={})
+        self._file.write(msgspec.json.encode(kept[:-1]) + b"\n")
         self._file.flush()
         os.fsync(self._file.fileno())
+        self.kept[flown.flight] = kept
 
     def __enter__(self) -> Self:
         """Begin."""
@@ -169,12 +156,11 @@ def read_journal(path: Path) -> list[Flown]:
     kept = []
     for number, line in enumerate(content[:whole].splitlines(), start=1):
         try:
-            each = msgspec.json.decode(line, type=_Kept)
+            kept.append(msgspec.json.decode(line, type=Flown))
         except msgspec.DecodeError as error:
             raise CampaignError(
                 f"{path}: line {number}: {error}: remove the line, its flight is flown again"
             ) from error
-        kept.append(Flown(each.flight, each.verdict, each.why, each.metrics, each.sha256, contents=each.contents))
     return kept
 
 

@@ -122,8 +122,9 @@ def _fly(
     left = (point for point in planned.points() if point.flight not in done)
     with closing(fly_points(left, common, engine)) as ended:
         for each in ended:
-            if journal is not None:
-                journal.add([each])
-            flown[each.flight] = each if journal is None else each._replace(files={})
+            if journal is None:
+                flown[each.flight] = each
+            else:
+                journal.add(each)
             progress(each)
     return CampaignResults(planned, flown)

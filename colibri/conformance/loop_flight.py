@@ -57,15 +57,15 @@ class LoopFlight:
             self._go_on()
         return np.array(off_m)
 
-    def hold(self, angles: tuple[float, float, float], thrust_n: float, seconds: float) -> VehicleState:
-        """Hold an attitude, rad, and a thrust; return the state at the end.
+    def hold(self, angles: tuple[float, float, float], thrust_n: float) -> VehicleState:
+        """Hold an attitude, rad, and a thrust for `HELD_S`; return the state at the end.
 
         Raises:
             InFlightError: As `fly`.
         """
         n = self.loop.preview.samples
         demand = AttitudeDemand(np.tile(angles, (n, 1)), np.zeros((n, 3)), np.full(n, thrust_n))
-        for _ in range(self._samples(seconds)):
+        for _ in range(self._samples(HELD_S)):
             state = self.loop.state(state_frame(self.world))
             self.loop.decide_attitude(self.world.time_us, state, demand)
             self._go_on()
@@ -101,7 +101,8 @@ class Restarted(NamedTuple):
     is_plain: bool
 
 
-BEFORE_S, AFTER_S, HELD_S = 1.0, 3.0, 1.5
+_BEFORE_S, _AFTER_S, HELD_S = 1.0, 3.0, 1.5
+"""So long is flown before a restart, after it, and with an attitude held."""
 HOW = ("seamless", "anew", "blind")
 
 
@@ -113,8 +114,6 @@ def restarted(
     profile: Any = None,
     vehicle: Any = None,
     seed: int = 0,
-    before_s: float = BEFORE_S,
-    after_s: float = AFTER_S,
     **options: Any,
 ) -> Restarted:
     """Fly, replace the control loop in mid-flight, and fly on.
@@ -127,31 +126,27 @@ def restarted(
         profile: Name, file or `Profile`; None: the one with numbers for the law.
         vehicle: Name, file or `Vehicle`; None: the profile's.
         seed: Of everything random.
-        before_s: Simulated time until then.
-        after_s: Simulated time after that.
         options: Others of `colibri.fly`: start, say.
 
     Raises:
         InFlightError: The law fails, or the vehicle leaves what the model describes.
     """
     subject = Subject.of(controller, profile, vehicle, seed)
-    return restart(subject, how, subject.plan(track, **options), before_s, after_s)
+    return restart(subject, how, subject.plan(track, **options))
 
 
-def restart(
-    subject: Subject, how: str, plan: FlightPlan, before_s: float = BEFORE_S, after_s: float = AFTER_S
-) -> Restarted:
+def restart(subject: Subject, how: str, plan: FlightPlan) -> Restarted:
     """Do what `restarted` does, for a plan."""
     flight = LoopFlight(subject, plan)
-    flight.fly(before_s)
+    flight.fly(_BEFORE_S)
     kept, yaw_rad, world = flight.loop.record(), flight.loop.state(state_frame(flight.world)).euler[2], flight.world
-    unbroken_m, unbroken = flight.fly(after_s), flight.world
+    unbroken_m, unbroken = flight.fly(_AFTER_S), flight.world
     flight.loop, flight.world = flight.new_loop(), world
     if how == "blind":
         flight.loop.begin_in_flight(yaw_rad)
     else:
         flight.loop.resume(kept, seamless=how == "seamless")
-    off_m = flight.fly(after_s)
+    off_m = flight.fly(_AFTER_S)
     return Restarted(unbroken_m, off_m, flight.tilt_deg, flight.world.state == unbroken.state, bool(kept.memory))
 
 
@@ -163,9 +158,8 @@ def held(
     controller: Any,
     profile: Any = None,
     vehicle: Any = None,
-    seconds: float = HELD_S,
 ) -> VehicleState:
-    """Have a law hold an attitude and a thrust, from hover on; return the state at the end.
+    """Have a law hold an attitude and a thrust for 1.5 s, from hover on; return the state at the end.
 
     Args:
         phi: Roll, rad.
@@ -174,16 +168,15 @@ def held(
         controller: Name or class, as `colibri.fly` takes it.
         profile: Name, file or `Profile`; None: the one with numbers for the law.
         vehicle: Name, file or `Vehicle`; None: the profile's.
-        seconds: Simulated time.
 
     Raises:
         InFlightError: The law fails, or the vehicle leaves what the model describes.
     """
-    return hold(Subject.of(controller, profile, vehicle, 0), phi, theta, thrust_n, seconds)
+    return hold(Subject.of(controller, profile, vehicle, 0), phi, theta, thrust_n)
 
 
-def hold(subject: Subject, phi: float, theta: float, thrust_n: float, seconds: float) -> VehicleState:
+def hold(subject: Subject, phi: float, theta: float, thrust_n: float) -> VehicleState:
     """Do what `held` does, for a subject."""
     flight = LoopFlight(subject, subject.plan("hover:height=60", start=subject.start(z=60.0)))
     yaw_rad = flight.loop.state(state_frame(flight.world)).euler[2]
-    return flight.hold((phi, theta, yaw_rad), thrust_n, seconds)
+    return flight.hold((phi, theta, yaw_rad), thrust_n)

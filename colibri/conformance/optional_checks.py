@@ -151,7 +151,7 @@ def _attitude(subject: Subject, law: Any, steps: list[FlownStep]) -> tuple[str, 
 
 def _not_held(subject: Subject, phi: float, theta: float, thrust_n: float) -> str:
     try:
-        state = hold(subject, phi, theta, thrust_n, HELD_S)
+        state = hold(subject, phi, theta, thrust_n)
     except Exception as error:
         return in_words(error)
     off_deg = degrees(acos(max(-1.0, min(1.0, float(_axis(*state.euler) @ _axis(phi, theta, state.euler[2]))))))

@@ -79,8 +79,7 @@ def _fly(points: Sequence[Point], common: Common, journal: Journal, args: argpar
         prepare(args.out / point.folder)
     with closing(fly_points(points, common, Pool())) as ended:
         for each in with_bar(ended, "flights", len(points), quiet=args.quiet):
-            journal.add([each])
-            journal.kept[each.flight] = each._replace(files={})
+            journal.add(each)
 
 
 def _in_folder(flown: Flown, folder: str, out: Path) -> Flown:

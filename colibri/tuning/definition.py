@@ -16,7 +16,7 @@ from colibri.common.errors import Error
 from colibri.tuning.objectives import Objective, metrics_of, read_objectives
 from colibri.tuning.space import Range, TuningError, as_flown, as_optuna, check_holds, read_range
 
-_LEAST_SEEDS = 3
+_MIN_SEEDS = 3
 
 
 class TuningTables(FlightTables, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -181,7 +181,7 @@ def _check_seeds(given: Any, seeds: tuple[int, ...]) -> tuple[int, ...]:
 
 def _prune_after(given: int | None, seeds: int, objectives: int) -> int:
     if given is None:
-        after = max(_LEAST_SEEDS, ceil(seeds / 4)) if objectives == 1 else 0
+        after = max(_MIN_SEEDS, ceil(seeds / 4)) if objectives == 1 else 0
         return after if after < seeds else 0
     if objectives > 1 and given:
         raise TuningError("prune_after: with several objectives no trial is worse before its end: leave it out")

@@ -56,17 +56,13 @@ class Flights:
             raise StopIteration
         return self._left.popleft()
 
-    def close(self) -> None:
-        """End the workers."""
-        self._flown.close()
-
     def __enter__(self) -> Self:
         """Begin."""
         return self
 
     def __exit__(self, *_error: object) -> None:
         """End the workers."""
-        self.close()
+        self._flown.close()
 
 
 def fly_trial(

@@ -1,6 +1,7 @@
 """What came of a tuning: its trials, the profile, what that is worth, and the folder that has them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.values import shown
 from colibri.tuning.definition import Tuning
 from colibri.tuning.profile_file import profile_file
+from colibri.tuning.space import TuningError
 from colibri.tuning.trials import Ended
 from colibri.tuning.verdict import HEADINGS, Compared, better, compare
 
@@ -47,11 +49,10 @@ class TuningResults:
         self.checked: CampaignResults | None = None
         self.verdict: list[Compared] = []
 
-    def with_check(self, checked: CampaignResults) -> "TuningResults":
+    def add_check(self, checked: CampaignResults) -> None:
         """Add the flights by seeds that tuning never saw."""
         self.checked = checked
         self.verdict = compare(self.tuning, checked)
-        return self
 
     @property
     def is_better(self) -> bool:
@@ -102,12 +103,15 @@ class TuningResults:
         ]
 
     def plot(self, what: str = "importance") -> "Figure":
-        """Return a figure: importance, slices, history or, with several objectives, pareto.
+        """Return a figure: history, slices, with eight trials importance, with several objectives pareto.
 
         Raises:
-            KeyError: There is none of that name.
+            TuningError: There is none of that name.
         """
-        return dict(self._figures())[what]
+        figures = self._figures()
+        if what not in figures:
+            raise TuningError(f"there is no figure {what} of these trials: choose {', '.join(figures)}")
+        return figures[what]()
 
     def save(self, folder: str | Path) -> Path:
         """Write profile, tables and figures into a folder, and return it."""
@@ -121,8 +125,8 @@ class TuningResults:
                 (path / "pareto" / f"trial-{trial.number}.toml").write_text(self.file_of(trial), encoding="utf-8")
         if self.verdict:
             self.save_verdict(path)
-        for name, figure in self._figures():
-            figure.savefig(path / f"{name}.png")
+        for name, draw in self._figures().items():
+            draw().savefig(path / f"{name}.png")
         return path
 
     def save_verdict(self, folder: Path) -> None:
@@ -137,18 +141,20 @@ class TuningResults:
             return "pruned"
         return "front" if len(self.tuning.objectives) > 1 and trial in self.front else "flown"
 
-    def _figures(self) -> "list[tuple[str, Figure]]":
+    def _figures(self) -> "dict[str, Callable[[], Figure]]":
         from colibri.tuning.figures import draw_history, draw_importance, draw_pareto, draw_slices
 
         tuning, trials, best = self.tuning, self.trials, self.best
         names = [objective.name for objective in tuning.objectives]
         title = f"{tuning.campaign.name}: {len(trials)} trials"
-        found = [("history", draw_history(title, names, trials, best))]
-        found.append(("slices", draw_slices(title, tuning.space, names[0], trials, best)))
+        found: dict[str, Callable[[], Figure]] = {
+            "history": partial(draw_history, title, names, trials, best),
+            "slices": partial(draw_slices, title, tuning.space, names[0], trials, best),
+        }
         if self.importances:
-            found.append(("importance", draw_importance(title, self.importances)))
+            found["importance"] = partial(draw_importance, title, self.importances)
         if len(names) > 1:
-            found.append(("pareto", draw_pareto(title, names, trials, self.front, best)))
+            found["pareto"] = partial(draw_pareto, title, names, trials, self.front, best)
         return found
 
 

@@ -102,7 +102,7 @@ def fly_tuning(
             if keep:
                 results.save(out)
             if tuning.check_seeds and results.best.number:
-                results.with_check(_check(tuning, results, engine(), out, told))
+                results.add_check(_check(tuning, results, engine(), out, told))
                 if keep:
                     results.save_verdict(out)
     return results

@@ -24,7 +24,7 @@ _NUMBER, _PROCESS, _FLIGHTS, _LOST, _PRUNED = "number", "process", "flights", "l
 _POLL_S = 0.2
 _MAX_P = 0.05
 """A trial ends early where it is worse than the best with less than this chance of that being chance."""
-_BEST_PART, _LEAST_TRIALS = 0.25, 8
+_BEST_PART, _MIN_TRIALS = 0.25, 8
 
 
 class Ended(NamedTuple):
@@ -135,11 +135,11 @@ class Trials:
         from optuna.importance import PedAnovaImportanceEvaluator, get_param_importances
 
         ended = [trial for trial in self._trials() if trial.state.is_finished()]
-        if len(ended) < _LEAST_TRIALS:
+        if len(ended) < _MIN_TRIALS:
             return []
         found = []
         for place in range(len(self._tuning.objectives)):
-            study = _study_of(ended, place)
+            study = self._study_of(ended, [place])
             with _unwarned():
                 parts = get_param_importances(study, evaluator=PedAnovaImportanceEvaluator(target_quantile=_BEST_PART))
             found.append({name: float(parts[name]) for name in self._tuning.space})
@@ -195,9 +195,20 @@ class Trials:
 
         root = self._tuning.campaign.root_seed
         (seed,) = SeedSequence(root, spawn_key=(number,)).generate_state(1)
-        study = _study_of(trials, sampler=TPESampler(seed=int(seed)))
+        ended = [trial for trial in trials if trial.state.is_finished()]
+        study = self._study_of(ended, range(len(self._tuning.objectives)), TPESampler(seed=int(seed)))
         params = study.ask(self._space).params
         return {name: as_tried(values, params[name]) for name, values in self._tuning.space.items()}
+
+    def _study_of(self, ended: Sequence["FrozenTrial"], objectives: Sequence[int], sampler: Any = None) -> "Study":
+        """Return a study in memory that has these trials, and of their objectives those at some places."""
+        import optuna
+
+        study = optuna.create_study(directions=["minimize"] * len(objectives), sampler=sampler)
+        for trial in ended:
+            values = [trial.values[place] for place in objectives]
+            study.add_trial(optuna.create_trial(values=values, params=trial.params, distributions=self._space))
+        return study
 
 
 def require_optuna() -> Any:
@@ -212,24 +223,6 @@ def require_optuna() -> Any:
     except ImportError as error:
         raise TuningError(f"{error.name} is not installed: pip install {_PACKAGE}[tune]") from error
     return optuna
-
-
-def _study_of(trials: Sequence["FrozenTrial"], objective: int | None = None, sampler: Any = None) -> "Study":
-    """Return a study in memory that has these trials, and all objectives or one."""
-    optuna = require_optuna()
-    several = [trial.values for trial in trials if trial.values]
-    count = 1 if objective is not None or not several else len(several[0])
-    study: Study = optuna.create_study(directions=["minimize"] * count, sampler=sampler)
-    for trial in trials:
-        values = trial.values
-        if objective is not None:
-            values = [values[objective]]
-        study.add_trial(
-            optuna.create_trial(
-                state=trial.state, values=values, params=trial.params, distributions=trial.distributions
-            )
-        )
-    return study
 
 
 @contextmanager

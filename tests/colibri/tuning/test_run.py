@@ -189,6 +189,10 @@ def test_from_python_with_a_profile_and_a_metric_of_one_s_own() -> None:
     assert [trial.number for trial in results.trials] == [0, 1]
     assert "velocity = 2.0" in results.profile_text
     assert results.plot("history").axes
+    with pytest.raises(
+        colibri.TuningError, match="there is no figure importance of these trials: choose history, slices"
+    ):
+        results.plot()
 
 
 @pytest.mark.parametrize(
