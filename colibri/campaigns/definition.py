@@ -12,7 +12,17 @@ from numpy.random import PCG64, Generator, SeedSequence
 
 from colibri.campaigns.factors import factor_name
 from colibri.campaigns.metrics import Metric, hint, read_metrics, usual
-from colibri.campaigns.values import CampaignError, Choice, Draw, Level, has_levels, is_number, read_draw, read_values
+from colibri.campaigns.values import (
+    CampaignError,
+    Choice,
+    Draw,
+    Level,
+    first_twice,
+    has_levels,
+    is_number,
+    read_draw,
+    read_values,
+)
 from colibri.common.config import read_settings, read_toml
 from colibri.common.process.arguments import seeds
 from colibri.experiments.options import option_names
@@ -240,7 +250,10 @@ def name_in_tables(given: str, value: Any, others: Sequence[str] = OF_ALL) -> st
 
 
 def _named(given: Mapping[str, Any], *others: str) -> dict[str, Any]:
-    return {name_in_tables(name, value, others): value for name, value in given.items()}
+    names = [name_in_tables(name, value, others) for name, value in given.items()]
+    if twice := first_twice(names):
+        raise CampaignError(f"{twice} is said twice, by two of its names")
+    return dict(zip(names, given.values(), strict=True))
 
 
 def _values(name: str, given: Any) -> tuple[Any, ...]:
@@ -258,9 +271,9 @@ def _check_names(planned: Campaign) -> None:
         if levels and name in option_names():
             raise CampaignError(f"{name}: a factor with levels needs a name of its own")
         said += dict.fromkeys(key for settings in levels for key in settings) if levels else [name]
-    for twice in (name for name in said if said.count(name) > 1):
+    if twice := first_twice(said):
         raise CampaignError(f"{twice} is said twice: keep it in one of fly, grid and draw")
-    for twice in (name for name in planned.columns if planned.columns.count(name) > 1):
+    if twice := first_twice(planned.columns):
         raise CampaignError(f"{twice}: the table would have two columns of that name: choose another")
     if "track" not in said:
         raise CampaignError('no track: say which is flown, track = ["spiral"] in grid say')

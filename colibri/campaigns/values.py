@@ -1,7 +1,7 @@
 """What a factor is set to: each of several values, or a draw from a distribution."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any, NamedTuple, Protocol
 
@@ -148,9 +148,14 @@ def read_values(key: str, given: Any) -> tuple[Any, ...]:
     values = tuple(given) if isinstance(given, list | tuple | range) else (given,)
     if not values:
         raise CampaignError(f"{key}: no values: give at least one")
-    for twice in (name for name, count in Counter(map(shown, values)).items() if count > 1):
+    if twice := first_twice(map(shown, values)):
         raise CampaignError(f"{key}: {twice} is there twice")
     return values
+
+
+def first_twice(names: Iterable[str]) -> str:
+    """Return the first name that is there twice; empty if none is."""
+    return next((name for name, count in Counter(names).items() if count > 1), "")
 
 
 def shown(value: Any) -> str:

@@ -126,15 +126,15 @@ def _strips(
     for place, flights in enumerate(table.groups().values()):
         values = column[table.through(flights)]
         values = values[np.isfinite(values)]
+        lost = len(flights) - len(table.through(flights))
+        if lost and metric == _TRUE:
+            text = f"{lost} lost"
+            axes.text(
+                0.99, -place, text, transform=axes.get_yaxis_transform(), ha="right", va="center", color="#D00000"
+            )
         if not len(values):
             continue
         at = np.full(len(values), -place - shift)
         axes.plot(values, at, "o", color=color, markersize=3, alpha=0.45, markeredgewidth=0, label=called)
         called = ""  # each label once
         axes.plot([middle(values)] * 2, [-place - shift - 0.12, -place - shift + 0.12], color=color, linewidth=2.2)
-        lost = len(flights) - len(values)
-        if lost and metric == _TRUE:
-            text = f"{lost} lost"
-            axes.text(
-                0.99, -place, text, transform=axes.get_yaxis_transform(), ha="right", va="center", color="#D00000"
-            )

@@ -9,7 +9,7 @@ import msgspec
 
 from colibri.autopilot.control.profile import Profile, ProfileError, profile_text
 from colibri.campaigns.definition import Campaign, CampaignTables, FlightTables, Point, campaign_of, read_seeds
-from colibri.campaigns.factors import factor_name, key_of, with_keys
+from colibri.campaigns.factors import SCALED, factor_name, key_of, with_keys
 from colibri.campaigns.flights import Common, check, common_of
 from colibri.common.config import value_at
 from colibri.common.errors import Error
@@ -139,6 +139,8 @@ def _space(tables: TuningTables) -> dict[str, Range]:
         key = key_of(name)
         if key is None or key.table != "profile":
             raise TuningError(f"tune: {given} is no number of a profile: controllers.LAW.KEY say")
+        if any(name.rstrip(SCALED) == other.rstrip(SCALED) for other in space):
+            raise TuningError(f"tune: {name.rstrip(SCALED)} is said twice")
         space[name] = read_range(name, values)
     if not space:
         raise TuningError('tune: say which numbers, "controllers.LAW.KEY" = { uniform = [2, 20] } say')
@@ -156,9 +158,8 @@ def _had(base: Profile, name: str) -> Any:
 
 def _check_factors(campaign: Campaign, space: Mapping[str, Range]) -> None:
     varied = {name for point in campaign.samples() for name in point.settings}
-    plain = {name.rstrip("*") for name in (*campaign.fly, *varied)}
-    twice = next((name for name in space if name.rstrip("*") in plain), None)
-    if twice is not None:
+    plain = {name.rstrip(SCALED) for name in (*campaign.fly, *varied)}
+    for twice in (name for name in space if name.rstrip(SCALED) in plain):
         raise TuningError(f"{twice} is said twice: what is tuned is not in fly, grid or draw")
     if "profile" in varied:
         raise TuningError("profile: one is tuned: say which in fly")

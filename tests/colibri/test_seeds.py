@@ -14,6 +14,7 @@ from colibri.campaigns.definition import CampaignTables, campaign_of
 from colibri.campaigns.engines.pool import Pool
 from colibri.campaigns.flight_table import FlightTable
 from colibri.campaigns.flights import Flown, Verdict
+from colibri.campaigns.values import shown
 from colibri.cli.main import main
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.studies import seed_figures
@@ -136,14 +137,19 @@ def test_the_figure_has_room_for_its_rows_and_a_dot_for_each_flight(
     names = ("my-longest-profile.toml:geometric-se3", "flight")
     grid = {"contender": {name: {"profile": "flight"} for name in names}, "track": ["circle:radius=3,speed=4"]}
     planned = campaign_of(CampaignTables(seeds="1-2", grid=grid, metrics=METRICS))
-    flown = {point.flight: Flown(point.flight, Verdict.FLOWN, "", values, "") for point in planned.points()}
+    verdicts = {names[0]: Verdict.LOST, names[1]: Verdict.FLOWN}
+    flown = {
+        point.flight: Flown(point.flight, verdicts[shown(point.factors["contender"])], "", values, "")
+        for point in planned.points()
+    }
     seed_figures.draw_seeds(FlightTable(planned, flown), Path())
     (figure,) = drawn
     figure.draw_without_rendering()
     assert min(text.get_window_extent().x0 for axes in figure.axes for text in axes.get_yticklabels()) > 0.0
     assert max(axes.xaxis.label.get_window_extent().x1 for axes in figure.axes) < figure.bbox.width
     dots = sum(line.get_marker() == "o" for line in figure.axes[0].lines)
-    assert dots == len(names) * (2 if estimated else 1)
+    assert dots == (2 if estimated else 1), "of those that came through"
+    assert [text.get_text() for text in figure.axes[0].texts] == ["2 lost"]
 
 
 def test_what_changed_since_is_flown_again(

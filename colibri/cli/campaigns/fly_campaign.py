@@ -1,7 +1,7 @@
 """`colibri campaign`: read what the command line adds to a file, fly, and say what came of it."""
 
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
@@ -10,7 +10,7 @@ from colibri.campaigns.definition import OF_ALL, CampaignTables, campaign_of, ta
 from colibri.campaigns.flights import Flown, Verdict
 from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import engine_of, fly_campaign
-from colibri.campaigns.values import CampaignError
+from colibri.campaigns.values import CampaignError, first_twice
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, fail
 from colibri.experiments.options import option_names
@@ -35,7 +35,7 @@ def fly(args: Namespace) -> int:
         said = vars(args)
         tables = {name: said[name] for name in _TABLES if name in said}
         options = {name: said[name] for name in (*OF_ALL, *option_names()) if name in said}
-        given = tables | {"fly": options, "grid": _grid(args), "draw": dict(map(_draw, args.draws))}
+        given = tables | {"fly": options, "grid": _grid(args), "draw": _once(_draw, args.draws)}
         planned = campaign_of(tables_of(CampaignTables, args.file, given))
         engine = engine_of(args.workers, args.dask)
         with _progress(planned.name, planned.flights, quiet=args.quiet) as bar:
@@ -52,7 +52,15 @@ def fly(args: Namespace) -> int:
 
 def _grid(args: Namespace) -> dict[str, Any]:
     tracks = {"track": args.tracks} if args.tracks else {}
-    return tracks | dict(map(_setting, args.settings))
+    return tracks | _once(_setting, args.settings)
+
+
+def _once(read: Callable[[str], tuple[str, Any]], texts: Sequence[str]) -> dict[str, Any]:
+    """Read factors of the command line, each of which is there once."""
+    pairs = list(map(read, texts))
+    if twice := first_twice(key for key, _ in pairs):
+        raise CampaignError(f"{twice} is said twice: give all of its values at once")
+    return dict(pairs)
 
 
 def _setting(text: str) -> tuple[str, Any]:

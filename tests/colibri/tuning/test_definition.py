@@ -25,6 +25,10 @@ def range_of(**given: Any) -> dict[str, Any]:
         ({"tune": {"track": {"choice": ["hover", "spiral"]}}}, "tune: track is no number of a profile"),
         ({"tune": {"vehicle.body.mass_kg": {"uniform": [0.6, 0.8]}}}, "vehicle.body.mass_kg is no number of a profile"),
         ({"tune": {f"{WEIGHTS}": {"uniform": [1, 2]}}}, f"{WEIGHTS}: the profile has "),
+        (
+            {"tune": {f"{WEIGHTS}.rate": {"uniform": [0, 1]}, f"{RATE}*": {"uniform": [0, 2]}}},
+            f"tune: {RATE} is said twice",
+        ),
         (range_of(uniform=[200, 1]), "position: uniform: 200 to 1 is no range"),
         (range_of(uniform=[200, 300]), "position: the profile has 100, not within 200 to 300: widen that"),
         (range_of(normal=[100, 3]), "position: expected one of uniform, log-uniform, integers, choice, as in"),
