@@ -133,7 +133,7 @@ def tuning_of(tables: TuningTables) -> Tuning:
 
 
 def _space(tables: TuningTables) -> dict[str, Range]:
-    space = {}
+    space: dict[str, Range] = {}
     for given, values in tables.tune.items():
         name = factor_name(given)
         key = key_of(name)
@@ -174,6 +174,8 @@ def _check_seeds(given: Any, seeds: tuple[int, ...]) -> tuple[int, ...]:
         checked = read_seeds(given)
     except Error as error:
         raise TuningError(f"check_{error}") from error
+    if len(checked) < 2:
+        raise TuningError("check_seeds: one seed has no spread, so that no interval follows: give more, 101-150 say")
     seen = sorted({*checked} & {*seeds})
     if seen:
         raise TuningError(f"check_seeds: {seen[0]} is among seeds: tuning must never have seen those it is checked by")

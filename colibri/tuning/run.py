@@ -12,6 +12,7 @@ from colibri.campaigns.definition import tables_of
 from colibri.campaigns.engines.engine import Engine
 from colibri.campaigns.flights import Flown
 from colibri.campaigns.journal import claim, identity_of
+from colibri.campaigns.results import CampaignResults
 from colibri.campaigns.run import engine_of, fly_campaign
 from colibri.tuning.definition import Tuning, TuningTables, tuning_of
 from colibri.tuning.file_lock import FileLock
@@ -121,7 +122,7 @@ def _fly_trials(tuning: Tuning, trials: Trials, engine: Engine, told: Watcher) -
             told.ended(len(values), values[0], min(values))
 
 
-def _check(tuning: Tuning, results: TuningResults, engine: Engine, out: Path, told: Watcher) -> Any:
+def _check(tuning: Tuning, results: TuningResults, engine: Engine, out: Path, told: Watcher) -> CampaignResults:
     """Fly the profile as it is, and the tuned one, by seeds that tuning never saw; go on with what there is of that."""
     after = msgspec.structs.replace(results.profile, name=tuned_name(tuning.base))
     campaign = check_campaign(tuning, tuning.base, after)

@@ -68,6 +68,7 @@ def range_of(**given: Any) -> dict[str, Any]:
         ),
         ({"check_seeds": "4-9"}, "check_seeds: 4 is among seeds: tuning must never have seen"),
         ({"check_seeds": "9-4"}, "check_seeds: expected 1-20, a seed, or several different ones, not 9-4"),
+        ({"check_seeds": 9}, "check_seeds: one seed has no spread, so that no interval follows"),
         ({"seeds": "4-1"}, "seeds: expected 1-20"),
         ({"trials": 1}, "trials: must be at least 2, not 1"),
         ({"prune_after": -1}, "prune_after: must be at least 0, not -1"),
