@@ -188,6 +188,7 @@ def is_refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixtu
     assert not (tmp_path / CERTIFICATE).exists()
 
 
+@pytest.mark.long  # its kernels are compiled for it alone; the next shows the refusal
 def test_a_profile_that_is_unstable_is_refused(
     sluggish: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -198,6 +199,7 @@ def test_so_is_one_whose_lqr_is(steep: str, tmp_path: Path, capsys: pytest.Captu
     is_refused([steep, "--controller", "lpv-mpc", "--least", str(REFUSED)], tmp_path, capsys)
 
 
+@pytest.mark.long
 def test_what_is_refused_is_unstable_indeed(sluggish: str) -> None:
     """By the law's own steps an error of a thousandth grows threefold; with the profile as it is it dies out."""
     unstable = WholeAttitude(load_profile(sluggish).table("whole-lpv-mpc"), VEHICLE, CONDITIONS)
