@@ -4,15 +4,12 @@ import os
 import signal
 import sys
 import threading
-from argparse import Action, Namespace
 from collections.abc import Sequence
 from errno import EDQUOT, EFBIG, ENOSPC
-from importlib import import_module
-from typing import NoReturn, Protocol, cast
 
+from colibri.cli.shared.parser import parser_for, subcommand
 from colibri.cli.shared.processes import PROCESSES, run_process
 from colibri.common.errors import Error
-from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import (
     EXIT_FAILED,
     EXIT_INTERRUPTED,
@@ -25,51 +22,7 @@ from colibri.common.process.lifecycle import (
 )
 from colibri.common.process.writable_folders import use_writable_folders
 
-SUBCOMMANDS = {
-    "fly": "fly a track and report how well it went",
-    "sitl": "stand ready for ground stations: QGroundControl, MAVSDK, MAVProxy",
-    "figures": "fly all that the thesis shows and draw its figures",
-    "compare": "fly several controllers on several tracks, side by side",
-    "campaign": "fly every combination of factors, by many seeds, into one table",
-    "tune": "find better numbers of a profile, and what they are worth on seeds never seen",
-    "study": "fly what shows how far profile flight reaches, and draw it",
-    "check-controller": "try on a control law of your own what every one must satisfy",
-    "certify": "prove what can be proven of a profile's attitude law",
-    "bench": "measure how fast it flies",
-    "plot": "draw the figures of a flight, however it ended",
-    "show": "print the file of a profile or vehicle, to copy and change",
-    "vehicle": "write a vehicle as parameters of PX4 or ArduPilot",
-    "replay": "feed a recorded flight to the autopilot: are its answers the same?",
-    "verify": "fly a fixed set of flights: is every bit the same, twice, or as it once was?",
-}
-"""What each does, by its name, which is also that of its file beside this one; `_ROOMS` has those in rooms."""
-_ROOMS = (
-    dict.fromkeys(("campaign", "compare", "study", "figures"), "campaigns")
-    | dict.fromkeys(("certify", "check-controller"), "laws")
-    | dict.fromkeys(("show", "vehicle"), "descriptions")
-)
 _NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
-
-
-class Subcommand(Protocol):
-    """The file of a subcommand."""
-
-    def add_options(self, parser: ArgumentParser) -> None:
-        """Add its options."""
-
-    def run(self, args: Namespace) -> int:
-        """Do it; return the exit code."""
-
-
-class Version(Action):
-    """Prints the version that is installed, and ends."""
-
-    def __call__(self, *_: object) -> NoReturn:
-        """Look it up only now: that takes a while."""
-        from importlib.metadata import version
-
-        print(f"colibri {version('colibri-sitl')}")  # noqa: T201
-        raise SystemExit(0)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -86,7 +39,7 @@ def main(argv: list[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that what was started is ended, too
     try:
         with loading():
-            args, unknown = _parser(given).parse_known_args(given)
+            args, unknown = parser_for(given).parse_known_args(given)
         if unknown:
             fail(f"unrecognized arguments: {' '.join(unknown)} (see colibri {args.command} --help)")
         use_writable_folders()
@@ -122,24 +75,3 @@ def _check_encoding(given: Sequence[str]) -> None:
             word.encode()
         except UnicodeEncodeError:
             fail(f"{word} is not UTF-8 by this locale: rename the file, or try LC_ALL=C.UTF-8")
-
-
-def _parser(given: Sequence[str]) -> ArgumentParser:
-    """Return the parser of the whole command, with the options of the subcommand that is given alone."""
-    parser = ArgumentParser(prog="colibri", description="A quadrotor autopilot in pure Python, flown over MAVLink.")
-    parser.add_argument("--version", action=Version, nargs=0, help="print the version")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    asked = next((word for word in given if word in SUBCOMMANDS), None)
-    for name, what in SUBCOMMANDS.items():
-        options = commands.add_parser(name, help=what)
-        if name == asked:
-            subcommand(name).add_options(options)
-    for name, what in PROCESSES.items():
-        commands.add_parser(name, help=what, add_help=False)
-    return parser
-
-
-def subcommand(name: str) -> Subcommand:
-    """Return the file of a subcommand."""
-    room = f"colibri.cli.{_ROOMS[name]}" if name in _ROOMS else "colibri.cli"
-    return cast(Subcommand, import_module(f"{room}.{name.replace('-', '_')}"))

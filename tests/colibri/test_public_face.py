@@ -17,7 +17,15 @@ FACES = (
     *("colibri.experiments", "colibri.flights", "colibri.mavlink"),
     *("colibri.plant", "colibri.sitl", "colibri.tuning"),
 )
-PACKAGES = (*FACES, "colibri.bench", "colibri.certification", "colibri.cli", "colibri.studies", "colibri.verification")
+PACKAGES = (
+    *FACES,
+    "colibri.bench",
+    "colibri.certification",
+    "colibri.cli",
+    "colibri.doctor",
+    "colibri.studies",
+    "colibri.verification",
+)
 MAX_IMPORT_MS = 50.0
 TRIES = 5
 IMPORT = "import sys, time; t = time.process_time(); import colibri; print((time.process_time() - t) * 1e3)"

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from colibri.bench.run import bench
 from colibri.bench.speed import Peer
-from colibri.cli.bench import add_options
+from colibri.cli.computer.bench import add_options
 from colibri.common.process.arguments import ArgumentParser
 from colibri.common.process.lifecycle import EXIT_INTERRUPTED, fail, use_one_thread
 from tools.bench import rotorpy_peer

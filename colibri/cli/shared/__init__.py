@@ -1,1 +1,1 @@
-"""What is no subcommand: options that several have, a flight with its progress and report, the two processes."""
+"""What is no subcommand: their list and parser, options that several have, a flight and its report, both processes."""

@@ -3,6 +3,7 @@
 import json
 import os
 import resource
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,7 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from colibri.cli.main import SUBCOMMANDS, main, subcommand
+from colibri.cli.computer.completion import SHELLS
+from colibri.cli.main import main
+from colibri.cli.shared.commands import COMMANDS
+from colibri.cli.shared.parser import parser_of, subcommand
 from colibri.cli.shared.processes import PROCESSES
 from colibri.flights.provenance import plan_of
 from tests.colibri.cli.commands import FLIGHT, VEHICLE, edited, exit_code
@@ -22,7 +26,8 @@ MAX_HELP_S = 0.2
 """Of a core, startup of Python included."""
 HELP = """
 import sys
-from colibri.cli.main import SUBCOMMANDS, main
+from colibri.cli.computer.completion import SHELLS
+from colibri.cli.main import main
 from colibri.cli.shared.processes import PROCESSES
 try:
     main(["--help"])
@@ -31,7 +36,7 @@ finally:
 """
 
 
-@pytest.mark.parametrize("command", SUBCOMMANDS)
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_subcommand_has_options_and_a_call(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert exit_code([command, "--help"]) == 0
     assert capsys.readouterr().out.startswith(f"usage: colibri {command} ")
@@ -44,10 +49,37 @@ def test_help_names_every_command_and_loads_nothing_that_is_large() -> None:
         before_s = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         done = subprocess.run([sys.executable, "-c", HELP], capture_output=True, text=True, check=True)
         took_s.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before_s)
-    for command in (*SUBCOMMANDS, *PROCESSES):
-        assert f"\n    {command}" in done.stdout
+    for command in (*COMMANDS, *PROCESSES):
+        assert f"\n  {command} " in done.stdout
     assert not {"numpy", "numba", "msgspec", "pymavlink", "rich"} & set(done.stderr.split())
     assert min(took_s) < MAX_HELP_S
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_example_of_the_help_is_a_command(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    examples = [line.partition("#")[0].partition(">")[0] for line in COMMANDS[command].examples.split("\n")]
+    given = [shlex.split(example) for example in examples if example.strip()]
+    assert given
+    for program, name, *options in given:
+        assert (program, name) == ("colibri", command)
+        parser_of(command).parse_args([name, *options])
+    assert exit_code([command, "--help"]) == 0
+    assert "\nexamples:\n  colibri " in capsys.readouterr().out
+
+
+def test_help_fits_a_narrow_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    for command in ((), *((name,) for name in COMMANDS)):
+        assert exit_code([*command, "--help"]) == 0
+        assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_shells_complete_commands_and_their_options(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert "check-controller" in script
+    assert "turbulence" in script
 
 
 @pytest.mark.parametrize("package", ["plant", "autopilot"])

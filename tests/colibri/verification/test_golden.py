@@ -10,8 +10,8 @@ import pytest
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import GROUP
 from colibri.autopilot.guidance.trajectories.tracks import THESIS_TRACKS
+from colibri.cli.computer.verify import GOLDEN_HASHES
 from colibri.cli.main import main
-from colibri.cli.verify import GOLDEN_HASHES
 from colibri.sitl.vehicle import Sitl
 from colibri.verification import golden, golden_flights
 from colibri.verification.cases import Case, SitlCase

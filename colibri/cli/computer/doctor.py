@@ -1,0 +1,32 @@
+"""`colibri doctor`: its options, and its call."""
+
+from argparse import Namespace
+
+from colibri.common.process.arguments import ArgumentParser, positive
+
+GCS = "udpout:127.0.0.1:14550"
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options of `colibri doctor`."""
+    add = parser.add_argument
+    add(
+        "--gcs",
+        nargs="?",
+        const=GCS,
+        metavar="URL",
+        help=f"call a ground station as a vehicle does, and wait for its heartbeat (default {GCS})",
+    )
+    add("--within", type=positive, default=10.0, metavar="S", help="how long to wait for it (default %(default)s)")
+
+
+def run(args: Namespace) -> int:
+    """Examine this computer as the command line says; return the exit code."""
+    from colibri.common.process.lifecycle import fail
+    from colibri.doctor.examine import examine_as_told
+    from colibri.mavlink.links.link import LinkError
+
+    try:
+        return examine_as_told(args)
+    except LinkError as error:
+        fail(str(error))

@@ -1,0 +1,147 @@
+"""Every subcommand: what it does, in which room its file is, and how it is used."""
+
+from typing import NamedTuple
+
+
+class Command(NamedTuple):
+    """A subcommand.
+
+    Attributes:
+        does: What it does, in a line.
+        room: Below `colibri.cli`, where its file is; empty for that room itself.
+        examples: Of its use, one a line, each with what it shows behind a `#`.
+    """
+
+    does: str
+    room: str
+    examples: str
+
+
+GROUPS: dict[str, dict[str, Command]] = {
+    "fly": {
+        "fly": Command(
+            "fly a track and report how well it went",
+            "",
+            """
+            colibri fly spiral                                # report and figures in out/
+            colibri fly lemniscate:lap=5 --wind 5@270         # in wind from the west
+            colibri fly circle --feedback sensors --seed 3    # by estimates
+            """,
+        ),
+        "sitl": Command(
+            "stand ready for ground stations: QGroundControl, MAVSDK, MAVProxy",
+            "",
+            """
+            colibri sitl                                      # then start QGroundControl
+            colibri sitl --count 3                            # a fleet of three
+            colibri sitl --feedback sensors --turbulence light --speed 1
+            """,
+        ),
+        "plot": Command(
+            "draw the figures of a flight, however it ended",
+            "",
+            "colibri plot out/spiral",
+        ),
+        "replay": Command(
+            "feed a recorded flight to the autopilot: are its answers the same?", "", "colibri replay out/spiral"
+        ),
+    },
+    "many flights": {
+        "campaign": Command(
+            "fly every combination of factors, by many seeds, into one table",
+            "campaigns",
+            """
+            colibri campaign mass.toml --out out/mass
+            colibri campaign mass.toml --out out/mass --resume    # go on with it
+            colibri campaign --track spiral --set feedback=state,sensors --seeds 1-10
+            """,
+        ),
+        "tune": Command(
+            "find better numbers of a profile, and what they are worth on seeds never seen",
+            "",
+            """
+            colibri tune weights.toml --out out/tune
+            colibri tune weights.toml --out out/tune --resume     # go on, or join
+            """,
+        ),
+        "compare": Command(
+            "fly several controllers on several tracks, side by side",
+            "campaigns",
+            """
+            colibri compare --profile flight --profile se3 --track spiral
+            colibri compare --track circle --seeds 1-20 --turbulence light
+            """,
+        ),
+        "study": Command(
+            "fly what shows how far profile flight reaches, and draw it",
+            "campaigns",
+            "colibri study speed robustness    # two of the studies; without a name all",
+        ),
+        "figures": Command(
+            "fly all that the thesis shows and draw its figures", "campaigns", "colibri figures --only 4.9"
+        ),
+    },
+    "control laws": {
+        "check-controller": Command(
+            "try on a control law of your own what every one must satisfy",
+            "laws",
+            """
+            colibri check-controller geometric-se3
+            colibri check-controller whole-lpv-mpc --only memory --only limits
+            """,
+        ),
+        "certify": Command(
+            "prove what can be proven of a profile's attitude law",
+            "laws",
+            "colibri certify flight --controller lpv-mpc",
+        ),
+    },
+    "profiles and vehicles": {
+        "show": Command(
+            "print the file of a profile or vehicle, to copy and change",
+            "descriptions",
+            """
+            colibri show profile flight > mine.toml
+            colibri show vehicle hummingbird
+            """,
+        ),
+        "vehicle": Command(
+            "write a vehicle as parameters of PX4 or ArduPilot",
+            "descriptions",
+            "colibri vehicle hummingbird --for px4 --out hummingbird.params",
+        ),
+    },
+    "this computer": {
+        "doctor": Command(
+            "look whether everything is there that flights need",
+            "computer",
+            """
+            colibri doctor
+            colibri doctor --gcs    # wait for a ground station, too
+            """,
+        ),
+        "bench": Command(
+            "measure how fast it flies",
+            "computer",
+            """
+            colibri bench --only commands
+            colibri bench --only stages --runs 1
+            """,
+        ),
+        "verify": Command(
+            "fly a fixed set of flights: is every bit the same, twice, or as it once was?",
+            "computer",
+            "colibri verify --link memory",
+        ),
+        "completion": Command(
+            "print what makes a shell complete these commands",
+            "computer",
+            """
+            colibri completion bash > ~/.local/share/bash-completion/completions/colibri
+            colibri completion zsh > ~/.zfunc/_colibri
+            """,
+        ),
+    },
+}
+"""By what they are for, and by their names, which are also those of their files."""
+COMMANDS = {name: command for group in GROUPS.values() for name, command in group.items()}

@@ -1,0 +1,92 @@
+"""The parser of the whole command, and its help. Loads only the subcommands that are asked for."""
+
+from argparse import Action, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Generator, Sequence
+from importlib import import_module
+from shutil import get_terminal_size
+from textwrap import dedent, indent, wrap
+from typing import NoReturn, Protocol, cast
+
+from colibri.cli.shared.commands import COMMANDS, GROUPS
+from colibri.cli.shared.processes import PROCESSES
+from colibri.common.process.arguments import ArgumentParser
+
+_MAX_WIDTH = 120
+_NAME = 18
+
+
+class Subcommand(Protocol):
+    """The file of a subcommand."""
+
+    def add_options(self, parser: ArgumentParser) -> None:
+        """Add its options."""
+
+    def run(self, args: Namespace) -> int:
+        """Do it; return the exit code."""
+
+
+class Version(Action):
+    """Prints the version that is installed, and ends."""
+
+    def __call__(self, *_: object) -> NoReturn:
+        """Look it up only now: that takes a while."""
+        from importlib.metadata import version
+
+        print(f"colibri {version('colibri-sitl')}")  # noqa: T201
+        raise SystemExit(0)
+
+
+class _Grouped(RawDescriptionHelpFormatter):
+    """Help in which the subcommands are listed by what they are for, at the end, and nowhere else."""
+
+    def _iter_indented_subactions(self, _action: Action) -> Generator[Action, None, None]:
+        yield from ()
+
+
+def parser_for(given: Sequence[str]) -> ArgumentParser:
+    """Return the parser of the whole command, with the options of the subcommand that is given alone."""
+    asked = next((word for word in given if word in COMMANDS), None)
+    return parser_of(*(name for name in COMMANDS if name == asked))
+
+
+def parser_of(*whole: str) -> ArgumentParser:
+    """Return the parser of the whole command, in which these subcommands have their options."""
+    parser = ArgumentParser(
+        prog="colibri",
+        description="A quadrotor autopilot in pure Python, flown over MAVLink.",
+        epilog=_listed(),
+        formatter_class=_Grouped,
+    )
+    parser.add_argument("--version", action=Version, nargs=0, help="print the version")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", help="one of those below")
+    for name, command in COMMANDS.items():
+        examples = f"examples:\n{indent(dedent(command.examples).strip(), '  ')}"
+        options = commands.add_parser(
+            name,
+            help=command.does,
+            description=command.does,
+            epilog=examples,
+            formatter_class=RawDescriptionHelpFormatter,
+        )
+        if name in whole:
+            subcommand(name).add_options(options)
+    for name, does in PROCESSES.items():
+        commands.add_parser(name, help=does, add_help=False)
+    return parser
+
+
+def _listed() -> str:
+    """Return what the subcommands do, by what they are for, within the terminal's width."""
+    known = {group: {name: it.does for name, it in commands.items()} for group, commands in GROUPS.items()}
+    width, lines = min(get_terminal_size().columns, _MAX_WIDTH), []
+    for group, commands in (known | {"the two processes of a flight": PROCESSES}).items():
+        lines.append(f"{group}:")
+        for name, does in commands.items():
+            lines += wrap(does, width - 2, initial_indent=f"  {name:<{_NAME}}", subsequent_indent=" " * (_NAME + 2))
+    return "\n".join([*lines, "", "colibri COMMAND --help says more of each."])
+
+
+def subcommand(name: str) -> Subcommand:
+    """Return the file of a subcommand."""
+    room = ".".join(filter(None, ("colibri.cli", COMMANDS[name].room, name.replace("-", "_"))))
+    return cast(Subcommand, import_module(room))

@@ -1,0 +1,61 @@
+"""`colibri doctor`: every check in its order, and the table of what they found."""
+
+import argparse
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeAlias
+
+from colibri.common.process.lifecycle import EXIT_FAILED
+from colibri.doctor.finding import Finding, Verdict
+from colibri.doctor.flying import flight, machine_code
+from colibri.doctor.ground_station import ground_station
+from colibri.doctor.network import beyond, loopback, ports
+from colibri.doctor.packages import extras, lock, packages, python
+from colibri.mavlink.links.open import open_ground_link
+
+Check: TypeAlias = Callable[[], Finding | Iterable[Finding] | None]
+
+CHECKS: tuple[Check, ...] = (python, packages, lock, machine_code, loopback, ports, beyond, flight, extras)
+"""What is looked at, in this order."""
+_COLORS = {Verdict.FINE: "green", Verdict.NOTE: "yellow", Verdict.FAILED: "bold red"}
+
+
+def examine(checks: Iterable[Check] = CHECKS) -> Iterator[Finding]:
+    """Yield what each check finds."""
+    for check in checks:
+        found = check()
+        if isinstance(found, Finding):
+            yield found
+        elif found is not None:
+            yield from found
+
+
+def examine_as_told(args: argparse.Namespace) -> int:
+    """Examine as the command line says, each finding shown as it comes; return the exit code.
+
+    Raises:
+        LinkError: The link to a ground station cannot be opened.
+    """
+    link = None if args.gcs is None else open_ground_link(args.gcs)
+    failed = 0
+    for finding in examine([*CHECKS, lambda: link and ground_station(link, args.within)]):
+        failed += finding.verdict is Verdict.FAILED
+        show(finding)
+    if link is not None:
+        link.close()
+    return EXIT_FAILED if failed else 0
+
+
+def show(finding: Finding) -> None:
+    """Print a finding, and what to do below it."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table.grid(padding=(0, 2))
+    for width in (6, 26):
+        table.add_column(width=width, no_wrap=True)
+    table.add_column()
+    table.add_row(Text(finding.verdict, _COLORS[finding.verdict]), Text(finding.checked), Text(finding.found))
+    if finding.advice:
+        table.add_row("", "", Text(f"→ {finding.advice}"))
+    Console().print(table)

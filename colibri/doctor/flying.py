@@ -1,0 +1,48 @@
+"""A flight as a user would fly it: whether it works, how fast, and whether its machine code is kept."""
+
+import os
+import platform
+from pathlib import Path
+
+from colibri.common.errors import Error
+from colibri.doctor.finding import Finding, Verdict
+
+_TRACK, _DURATION_S = "hover", 2.0
+_CPU_INFO = Path("/proc/cpuinfo")
+
+
+def machine_code() -> Finding:
+    """Return where compiled kernels are kept."""
+    from colibri.common.machine_code.on_disk import MachineCode
+    from colibri.common.rotations import rotation_matrix
+
+    folder = MachineCode(rotation_matrix).cache_path
+    if folder is None:
+        advice = "name a folder: NUMBA_CACHE_DIR=FOLDER"
+        return Finding("machine code", Verdict.NOTE, "can be kept nowhere: each start compiles anew", advice)
+    if not os.access(folder, os.W_OK):
+        advice = "make it so, or name another: NUMBA_CACHE_DIR=FOLDER"
+        return Finding("machine code", Verdict.NOTE, f"{folder} cannot be written to", advice)
+    return Finding("machine code", Verdict.FINE, f"kept in {folder}")
+
+
+def flight() -> Finding:
+    """Return how fast two processes fly over loopback; the first flight there is compiles, which is not counted."""
+    from colibri.experiments.flight import fly
+
+    try:
+        flown = fly(_TRACK, link="udp", duration=_DURATION_S)
+    except Error as error:
+        return Finding("flight", Verdict.FAILED, str(error), "colibri fly hover says more")
+    times = flown.report["real_time_factor"]
+    return Finding("flight", Verdict.FINE, f"{times:.0f} times real time, on {os.cpu_count()} cores: {processor()}")
+
+
+def processor() -> str:
+    """Return what the processor is called."""
+    if _CPU_INFO.exists():
+        for line in _CPU_INFO.read_text(encoding="utf-8", errors="replace").splitlines():
+            name, _, value = line.partition(":")
+            if name.strip() == "model name":
+                return value.strip()
+    return platform.processor() or platform.machine()

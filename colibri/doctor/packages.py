@@ -1,0 +1,90 @@
+"""Python and the packages: whether they are what Colibri asks for, and what the lock names."""
+
+import platform
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from importlib.metadata import PackageNotFoundError, distribution, version
+from pathlib import Path
+
+from packaging.requirements import Requirement
+
+import colibri
+from colibri.doctor.finding import Finding, Verdict
+
+PACKAGE = "colibri-sitl"
+FOR_DEVELOPERS = ("bench", "clients", "dev")
+"""Extras that nobody needs to fly."""
+_LOCK = "requirements.lock"
+_PINNED = re.compile(r"^[\w.-]+==[^\\\n]+", re.MULTILINE)
+_SHOWN = 3
+
+
+def python() -> Finding:
+    """Return which Python this is."""
+    return Finding("Python", Verdict.FINE, f"{platform.python_version()}, {sys.executable}")
+
+
+def packages() -> Finding:
+    """Return whether every package is there, in a version that Colibri can use."""
+    wrong = [words for asked in _asked() if (words := _wrong(asked))]
+    if wrong:
+        return Finding("packages", Verdict.FAILED, ", ".join(wrong), f"pip install --upgrade {PACKAGE}")
+    return Finding("packages", Verdict.FINE, f"{PACKAGE} {version(PACKAGE)} and the {len(_asked())} that it needs")
+
+
+def lock() -> Finding | None:
+    """Return whether the packages are those of the lock; None where there is none, as beside what pip installed."""
+    path = Path(colibri.__file__).resolve().parents[1] / _LOCK
+    if not path.is_file():
+        return None
+    pinned = _here(map(Requirement, _PINNED.findall(path.read_text(encoding="utf-8"))))
+    others = [words for pin in pinned if version_of(pin.name) is not None and (words := _wrong(pin))]
+    if others:
+        more = f" and {len(others) - _SHOWN} more" if len(others) > _SHOWN else ""
+        return Finding("lock", Verdict.NOTE, ", ".join(others[:_SHOWN]) + more, "make clean setup: as they were tested")
+    return Finding("lock", Verdict.FINE, f"no other version than {_LOCK} names")
+
+
+def extras() -> Iterator[Finding]:
+    """Yield each optional part, and whether it is installed."""
+    for extra in distribution(PACKAGE).metadata.get_all("Provides-Extra") or []:
+        if extra in FOR_DEVELOPERS:
+            continue
+        missing = [asked.name for asked in _asked(extra) if _wrong(asked)]
+        if missing:
+            yield Finding(f"extra {extra}", Verdict.NOTE, f"without {', '.join(missing)}", _how(extra))
+        else:
+            yield Finding(f"extra {extra}", Verdict.FINE, "installed")
+
+
+def _how(extra: str) -> str:
+    return f"if you need it: pip install '{PACKAGE}[{extra}]'"
+
+
+def _asked(extra: str = "") -> list[Requirement]:
+    """Return what is asked for on this computer; of an extra, what it alone asks for."""
+    every = [Requirement(line) for line in distribution(PACKAGE).requires or []]
+    always = _here(every)
+    return [asked for asked in _here(every, extra) if asked not in always] if extra else always
+
+
+def _here(every: Iterable[Requirement], extra: str = "") -> list[Requirement]:
+    """Return the requirements that count on this computer."""
+    return [asked for asked in every if asked.marker is None or asked.marker.evaluate({"extra": extra})]
+
+
+def _wrong(asked: Requirement) -> str:
+    """Return in words how a package is not what is asked for; empty if it is."""
+    has = version_of(asked.name)
+    if has is None:
+        return f"{asked.name} is missing"
+    return "" if asked.specifier.contains(has, prereleases=True) else f"{asked.name} is {has}, not {asked.specifier}"
+
+
+def version_of(name: str) -> str | None:
+    """Return the version of a package that is installed; None if it is not."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None

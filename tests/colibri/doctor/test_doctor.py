@@ -1,0 +1,138 @@
+"""`colibri doctor`: what it finds on a computer that is well, and what it says of one that is not."""
+
+import os
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from colibri.cli.main import main
+from colibri.common.machine_code.on_disk import MachineCode
+from colibri.doctor import examine, flying, network, packages
+from colibri.doctor.finding import Finding, Verdict
+from colibri.doctor.ground_station import called, ground_station
+from colibri.flights.fleet import PLANT_PORT
+from colibri.mavlink.links.open import open_ground_link
+from colibri.mavlink.wire.dialect import Codec, mav
+from tests.colibri.cli.commands import exit_code
+
+FINE, FAILED = Finding("one", Verdict.FINE, "there"), Finding("other", Verdict.FAILED, "not there", "put it there")
+ROUTES = (
+    "Iface\tDestination\tGateway\tFlags\n"
+    "eth0\t000013AC\t00000000\t0001\n"
+    "eth0\t00000000\t010013AC\t0003\n"
+)  # fmt: skip
+
+
+@pytest.fixture
+def taken() -> Iterator[int]:
+    """Yield a port of loopback that this process has."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as mine:
+        mine.bind((network.HOST, 0))
+        yield mine.getsockname()[1]
+
+
+def test_this_computer_flies() -> None:
+    """What the tests themselves need is there; whether a port is free depends on who else flies here."""
+    found = list(examine.examine([packages.packages, network.loopback, flying.machine_code, flying.flight]))
+    assert [finding.verdict for finding in found] == [Verdict.FINE] * 4
+    assert "times real time" in found[-1].found
+
+
+def test_what_failed_is_shown_with_what_to_do_and_ends_with_1(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(examine, "CHECKS", (lambda: FINE, lambda: None, lambda: [FINE, FAILED]))
+    assert main(["doctor"]) == 1
+    assert [line.split() for line in capsys.readouterr().out.splitlines()] == [
+        ["fine", "one", "there"],
+        ["fine", "one", "there"],
+        ["failed", "other", "not", "there"],
+        ["→", "put", "it", "there"],
+    ]
+    monkeypatch.setattr(examine, "CHECKS", (lambda: FINE,))
+    assert main(["doctor"]) == 0
+
+
+def test_a_package_that_is_missing_or_too_old_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    has = packages.version_of
+    others = {"daqp": None, "numpy": "1.20.0"}
+    monkeypatch.setattr(packages, "version_of", lambda name: others.get(name, "") if name in others else has(name))
+    found = packages.packages()
+    assert found.verdict is Verdict.FAILED
+    assert found.found == "daqp is missing, numpy is 1.20.0, not >=2.0"
+
+
+def test_what_differs_from_the_lock_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    has = packages.version_of
+    monkeypatch.setattr(packages, "version_of", lambda name: "0.0.1" if name == "rich" else has(name))
+    found = packages.lock()
+    assert found is not None
+    assert found.verdict is Verdict.NOTE
+    assert "rich is 0.0.1, not ==" in found.found
+
+
+def test_without_an_extra_its_command_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    has = packages.version_of
+    monkeypatch.setattr(packages, "version_of", lambda name: None if name == "optuna" else has(name))
+    (tune,) = [finding for finding in packages.extras() if finding.checked == "extra tune"]
+    assert tune.verdict is Verdict.NOTE
+    assert tune.advice == "if you need it: pip install 'colibri-sitl[tune]'"
+
+
+def test_the_port_of_the_plant_must_be_free_and_others_may_be_waited_at(
+    monkeypatch: pytest.MonkeyPatch, taken: int
+) -> None:
+    monkeypatch.setattr(network, "PLANT_PORT", taken)
+    monkeypatch.setattr(network, "GROUND_PORT", taken)
+    ground, _, plant = network.ports()
+    assert ground.verdict is Verdict.FINE
+    assert f"(process {os.getpid()}) waits there" in ground.found
+    assert plant.verdict is Verdict.FAILED
+    assert plant.found.startswith("taken by ")
+    assert PLANT_PORT == 14560
+
+
+def test_the_way_out_of_a_container_is_the_default_gateway(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert network.gateway(ROUTES) == "172.19.0.1"
+    assert network.gateway("\n".join(ROUTES.splitlines()[:2])) is None
+    (tmp_path / "routes").write_text(ROUTES, encoding="ascii")
+    monkeypatch.setattr(network, "_ROUTES", tmp_path / "routes")
+    monkeypatch.setattr(network, "_CONTAINERS", (tmp_path,))
+    found = network.beyond()
+    assert found is not None
+    assert "--gcs udpout:172.19.0.1:14550" in found.advice
+    monkeypatch.setattr(network, "_CONTAINERS", (tmp_path / "none",))
+    monkeypatch.setattr(network, "_in_wsl", lambda: False)
+    assert network.beyond() is None
+
+
+def test_a_folder_for_machine_code_that_is_none_is_a_note(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(MachineCode, "cache_path", None)
+    found = flying.machine_code()
+    assert (found.verdict, found.advice) == (Verdict.NOTE, "name a folder: NUMBA_CACHE_DIR=FOLDER")
+
+
+@pytest.mark.parametrize(("kind", "is_one"), [(mav.MAV_TYPE_GCS, True), (mav.MAV_TYPE_QUADROTOR, False)])
+def test_a_ground_station_is_known_by_its_heartbeat(kind: int, *, is_one: bool) -> None:
+    beat = Codec(255, 190).encode("HEARTBEAT", kind, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE, 3)
+    link = open_ground_link("udpin:127.0.0.1:0")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+        station.sendto(beat, (network.HOST, int(link.url.rpartition(":")[2])))
+        answers = called(link, within_s=10.0 if is_one else 0.05)
+    link.close()
+    assert (answers is not None) == is_one
+    if answers:
+        assert answers.startswith("system 255 at 127.0.0.1:")
+
+
+def test_a_ground_station_that_is_not_there_is_said(taken: int, capsys: pytest.CaptureFixture[str]) -> None:
+    link = open_ground_link(f"udpout:127.0.0.1:{taken}")
+    found = ground_station(link, 0.05)
+    link.close()
+    assert found.verdict is Verdict.FAILED
+    assert found.found == f"no heartbeat over udpout:127.0.0.1:{taken} within 0.05 s"
+    assert exit_code(["doctor", "--gcs", "nonsense"]) == 2
+    assert capsys.readouterr().err.startswith("colibri: error: nonsense")
