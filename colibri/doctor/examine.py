@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from typing import TypeAlias
 
 from colibri.common.process.lifecycle import EXIT_FAILED
@@ -36,8 +37,9 @@ def examine_as_told(args: argparse.Namespace) -> int:
         LinkError: The link to a ground station cannot be opened.
     """
     link = None if args.gcs is None else open_ground_link(args.gcs)
+    asked: list[Check] = [] if link is None else [partial(ground_station, link, args.within)]
     failed = 0
-    for finding in examine([*CHECKS, lambda: link and ground_station(link, args.within)]):
+    for finding in examine([*CHECKS, *asked]):
         failed += finding.verdict is Verdict.FAILED
         show(finding)
     if link is not None:
