@@ -44,7 +44,13 @@ def command_line() -> ArgumentParser:
     )
     add("--solver", metavar="NAME", help="QP solver of qpsolvers (default: the profile's)")
     add_delay(add)
-    add("--gcs", action="append", default=[], metavar="URL", help="a ground station: udpout:, udpin:, tcp: or tcpin:")
+    add(
+        "--gcs",
+        action="append",
+        default=[],
+        metavar="URL",
+        help="a ground station: udpout:, udpin:, tcp:, tcpin: or serial:",
+    )
     add("--stepped", metavar="URL", help="a program that speaks for all ground stations, frame by frame (for tests)")
     add("--home", type=home, default=DEFAULT_HOME, metavar="LAT,LON,ALT,YAW", help="the origin (default %(default)s)")
     add("--identity", default="px4", choices=("px4", "generic"), help="towards ground stations (default %(default)s)")

@@ -80,6 +80,8 @@ class Client:
                 if self._ground.shut_down:
                     break
             self._report_changes()
+            for note in self._link.take_notes():
+                self._status.say("said", note)
         self._keep(AutopilotLog.flush)
         self._status.say("ended", "ended", repeated=self._end.repeated, dropped=dict(self._end.dropped))
 

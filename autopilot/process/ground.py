@@ -241,7 +241,7 @@ class Ground:
             self._state.save_signing()
 
     def _report_texts(self) -> None:
-        for text in self.copter.stations.take_texts():
+        for text in (*self.copter.stations.take_texts(), *self._links.take_notes()):
             self._status.say("said", text)
 
     def _facts(self, now_s: float) -> dict[str, Any]:
@@ -260,5 +260,5 @@ class Ground:
 
 def _invitation(url: str) -> str:
     scheme, _, rest = url.partition(":")
-    calls = scheme in ("udpout", "tcp")
+    calls = scheme in ("udpout", "tcp", "serial")
     return f"calls ground stations at {rest} ({scheme})" if calls else f"waits for ground stations on {rest} ({scheme})"

@@ -10,7 +10,7 @@ from colibri.autopilot.core.step import Received
 from colibri.autopilot.ground.stations import Stations
 from colibri.common.types import Address
 from colibri.mavlink.links.link import GroundLink, LinkError
-from colibri.mavlink.links.open import beyond_loopback, check_reach, open_ground_link
+from colibri.mavlink.links.open import beyond_loopback, check_reach, is_serial, open_ground_link
 from colibri.mavlink.node.channel import Channel
 from colibri.mavlink.node.hub import Outgoing
 from colibri.mavlink.node.router import Source
@@ -82,7 +82,8 @@ class GroundLinks:
         self._links = tuple(links)
         self._waiting: list[deque[tuple[bytes, Address]]] = [deque() for _ in links]
         self._allowance = Allowance(clock, processor_clock)
-        self._loopback = [not beyond_loopback(link.url) for link in links]
+        self._loopback = [not (is_serial(link.url) or beyond_loopback(link.url)) for link in links]
+        self._serial = [is_serial(link.url) for link in links]
         self._opened: list[tuple[int, Address]] = []
         self._counts: dict[int, tuple[int, int]] = {}
         self._clock = clock
@@ -173,10 +174,16 @@ class GroundLinks:
             if now_s < since_s + _GONE_AFTER_S:
                 yield source
 
+    def take_notes(self) -> list[str]:
+        """Return what a user must know of the links since last asked."""
+        return [note for link in self._links for note in link.take_notes()]
+
     def close(self) -> None:
         """Close every link."""
         for link in self._links:
             link.close()
 
     def _is_loopback(self, number: int, address: Address) -> bool:
+        if self._serial[number]:
+            return False  # nobody knows what is at its other end
         return self._loopback[number] or ip_address(address[0]).is_loopback

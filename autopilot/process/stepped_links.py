@@ -91,6 +91,10 @@ class SteppedLinks:
         del stations, interval_s
         return []
 
+    def take_notes(self) -> list[str]:
+        """Return nothing: there is no device that could go."""
+        return []
+
     def close(self) -> None:
         """Let go of the conductor."""
         self._conductor.close()

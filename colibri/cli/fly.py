@@ -18,7 +18,8 @@ def add_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="URL",
-        help="a ground station that may watch and command: udpout:, udpin:, tcp: or tcpin:HOST:PORT; may be repeated",
+        help="a ground station that may watch and command: udpout:, udpin:, tcp: or tcpin:HOST:PORT, or "
+        "serial:DEVICE:BAUD; may be repeated",
     )
     add_signing(add)
     add_out(add, "out", "logs and figures")

@@ -38,7 +38,8 @@ def add_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="URL",
-        help="a ground station to call or to wait for: udpout:, udpin:, tcp: or tcpin:HOST:PORT; may be repeated "
+        help="a ground station to call or to wait for: udpout:, udpin:, tcp: or tcpin:HOST:PORT, or "
+        "serial:DEVICE:BAUD; may be repeated "
         "(default: udpout:127.0.0.1:14550, and udpout:127.0.0.1:14540 + N)",
     )
     add_signing(add)

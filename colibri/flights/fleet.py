@@ -107,13 +107,17 @@ def _check(args: argparse.Namespace) -> None:
         fail(f"vehicle {name} has no ground to stand on: fly a vehicle with a table ground, or give --start z=...")
     if not 1 <= args.count <= MAX_FLEET - args.instance:
         fail(f"--instance and --count: at least one vehicle, instances from 0 to {MAX_FLEET - 1}")
-    if args.count > 1 and any(url.startswith(("udpin:", "tcpin:")) and not url.endswith(":0") for url in args.gcs):
-        fail("--gcs: several vehicles cannot wait on one port; let them call, by udpout: or tcp:, or fly one")
+    if args.count > 1 and any(_taken_by_one(url) for url in args.gcs):
+        fail("--gcs: several vehicles cannot have one port; let them call, by udpout: or tcp:, or fly one")
     try:
         for instance in range(args.instance, args.instance + args.count):
             open_link(_plant_url(args, instance)).close()
     except LinkError as error:
         fail(str(error))
+
+
+def _taken_by_one(url: str) -> bool:
+    return url.startswith("serial:") or (url.startswith(("udpin:", "tcpin:")) and not url.endswith(":0"))
 
 
 def _plant_url(args: argparse.Namespace, instance: int) -> str:

@@ -49,6 +49,9 @@ class GroundLink(Protocol):
     def take_closed(self) -> list[Address]:
         """Return whose connections have ended since last asked."""
 
+    def take_notes(self) -> list[str]:
+        """Return what a user must know of the link since last asked, a line each."""
+
     def close(self) -> None:
         """Close every socket."""
 
@@ -62,6 +65,7 @@ class Endpoint:
         self.target = target
         self._opened: list[Address] = []
         self._closed: list[Address] = []
+        self._notes: list[str] = []
 
     def take_opened(self) -> list[Address]:
         """Return the addresses connected since the last call: some clients send nothing before they receive."""
@@ -72,6 +76,11 @@ class Endpoint:
         """Return the addresses whose connections have ended since the last call; none over UDP."""
         closed, self._closed = self._closed, []
         return closed
+
+    def take_notes(self) -> list[str]:
+        """Return what a user must know since the last call: that a device has gone, that it is back."""
+        notes, self._notes = self._notes, []
+        return notes
 
 
 class BlockingReceiver:
@@ -92,6 +101,10 @@ class BlockingReceiver:
         if not self._waiting:
             self._waiting.extend(receive_soon(self._link, timeout_s))
         return self._waiting.popleft() if self._waiting else None
+
+    def take_notes(self) -> list[str]:
+        """Return what a user must know of the link since last asked."""
+        return self._link.take_notes()
 
     def close(self) -> None:
         """Close the link."""

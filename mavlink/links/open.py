@@ -1,7 +1,8 @@
 """Endpoints by URL.
 
 `udpin:HOST:PORT` waits for whoever sends, `udpout:HOST:PORT` speaks with that address only; `tcpin:HOST:PORT` waits for
-clients, `tcp:HOST:PORT` calls a server. The link between plant and autopilot is UDP.
+clients, `tcp:HOST:PORT` calls a server; `serial:DEVICE:BAUD` is a serial port. The link between plant and autopilot is
+UDP.
 """
 
 import os
@@ -11,11 +12,13 @@ from ipaddress import ip_address
 
 from colibri.common.types import Address
 from colibri.mavlink.links.link import GroundLink, LinkError
+from colibri.mavlink.links.serial_port import SerialLink
 from colibri.mavlink.links.tcp import TcpClient, TcpServer
 from colibri.mavlink.links.udp import UdpLink
 
 _UDP = ("udpin", "udpout")
 _TCP = ("tcpin", "tcp")
+_SERIAL, _SERIAL_FORM = "serial:", "serial:DEVICE:BAUD"
 
 
 def open_link(url: str) -> UdpLink:
@@ -28,11 +31,13 @@ def open_link(url: str) -> UdpLink:
 
 
 def open_ground_link(url: str) -> GroundLink:
-    """Open the endpoint that `url` names, of UDP or TCP; port 0 takes any free port where it waits.
+    """Open the endpoint that `url` names, of UDP or TCP, or a serial port; port 0 takes any free port where it waits.
 
     Raises:
-        LinkError: The URL is malformed, the host unknown, or the port taken.
+        LinkError: The URL is malformed, the host unknown, the port taken, the device not there.
     """
+    if is_serial(url):
+        return SerialLink(url, *_parse_serial(url))
     scheme, host, port = _parse(url, (*_UDP, *_TCP))
     if scheme in _UDP:
         return _open_udp(url, scheme, host, port)
@@ -46,12 +51,22 @@ def open_ground_link(url: str) -> GroundLink:
     return TcpServer(sock, f"tcpin:{host}:{sock.getsockname()[1]}")
 
 
+def is_serial(url: str) -> bool:
+    """Whether `url` names a serial port."""
+    return url.startswith(_SERIAL)
+
+
 def beyond_loopback(url: str) -> bool:
-    """Whether the endpoint that `url` names can be reached from, or reaches, another computer.
+    """Whether the endpoint that `url` names can be reached from, or reaches, another computer by a network.
+
+    A serial port cannot: whoever is at its end has a cable here, or a radio that belongs to it.
 
     Raises:
         LinkError: The URL is malformed, or the host unknown.
     """
+    if is_serial(url):
+        _parse_serial(url)
+        return False
     _, host, _ = _parse(url, (*_UDP, *_TCP))
     return not ip_address(_resolved(url, host)).is_loopback
 
@@ -102,7 +117,15 @@ def _parse(url: str, schemes: tuple[str, ...]) -> tuple[str, str, int]:
     scheme, _, rest = url.partition(":")
     host, _, port = rest.rpartition(":")
     if scheme not in schemes or not host or not port.isdecimal() or int(port) > 65535:
-        raise LinkError(f"{url}: expected " + " or ".join(f"{scheme}:HOST:PORT" for scheme in schemes))
+        forms = [f"{scheme}:HOST:PORT" for scheme in schemes]
+        raise LinkError(f"{url}: expected " + " or ".join(forms if schemes == _UDP else [*forms, _SERIAL_FORM]))
     if scheme in ("udpout", "tcp") and int(port) == 0:
         raise LinkError(f"{url}: port 0 is no port to send to")
     return scheme, host, int(port)
+
+
+def _parse_serial(url: str) -> tuple[str, int]:
+    device, _, baud = url.removeprefix(_SERIAL).rpartition(":")
+    if not device or not baud.isdecimal() or int(baud) == 0:
+        raise LinkError(f"{url}: expected {_SERIAL_FORM}, for instance serial:/dev/ttyACM0:921600")
+    return device, int(baud)

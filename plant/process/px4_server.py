@@ -166,6 +166,8 @@ class Simulator:
         for datagram, sender in receive_soon(self._link, timeout_s):
             self._end.receive(datagram, sender)
         self._link.take_opened()
+        for note in self._link.take_notes():
+            self._status.say("said", note)
         for address in self._link.take_closed():
             self._end.close(address)
         self._send()

@@ -32,6 +32,8 @@ class FakeLink:
         self.url = f"tcpin:127.0.0.1:{number + 1}"
         self.target = None
         self.waiting = waiting
+        self.here = HERE
+        self.notes: list[str] = []
         self.opened: list[Address] = []
         self.closed: list[Address] = []
 
@@ -41,7 +43,7 @@ class FakeLink:
     def receive_now(self) -> list[tuple[bytes, Address]]:
         taken = min(self.waiting, 64)
         self.waiting -= taken
-        return [(HEARTBEAT, HERE)] * taken
+        return [(HEARTBEAT, self.here)] * taken
 
     def wait(self, timeout_s: float) -> None:
         pass
@@ -53,6 +55,10 @@ class FakeLink:
     def take_closed(self) -> list[Address]:
         closed, self.closed = self.closed, []
         return closed
+
+    def take_notes(self) -> list[str]:
+        notes, self.notes = self.notes, []
+        return notes
 
     def close(self) -> None:
         pass
@@ -156,3 +162,26 @@ def test_who_is_silent_is_heard_no_more(stations: Stations) -> None:
     assert there() == []
     link.waiting = 1
     assert there() == ["255/190"]
+
+
+@pytest.mark.parametrize(("url", "address", "loopback"), [
+    ("tcpin:127.0.0.1:5760", HERE, True),
+    ("udpin:0.0.0.0:14550", HERE, True),
+    ("udpin:0.0.0.0:14550", ("192.0.2.1", 5), False),
+    ("serial:/dev/ttyACM0:57600", ("/dev/ttyACM0", 57600), False),
+])  # fmt: skip
+def test_what_comes_from_this_computer_by_a_network_counts_as_its_own(
+    stations: Stations, url: str, address: Address, loopback: bool
+) -> None:
+    clock, link = Clock(), FakeLink(0, 1)
+    link.url, link.here = url, address
+    (received,) = GroundLinks([link], clock, clock).receive(stations)
+    assert received.loopback is loopback
+
+
+def test_notes_of_links_are_handed_on() -> None:
+    clock, link = Clock(), FakeLink(0, 0)
+    links = GroundLinks([link, FakeLink(1, 0)], clock, clock)
+    link.notes = ["the device is gone"]
+    assert links.take_notes() == ["the device is gone"]
+    assert links.take_notes() == []

@@ -133,7 +133,7 @@ def test_what_reaches_beyond_loopback(url: str, beyond: bool) -> None:
     assert url in unsigned_refusal(url)
 
 
-@pytest.mark.parametrize("url", ["", "tcp:127.0.0.1:0", "tcp:127.0.0.1", "serial:/dev/ttyS0:57600", "tcpin:a b:1"])
+@pytest.mark.parametrize("url", ["", "tcp:127.0.0.1:0", "tcp:127.0.0.1", "tcpin:a b:1"])
 def test_a_malformed_url_of_a_ground_station_is_refused(url: str) -> None:
     for function in (open_ground_link, beyond_loopback):
         with pytest.raises(LinkError, match=r"port 0|expected udpin:HOST:PORT or .* or tcp:HOST:PORT|unknown host"):
