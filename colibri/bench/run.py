@@ -19,6 +19,7 @@ from colibri.autopilot.control.qp import installed_solvers
 from colibri.bench.commands import COMMANDS, colibri_of, command_figures
 from colibri.bench.sensing import FLIGHTS_A_RUN, sensing_figures
 from colibri.bench.serving import CHANNELS, serving_figures
+from colibri.bench.simulators import AIR, VEHICLES, simulator_figures
 from colibri.bench.speed import CONTROL_S, LINKS, Peer, Report, rate_figures
 from colibri.bench.stages import BLOCKS, STAGES, stage_figures
 from colibri.common.process.lifecycle import fail
@@ -32,7 +33,7 @@ _QUANTILES = {"p50": "p50", "p99": "p99"}
 
 def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
     """Measure what the command line says, flights beside `peer`; print tables, write JSON; return the exit code."""
-    wanted = args.only or ["stages", "flights", "sensors", "ground", "commands"]
+    wanted = args.only or ["stages", "flights", "sensors", "simulators", "ground", "commands"]
     if not MIN_DURATION_S <= args.duration <= MAX_DURATION_S:
         fail(f"--duration: {MIN_DURATION_S:g} to {MAX_DURATION_S:g} s, not {args.duration:g}")
     if args.out:
@@ -49,6 +50,7 @@ def bench(args: argparse.Namespace, peer: Peer | None = None) -> int:
             "stages": lambda: stage_figures(*flown, report),
             "flights": lambda: rate_figures(*flown, args.runs, report, peer),
             "sensors": lambda: sensing_figures(*flown, args.runs, report),
+            "simulators": lambda: simulator_figures(args.duration, report),
             "ground": lambda: serving_figures(*flown, args.runs, report),
             "commands": lambda: command_figures(args.duration, args.runs, report, args.against),
         }
@@ -71,8 +73,9 @@ def parts(wanted: list[str], runs: int, *, beside: bool, against: bool = False) 
     ground = len(CHANNELS) + 2 * runs
     sensors = 1 + runs * FLIGHTS_A_RUN
     commands = runs * COMMANDS * (1 + against)
-    parts = {"stages": stages, "flights": flights, "sensors": sensors, "ground": ground, "commands": commands}
-    return sum(parts[section] for section in set(wanted))
+    simulators = len(VEHICLES) * len(AIR)
+    parts = {"stages": stages, "flights": flights, "sensors": sensors, "simulators": simulators, "ground": ground}
+    return sum((parts | {"commands": commands})[section] for section in set(wanted))
 
 
 @contextmanager
@@ -106,6 +109,9 @@ def _print(figures: Mapping[str, Any]) -> None:
     if "sensors" in figures:
         for table in _sensor_tables(figures["sensors"], settings["runs"]):
             console.print(table)
+    if "simulators" in figures:
+        title = "the plant as a simulator, from an autopilot's command to the next frame, µs"
+        console.print(_columns(title, figures["simulators"]["exchange_us"], _QUANTILES))
     if "ground" in figures:
         for table in _ground_tables(figures["ground"]):
             console.print(table)

@@ -4,6 +4,7 @@ The projection and the radius are those that PX4 and the ground stations that fl
 waypoint on the same spot. Altitude is not projected: z is the height above the origin's.
 """
 
+from functools import lru_cache
 from math import degrees, hypot, isfinite, radians
 from typing import NamedTuple
 
@@ -55,10 +56,18 @@ def geodetic_of(position_enu_m: Vector, origin: Geodetic) -> Geodetic:
     distance = hypot(east, north)
     if distance == 0.0:
         return origin._replace(altitude_m=origin.altitude_m + up)
-    angle, first = distance / EARTH_RADIUS_M, radians(origin.latitude_deg)
-    latitude = asin(cos(angle) * sin(first) + north * sin(angle) * cos(first) / distance)
+    angle = distance / EARTH_RADIUS_M
+    sine, cosine = sin(angle), cos(angle)
+    first_sine, first_cosine = _sine_and_cosine(origin.latitude_deg)
+    latitude = asin(cosine * first_sine + north * sine * first_cosine / distance)
     longitude = radians(origin.longitude_deg) + atan2(
-        east * sin(angle), distance * cos(first) * cos(angle) - north * sin(first) * sin(angle)
+        east * sine, distance * first_cosine * cosine - north * first_sine * sine
     )
     wrapped = (degrees(longitude) + 180.0) % 360.0 - 180.0
     return Geodetic(degrees(latitude), wrapped, origin.altitude_m + up)
+
+
+@lru_cache(maxsize=64)
+def _sine_and_cosine(angle_deg: float) -> tuple[float, float]:
+    angle = radians(angle_deg)
+    return sin(angle), cos(angle)

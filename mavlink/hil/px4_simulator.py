@@ -21,7 +21,8 @@ from colibri.mavlink.hil.sensors import SensorFrame, encode_sensors
 from colibri.mavlink.hil.state import LOCKSTEP_FLAG, ROTORS, StateFrame
 from colibri.mavlink.wire import dialect
 from colibri.mavlink.wire.dialect import Codec, Message
-from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
+from colibri.mavlink.wire.fixed_frames import FixedFrame
+from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu
 
 RESEND_AFTER_S = 1.0
 """Wall-clock silence after which a frame is sent again: PX4 may have been restarted, or a datagram lost."""
@@ -31,6 +32,12 @@ _BEGINNING = ("HEARTBEAT", "COMMAND_LONG")
 _STOPPED: FourRotors = (0.0, 0.0, 0.0, 0.0)
 _G_M_S2 = 9.80665
 _INT16_MAX, _UINT16_MAX = 32767, 65535
+_CONTROLS = FixedFrame("HIL_ACTUATOR_CONTROLS", f"time_usec flags controls[{ROTORS}] mode")
+_TRUTH = FixedFrame(
+    "HIL_STATE_QUATERNION",
+    "time_usec attitude_quaternion rollspeed pitchspeed yawspeed lat lon alt vx vy vz "
+    "ind_airspeed true_airspeed xacc yacc zacc",
+)
 
 
 class Motors(NamedTuple):
@@ -72,6 +79,7 @@ class SimulatorEnd:
         self.resent = 0
         self.dropped: Counter[str] = self._codec.dropped
         self.received: list[bytes] = []
+        self._source = b""
         self._answer_us: int | None = None
         self._truth_every_us: int | None = None
         self._truth_at_us = 0
@@ -96,14 +104,22 @@ class SimulatorEnd:
 
     def receive(self, datagram: bytes, sender: Address) -> None:
         """Take in what one sender has sent."""
+        if len(datagram) == _CONTROLS.size and sender == self.peer:
+            numbers = _CONTROLS.read(datagram, 0, self._source)
+            if numbers is not None:
+                time_us, flags, a, b, c, d, mode = numbers
+                self._obey(time_us, flags, (a, b, c, d), mode)
+                self.received.append(datagram)
+                return
         for message in self._codec.decode(datagram):
             if message.name in _BEGINNING and self.peer is None:
-                self._begin(sender)
+                self._begin(sender, message)
             if sender != self.peer:
                 self.dropped["second autopilot" if self.peer else "not begun"] += 1
                 continue
             if message.name == "HIL_ACTUATOR_CONTROLS":
-                self._obey(message)
+                fields = message.fields
+                self._obey(fields.time_usec, fields.flags, tuple(fields.controls[:ROTORS]), fields.mode)
             elif message.name == "COMMAND_LONG":
                 self._receive_request(message)
             elif message.name != "HEARTBEAT":
@@ -138,27 +154,27 @@ class SimulatorEnd:
         if self.peer is not None:
             self._outbox.append((self._frames, self.peer))
 
-    def _begin(self, sender: Address) -> None:
-        self.peer = sender
+    def _begin(self, sender: Address, message: Message) -> None:
+        self.peer, self._source = sender, bytes(message.source)
         self.calls += 1
         self.lockstep, self.answered = False, True
         self.motors = Motors(_STOPPED, armed=False)
         self._answer_us = self._truth_every_us = None
 
-    def _obey(self, message: Message) -> None:
-        fields = message.fields
-        if fields.time_usec == self._answer_us:
+    def _obey(self, time_us: int, flags: int, controls: FourRotors, mode: int) -> None:
+        if time_us == self._answer_us:
             self.dropped["repeated"] += 1
             return
-        self._answer_us = fields.time_usec
-        self.lockstep = bool(fields.flags & LOCKSTEP_FLAG)
+        self._answer_us = time_us
+        self.lockstep = bool(flags & LOCKSTEP_FLAG)
         self.answered = True
-        controls = fields.controls[:ROTORS]
-        if all(map(isfinite, controls)):
+        a, b, c, d = controls
+        if not (0.0 <= a <= 1.0 and 0.0 <= b <= 1.0 and 0.0 <= c <= 1.0 and 0.0 <= d <= 1.0):
+            if not isfinite(a + b + c + d):
+                self.dropped["invalid"] += 1
+                return
             a, b, c, d = (min(max(control, 0.0), 1.0) for control in controls)
-            self.motors = Motors((a, b, c, d), bool(fields.mode & dialect.MODE_ARMED))
-        else:
-            self.dropped["invalid"] += 1
+        self.motors = Motors((a, b, c, d), bool(mode & dialect.MODE_ARMED))
 
     def _receive_request(self, message: Message) -> None:
         fields = message.fields
@@ -177,18 +193,26 @@ class SimulatorEnd:
         assert self._truth_every_us is not None, "it is sent on request"
         self._truth_at_us = state.time_us + self._truth_every_us
         airspeed = min(round(truth.airspeed_m_s * 1e2), _UINT16_MAX)
-        return self._codec.encode(
-            "HIL_STATE_QUATERNION",
-            state.time_us,
-            ned_frd_from_enu_flu(state.attitude),
-            *frd_from_flu(state.rate_flu_rad_s),
-            round(place.latitude_deg * 1e7),
-            round(place.longitude_deg * 1e7),
-            round(place.altitude_m * 1e3),
-            *(_signed(speed * 1e2) for speed in ned_from_enu(state.velocity_enu_m_s)),
-            airspeed,
-            airspeed,
-            *(_signed(part / _G_M_S2 * 1e3) for part in ned_from_enu(truth.acceleration_enu_m_s2)),
+        east, north, up = state.velocity_enu_m_s
+        ahead_east, ahead_north, ahead_up = truth.acceleration_enu_m_s2
+        return _TRUTH.encode(
+            self._codec,
+            (
+                state.time_us,
+                *ned_frd_from_enu_flu(state.attitude),
+                *frd_from_flu(state.rate_flu_rad_s),
+                round(place.latitude_deg * 1e7),
+                round(place.longitude_deg * 1e7),
+                round(place.altitude_m * 1e3),
+                _signed(north * 1e2),
+                _signed(east * 1e2),
+                _signed(-up * 1e2),
+                airspeed,
+                airspeed,
+                _signed(ahead_north / _G_M_S2 * 1e3),
+                _signed(ahead_east / _G_M_S2 * 1e3),
+                _signed(-ahead_up / _G_M_S2 * 1e3),
+            ),
         )
 
 

@@ -72,6 +72,8 @@ class Connection:
                 self.close()
                 break
             frames += self._framer.take(chunk)
+            if len(chunk) < _CHUNK_BYTES:
+                break
         return frames
 
     def close(self) -> None:

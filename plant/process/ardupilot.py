@@ -92,12 +92,16 @@ class ArduPilotEnd:
 
     def _advance(self, rate_hz: int, pulses_us: tuple[int, ...]) -> None:
         duration_us, self._carried = divmod(_SECOND_US + self._carried, rate_hz)
-        a, b, c, d = (min(max((pulse - _MIN_PULSE_US) / _PULSE_RANGE_US, 0.0), 1.0) for pulse in pulses_us)
+        a, b, c, d = map(_control, pulses_us)
         turning = any((a, b, c, d))  # disarmed, ArduPilot sends the least pulse or none
         speeds = self._rotors.speeds_of(self._motors.to_vehicle((a, b, c, d)))
         command = ActuatorCommand(self.world.time_us, speeds, turning)
         self.world = self._physics.step(self.world, command, duration_us)
         self.steps += 1
+
+
+def _control(pulse_us: int) -> float:
+    return min(max((pulse_us - _MIN_PULSE_US) / _PULSE_RANGE_US, 0.0), 1.0)
 
 
 def _encode(world: World, physics: Physics) -> bytes:

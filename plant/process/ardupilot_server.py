@@ -1,6 +1,7 @@
 """The plant as a server of ArduPilot: it answers on a link, and ArduPilot's clock is the only one."""
 
 import argparse
+from math import inf
 from time import perf_counter
 from typing import Any
 
@@ -41,6 +42,10 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     return EXIT_INTERRUPTED if stop else 0
 
 
+REPEATED_AFTER_S = 0.5
+"""Time since the last answer after which a request may have come twice: ArduPilot asks again after about a second."""
+
+
 class _Flight:
     """One ArduPilot's flight.
 
@@ -71,6 +76,7 @@ class ArduPilotServer:
         self._end, self._link, self._status, self._stop, self._logs = end, link, status, stop, logs
         self._silence = Silence(status, SILENT_AFTER_S, "ArduPilot asks again", perf_counter())
         self._flight = _Flight(perf_counter(), status)
+        self._answered_s = -inf
 
     def serve(self, *, duration_s: float) -> None:
         """Answer until a flight is `duration_s` long, or a signal ends it.
@@ -94,12 +100,14 @@ class ArduPilotServer:
         A request that has come again before it was answered, for instance while the plant was loading, is answered
         once: ArduPilot would take the second reply for that to its next request, and so fly a step late for good.
         """
-        for datagram, sender in dict.fromkeys([received, *self._link.receive_now()]):
+        late = now_s > self._answered_s + REPEATED_AFTER_S
+        for datagram, sender in dict.fromkeys([received, *self._link.receive_now()]) if late else (received,):
             before, restarts, begins = self._end.world, self._end.restarts, self._end.peer is None
             reply = self._end.receive(datagram, sender, now_s)
             if reply is None:
                 continue
             self._link.send(reply, sender)
+            self._answered_s = now_s
             self._silence.end(now_s)
             if self._end.restarts > restarts:
                 self._report(before.time_us, "gone", "ArduPilot has begun again, the flight before ended")

@@ -84,6 +84,7 @@ class Simulator:
             if self._link.target is not None:
                 self._end.call(self._link.target, perf_counter())
             self._exchange(MAX_WAIT_S)
+            self._log_received()
             if self._end.peer is not None:
                 self._status.say("connected", "PX4 has called")
                 over = self._fly()
@@ -99,22 +100,24 @@ class Simulator:
         suite = SensorSuite(self._sensors, self._physics, self._origin, seed=self._seed, interval_us=self._interval_us)
         world = self._start._replace(time_us=self._interval_us)  # PX4's clock has no use for 0
         pace, progress, frames = Pace(self._speed, began_s), Progress(self._status), 0
+        silence = Silence(self._status, SILENT_AFTER_S, "PX4 answers again", began_s)
         while not self._stop and self._end.peer is not None and self._end.calls == call:
             if world.time_us > self._duration_us:
                 break
             self._wait_until(self._due_s(pace, world))
             self._offer(world, suite)
-            if self._end.lockstep and not self._await_answer(world):
+            progress.report(world.time_us / 1e6, perf_counter() - began_s)
+            if self._end.lockstep and not self._await_answer(world, silence):
                 break
             world = self._physics.step(world, self._command(world), self._interval_us)
             frames += 1
-            progress.report(world.time_us / 1e6, perf_counter() - began_s)
         gone = self._end.peer is None or self._end.calls != call
         figures: dict[str, Any] = {"frames": frames, "resent": self._end.resent, "dropped": dict(self._end.dropped)}
         event, text = ("gone", "PX4 has gone") if gone else ("ended", "ended")
         text = f"{text} {{}} after {frames} frames"
         if gone:
             text += f"; {awaiting('PX4', self._link)}"
+        self._log_received()
         if self._logs:
             self._logs.flush()
         report_end(self._status, world.time_us, began_s, text, event=event, **figures)
@@ -127,10 +130,13 @@ class Simulator:
         return due_s if self._end.lockstep else max(due_s, now_s + self._interval_us * 1e-6)
 
     def _offer(self, world: World, suite: SensorSuite) -> None:
-        self._time_us = world.time_us
+        """Send a frame, and log what there is to log while PX4 computes its answer."""
         truth = self._truth(world) if self._end.wants_truth(world.time_us) else None
         self._end.offer(suite.measure(world), truth, perf_counter())
-        self._send()
+        sent = self._send()
+        self._log_received()
+        self._time_us = world.time_us
+        self._log_sent(sent)
         if self._logs:
             self._logs.write_world(world)
 
@@ -142,19 +148,19 @@ class Simulator:
         acceleration = (east, north, up - self._gravity_m_s2)
         return Truth(state, geodetic_of(state.position_enu_m, self._origin), acceleration, airspeed_m_s)
 
-    def _await_answer(self, world: World) -> bool:
+    def _await_answer(self, world: World, silence: Silence) -> bool:
         """Wait for the answer to a frame; return False if there will be none."""
-        call = self._end.calls
-        silence = Silence(self._status, SILENT_AFTER_S, "PX4 answers again", perf_counter())
-        while not self._end.answered and not self._stop:
+        end, call = self._end, self._end.calls
+        silence.end(perf_counter())
+        while not end.answered and not self._stop:
             self._exchange(MAX_WAIT_S)
-            if self._end.peer is None or self._end.calls != call:
+            if end.peer is None or end.calls != call:
                 return False
-            self._end.poll(perf_counter())
-            silence.lasts(perf_counter(), "no answer", world.time_us, ", waiting for PX4")
-        if self._end.answered:
-            silence.end(perf_counter())
-        return self._end.answered
+            if not end.answered:
+                now_s = perf_counter()
+                end.poll(now_s)
+                silence.lasts(now_s, "no answer", world.time_us, ", waiting for PX4")
+        return end.answered
 
     def _command(self, world: World) -> ActuatorCommand:
         controls, armed = self._end.motors
@@ -162,7 +168,7 @@ class Simulator:
 
     def _exchange(self, timeout_s: float) -> None:
         """Send what is to be sent, and receive what comes within a time."""
-        self._send()
+        self._log_sent(self._send())
         for datagram, sender in receive_soon(self._link, timeout_s):
             self._end.receive(datagram, sender)
         self._link.take_opened()
@@ -170,16 +176,26 @@ class Simulator:
             self._status.say("said", note)
         for address in self._link.take_closed():
             self._end.close(address)
-        self._send()
 
-    def _send(self) -> None:
-        if self._logs and self._end.calls > self._logged_calls:  # another flight: what is logged from here on is its
+    def _send(self) -> list[tuple[bytes, ...]]:
+        """Send what is to be sent; return the frames of each datagram."""
+        outbox = self._end.take_outbox()
+        for frames, address in outbox:
+            self._link.send(b"".join(frames), address)
+        return [frames for frames, _ in outbox]
+
+    def _log_sent(self, sent: list[tuple[bytes, ...]]) -> None:
+        """Log what was sent at the time of the last frame, behind what was received before."""
+        if self._logs and sent:
+            self._log_received()
+            for frames in sent:
+                self._logs.write_frames(self._time_us, list(frames))
+
+    def _log_received(self) -> None:
+        """Log what was received since last asked, at the time of the last frame; another PX4's in files of its own."""
+        if self._logs and self._end.calls > self._logged_calls:
             self._logs.begin_again()
             self._logged_calls, self._time_us = self._end.calls, 0
-        for frames, address in self._end.take_outbox():
-            self._link.send(b"".join(frames), address)
-            if self._logs:
-                self._logs.write_frames(self._time_us, list(frames))
         if self._logs:
             self._logs.write_frames(self._time_us, self._end.received)
         self._end.received.clear()

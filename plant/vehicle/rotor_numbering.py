@@ -36,8 +36,10 @@ class Numbering(NamedTuple):
 
     def to_vehicle(self, motors: FourRotors) -> FourRotors:
         """Return what is given for each motor in the order of the vehicle file."""
-        a, b, c, d = (motors[self.rotors.index(rotor)] for rotor in range(4))
-        return (a, b, c, d)
+        a, b, c, d = self.rotors
+        given = [0.0, 0.0, 0.0, 0.0]
+        given[a], given[b], given[c], given[d] = motors
+        return (given[0], given[1], given[2], given[3])
 
     def to_motors(self, rotors: FourRotors) -> FourRotors:
         """Return what is given for each rotor of the vehicle file in the order of their motors."""

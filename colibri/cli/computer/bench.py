@@ -12,11 +12,11 @@ def add_options(parser: ArgumentParser) -> None:
     add(
         "--only",
         action="append",
-        choices=("stages", "flights", "sensors", "ground", "commands"),
+        choices=("stages", "flights", "sensors", "simulators", "ground", "commands"),
         help="stages: each stage of a control step; flights: times real time at several rates; "
-        "sensors: the estimator, and flights on sensors beside those on the state; ground: serving ground "
-        "stations, and the control step beside it; commands: whole ones, beside their goals; may be repeated "
-        "(default: all)",
+        "sensors: the estimator, and flights on sensors beside those on the state; simulators: the plant answering "
+        "PX4 and ArduPilot; ground: serving ground stations, and the control step beside it; commands: whole ones, "
+        "beside their goals; may be repeated (default: all)",
     )
     add("--runs", type=int, default=3, choices=range(1, 101), metavar="N", help="flights of each kind (default 3)")
     add(

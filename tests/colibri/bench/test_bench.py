@@ -11,7 +11,7 @@ import pytest
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.qp import installed_solvers
-from colibri.bench import commands, run, sensing, serving, speed, stages
+from colibri.bench import commands, run, sensing, serving, simulators, speed, stages
 from colibri.bench.variants import plan_of, toml_lines, with_blocks, with_intervals
 from colibri.cli.main import main
 
@@ -109,6 +109,17 @@ def test_the_estimator_is_timed_and_flights_on_sensors_beside_those_on_the_state
     assert all(0.0 < figure["p50"] <= figure["p99"] for figure in sensors["estimator_us"].values())
     assert {figure["samples"] for figure in sensors["estimator_us"].values()} == {500}
     assert set(sensors["real_time_factor"]) == {"memory, state", "memory, sensors", "udp, state", "udp, sensors"}
+
+
+def test_the_plant_is_timed_as_a_simulator_of_others(tmp_path: Path) -> None:
+    exchanges = figures_of(tmp_path / "simulators.json", "--only", "simulators")["simulators"]["exchange_us"]
+    assert (
+        len(exchanges) == len(simulators.VEHICLES) * len(simulators.AIR) == run.parts(["simulators"], 1, beside=False)
+    )
+    for name, figure in exchanges.items():
+        frames_hz = simulators.FRAMES_HZ[name.partition(",")[0]]
+        assert 0.0 < figure["p50"] <= figure["p99"]
+        assert figure["samples"] == pytest.approx(float(SHORT_S) * frames_hz, abs=110)
 
 
 def test_says_how_much_there_is_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -49,6 +49,23 @@ def carried(end: SimulatorEnd, px4: Px4) -> list[bytes]:
     return [answer for frames, _ in end.take_outbox() for answer in px4.hear(b"".join(frames))]
 
 
+CONTROLS = st.lists(st.floats(width=32), min_size=16, max_size=16)
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), CONTROLS, st.sampled_from([1, 129]), st.integers(0, 1)), max_size=6))
+def test_answers_are_obeyed_alike_alone_and_among_others(answers: list[tuple[int, list[float], int, int]]) -> None:
+    """What comes alone is read quickly, what comes with a HEARTBEAT as all messages are."""
+    alone, among = connected()[0], connected()[0]
+    for answer in answers:
+        codec = Codec(1, 1)
+        datagram = codec.encode("HIL_ACTUATOR_CONTROLS", *answer)
+        alone.receive(datagram, PX4)
+        among.receive(datagram + codec.encode("HEARTBEAT", 0, 12, 0, 0, 0, 3), PX4)
+        assert alone.received[-1] == among.received[-2] == datagram
+        assert (alone.motors, alone.lockstep, alone.answered) == (among.motors, among.lockstep, among.answered)
+    assert alone.dropped == among.dropped
+
+
 def test_it_begins_when_it_is_called_and_waits_for_nobody_before_the_first_answer() -> None:
     for hello in (Px4().hello(), Px4().hello()[::-1]):  # two threads of PX4 say these
         end = SimulatorEnd(system_id=1)
