@@ -20,6 +20,13 @@ Values: TypeAlias = dict[str, int | float]
 PX4_DELAYS: Final = ("SENS_GPS0_DELAY", "SENS_GNSS0_DELAY", "EKF2_GPS_DELAY")
 """The GPS receiver's delay, ms: since March 2026, after that, and before. A PX4 refuses those that it does not have."""
 _EKF2_DELAY_MAX_MS = 200
+_PX4_BEGINS_WITH: Final = (
+    ("_PX", 0.0, 1e-6),
+    ("_PY", 0.0, 1e-6),
+    ("_KM", 0.05, 1e-6),
+    *((name, 110, 1) for name in PX4_DELAYS),
+)
+"""What PX4 has before its airframe changes it, by the ends of names, and a step that is next to nothing."""
 _SPIN_MIN = 0.15
 _MAX_SPIN_MIN = 0.3
 
@@ -124,7 +131,7 @@ def px4_file(vehicle: Vehicle, remark: str) -> str:
         kind = Kind.INT if isinstance(value, int) else Kind.REAL
         if name == PX4_DELAYS[0]:
             lines.append("# The delay of GPS by its three names: a PX4 has one of them, and passes over the others.")
-        lines.append("\t".join(("1", str(AUTOPILOT_COMPONENT), name, _text(value), str(kind.value))))
+        lines.append("\t".join(("1", str(AUTOPILOT_COMPONENT), name, _px4_text(name, value), str(kind.value))))
     return "\n".join(lines) + "\n"
 
 
@@ -174,6 +181,17 @@ def _within(allowed: _Range, vehicle: Vehicle, what: str, value: float) -> float
         limits = f"{allowed.name} is {allowed.lowest:g} to {allowed.highest:g}"
         raise VehicleError(f"{vehicle.name}: {what} is {value:.3g}, and {limits}")
     return value
+
+
+def _px4_text(name: str, value: float) -> str:
+    """Return a value as PX4 must be given it before its airframe is read.
+
+    It passes over one that it has already, and the airframe's then counts: the value beside that is given in its place.
+    """
+    for end, begins_with, step in _PX4_BEGINS_WITH:
+        if name.endswith(end) and value == begins_with:
+            return _text(value + step)
+    return _text(value)
 
 
 def _text(value: float) -> str:

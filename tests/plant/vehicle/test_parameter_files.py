@@ -140,7 +140,17 @@ def test_the_file_for_px4_is_one_of_qgroundcontrol(name: str) -> None:
     defined = [Parameter(name=key, kind=kind, default=0, description=key) for key, kind in kinds.items()]
     found = read(px4_file(vehicle, "by a test"), Parameters(defined))
     assert list(found) == list(wanted)
-    assert list(found.values()) == pytest.approx(list(wanted.values()), rel=1e-6)
+    assert list(found.values()) == pytest.approx(list(wanted.values()), rel=1e-6, abs=1.01e-6)
+
+
+def test_px4_is_given_no_value_that_it_begins_with_and_its_airframe_changes() -> None:
+    """It would pass over that, and fly by its airframe's: seen with PX4, whose '+' had the rotors of an 'x'."""
+    lines = px4_file(load_vehicle("hummingbird").replace("sensors.gps.delay_s", 0.11), "by a test").splitlines()
+    texts = {fields[2]: fields[3] for fields in (line.split("\t") for line in lines if not line.startswith("#"))}
+    assert [texts[f"CA_ROTOR{i}_{axis}"] for i in range(4) for axis in ("PX", "PY")] == [
+        *("1e-06", "0.171", "1e-06", "-0.171", "0.171", "1e-06", "-0.171", "1e-06")
+    ]
+    assert [texts[name] for name in PX4_DELAYS] == ["111"] * 3
 
 
 @pytest.mark.parametrize("name", NAMES)
