@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Literal, NamedTuple, TypeAlias, TypeVar, cast
+from typing import Any, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numba import njit
@@ -36,7 +36,7 @@ def inlined(function: _Function) -> _Function:
 
     There the shapes of a record's arrays are known, and that no two of them overlap: loops over several are vectorised.
     """
-    return cast(_Function, _kernel(function, inline="always"))
+    return cast(_Function, _kernel(function, forceinline=True))
 
 
 def compiled_for(*signatures: str) -> Callable[[_Function], _Function]:
@@ -115,7 +115,7 @@ class _Compiling(Listener):
         pass
 
 
-def _kernel(function: Callable[..., Any], *, inline: Literal["never", "always"] = "never") -> Any:
-    kernel: Any = njit(error_model="numpy", inline=inline)(function)
+def _kernel(function: Callable[..., Any], *, forceinline: bool = False) -> Any:
+    kernel: Any = njit(error_model="numpy", forceinline=forceinline)(function)
     kernel._cache = MachineCode(function)  # noqa: SLF001
     return kernel

@@ -20,6 +20,13 @@ _TAYLOR_NORM = 0.5
 """Beyond it the exponential is that of a half, squared: 0.5^16 / 16! is far below what a double shows."""
 
 
+@compiled
+def put(values: Array, out: Array) -> None:
+    """Write `values`, (n,), into `out`, as `out[:] = values` does: that takes seconds to compile, for its error."""
+    for i in range(out.shape[0]):
+        out[i] = values[i]
+
+
 @compiled_for(f"{_NEW_MATRIX}({_MATRIX}, {_MATRIX})")
 def matmul(A: Array, B: Array) -> Array:
     """Return A B, (n, m), of A (n, k) and B (k, m)."""

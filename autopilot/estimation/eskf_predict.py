@@ -11,6 +11,7 @@ import numpy as np
 
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import cos, exp, sin
+from colibri.common.matrices import put
 from colibri.common.types import Array
 
 Three: TypeAlias = tuple[float, float, float]
@@ -150,7 +151,7 @@ def look_ahead(x: Array, P: Array, samples: Array, first: int, count: int, gravi
         row += 1
         if row == len(samples):
             row = 0
-    now[:10] = ahead[:10]
+    put(ahead, now[:10])
     R = _matrix((x[6], x[7], x[8], x[9]))
     for i in range(3):
         p, v = POSITION + i, VELOCITY + i

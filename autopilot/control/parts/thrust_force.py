@@ -7,7 +7,7 @@ import numpy as np
 
 from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
 from colibri.common.jit import compiled
-from colibri.common.matrices import norm
+from colibri.common.matrices import norm, put
 from colibri.common.types import Array
 
 _DRAG_PASSES = 2
@@ -47,7 +47,7 @@ def overcome_drag(velocities: Array, airframe: Airframe, limits: ForceLimits, fo
     free = np.empty(3)
     for n in range(forces.shape[0]):
         force = forces[n]
-        free[:] = force
+        put(force, free)
         limit_force(force, limits)
         for _ in range(_DRAG_PASSES):
             thrust = norm(force)

@@ -19,7 +19,7 @@ from colibri.autopilot.control.vehicle_model.rotor_lag import Rotors
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.elementary import square
 from colibri.common.jit import Packed, compiled, packed
-from colibri.common.matrices import dot, matvec
+from colibri.common.matrices import dot, matvec, put
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -174,9 +174,10 @@ def look(
             rotation[i, j] = R[i][j]
     if before.shape[0] > 0:
         h = dot(momentum, speeds)
-        estimate[:] = observe(estimate_before, before, measured, mean_wrench, h, mass_kg, observer)
+        put(observe(estimate_before, before, measured, mean_wrench, h, mass_kg, observer), estimate)
     else:
-        estimate[:6], estimate[6:] = measured[:6], 0.0
+        put(measured, estimate[:6])
+        estimate[6:] = 0.0
     if airborne:
         mass_kg = follow_mass(mass_kg, estimate[6:], measured[6:], wrench[0], mass)
     voltage_v, current_a = terminal(open_v, speeds, battery)

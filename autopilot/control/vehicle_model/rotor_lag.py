@@ -13,6 +13,7 @@ import numpy as np
 
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import exp
+from colibri.common.matrices import put
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
 
@@ -83,8 +84,8 @@ def actuate(speeds: Array, squared_commands: Array, max_speed: float, packed: Pa
     """
     lag, allocation = packed[0].lag, packed[0].allocation
     commands, after, wrench, mean = out[0], out[1], out[2], out[3]
-    commands[:] = lead(speeds, squared_commands, lag, max_speed)
-    after[:] = follow(speeds, commands, lag)
+    put(lead(speeds, squared_commands, lag, max_speed), commands)
+    put(follow(speeds, commands, lag), after)
     wrench[:], mean[:] = 0.0, 0.0
     for row in range(allocation.shape[0]):
         for i in range(speeds.shape[0]):

@@ -23,6 +23,7 @@ from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS
 from colibri.common.compiled_rotations import euler_from_quaternion, rotation_matrix
 from colibri.common.jit import compiled, inlined
 from colibri.common.kernels import atan2
+from colibri.common.matrices import put
 from colibri.common.types import Array
 
 Integers: TypeAlias = NDArray[np.int64]
@@ -248,8 +249,8 @@ def _add_terminal(x: Array, squared: Array, X: Array, target: Target, problem: P
                 E[VELOCITY + i, k] += turned * X[VELOCITY + j, k]
         error[ROTATION + i] = away[i]
         error[RATE + i] = x[10 + i] - target.rates[steps - 1, i]
-        E[ROTATION + i] = X[ROTATION + i]
-        E[RATE + i] = X[RATE + i]
+        put(X[ROTATION + i], E[ROTATION + i])
+        put(X[RATE + i], E[RATE + i])
     for rotor in range(ROTORS):
         error[DEVIATIONS + rotor] = squared[rotor] - target.end_squared[rotor]
         for block in range(problem.levels.shape[0]):

@@ -17,7 +17,7 @@ from colibri.autopilot.control.parts.thrust_force import ForceLimits, limit_forc
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import cos, sin
-from colibri.common.matrices import norm
+from colibri.common.matrices import norm, put
 from colibri.common.types import Array
 
 _JUMP_M_S = 0.02
@@ -92,11 +92,11 @@ def follow(
     p, v, a, yaw = before_jump((position, velocity, acceleration, yaw_rad), law[0].interval_s)
     rigid, disturbance, limits, target = now[0].rigid, now[0].disturbance, now[0].force, out[0]
     near = (target.position, target.velocity, target.acceleration)
-    target.yaw_rad[:] = yaw
+    put(yaw, target.yaw_rad)
     approach(rigid[:3], rigid[3:6], (p, v, a), law, near)
     flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
     ask(near[1], near[2], target.yaw_rad, disturbance, limits, law[0].from_wrench, vehicle, flat)
-    target.end_squared[:] = target.squared[-1]
+    put(target.squared[-1], target.end_squared)
     return demanded_force(rigid, near, disturbance, law, limits, vehicle)
 
 
@@ -257,7 +257,8 @@ def approach(
     distance = sqrt(squared)
     if distance <= law.exact_within_m:
         for order in range(3):
-            near[order][:] = references[order]
+            for n in range(references[order].shape[0]):
+                put(references[order][n], near[order][n])
         return
     part, smooth = min(1.0, law.follow_within_m / distance), 1.0 - law.exact_within_m / distance
     is_far, h = distance > law.max_error_m, law.interval_s

@@ -13,6 +13,7 @@ import numpy as np
 
 from colibri.autopilot.control.vehicle_model.airframe import Airframe, drag_force
 from colibri.common.jit import Packed, inlined
+from colibri.common.matrices import put
 from colibri.common.types import Array
 
 ROTORS = 4
@@ -114,8 +115,8 @@ def roll_out(
     """
     model = packed[0]
     lag, h = model.lag, model.interval_s
-    motion[0] = rigid
-    speeds[0] = squared
+    put(rigid, motion[0])
+    put(squared, speeds[0])
     for step in range(commands.shape[0]):
         for i in range(ROTORS):
             away = speeds[step, i] - commands[step, i]

@@ -27,6 +27,7 @@ from colibri.autopilot.control.whole_lpv_mpc.feed_forward import lead
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance, Drive, roll_out
 from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
 from colibri.common.jit import Packed, compiled, inlined
+from colibri.common.matrices import put
 from colibri.common.types import Array
 
 _BINDING = 1e-9
@@ -117,7 +118,7 @@ def begin(
         now: Is filled.
     """
     it = now[0]
-    it.rigid[:] = rigid
+    put(rigid, it.rigid)
     for i in range(ROTORS):
         it.squared[i] = speeds[i] * speeds[i]
     for i in range(3):
@@ -211,7 +212,7 @@ def carry_over(last: Array, commands: Array, starts: Integers, corrections: Arra
             for rotor in range(ROTORS):
                 planned = last[min(step, last.shape[0] - 1), rotor]
                 corrections[block + 1, rotor] += (planned - commands[step, rotor]) / steps
-    corrections[0] = corrections[1]
+    put(corrections[1], corrections[0])
 
 
 @compiled
@@ -312,8 +313,9 @@ def limit(kind: Packed) -> None:
     it = kind[0]
     free, qp = it.qp, it.limited
     moved = free.f.shape[0]
-    qp.H[:moved, :moved] = free.H
-    qp.f[:moved], qp.lower[:moved], qp.upper[:moved] = free.f, free.lower, free.upper
+    for k in range(moved):
+        put(free.H[k], qp.H[k, :moved])
+        qp.f[k], qp.lower[k], qp.upper[k] = free.f[k], free.lower[k], free.upper[k]
     limit_motion(it.work.motion, it.work.responses, it.problem, qp.G, qp.h)
 
 
