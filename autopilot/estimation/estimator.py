@@ -28,7 +28,8 @@ from colibri.autopilot.estimation.sensing.inertial import Inertial, Reading
 from colibri.autopilot.estimation.sensing.plausibility import MAX_GAP_US, ClockResets, GpsWatch
 from colibri.autopilot.estimation.sensing.rejection import Reason, Rejected, Source
 from colibri.common.earth.atmosphere import altitude_m
-from colibri.common.earth.geodesy import Geodetic, enu_of
+from colibri.common.earth.compiled_geodesy import enu_of
+from colibri.common.earth.geodesy import Geodetic
 from colibri.common.earth.magnetic_field import field_enu_gauss
 from colibri.common.serialization import of_bytes, to_bytes
 from colibri.common.types import Array, Vector

@@ -4,7 +4,7 @@ The projection and the radius are those that PX4 and the ground stations that fl
 waypoint on the same spot. Altitude is not projected: z is the height above the origin's.
 """
 
-from functools import lru_cache
+from collections.abc import Callable
 from math import degrees, hypot, isfinite, radians
 from typing import NamedTuple
 
@@ -38,36 +38,45 @@ def is_on_earth(latitude_deg: float, longitude_deg: float) -> bool:
     )
 
 
-def enu_of(place: Geodetic, origin: Geodetic) -> Vector:
-    """Return where `place` is seen from `origin`, m, ENU."""
-    latitude, first = radians(place.latitude_deg), radians(origin.latitude_deg)
-    along = radians(place.longitude_deg - origin.longitude_deg)
+def offset_m(
+    latitude_deg: float, longitude_deg: float, first_latitude_deg: float, first_longitude_deg: float
+) -> tuple[float, float]:
+    """Return how far east and north a place is of a first one, m."""
+    latitude, first = radians(latitude_deg), radians(first_latitude_deg)
+    along = radians(longitude_deg - first_longitude_deg)
     cosine = sin(first) * sin(latitude) + cos(first) * cos(latitude) * cos(along)
     angle = acos(max(-1.0, min(1.0, cosine)))
     scale = EARTH_RADIUS_M * (angle / sin(angle) if sin(angle) > 0.0 else 1.0)
     north = cos(first) * sin(latitude) - sin(first) * cos(latitude) * cos(along)
     east = cos(latitude) * sin(along)
-    return (scale * east, scale * north, place.altitude_m - origin.altitude_m)
+    return scale * east, scale * north
 
 
-def geodetic_of(position_enu_m: Vector, origin: Geodetic) -> Geodetic:
-    """Return the place at `position_enu_m` from `origin`."""
+def place_deg(
+    east_m: float, north_m: float, distance_m: float, first_latitude_deg: float, first_longitude_deg: float
+) -> tuple[float, float]:
+    """Return latitude and longitude, degrees, of what is so far east and north of a first place; not of itself."""
+    angle, first = distance_m / EARTH_RADIUS_M, radians(first_latitude_deg)
+    latitude = asin(cos(angle) * sin(first) + north_m * sin(angle) * cos(first) / distance_m)
+    longitude = radians(first_longitude_deg) + atan2(
+        east_m * sin(angle), distance_m * cos(first) * cos(angle) - north_m * sin(first) * sin(angle)
+    )
+    return degrees(latitude), (degrees(longitude) + 180.0) % 360.0 - 180.0
+
+
+def enu_of(place: Geodetic, origin: Geodetic, *, offset: Callable[..., tuple[float, float]] = offset_m) -> Vector:
+    """Return where `place` is seen from `origin`, m, ENU; `offset` may be another `offset_m`."""
+    east, north = offset(place.latitude_deg, place.longitude_deg, origin.latitude_deg, origin.longitude_deg)
+    return (east, north, place.altitude_m - origin.altitude_m)
+
+
+def geodetic_of(
+    position_enu_m: Vector, origin: Geodetic, *, place: Callable[..., tuple[float, float]] = place_deg
+) -> Geodetic:
+    """Return the place at `position_enu_m` from `origin`; `place` may be another `place_deg`."""
     east, north, up = position_enu_m
     distance = hypot(east, north)
-    if distance == 0.0:
-        return origin._replace(altitude_m=origin.altitude_m + up)
-    angle = distance / EARTH_RADIUS_M
-    sine, cosine = sin(angle), cos(angle)
-    first_sine, first_cosine = _sine_and_cosine(origin.latitude_deg)
-    latitude = asin(cosine * first_sine + north * sine * first_cosine / distance)
-    longitude = radians(origin.longitude_deg) + atan2(
-        east * sine, distance * first_cosine * cosine - north * first_sine * sine
-    )
-    wrapped = (degrees(longitude) + 180.0) % 360.0 - 180.0
-    return Geodetic(degrees(latitude), wrapped, origin.altitude_m + up)
-
-
-@lru_cache(maxsize=64)
-def _sine_and_cosine(angle_deg: float) -> tuple[float, float]:
-    angle = radians(angle_deg)
-    return sin(angle), cos(angle)
+    latitude_deg, longitude_deg, altitude_m = origin
+    if distance != 0.0:
+        latitude_deg, longitude_deg = place(east, north, distance, latitude_deg, longitude_deg)
+    return Geodetic(latitude_deg, longitude_deg, altitude_m + up)

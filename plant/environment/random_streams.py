@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from enum import IntEnum
+from itertools import chain
 
 import numpy as np
 from numpy.random import SeedSequence, default_rng
@@ -19,11 +20,11 @@ class Source(IntEnum):
 
 def streams(seed: int, source: Source, count: int) -> list[Iterator[float]]:
     """Return independent streams of standard normal numbers; the same for the same `seed` (not negative)."""
-    return [_normal(child) for child in SeedSequence(seed, spawn_key=(source,)).spawn(count)]
+    return [chain.from_iterable(_blocks(child)) for child in SeedSequence(seed, spawn_key=(source,)).spawn(count)]
 
 
-def _normal(seed: SeedSequence) -> Iterator[float]:
+def _blocks(seed: SeedSequence) -> Iterator[list[float]]:
     """Yield numbers of 24 bits: NumPy takes the rare ones of the tail from libm, whose last bit differs by computer."""
     generator = default_rng(seed)
     while True:
-        yield from generator.standard_normal(_BLOCK).astype(np.float32).tolist()
+        yield generator.standard_normal(_BLOCK).astype(np.float32).tolist()

@@ -1,7 +1,6 @@
 """How sensors err: processes driven by a stream of standard normal numbers, exact at any interval."""
 
 from collections.abc import Iterator
-from itertools import islice
 from math import sqrt
 
 import numpy as np
@@ -73,7 +72,7 @@ def _errors(bias: Vector, walk: float, noise: float, chance: Iterator[float]) ->
     """Yield, for each sample after `bias`, the bias and white noise, of each axis; many samples are drawn at once."""
     last = np.array(bias)
     while True:
-        drawn = np.array(list(islice(chance, 6 * _DRAWN))).reshape(_DRAWN, 6)
+        drawn = np.fromiter(chance, np.float64, 6 * _DRAWN).reshape(_DRAWN, 6)
         biases = np.add.accumulate(np.concatenate([last[None], walk * drawn[:, :3]]))[1:]
         last = biases[-1]
         yield from np.concatenate([biases, noise * drawn[:, 3:]], axis=1).tolist()

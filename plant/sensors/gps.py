@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import hypot
 
-from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.common.earth.compiled_geodesy import geodetic_of
+from colibri.common.earth.geodesy import Geodetic
 from colibri.common.rotations import earth_from_body
 from colibri.common.types import Vector
 from colibri.mavlink.hil.faults import GPS

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from colibri.common.earth import compiled_geodesy
 from colibri.common.earth.geodesy import DEFAULT_ORIGIN, EARTH_RADIUS_M, Geodetic, enu_of, geodetic_of, is_on_earth
 from tests.strategies import reals
 
@@ -25,6 +26,13 @@ def test_the_distance_is_kept(origin: Geodetic, east: float, north: float) -> No
     x, y, z = enu_of(geodetic_of((east, north, 0.0), origin), origin)
     assert hypot(x, y) == pytest.approx(hypot(east, north), abs=1e-6)
     assert z == pytest.approx(0.0, abs=1e-9)
+
+
+@given(ORIGINS, st.tuples(reals(1e5), reals(1e5), reals(1e4)))
+def test_compiled_they_give_the_same_bits(origin: Geodetic, place: tuple[float, float, float]) -> None:
+    there = geodetic_of(place, origin)
+    assert compiled_geodesy.geodetic_of(place, origin) == there
+    assert compiled_geodesy.enu_of(there, origin) == enu_of(there, origin)
 
 
 @given(ORIGINS)
