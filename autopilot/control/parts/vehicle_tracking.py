@@ -134,11 +134,12 @@ class VehicleTracker:
         """
         _, _, measured, estimate, mass_kg, max_speed, current_a = observed
         actuated = np.empty((4, 4))
-        rotor_lag.actuate(tracked.speeds, squared, max_speed, self._rotors, actuated)
+        top = self.vehicle.rotors.max_speed
+        rotor_lag.actuate(tracked.speeds, squared, max_speed, top, self._rotors, actuated)
         commands, speeds, wrench, mean_wrench = actuated
         charge_ah = charged(tracked.charge_ah, current_a, self._interval_s)
         after = Tracked(speeds, wrench, mean_wrench, measured, estimate, charge_ah, mass_kg)
-        return commands * self.vehicle.rotors.max_speed, after
+        return commands, after
 
 
 @compiled

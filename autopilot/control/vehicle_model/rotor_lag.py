@@ -77,10 +77,10 @@ def lead(speeds: Array, squared_commands: Array, lag: RotorLag, max_speed: float
 
 
 @compiled
-def actuate(speeds: Array, squared_commands: Array, max_speed: float, packed: Packed, out: Array) -> None:
+def actuate(speeds: Array, squared_commands: Array, max_speed: float, top: float, packed: Packed, out: Array) -> None:
     """Write commands as `lead` does, speeds and wrench a sample later, and the mean wrench until then, (4, 4).
 
-    `packed` are the `Rotors`.
+    Commands are in the vehicle's unit, of which `top` is the largest; `packed` are the `Rotors`.
     """
     lag, allocation = packed[0].lag, packed[0].allocation
     commands, after, wrench, mean = out[0], out[1], out[2], out[3]
@@ -91,3 +91,5 @@ def actuate(speeds: Array, squared_commands: Array, max_speed: float, packed: Pa
         for i in range(speeds.shape[0]):
             wrench[row] += allocation[row, i] * after[i] * after[i]
             mean[row] += 0.5 * allocation[row, i] * (speeds[i] * speeds[i] + after[i] * after[i])
+    for i in range(speeds.shape[0]):
+        commands[i] *= top

@@ -81,7 +81,7 @@ def follow(
 
     Args:
         now: The vehicle, `planning.Now`.
-        position: Of the references, as all that follows, ENU, (n, 3).
+        position: Of the references, as all that follows, ENU, (n, 3), or more than are needed.
         velocity: ENU, (n, 3).
         acceleration: ENU, (n, 3).
         yaw_rad: (n,).
@@ -89,8 +89,9 @@ def follow(
         vehicle: The `Model`.
         out: The `Target`; is filled, but for thrusts.
     """
-    p, v, a, yaw = before_jump((position, velocity, acceleration, yaw_rad), law[0].interval_s)
     rigid, disturbance, limits, target = now[0].rigid, now[0].disturbance, now[0].force, out[0]
+    n = target.yaw_rad.shape[0]
+    p, v, a, yaw = before_jump((position[:n], velocity[:n], acceleration[:n], yaw_rad[:n]), law[0].interval_s)
     near = (target.position, target.velocity, target.acceleration)
     put(yaw, target.yaw_rad)
     approach(rigid[:3], rigid[3:6], (p, v, a), law, near)

@@ -35,8 +35,7 @@ from colibri.autopilot.control.whole_lpv_mpc.planning import Now
 from colibri.autopilot.control.whole_lpv_mpc.targets import TargetBuilder, Wanted
 from colibri.common.config import Count, Degrees, Negative, Positive, Table, read_settings
 from colibri.common.elementary import cos, square, tan
-from colibri.common.jit import Packed, opened, packed
-from colibri.common.kernels import asin, atan2
+from colibri.common.jit import opened, packed
 from colibri.common.matrices import dot, matvec, norm
 from colibri.common.rotations import nearest_turn, quaternion_from_euler, rotation_matrix
 from colibri.common.types import Array
@@ -50,7 +49,6 @@ _SHARES, _ALWAYS, _LIMITED_STEPS = 3.0, 0.5, 3
 """At first, no rotor has more than so many shares of the thrust that must point along its axis, or than such a part of
 its share in hover: where little thrust is to be made, moments must not make much of it. A vehicle that stands, and does
 not know it, would be tipped over by the moments that it takes for a disturbance."""
-
 
 _NO_DISTURBANCE = Disturbance(np.zeros(3), np.zeros(3))
 
@@ -114,14 +112,12 @@ class Inputs(NamedTuple):
     Attributes:
         observed: Of the vehicle.
         psi: Yaw, rad, unwrapped.
-        now: For the plan: of the arrays in `record`, which each decision fills again.
-        record: The same, packed.
+        max_n: Largest thrust.
     """
 
     observed: Observed
     psi: float
-    now: Now
-    record: Packed
+    max_n: float
 
 
 class WholeLpvMpc(TrackingLaw[Memory]):
@@ -203,7 +199,7 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         """Decide the rotor speeds to hold until the next control sample."""
         del time_us
         inputs = self._inputs(memory, state)
-        return self._decide(memory, inputs, self._targets.on_clock(inputs.record, references))
+        return self._decide(memory, inputs, self._targets.on_clock(self._now, references))
 
     def step_on_path(
         self, memory: Memory, time_us: int, state: VehicleState, references: Horizon
@@ -213,7 +209,7 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         inputs = self._inputs(memory, state)
         kept = memory.plan.speeds if memory.plan else None
         last = None if kept is None else kept[memory.age :]
-        wanted = self._targets.on_path(inputs.now, references, last, memory.lag_us * 1e-6)
+        wanted = self._targets.on_path(self._filled(inputs), references, last, memory.lag_us * 1e-6)
         return self._decide(memory, inputs, wanted)
 
     def step_attitude(
@@ -222,7 +218,7 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         """Decide the same for an attitude and a thrust, which is kept within what the rotors can make."""
         del time_us
         inputs = self._inputs(memory, state)
-        wanted = self._targets.of_demand(inputs.now, demand)
+        wanted = self._targets.of_demand(self._filled(inputs), demand)
         return self._decide(memory, inputs, wanted, on_track=False)
 
     def _inputs(self, memory: Memory, state: VehicleState) -> Inputs:
@@ -242,8 +238,11 @@ class WholeLpvMpc(TrackingLaw[Memory]):
             battery.numbers,
             self._now,
         )
-        now = self._arrays._replace(force=self._force._replace(max_n=max_n))
-        return Inputs(observed, float(state.euler[2]), now, self._now)
+        return Inputs(observed, float(state.euler[2]), max_n)
+
+    def _filled(self, inputs: Inputs) -> Now:
+        """Return what a plan begins with, as arrays of the record that each decision fills again."""
+        return self._arrays._replace(force=self._force._replace(max_n=inputs.max_n))
 
     def _decide(
         self, memory: Memory, inputs: Inputs, wanted: Wanted, *, on_track: bool = True
@@ -252,15 +251,10 @@ class WholeLpvMpc(TrackingLaw[Memory]):
         tracked, observed = memory.tracked, inputs.observed
         commands, after = self.tracker.actuate(tracked, observed, squared)
         lag_us = self._lag_us(memory.lag_us, plan, age) if wanted.path else 0
-        R = wanted.target.attitudes[0]
-        angles = (
-            atan2(R[2, 1], R[2, 2]),
-            -asin(min(max(R[2, 0], -1.0), 1.0)),
-            nearest_turn(float(wanted.target.yaw_rad[0]), inputs.psi),
-        )
+        phi, theta, psi = planning.first_angles(wanted.record)
         path_lag_s = memory.lag_us * 1e-6 if wanted.path else nan
         how = diagnostics._replace(mass_kg=observed.mass_kg, path_lag_s=path_lag_s)
-        return Memory(after, plan, age, lag_us), Decision(commands, angles, how)
+        return Memory(after, plan, age, lag_us), Decision(commands, (phi, theta, nearest_turn(psi, inputs.psi)), how)
 
     def _lag_us(self, lag_us: int, plan: Plan | None, age: int) -> int:
         """Return the lag a sample later, on a plan that is so old then."""
@@ -274,14 +268,13 @@ class WholeLpvMpc(TrackingLaw[Memory]):
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
         """Plan, or fall back: return squared rotor speeds, the plan to go on with, its age, and how it came about."""
         _, target, force, path = wanted
-        along_n = dot(force, inputs.observed.measured[6:])
-        if along_n < _RECOVER_BEYOND * norm(force) and not _planned(memory, inputs):
+        along_n, force_n = planning.along(force, inputs.observed.measured)
+        if along_n < _RECOVER_BEYOND * force_n and not _planned(memory, inputs):
             return self._recover(inputs, force, Diagnostics())
         most = max(_SHARES * along_n / self._span_n, _ALWAYS * self._hover_squared)
-        at_first = inputs.now.limits[:_LIMITED_STEPS, 1]
-        np.minimum(at_first, most, out=at_first)
+        planning.limit_first(self._now, most, _LIMITED_STEPS)
         last = memory.plan.commands[memory.age :] if memory.plan else None
-        plan, diagnostics = self._mpc.plan(inputs.record, target, last, inputs.psi, path, on_track=on_track)
+        plan, diagnostics = self._mpc.plan(self._now, target, last, inputs.psi, path, on_track=on_track)
         if plan is not None:
             return plan.commands[0], plan, 1, diagnostics
         if memory.plan is not None and memory.age <= min(self._fallback.shifted_samples, self._mpc.horizon - 1):
@@ -294,10 +287,10 @@ class WholeLpvMpc(TrackingLaw[Memory]):
     ) -> tuple[Array, Plan | None, int, Diagnostics]:
         """Turn the thrust axis the shortest way to where it must point; thrust as far as it points there."""
         direction = matvec(inputs.observed.rotation.T, force / norm(force))
-        rates = inputs.now.rigid[10:]
+        rates = inputs.observed.rigid[10:]
         moments = recovery.turning_moment(direction, rates, self.tracker.inertia, self._turn)
         thrust_n = max(dot(force, inputs.observed.rotation[:, 2].copy()), 0.0)
-        from_wrench, (least, most) = self._mpc.from_wrench, inputs.now.limits[0].tolist()
+        from_wrench, (least, most) = self._mpc.from_wrench, self._arrays.limits[0].tolist()
         squared = recovery.mix_with_priority(
             thrust_n, moments, from_wrench[:, 0].copy(), from_wrench[:, 1:].copy(), least, most
         )

@@ -27,7 +27,8 @@ from colibri.autopilot.control.whole_lpv_mpc.feed_forward import lead
 from colibri.autopilot.control.whole_lpv_mpc.model import ROTORS, Disturbance, Drive, roll_out
 from colibri.autopilot.control.whole_lpv_mpc.path import PathNow, SpeedEffects, fill_slides, price
 from colibri.common.jit import Packed, compiled, inlined
-from colibri.common.matrices import put
+from colibri.common.kernels import asin, atan2
+from colibri.common.matrices import dot, norm, put
 from colibri.common.types import Array
 
 _BINDING = 1e-9
@@ -126,6 +127,26 @@ def begin(
     it.limits[:, 0] = least
     fill_limits(expected, open_v, battery, it.limits[:, 1])
     it.force.max_n = max_n
+
+
+@compiled
+def along(force: Array, measured: Array) -> tuple[float, float]:
+    """Return how much of a force, ENU, (3,), is along the body's z axis, and all of it; `measured` is of `Observed`."""
+    return dot(force, measured[6:]), norm(force)
+
+
+@compiled
+def limit_first(now: Packed, most: float, steps: int) -> None:
+    """Limit the largest squared speed of the first steps."""
+    for step in range(min(steps, now[0].limits.shape[0])):
+        now[0].limits[step, 1] = min(now[0].limits[step, 1], most)
+
+
+@compiled
+def first_angles(target: Packed) -> tuple[float, float, float]:
+    """Return phi, theta and psi, rad, in any turn, of the `Target` now."""
+    R = target[0].attitudes[0]
+    return atan2(R[2, 1], R[2, 2]), -asin(min(max(R[2, 0], -1.0), 1.0)), target[0].yaw_rad[0]
 
 
 @compiled

@@ -53,8 +53,7 @@ class TargetBuilder:
 
     def on_clock(self, now: Packed, references: Horizon) -> Wanted:
         """Return what follows references at their times, until that of the next is asked for; `now` is the `Now`."""
-        n = self._samples
-        p, v, a, yaw = references[0][:n], references[1][:n], references[2][:n], references[5][:n]
+        p, v, a, _, _, yaw, _, _ = references
         force = feed_forward.follow(now, p, v, a, yaw, self._law, self._mpc.model, self._record)
         return Wanted(self._target, self._record, force)
 
