@@ -106,12 +106,6 @@ class BlockLog(LogFile, ABC, Generic[_Record]):
         if len(self._waiting) >= self.BLOCK:
             self.flush()
 
-    def extend(self, records: Iterable[_Record]) -> None:
-        """Append records as `add` does."""
-        self._waiting += records
-        if len(self._waiting) >= self.BLOCK:
-            self.flush()
-
     def flush(self) -> None:
         """Write what waits.
 

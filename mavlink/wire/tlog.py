@@ -40,7 +40,7 @@ def decode(log: bytes) -> Iterator[Logged]:
         at = begin + length
 
 
-class TlogWriter(BlockLog[tuple[int, bytes]]):
+class TlogWriter(BlockLog[tuple[int, tuple[bytes, ...]]]):
     """A telemetry log that is written block by block."""
 
     def write(self, time_us: int, frames: Iterable[bytes]) -> None:
@@ -49,8 +49,14 @@ class TlogWriter(BlockLog[tuple[int, bytes]]):
         Raises:
             LogError: They cannot be written.
         """
-        self.extend([(time_us, frame) for frame in frames])
+        at_once = tuple(frames)
+        if at_once:
+            self.add((time_us, at_once))
 
-    def encode(self, records: list[tuple[int, bytes]]) -> Iterable[bytes]:
+    def encode(self, records: list[tuple[int, tuple[bytes, ...]]]) -> Iterable[bytes]:
         """Return each frame behind its time."""
-        return [STAMP.pack(time_us) + frame for time_us, frame in records]
+        dated: list[bytes] = []
+        for time_us, frames in records:
+            stamp = STAMP.pack(time_us)
+            dated += [stamp + frame for frame in frames]
+        return dated
