@@ -17,7 +17,7 @@ import numpy as np
 from colibri.autopilot.estimation.accelerometer_bias import AccelerometerWatch
 from colibri.autopilot.estimation.delay_buffer import DelayBuffer, Waiting
 from colibri.autopilot.estimation.eskf import Filter, FilterRecord
-from colibri.autopilot.estimation.eskf_predict import look_ahead
+from colibri.autopilot.estimation.eskf_predict import ERRORS, look_ahead
 from colibri.autopilot.estimation.estimate import Check, Estimate, Health, Tests
 from colibri.autopilot.estimation.gyroscope_bias import turned_since
 from colibri.autopilot.estimation.measurements.instrument import Instrument, Value
@@ -50,7 +50,7 @@ _KNOWN_M = 5.0
 _MAX_SPEED_M_S = 500.0
 _CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000
 """Between two fixes: a frame with one has enough to do."""
-_UPPER = np.triu_indices(9)
+_UPPER = np.ravel_multi_index(np.triu_indices(9), (ERRORS, ERRORS))
 _NOTHING = Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
 
@@ -327,12 +327,11 @@ class Estimator:
         at_us = now_us - _CHECK_AT_US
         if at_us // _CHECK_EVERY_US == (at_us - since_us) // _CHECK_EVERY_US:
             return None
-        upper = self.filter.P[:9, :9][_UPPER]
         kinds = self.filter.kinds
         return Check(
             self.filter_us,
             tuple(self.filter.x[:10].tolist()),
-            tuple(upper.tolist()),
+            tuple(self.filter.P.take(_UPPER).tolist()),
             tuple(kind.nis for kind in kinds),
             tuple(kind.accepted for kind in kinds),
         )

@@ -13,6 +13,7 @@ import numpy as np
 
 from colibri.common.compiled_rotations import rotation_matrix
 from colibri.common.jit import Packed, compiled
+from colibri.common.matrices import put
 from colibri.common.types import Array, FourRotors, Matrix, Quaternion, Vector
 
 STATE = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "qw", "qx", "qy", "qz")
@@ -218,15 +219,14 @@ def specific_force(x: Array, parameters: Packed) -> Vector:
 
 
 @compiled
-def held(x: Array, target: FourRotors, parameters: Packed) -> Array:
-    """Return x as a command finds it, (18,): rotors without lag turn at once at what the battery can hold."""
-    x = x.copy()
+def hold(start: Array, target: FourRotors, parameters: Packed, x: Array) -> None:
+    """Write x as a command finds it, (18,): rotors without lag turn at once at what the battery can hold."""
+    put(start, x)
     numbers = parameters[0]
     if numbers.lag_up_s == np.inf:
         share = _share_held(target, x[17], numbers)
         for i in range(4):
             x[13 + i] = min(target[i], share * numbers.top_speed)
-    return x
 
 
 @compiled

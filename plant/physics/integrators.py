@@ -10,7 +10,7 @@ import numpy as np
 from colibri.common.jit import Packed, compiled
 from colibri.common.kernels import power
 from colibri.common.types import Array, FourRotors
-from colibri.plant.physics.equations import close, held, write_derivative
+from colibri.plant.physics.equations import close, hold, write_derivative
 
 Solver: TypeAlias = Callable[[Array, FourRotors, Packed, float], tuple[Array, float]]
 """(x, commanded rotor speeds, parameters, duration in s) -> x after it, the battery's voltage; see `equations`."""
@@ -43,7 +43,8 @@ _TOO_SMALL = 1e-14
 
 def fixed_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:
     """Integrate by Runge-Kutta 4 in equal steps of at most `RK4_STEP_S`."""
-    return runge_kutta_4(x, target, parameters, duration_s, _steps(duration_s))
+    end = np.empty_like(x)
+    return end, runge_kutta_4(x, target, parameters, duration_s, _steps(duration_s), end)
 
 
 @lru_cache(maxsize=64)
@@ -53,7 +54,8 @@ def _steps(duration_s: float) -> int:
 
 def adaptive_step(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float]:
     """Integrate by the embedded pair of Dormand and Prince, to a tight tolerance; nan if no step is small enough."""
-    end, voltage_v, done = dormand_prince(x, target, parameters, duration_s)
+    end = np.empty_like(x)
+    voltage_v, done = dormand_prince(x, target, parameters, duration_s, end)
     if not done:
         end[:] = np.nan
     return end, voltage_v
@@ -66,11 +68,11 @@ def solver(name: Integrator) -> Solver:
 
 @compiled
 def runge_kutta_4(
-    x: Array, target: FourRotors, parameters: Packed, duration_s: float, steps: int
-) -> tuple[Array, float]:
-    """Return x after `duration_s` by the classical fourth-order rule in `steps` equal steps, and the voltage then."""
+    start: Array, target: FourRotors, parameters: Packed, duration_s: float, steps: int, x: Array
+) -> float:
+    """Write x after `duration_s` by the classical fourth-order rule in `steps` equal steps; return the voltage then."""
     h = duration_s / steps
-    x = held(x, target, parameters)
+    hold(start, target, parameters, x)
     k1, k2, k3, k4 = np.empty_like(x), np.empty_like(x), np.empty_like(x), np.empty_like(x)
     y = np.empty_like(x)
     for _ in range(steps):
@@ -84,18 +86,20 @@ def runge_kutta_4(
         for i in range(x.size):
             x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
         close(x, parameters)
-    return x, close(x, parameters)
+    return close(x, parameters)
 
 
 @compiled
-def dormand_prince(x: Array, target: FourRotors, parameters: Packed, duration_s: float) -> tuple[Array, float, bool]:
-    """Return x after `duration_s`, the voltage then, and whether it got there.
+def dormand_prince(
+    start: Array, target: FourRotors, parameters: Packed, duration_s: float, x: Array
+) -> tuple[float, bool]:
+    """Write x after `duration_s`; return the voltage then, and whether it got there.
 
     J. R. Dormand and P. J. Prince, A family of embedded Runge-Kutta formulae, Journal of Computational and Applied
     Mathematics 6(1), 1980; error norm and step control as E. Hairer, S. P. Nørsett and G. Wanner, Solving Ordinary
     Differential Equations I, II.4.
     """
-    x = held(x, target, parameters)
+    hold(start, target, parameters, x)
     k = np.empty((_STAGES, x.size))
     y = np.empty_like(x)
     write_derivative(k[0], x, target, parameters[0])
@@ -114,12 +118,12 @@ def dormand_prince(x: Array, target: FourRotors, parameters: Packed, duration_s:
             x[:] = y
             k[0] = k[_STAGES - 1]
             if gone_s >= duration_s:
-                return x, close(x, parameters), True
+                return close(x, parameters), True
         elif not h > _TOO_SMALL * duration_s:
             break
         factor = _SAFETY * power(error, _EXPONENT) if error > 0.0 else _MAX_FACTOR
         h = min(h * min(max(factor, _MIN_FACTOR), _MAX_FACTOR if error <= 1.0 else 1.0), duration_s - gone_s)
-    return x, 0.0, False
+    return 0.0, False
 
 
 @compiled

@@ -18,6 +18,9 @@ from colibri.plant.sensors.table import ROWS, is_fitted
 from colibri.plant.vehicle.description import Vehicle
 from colibri.plant.vehicle.sensors import Sensors
 
+_PLACE = {field: place for place, field in enumerate(SensorFrame._fields)}
+_TIME, _UPDATED, _TEMPERATURE = _PLACE["time_us"], _PLACE["updated"], _PLACE["temperature_c"]
+
 
 def served_by(vehicle: Vehicle) -> list[Feedback]:
     """Return the feedback that a vehicle can give."""
@@ -42,11 +45,12 @@ class SensorSuite:
         self._origin = origin
         setting, chances = Setting(physics, origin, interval_us * 1e-6), streams(seed, Source.SENSORS, len(ROWS))
         self._instruments = [
-            (row.field, row.group, row.switched_on(getattr(parts, row.part), setting, chance))
+            (_PLACE[row.field], row.group, row.switched_on(getattr(parts, row.part), setting, chance))
             for row, chance in zip(ROWS, chances, strict=True)
             if is_fitted(row, parts)
         ]
-        self._reported: dict[str, Any] = {"magnetic_field_flu_gauss": (0.0, 0.0, 0.0), "pressure_pa": 0.0}
+        nothing = (0.0, 0.0, 0.0)
+        self._reported: list[Any] = [*SensorFrame(0, 0, nothing, nothing, nothing, pressure_pa=0.0, temperature_c=0.0)]
         self._frame: SensorFrame | None = None
 
     def measure(self, world: World) -> SensorFrame:
@@ -58,16 +62,13 @@ class SensorSuite:
 
     def _measured(self, world: World) -> SensorFrame:
         reported, updated = self._reported, 0
-        for field, group, measure in self._instruments:
+        for place, group, measure in self._instruments:
             value = measure(world)
             if value is not None:
                 updated |= group
-                reported[field] = value
+                reported[place] = value
             elif not group:
-                reported[field] = None
-        return SensorFrame(
-            time_us=world.time_us,
-            updated=updated,
-            temperature_c=temperature_c(self._origin.altitude_m + world.state[8]),
-            **reported,
-        )
+                reported[place] = None
+        reported[_TIME], reported[_UPDATED] = world.time_us, updated
+        reported[_TEMPERATURE] = temperature_c(self._origin.altitude_m + world.state[8])
+        return SensorFrame._make(reported)

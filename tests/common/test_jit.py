@@ -127,7 +127,7 @@ def test_kernels_are_exact_and_kept_on_disk_and_call_others_by_name(kernel: Disp
 
 def test_the_files_of_a_kernel_are_those_of_all_that_it_calls() -> None:
     names = {Path(file).name for file in files_of(KERNELS["colibri.plant.physics.integrators.runge_kutta_4"])}
-    assert names == {"integrators.py", "equations.py", "rotations.py"}
+    assert names == {"integrators.py", "equations.py", "matrices.py", "rotations.py"}
 
 
 def _run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:

@@ -352,11 +352,12 @@ def limit_motion(motion: Array, responses: Array, problem: Problem, G: Array, h:
 
 
 @inlined
-def read_plan(motion: Array, speeds: Array, responses: Array, z: Array, levels: Array, psi: float) -> Array:
-    """Return the states that z, (4 b,), leads to, (N + 1, 16), see `PREDICTED`; psi is unwrapped from `psi` on."""
-    steps, inputs = motion.shape[0], responses.shape[2] // levels.shape[0]
-    states, change = np.empty((steps, PREDICTED)), np.empty(DEVIATIONS)
-    for step in range(steps):
+def read_plan(
+    motion: Array, speeds: Array, responses: Array, z: Array, levels: Array, psi: float, states: Array
+) -> None:
+    """Write the states that z, (4 b,), leads to, (N + 1, 16), see `PREDICTED`; psi is unwrapped from `psi` on."""
+    inputs, change = responses.shape[2] // levels.shape[0], np.empty(DEVIATIONS)
+    for step in range(motion.shape[0]):
         x, X, state = motion[step], responses[step], states[step]
         for part in range(0, DEVIATIONS, 4):
             a, b, c, d = 0.0, 0.0, 0.0, 0.0
@@ -387,4 +388,3 @@ def read_plan(motion: Array, speeds: Array, responses: Array, z: Array, levels: 
             state[12 + rotor] = speeds[step, rotor]
             for block in range(levels.shape[0]):
                 state[12 + rotor] += levels[block, step] * z[inputs * block + rotor]
-    return states

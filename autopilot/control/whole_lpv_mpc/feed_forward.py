@@ -76,8 +76,9 @@ def follow(
     law: Packed,
     vehicle: Packed,
     out: Packed,
-) -> Array:
-    """Fill what follows references at their times; return the force, N, ENU, (3,), along which thrust must point now.
+    force: Array,
+) -> None:
+    """Fill what follows references at their times, and the force, N, ENU, (3,), along which thrust must point now.
 
     Args:
         now: The vehicle, `planning.Now`.
@@ -88,6 +89,7 @@ def follow(
         law: The `Guidance`.
         vehicle: The `Model`.
         out: The `Target`; is filled, but for thrusts.
+        force: Is filled.
     """
     rigid, disturbance, limits, target = now[0].rigid, now[0].disturbance, now[0].force, out[0]
     n = target.yaw_rad.shape[0]
@@ -98,7 +100,7 @@ def follow(
     flat = Flat(target.forces, target.attitudes, target.rates, target.squared)
     ask(near[1], near[2], target.yaw_rad, disturbance, limits, law[0].from_wrench, vehicle, flat)
     put(target.squared[-1], target.end_squared)
-    return demanded_force(rigid, near, disturbance, law, limits, vehicle)
+    put(demanded_force(rigid, near, disturbance, law, limits, vehicle), force)
 
 
 @compiled

@@ -217,7 +217,8 @@ class WholeMpc:
         solve_time_s = self._clock() - started_s
         if z is None:
             return None, Diagnostics(status, solve_time_s=solve_time_s, qp_iterations=iterations)
-        commands, states, binding = planning.read(qps.kind, z, psi)
+        commands, states = np.empty((self.horizon, ROTORS)), np.empty((self.horizon + 1, condensing.PREDICTED))
+        binding = planning.read(qps.kind, z, psi, commands, states)
         diagnostics = Diagnostics(
             QpStatus.SOLVED,
             solve_time_s=solve_time_s,

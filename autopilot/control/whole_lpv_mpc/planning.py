@@ -299,13 +299,13 @@ def is_beyond(kind: Packed, z: Array) -> bool:
 
 
 @compiled
-def read(kind: Packed, z: Array, psi: float) -> tuple[Array, Array, int]:
-    """Return commands and states of the plan that z, (n,), stands for, see `Plan`, and how many bounds bind in it.
+def read(kind: Packed, z: Array, psi: float, commands: Array, states: Array) -> int:
+    """Write commands and states of the plan that z, (n,), stands for, see `Plan`; return how many bounds bind in it.
 
     `psi` is that now, unwrapped.
     """
     starts, work, qp = kind[0].problem.starts, kind[0].work, kind[0].qp
-    corrections, commands = work.corrections[1:].copy(), np.empty_like(work.commands)
+    corrections = work.corrections[1:].copy()
     inputs = z.shape[0] // corrections.shape[0]
     binding = 0
     for block in range(corrections.shape[0]):
@@ -315,8 +315,8 @@ def read(kind: Packed, z: Array, psi: float) -> tuple[Array, Array, int]:
             if z[k] <= qp.lower[k] + _BINDING or z[k] >= qp.upper[k] - _BINDING:
                 binding += 1
     _correct(work.commands, corrections, starts, commands)
-    states = read_plan(work.motion, work.speeds, work.responses, z, work.levels, psi)
-    return commands, states, binding
+    read_plan(work.motion, work.speeds, work.responses, z, work.levels, psi, states)
+    return binding
 
 
 @compiled

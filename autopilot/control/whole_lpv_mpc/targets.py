@@ -53,8 +53,8 @@ class TargetBuilder:
 
     def on_clock(self, now: Packed, references: Horizon) -> Wanted:
         """Return what follows references at their times, until that of the next is asked for; `now` is the `Now`."""
-        p, v, a, _, _, yaw, _, _ = references
-        force = feed_forward.follow(now, p, v, a, yaw, self._law, self._mpc.model, self._record)
+        (p, v, a, _, _, yaw, _, _), force = references, np.empty(3)
+        feed_forward.follow(now, p, v, a, yaw, self._law, self._mpc.model, self._record, force)
         return Wanted(self._target, self._record, force)
 
     def on_path(self, now: Now, references: Horizon, last: Array | None, lag_s: float) -> Wanted:
