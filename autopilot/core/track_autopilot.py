@@ -74,7 +74,7 @@ class Autopilot:
         if plant_status.delay_us is not None:
             self._delay.measure(plant_status.delay_us)
         due = self._loop.is_due(frame.time_us)
-        known = self._state_source.state(frame, asked=due)
+        known = self._state_source.state(frame, asked=due, settles=True)
         if known is None:
             self._time_us = None
             return nothing_known(frame.time_us, self._clock() - started_s)
@@ -94,6 +94,10 @@ class Autopilot:
         self._delay.sent(command)
         estimate = self._state_source.estimate if due else None
         return Step(command, decision, self._clock() - started_s, estimate, delay_us=self._delay.delay_us)
+
+    def settle(self) -> None:
+        """Do what need not be done before an answer, while the plant integrates; else the next step does it."""
+        self._state_source.settle()
 
     def _begin(self, frame: StateFrame) -> None:
         vehicle = self._loop.vehicle

@@ -26,7 +26,7 @@ from colibri.autopilot.estimation.eskf_predict import (
     Noise,
     predict,
 )
-from colibri.autopilot.estimation.estimate import Tests
+from colibri.autopilot.estimation.estimate import Check, Tests
 from colibri.autopilot.estimation.measurements.kind import FIVE_SIGMA, Kind, KindRecord
 from colibri.autopilot.estimation.measurements.table import instruments_of, kinds_of
 from colibri.autopilot.estimation.sensing.alignment import Aligned
@@ -44,6 +44,8 @@ _FIRST_POSITION_M, _FIRST_VELOCITY_M_S, _FIRST_ATTITUDE_RAD, _FIRST_OFFSET_M = 1
 _CAUGHT_M, _CAUGHT_M_S, _CAUGHT_RAD = 3.0, 1.0, 0.4
 """How well a vehicle that falls is known: it need not have been level."""
 _ITERATIONS = 4
+_UPPER = np.ravel_multi_index(np.triu_indices(9), (ERRORS, ERRORS))
+"""Of P, where the upper triangle of position, velocity and attitude is."""
 _MIN_NOISE = 1e-6
 """Of anything, in its own unit: a perfect sensor would leave nothing to divide by."""
 _PLACE_STEP_M, _HEIGHT_STEP_M, _SPEED_STEP_M_S = 0.011, 0.001, 0.01
@@ -253,6 +255,12 @@ class Filter:
         self.velocity.accept(time_us)
         self.magnetometer.kind.accept(self.magnetometer.kind.test.time_us)
         self.gyro_bias_us = time_us
+
+    def check(self, time_us: int) -> Check:
+        """Return what its consistency can be checked by; `time_us` is its time."""
+        upper = self.P.take(_UPPER).tolist()
+        nis, accepted = tuple(kind.nis for kind in self.kinds), tuple(kind.accepted for kind in self.kinds)
+        return Check(time_us, tuple(self.x[:10].tolist()), tuple(upper), nis, accepted)
 
     @property
     def tests(self) -> Tests:

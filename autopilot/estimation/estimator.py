@@ -17,7 +17,7 @@ import numpy as np
 from colibri.autopilot.estimation.accelerometer_bias import AccelerometerWatch
 from colibri.autopilot.estimation.delay_buffer import DelayBuffer, Waiting
 from colibri.autopilot.estimation.eskf import Filter, FilterRecord
-from colibri.autopilot.estimation.eskf_predict import ERRORS, look_ahead
+from colibri.autopilot.estimation.eskf_predict import look_ahead
 from colibri.autopilot.estimation.estimate import Check, Estimate, Health, Tests
 from colibri.autopilot.estimation.gyroscope_bias import turned_since
 from colibri.autopilot.estimation.measurements.instrument import Instrument, Value
@@ -50,7 +50,6 @@ _KNOWN_M = 5.0
 _MAX_SPEED_M_S = 500.0
 _CHECK_EVERY_US, _CHECK_AT_US = 100_000, 50_000
 """Between two fixes: a frame with one has enough to do."""
-_UPPER = np.ravel_multi_index(np.triu_indices(9), (ERRORS, ERRORS))
 _NOTHING = Reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, False)
 
 
@@ -128,6 +127,7 @@ class Estimator:
         self._buffer = DelayBuffer(self._capacity)
         self.filter_us = 0
         self._reading = _NOTHING
+        self._late: SensorFrame | None = None
         self._time_us: int | None = None
         self._published_us = 0
         self._estimate: Estimate | None = None
@@ -140,6 +140,7 @@ class Estimator:
         Unless `asked`, the estimate before is returned again, which takes half of the time; and so it is where the time
         of a frame does not follow. When such frames go on, the simulator has restarted, and so does the estimator.
         """
+        self._take_late()
         last_us = self._time_us
         if last_us is not None and not 0 < frame.time_us - last_us <= MAX_GAP_US:
             self._rejected.add(Source.CLOCK, Reason.TIME)
@@ -172,18 +173,38 @@ class Estimator:
         else:
             buffer = self._buffer
             if buffer.is_full():
-                self._take()
+                self._take(frame.time_us)
             buffer.put(before, self._reading, (frame.time_us - last_us) * 1e-6, Waiting(frame.time_us, values))
-            while buffer.waiting and frame.time_us - buffer.waiting[0].time_us >= self._delay_us:
-                self._take()
+            self._take_until(frame.time_us)
             if fix is not None:
                 self._fuse(fix, frame.time_us)
         if not asked and self._estimate is not None:
             return self._estimate
         return self._publish(frame.time_us)
 
+    def put_off(self, frame: SensorFrame) -> Estimate | None:
+        """Return the estimate before, as `step` does unless asked, but leave the frame to `settle`, or the next one."""
+        self._take_late()
+        last_us = self._time_us
+        if self._estimate is None or last_us is None or not 0 < frame.time_us - last_us <= MAX_GAP_US:
+            return self.step(frame, asked=False)
+        self._late = frame
+        return self._estimate
+
+    def settle(self) -> None:
+        """Do what can be done before the next frame comes, where it comes in time: the same, but earlier."""
+        self._take_late()
+        if self._estimate is not None and self._time_us is not None:
+            self._take_until(self._time_us + self._interval_us)
+
+    def _take_late(self) -> None:
+        frame, self._late = self._late, None
+        if frame is not None:
+            self.step(frame, asked=False)
+
     def record(self) -> bytes:
         """Return what is needed to go on after a restart; empty before the first estimate."""
+        self._take_late()
         if self._estimate is None or self._time_us is None:
             return b""
         return to_bytes(
@@ -243,7 +264,13 @@ class Estimator:
         (e, n, u), (de, dn, du) = enu_of(caught.fix.place, self._origin), caught.moved_m
         self.filter.start_in_air(caught, (e + de, n + dn, u + du), time_us)
 
-    def _take(self) -> None:
+    def _take_until(self, now_us: int) -> None:
+        """Take what is as old as a fix that came at `now_us`."""
+        waiting, before_us = self._buffer.waiting, now_us - self._delay_us
+        while waiting and waiting[0].time_us <= before_us:
+            self._take(now_us)
+
+    def _take(self, now_us: int) -> None:
         """Bring the filter on by the oldest sample that waits, and fuse what was measured at its end."""
         filter_ = self.filter
         filter_.predict(self._buffer.samples, self._buffer.first)
@@ -254,16 +281,16 @@ class Estimator:
         self._tests = None
         for instrument, value in zip(filter_.instruments, values, strict=True):
             if value is not None:
-                self._fuse_value(instrument, value, time_us)
+                self._fuse_value(instrument, value, time_us, now_us)
 
-    def _fuse_value(self, instrument: Instrument, value: Value, time_us: int) -> None:
+    def _fuse_value(self, instrument: Instrument, value: Value, time_us: int, now_us: int) -> None:
         x = self.filter.x
         before = x[:6].tolist() if instrument.smoothed else None
         reason = instrument.fuse(x, self.filter.P, value, time_us)
         if reason is not None:
             self._rejected.add(instrument.source, reason)
-        elif before is not None and self._time_us is not None:
-            self._output_smoothing.absorb(before, x[:6].tolist(), (self._time_us - time_us) * 1e-6)
+        elif before is not None:
+            self._output_smoothing.absorb(before, x[:6].tolist(), (now_us - time_us) * 1e-6)
 
     def _fuse(self, fix: GpsFix, now_us: int) -> None:
         after_s = (fix.time_us - self._delay_us - self.filter_us) * 1e-6
@@ -327,14 +354,7 @@ class Estimator:
         at_us = now_us - _CHECK_AT_US
         if at_us // _CHECK_EVERY_US == (at_us - since_us) // _CHECK_EVERY_US:
             return None
-        kinds = self.filter.kinds
-        return Check(
-            self.filter_us,
-            tuple(self.filter.x[:10].tolist()),
-            tuple(self.filter.P.take(_UPPER).tolist()),
-            tuple(kind.nis for kind in kinds),
-            tuple(kind.accepted for kind in kinds),
-        )
+        return self.filter.check(self.filter_us)
 
     def _health(self, now_us: int, sigma: list[float]) -> Health:
         filter_, reading = self.filter, self._reading
@@ -369,6 +389,6 @@ class Estimator:
         rest = Reading(force, (0.0, 0.0, 0.0), True, True)
         typical: list[Value | None] = [instrument.typical() for instrument in self.filter.instruments]
         self._buffer.put(rest, self._reading, self._interval_us * 1e-6, Waiting(self._interval_us, typical))
-        self._take()
+        self._take(self._interval_us)
         self._fuse(fix, self._interval_us)
         self._publish(self._interval_us)

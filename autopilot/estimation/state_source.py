@@ -81,8 +81,10 @@ class StateSource:
         """Have the estimator go on from a record, the next frame being of `time_us`; return whether it does."""
         return self._estimating is not None and self._estimating.resume(record, time_us)
 
-    def state(self, frame: Frame, *, asked: bool = True) -> StateFrame | None:
+    def state(self, frame: Frame, *, asked: bool = True, settles: bool = False) -> StateFrame | None:
         """Return the state at a frame, or unless `asked` an older one; None until there is an estimate.
+
+        Where `settle` is called between frames, less is done for the one that is not asked for.
 
         Time that begins again is another flight, of which nothing is known. A frame that is a little late is the
         estimator's to judge.
@@ -100,8 +102,16 @@ class StateSource:
                 self.latest[row.field] = value
         if frame.gps is not None:
             self._fix_us = frame.time_us
-        self.estimate = self._estimating.step(frame, asked=asked)
+        if settles and not asked:
+            self.estimate = self._estimating.put_off(frame)
+        else:
+            self.estimate = self._estimating.step(frame, asked=asked)
         return None if self.estimate is None else self.estimate.frame
+
+    def settle(self) -> None:
+        """Do what need not be done between a frame and its answer."""
+        if self._estimating is not None:
+            self._estimating.settle()
 
     def has_gps(self, now_us: int) -> bool:
         """Whether there is GPS; where the simulator sends the state, there always is."""

@@ -73,6 +73,8 @@ class Client:
             due_s = self._end.poll(perf_counter())
             for datagram in self._end.take_outbox():
                 self._link.send(datagram)
+            if step and isinstance(autopilot, Autopilot):
+                autopilot.settle()
             if step:
                 self._keep(partial(AutopilotLog.write, step=step))  # while the plant integrates
             if step and self._ground:

@@ -62,6 +62,28 @@ def max_jump_m(of: list[Estimate | None]) -> float:
     return float(np.linalg.norm(steps, axis=1).max())
 
 
+# --- what is put off
+
+
+@pytest.mark.parametrize("settles", [True, False])
+def test_what_is_put_off_changes_no_bit(settles: bool) -> None:
+    """Not where frames are lost, either, nor one that has come before comes again."""
+    frames = list(recorded(source.climb, 1, 3.0).frames)
+    frames = [frame for k, frame in enumerate(frames) if k % 97 not in (3, 4)]
+    frames.insert(600, frames[590])
+    at_once, putting_off = estimator(), estimator()
+    for k, frame in enumerate(frames):
+        if k % 2:
+            at_once.step(frame, asked=False)
+            putting_off.put_off(frame)
+        else:
+            assert at_once.step(frame) == putting_off.step(frame)
+        if settles:
+            putting_off.settle()
+    if not settles:  # which brings the filter on
+        assert at_once.record() == putting_off.record()
+
+
 # --- how it begins
 
 

@@ -49,6 +49,9 @@ class Standing(Estimator):
             return None
         return known(StateFrame(frame.time_us, (0.0, -1.0, 0.0), ZERO, quaternion_from_euler(0.0, 0.0, 1.57), ZERO))
 
+    def put_off(self, frame: SensorFrame) -> Estimate | None:
+        return self.step(frame, asked=False)
+
     def record(self) -> bytes:
         return b""
 
