@@ -76,6 +76,7 @@ class Plant:
             self._measure = SensorSuite(
                 vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults
             ).measure
+            physics.specific_force(world)  # loads it, before any frame
         self._actuation = Actuation(_held(world, vehicle))
         self._round_trip_us = 2 * latency_us
         self._results: tuple[FaultResult, ...] = ()

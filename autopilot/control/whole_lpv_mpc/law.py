@@ -178,6 +178,11 @@ class WholeLpvMpc(TrackingLaw[Memory]):
             settings.fallback.turn_1_s, settings.fallback.rate_1_s, settings.fallback.max_rate_rad_s
         )
 
+    def warm_up(self) -> None:
+        """Load what is compiled."""
+        super().warm_up()
+        self._mpc.warm_up()
+
     def initial(self, rotor_speed: float) -> Memory:
         """Return the memory of a law whose rotors all turn at `rotor_speed` (the vehicle's unit)."""
         return Memory(self.tracker.initial(rotor_speed), None, 0, 0)

@@ -231,6 +231,11 @@ class WholeMpc:
         speeds = None if path is None else read_speeds(path.speeds, self._effects.shares, z)
         return Plan(commands, states, speeds), diagnostics
 
+    def warm_up(self) -> None:
+        """Load what is compiled for soft limits, which no flight may have for long; after a first plan."""
+        planning.limit(self._on_clock.kind)
+        planning.count_active(self._on_clock.kind, np.zeros(len(self._on_clock.free.f)))
+
     def solve(self, kind: Packed, free: Qp, limited: Qp) -> Corrections:
         """Return the corrections of the last commands that cost least.
 
