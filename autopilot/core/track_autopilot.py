@@ -1,7 +1,7 @@
 """An autopilot that flies one track, without ground stations."""
 
 from colibri.autopilot.control.delay import DelayCompensation
-from colibri.autopilot.control.interface import Clock, Pace
+from colibri.autopilot.control.interface import Clock, Pace, VehicleState
 from colibri.autopilot.control.loop import ControlLoop
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import Factory
@@ -88,7 +88,7 @@ class Autopilot:
             references = self._planner.horizon_at(acts_us - self._loop.lag_us, self._loop.control_interval_us)
             sinks = is_below(float(references.position_enu_m[0, 2]), state)
             self._landing, _ = watch(self._landing, frame.time_us, state, sinks)
-            state = state._replace(airborne=is_clear(self._landing, state, self._ground_m))
+            state = VehicleState(*state[:-1], airborne=is_clear(self._landing, state, self._ground_m))
             decision = self._loop.decide(frame.time_us, state, references, Pace.CATCHING_UP)
         command = ActuatorCommand(frame.time_us, self._loop.controls, armed=True)
         self._delay.sent(command)
