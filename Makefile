@@ -5,8 +5,8 @@ OUT ?= out/spiral
 # Every command starts processes, the tests hundreds of them: each would compile all modules anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup fly test test-long lint test-clients fuzz chaos scenarios scenarios-rough soak soak-clients kills \
-  golden verify-pythons bench lock clean
+.PHONY: setup fly test test-long lint test-clients test-peers fuzz chaos scenarios scenarios-rough soak soak-clients \
+  kills golden verify-pythons bench lock clean
 
 setup: .venv/.ready
 
@@ -49,6 +49,10 @@ test-clients: setup .venv-clients/.ready
 	@.venv-clients/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes \
 	  -r requirements-clients.lock
 	@touch $@
+
+# Real PX4 and ArduCopter on our plant: COLIBRI_PX4=FOLDER, a build of its SITL, and COLIBRI_ARDUCOPTER=FILE, the program.
+test-peers: setup
+	$(BIN)/python -m pytest -m peers tests/peers
 
 fuzz: setup
 	$(BIN)/python -m tools.fuzz $(FUZZ)

@@ -1,0 +1,149 @@
+"""PX4 or ArduCopter on our plant, twice: each time it takes off and hovers, and is killed.
+
+`python -m tests.peers.on_the_plant px4|ardupilot PROGRAM FOLDER`, in a network namespace with loopback alone: both
+programs bind to all addresses.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from math import nan
+from pathlib import Path
+from subprocess import STDOUT, Popen, run
+from time import monotonic
+
+from colibri.mavlink.links.link import GroundLink
+from colibri.mavlink.links.open import open_ground_link
+from colibri.mavlink.wire.dialect import Codec, Message, mav
+
+VEHICLES = {"px4": "iris", "ardupilot": "hummingbird"}
+SPEED = 5
+"""Times real time: what a computer that is busy with other tests still keeps to."""
+HOVER_S = 15.0
+NEARLY_THERE_M = 1.7
+TAKE_OFF_M = 2.0
+"""Of ArduPilot; PX4 has MIS_TAKEOFF_ALT, 2.5 m."""
+_GUIDED = 4
+_GIVE_UP_AFTER_S = 120.0
+_ASK_EVERY_S = 0.2
+_COLIBRI = (sys.executable, "-m", "colibri")
+
+
+def main(whom: str, program: str, folder: Path) -> None:
+    """Fly twice on one plant; what was flown is in FOLDER/plant."""
+    parameters = folder / "parameters"
+    run([*_COLIBRI, "vehicle", VEHICLES[whom], "--for", whom, "--out", str(parameters)], check=True)
+    with plant(whom, folder):
+        for number in (1, 2):
+            start = px4 if whom == "px4" else arducopter
+            with start(Path(program), parameters, folder / f"stack-{number}"):
+                hover(whom)
+
+
+@contextmanager
+def plant(whom: str, folder: Path) -> Iterator[None]:
+    """Have `colibri plant` wait for it."""
+    served = "px4" if whom == "px4" else "ardupilot-json"
+    options = ("--serve", served, "--vehicle", VEHICLES[whom], "--speed", str(SPEED), "--out", str(folder / "plant"))
+    with (
+        (folder / "plant.txt").open("wb") as said,
+        Popen([*_COLIBRI, "plant", *options], stdout=said, stderr=STDOUT) as process,
+    ):
+        try:
+            yield
+        finally:
+            process.terminate()
+
+
+@contextmanager
+def px4(build: Path, parameters: Path, folder: Path) -> Iterator[None]:
+    """Start PX4 with the parameters in its environment, as docs/simulators.md says."""
+    lines = [line.split() for line in parameters.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    given = {f"PX4_PARAM_{name}": value for _, _, name, value, _ in lines}
+    others = {"PX4_SIM_MODEL": "none_iris", "PX4_SIM_SPEED_FACTOR": str(SPEED), "PX4_PARAM_NAV_DLL_ACT": "0"}
+    command = [str(build / "bin" / "px4"), "-d", str(build / "etc"), "-s", "etc/init.d-posix/rcS"]
+    with killed_after(command, folder, os.environ | given | others | {"PX4_PARAM_COM_RCL_EXCEPT": "7"}):
+        yield
+
+
+@contextmanager
+def arducopter(program: Path, parameters: Path, folder: Path) -> Iterator[None]:
+    """Start ArduCopter with the parameters as its defaults, all that it has kept forgotten."""
+    options = ("--model", "JSON:127.0.0.1", "--speedup", str(SPEED), "-w", "--defaults", str(parameters))
+    with killed_after([str(program), *options], folder, dict(os.environ)):
+        yield
+
+
+@contextmanager
+def killed_after(command: list[str], folder: Path, environment: dict[str, str]) -> Iterator[None]:
+    """Run a program in a folder of its own. ArduCopter heeds nothing but SIGKILL while it waits for its simulator."""
+    folder.mkdir()
+    with (folder / "said.txt").open("wb") as said:
+        process = Popen(command, cwd=folder, env=environment, stdout=said, stderr=STDOUT)
+        try:
+            yield
+        finally:
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+
+
+def hover(whom: str) -> None:
+    """Have it take off, and wait until it has hovered for `HOVER_S` by its own clock."""
+    url = "udpin:127.0.0.1:14540" if whom == "px4" else "tcp:127.0.0.1:5760"
+    asking_s, up_since_ms, armed, peer = 0.0, None, False, None
+    codec, give_up_s = Codec(255, 190), monotonic() + _GIVE_UP_AFTER_S
+    with closing(open_ground_link(url)) as link:
+        while monotonic() < give_up_s:
+            link.wait(0.05)
+            for datagram, sender in link.receive_now():
+                peer = sender
+                for message in codec.decode(datagram):
+                    armed = is_armed(message, armed)
+                    if message.name == "LOCAL_POSITION_NED":
+                        now_ms, is_up = message.fields.time_boot_ms, message.fields.z < -NEARLY_THERE_M
+                        up_since_ms = (up_since_ms or now_ms) if is_up else None
+                        if up_since_ms is not None and now_ms - up_since_ms > 1e3 * HOVER_S:
+                            return
+            if peer is not None and monotonic() >= asking_s:
+                asking_s = monotonic() + _ASK_EVERY_S
+                ask(whom, codec, link, armed=armed, up=up_since_ms is not None)
+    raise SystemExit(f"{whom} did not hover within {_GIVE_UP_AFTER_S:.0f} s")
+
+
+def is_armed(message: Message, before: bool) -> bool:
+    """Return whether the vehicle is armed, by a message or as it was before."""
+    if message.name != "HEARTBEAT" or message.source[1] != mav.MAV_COMP_ID_AUTOPILOT1:
+        return before
+    return bool(message.fields.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED)
+
+
+def ask(whom: str, codec: Codec, link: GroundLink, *, armed: bool, up: bool) -> None:
+    """Send what brings it one step further: telemetry, mode, arming, take-off."""
+    kind = mav.MAV_TYPE_ONBOARD_CONTROLLER if whom == "px4" else mav.MAV_TYPE_GCS
+    frames = [codec.encode("HEARTBEAT", kind, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE, 3)]
+
+    def command(number: int, *parameters: float) -> None:
+        padded = [*parameters, *[0.0] * 7][:7]
+        frames.append(codec.encode("COMMAND_LONG", 1, mav.MAV_COMP_ID_AUTOPILOT1, number, 0, *padded))
+
+    command(mav.MAV_CMD_SET_MESSAGE_INTERVAL, mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED, 1e5)
+    if not armed:
+        if whom == "px4":
+            command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, nan)
+        else:
+            command(mav.MAV_CMD_DO_SET_MODE, mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, _GUIDED)
+        command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+    elif not up and whom == "ardupilot":
+        command(mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, TAKE_OFF_M)
+    for frame in frames:
+        link.send(frame, link.target or PX4_SDK)
+
+
+PX4_SDK = ("127.0.0.1", 14580)
+"""Where PX4's first vehicle listens for those whom it sends to 14540."""
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2], Path(sys.argv[3]))
