@@ -122,7 +122,7 @@ def test_numbers_of_the_report_have_limits(tmp_path: Path, capsys: pytest.Captur
     report = fly(tmp_path, "hover", "--link", "memory", "--duration", "1", "--fail-above", "qp_failures=0")
     assert report["lost"] is None
     assert report["ground_contact_s"] == 0.0
-    limits = ("--fail-above", "0.1", "--fail-above", "max_error_m=0.5", "--fail-above", "fallbacks=0")
+    limits = ("--no-figures", "--fail-above", "0.1", "--fail-above", "max_error_m=0.5", "--fail-above", "fallbacks=0")
     with pytest.raises(SystemExit) as end:
         main(["fly", "hover", "--link", "memory", "--duration", "1", "--quiet", *limits, "--out", str(tmp_path)])
     assert end.value.code == 1

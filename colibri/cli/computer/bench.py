@@ -13,6 +13,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--only",
         action="append",
         choices=("stages", "flights", "sensors", "simulators", "ground", "commands"),
+        metavar="PART",
         help="stages: each stage of a control step; flights: times real time at several rates; "
         "sensors: the estimator, and flights on sensors beside those on the state; simulators: the plant answering "
         "PX4 and ArduPilot; ground: serving ground stations, and the control step beside it; commands: whole ones, "

@@ -67,6 +67,7 @@ def test_it_is_interrupted_and_goes_on_though_a_worker_is_killed(tmp_path: Path,
     assert tables_in(out) == expected
 
 
+@pytest.mark.long
 def test_it_is_killed_and_goes_on(tmp_path: Path, expected: tuple[str, str]) -> None:
     out = tmp_path / "out"
     with begin(out, "--workers", "2") as first:

@@ -49,6 +49,7 @@ def wait_for(folder: Path, words: str, least: int) -> None:
         sleep(0.005)
 
 
+@pytest.mark.long
 def test_it_is_killed_and_goes_on_as_if_it_had_not_been(tmp_path: Path) -> None:
     with begin(tmp_path) as first:
         wait_for(tmp_path, '"pruned"', 5)
