@@ -1,0 +1,207 @@
+"""A control law that flies a vehicle whose rotors are another's: its moments become body rates, its rotors a thrust.
+
+The law is given the vehicle as it will be when the command takes effect, and returns rotor speeds. Rotors that nobody
+has follow them, as those of the vehicle file would; they turn the vehicle of the file for one interval, and the body
+rates that it would have then are what the stack is made to reach, by the exact inverse of its response.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.commander.flight.reference_generator import ReferenceGenerator
+from colibri.autopilot.control.interface import Clock, Decision, Horizon, VehicleState
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.registry import Factory
+from colibri.autopilot.control.vehicle_model import motion
+from colibri.autopilot.control.vehicle_model.battery import open_voltage_v
+from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.integrator_chain import Limits
+from colibri.autopilot.guidance.sample_grid import instants
+from colibri.autopilot.guidance.tasks.position import HoldTask, TaskSequence, TrackTask, to_track
+from colibri.autopilot.guidance.tasks.task import FlightTask, Motion, PlannedMotion, TaskContext
+from colibri.autopilot.guidance.trajectories.planner import Planner
+from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.common.jit import packed
+from colibri.common.types import Array, Vector
+from colibri.companion.stacks.stack import Response
+from colibri.companion.steering import response as model
+from colibri.mavlink.hil.state import StateFrame
+from colibri.plant.vehicle.description import Vehicle
+
+APPROACH = Limits(
+    speed_m_s=2.0, climb_m_s=1.0, sink_m_s=1.0, acceleration_m_s2=2.0, lift_m_s2=2.0, jerk_m_s3=8.0, yaw_rate_rad_s=0.8
+)
+"""How fast a vehicle is led to the track."""
+_MAX_INTERVAL_US = 10_000
+"""Setpoints are sent at 100 Hz and more, however seldom the law decides."""
+_NO_DISTURBANCE = np.zeros(6)
+
+
+class Asked(NamedTuple):
+    """What a law asks for at one instant.
+
+    Attributes:
+        rate_flu_rad_s: Body rates to command.
+        thrust_n: Of all rotors.
+        reference: The references that it was given; None between two decisions.
+        decision: The law's; None between two.
+        on_track: Whether the reference is the track's own, not on the way to it.
+        track_s: Time along the track; negative before it.
+    """
+
+    rate_flu_rad_s: Vector
+    thrust_n: float
+    reference: Horizon | None
+    decision: Decision | None
+    on_track: bool
+    track_s: float
+
+
+class LawPilot:
+    """Flies one track by one law.
+
+    Attributes:
+        interval_us: Between two setpoints.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        vehicle: Vehicle,
+        track: Track,
+        response: Response,
+        clock: Clock,
+        law: Factory | None = None,
+    ) -> None:
+        """Fly `track` by the law of `profile`, or one made by `law`; `clock` only measures.
+
+        Raises:
+            ControllerError: The profile's control law cannot be used.
+            ProfileError: Its table is wrong.
+            SolverError: Its solver cannot be used.
+        """
+        self._loop = ControlLoop(profile, vehicle, clock, law)
+        self._vehicle, self._track = vehicle, track
+        self._motion = packed(motion.motion_model(vehicle))
+        self._response = response
+        self._instants = instants(self._loop.preview, self._loop.control_interval_us)
+        self._planner = Planner(track, profile.references, self._instants.preview)
+        self._behaviour = Behaviour(limits=APPROACH)
+        self._generator = ReferenceGenerator(self._instants, APPROACH)
+        parts = -(-self._loop.control_interval_us // _MAX_INTERVAL_US)
+        self.interval_us = self._loop.control_interval_us // parts
+        self._parts, self._tick = parts, 0
+        self._rotors = np.full(4, vehicle.hover_speed)
+        self._task: FlightTask = HoldTask()
+        self._last: tuple[Decision, bool] | None = None
+        carried = np.zeros(motion.STATES)
+        carried[6] = 1.0
+        motion.carry(carried, np.ones(1), np.zeros((1, 4)), _NO_DISTURBANCE, 1.0, self._motion)
+
+    @property
+    def law(self) -> str:
+        """The law's class."""
+        return type(self._loop.controller).__name__
+
+    @property
+    def start_enu_m(self) -> Vector:
+        """Where the track begins."""
+        x, y, z = self._planner.horizon(0).position_enu_m[0].tolist()
+        return (x, y, z)
+
+    def adopt(self, response: Response) -> None:
+        """Invert another response."""
+        self._response = response
+
+    def begin(self, y: Array) -> None:
+        """Begin with a vehicle that moves as `y` says, (14,), and take it over as it moves: brake, and stay."""
+        frame = _frame(0, y)
+        self._tick = 0
+        self._loop.begin(self._vehicle.hover_speed, self._loop.state(frame).euler[2])
+        self._rotors = np.full(4, self._vehicle.hover_speed)
+        self._generator.follow(self._loop.state(frame))
+        self._task = HoldTask()
+
+    def fly_track(self) -> None:
+        """Go to the track from wherever the reference is, and along it."""
+        self._task = to_track(self._planner, self._track.duration_s)
+
+    def hold(self) -> None:
+        """Brake, and stay."""
+        self._task = HoldTask()
+
+    @property
+    def finished(self) -> bool:
+        """Whether the track is flown to its end."""
+        task = self._flown
+        return isinstance(task, TrackTask) and self._time_us - task.began_us > self._track.duration_s * 1e6
+
+    @property
+    def _flown(self) -> FlightTask | None:
+        return self._task.task if isinstance(self._task, TaskSequence) else self._task
+
+    @property
+    def _time_us(self) -> int:
+        return self._tick * self.interval_us
+
+    def step(self, y: Array) -> Asked:
+        """Return what is asked of a vehicle that moves as `y` says when it takes effect; once an interval.
+
+        Raises:
+            DecisionError: The law raised, or gave what no rotor can follow.
+        """
+        decision, horizon, on_track = None, None, False
+        time_us = self._time_us
+        if self._tick % self._parts == 0:
+            state = self._loop.state(_frame(time_us, y))
+            horizon, on_track = self._references(time_us, state)
+            decision = self._loop.decide(time_us, state, horizon)
+        speeds = np.array(self._loop.controls) * self._vehicle.rotors.max_speed
+        x = np.concatenate((y[: model.LIFT], self._rotors))
+        interval_s = self.interval_us * 1e-6
+        after = motion.carry(x, np.array([interval_s]), speeds[None], _NO_DISTURBANCE, self._voltage_v, self._motion)
+        made_n = float(y[model.LIFT]) * self._vehicle.body.mass_kg
+        if self._response.thrust_lag_s <= 0.0:
+            made_n = motion.thrust_n(self._rotors, self._motion)
+        self._rotors = after[motion.ROTORS]
+        thrust = model.lift_command(made_n, motion.thrust_n(self._rotors, self._motion), interval_s, self._response)
+        now, then = y[model.RATE].tolist(), after[motion.RATE].tolist()
+        rate = model.rate_command(tuple(now), tuple(then), interval_s, self._response)
+        self._tick += 1
+        return Asked(rate, thrust, horizon, decision, on_track, self._track_s(time_us))
+
+    def _track_s(self, time_us: int) -> float:
+        task = self._flown
+        return (time_us - task.began_us) * 1e-6 if isinstance(task, TrackTask) else -1.0
+
+    @property
+    def _voltage_v(self) -> float:
+        battery = self._vehicle.battery
+        return 1.0 if battery is None else open_voltage_v(battery, self._loop.charge_ah)
+
+    def _references(self, time_us: int, state: VehicleState) -> tuple[Horizon, bool]:
+        generator = self._generator
+        assert generator.reference is not None, "it was begun"
+        context = TaskContext(
+            time_us,
+            state,
+            generator.reference,
+            state.position_enu_m,
+            self._behaviour,
+            generator.interval_s,
+            generator.samples,
+        )
+        wanted = self._task.update(context)
+        assert isinstance(wanted, Motion | PlannedMotion), "no task of these asks for attitudes"
+        horizon = generator.lead(context, wanted)
+        on_track = isinstance(wanted, PlannedMotion) and bool(
+            np.abs(horizon.position_enu_m[0] - wanted.horizon.position_enu_m[0]).max() < 1e-9
+        )
+        return horizon, on_track
+
+
+def _frame(time_us: int, y: Array) -> StateFrame:
+    px, py, pz, vx, vy, vz, qw, qx, qy, qz, p, q, r, _ = y.tolist()
+    return StateFrame(time_us, (px, py, pz), (vx, vy, vz), (qw, qx, qy, qz), (p, q, r))

@@ -1,0 +1,100 @@
+"""A companion and a vehicle of `colibri sitl`, in memory and in lockstep: no sockets, no clock, and the same flight again."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.guidance.trajectories.loading import load_track
+from colibri.companion.guide import Companion
+from colibri.companion.settings import CompanionSettings
+from colibri.companion.supervision.phases import Phase
+from colibri.plant.vehicle.description import load_vehicle
+from colibri.sitl.backends.link_faults import Pipe, Trouble
+from colibri.sitl.session import Flights
+from colibri.sitl.vehicle import Sitl
+
+AHEAD_US = 7_654_321
+"""The companion's clock is ahead of the vehicle's by this."""
+NO_LAW_CLOCK = 0.0
+
+
+class Ride:
+    """A companion on a link of its own to a vehicle.
+
+    Attributes:
+        sitl: The vehicle.
+        companion: The companion.
+        trouble: What the link does; may be changed at any time.
+        sent: When and what the companion has sent, before the link.
+    """
+
+    def __init__(
+        self,
+        sitl: Sitl,
+        track: str = "spiral",
+        settings: CompanionSettings | None = None,
+        *,
+        trouble: Trouble | None = None,
+        seed: int = 0,
+        profile: str = "flight",
+    ) -> None:
+        self.sitl = sitl
+        loaded, vehicle = load_profile(profile), load_vehicle(sitl.setting.believed or sitl.setting.vehicle)
+        path = load_track(track, vehicle, loaded).track
+        settings = settings or CompanionSettings(may_arm=True)
+        self.companion = Companion(settings, loaded, vehicle, path, lambda: NO_LAW_CLOCK)
+        self.trouble = trouble or Trouble()
+        self._up, self._down = Pipe(self.trouble, f"{seed} up"), Pipe(self.trouble, f"{seed} down")
+        self._port = Port(sitl, self)
+        self.sent: list[tuple[int, bytes]] = []
+        self.history: list[tuple[float, Phase]] = []
+        self.frozen = False
+
+    @property
+    def now_us(self) -> int:
+        return self.sitl.time_us + AHEAD_US
+
+    def step(self) -> None:
+        """Fly one frame."""
+        now_us = self.now_us
+        for datagram in self._down.due(now_us):
+            self.companion.receive(datagram, now_us)
+        if not self.frozen:
+            for frame in self.companion.poll(now_us):
+                self.sent.append((now_us, frame))
+                self._up.put(frame, now_us)
+        if not self.history or self.history[-1][1] is not self.companion.phase:
+            self.history.append((self.sitl.time_s, self.companion.phase))
+        self._port.carry([datagram for datagram in self._up.due(now_us)])
+        self.sitl.step()
+
+    def arrive(self, datagram: bytes) -> None:
+        self._down.put(datagram, self.now_us)
+
+    def until(self, condition: Callable[[], object], within_s: float) -> None:
+        """Fly until something is so."""
+        ends_s = self.sitl.time_s + within_s
+        while not condition():
+            assert self.sitl.time_s < ends_s, (self.companion.phase, self.companion.said, self.companion.failing)
+            self.step()
+
+    def to_the_end(self, within_s: float) -> None:
+        """Fly until the companion has ended."""
+        self.until(lambda: self.companion.ended is not None, within_s)
+
+
+class Port:
+    """The vehicle's end of the link: a station without a voice of its own."""
+
+    def __init__(self, sitl: Sitl, ride: Ride) -> None:
+        self._station = sitl.client(250, 250, beats=False)
+        self._station.arriving = lambda datagram, _now_us: ride.arrive(datagram)  # type: ignore[method-assign]
+        self._waiting: list[bytes] = []
+        self._station.departing = lambda _now_us: self._take()  # type: ignore[method-assign]
+
+    def carry(self, datagrams: list[bytes]) -> None:
+        self._waiting.extend(datagrams)
+
+    def _take(self) -> list[bytes]:
+        taken, self._waiting = self._waiting, []
+        return taken
