@@ -25,6 +25,7 @@ from colibri.companion.steering import setpoints
 from colibri.companion.steering.law_pilot import Asked, LawPilot
 from colibri.companion.steering.predictor import Predictor
 from colibri.companion.steering.reference_history import PastReference, ReferenceHistory
+from colibri.companion.steering.smooth_start import smoothly_started
 from colibri.companion.supervision.checks import CheckFacts, failing
 from colibri.companion.supervision.conditions import Situation, conditions
 from colibri.companion.supervision.limits import Box, FlightFacts, Limit, exceeded
@@ -40,6 +41,8 @@ _BRAKES_US = 3_000_000
 _SLOW_M_S = 0.3
 _UP_M, _UP_M_S = 0.5, 0.3
 _TRACK_POINTS = 400
+_CORRECTED_IN = 0.5
+"""Round trips in which an error of the prediction is corrected."""
 _ENDLESS_S = 100.0
 
 
@@ -87,6 +90,7 @@ class Companion:
         self._settings, self._vehicle = settings, vehicle
         self.peer = VehiclePeer(settings.stack)
         self._response = settings.response or (settings.stack.response if settings.stack else _GUESSED)
+        track = smoothly_started(track)
         self._pilot = LawPilot(profile, vehicle, track, self._response, clock, law)
         self._predictor = Predictor(vehicle, self._response)
         self._history = ReferenceHistory()
@@ -161,10 +165,11 @@ class Companion:
             there = tuple(p + passed_s * v for p, v in zip(before.position_enu_m, before.velocity_enu_m_s, strict=True))
             self._jumped_m = dist(there, state.position_enu_m) if passed_s < 1.0 else 0.0
         self._newest = received
+        self._predictor.corrected_in_s = _CORRECTED_IN * self.peer.clock.round_trip_us * 1e-6
         self._predictor.observe(at_us, state)
         past = self._history.at(at_us)
-        if self.phase is Phase.FLYING and past is not None and past.on_track:
-            self.errors.add(past.track_s, past.position_enu_m, state.position_enu_m)
+        if self.phase is Phase.FLYING and past is not None and past.track_enu_m is not None:
+            self.errors.add(past.track_s, past.track_enu_m, state.position_enu_m)
 
     def _know_stack(self, parameters: dict[str, float]) -> None:
         stack = self.peer.stack
@@ -306,7 +311,7 @@ class Companion:
         if asked.reference is not None:
             self._asked = asked
             place = _first(asked.reference.position_enu_m)
-            self._history.add(PastReference(acts_us, place, asked.on_track, asked.track_s))
+            self._history.add(PastReference(acts_us, place, asked.track_enu_m, asked.track_s))
         if self.phase is Phase.TAKING_OVER and not rehearses:
             asked = asked._replace(rate_flu_rad_s=(0.0, 0.0, 0.0), thrust_n=self._weight_n)
         thrust = self._thrust.command(asked.thrust_n / (self._weight_n * self._predictor.thrust_scale))
@@ -385,7 +390,7 @@ class Companion:
         fallback = last.decision.diagnostics.fallback if last.decision else None
         euler = euler_from_quaternion(tuple(y[model.ATTITUDE].tolist()))
         numbers: tuple[Any, ...] = (
-            *(now_us * 1e-6, self.phase.value, int(last.on_track), last.track_s),
+            *(now_us * 1e-6, self.phase.value, int(last.track_enu_m is not None), last.track_s),
             *(self._age_s(now_us), self.peer.clock.round_trip_us * 1e-6),
             *(*place, *y[model.VELOCITY].tolist(), *euler, *y[model.RATE].tolist()),
             *(*wanted, *_first(reference.velocity_enu_m_s), float(reference.yaw_rad[0]), dist(place, wanted)),

@@ -49,7 +49,8 @@ class Orders:
         if stack is None:
             return False
         return any(
-            self._peer.orders.results.get(f"mode {mode.name}") == RESULT_ACCEPTED and self._peer.report.mode == mode.custom
+            self._peer.orders.results.get(f"mode {mode.name}") == RESULT_ACCEPTED
+            and self._peer.report.mode == mode.custom
             for mode in (stack.hold, stack.last_resort)
         )
 

@@ -5,6 +5,7 @@ has follow them, as those of the vehicle file would; they turn the vehicle of th
 rates that it would have then are what the stack is made to reach, by the exact inverse of its response.
 """
 
+from math import dist, hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,8 @@ from colibri.autopilot.control.vehicle_model.battery import open_voltage_v
 from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.sample_grid import instants
-from colibri.autopilot.guidance.tasks.position import HoldTask, TaskSequence, TrackTask, to_track
+from colibri.autopilot.guidance.tasks.orders import GoTo
+from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TaskSequence, TakeoffTask, TrackTask
 from colibri.autopilot.guidance.tasks.task import FlightTask, Motion, PlannedMotion, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.tracks import Track
@@ -36,7 +38,17 @@ APPROACH = Limits(
 """How fast a vehicle is led to the track."""
 _MAX_INTERVAL_US = 10_000
 """Setpoints are sent at 100 Hz and more, however seldom the law decides."""
+_THERE_M, _THERE_M_S = 0.002, 0.005
 _NO_DISTURBANCE = np.zeros(6)
+
+
+class ApproachTask(GoToTask):
+    """To the first point of the track, and there until the reference itself stands at it."""
+
+    def arrived(self, context: TaskContext) -> bool:
+        """Whether vehicle and reference are there."""
+        there = dist(context.place, self._place) < _THERE_M and hypot(*context.velocity) < _THERE_M_S
+        return there and super().arrived(context)
 
 
 class Asked(NamedTuple):
@@ -47,7 +59,7 @@ class Asked(NamedTuple):
         thrust_n: Of all rotors.
         reference: The references that it was given; None between two decisions.
         decision: The law's; None between two.
-        on_track: Whether the reference is the track's own, not on the way to it.
+        track_enu_m: Where the track has the vehicle; None on the way to it, and between two decisions.
         track_s: Time along the track; negative before it.
     """
 
@@ -55,7 +67,7 @@ class Asked(NamedTuple):
     thrust_n: float
     reference: Horizon | None
     decision: Decision | None
-    on_track: bool
+    track_enu_m: Vector | None
     track_s: float
 
 
@@ -95,7 +107,6 @@ class LawPilot:
         self._parts, self._tick = parts, 0
         self._rotors = np.full(4, vehicle.hover_speed)
         self._task: FlightTask = HoldTask()
-        self._last: tuple[Decision, bool] | None = None
         carried = np.zeros(motion.STATES)
         carried[6] = 1.0
         motion.carry(carried, np.ones(1), np.zeros((1, 4)), _NO_DISTURBANCE, 1.0, self._motion)
@@ -126,7 +137,14 @@ class LawPilot:
 
     def fly_track(self) -> None:
         """Go to the track from wherever the reference is, and along it."""
-        self._task = to_track(self._planner, self._track.duration_s)
+        first = self._planner.horizon(0)
+        x, y, z = first.position_enu_m[0].tolist()
+        yaw_rad = float(first.yaw_rad[0])
+        self._task = TaskSequence(
+            lambda context: TakeoffTask(z, None, context),
+            lambda context: ApproachTask(GoTo((x, y, z), yaw_rad), context),
+            lambda context: TrackTask(self._planner, self._track.duration_s, context.now_us),
+        )
 
     def hold(self) -> None:
         """Brake, and stay."""
@@ -152,11 +170,11 @@ class LawPilot:
         Raises:
             DecisionError: The law raised, or gave what no rotor can follow.
         """
-        decision, horizon, on_track = None, None, False
+        decision, horizon, place = None, None, None
         time_us = self._time_us
         if self._tick % self._parts == 0:
             state = self._loop.state(_frame(time_us, y))
-            horizon, on_track = self._references(time_us, state)
+            horizon, place = self._references(time_us, state)
             decision = self._loop.decide(time_us, state, horizon)
         speeds = np.array(self._loop.controls) * self._vehicle.rotors.max_speed
         x = np.concatenate((y[: model.LIFT], self._rotors))
@@ -170,7 +188,7 @@ class LawPilot:
         now, then = y[model.RATE].tolist(), after[motion.RATE].tolist()
         rate = model.rate_command(tuple(now), tuple(then), interval_s, self._response)
         self._tick += 1
-        return Asked(rate, thrust, horizon, decision, on_track, self._track_s(time_us))
+        return Asked(rate, thrust, horizon, decision, place, self._track_s(time_us))
 
     def _track_s(self, time_us: int) -> float:
         task = self._flown
@@ -181,7 +199,7 @@ class LawPilot:
         battery = self._vehicle.battery
         return 1.0 if battery is None else open_voltage_v(battery, self._loop.charge_ah)
 
-    def _references(self, time_us: int, state: VehicleState) -> tuple[Horizon, bool]:
+    def _references(self, time_us: int, state: VehicleState) -> tuple[Horizon, Vector | None]:
         generator = self._generator
         assert generator.reference is not None, "it was begun"
         context = TaskContext(
@@ -196,10 +214,10 @@ class LawPilot:
         wanted = self._task.update(context)
         assert isinstance(wanted, Motion | PlannedMotion), "no task of these asks for attitudes"
         horizon = generator.lead(context, wanted)
-        on_track = isinstance(wanted, PlannedMotion) and bool(
-            np.abs(horizon.position_enu_m[0] - wanted.horizon.position_enu_m[0]).max() < 1e-9
-        )
-        return horizon, on_track
+        if not isinstance(wanted, PlannedMotion):
+            return horizon, None
+        x, y, z = wanted.horizon.position_enu_m[0].tolist()
+        return horizon, (x, y, z)
 
 
 def _frame(time_us: int, y: Array) -> StateFrame:

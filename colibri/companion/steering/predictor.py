@@ -40,6 +40,9 @@ class Predictor:
     """Predicts one vehicle.
 
     Attributes:
+        corrected_in_s: In which an error of the prediction is corrected, as a time constant. The longer a state and a
+            command are on their way, the longer it must be: corrections at once, of what jitter and loss make of a
+            prediction, would be taken for motion, and answered too late.
         thrust_scale: Thrust that is made, in parts of the one that was meant.
         disturbance: Acceleration, ENU, m/s², and angular acceleration, FLU, rad/s², (6,).
     """
@@ -48,6 +51,7 @@ class Predictor:
         """Predict `vehicle`; what is compiled is loaded here."""
         self._gravity_m_s2 = vehicle.gravity_m_s2
         self.thrust_scale = 1.0
+        self.corrected_in_s = 0.0
         self.adopt(vehicle, response)
         self.begin()
         model.carry(np.ones(model.STATES), np.ones(1), np.zeros((1, model.COMMANDS)), self.disturbance, self._model)
@@ -84,7 +88,7 @@ class Predictor:
         else:
             expected = self._carried(known[1], known[0], at_us)
             y[model.LIFT] = expected[model.LIFT]
-            self._learn(y, expected, (at_us - known[0]) * 1e-6)
+            y = self._corrected(expected, y, (at_us - known[0]) * 1e-6)
         self._known = (at_us, y)
 
     def at(self, time_us: int) -> Array:
@@ -103,10 +107,19 @@ class Predictor:
         """When the last state was, by the own clock; None before the first."""
         return None if self._known is None else self._known[0]
 
-    def _learn(self, y: Array, expected: Array, passed_s: float) -> None:
-        missed = np.concatenate((y[model.VELOCITY] - expected[model.VELOCITY], y[model.RATE] - expected[model.RATE]))
+    def _corrected(self, expected: Array, measured: Array, passed_s: float) -> Array:
+        """Return the expected state corrected by a part of what was missed, of which the disturbance learns, too."""
+        part = 1.0 - exp(-passed_s / self.corrected_in_s) if self.corrected_in_s > 0.0 else 1.0
+        if float(expected[model.ATTITUDE] @ measured[model.ATTITUDE]) < 0.0:
+            measured[model.ATTITUDE] *= -1.0
+        missed = part * (measured - expected)
+        y: Array = expected + missed
+        y[model.ATTITUDE] /= np.linalg.norm(y[model.ATTITUDE])
+        self._learn(y, np.concatenate((missed[model.VELOCITY], _TURN_PART * missed[model.RATE])), passed_s)
+        return y
+
+    def _learn(self, y: Array, missed: Array, passed_s: float) -> None:
         part = 1.0 - exp(-_DISTURBANCE_1_S * passed_s)
-        missed[3:] *= _TURN_PART
         change = part * missed / passed_s
         self.disturbance = np.clip(self.disturbance + change, -_MAX_DISTURBANCE, _MAX_DISTURBANCE)
         if not self.learns:

@@ -9,11 +9,18 @@ _KEPT = 256
 
 
 class PastReference(NamedTuple):
-    """A reference: when it is to be reached, by the own clock, where, and whether it is of the track."""
+    """A reference.
+
+    Attributes:
+        at_us: When it is to be reached, by the own clock.
+        position_enu_m: Where.
+        track_enu_m: Where the track is then; None on the way to it.
+        track_s: Time along the track.
+    """
 
     at_us: int
     position_enu_m: Vector
-    on_track: bool
+    track_enu_m: Vector | None
     track_s: float
 
 
@@ -39,6 +46,13 @@ class ReferenceHistory:
             return None
         before, then = self._past[after - 1], self._past[after]
         part = (time_us - before.at_us) / (then.at_us - before.at_us)
-        x, y, z = (a + part * (b - a) for a, b in zip(before.position_enu_m, then.position_enu_m, strict=True))
         track_s = before.track_s + part * (then.track_s - before.track_s)
-        return PastReference(time_us, (x, y, z), before.on_track and then.on_track, track_s)
+        place = _between(before.position_enu_m, then.position_enu_m, part)
+        if before.track_enu_m is None or then.track_enu_m is None:
+            return PastReference(time_us, place, None, track_s)
+        return PastReference(time_us, place, _between(before.track_enu_m, then.track_enu_m, part), track_s)
+
+
+def _between(first: Vector, second: Vector, part: float) -> Vector:
+    x, y, z = (a + part * (b - a) for a, b in zip(first, second, strict=True))
+    return (x, y, z)
