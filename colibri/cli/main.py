@@ -38,6 +38,7 @@ SUBCOMMANDS = {
     "bench": "measure how fast it flies",
     "plot": "draw the figures of a flight, however it ended",
     "show": "print the file of a profile or vehicle, to copy and change",
+    "companion": "fly a vehicle of PX4, ArduPilot or Colibri as its offboard companion",
     "vehicle": "write a vehicle as parameters of PX4 or ArduPilot",
     "replay": "feed a recorded flight to the autopilot: are its answers the same?",
     "verify": "fly a fixed set of flights: is every bit the same, twice, or as it once was?",
@@ -47,6 +48,7 @@ _ROOMS = (
     dict.fromkeys(("campaign", "compare", "study", "figures"), "campaigns")
     | dict.fromkeys(("certify", "check-controller"), "laws")
     | dict.fromkeys(("show", "vehicle"), "descriptions")
+    | dict.fromkeys(("companion",), "vehicles")
 )
 _NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 

@@ -128,6 +128,17 @@ class Companion:
         """What fails of the checks, and what to do about it."""
         return self._failing
 
+    @property
+    def waits_for(self) -> list[str]:
+        """What it waits for before it flies, a line each."""
+        if self.phase is Phase.CONNECTING:
+            return ["waits for a HEARTBEAT"] if self.peer.system == 0 else ["waits for its parameters"]
+        if self.phase is not Phase.CHECKING:
+            return []
+        if self._failing or self._settings.dry_run or self._settings.may_arm:
+            return self._failing
+        return ["all is checked: waits for a vehicle that flies, in a mode that holds or takes setpoints"]
+
     def stop(self, why: str) -> None:
         """End the flight: hand over, or never begin."""
         if not self._stopped:

@@ -1,8 +1,10 @@
 """What a companion remembers of its flight: a row for each setpoint."""
 
-from math import dist, nan, sqrt
+from collections import Counter
+from math import acos, cos, dist, nan, sqrt
 from typing import NamedTuple
 
+from colibri.autopilot.control.interface import FALLBACK_CODES, Fallback
 from colibri.common.types import Vector
 
 
@@ -95,3 +97,44 @@ class TrackErrors:
     def flown_s(self) -> float:
         """Time along the track at the last."""
         return self._of[-1][0] if self._of else 0.0
+
+
+class FlightSummary:
+    """What the rows of a flight come to.
+
+    Attributes:
+        sent: How many setpoints were sent.
+        first_s, last_s: When, of the first and last row.
+        max_tilt_rad: The largest tilt.
+        max_age_s: Of the newest state, the largest while it flew.
+        fallbacks: How many rows each fallback decided.
+        phases: How long each phase sent setpoints, s.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a row."""
+        self.sent = 0
+        self.first_s = self.last_s = 0.0
+        self.max_tilt_rad = self.max_age_s = 0.0
+        self.fallbacks: Counter[Fallback] = Counter()
+        self.phases: dict[str, float] = {}
+        self._rows = 0
+
+    @property
+    def rate_hz(self) -> float:
+        """How many setpoints were made a second."""
+        return (self._rows - 1) / (self.last_s - self.first_s) if self.last_s > self.first_s else nan
+
+    def add(self, row: LogRow) -> None:
+        """Add a row."""
+        self._rows += 1
+        self.sent += row.sent
+        if self._rows == 1:
+            self.first_s = self.last_s = row.t
+        self.phases[row.phase] = self.phases.get(row.phase, 0.0) + row.t - self.last_s
+        self.last_s = row.t
+        self.max_tilt_rad = max(self.max_tilt_rad, acos(min(max(cos(row.phi) * cos(row.theta), -1.0), 1.0)))
+        self.max_age_s = max(self.max_age_s, row.state_age_s)
+        for fallback, code in FALLBACK_CODES.items():
+            if fallback is not None and code == row.fallback:
+                self.fallbacks[fallback] += 1

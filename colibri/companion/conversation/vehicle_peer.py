@@ -21,6 +21,7 @@ from colibri.mavlink.wire.dialect import (
     definition_of,
     mav,
 )
+from colibri.mavlink.wire.signing import Signing
 
 OWN_SYSTEM, OWN_COMPONENT = 1, mav.MAV_COMP_ID_ONBOARD_COMPUTER
 _HEARTBEAT_EVERY_US = 500_000
@@ -60,7 +61,8 @@ class VehiclePeer:
         self.stack = stack
         self.system = 0
         self.parameters: ParameterReader | None = None
-        self._told = stack
+        self._signing: Signing | None = None
+        self._now_us = 0
         self._states = StateAssembler()
         self._questions = CommandQueue()
         self._heartbeat_at_us: int | None = None
@@ -90,10 +92,18 @@ class VehiclePeer:
         delays = sorted(self._delays_us)
         return 1e-6 * delays[len(delays) // 2] if delays else 0.0
 
+    def sign_with(self, signing: Signing | None) -> None:
+        """Sign what is sent, and drop what is not signed with the same key; None: neither."""
+        self._signing = signing
+        self.codec.seal = None if signing is None else lambda frame: signing.sign(frame, 0, self._now_us)
+
     def receive(self, datagram: bytes, now_us: int) -> list[ReceivedState]:
         """Take in what came; return the states in it."""
         received = []
+        self._now_us = now_us
         for message in self.codec.decode(datagram):
+            if self._signing is not None and self._signing.refusal(message.name, message.frame, now_us) is not None:
+                continue
             if message.source[1] != AUTOPILOT_COMPONENT or not self._is_vehicle(message):
                 continue
             state = self._take(message, now_us)
@@ -103,6 +113,7 @@ class VehiclePeer:
 
     def poll(self, now_us: int) -> list[bytes]:
         """Return what is due: heartbeats, requests, commands."""
+        self._now_us = now_us
         frames = []
         if self._heartbeat_at_us is None or now_us >= self._heartbeat_at_us:
             self._heartbeat_at_us = now_us + _HEARTBEAT_EVERY_US

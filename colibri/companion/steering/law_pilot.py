@@ -21,7 +21,7 @@ from colibri.autopilot.guidance.behaviour import Behaviour
 from colibri.autopilot.guidance.integrator_chain import Limits
 from colibri.autopilot.guidance.sample_grid import instants
 from colibri.autopilot.guidance.tasks.orders import GoTo
-from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TaskSequence, TakeoffTask, TrackTask
+from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask, TaskSequence, TrackTask
 from colibri.autopilot.guidance.tasks.task import FlightTask, Motion, PlannedMotion, TaskContext
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.tracks import Track

@@ -1,7 +1,6 @@
-"""A companion and a vehicle of `colibri sitl`, in memory and in lockstep: no sockets, no clock, and the same flight again."""
+"""A companion and a vehicle of `colibri sitl`, in memory and in lockstep: no sockets, no clock, the same flight again."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.guidance.trajectories.loading import load_track
@@ -10,7 +9,6 @@ from colibri.companion.settings import CompanionSettings
 from colibri.companion.supervision.phases import Phase
 from colibri.plant.vehicle.description import load_vehicle
 from colibri.sitl.backends.link_faults import Pipe, Trouble
-from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
 
 AHEAD_US = 7_654_321
@@ -87,14 +85,20 @@ class Port:
     """The vehicle's end of the link: a station without a voice of its own."""
 
     def __init__(self, sitl: Sitl, ride: Ride) -> None:
-        self._station = sitl.client(250, 250, beats=False)
-        self._station.arriving = lambda datagram, _now_us: ride.arrive(datagram)  # type: ignore[method-assign]
+        station = sitl.client(250, 250, beats=False)
+        self._ride = ride
         self._waiting: list[bytes] = []
-        self._station.departing = lambda _now_us: self._take()  # type: ignore[method-assign]
+        station.arriving = self._arriving  # type: ignore[method-assign]
+        station.departing = self._departing  # type: ignore[method-assign]
 
     def carry(self, datagrams: list[bytes]) -> None:
         self._waiting.extend(datagrams)
 
-    def _take(self) -> list[bytes]:
+    def _arriving(self, datagram: bytes, now_us: int) -> None:
+        del now_us
+        self._ride.arrive(datagram)
+
+    def _departing(self, now_us: int) -> list[bytes]:
+        del now_us
         taken, self._waiting = self._waiting, []
         return taken
