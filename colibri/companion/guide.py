@@ -15,6 +15,7 @@ from colibri.autopilot.guidance.trajectories.tracks import Track, position
 from colibri.common.rotations import euler_from_quaternion, tilt_deg
 from colibri.common.types import Array, Vector
 from colibri.companion.conversation.vehicle_peer import ReceivedState, VehiclePeer
+from colibri.companion.identification import steps
 from colibri.companion.log import LogRow, TrackErrors
 from colibri.companion.orders import Orders
 from colibri.companion.settings import CompanionSettings, SetpointKind
@@ -68,6 +69,7 @@ class Companion:
         errors: On the track, by the vehicle's own estimate.
         said: What is to be told, a line each; whoever reads it clears it.
         rows: The log; whoever writes it clears it.
+        commanded, measured: Of an identification: times, s, and body rates, rad/s.
         limit: The limit that ended the flight; None for none.
     """
 
@@ -93,6 +95,7 @@ class Companion:
         track = smoothly_started(track)
         self._pilot = LawPilot(profile, vehicle, track, self._response, clock, law)
         self._predictor = Predictor(vehicle, self._response)
+        self._predictor.thrust_scale = settings.thrust_scale
         self._history = ReferenceHistory()
         self._orders = Orders(self.peer, settings, self._pilot.start_enu_m[2])
         self._box = _box_of(track, settings)
@@ -112,6 +115,8 @@ class Companion:
         self.errors = TrackErrors()
         self.said: list[str] = []
         self.rows: list[LogRow] = []
+        self.commanded: list[tuple[float, float, float, float]] = []
+        self.measured: list[tuple[float, float, float, float]] = []
 
     @property
     def interval_us(self) -> int:
@@ -178,6 +183,8 @@ class Companion:
         self._newest = received
         self._predictor.corrected_in_s = _CORRECTED_IN * self.peer.clock.round_trip_us * 1e-6
         self._predictor.observe(at_us, state)
+        if self._settings.identifies and self._on_way:
+            self.measured.append((at_us * 1e-6, *state.rate_flu_rad_s))
         past = self._history.at(at_us)
         if self.phase is Phase.FLYING and past is not None and past.track_enu_m is not None:
             self.errors.add(past.track_s, past.track_enu_m, state.position_enu_m)
@@ -224,7 +231,7 @@ class Companion:
             phase=self.phase,
             stack=stack,
             in_phase_s=(now_us - self._since_us) * 1e-6,
-            gives_up_s=self._settings.gives_up_s,
+            gives_up_s=inf if self._settings.dry_run else self._settings.gives_up_s,
             mode=report.mode,
             modes=self._orders.own_modes(self.phase),
             failing=len(self._failing) + self._settings.dry_run,
@@ -251,7 +258,13 @@ class Companion:
             return (now_us - self._since_us) * 1e-6 >= self._settings.duration_s
         if not self._on_way or self._asked is None:
             return False
+        if self._settings.identifies:
+            return self._identified_s(now_us) >= steps.duration_s()
         return self._pilot.finished or self._asked.track_s >= self._settings.duration_s
+
+    def _identified_s(self, now_us: int) -> float:
+        """Return the time since the steps of an identification began, s."""
+        return (now_us - self._since_us - _STEADY_US) * 1e-6
 
     def _enter(self, phase: Phase, why: Condition, now_us: int) -> None:
         before, self.phase, self._since_us = self.phase, phase, now_us
@@ -311,8 +324,9 @@ class Companion:
         if rehearses or self.phase is Phase.TAKING_OVER:
             self._pilot.begin(self._predictor.at(acts_us))
         if self.phase is Phase.FLYING and not self._on_way and now_us - self._since_us >= _STEADY_US:
-            self._pilot.fly_track()
             self._on_way = True
+            if not self._settings.identifies:
+                self._pilot.fly_track()
         y = self._predictor.at(acts_us)
         try:
             asked = self._pilot.step(y)
@@ -325,6 +339,8 @@ class Companion:
             self._history.add(PastReference(acts_us, place, asked.track_enu_m, asked.track_s))
         if self.phase is Phase.TAKING_OVER and not rehearses:
             asked = asked._replace(rate_flu_rad_s=(0.0, 0.0, 0.0), thrust_n=self._weight_n)
+        if self.phase is Phase.FLYING and self._on_way and self._settings.identifies:
+            asked = self._with_step(asked, now_us)
         thrust = self._thrust.command(asked.thrust_n / (self._weight_n * self._predictor.thrust_scale))
         if flies:
             lift = (
@@ -336,6 +352,12 @@ class Companion:
             return []
         name, fields = self._encoded(now_us, asked, thrust, y)
         return [self.peer.codec.encode(name, *fields)]
+
+    def _with_step(self, asked: Asked, now_us: int) -> Asked:
+        """Return what is asked with a step of the identification added, and note both."""
+        p, q, r = (a + b for a, b in zip(asked.rate_flu_rad_s, steps.step_at(self._identified_s(now_us)), strict=True))
+        self.commanded.append(((now_us + self.peer.clock.round_trip_us // 2) * 1e-6, p, q, r))
+        return asked._replace(rate_flu_rad_s=(p, q, r))
 
     def _encoded(self, now_us: int, asked: Asked, thrust: float, y: Array) -> setpoints.Encoded:
         kind, target, last = self._settings.setpoints, self.peer.target, self._asked

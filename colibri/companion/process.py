@@ -29,8 +29,9 @@ from colibri.mavlink.links.open import check_reach, open_ground_link
 from colibri.mavlink.wire.signing import Signing, SigningError, parse_key, tick_at
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 
-LOG, REPORT = "companion.csv", "report.json"
+LOG, REPORT, RESPONSE, FIGURE = "companion.csv", "report.json", "companion.toml", "identification.png"
 _POLL_S = 0.002
+_IDENTIFIES_AT_M = 3.0
 _SAY_FAILING_EVERY_S = 5.0
 
 
@@ -52,7 +53,8 @@ def plan_of(args: Namespace) -> Plan:
     """
     profile = load_profile(args.profile).with_choices(args.controller, None)
     vehicle = load_vehicle(args.model or profile.simulation.vehicle)
-    track, note = load_track(args.track, vehicle, profile)
+    track, note = load_track(_track_name(args), vehicle, profile)
+    response, thrust_scale = read_response(Path(args.response)) if args.response else (None, 1.0)
     if args.arm and args.dry_run:
         raise CompanionError("--dry-run arms nothing: leave --arm out")
     settings = CompanionSettings(
@@ -61,12 +63,34 @@ def plan_of(args: Namespace) -> Plan:
         duration_s=args.duration,
         takeoff_height_m=args.height,
         gives_up_s=args.wait,
-        limits=FlightLimits(margin_m=args.margin, max_tilt_deg=args.max_tilt, max_error_m=args.max_error),
+        limits=FlightLimits(
+            margin_m=args.margin,
+            max_tilt_deg=args.max_tilt,
+            max_error_m=args.max_error,
+            max_state_age_s=1e-3 * args.max_age,
+        ),
         setpoints=SetpointKind(args.setpoints),
         stack=STACKS[args.stack] if args.stack else None,
-        response=read_response(Path(args.response)) if args.response else None,
+        response=response,
+        identifies=args.identify,
+        thrust_scale=thrust_scale,
     )
     return Plan(settings, profile, vehicle, track, note)
+
+
+def _track_name(args: Namespace) -> str:
+    """Return the name of the track; one that identifies hovers.
+
+    Raises:
+        CompanionError: There is none.
+    """
+    if args.identify:
+        if args.track or args.dry_run:
+            raise CompanionError("--identify hovers and sends steps: leave TRACK and --dry-run out")
+        return f"hover:height={args.height or _IDENTIFIES_AT_M:g}"
+    if args.track is None:
+        raise CompanionError("name a TRACK to fly, or --identify")
+    return str(args.track)
 
 
 def fly(args: Namespace) -> int:
@@ -95,6 +119,8 @@ def fly(args: Namespace) -> int:
         given = _given(args, plan)
         figures = report(companion, summary, given)
         write_report(figures, args.out / REPORT)
+        if plan.settings.identifies and companion.ended is not None and companion.ended.in_order:
+            _identify(companion, status, args.out)
     return _end(companion, figures, status, args.out)
 
 
@@ -172,9 +198,24 @@ def _signing(path: Path | None) -> Signing | None:
         raise CompanionError(f"--signing-key {path}: {error}") from error
 
 
+def _identify(companion: Companion, status: Status, out: Path) -> None:
+    """Fit the response to what was flown, and write it."""
+    from colibri.companion.identification.figure import draw
+    from colibri.companion.identified import identified
+
+    try:
+        found, text, fitted = identified(companion)
+    except Error as error:
+        fail(f"{error}; what was logged is in {out}", EXIT_FAILED)
+    (out / RESPONSE).write_text(text, encoding="utf-8")
+    draw(fitted, out / FIGURE)
+    lags = ", ".join(f"{1e3 * lag_s:.0f}" for lag_s in found.time_constant_s)
+    status.say("identified", f"time constants {lags} ms after {1e3 * found.latency_s:.0f} ms: {out / RESPONSE}")
+
+
 def _given(args: Namespace, plan: Plan) -> dict[str, Any]:
     return {
-        "track": args.track,
+        "track": args.track or "identification",
         "track_note": plan.note,
         "profile": plan.profile.name,
         "controller": plan.profile.controller,

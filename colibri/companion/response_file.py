@@ -10,6 +10,7 @@ from colibri.companion.errors import CompanionError
 from colibri.companion.stacks.stack import Response
 
 TimeConstant: TypeAlias = Annotated[float, msgspec.Meta(ge=0.005, le=1.0)]
+Scale: TypeAlias = Annotated[float, msgspec.Meta(ge=0.5, le=1.8)]
 Latency: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.2)]
 
 
@@ -20,10 +21,12 @@ class ResponseFile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
     latency_s: Latency
     thrust_lag_s: NotNegative
     max_rate_rad_s: tuple[Positive, Positive, Positive]
+    thrust_scale: Scale = 1.0
+    """Thrust that was made, in parts of the one that the vehicle's parameters mean."""
 
 
-def read_response(path: Path) -> Response:
-    """Read the response of a file.
+def read_response(path: Path) -> tuple[Response, float]:
+    """Read the response of a file, and its scale of thrust.
 
     Raises:
         CompanionError: It cannot be read, or has a missing, unknown or impossible key.
@@ -35,13 +38,14 @@ def read_response(path: Path) -> Response:
         raise CompanionError(f"{path}: {getattr(error, 'strerror', error)}") from error
     except msgspec.MsgspecError as error:
         raise CompanionError(f"{path}: {error}") from error
-    return Response(found.time_constant_s, found.latency_s, found.thrust_lag_s, found.max_rate_rad_s)
+    response = Response(found.time_constant_s, found.latency_s, found.thrust_lag_s, found.max_rate_rad_s)
+    return response, found.thrust_scale
 
 
-def response_text(response: Response, remarks: list[str]) -> str:
+def response_text(response: Response, thrust_scale: float, remarks: list[str]) -> str:
     """Return what is in the file of a response, with remarks above it."""
     lines = [f"# {remark}" for remark in remarks]
-    for name, value in response._asdict().items():
+    for name, value in (response._asdict() | {"thrust_scale": thrust_scale}).items():
         values = [f"{part:.4g}" for part in value] if isinstance(value, tuple) else None
         lines.append(f"{name} = [{', '.join(values)}]" if values else f"{name} = {float(value):.4g}")
     return "\n".join(lines) + "\n"

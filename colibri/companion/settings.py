@@ -30,6 +30,8 @@ class CompanionSettings:
         limits: Of the flight.
         setpoints: What is sent.
         stack: The vehicle's; None for the one that it says.
+        identifies: Whether it flies the steps of an identification in place of the track.
+        thrust_scale: Thrust that is made, in parts of the one that the vehicle's parameters mean, to begin with.
         response: Of its rates; None for what the stack assumes.
     """
 
@@ -42,3 +44,5 @@ class CompanionSettings:
     setpoints: SetpointKind = SetpointKind.RATES
     stack: Stack | None = None
     response: Response | None = None
+    identifies: bool = False
+    thrust_scale: float = 1.0

@@ -12,7 +12,7 @@ from colibri.experiments.options import TRACK_HELP
 def add_options(parser: ArgumentParser) -> None:
     """Add the options of `colibri companion`."""
     add = parser.add_argument
-    add("track", metavar="TRACK", help=f"{TRACK_HELP}; or the file of a mission: .plan of QGroundControl")
+    add("track", metavar="TRACK", nargs="?", help=f"{TRACK_HELP}; or the file of a mission: .plan of QGroundControl")
     add(
         "--vehicle",
         required=True,
@@ -43,6 +43,13 @@ def add_options(parser: ArgumentParser) -> None:
     add("--margin", type=positive, default=3.0, metavar="M", help="of the box around the track (default %(default)g)")
     add("--max-tilt", type=positive, default=50.0, metavar="DEG", help="ends the flight (default %(default)g)")
     add("--max-error", type=positive, default=1.5, metavar="M", help="from the reference (default %(default)g)")
+    add(
+        "--max-age",
+        type=positive,
+        default=100.0,
+        metavar="MS",
+        help="of the newest state; ends the flight (default %(default)g)",
+    )
     add_signing(add)
     add_out(add, "out/companion", "logs and report")
 

@@ -1,7 +1,8 @@
 """The vehicle's clock by TIMESYNC: its offset, and how long messages are on their way.
 
 Of the exchanges of the last seconds the one that was quickest tells the offset: what delayed the others was jitter,
-which is all in one of their two ways (the clock filter of RFC 5905, section 10). https://mavlink.io/en/services/timesync.html
+which is all in one of their two ways (the clock filter of RFC 5905, section 10). An older one must have been so much
+quicker as the clocks may have drifted apart since. https://mavlink.io/en/services/timesync.html
 """
 
 from collections import deque
@@ -13,7 +14,9 @@ WINDOW_US = 10_000_000
 ENOUGH = 5
 _EVERY_US = 100_000
 _RESET_AFTER = 3
-_RESET_US = 20_000
+_RESET_US = 10_000
+_DRIFT = 0.002
+"""By which clocks may differ: a simulator's is not a quartz."""
 
 
 class Exchange(NamedTuple):
@@ -77,7 +80,7 @@ class VehicleClock:
         self._exchanges.append(exchange)
         while self._exchanges[0].received_us < now_us - WINDOW_US:
             self._exchanges.popleft()
-        self._best = min(self._exchanges, key=lambda it: it.round_trip_us)
+        self._best = min(self._exchanges, key=lambda it: 0.5 * it.round_trip_us + _DRIFT * (now_us - it.received_us))
 
     def _contradicts(self, exchange: Exchange) -> bool:
         """Whether no delays explain an exchange beside the best: the vehicle was started again."""

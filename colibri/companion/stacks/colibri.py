@@ -6,9 +6,8 @@ from colibri.companion.stacks.thrust_curve import MiddleHovers
 from colibri.mavlink.wire.dialect import mav
 from colibri.plant.vehicle.description import Vehicle
 
-_TILT_1_S, _YAW_1_S = 28.0, 8.0
-"""How fast the generator has rates follow commands: twice its frequencies, `autopilot/guidance/attitude_reference.py`.
-"""
+_IDENTIFIED = Response((0.023, 0.023, 0.115), 0.022, 0.0, (4.0, 4.0, 2.0))
+"""As --identify finds it with profile `flight`, of any airframe: its generator of demands slews, its law follows."""
 
 
 def _thrust(parameters: Parameters, vehicle: Vehicle) -> MiddleHovers:
@@ -37,7 +36,7 @@ COLIBRI = Stack(
     rules=(),
     fence=("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"),
     thrust=_thrust,
-    response=Response((1.0 / _TILT_1_S, 1.0 / _TILT_1_S, 1.0 / _YAW_1_S), 0.006, 0.0, (4.0, 4.0, 2.0)),
+    response=_IDENTIFIED,
     take_off=TakeOff.COMMAND_THEN_ARM,
     integers_by_bits=True,
 )

@@ -64,6 +64,7 @@ TABLE: tuple[Row, ...] = (
     Row((*_CLIMBS, *_FLIES), Condition.STOPPED, Phase.HANDING_OVER),
     Row((Phase.TAKING_OFF, *_FLIES), Condition.MUST_END, Phase.HANDING_OVER),
     Row((Phase.CONNECTING,), Condition.CONNECTED, Phase.CHECKING),
+    Row((Phase.CHECKING,), Condition.FINISHED, Phase.ENDED),
     Row((Phase.CHECKING,), Condition.CHECKED_IN_AIR, Phase.TAKING_OVER),
     Row((Phase.CHECKING,), Condition.CHECKED_TO_ARM, Phase.ARMING),
     Row((Phase.ARMING,), Condition.ARMED, Phase.TAKING_OFF),

@@ -1,19 +1,41 @@
-"""A companion and a vehicle of `colibri sitl`, in memory and in lockstep: no sockets, no clock, the same flight again."""
+"""A companion and a vehicle of `colibri sitl`, in memory and in lockstep: no sockets, no clock."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
+from colibri.autopilot.control.interface import Clock, Controller
 from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.guidance.trajectories.loading import load_track
 from colibri.companion.guide import Companion
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.supervision.phases import Phase
-from colibri.plant.vehicle.description import load_vehicle
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.vehicle import Sitl
 
 AHEAD_US = 7_654_321
 """The companion's clock is ahead of the vehicle's by this."""
 NO_LAW_CLOCK = 0.0
+
+
+class Mutinous:
+    """The law of profile `flight`, until it raises."""
+
+    def __init__(self) -> None:
+        self.raises = False
+
+    def __call__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> Controller[Any]:
+        law = load_controller(load_profile("flight").controller)(table, vehicle, clock)
+        step = law.step
+
+        def mutinous(*args: Any) -> Any:
+            if self.raises:
+                raise ArithmeticError("no more")
+            return step(*args)
+
+        law.step = mutinous  # type: ignore[method-assign, assignment]
+        return law
 
 
 class Ride:
@@ -23,6 +45,7 @@ class Ride:
         sitl: The vehicle.
         companion: The companion.
         trouble: What the link does; may be changed at any time.
+        law: The control law.
         sent: When and what the companion has sent, before the link.
     """
 
@@ -40,7 +63,9 @@ class Ride:
         loaded, vehicle = load_profile(profile), load_vehicle(sitl.setting.believed or sitl.setting.vehicle)
         path = load_track(track, vehicle, loaded).track
         settings = settings or CompanionSettings(may_arm=True)
-        self.companion = Companion(settings, loaded, vehicle, path, lambda: NO_LAW_CLOCK)
+        self.law = Mutinous()
+        law = self.law if profile == "flight" else None
+        self.companion = Companion(settings, loaded, vehicle, path, lambda: NO_LAW_CLOCK, law)
         self.trouble = trouble or Trouble()
         self._up, self._down = Pipe(self.trouble, f"{seed} up"), Pipe(self.trouble, f"{seed} down")
         self._port = Port(sitl, self)
