@@ -249,6 +249,8 @@ class Companion:
     def _is_up(self) -> bool:
         if self._newest is None or not self.peer.report.armed:
             return False
+        if not self._orders.climbed:
+            return False
         state = self._newest.state
         off_m = abs(state.position_enu_m[2] - self._orders.height_enu_m)
         return off_m < _UP_M and abs(state.velocity_enu_m_s[2]) < _UP_M_S

@@ -12,6 +12,7 @@ from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, mav
 _STREAMS_FIRST_US = 1_000_000
 """So long setpoints are streamed before the mode is asked for, as PX4 wants it."""
 _HOLD_TRIES = 3
+_AGAIN_US = 400_000
 _ABOVE_SEA = -1.0
 """A pitch, as QGroundControl sends it with a height above the sea; PX4 passes over it."""
 _LEAST_HEIGHT_M = 1.0
@@ -33,7 +34,7 @@ class Orders:
         self._before = -1
         self._reached = False
         self._own: frozenset[int] = frozenset()
-        self._asked_hold = 0
+        self._asked_hold = self._again_us = 0
         self._disarming = False
         self.refused = ""
 
@@ -41,6 +42,14 @@ class Orders:
     def disarms(self) -> bool:
         """Whether a command to disarm is on its way, which must not be left there."""
         return self._disarming and "disarm" not in self._peer.orders.results
+
+    @property
+    def climbed(self) -> bool:
+        """Whether the take-off itself is over: a stack that has a mode for it has left that for hold."""
+        stack = self._peer.stack
+        return stack is not None and (
+            stack.take_off is TakeOff.ARM_THEN_COMMAND or self._peer.report.mode == stack.hold.custom
+        )
 
     @property
     def held(self) -> bool:
@@ -59,6 +68,7 @@ class Orders:
         stack = self._peer.stack
         if stack is None:
             return
+        self._again_us = 0
         self._before, self._reached = self._peer.report.mode, False
         if phase in (Phase.ARMING, Phase.TAKING_OFF):
             self._own = stack.steady | {stack.offboard.custom}
@@ -90,14 +100,14 @@ class Orders:
         elif phase is Phase.TAKING_OFF and stack.take_off is TakeOff.ARM_THEN_COMMAND:
             self._once("take-off", mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, 0.0, 0.0, self._climb_m)
         elif phase is Phase.TAKING_OVER and in_phase_us >= _STREAMS_FIRST_US:
-            self._mode(stack.offboard)
+            self._mode(stack.offboard, in_phase_us)
         elif phase is Phase.HANDING_OVER and ready and self._peer.report.armed:
             last_try = self._asked_hold >= _HOLD_TRIES
             wanted = stack.last_resort if last_try else stack.hold
             name = f"mode {wanted.name}"
             if results.get(name) not in (None, RESULT_ACCEPTED):
                 self._asked_hold += 1
-            self._mode(wanted)
+            self._mode(wanted, in_phase_us)
 
     def _arm(self, take_off: TakeOff) -> None:
         stack, results = self._peer.stack, self._peer.orders.results
@@ -121,9 +131,12 @@ class Orders:
         self._climb_m = max(climb_m, _LEAST_HEIGHT_M)
         self.height_enu_m = ground_enu_m + self._climb_m
 
-    def _mode(self, mode: ModeNumber) -> None:
+    def _mode(self, mode: ModeNumber, in_phase_us: int) -> None:
+        """Order a mode, and again after a while if it was refused, or taken and yet is not reported."""
         name = f"mode {mode.name}"
-        if self._peer.orders.results.get(name) != RESULT_ACCEPTED or self._peer.report.mode != mode.custom:
+        taken = self._peer.orders.results.get(name) == RESULT_ACCEPTED and self._peer.report.mode == mode.custom
+        if not taken and in_phase_us >= self._again_us:
+            self._again_us = in_phase_us + _AGAIN_US
             self._peer.orders.ask(name, mav.MAV_CMD_DO_SET_MODE, *mode.command)
 
     def _once(self, name: str, number: int, *params: float) -> None:

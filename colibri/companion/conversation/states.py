@@ -13,7 +13,7 @@ _ODOMETRY_STAYS_US = 500_000
 """After so long without ODOMETRY the other messages count."""
 _PAIRED_US = 60_000
 """A position older than this beside an attitude is none."""
-_EARTH_FRAMES = frozenset({mav.MAV_FRAME_LOCAL_NED, mav.MAV_FRAME_LOCAL_FRD})
+_EARTH: int = mav.MAV_FRAME_LOCAL_NED
 
 HANDLES = frozenset({"ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSITION_NED"})
 
@@ -96,11 +96,11 @@ class StateAssembler:
 
 def _of_odometry(fields: Any) -> TimedState | None:
     """Return the state of an ODOMETRY; None of one whose frames are no vehicle's in its local frame."""
-    if fields.frame_id not in _EARTH_FRAMES:
+    if fields.frame_id != _EARTH:
         return None
     attitude = _unit(ned_frd_from_enu_flu(tuple(fields.q)))
     wire = (fields.vx, fields.vy, fields.vz)
-    by_earth = fields.child_frame_id in _EARTH_FRAMES
+    by_earth = fields.child_frame_id == _EARTH
     velocity = ned_from_enu(wire) if by_earth else earth_from_body(attitude, frd_from_flu(wire))
     rate = frd_from_flu((fields.rollspeed, fields.pitchspeed, fields.yawspeed))
     return TimedState(fields.time_usec, ned_from_enu((fields.x, fields.y, fields.z)), velocity, attitude, rate)

@@ -14,6 +14,7 @@ _ESTIMATES = bits("ESTIMATOR_", "ATTITUDE VELOCITY_HORIZ VELOCITY_VERT")
 _PLACES = bits("ESTIMATOR_", "POS_HORIZ_REL POS_HORIZ_ABS")
 _HEIGHTS = bits("ESTIMATOR_", "POS_VERT_ABS POS_VERT_AGL")
 _PREARM: int = mav.MAV_SYS_STATUS_PREARM_CHECK
+_AHRS: int = mav.MAV_SYS_STATUS_AHRS
 _FENCE: int = mav.MAV_SYS_STATUS_GEOFENCE
 _PERCENT = 100.0
 _MM = 1e-3
@@ -56,6 +57,7 @@ class VehicleReport:
         self.altitude_amsl_m = nan
         self.texts: list[str] = []
         self._sequence: int | None = None
+        self._tells_estimates = False
 
     @property
     def airborne(self) -> bool | None:
@@ -85,8 +87,8 @@ class VehicleReport:
             case "BATTERY_STATUS":
                 if fields.battery_remaining >= 0:
                     self.battery = fields.battery_remaining / _PERCENT
-            case "ESTIMATOR_STATUS" | "EKF_STATUS_REPORT":  # the flags of both begin alike
-                flags = fields.flags
+            case "ESTIMATOR_STATUS":
+                self._tells_estimates, flags = True, fields.flags
                 self.estimator_ok = (
                     flags & _ESTIMATES == _ESTIMATES and bool(flags & _PLACES) and bool(flags & _HEIGHTS)
                 )
@@ -110,6 +112,8 @@ class VehicleReport:
     def _take_status(self, fields: Any) -> None:
         if fields.onboard_control_sensors_present & _PREARM:
             self.prearm_ok = bool(fields.onboard_control_sensors_health & _PREARM)
+        if not self._tells_estimates and fields.onboard_control_sensors_present & _AHRS:
+            self.estimator_ok = bool(fields.onboard_control_sensors_health & _AHRS)
         watched = fields.onboard_control_sensors_enabled & _FENCE
         self.fence_breached = bool(watched) and not fields.onboard_control_sensors_health & _FENCE
         if fields.battery_remaining >= 0:

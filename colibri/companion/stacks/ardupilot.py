@@ -47,7 +47,6 @@ ARDUPILOT = Stack(
         "HEARTBEAT": 25.0,
         "EXTENDED_SYS_STATE": 5.0,
         "SYS_STATUS": 5.0,
-        "EKF_STATUS_REPORT": 5.0,
         "BATTERY_STATUS": 1.0,
         "GLOBAL_POSITION_INT": 5.0,
     },

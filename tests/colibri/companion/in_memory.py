@@ -1,7 +1,7 @@
 """A companion and a vehicle of `colibri sitl`, in memory and in lockstep: no sockets, no clock."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from colibri.autopilot.control.interface import Clock, Controller
 from colibri.autopilot.control.profile import load_profile
@@ -13,6 +13,7 @@ from colibri.companion.supervision.phases import Phase
 from colibri.plant.vehicle.description import Vehicle, load_vehicle
 from colibri.sitl.backends.link_faults import Pipe, Trouble
 from colibri.sitl.vehicle import Sitl
+from tests.colibri.companion.stand_in import StandIn
 
 AHEAD_US = 7_654_321
 """The companion's clock is ahead of the vehicle's by this."""
@@ -38,7 +39,10 @@ class Mutinous:
         return law
 
 
-class Ride:
+Flown = TypeVar("Flown", Sitl, StandIn)
+
+
+class Ride(Generic[Flown]):
     """A companion on a link of its own to a vehicle.
 
     Attributes:
@@ -51,7 +55,7 @@ class Ride:
 
     def __init__(
         self,
-        sitl: Sitl,
+        sitl: Flown,
         track: str = "spiral",
         settings: CompanionSettings | None = None,
         *,
@@ -59,8 +63,8 @@ class Ride:
         seed: int = 0,
         profile: str = "flight",
     ) -> None:
-        self.sitl = sitl
-        loaded, vehicle = load_profile(profile), load_vehicle(sitl.setting.believed or sitl.setting.vehicle)
+        self.sitl: Flown = sitl
+        loaded, vehicle = load_profile(profile), load_vehicle("hummingbird")
         path = load_track(track, vehicle, loaded).track
         settings = settings or CompanionSettings(may_arm=True)
         self.law = Mutinous()
@@ -68,7 +72,7 @@ class Ride:
         self.companion = Companion(settings, loaded, vehicle, path, lambda: NO_LAW_CLOCK, law)
         self.trouble = trouble or Trouble()
         self._up, self._down = Pipe(self.trouble, f"{seed} up"), Pipe(self.trouble, f"{seed} down")
-        self._port = Port(sitl, self)
+        self._port: StandIn | Port = sitl if isinstance(sitl, StandIn) else Port(sitl)
         self.sent: list[tuple[int, bytes]] = []
         self.history: list[tuple[float, Phase]] = []
         self.frozen = False
@@ -88,11 +92,10 @@ class Ride:
                 self._up.put(frame, now_us)
         if not self.history or self.history[-1][1] is not self.companion.phase:
             self.history.append((self.sitl.time_s, self.companion.phase))
-        self._port.carry([datagram for datagram in self._up.due(now_us)])
+        self._port.carry(self._up.due(now_us))
         self.sitl.step()
-
-    def arrive(self, datagram: bytes) -> None:
-        self._down.put(datagram, self.now_us)
+        for datagram in self._port.take():
+            self._down.put(datagram, self.now_us)
 
     def until(self, condition: Callable[[], object], within_s: float) -> None:
         """Fly until something is so."""
@@ -109,21 +112,27 @@ class Ride:
 class Port:
     """The vehicle's end of the link: a station without a voice of its own."""
 
-    def __init__(self, sitl: Sitl, ride: Ride) -> None:
+    def __init__(self, sitl: Sitl) -> None:
         station = sitl.client(250, 250, beats=False)
-        self._ride = ride
-        self._waiting: list[bytes] = []
+        self._to_vehicle: list[bytes] = []
+        self._from_vehicle: list[bytes] = []
         station.arriving = self._arriving  # type: ignore[method-assign]
         station.departing = self._departing  # type: ignore[method-assign]
 
     def carry(self, datagrams: list[bytes]) -> None:
-        self._waiting.extend(datagrams)
+        """Hand datagrams to the vehicle."""
+        self._to_vehicle.extend(datagrams)
+
+    def take(self) -> list[bytes]:
+        """Return what the vehicle has sent."""
+        taken, self._from_vehicle = self._from_vehicle, []
+        return taken
 
     def _arriving(self, datagram: bytes, now_us: int) -> None:
         del now_us
-        self._ride.arrive(datagram)
+        self._from_vehicle.append(datagram)
 
     def _departing(self, now_us: int) -> list[bytes]:
         del now_us
-        taken, self._waiting = self._waiting, []
+        taken, self._to_vehicle = self._to_vehicle, []
         return taken

@@ -17,6 +17,7 @@ from colibri.mavlink.wire.dialect import Codec, Message, mav
 from colibri.sitl.backends.link_faults import Trouble
 from colibri.sitl.backends.setting import Setting
 from colibri.sitl.session import Flights
+from colibri.sitl.vehicle import Sitl
 from tests.colibri.companion.in_memory import Ride
 
 MOVES = frozenset({mav.MAV_CMD_DO_SET_MODE, mav.MAV_CMD_COMPONENT_ARM_DISARM, mav.MAV_CMD_NAV_TAKEOFF})
@@ -32,26 +33,26 @@ def flights() -> Iterator[Flights]:
         yield begun
 
 
-def messages_of(ride: Ride, since_us: int = 0) -> list[Message]:
+def messages_of(ride: Ride[Sitl], since_us: int = 0) -> list[Message]:
     codec = Codec(0, 0)
     return [message for at_us, frame in ride.sent if at_us >= since_us for message in codec.decode(frame)]
 
 
-def names_of(ride: Ride, since_us: int = 0) -> set[str]:
+def names_of(ride: Ride[Sitl], since_us: int = 0) -> set[str]:
     return {message.name for message in messages_of(ride, since_us)}
 
 
-def moves_of(ride: Ride, since_us: int = 0) -> list[int]:
+def moves_of(ride: Ride[Sitl], since_us: int = 0) -> list[int]:
     said = (message.fields for message in messages_of(ride, since_us) if message.name == "COMMAND_LONG")
     return [fields.command for fields in said if fields.command in MOVES]
 
 
-def in_air(flights: Flights, settings: CompanionSettings | None = None, **more: Any) -> Ride:
+def in_air(flights: Flights, settings: CompanionSettings | None = None, **more: Any) -> Ride[Sitl]:
     """Return a companion of a vehicle that hovers at 3 m, on its true state."""
     return Ride(flights.begin(airborne=3.0), HOVER, settings or CompanionSettings(), **more)
 
 
-def flying(flights: Flights, settings: CompanionSettings | None = None, **more: Any) -> Ride:
+def flying(flights: Flights, settings: CompanionSettings | None = None, **more: Any) -> Ride[Sitl]:
     """Return one that flies it."""
     ride = in_air(flights, settings, **more)
     ride.until(lambda: ride.companion.phase is Phase.FLYING, 10.0)
@@ -182,47 +183,47 @@ def test_an_identification_finds_the_response_that_the_vehicle_has(flights: Flig
 # Each end that it must come to.
 
 
-def _say(ride: Ride, name: str, *fields: Any) -> Callable[[], None]:
+def _say(ride: Ride[Sitl], name: str, *fields: Any) -> Callable[[], None]:
     """Return what has the vehicle say something at each step, whatever else it says."""
     codec = Codec(1, 1)
     return lambda: ride.companion.receive(codec.encode(name, *fields), ride.now_us)
 
 
-def _estimator_lost(ride: Ride) -> Callable[[], None]:
+def _estimator_lost(ride: Ride[Sitl]) -> Callable[[], None]:
     return _say(ride, "ESTIMATOR_STATUS", 0, 0, *(0.0,) * 8)
 
 
-def _battery_low(ride: Ride) -> Callable[[], None]:
+def _battery_low(ride: Ride[Sitl]) -> Callable[[], None]:
     return _say(ride, "SYS_STATUS", 0, 0, 0, 0, 10_000, -1, 10, 0, 0, 0, 0, 0, 0)
 
 
-def _fence_breached(ride: Ride) -> Callable[[], None]:
+def _fence_breached(ride: Ride[Sitl]) -> Callable[[], None]:
     fence = mav.MAV_SYS_STATUS_GEOFENCE
     return _say(ride, "SYS_STATUS", fence, fence, 0, 0, 12_000, -1, 90, 0, 0, 0, 0, 0, 0)
 
 
-def _failsafe(ride: Ride) -> Callable[[], None]:
+def _failsafe(ride: Ride[Sitl]) -> Callable[[], None]:
     mode = ride.companion.peer.report.mode
     base = mav.MAV_MODE_FLAG_SAFETY_ARMED | mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     return _say(ride, "HEARTBEAT", 2, 12, base, mode, mav.MAV_STATE_CRITICAL, 3)
 
 
-def _blow(ride: Ride) -> Callable[[], None]:
+def _blow(ride: Ride[Sitl]) -> Callable[[], None]:
     ride.sitl.wind = "14@0"
     return lambda: None
 
 
-def _cut(ride: Ride) -> Callable[[], None]:
+def _cut(ride: Ride[Sitl]) -> Callable[[], None]:
     ride.trouble.down = True
     return lambda: None
 
 
-def _raise(ride: Ride) -> Callable[[], None]:
+def _raise(ride: Ride[Sitl]) -> Callable[[], None]:
     ride.law.raises = True
     return lambda: None
 
 
-def _jump(ride: Ride) -> Callable[[], None]:
+def _jump(ride: Ride[Sitl]) -> Callable[[], None]:
     codec, report = Codec(1, 1), ride.companion.peer
     q, nothing = (1.0, 0.0, 0.0, 0.0), (nan,) + (0.0,) * 20
 
@@ -257,7 +258,7 @@ AS_IT_IS = FlightLimits()
     ],
 )
 def test_each_limit_ends_it_and_leaves_the_vehicle_in_hold(
-    flights: Flights, name: str, provoke: Callable[[Ride], Callable[[], None]], limits: FlightLimits
+    flights: Flights, name: str, provoke: Callable[[Ride[Sitl]], Callable[[], None]], limits: FlightLimits
 ) -> None:
     ride = flying(flights, CompanionSettings(limits=limits))
     for _ in range(100):
