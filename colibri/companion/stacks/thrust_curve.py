@@ -40,8 +40,8 @@ class ThrustCurve:
         return ratio * ratio if self.quadratic else ratio
 
     def _signal(self, command: float) -> float:
-        e = self.expo
-        x = command if e == 0.0 else (sqrt((1.0 - e) ** 2 + 4.0 * e * command) - (1.0 - e)) / (2.0 * e)
+        linear = 1.0 - self.expo
+        x = 2.0 * command / (linear + sqrt(linear * linear + 4.0 * self.expo * command)) if command > 0.0 else 0.0
         return self.spin_min + (self.spin_max - self.spin_min) * x
 
 
