@@ -132,7 +132,7 @@ def serve(companion: Companion, link: GroundLink, status: Status, stop: Stop, lo
     """
     began_s = perf_counter()
     address: Address | None = link.target
-    tell_s = _SAY_FAILING_EVERY_S
+    tell_s, told = _SAY_FAILING_EVERY_S, list[str]()
     while companion.ended is None:
         now_us = round((perf_counter() - began_s) * 1e6)
         if stop:
@@ -151,9 +151,11 @@ def serve(companion: Companion, link: GroundLink, status: Status, stop: Stop, lo
         for line in companion.said:
             status.say("phase", line)
         companion.said.clear()
-        if now_us * 1e-6 > tell_s:
-            tell_s = now_us * 1e-6 + _SAY_FAILING_EVERY_S
-            for line in companion.waits_for:
+        for line in companion.peer.report.take_new_texts():
+            status.say("vehicle", f"vehicle says: {line}")
+        if now_us * 1e-6 > tell_s and companion.waits_for != told:
+            tell_s, told = now_us * 1e-6 + _SAY_FAILING_EVERY_S, companion.waits_for
+            for line in told:
                 status.say("waits", line)
         link.wait(_POLL_S)
 

@@ -21,6 +21,7 @@ class ResponseFile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True)
     latency_s: Latency
     thrust_lag_s: NotNegative
     max_rate_rad_s: tuple[Positive, Positive, Positive]
+    max_acceleration_rad_s2: tuple[Positive, Positive, Positive]
     thrust_scale: Scale = 1.0
     """Thrust that was made, in parts of the one that the vehicle's parameters mean."""
 
@@ -38,7 +39,7 @@ def read_response(path: Path) -> tuple[Response, float]:
         raise CompanionError(f"{path}: {getattr(error, 'strerror', error)}") from error
     except msgspec.MsgspecError as error:
         raise CompanionError(f"{path}: {error}") from error
-    response = Response(found.time_constant_s, found.latency_s, found.thrust_lag_s, found.max_rate_rad_s)
+    response = Response(*(getattr(found, name) for name in Response._fields))
     return response, found.thrust_scale
 
 

@@ -56,6 +56,7 @@ class VehicleReport:
         self.fence_breached = False
         self.altitude_amsl_m = nan
         self.texts: list[str] = []
+        self._told = 0
         self._sequence: int | None = None
         self._tells_estimates = False
 
@@ -63,6 +64,11 @@ class VehicleReport:
     def airborne(self) -> bool | None:
         """Whether it flies; None where it does not say."""
         return None if self.landed_state == _UNKNOWN_LANDED else self.landed_state in _AIRBORNE
+
+    def take_new_texts(self) -> list[str]:
+        """Return the STATUSTEXT lines since this was last asked."""
+        new, self._told = self.texts[self._told :], len(self.texts)
+        return new
 
     def mode_rate_hz(self, now_us: int) -> float:
         """Return how often the mode was reported in the last second, Hz."""

@@ -56,12 +56,16 @@ class Response(NamedTuple):
         latency_s: Between a command's arrival and its first effect, s.
         thrust_lag_s: Of thrust, s; 0 where it follows at once.
         max_rate_rad_s: Commands beyond are cut by the stack.
+        max_acceleration_rad_s2: So fast, at most, the stack lets each rate change.
+
+    A time constant that is too short costs bandwidth, one that is too long stability: what is assumed is short.
     """
 
     time_constant_s: Vector
     latency_s: float
     thrust_lag_s: float
     max_rate_rad_s: Vector
+    max_acceleration_rad_s2: Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,9 +3,12 @@
 The law is given the vehicle as it will be when the command takes effect, and returns rotor speeds. Rotors that nobody
 has follow them, as those of the vehicle file would; they turn the vehicle of the file for one interval, and the body
 rates that it would have then are what the stack is made to reach, by the exact inverse of its response.
+
+So it is for roll and pitch. Yaw has its own loop, since no two stacks turn alike: the law is told that the vehicle is
+to turn as it turns, which asks for no moment, and the heading follows the references by a commanded rate.
 """
 
-from math import dist, hypot
+from math import cos, dist, hypot, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +29,7 @@ from colibri.autopilot.guidance.tasks.task import FlightTask, Motion, PlannedMot
 from colibri.autopilot.guidance.trajectories.planner import Planner
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.jit import packed
+from colibri.common.rotations import euler_from_quaternion, nearest_turn
 from colibri.common.types import Array, Vector
 from colibri.companion.stacks.stack import Response
 from colibri.companion.steering import response as model
@@ -39,6 +43,9 @@ APPROACH = Limits(
 _MAX_INTERVAL_US = 10_000
 """Setpoints are sent at 100 Hz and more, however seldom the law decides."""
 _THERE_M, _THERE_M_S = 0.002, 0.005
+_YAW_1_S = 2.0
+"""How fast an error of the heading dies."""
+_MIN_UPRIGHT = 0.2
 _NO_DISTURBANCE = np.zeros(6)
 
 
@@ -105,6 +112,8 @@ class LawPilot:
         parts = -(-self._loop.control_interval_us // _MAX_INTERVAL_US)
         self.interval_us = self._loop.control_interval_us // parts
         self._parts, self._tick = parts, 0
+        self._heading = (0.0, 0.0, 0.0)
+        self._ahead_s = 1e-6 * self._loop.preview.interval_us * np.arange(self._loop.preview.samples)
         self._rotors = np.full(4, vehicle.hover_speed)
         self._task: FlightTask = HoldTask()
         carried = np.zeros(motion.STATES)
@@ -175,7 +184,9 @@ class LawPilot:
         if self._tick % self._parts == 0:
             state = self._loop.state(_frame(time_us, y))
             horizon, place = self._references(time_us, state)
-            decision = self._loop.decide(time_us, state, horizon)
+            yaw, yaw_rate, yaw_acceleration = (float(of[0]) for of in horizon[5:])
+            self._heading = (yaw, yaw_rate, yaw_acceleration)
+            decision = self._loop.decide(time_us, state, self._turning_as_it_does(horizon, state))
         speeds = np.array(self._loop.controls) * self._vehicle.rotors.max_speed
         x = np.concatenate((y[: model.LIFT], self._rotors))
         interval_s = self.interval_us * 1e-6
@@ -186,9 +197,27 @@ class LawPilot:
         self._rotors = after[motion.ROTORS]
         thrust = model.lift_command(made_n, motion.thrust_n(self._rotors, self._motion), interval_s, self._response)
         now, then = y[model.RATE].tolist(), after[motion.RATE].tolist()
-        rate = model.rate_command(tuple(now), tuple(then), interval_s, self._response)
+        p, q, _ = model.rate_command(tuple(now), tuple(then), interval_s, self._response)
         self._tick += 1
-        return Asked(rate, thrust, horizon, decision, place, self._track_s(time_us))
+        return Asked((p, q, self._yaw_rate(y, q)), thrust, horizon, decision, place, self._track_s(time_us))
+
+    def _turning_as_it_does(self, horizon: Horizon, state: VehicleState) -> Horizon:
+        """Return references whose heading is the vehicle's own, turning as it does."""
+        turns = _yaw_rate_of(state.euler, state.rate_flu_rad_s)
+        yaw: Array = state.euler[2] + turns * self._ahead_s
+        return horizon._replace(
+            yaw_rad=yaw, yaw_rate_rad_s=np.full_like(yaw, turns), yaw_acceleration_rad_s2=np.zeros_like(yaw)
+        )
+
+    def _yaw_rate(self, y: Array, q: float) -> float:
+        """Return the body rate r by which the heading follows its reference, rad/s, within what the stack turns."""
+        phi, theta, psi = euler_from_quaternion(tuple(y[model.ATTITUDE].tolist()))
+        wanted, rate, acceleration = self._heading
+        off = nearest_turn(wanted, psi) - psi
+        turns = rate + self._response.time_constant_s[2] * acceleration + _YAW_1_S * off
+        r = (turns * cos(theta) - sin(phi) * q) / max(cos(phi), _MIN_UPRIGHT)
+        maximum = self._response.max_rate_rad_s[2]
+        return min(max(r, -maximum), maximum)
 
     def _track_s(self, time_us: int) -> float:
         task = self._flown
@@ -218,6 +247,12 @@ class LawPilot:
             return horizon, None
         x, y, z = wanted.horizon.position_enu_m[0].tolist()
         return horizon, (x, y, z)
+
+
+def _yaw_rate_of(euler: Vector, rate: Vector) -> float:
+    """Return how fast the heading turns, rad/s: THESIS [2.7]."""
+    phi, theta, _ = euler
+    return (sin(phi) * rate[1] + cos(phi) * rate[2]) / max(cos(theta), _MIN_UPRIGHT)
 
 
 def _frame(time_us: int, y: Array) -> StateFrame:

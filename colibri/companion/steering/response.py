@@ -28,11 +28,13 @@ class ResponseModel(NamedTuple):
 
     Attributes:
         time_constant_s: Of p, q, r, (3,).
+        max_acceleration_rad_s2: Of rates, (3,).
         lift_lag_s: Of thrust; 0 where it follows at once.
         drag_1_s: Along the FLU axes, over the mass, (3,).
     """
 
     time_constant_s: Array
+    max_acceleration_rad_s2: Array
     lift_lag_s: float
     drag_1_s: Array
     gravity_m_s2: float
@@ -44,7 +46,8 @@ def response_model(vehicle: Vehicle, response: Response) -> ResponseModel:
     if vehicle.drag is not None:
         in_plane = vehicle.drag.rotor_coefficient * len(vehicle.rotors.position_m) * vehicle.hover_speed
         drag = (np.array(vehicle.drag.linear_n_s_m) + np.array([in_plane, in_plane, 0.0])) / vehicle.body.mass_kg
-    return ResponseModel(np.array(response.time_constant_s), response.thrust_lag_s, drag, vehicle.gravity_m_s2)
+    lags, limits = np.array(response.time_constant_s), np.array(response.max_acceleration_rad_s2)
+    return ResponseModel(lags, limits, response.thrust_lag_s, drag, vehicle.gravity_m_s2)
 
 
 def rate_command(rate: Vector, next_rate: Vector, interval_s: float, response: Response) -> Vector:
@@ -53,12 +56,24 @@ def rate_command(rate: Vector, next_rate: Vector, interval_s: float, response: R
     The exact inverse of the model, within what the stack lets through.
     """
     p, q, r = (
-        min(max(now + (then - now) / (1.0 - exp(-interval_s / lag_s)), -maximum), maximum)
-        for now, then, lag_s, maximum in zip(
-            rate, next_rate, response.time_constant_s, response.max_rate_rad_s, strict=True
+        _rate_command(now, then, interval_s, *of)
+        for now, then, *of in zip(
+            rate,
+            next_rate,
+            response.time_constant_s,
+            response.max_rate_rad_s,
+            response.max_acceleration_rad_s2,
+            strict=True,
         )
     )
     return (p, q, r)
+
+
+def _rate_command(
+    now: float, then: float, interval_s: float, lag_s: float, max_rate: float, max_acceleration: float
+) -> float:
+    change = min(max(then - now, -max_acceleration * interval_s), max_acceleration * interval_s)
+    return min(max(now + change / (1.0 - exp(-interval_s / lag_s)), -max_rate), max_rate)
 
 
 def lift_command(lift: float, next_lift: float, interval_s: float, response: Response) -> float:
@@ -88,7 +103,9 @@ def carry(y: Array, durations_s: Array, commands: Array, disturbance: Array, pac
         for _ in range(steps):
             for i in range(3):
                 stays = exp(-h / model.time_constant_s[i])
-                after = commands[n, i] + (y[10 + i] - commands[n, i]) * stays + h * disturbance[3 + i]
+                change = (commands[n, i] - y[10 + i]) * (1.0 - stays)
+                most = h * model.max_acceleration_rad_s2[i]
+                after = y[10 + i] + min(max(change, -most), most) + h * disturbance[3 + i]
                 mean[i] = 0.5 * (y[10 + i] + after)
                 y[10 + i] = after
             lift = commands[n, 3]

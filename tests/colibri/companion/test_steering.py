@@ -19,7 +19,7 @@ from colibri.companion.steering.smooth_start import OVER_S, smoothly_started
 from colibri.plant.vehicle.description import load_vehicle
 
 HUMMINGBIRD = load_vehicle("hummingbird")
-RESPONSE = Response((0.03, 0.05, 0.2), 0.01, 0.02, (9.0, 9.0, 9.0))
+RESPONSE = Response((0.03, 0.05, 0.2), 0.01, 0.02, (9.0, 9.0, 9.0), (999.0, 999.0, 999.0))
 NOTHING = np.zeros(6)
 
 
