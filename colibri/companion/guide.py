@@ -33,7 +33,7 @@ from colibri.companion.supervision.limits import Box, FlightFacts, Limit, exceed
 from colibri.companion.supervision.phases import Condition, Phase, next_phase
 from colibri.plant.vehicle.description import Vehicle
 
-_GUESSED = Response((0.03, 0.03, 0.12), 0.01, 0.03, (3.8, 3.8, 2.0), (15.0, 15.0, 4.0))
+_GUESSED = Response((0.03, 0.03, 0.12), 0.02, 0.03, (3.8, 3.8, 2.0), (15.0, 15.0, 4.0))
 """Until the stack is known."""
 _STEADY_US = 1_000_000
 """So long it holds after the take-over, and streams before it."""

@@ -23,7 +23,7 @@ class Doublet(NamedTuple):
     half_s: float
 
 
-DOUBLETS = (Doublet(0, 0.6, 0.2), Doublet(1, 0.6, 0.2), Doublet(2, 0.5, 0.4))
+DOUBLETS = (Doublet(0, 0.4, 0.2), Doublet(1, 0.4, 0.2), Doublet(2, 0.4, 0.4))
 _NOTHING: Vector = (0.0, 0.0, 0.0)
 
 

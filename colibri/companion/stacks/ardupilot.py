@@ -75,7 +75,7 @@ ARDUPILOT = Stack(
     ),
     fence=("FENCE_RADIUS", "FENCE_ALT_MAX"),
     thrust=_thrust,
-    response=Response((0.03, 0.03, 0.2), 0.01, 0.03, (3.8, 3.8, 1.5), (15.0, 15.0, 4.0)),
+    response=Response((0.03, 0.03, 0.2), 0.026, 0.03, (3.8, 3.8, 1.5), (18.0, 18.0, 4.0)),
     take_off=TakeOff.ARM_THEN_COMMAND,
     integers_by_bits=False,
 )

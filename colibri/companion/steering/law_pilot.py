@@ -101,10 +101,9 @@ class LawPilot:
             ProfileError: Its table is wrong.
             SolverError: Its solver cannot be used.
         """
-        self._loop = ControlLoop(profile, vehicle, clock, law)
-        self._vehicle, self._track = vehicle, track
-        self._motion = packed(motion.motion_model(vehicle))
-        self._response = response
+        self._profile, self._clock, self._law = profile, clock, law
+        self._airframe, self._track = vehicle, track
+        self._build(response)
         self._instants = instants(self._loop.preview, self._loop.control_interval_us)
         self._planner = Planner(track, profile.references, self._instants.preview)
         self._behaviour = Behaviour(limits=APPROACH)
@@ -132,8 +131,19 @@ class LawPilot:
         return (x, y, z)
 
     def adopt(self, response: Response) -> None:
-        """Invert another response."""
+        """Fly a vehicle of another response.
+
+        Raises:
+            ControllerError: The control law cannot be built for it.
+        """
+        self._build(response)
+
+    def _build(self, response: Response) -> None:
+        """Build the law for the vehicle as its stack lets it turn."""
         self._response = response
+        self._vehicle = turning_no_faster(self._airframe, response)
+        self._loop = ControlLoop(self._profile, self._vehicle, self._clock, self._law)
+        self._motion = packed(motion.motion_model(self._vehicle))
 
     def begin(self, y: Array) -> None:
         """Begin with a vehicle that moves as `y` says, (14,), and take it over as it moves: brake, and stay."""
@@ -204,7 +214,7 @@ class LawPilot:
     def _turning_as_it_does(self, horizon: Horizon, state: VehicleState) -> Horizon:
         """Return references whose heading is the vehicle's own, turning as it does."""
         turns = _yaw_rate_of(state.euler, state.rate_flu_rad_s)
-        yaw: Array = state.euler[2] + turns * self._ahead_s
+        yaw = np.asarray(state.euler[2] + turns * self._ahead_s, dtype=np.float64)
         return horizon._replace(
             yaw_rad=yaw, yaw_rate_rad_s=np.full_like(yaw, turns), yaw_acceleration_rad_s2=np.zeros_like(yaw)
         )
@@ -247,6 +257,20 @@ class LawPilot:
             return horizon, None
         x, y, z = wanted.horizon.position_enu_m[0].tolist()
         return horizon, (x, y, z)
+
+
+def turning_no_faster(vehicle: Vehicle, response: Response) -> Vehicle:
+    """Return a vehicle whose rotors can turn it no faster than its stack lets them: heavier to turn where need be.
+
+    A law that knows so brakes in time; one that does not would ask for what never comes, and overshoot.
+    """
+    _, *moments_n_m = vehicle.max_wrench().tolist()
+    most = response.max_acceleration_rad_s2
+    ix, iy = (
+        max(inertia, moment / limit)
+        for inertia, moment, limit in zip(vehicle.body.inertia_kg_m2[:2], moments_n_m[:2], most[:2], strict=True)
+    )
+    return vehicle.replace("body.inertia_kg_m2", (ix, iy, vehicle.body.inertia_kg_m2[2]))
 
 
 def _yaw_rate_of(euler: Vector, rate: Vector) -> float:
