@@ -201,11 +201,9 @@ class LawPilot:
         x = np.concatenate((y[: model.LIFT], self._rotors))
         interval_s = self.interval_us * 1e-6
         after = motion.carry(x, np.array([interval_s]), speeds[None], _NO_DISTURBANCE, self._voltage_v, self._motion)
-        made_n = float(y[model.LIFT]) * self._vehicle.body.mass_kg
-        if self._response.thrust_lag_s <= 0.0:
-            made_n = motion.thrust_n(self._rotors, self._motion)
+        before_n = motion.thrust_n(self._rotors, self._motion)
         self._rotors = after[motion.ROTORS]
-        thrust = model.lift_command(made_n, motion.thrust_n(self._rotors, self._motion), interval_s, self._response)
+        thrust = 0.5 * (before_n + motion.thrust_n(self._rotors, self._motion))
         now, then = y[model.RATE].tolist(), after[motion.RATE].tolist()
         p, q, _ = model.rate_command(tuple(now), tuple(then), interval_s, self._response)
         self._tick += 1

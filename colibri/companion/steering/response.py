@@ -76,13 +76,6 @@ def _rate_command(
     return min(max(now + change / (1.0 - exp(-interval_s / lag_s)), -max_rate), max_rate)
 
 
-def lift_command(lift: float, next_lift: float, interval_s: float, response: Response) -> float:
-    """Return the thrust to command so that that of now is `next_lift` an interval later, in whatever unit they have."""
-    if response.thrust_lag_s <= 0.0:
-        return 0.5 * (lift + next_lift)
-    return max(lift + (next_lift - lift) / (1.0 - exp(-interval_s / response.thrust_lag_s)), 0.0)
-
-
 @compiled
 def carry(y: Array, durations_s: Array, commands: Array, disturbance: Array, packed: Packed) -> Array:
     """Return y, (14,), after commands that follow each other.

@@ -41,9 +41,6 @@ def test_the_commanded_rate_reaches_the_next_one_exactly() -> None:
     numbers = packed(model.response_model(HUMMINGBIRD, RESPONSE))
     after = model.carry(y, np.array([0.008]), np.array([[*command, 9.81]]), NOTHING, numbers)
     assert after[model.RATE] == pytest.approx(wanted)
-    lift = model.lift_command(9.81, 10.5, 0.008, RESPONSE)
-    after = model.carry(y, np.array([0.008]), np.array([[*command, lift]]), NOTHING, numbers)
-    assert after[model.LIFT] == pytest.approx(10.5)
 
 
 def test_what_is_commanded_stays_within_what_the_stack_lets_through() -> None:
