@@ -7,7 +7,7 @@ from colibri.companion.conversation.vehicle_peer import VehiclePeer
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.stacks.stack import ModeNumber, TakeOff
 from colibri.companion.supervision.phases import Phase
-from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, mav
+from colibri.mavlink.wire.dialect import RESULT_ACCEPTED, RESULT_TEMPORARILY_REJECTED, mav
 
 _STREAMS_FIRST_US = 1_000_000
 """So long setpoints are streamed before the mode is asked for, as PX4 wants it."""
@@ -34,7 +34,7 @@ class Orders:
         self._before = -1
         self._reached = False
         self._own: frozenset[int] = frozenset()
-        self._asked_hold = self._again_us = 0
+        self._asked_hold = self._again_us = self._in_phase_us = 0
         self._disarming = False
         self.refused = ""
 
@@ -93,6 +93,7 @@ class Orders:
     def poll(self, phase: Phase, in_phase_us: int, *, ready: bool) -> None:
         """Have sent what a phase needs; `ready`: whether the vehicle may be told to hold."""
         stack, results = self._peer.stack, self._peer.orders.results
+        self._in_phase_us = in_phase_us
         if stack is None or self._settings.dry_run:
             return
         if phase is Phase.ARMING:
@@ -140,10 +141,14 @@ class Orders:
             self._peer.orders.ask(name, mav.MAV_CMD_DO_SET_MODE, *mode.command)
 
     def _once(self, name: str, number: int, *params: float) -> None:
-        """Give a command once; what is refused, or never answered, ends the flight."""
+        """Give a command, and again while it is refused for the time being; else a refusal, or silence, is the end."""
         result = self._peer.orders.results.get(name)
         if result is None:
             self._peer.orders.ask(name, number, *params)
+        elif result == RESULT_TEMPORARILY_REJECTED:
+            if self._in_phase_us >= self._again_us:
+                self._again_us = self._in_phase_us + _AGAIN_US
+                self._peer.orders.ask(name, number, *params)
         elif result != RESULT_ACCEPTED:
             said = "; ".join(self._peer.report.texts[-2:])
             how = "was not answered" if result == UNANSWERED else f"was refused (result {result})"
