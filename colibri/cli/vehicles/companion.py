@@ -12,7 +12,7 @@ from colibri.experiments.options import TRACK_HELP
 def add_options(parser: ArgumentParser) -> None:
     """Add the options of `colibri companion`."""
     add = parser.add_argument
-    add("track", metavar="TRACK", nargs="?", help=f"{TRACK_HELP}; or the file of a mission: .plan of QGroundControl")
+    add("track", metavar="TRACK", nargs="?", help=TRACK_HELP)
     add(
         "--vehicle",
         required=True,
