@@ -61,13 +61,13 @@ def flying(flights: Flights, settings: CompanionSettings | None = None, **more: 
 
 def test_it_arms_takes_off_flies_a_track_and_hands_over(flights: Flights) -> None:
     sitl = flights.begin(feedback="sensors", turbulence="light", seed=1)
-    ride = Ride(sitl, "spiral", CompanionSettings(may_arm=True, duration_s=8.0))
+    ride = Ride(sitl, "spiral", CompanionSettings(may_arm=True, duration_s=5.0))
     ride.to_the_end(60.0)
     assert ride.companion.ended
     assert ride.companion.ended.in_order
     assert [phase for _, phase in ride.history] == list(Phase)
     assert ride.companion.errors.rmse_m() < 0.05
-    assert ride.companion.errors.flown_s == pytest.approx(8.0, abs=0.1)
+    assert ride.companion.errors.flown_s == pytest.approx(5.0, abs=0.1)
     assert sitl.mode is Mode.HOLD
     assert sitl.armed
     setpoints = [at_us for at_us, frame in ride.sent if frame[7:10] == (82).to_bytes(3, "little")]
@@ -77,7 +77,7 @@ def test_it_arms_takes_off_flies_a_track_and_hands_over(flights: Flights) -> Non
 
 def test_it_flies_a_fast_track_over_a_bad_link(flights: Flights) -> None:
     sitl = flights.begin(feedback="sensors", turbulence="light", seed=2)
-    settings = CompanionSettings(may_arm=True, duration_s=12.0)
+    settings = CompanionSettings(may_arm=True, duration_s=7.0)
     ride = Ride(sitl, "lemniscate:lap=8", settings, trouble=BAD_LINK, seed=2)
     ride.to_the_end(60.0)
     assert ride.companion.ended
@@ -158,16 +158,24 @@ def test_a_vehicle_that_refuses_to_arm_ends_it(flights: Flights) -> None:
     assert "take-off was refused" in ride.companion.ended.why
 
 
-@pytest.mark.parametrize("kind", [SetpointKind.ATTITUDE, SetpointKind.VELOCITY, SetpointKind.POSITION])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        SetpointKind.POSITION,
+        pytest.param(SetpointKind.VELOCITY, marks=pytest.mark.long),
+        pytest.param(SetpointKind.ATTITUDE, marks=pytest.mark.long),
+    ],
+)
 def test_it_flies_by_other_setpoints_too(flights: Flights, kind: SetpointKind) -> None:
     sitl = flights.begin(airborne=2.0)
-    ride = Ride(sitl, "circle:speed=1", CompanionSettings(setpoints=kind, duration_s=6.0))
+    ride = Ride(sitl, "circle:speed=1", CompanionSettings(setpoints=kind, duration_s=4.0))
     ride.to_the_end(30.0)
     assert ride.companion.ended
     assert ride.companion.ended.in_order
     assert ride.companion.errors.rmse_m() < 0.3
 
 
+@pytest.mark.long
 def test_an_identification_finds_the_response_that_the_vehicle_has(flights: Flights) -> None:
     ride = in_air(flights, CompanionSettings(identifies=True))
     ride.to_the_end(60.0)

@@ -81,7 +81,7 @@ def test_an_ardupilot_that_would_take_thrust_for_a_climb_rate_is_not_flown() -> 
     assert "add 8 to GUID_OPTIONS" in ride.companion.ended.why
 
 
-@pytest.mark.parametrize("made", STACKS)
+@pytest.mark.parametrize("made", [Px4, pytest.param(ArduPilot, marks=pytest.mark.long)])
 def test_an_identification_finds_what_the_stand_in_has(made: Callable[[], StandIn]) -> None:
     vehicle = made()
     ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, identifies=True))
