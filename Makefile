@@ -52,7 +52,7 @@ test-clients: setup .venv-clients/.ready
 
 # Real PX4 and ArduCopter on our plant: COLIBRI_PX4=FOLDER, a build of its SITL, and COLIBRI_ARDUCOPTER=FILE, the program.
 test-peers: setup
-	$(BIN)/python -m pytest -m peers tests/peers
+	$(BIN)/python -m pytest -m peers
 
 fuzz: setup
 	$(BIN)/python -m tools.fuzz $(FUZZ)

@@ -6,8 +6,9 @@ from collections.abc import Iterable
 class Error(Exception):
     """Something that a user can put right; the message is the one line of what, where and how.
 
-    Below it is one base a package: `MavlinkError`, `PlantError`, `AutopilotError`, `SitlError`. What derives from none
-    of them belongs to `common`, or to what a user runs. A mistake in this program is another exception, a traceback.
+    Below it is one base a package: `MavlinkError`, `PlantError`, `AutopilotError`, `SitlError`, `CompanionError`. What
+    derives from none of them belongs to `common`, or to what a user runs. A mistake in this program is another
+    exception, a traceback.
     """
 
 

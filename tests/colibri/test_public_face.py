@@ -13,7 +13,8 @@ import pytest
 
 FACES = (
     "colibri",
-    *("colibri.analysis", "colibri.autopilot", "colibri.campaigns", "colibri.common", "colibri.conformance"),
+    *("colibri.analysis", "colibri.autopilot", "colibri.campaigns", "colibri.common", "colibri.companion"),
+    "colibri.conformance",
     *("colibri.experiments", "colibri.flights", "colibri.mavlink"),
     *("colibri.plant", "colibri.sitl", "colibri.tuning"),
 )

@@ -81,6 +81,21 @@ GROUPS: dict[str, dict[str, Command]] = {
             "fly all that the thesis shows and draw its figures", "campaigns", "colibri figures --only 4.9"
         ),
     },
+    "vehicles of others": {
+        "companion": Command(
+            "fly a vehicle of PX4, ArduPilot or Colibri as its offboard companion",
+            "vehicles",
+            """
+            colibri companion spiral --vehicle udpin:127.0.0.1:14540 --dry-run
+            colibri companion circle --vehicle udpin:127.0.0.1:14540 --arm
+            """,
+        ),
+        "vehicle": Command(
+            "write a vehicle as parameters of PX4 or ArduPilot",
+            "descriptions",
+            "colibri vehicle hummingbird --for px4 --out hummingbird.params",
+        ),
+    },
     "control laws": {
         "check-controller": Command(
             "try on a control law of your own what every one must satisfy",
@@ -104,11 +119,6 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri show profile flight > mine.toml
             colibri show vehicle hummingbird
             """,
-        ),
-        "vehicle": Command(
-            "write a vehicle as parameters of PX4 or ArduPilot",
-            "descriptions",
-            "colibri vehicle hummingbird --for px4 --out hummingbird.params",
         ),
     },
     "this computer": {

@@ -1,0 +1,1 @@
+"""Commands that fly vehicles of others: `colibri companion`."""

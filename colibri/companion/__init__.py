@@ -1,0 +1,12 @@
+"""The control law as an offboard companion of a vehicle that flies PX4, ArduPilot or Colibri."""
+
+from typing import TYPE_CHECKING
+
+from colibri.common.lazy import public
+
+if TYPE_CHECKING:
+    from colibri.companion.errors import CompanionError as CompanionError
+    from colibri.companion.guide import Companion as Companion
+    from colibri.companion.settings import CompanionSettings as CompanionSettings
+else:
+    __getattr__, __dir__ = public(__name__)

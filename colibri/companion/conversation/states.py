@@ -1,0 +1,112 @@
+"""The vehicle's state out of whatever it streams: ODOMETRY, or attitude and position of messages of their own."""
+
+from math import isfinite
+from typing import Any, NamedTuple
+
+from colibri.common.rotations import earth_from_body, quaternion_from_euler
+from colibri.common.types import Quaternion, Vector
+from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.ned import frd_from_flu, ned_frd_from_enu_flu, ned_from_enu
+
+_MS = 1000
+_ODOMETRY_STAYS_US = 500_000
+"""After so long without ODOMETRY the other messages count."""
+_PAIRED_US = 60_000
+"""A position older than this beside an attitude is none."""
+_EARTH: int = mav.MAV_FRAME_LOCAL_NED
+
+HANDLES = frozenset({"ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSITION_NED"})
+
+
+class TimedState(NamedTuple):
+    """The state of the vehicle by its own estimate.
+
+    Attributes:
+        vehicle_us: When, by the vehicle's clock.
+        position_enu_m, velocity_enu_m_s: In the vehicle's local frame, turned to ENU.
+        attitude: FLU to ENU.
+        rate_flu_rad_s: Body rates.
+    """
+
+    vehicle_us: int
+    position_enu_m: Vector
+    velocity_enu_m_s: Vector
+    attitude: Quaternion
+    rate_flu_rad_s: Vector
+
+
+class StateAssembler:
+    """Makes states of messages.
+
+    Attributes:
+        refused: How many messages held no finite state.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a state."""
+        self._last_us = -1
+        self._odometry_us: int | None = None
+        self._place: tuple[int, Vector, Vector] | None = None
+        self._quaternion_us: int | None = None
+        self.refused = 0
+
+    def receive(self, message: Message, now_us: int) -> TimedState | None:
+        """Return the state that a message completes; None where it does not, or is older than the last one."""
+        name, fields = message.name, message.fields
+        if name == "ODOMETRY":
+            state = _of_odometry(fields)
+            self._odometry_us = now_us
+        elif self._odometry_us is not None and now_us - self._odometry_us < _ODOMETRY_STAYS_US:
+            return None
+        elif name == "LOCAL_POSITION_NED":
+            place, velocity = (fields.x, fields.y, fields.z), (fields.vx, fields.vy, fields.vz)
+            self._place = (fields.time_boot_ms * _MS, ned_from_enu(place), ned_from_enu(velocity))
+            return None
+        else:
+            state = self._of_attitude(name, fields, now_us)
+        if state is None:
+            return None
+        if not all(map(isfinite, (*state.position_enu_m, *state.velocity_enu_m_s, *state.attitude, *state[4]))):
+            self.refused += 1
+            return None
+        if state.vehicle_us <= self._last_us and self._last_us - state.vehicle_us < _ODOMETRY_STAYS_US:
+            return None
+        self._last_us = state.vehicle_us
+        return state
+
+    def _of_attitude(self, name: str, fields: Any, now_us: int) -> TimedState | None:
+        """Return the state of an attitude, with the last position carried to its time."""
+        if name == "ATTITUDE_QUATERNION":
+            self._quaternion_us = now_us
+            ned_frd: Quaternion = (fields.q1, fields.q2, fields.q3, fields.q4)
+        elif self._quaternion_us is not None and now_us - self._quaternion_us < _ODOMETRY_STAYS_US:
+            return None
+        else:
+            ned_frd = quaternion_from_euler(fields.roll, fields.pitch, fields.yaw)
+        rate = frd_from_flu((fields.rollspeed, fields.pitchspeed, fields.yawspeed))
+        at_us = fields.time_boot_ms * _MS
+        if self._place is None or not -_PAIRED_US <= at_us - self._place[0] <= _PAIRED_US:
+            return None
+        place_us, (x, y, z), velocity = self._place
+        by_s = (at_us - place_us) * 1e-6
+        vx, vy, vz = velocity
+        place = (x + by_s * vx, y + by_s * vy, z + by_s * vz)
+        return TimedState(at_us, place, velocity, _unit(ned_frd_from_enu_flu(ned_frd)), rate)
+
+
+def _of_odometry(fields: Any) -> TimedState | None:
+    """Return the state of an ODOMETRY; None of one whose frames are no vehicle's in its local frame."""
+    if fields.frame_id != _EARTH:
+        return None
+    attitude = _unit(ned_frd_from_enu_flu(tuple(fields.q)))
+    wire = (fields.vx, fields.vy, fields.vz)
+    by_earth = fields.child_frame_id == _EARTH
+    velocity = ned_from_enu(wire) if by_earth else earth_from_body(attitude, frd_from_flu(wire))
+    rate = frd_from_flu((fields.rollspeed, fields.pitchspeed, fields.yawspeed))
+    return TimedState(fields.time_usec, ned_from_enu((fields.x, fields.y, fields.z)), velocity, attitude, rate)
+
+
+def _unit(q: Quaternion) -> Quaternion:
+    w, x, y, z = q
+    length = (w * w + x * x + y * y + z * z) ** 0.5
+    return q if length == 0.0 or not isfinite(length) else (w / length, x / length, y / length, z / length)

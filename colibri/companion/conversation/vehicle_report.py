@@ -1,0 +1,126 @@
+"""What a vehicle reports of itself beside its state: mode, arming, battery, estimator, fence."""
+
+from math import nan
+from typing import Any
+
+from colibri.mavlink.wire.dialect import MODE_ARMED, Message, bits, mav, sequence_of
+
+_OLDER_FROM = 128
+"""A sequence number so far behind, of 256, is that of an older message, which a link has held back."""
+_AIRBORNE = frozenset(
+    {mav.MAV_LANDED_STATE_IN_AIR, mav.MAV_LANDED_STATE_TAKEOFF, mav.MAV_LANDED_STATE_LANDING},
+)
+_ESTIMATES = bits("ESTIMATOR_", "ATTITUDE VELOCITY_HORIZ VELOCITY_VERT")
+_PLACES = bits("ESTIMATOR_", "POS_HORIZ_REL POS_HORIZ_ABS")
+_HEIGHTS = bits("ESTIMATOR_", "POS_VERT_ABS POS_VERT_AGL")
+_PREARM: int = mav.MAV_SYS_STATUS_PREARM_CHECK
+_AHRS: int = mav.MAV_SYS_STATUS_AHRS
+_FENCE: int = mav.MAV_SYS_STATUS_GEOFENCE
+_PERCENT = 100.0
+_MM = 1e-3
+_UNKNOWN_LANDED: int = mav.MAV_LANDED_STATE_UNDEFINED
+
+
+class VehicleReport:
+    """The last word of a vehicle on each matter.
+
+    Attributes:
+        heartbeat_us: When the last HEARTBEAT came; None before the first.
+        autopilot: MAV_AUTOPILOT.
+        mode: `custom_mode`.
+        mode_us: When a mode was last reported.
+        armed: Whether its rotors may turn.
+        system_status: MAV_STATE.
+        landed_state: MAV_LANDED_STATE.
+        battery: Part of the charge that is left; nan where it is not known.
+        estimator_ok: Whether attitude, velocity and position are estimated; None before it says so.
+        prearm_ok: Whether it could be armed; None where it does not say.
+        fence_breached: Whether it is beyond its fence.
+        altitude_amsl_m: Height above the sea; nan where it is not known.
+        texts: STATUSTEXT lines.
+    """
+
+    def __init__(self) -> None:
+        """Begin knowing nothing."""
+        self.heartbeat_us: int | None = None
+        self.autopilot = -1
+        self.mode = -1
+        self.mode_us: int | None = None
+        self.mode_reports_us: list[int] = []
+        self.armed = False
+        self.system_status = 0
+        self.landed_state: int = _UNKNOWN_LANDED
+        self.battery = nan
+        self.estimator_ok: bool | None = None
+        self.prearm_ok: bool | None = None
+        self.fence_breached = False
+        self.altitude_amsl_m = nan
+        self.texts: list[str] = []
+        self._told = 0
+        self._sequence: int | None = None
+        self._tells_estimates = False
+
+    @property
+    def airborne(self) -> bool | None:
+        """Whether it flies; None where it does not say."""
+        return None if self.landed_state == _UNKNOWN_LANDED else self.landed_state in _AIRBORNE
+
+    def take_new_texts(self) -> list[str]:
+        """Return the STATUSTEXT lines since this was last asked."""
+        new, self._told = self.texts[self._told :], len(self.texts)
+        return new
+
+    def mode_rate_hz(self, now_us: int) -> float:
+        """Return how often the mode was reported in the last second, Hz."""
+        return float(sum(1 for at_us in self.mode_reports_us if now_us - at_us <= 1_000_000))
+
+    def receive(self, message: Message, now_us: int) -> None:
+        """Take in a message of the vehicle."""
+        fields, newest = message.fields, self._is_newest(message)
+        match message.name:
+            case "HEARTBEAT":
+                self.heartbeat_us, self.autopilot = now_us, fields.autopilot
+                self.system_status = fields.system_status
+                if newest:
+                    self.armed = bool(fields.base_mode & MODE_ARMED)
+                    self._set_mode(fields.custom_mode, now_us)
+            case "CURRENT_MODE" if newest:
+                self._set_mode(fields.custom_mode, now_us)
+            case "EXTENDED_SYS_STATE":
+                self.landed_state = fields.landed_state
+            case "SYS_STATUS":
+                self._take_status(fields)
+            case "BATTERY_STATUS":
+                if fields.battery_remaining >= 0:
+                    self.battery = fields.battery_remaining / _PERCENT
+            case "ESTIMATOR_STATUS":
+                self._tells_estimates, flags = True, fields.flags
+                self.estimator_ok = (
+                    flags & _ESTIMATES == _ESTIMATES and bool(flags & _PLACES) and bool(flags & _HEIGHTS)
+                )
+            case "GLOBAL_POSITION_INT":
+                self.altitude_amsl_m = fields.alt * _MM
+            case "STATUSTEXT":
+                self.texts.append(fields.text)
+
+    def _set_mode(self, mode: int, now_us: int) -> None:
+        self.mode, self.mode_us = mode, now_us
+        self.mode_reports_us = [at_us for at_us in self.mode_reports_us if now_us - at_us < 1_000_000] + [now_us]
+
+    def _is_newest(self, message: Message) -> bool:
+        """Whether no later message came before: a link may deliver an old mode after a new one."""
+        sequence = sequence_of(message.frame)
+        if self._sequence is not None and (sequence - self._sequence) % 256 >= _OLDER_FROM:
+            return False
+        self._sequence = sequence
+        return True
+
+    def _take_status(self, fields: Any) -> None:
+        if fields.onboard_control_sensors_present & _PREARM:
+            self.prearm_ok = bool(fields.onboard_control_sensors_health & _PREARM)
+        if not self._tells_estimates and fields.onboard_control_sensors_present & _AHRS:
+            self.estimator_ok = bool(fields.onboard_control_sensors_health & _AHRS)
+        watched = fields.onboard_control_sensors_enabled & _FENCE
+        self.fence_breached = bool(watched) and not fields.onboard_control_sensors_health & _FENCE
+        if fields.battery_remaining >= 0:
+            self.battery = fields.battery_remaining / _PERCENT

@@ -1,0 +1,449 @@
+"""A companion: bytes and the time in, bytes out; no socket, no clock.
+
+What is done in each phase is here; which follows which, and why, is in `supervision/phases`.
+"""
+
+from math import dist, inf, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.control.interface import FALLBACK_CODES, Clock
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.registry import DecisionError, Factory
+from colibri.autopilot.guidance.trajectories.tracks import Track, position
+from colibri.common.rotations import euler_from_quaternion, tilt_deg
+from colibri.common.types import Array, Vector
+from colibri.companion.conversation.vehicle_peer import ReceivedState, VehiclePeer
+from colibri.companion.identification import steps
+from colibri.companion.log import LogRow, TrackErrors
+from colibri.companion.orders import Orders
+from colibri.companion.settings import CompanionSettings, SetpointKind
+from colibri.companion.stacks.stack import Response
+from colibri.companion.stacks.thrust_curve import Thrust
+from colibri.companion.steering import response as model
+from colibri.companion.steering import setpoints
+from colibri.companion.steering.law_pilot import Asked, LawPilot
+from colibri.companion.steering.predictor import Predictor
+from colibri.companion.steering.reference_history import PastReference, ReferenceHistory
+from colibri.companion.steering.smooth_start import smoothly_started
+from colibri.companion.supervision.checks import CheckFacts, failing
+from colibri.companion.supervision.conditions import Situation, conditions
+from colibri.companion.supervision.limits import Box, FlightFacts, Limit, exceeded
+from colibri.companion.supervision.phases import Condition, Phase, next_phase
+from colibri.plant.vehicle.description import Vehicle
+
+_GUESSED = Response((0.03, 0.03, 0.12), 0.02, 0.03, (3.8, 3.8, 2.0), (15.0, 15.0, 4.0))
+"""Until the stack is known."""
+_STEADY_US = 1_000_000
+"""So long it holds after the take-over, and streams before it."""
+_BRAKES_US = 3_000_000
+"""How long it may brake at the end of a track before the vehicle is handed over."""
+_SLOW_M_S = 0.3
+_UP_M, _UP_M_S = 0.5, 0.3
+_TRACK_POINTS = 400
+_CORRECTED_IN = 0.5
+"""Round trips in which an error of the prediction is corrected."""
+_ENDLESS_S = 100.0
+
+
+class Ended(NamedTuple):
+    """How it ended.
+
+    Attributes:
+        in_order: Whether all was flown that was asked for, or whoever may end it did.
+        why: In words.
+    """
+
+    in_order: bool
+    why: str
+
+
+class Companion:
+    """Flies one vehicle along one track.
+
+    Attributes:
+        phase: What it is doing.
+        ended: How it ended; None before.
+        peer: The vehicle.
+        errors: On the track, by the vehicle's own estimate.
+        said: What is to be told, a line each; whoever reads it clears it.
+        rows: The log; whoever writes it clears it.
+        commanded, measured: Of an identification: times, s, and body rates, rad/s.
+        limit: The limit that ended the flight; None for none.
+    """
+
+    def __init__(
+        self,
+        settings: CompanionSettings,
+        profile: Profile,
+        vehicle: Vehicle,
+        track: Track,
+        clock: Clock,
+        law: Factory | None = None,
+    ) -> None:
+        """Fly `track` by the law of `profile`, made for `vehicle`; `clock` only measures, it decides nothing.
+
+        Raises:
+            ControllerError: The profile's control law cannot be used.
+            ProfileError: Its table is wrong.
+            SolverError: Its solver cannot be used.
+        """
+        self._settings, self._vehicle = settings, vehicle
+        self.peer = VehiclePeer(settings.stack)
+        self._response = settings.response or (settings.stack.response if settings.stack else _GUESSED)
+        track = smoothly_started(track)
+        self._pilot = LawPilot(profile, vehicle, track, self._response, clock, law)
+        self._predictor = Predictor(vehicle, self._response)
+        self._predictor.thrust_scale = settings.thrust_scale
+        self._history = ReferenceHistory()
+        self._orders = Orders(self.peer, settings, self._pilot.start_enu_m[2])
+        self._box = _box_of(track, settings)
+        self._weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
+        self._thrust: Thrust | None = None
+        self.phase, self._since_us = Phase.CONNECTING, 0
+        self._begun = False
+        self._next_us = 0
+        self._newest: ReceivedState | None = None
+        self._asked: Asked | None = None
+        self._jumped_m = 0.0
+        self._law_error = ""
+        self._stopped = self._brakes = self._on_way = self._has_flown = False
+        self._failing: list[str] = ["clock"]
+        self.ended: Ended | None = None
+        self.limit: Limit | None = None
+        self.errors = TrackErrors()
+        self.said: list[str] = []
+        self.rows: list[LogRow] = []
+        self.commanded: list[tuple[float, float, float, float]] = []
+        self.measured: list[tuple[float, float, float, float]] = []
+
+    @property
+    def interval_us(self) -> int:
+        """Between two setpoints."""
+        return self._pilot.interval_us
+
+    @property
+    def thrust_scale(self) -> float:
+        """Thrust that is made, in parts of the one that was meant, as refined in flight."""
+        return self._predictor.thrust_scale
+
+    @property
+    def failing(self) -> list[str]:
+        """What fails of the checks, and what to do about it."""
+        return self._failing
+
+    @property
+    def waits_for(self) -> list[str]:
+        """What it waits for before it flies, a line each."""
+        if self.phase is Phase.CONNECTING:
+            return ["waits for a HEARTBEAT"] if self.peer.system == 0 else ["waits for its parameters"]
+        if self.phase is not Phase.CHECKING:
+            return []
+        if self._failing or self._settings.dry_run or self._settings.may_arm:
+            return self._failing
+        return ["all is checked: waits for a vehicle that flies, in a mode that holds or takes setpoints"]
+
+    def stop(self, why: str) -> None:
+        """End the flight: hand over, or never begin."""
+        if not self._stopped:
+            self.said.append(why)
+        self._stopped = True
+
+    def receive(self, datagram: bytes, now_us: int) -> None:
+        """Take in what the vehicle has sent."""
+        for received in self.peer.receive(datagram, now_us):
+            self._take_in(received)
+
+    def poll(self, now_us: int) -> list[bytes]:
+        """Return what is to be sent now; to be called at least every `interval_us`."""
+        if not self._begun:
+            self._begun, self._since_us, self._next_us = True, now_us, now_us
+        if self.ended is not None:
+            return []
+        if self.peer.stack is not None and self._thrust is None and self.peer.parameter_values is not None:
+            self._know_stack(self.peer.parameter_values)
+        self._advance(now_us)
+        frames = []
+        if now_us >= self._next_us:
+            self._next_us += (1 + (now_us - self._next_us) // self.interval_us) * self.interval_us
+            frames = self._setpoint(now_us)
+        self._orders.poll(self.phase, now_us - self._since_us, ready=self._may_hand_over(now_us))
+        return self.peer.poll(now_us) + frames
+
+    # What is known.
+
+    def _take_in(self, received: ReceivedState) -> None:
+        at_us, state = received
+        if self._newest is not None and at_us > self._newest.at_us:
+            before = self._newest.state
+            passed_s = (at_us - self._newest.at_us) * 1e-6
+            there = tuple(p + passed_s * v for p, v in zip(before.position_enu_m, before.velocity_enu_m_s, strict=True))
+            self._jumped_m = dist(there, state.position_enu_m) if passed_s < 1.0 else 0.0
+        self._newest = received
+        self._predictor.corrected_in_s = _CORRECTED_IN * self.peer.clock.round_trip_us * 1e-6
+        self._predictor.observe(at_us, state)
+        if self._settings.identifies and self._on_way:
+            self.measured.append((at_us * 1e-6, *state.rate_flu_rad_s))
+        past = self._history.at(at_us)
+        if self.phase is Phase.FLYING and past is not None and past.track_enu_m is not None:
+            self.errors.add(past.track_s, past.track_enu_m, state.position_enu_m)
+
+    def _know_stack(self, parameters: dict[str, float]) -> None:
+        stack = self.peer.stack
+        assert stack is not None, "its parameters were read"
+        self._thrust = stack.thrust(parameters, self._vehicle)
+        self._response = self._settings.response or stack.response
+        self._pilot.adopt(self._response)
+        self._predictor.adopt(self._vehicle, self._response)
+
+    def _age_s(self, now_us: int) -> float:
+        return inf if self._newest is None else (now_us - self._newest.at_us) * 1e-6
+
+    def _acts_us(self, now_us: int) -> int:
+        """Return when a command that is sent now takes effect."""
+        return now_us + self.peer.clock.round_trip_us // 2 + round(self._response.latency_s * 1e6)
+
+    # Phases.
+
+    def _advance(self, now_us: int) -> None:
+        """Go on to the next phase as long as there is one."""
+        self._look(now_us)
+        while self.ended is None:
+            after, why = next_phase(self.phase, conditions(self._situation(now_us)))
+            if why is None:
+                return
+            self._enter(after, why, now_us)
+
+    def _look(self, now_us: int) -> None:
+        """Look for what fails of the checks, or which limit is exceeded."""
+        if self.phase is Phase.CHECKING:
+            self._failing = failing(self._check_facts(now_us))
+        elif self.phase in (Phase.TAKING_OFF, Phase.TAKING_OVER, Phase.FLYING) and self.limit is None:
+            facts = self._flight_facts(now_us)
+            self.limit = exceeded(facts, self._settings.limits, self._box)
+            if self.limit is not None:
+                self.said.append(f"{self.limit.name}: {self.limit.words(facts, self._settings.limits)}")
+
+    def _situation(self, now_us: int) -> Situation:
+        report, stack = self.peer.report, self.peer.stack
+        return Situation(
+            phase=self.phase,
+            stack=stack,
+            in_phase_s=(now_us - self._since_us) * 1e-6,
+            gives_up_s=inf if self._settings.dry_run else self._settings.gives_up_s,
+            mode=report.mode,
+            modes=self._orders.own_modes(self.phase),
+            failing=len(self._failing) + self._settings.dry_run,
+            connected=self.peer.connected and self._thrust is not None,
+            armed=report.armed or self._orders.disarms,
+            airborne=report.airborne,
+            may_arm=self._settings.may_arm,
+            held=self._orders.held,
+            is_up=self._is_up(),
+            finished=self._finished(now_us),
+            must_end=self.limit is not None,
+            stopped=self._stopped or self._orders.refused != "",
+        )
+
+    def _is_up(self) -> bool:
+        if self._newest is None or not self.peer.report.armed:
+            return False
+        if not self._orders.climbed:
+            return False
+        state = self._newest.state
+        off_m = abs(state.position_enu_m[2] - self._orders.height_enu_m)
+        return off_m < _UP_M and abs(state.velocity_enu_m_s[2]) < _UP_M_S
+
+    def _finished(self, now_us: int) -> bool:
+        if self._settings.dry_run:
+            return (now_us - self._since_us) * 1e-6 >= self._settings.duration_s
+        if not self._on_way or self._asked is None:
+            return False
+        if self._settings.identifies:
+            return self._identified_s(now_us) >= steps.duration_s()
+        return self._pilot.finished or self._asked.track_s >= self._settings.duration_s
+
+    def _identified_s(self, now_us: int) -> float:
+        """Return the time since the steps of an identification began, s."""
+        return (now_us - self._since_us - _STEADY_US) * 1e-6
+
+    def _enter(self, phase: Phase, why: Condition, now_us: int) -> None:
+        before, self.phase, self._since_us = self.phase, phase, now_us
+        self.said.append(f"{phase}: {self._orders.refused or why.value}")
+        if self._newest is not None and before is Phase.CHECKING:
+            x, y, z = self._newest.state.position_enu_m
+            self._orders.set_ground(z)
+            here = (x, y, z) if phase is Phase.TAKING_OVER else (x, y, self._orders.height_enu_m)
+            margin_m = self._settings.limits.margin_m
+            for place in ((x, y, z), here):
+                self._box = self._box.around(place, margin_m)
+        self._orders.enter(phase, before)
+        if phase is Phase.FLYING:
+            self._predictor.begin()
+            self._predictor.observe(self._newest.at_us, self._newest.state) if self._newest else None
+            self._pilot.begin(self._predictor.at(self._acts_us(now_us)))
+            self._on_way, self._has_flown, self._predictor.learns = False, True, True
+        elif phase is Phase.HANDING_OVER:
+            self._pilot.hold()
+            self._brakes = why is Condition.FINISHED
+        elif phase is Phase.ENDED:
+            self.ended = self._how_it_ended(before, why)
+
+    def _how_it_ended(self, before: Phase, why: Condition) -> Ended:
+        if why is Condition.PILOT:
+            return Ended(True, "the pilot, or the vehicle itself, has chosen another mode: it is theirs")
+        if self.limit is not None:
+            return Ended(False, f"ended by its limit: {self.limit.name}")
+        if self._orders.refused:
+            return Ended(False, self._orders.refused)
+        if why is Condition.TOO_LATE:
+            what = "; ".join(self._failing) if before is Phase.CHECKING else f"nothing came of {before} in time"
+            return Ended(False, what)
+        if why is Condition.DISARMED and before is not Phase.HANDING_OVER:
+            return Ended(False, why.value)
+        return Ended(True, why.value)
+
+    def _may_hand_over(self, now_us: int) -> bool:
+        """Whether it is time to order the vehicle to hold: once it is slow at the end of a track, else at once."""
+        if not self._brakes or self._newest is None or self.limit is not None or self._stopped:
+            return True
+        slow = dist(self._newest.state.velocity_enu_m_s, (0.0, 0.0, 0.0)) < _SLOW_M_S
+        return slow or now_us - self._since_us > _BRAKES_US
+
+    # Setpoints.
+
+    def _setpoint(self, now_us: int) -> list[bytes]:
+        """Return the setpoint of this instant, if this phase has one."""
+        rehearses = self._settings.dry_run and self.phase is Phase.CHECKING
+        blind = self.limit is not None and self.limit.blind
+        flies = self._has_flown and self.phase in (Phase.FLYING, Phase.HANDING_OVER) and not blind
+        if self._thrust is None or self._newest is None or not (flies or rehearses or self.phase is Phase.TAKING_OVER):
+            return []
+        if self.phase is Phase.HANDING_OVER and self._age_s(now_us) > self._settings.limits.max_state_age_s:
+            return []
+        acts_us = self._acts_us(now_us)
+        if rehearses or self.phase is Phase.TAKING_OVER:
+            self._pilot.begin(self._predictor.at(acts_us))
+        if self.phase is Phase.FLYING and not self._on_way and now_us - self._since_us >= _STEADY_US:
+            self._on_way = True
+            if not self._settings.identifies:
+                self._pilot.fly_track()
+        y = self._predictor.at(acts_us)
+        try:
+            asked = self._pilot.step(y)
+        except DecisionError as error:
+            self._law_error = str(error)
+            return []
+        if asked.reference is not None:
+            self._asked = asked
+            place = _first(asked.reference.position_enu_m)
+            self._history.add(PastReference(acts_us, place, asked.track_enu_m, asked.track_s))
+        if self.phase is Phase.TAKING_OVER and not rehearses:
+            asked = asked._replace(rate_flu_rad_s=(0.0, 0.0, 0.0), thrust_n=self._weight_n)
+        if self.phase is Phase.FLYING and self._on_way and self._settings.identifies:
+            asked = self._with_step(asked, now_us)
+        thrust = self._thrust.command(asked.thrust_n / (self._weight_n * self._predictor.thrust_scale))
+        if flies:
+            lift = (
+                self._thrust.load(thrust) * self._weight_n * self._predictor.thrust_scale / self._vehicle.body.mass_kg
+            )
+            self._predictor.sent(acts_us, asked.rate_flu_rad_s, lift)
+        self._note(now_us, y, asked, thrust, sent=not rehearses)
+        if rehearses:
+            return []
+        name, fields = self._encoded(now_us, asked, thrust, y)
+        return [self.peer.codec.encode(name, *fields)]
+
+    def _with_step(self, asked: Asked, now_us: int) -> Asked:
+        """Return what is asked with a step of the identification added, and note both."""
+        p, q, r = (a + b for a, b in zip(asked.rate_flu_rad_s, steps.step_at(self._identified_s(now_us)), strict=True))
+        self.commanded.append(((now_us + self.peer.clock.round_trip_us // 2) * 1e-6, p, q, r))
+        return asked._replace(rate_flu_rad_s=(p, q, r))
+
+    def _encoded(self, now_us: int, asked: Asked, thrust: float, y: Array) -> setpoints.Encoded:
+        kind, target, last = self._settings.setpoints, self.peer.target, self._asked
+        if kind is SetpointKind.RATES or last is None or last.reference is None or last.decision is None:
+            return setpoints.rates(now_us, target, asked.rate_flu_rad_s, thrust)
+        if kind is SetpointKind.ATTITUDE:
+            return setpoints.attitude(now_us, target, last.decision.attitude_reference, thrust)
+        if kind is SetpointKind.POSITION:
+            return setpoints.position(now_us, target, last.reference)
+        return setpoints.velocity(now_us, target, last.reference, _first(y[None, model.POSITION]))
+
+    # Facts.
+
+    def _check_facts(self, now_us: int) -> CheckFacts:
+        peer, report = self.peer, self.peer.report
+        assert peer.stack is not None, "it is connected"
+        return CheckFacts(
+            stack=peer.stack,
+            thrust=self._thrust,
+            parameters=peer.parameter_values,
+            clock_known=peer.clock.known,
+            round_trip_s=peer.clock.round_trip_us * 1e-6,
+            state_age_s=self._age_s(now_us),
+            state_rate_hz=peer.state_rate_hz(now_us),
+            state_delay_s=peer.state_delay_s,
+            mode_rate_hz=report.mode_rate_hz(now_us),
+            estimator_ok=report.estimator_ok,
+            prearm_ok=report.prearm_ok,
+            battery=report.battery,
+            fence_breached=report.fence_breached,
+            armed=report.armed,
+            may_arm=self._settings.may_arm,
+            box=self._box,
+            limits=self._settings.limits,
+        )
+
+    def _flight_facts(self, now_us: int) -> FlightFacts:
+        report, newest = self.peer.report, self._newest
+        flies = self.phase is Phase.FLYING
+        reference = None
+        if newest is not None and flies:
+            past = self._history.at(newest.at_us)
+            reference = None if past is None else past.position_enu_m
+        return FlightFacts(
+            state_age_s=self._age_s(now_us),
+            position_enu_m=newest.state.position_enu_m if newest else (nan, nan, nan),
+            tilt_deg=tilt_deg(newest.state.attitude) if newest else 0.0,
+            reference_enu_m=reference,
+            estimator_ok=report.estimator_ok,
+            jumped_m=self._jumped_m,
+            battery=report.battery,
+            system_status=report.system_status,
+            fence_breached=report.fence_breached,
+            law_error=self._law_error,
+        )
+
+    def _note(self, now_us: int, y: Array, asked: Asked, thrust: float, *, sent: bool) -> None:
+        last = self._asked
+        assert last is not None, "a law has decided"
+        assert last.reference is not None, "a law has decided"
+        reference, place = last.reference, _first(y[None, model.POSITION])
+        wanted = _first(reference.position_enu_m)
+        fallback = last.decision.diagnostics.fallback if last.decision else None
+        euler = euler_from_quaternion(tuple(y[model.ATTITUDE].tolist()))
+        numbers: tuple[Any, ...] = (
+            *(now_us * 1e-6, self.phase.value, int(last.track_enu_m is not None), last.track_s),
+            *(self._age_s(now_us), self.peer.clock.round_trip_us * 1e-6),
+            *(*place, *y[model.VELOCITY].tolist(), *euler, *y[model.RATE].tolist()),
+            *(*wanted, *_first(reference.velocity_enu_m_s), float(reference.yaw_rad[0]), dist(place, wanted)),
+            *(*asked.rate_flu_rad_s, thrust, asked.thrust_n, self._predictor.thrust_scale),
+            *(*self._predictor.disturbance[:3].tolist(), FALLBACK_CODES[fallback], int(sent)),
+        )
+        self.rows.append(LogRow(*numbers))
+
+
+def _box_of(track: Track, settings: CompanionSettings) -> Box:
+    """Return the box around the part of a track that is flown, with the margin; it ends at the ground."""
+    ends_s = min(track.duration_s, settings.duration_s, _ENDLESS_S)
+    points = position(track, np.linspace(0.0, ends_s, _TRACK_POINTS))
+    margin_m = settings.limits.margin_m
+    lower, upper = (points.min(axis=0) - margin_m).tolist(), (points.max(axis=0) + margin_m).tolist()
+    return Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
+
+
+def _first(rows: Any) -> Vector:
+    x, y, z = rows[0].tolist()
+    return (x, y, z)

@@ -1,0 +1,50 @@
+"""The steps of an identification: doublets of body rates about one axis after another, small and short."""
+
+from typing import NamedTuple
+
+from colibri.common.types import Vector
+
+ROUNDS = 3
+PAUSE_S = 1.2
+"""For the vehicle to come to rest again."""
+
+
+class Doublet(NamedTuple):
+    """A rate for a while, then the opposite one for as long.
+
+    Attributes:
+        axis: 0, 1, 2 for p, q, r.
+        rate_rad_s: Added to what is commanded.
+        half_s: How long each half lasts.
+    """
+
+    axis: int
+    rate_rad_s: float
+    half_s: float
+
+
+DOUBLETS = (Doublet(0, 0.4, 0.2), Doublet(1, 0.4, 0.2), Doublet(2, 0.4, 0.4))
+_NOTHING: Vector = (0.0, 0.0, 0.0)
+
+
+def duration_s() -> float:
+    """Return how long all of them take."""
+    return ROUNDS * sum(PAUSE_S + 2.0 * doublet.half_s for doublet in DOUBLETS)
+
+
+def step_at(time_s: float) -> Vector:
+    """Return what is added to the body rates commanded at a time, FLU, rad/s."""
+    left_s = time_s % (duration_s() / ROUNDS)
+    for doublet in DOUBLETS:
+        left_s -= PAUSE_S
+        if left_s < 0.0:
+            return _NOTHING
+        if left_s < 2.0 * doublet.half_s:
+            rate = doublet.rate_rad_s if left_s < doublet.half_s else -doublet.rate_rad_s
+            return (
+                rate if doublet.axis == 0 else 0.0,
+                rate if doublet.axis == 1 else 0.0,
+                rate if doublet.axis == 2 else 0.0,
+            )
+        left_s -= 2.0 * doublet.half_s
+    return _NOTHING

@@ -1,0 +1,243 @@
+"""A companion as a process: its link and its clock. Everything else is decided in `guide`."""
+
+import csv
+from argparse import Namespace
+from math import inf
+from pathlib import Path
+from time import perf_counter, time
+from typing import Any, NamedTuple, TextIO
+
+from colibri.analysis.report import length, write_report
+from colibri.autopilot.control.profile import Profile, load_profile
+from colibri.autopilot.guidance.trajectories.loading import load_track
+from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.common.errors import Error
+from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen
+from colibri.common.process.status import Status
+from colibri.common.types import Address
+from colibri.companion.errors import CompanionError
+from colibri.companion.guide import Companion
+from colibri.companion.log import FlightSummary, LogRow
+from colibri.companion.report import report
+from colibri.companion.response_file import read_response
+from colibri.companion.settings import CompanionSettings, SetpointKind
+from colibri.companion.stacks.recognition import STACKS
+from colibri.companion.supervision.limits import FlightLimits
+from colibri.flights.folder import occupied
+from colibri.mavlink.links.link import GroundLink
+from colibri.mavlink.links.open import check_reach, open_ground_link
+from colibri.mavlink.wire.signing import Signing, SigningError, parse_key, tick_at
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
+
+LOG, REPORT, RESPONSE, FIGURE = "companion.csv", "report.json", "companion.toml", "identification.png"
+_POLL_S = 0.002
+_IDENTIFIES_AT_M = 3.0
+_SAY_FAILING_EVERY_S = 5.0
+
+
+class Plan(NamedTuple):
+    """What is to be flown."""
+
+    settings: CompanionSettings
+    profile: Profile
+    vehicle: Vehicle
+    track: Track
+    note: str
+
+
+def plan_of(args: Namespace) -> Plan:
+    """Read the plan of a command line.
+
+    Raises:
+        Error: There is no such thing, or it cannot be flown.
+    """
+    profile = load_profile(args.profile).with_choices(args.controller, None)
+    vehicle = load_vehicle(args.model or profile.simulation.vehicle)
+    track, note = load_track(_track_name(args), vehicle, profile)
+    response, thrust_scale = read_response(Path(args.response)) if args.response else (None, 1.0)
+    if args.arm and args.dry_run:
+        raise CompanionError("--dry-run arms nothing: leave --arm out")
+    settings = CompanionSettings(
+        may_arm=args.arm,
+        dry_run=args.dry_run,
+        duration_s=args.duration,
+        takeoff_height_m=args.height,
+        gives_up_s=args.wait,
+        limits=FlightLimits(
+            margin_m=args.margin,
+            max_tilt_deg=args.max_tilt,
+            max_error_m=args.max_error,
+            max_state_age_s=1e-3 * args.max_age,
+        ),
+        setpoints=SetpointKind(args.setpoints),
+        stack=STACKS[args.stack] if args.stack else None,
+        response=response,
+        identifies=args.identify,
+        thrust_scale=thrust_scale,
+    )
+    return Plan(settings, profile, vehicle, track, note)
+
+
+def _track_name(args: Namespace) -> str:
+    """Return the name of the track; one that identifies hovers.
+
+    Raises:
+        CompanionError: There is none.
+    """
+    if args.identify:
+        if args.track or args.dry_run:
+            raise CompanionError("--identify hovers and sends steps: leave TRACK and --dry-run out")
+        return f"hover:height={args.height or _IDENTIFIES_AT_M:g}"
+    if args.track is None:
+        raise CompanionError("name a TRACK to fly, or --identify")
+    return str(args.track)
+
+
+def fly(args: Namespace) -> int:
+    """Fly as the command line says; return the exit code."""
+    try:
+        plan = plan_of(args)
+        signing = _signing(args.signing_key)
+        check_reach([args.vehicle], signed=signing is not None, insecure=args.insecure)
+        companion = Companion(plan.settings, plan.profile, plan.vehicle, plan.track, perf_counter)
+        link = open_ground_link(args.vehicle)
+    except Error as error:
+        fail(str(error))
+    companion.peer.sign_with(signing)
+    status = _Quiet() if args.quiet else Status("companion", as_json=False)
+    if plan.note:
+        status.say("note", plan.note)
+    with occupied(args.out):
+        stop, summary = Stop(), FlightSummary()
+        try:
+            with (args.out / LOG).open("w", newline="", encoding="utf-8") as file, gc_frozen():
+                serve(companion, link, status, stop, _Log(file, summary))
+        except Error as error:
+            fail(str(error), EXIT_FAILED)
+        finally:
+            link.close()
+        given = _given(args, plan)
+        figures = report(companion, summary, given)
+        write_report(figures, args.out / REPORT)
+        if plan.settings.identifies and companion.ended is not None and companion.ended.in_order:
+            _identify(companion, status, args.out)
+    return _end(companion, figures, status, args.out)
+
+
+def serve(companion: Companion, link: GroundLink, status: Status, stop: Stop, log: "_Log") -> None:
+    """Fly until the companion has ended.
+
+    Raises:
+        LinkError: The vehicle can never be reached.
+    """
+    began_s = perf_counter()
+    address: Address | None = link.target
+    tell_s, told = _SAY_FAILING_EVERY_S, list[str]()
+    while companion.ended is None:
+        now_us = round((perf_counter() - began_s) * 1e6)
+        if stop:
+            companion.stop("interrupted: the vehicle is handed over")
+        for datagram, sender in link.receive_now():
+            companion.receive(datagram, now_us)
+            address = sender
+        for opened in link.take_opened():
+            address = address or opened
+        if address in link.take_closed():
+            address = None
+        for frame in companion.poll(now_us):
+            if address is not None:
+                link.send(frame, None if link.target == address else address)
+        log.write(companion)
+        for line in companion.said:
+            status.say("phase", line)
+        companion.said.clear()
+        for line in companion.peer.report.take_new_texts():
+            status.say("vehicle", f"vehicle says: {line}")
+        if now_us * 1e-6 > tell_s and companion.waits_for != told:
+            tell_s, told = now_us * 1e-6 + _SAY_FAILING_EVERY_S, companion.waits_for
+            for line in told:
+                status.say("waits", line)
+        link.wait(_POLL_S)
+
+
+class _Log:
+    """The rows of a flight on their way to a file."""
+
+    def __init__(self, file: TextIO, summary: FlightSummary) -> None:
+        self._file, self._summary = file, summary
+        self._writer = csv.writer(file)
+        self._writer.writerow(LogRow._fields)
+
+    def write(self, companion: Companion) -> None:
+        """Write what has come; the numbers as short as they are read back."""
+        for row in companion.rows:
+            self._summary.add(row)
+            self._writer.writerow(f"{value:.9g}" if isinstance(value, float) else value for value in row)
+        companion.rows.clear()
+
+
+class _Quiet(Status):
+    """Says nothing."""
+
+    def __init__(self) -> None:
+        super().__init__("", as_json=False)
+
+    def say(self, event: str, text: str, **facts: Any) -> None:
+        """Say nothing."""
+
+
+def _signing(path: Path | None) -> Signing | None:
+    """Return what signs with the key of a file; None without one.
+
+    Raises:
+        CompanionError: It holds no key, or cannot be read.
+    """
+    if path is None:
+        return None
+    try:
+        return Signing(parse_key(path.read_bytes()), tick_at(time()))
+    except (OSError, SigningError) as error:
+        raise CompanionError(f"--signing-key {path}: {error}") from error
+
+
+def _identify(companion: Companion, status: Status, out: Path) -> None:
+    """Fit the response to what was flown, and write it."""
+    from colibri.companion.identification.figure import draw
+    from colibri.companion.identified import identified
+
+    try:
+        found, text, fitted = identified(companion)
+    except Error as error:
+        fail(f"{error}; what was logged is in {out}", EXIT_FAILED)
+    (out / RESPONSE).write_text(text, encoding="utf-8")
+    draw(fitted, out / FIGURE)
+    lags = ", ".join(f"{1e3 * lag_s:.0f}" for lag_s in found.time_constant_s)
+    status.say("identified", f"time constants {lags} ms after {1e3 * found.latency_s:.0f} ms: {out / RESPONSE}")
+
+
+def _given(args: Namespace, plan: Plan) -> dict[str, Any]:
+    return {
+        "track": args.track or "identification",
+        "track_note": plan.note,
+        "profile": plan.profile.name,
+        "controller": plan.profile.controller,
+        "link": args.vehicle,
+        "vehicle": plan.vehicle.name,
+        "setpoint_kind": plan.settings.setpoints.value,
+        "dry_run": plan.settings.dry_run,
+        "duration_s": None if plan.settings.duration_s == inf else plan.settings.duration_s,
+    }
+
+
+def _end(companion: Companion, figures: dict[str, Any], status: Status, out: Path) -> int:
+    ended = companion.ended
+    assert ended is not None, "it was served until then"
+    if figures["control_rmse_m"] is not None:
+        status.say(
+            "report",
+            f"estimate from track, RMS {length(figures['control_rmse_m'])}, at most {length(figures['max_error_m'])}; "
+            f"written to {out}",
+        )
+    if ended.in_order:
+        return 0
+    fail(f"{ended.why}; what was logged is in {out}", EXIT_FAILED)

@@ -1,0 +1,52 @@
+"""The file of an identified response, `companion.toml`: written by --identify, read by --response."""
+
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import msgspec
+
+from colibri.common.config import NotNegative, Positive, Table
+from colibri.companion.errors import CompanionError
+from colibri.companion.stacks.stack import Response
+
+TimeConstant: TypeAlias = Annotated[float, msgspec.Meta(ge=0.005, le=1.0)]
+Scale: TypeAlias = Annotated[float, msgspec.Meta(ge=0.5, le=1.8)]
+Latency: TypeAlias = Annotated[float, msgspec.Meta(ge=0.0, le=0.2)]
+
+
+class ResponseFile(Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How body rates follow their commands."""
+
+    time_constant_s: tuple[TimeConstant, TimeConstant, TimeConstant]
+    latency_s: Latency
+    thrust_lag_s: NotNegative
+    max_rate_rad_s: tuple[Positive, Positive, Positive]
+    max_acceleration_rad_s2: tuple[Positive, Positive, Positive]
+    thrust_scale: Scale = 1.0
+    """Thrust that was made, in parts of the one that the vehicle's parameters mean."""
+
+
+def read_response(path: Path) -> tuple[Response, float]:
+    """Read the response of a file, and its scale of thrust.
+
+    Raises:
+        CompanionError: It cannot be read, or has a missing, unknown or impossible key.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        found = msgspec.toml.decode(text, type=ResponseFile)
+    except (OSError, UnicodeDecodeError) as error:
+        raise CompanionError(f"{path}: {getattr(error, 'strerror', error)}") from error
+    except msgspec.MsgspecError as error:
+        raise CompanionError(f"{path}: {error}") from error
+    response = Response(*(getattr(found, name) for name in Response._fields))
+    return response, found.thrust_scale
+
+
+def response_text(response: Response, thrust_scale: float, remarks: list[str]) -> str:
+    """Return what is in the file of a response, with remarks above it."""
+    lines = [f"# {remark}" for remark in remarks]
+    for name, value in (response._asdict() | {"thrust_scale": thrust_scale}).items():
+        values = [f"{part:.4g}" for part in value] if isinstance(value, tuple) else None
+        lines.append(f"{name} = [{', '.join(values)}]" if values else f"{name} = {float(value):.4g}")
+    return "\n".join(lines) + "\n"

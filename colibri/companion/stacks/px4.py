@@ -1,0 +1,60 @@
+"""PX4: offboard mode by body rates and thrust.
+
+Sources: PX4 guide, Offboard Mode; PX4 Parameter Reference (Multicopter Position Control, Motor Control, Geofence).
+"""
+
+from colibri.companion.stacks.px4_modes import HOLD, LAND, OFFBOARD, STEADY
+from colibri.companion.stacks.stack import ParameterRule, Parameters, Response, Stack, TakeOff
+from colibri.companion.stacks.thrust_curve import ThrustCurve
+from colibri.mavlink.wire.dialect import mav
+from colibri.plant.vehicle.description import Vehicle
+
+_HOVER = 0.5
+_RATES_REACHED_S = 2.0
+
+
+def _thrust(parameters: Parameters, vehicle: Vehicle) -> ThrustCurve:
+    return ThrustCurve(
+        hover=parameters.get("MPC_THR_HOVER", _HOVER),
+        expo=parameters.get("THR_MDL_FAC", 0.0),
+        quadratic=vehicle.rotors.control == "speed",
+    )
+
+
+PX4 = Stack(
+    name="px4",
+    autopilot=mav.MAV_AUTOPILOT_PX4,
+    offboard=OFFBOARD,
+    hold=HOLD,
+    last_resort=LAND,
+    steady=STEADY,
+    streams={
+        "ODOMETRY": 100.0,
+        "ATTITUDE_QUATERNION": 50.0,
+        "LOCAL_POSITION_NED": 50.0,
+        "CURRENT_MODE": 25.0,
+        "EXTENDED_SYS_STATE": 5.0,
+        "SYS_STATUS": 5.0,
+        "ESTIMATOR_STATUS": 5.0,
+        "BATTERY_STATUS": 1.0,
+        "GLOBAL_POSITION_INT": 5.0,
+    },
+    parameters=(
+        "MPC_THR_HOVER",
+        "THR_MDL_FAC",
+        "COM_OF_LOSS_T",
+        "COM_RC_OVERRIDE",
+        "GF_MAX_HOR_DIST",
+        "GF_MAX_VER_DIST",
+    ),
+    rules=(
+        ParameterRule(
+            "COM_OF_LOSS_T", lambda value: value <= _RATES_REACHED_S, "set COM_OF_LOSS_T to 1: PX4 is to act on silence"
+        ),
+    ),
+    fence=("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"),
+    thrust=_thrust,
+    response=Response((0.055, 0.055, 0.15), 0.012, 0.03, (3.8, 3.8, 2.0), (40.0, 40.0, 6.0)),
+    take_off=TakeOff.COMMAND_THEN_ARM,
+    integers_by_bits=True,
+)

@@ -1,0 +1,282 @@
+"""A control law that flies a vehicle whose rotors are another's: its moments become body rates, its rotors a thrust.
+
+The law is given the vehicle as it will be when the command takes effect, and returns rotor speeds. Rotors that nobody
+has follow them, as those of the vehicle file would; they turn the vehicle of the file for one interval, and the body
+rates that it would have then are what the stack is made to reach, by the exact inverse of its response.
+
+So it is for roll and pitch. Yaw has its own loop, since no two stacks turn alike: the law is told that the vehicle is
+to turn as it turns, which asks for no moment, and the heading follows the references by a commanded rate.
+"""
+
+from math import cos, dist, hypot, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.autopilot.commander.flight.reference_generator import ReferenceGenerator
+from colibri.autopilot.control.interface import Clock, Decision, Horizon, VehicleState
+from colibri.autopilot.control.loop import ControlLoop
+from colibri.autopilot.control.profile import Profile
+from colibri.autopilot.control.registry import Factory
+from colibri.autopilot.control.vehicle_model import motion
+from colibri.autopilot.control.vehicle_model.battery import open_voltage_v
+from colibri.autopilot.guidance.behaviour import Behaviour
+from colibri.autopilot.guidance.integrator_chain import Limits
+from colibri.autopilot.guidance.sample_grid import instants
+from colibri.autopilot.guidance.tasks.orders import GoTo
+from colibri.autopilot.guidance.tasks.position import GoToTask, HoldTask, TakeoffTask, TaskSequence, TrackTask
+from colibri.autopilot.guidance.tasks.task import FlightTask, Motion, PlannedMotion, TaskContext
+from colibri.autopilot.guidance.trajectories.planner import Planner
+from colibri.autopilot.guidance.trajectories.tracks import Track
+from colibri.common.jit import packed
+from colibri.common.rotations import euler_from_quaternion, nearest_turn
+from colibri.common.types import Array, Vector
+from colibri.companion.stacks.stack import Response
+from colibri.companion.steering import response as model
+from colibri.mavlink.hil.state import StateFrame
+from colibri.plant.vehicle.description import Vehicle
+
+APPROACH = Limits(
+    speed_m_s=2.0, climb_m_s=1.0, sink_m_s=1.0, acceleration_m_s2=2.0, lift_m_s2=2.0, jerk_m_s3=8.0, yaw_rate_rad_s=0.8
+)
+"""How fast a vehicle is led to the track."""
+_MAX_INTERVAL_US = 10_000
+"""Setpoints are sent at 100 Hz and more, however seldom the law decides."""
+_THERE_M, _THERE_M_S = 0.002, 0.005
+_YAW_1_S = 2.0
+"""How fast an error of the heading dies."""
+_MIN_UPRIGHT = 0.2
+_NO_DISTURBANCE = np.zeros(6)
+
+
+class ApproachTask(GoToTask):
+    """To the first point of the track, and there until the reference itself stands at it."""
+
+    def arrived(self, context: TaskContext) -> bool:
+        """Whether vehicle and reference are there."""
+        there = dist(context.place, self._place) < _THERE_M and hypot(*context.velocity) < _THERE_M_S
+        return there and super().arrived(context)
+
+
+class Asked(NamedTuple):
+    """What a law asks for at one instant.
+
+    Attributes:
+        rate_flu_rad_s: Body rates to command.
+        thrust_n: Of all rotors.
+        reference: The references that it was given; None between two decisions.
+        decision: The law's; None between two.
+        track_enu_m: Where the track has the vehicle; None on the way to it, and between two decisions.
+        track_s: Time along the track; negative before it.
+    """
+
+    rate_flu_rad_s: Vector
+    thrust_n: float
+    reference: Horizon | None
+    decision: Decision | None
+    track_enu_m: Vector | None
+    track_s: float
+
+
+class LawPilot:
+    """Flies one track by one law.
+
+    Attributes:
+        interval_us: Between two setpoints.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        vehicle: Vehicle,
+        track: Track,
+        response: Response,
+        clock: Clock,
+        law: Factory | None = None,
+    ) -> None:
+        """Fly `track` by the law of `profile`, or one made by `law`; `clock` only measures.
+
+        Raises:
+            ControllerError: The profile's control law cannot be used.
+            ProfileError: Its table is wrong.
+            SolverError: Its solver cannot be used.
+        """
+        self._profile, self._clock, self._law = profile, clock, law
+        self._airframe, self._track = vehicle, track
+        self._build(response)
+        self._instants = instants(self._loop.preview, self._loop.control_interval_us)
+        self._planner = Planner(track, profile.references, self._instants.preview)
+        self._behaviour = Behaviour(limits=APPROACH)
+        self._generator = ReferenceGenerator(self._instants, APPROACH)
+        parts = -(-self._loop.control_interval_us // _MAX_INTERVAL_US)
+        self.interval_us = self._loop.control_interval_us // parts
+        self._parts, self._tick = parts, 0
+        self._heading = (0.0, 0.0, 0.0)
+        self._ahead_s = 1e-6 * self._loop.preview.interval_us * np.arange(self._loop.preview.samples)
+        self._rotors = np.full(4, vehicle.hover_speed)
+        self._task: FlightTask = HoldTask()
+        carried = np.zeros(motion.STATES)
+        carried[6] = 1.0
+        motion.carry(carried, np.ones(1), np.zeros((1, 4)), _NO_DISTURBANCE, 1.0, self._motion)
+
+    @property
+    def law(self) -> str:
+        """The law's class."""
+        return type(self._loop.controller).__name__
+
+    @property
+    def start_enu_m(self) -> Vector:
+        """Where the track begins."""
+        x, y, z = self._planner.horizon(0).position_enu_m[0].tolist()
+        return (x, y, z)
+
+    def adopt(self, response: Response) -> None:
+        """Fly a vehicle of another response.
+
+        Raises:
+            ControllerError: The control law cannot be built for it.
+        """
+        self._build(response)
+
+    def _build(self, response: Response) -> None:
+        """Build the law for the vehicle as its stack lets it turn."""
+        self._response = response
+        self._vehicle = turning_no_faster(self._airframe, response)
+        self._loop = ControlLoop(self._profile, self._vehicle, self._clock, self._law)
+        self._motion = packed(motion.motion_model(self._vehicle))
+
+    def begin(self, y: Array) -> None:
+        """Begin with a vehicle that moves as `y` says, (14,), and take it over as it moves: brake, and stay."""
+        frame = _frame(0, y)
+        self._tick = 0
+        self._loop.begin(self._vehicle.hover_speed, self._loop.state(frame).euler[2])
+        self._rotors = np.full(4, self._vehicle.hover_speed)
+        self._generator.follow(self._loop.state(frame))
+        self._task = HoldTask()
+
+    def fly_track(self) -> None:
+        """Go to the track from wherever the reference is, and along it."""
+        first = self._planner.horizon(0)
+        x, y, z = first.position_enu_m[0].tolist()
+        yaw_rad = float(first.yaw_rad[0])
+        self._task = TaskSequence(
+            lambda context: TakeoffTask(z, None, context),
+            lambda context: ApproachTask(GoTo((x, y, z), yaw_rad), context),
+            lambda context: TrackTask(self._planner, self._track.duration_s, context.now_us),
+        )
+
+    def hold(self) -> None:
+        """Brake, and stay."""
+        self._task = HoldTask()
+
+    @property
+    def finished(self) -> bool:
+        """Whether the track is flown to its end."""
+        task = self._flown
+        return isinstance(task, TrackTask) and self._time_us - task.began_us > self._track.duration_s * 1e6
+
+    @property
+    def _flown(self) -> FlightTask | None:
+        return self._task.task if isinstance(self._task, TaskSequence) else self._task
+
+    @property
+    def _time_us(self) -> int:
+        return self._tick * self.interval_us
+
+    def step(self, y: Array) -> Asked:
+        """Return what is asked of a vehicle that moves as `y` says when it takes effect; once an interval.
+
+        Raises:
+            DecisionError: The law raised, or gave what no rotor can follow.
+        """
+        decision, horizon, place = None, None, None
+        time_us = self._time_us
+        if self._tick % self._parts == 0:
+            state = self._loop.state(_frame(time_us, y))
+            horizon, place = self._references(time_us, state)
+            yaw, yaw_rate, yaw_acceleration = (float(of[0]) for of in horizon[5:])
+            self._heading = (yaw, yaw_rate, yaw_acceleration)
+            decision = self._loop.decide(time_us, state, self._turning_as_it_does(horizon, state))
+        speeds = np.array(self._loop.controls) * self._vehicle.rotors.max_speed
+        x = np.concatenate((y[: model.LIFT], self._rotors))
+        interval_s = self.interval_us * 1e-6
+        after = motion.carry(x, np.array([interval_s]), speeds[None], _NO_DISTURBANCE, self._voltage_v, self._motion)
+        before_n = motion.thrust_n(self._rotors, self._motion)
+        self._rotors = after[motion.ROTORS]
+        thrust = 0.5 * (before_n + motion.thrust_n(self._rotors, self._motion))
+        now, then = y[model.RATE].tolist(), after[motion.RATE].tolist()
+        p, q, _ = model.rate_command(tuple(now), tuple(then), interval_s, self._response)
+        self._tick += 1
+        return Asked((p, q, self._yaw_rate(y, q)), thrust, horizon, decision, place, self._track_s(time_us))
+
+    def _turning_as_it_does(self, horizon: Horizon, state: VehicleState) -> Horizon:
+        """Return references whose heading is the vehicle's own, turning as it does."""
+        turns = _yaw_rate_of(state.euler, state.rate_flu_rad_s)
+        yaw = np.asarray(state.euler[2] + turns * self._ahead_s, dtype=np.float64)
+        return horizon._replace(
+            yaw_rad=yaw, yaw_rate_rad_s=np.full_like(yaw, turns), yaw_acceleration_rad_s2=np.zeros_like(yaw)
+        )
+
+    def _yaw_rate(self, y: Array, q: float) -> float:
+        """Return the body rate r by which the heading follows its reference, rad/s, within what the stack turns."""
+        phi, theta, psi = euler_from_quaternion(tuple(y[model.ATTITUDE].tolist()))
+        wanted, rate, acceleration = self._heading
+        off = nearest_turn(wanted, psi) - psi
+        turns = rate + self._response.time_constant_s[2] * acceleration + _YAW_1_S * off
+        r = (turns * cos(theta) - sin(phi) * q) / max(cos(phi), _MIN_UPRIGHT)
+        maximum = self._response.max_rate_rad_s[2]
+        return min(max(r, -maximum), maximum)
+
+    def _track_s(self, time_us: int) -> float:
+        task = self._flown
+        return (time_us - task.began_us) * 1e-6 if isinstance(task, TrackTask) else -1.0
+
+    @property
+    def _voltage_v(self) -> float:
+        battery = self._vehicle.battery
+        return 1.0 if battery is None else open_voltage_v(battery, self._loop.charge_ah)
+
+    def _references(self, time_us: int, state: VehicleState) -> tuple[Horizon, Vector | None]:
+        generator = self._generator
+        assert generator.reference is not None, "it was begun"
+        context = TaskContext(
+            time_us,
+            state,
+            generator.reference,
+            state.position_enu_m,
+            self._behaviour,
+            generator.interval_s,
+            generator.samples,
+        )
+        wanted = self._task.update(context)
+        assert isinstance(wanted, Motion | PlannedMotion), "no task of these asks for attitudes"
+        horizon = generator.lead(context, wanted)
+        if not isinstance(wanted, PlannedMotion):
+            return horizon, None
+        x, y, z = wanted.horizon.position_enu_m[0].tolist()
+        return horizon, (x, y, z)
+
+
+def turning_no_faster(vehicle: Vehicle, response: Response) -> Vehicle:
+    """Return a vehicle whose rotors can turn it no faster than its stack lets them: heavier to turn where need be.
+
+    A law that knows so brakes in time; one that does not would ask for what never comes, and overshoot.
+    """
+    _, *moments_n_m = vehicle.max_wrench().tolist()
+    most = response.max_acceleration_rad_s2
+    ix, iy = (
+        max(inertia, moment / limit)
+        for inertia, moment, limit in zip(vehicle.body.inertia_kg_m2[:2], moments_n_m[:2], most[:2], strict=True)
+    )
+    return vehicle.replace("body.inertia_kg_m2", (ix, iy, vehicle.body.inertia_kg_m2[2]))
+
+
+def _yaw_rate_of(euler: Vector, rate: Vector) -> float:
+    """Return how fast the heading turns, rad/s: THESIS [2.7]."""
+    phi, theta, _ = euler
+    return (sin(phi) * rate[1] + cos(phi) * rate[2]) / max(cos(theta), _MIN_UPRIGHT)
+
+
+def _frame(time_us: int, y: Array) -> StateFrame:
+    px, py, pz, vx, vy, vz, qw, qx, qy, qz, p, q, r, _ = y.tolist()
+    return StateFrame(time_us, (px, py, pz), (vx, vy, vz), (qw, qx, qy, qz), (p, q, r))

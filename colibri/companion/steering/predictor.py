@@ -1,0 +1,146 @@
+"""The vehicle at the instant at which a command takes effect: its last state carried there by the commands sent since.
+
+What each new state differs by from the one predicted for it is a disturbance: wind, a thrust that is not as it was
+thought. Of the thrust, what lasts is taken for a scale: the hover thrust, refined in flight.
+"""
+
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.common.jit import packed
+from colibri.common.kernels import exp
+from colibri.common.rotations import rotation_matrix
+from colibri.common.types import Array, Vector
+from colibri.companion.conversation.states import TimedState
+from colibri.companion.stacks.stack import Response
+from colibri.companion.steering import response as model
+from colibri.plant.vehicle.description import Vehicle
+
+_FOLLOWS_US = 150_000
+"""After a longer gap nothing is known of disturbances."""
+_KEPT_US = 1_000_000
+_DISTURBANCE_1_S = 6.0
+_MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 20.0, 20.0, 20.0])
+_TURN_PART = 0.5
+"""Of the disturbance of rates: their model is the less certain one."""
+_SCALE_1_S = 0.25
+MIN_SCALE, MAX_SCALE = 0.5, 1.8
+
+
+class SentCommand(NamedTuple):
+    """A command: when it takes effect, by the own clock, body rates, rad/s, and lift, m/s²."""
+
+    acts_us: int
+    values: tuple[float, float, float, float]
+
+
+class Predictor:
+    """Predicts one vehicle.
+
+    Attributes:
+        corrected_in_s: In which an error of the prediction is corrected, as a time constant. The longer a state and a
+            command are on their way, the longer it must be: corrections at once, of what jitter and loss make of a
+            prediction, would be taken for motion, and answered too late.
+        thrust_scale: Thrust that is made, in parts of the one that was meant.
+        disturbance: Acceleration, ENU, m/s², and angular acceleration, FLU, rad/s², (6,).
+    """
+
+    def __init__(self, vehicle: Vehicle, response: Response) -> None:
+        """Predict `vehicle`; what is compiled is loaded here."""
+        self._gravity_m_s2 = vehicle.gravity_m_s2
+        self.thrust_scale = 1.0
+        self.corrected_in_s = 0.0
+        self.adopt(vehicle, response)
+        self.begin()
+        model.carry(np.ones(model.STATES), np.ones(1), np.zeros((1, model.COMMANDS)), self.disturbance, self._model)
+
+    def adopt(self, vehicle: Vehicle, response: Response) -> None:
+        """Predict with another response."""
+        self._model = packed(model.response_model(vehicle, response))
+
+    def begin(self) -> None:
+        """Begin with level hover commanded, and no disturbance."""
+        self._sent = deque([SentCommand(-(2**62), (0.0, 0.0, 0.0, self._gravity_m_s2))])
+        self._known: tuple[int, Array] | None = None
+        self.disturbance = np.zeros(6)
+        self.learns = False
+
+    def sent(self, acts_us: int, rate: Vector, lift_m_s2: float) -> None:
+        """Take in a command that is sent now, and takes effect at `acts_us`."""
+        while self._sent and self._sent[-1].acts_us >= acts_us:
+            self._sent.pop()
+        self._sent.append(SentCommand(acts_us, (*rate, lift_m_s2)))
+        while len(self._sent) > 1 and self._sent[1].acts_us < acts_us - _KEPT_US:
+            self._sent.popleft()
+
+    def observe(self, at_us: int, state: TimedState) -> None:
+        """Take in the state of a time of the own clock; an older one than the last is dropped."""
+        if self._known is not None and at_us <= self._known[0]:
+            return
+        lift = self._acting(at_us)[0].values[3]
+        values = (*state.position_enu_m, *state.velocity_enu_m_s, *state.attitude, *state.rate_flu_rad_s, lift)
+        y = np.array(values)
+        known = self._known
+        if known is None or at_us - known[0] > _FOLLOWS_US:
+            self.disturbance = np.zeros(6)
+        else:
+            expected = self._carried(known[1], known[0], at_us)
+            y[model.LIFT] = expected[model.LIFT]
+            y = self._corrected(expected, y, (at_us - known[0]) * 1e-6)
+        self._known = (at_us, y)
+
+    def at(self, time_us: int) -> Array:
+        """Return position, velocity, attitude, rates and lift, (14,), at a time of the own clock.
+
+        Raises:
+            ValueError: No state is known.
+        """
+        if self._known is None:
+            raise ValueError("no state is known")
+        at_us, y = self._known
+        return self._carried(y, at_us, time_us) if time_us > at_us else y
+
+    @property
+    def known_us(self) -> int | None:
+        """When the last state was, by the own clock; None before the first."""
+        return None if self._known is None else self._known[0]
+
+    def _corrected(self, expected: Array, measured: Array, passed_s: float) -> Array:
+        """Return the expected state corrected by a part of what was missed, of which the disturbance learns, too."""
+        part = 1.0 - exp(-passed_s / self.corrected_in_s) if self.corrected_in_s > 0.0 else 1.0
+        if float(expected[model.ATTITUDE] @ measured[model.ATTITUDE]) < 0.0:
+            measured[model.ATTITUDE] *= -1.0
+        missed = part * (measured - expected)
+        y: Array = expected + missed
+        y[model.ATTITUDE] /= np.linalg.norm(y[model.ATTITUDE])
+        self._learn(y, np.concatenate((missed[model.VELOCITY], _TURN_PART * missed[model.RATE])), passed_s)
+        return y
+
+    def _learn(self, y: Array, missed: Array, passed_s: float) -> None:
+        part = 1.0 - exp(-_DISTURBANCE_1_S * passed_s)
+        change = part * missed / passed_s
+        self.disturbance = np.clip(self.disturbance + change, -_MAX_DISTURBANCE, _MAX_DISTURBANCE)
+        if not self.learns:
+            return
+        up = np.array(rotation_matrix(tuple(y[model.ATTITUDE].tolist())))[:, 2]
+        along = float(up @ self.disturbance[:3]) / max(float(y[model.LIFT]), 1.0)
+        step = _SCALE_1_S * passed_s * along
+        self.thrust_scale = min(max(self.thrust_scale * (1.0 + step), MIN_SCALE), MAX_SCALE)
+
+    def _carried(self, y: Array, from_us: int, until_us: int) -> Array:
+        acting = self._acting(from_us, until_us)
+        begins = np.array([from_us, *(it.acts_us for it in acting[1:]), until_us])
+        commands = np.array([it.values for it in acting])
+        return model.carry(y, np.diff(begins) * 1e-6, commands, self.disturbance, self._model)
+
+    def _acting(self, from_us: int, until_us: int = 0) -> list[SentCommand]:
+        """Return the command that acts at a time, and those that take effect until another."""
+        acting = [self._sent[0]]
+        for it in self._sent:
+            if it.acts_us <= from_us:
+                acting = [it]
+            elif it.acts_us < until_us:
+                acting.append(it)
+        return acting

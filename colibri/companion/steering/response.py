@@ -1,0 +1,142 @@
+"""A vehicle under a stack's rate loop, as a companion models it: rates and thrust that follow as first-order lags.
+
+With c the commanded body rates and T a time constant of each axis, w' = (c - w) / T; thrust likewise. The rest is the
+vehicle's: it drags, and is pushed by what is observed of a disturbance.
+"""
+
+from math import ceil, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.common.compiled_rotations import rotation_matrix
+from colibri.common.jit import Packed, compiled
+from colibri.common.kernels import exp
+from colibri.common.types import Array, Vector
+from colibri.companion.stacks.stack import Response
+from colibri.plant.vehicle.description import Vehicle
+
+STATES, COMMANDS = 14, 4
+POSITION, VELOCITY, ATTITUDE, RATE, LIFT = slice(3), slice(3, 6), slice(6, 10), slice(10, 13), 13
+"""Lift is thrust over mass, m/s²."""
+_STEP_S = 0.004
+_ROUNDING = 1e-6
+
+
+class ResponseModel(NamedTuple):
+    """The numbers of the model.
+
+    Attributes:
+        time_constant_s: Of p, q, r, (3,).
+        max_acceleration_rad_s2: Of rates, (3,).
+        lift_lag_s: Of thrust; 0 where it follows at once.
+        drag_1_s: Along the FLU axes, over the mass, (3,).
+    """
+
+    time_constant_s: Array
+    max_acceleration_rad_s2: Array
+    lift_lag_s: float
+    drag_1_s: Array
+    gravity_m_s2: float
+
+
+def response_model(vehicle: Vehicle, response: Response) -> ResponseModel:
+    """Return the numbers of a vehicle under a stack."""
+    drag = np.zeros(3)
+    if vehicle.drag is not None:
+        in_plane = vehicle.drag.rotor_coefficient * len(vehicle.rotors.position_m) * vehicle.hover_speed
+        drag = (np.array(vehicle.drag.linear_n_s_m) + np.array([in_plane, in_plane, 0.0])) / vehicle.body.mass_kg
+    lags, limits = np.array(response.time_constant_s), np.array(response.max_acceleration_rad_s2)
+    return ResponseModel(lags, limits, response.thrust_lag_s, drag, vehicle.gravity_m_s2)
+
+
+def rate_command(rate: Vector, next_rate: Vector, interval_s: float, response: Response) -> Vector:
+    """Return the body rates to command so that those of now are `next_rate` an interval later, rad/s.
+
+    The exact inverse of the model, within what the stack lets through.
+    """
+    p, q, r = (
+        _rate_command(now, then, interval_s, *of)
+        for now, then, *of in zip(
+            rate,
+            next_rate,
+            response.time_constant_s,
+            response.max_rate_rad_s,
+            response.max_acceleration_rad_s2,
+            strict=True,
+        )
+    )
+    return (p, q, r)
+
+
+def _rate_command(
+    now: float, then: float, interval_s: float, lag_s: float, max_rate: float, max_acceleration: float
+) -> float:
+    change = min(max(then - now, -max_acceleration * interval_s), max_acceleration * interval_s)
+    return min(max(now + change / (1.0 - exp(-interval_s / lag_s)), -max_rate), max_rate)
+
+
+@compiled
+def carry(y: Array, durations_s: Array, commands: Array, disturbance: Array, packed: Packed) -> Array:
+    """Return y, (14,), after commands that follow each other.
+
+    Args:
+        y: Position, m, velocity, m/s, ENU; attitude, FLU to ENU; body rates, rad/s; lift, m/s².
+        durations_s: How long each command acts, (n,).
+        commands: Body rates, rad/s, and lift, m/s², (n, 4).
+        disturbance: Acceleration, ENU, m/s², and angular acceleration, FLU, rad/s², (6,).
+        packed: The `ResponseModel`.
+    """
+    y = y.copy()
+    model = packed[0]
+    mean = np.empty(3)
+    for n in range(durations_s.size):
+        steps = max(1, ceil(durations_s[n] / _STEP_S - _ROUNDING))
+        h = durations_s[n] / steps
+        for _ in range(steps):
+            for i in range(3):
+                stays = exp(-h / model.time_constant_s[i])
+                change = (commands[n, i] - y[10 + i]) * (1.0 - stays)
+                most = h * model.max_acceleration_rad_s2[i]
+                after = y[10 + i] + min(max(change, -most), most) + h * disturbance[3 + i]
+                mean[i] = 0.5 * (y[10 + i] + after)
+                y[10 + i] = after
+            lift = commands[n, 3]
+            if model.lift_lag_s > 0.0:
+                lift = commands[n, 3] + (y[13] - commands[n, 3]) * exp(-h / model.lift_lag_s)
+            mean_lift = 0.5 * (y[13] + lift) if model.lift_lag_s > 0.0 else lift
+            y[13] = lift
+            _turn(y, mean, 0.5 * h)
+            _push(y, mean_lift, disturbance, model.drag_1_s, model.gravity_m_s2, h)
+            _turn(y, mean, 0.5 * h)
+    return y
+
+
+@compiled
+def _turn(y: Array, rate: Array, h: float) -> None:
+    """Turn the attitude at a rate for a while, in place."""
+    w, x, a, b = y[6], y[7], y[8], y[9]
+    p, q, r = 0.5 * h * rate[0], 0.5 * h * rate[1], 0.5 * h * rate[2]
+    y[6] = w - x * p - a * q - b * r
+    y[7] = x + w * p + a * r - b * q
+    y[8] = a + w * q + b * p - x * r
+    y[9] = b + w * r + x * q - a * p
+    length = sqrt(y[6] * y[6] + y[7] * y[7] + y[8] * y[8] + y[9] * y[9])
+    for i in range(6, 10):
+        y[i] /= length
+
+
+@compiled
+def _push(y: Array, lift: float, disturbance: Array, drag: Array, gravity_m_s2: float, h: float) -> None:
+    """Move velocity and position on for a while, in place."""
+    R = rotation_matrix((y[6], y[7], y[8], y[9]))
+    along = np.empty(3)
+    for i in range(3):
+        along[i] = -drag[i] * (R[0][i] * y[3] + R[1][i] * y[4] + R[2][i] * y[5])
+    along[2] += lift
+    for i in range(3):
+        a = R[i][0] * along[0] + R[i][1] * along[1] + R[i][2] * along[2] + disturbance[i]
+        if i == 2:
+            a -= gravity_m_s2
+        y[i] += h * (y[3 + i] + 0.5 * h * a)
+        y[3 + i] += h * a

@@ -1,0 +1,147 @@
+"""What is checked before a companion arms or takes over: one table, each row with what to do where it fails."""
+
+from collections.abc import Callable, Mapping
+from math import hypot, isfinite
+from typing import NamedTuple
+
+from colibri.companion.stacks.stack import Stack
+from colibri.companion.stacks.thrust_curve import Thrust
+from colibri.companion.supervision.limits import Box, FlightLimits
+
+MIN_STATE_RATE_HZ = 40.0
+MAX_DELAY_S = 0.08
+MIN_MODE_RATE_HZ = 8.0
+START_BATTERY = 0.3
+_MIN_HOVER, _MAX_HOVER = 0.05, 0.8
+
+
+class CheckFacts(NamedTuple):
+    """What is known before a flight.
+
+    Attributes:
+        parameters: Of the vehicle; None until they are read.
+        clock_known: Whether TIMESYNC is answered.
+        round_trip_s: To the vehicle and back.
+        state_age_s: Of the newest state.
+        state_rate_hz: How many states came in the last second.
+        state_delay_s: How old they are when they come: the median.
+        mode_rate_hz: How often the mode is reported.
+        estimator_ok, prearm_ok: By the vehicle; None where it does not say.
+        battery: nan where it is not known.
+        fence_breached: By the vehicle.
+        armed: Whether its rotors turn.
+        may_arm: Whether it is to be armed.
+        box: Where it will fly.
+    """
+
+    stack: Stack
+    thrust: Thrust | None
+    parameters: Mapping[str, float] | None
+    clock_known: bool
+    round_trip_s: float
+    state_age_s: float
+    state_rate_hz: float
+    state_delay_s: float
+    mode_rate_hz: float
+    estimator_ok: bool | None
+    prearm_ok: bool | None
+    battery: float
+    fence_breached: bool
+    armed: bool
+    may_arm: bool
+    box: Box
+    limits: FlightLimits
+
+
+class Check(NamedTuple):
+    """A row of the table.
+
+    Attributes:
+        name: What is checked.
+        passes: Whether it is right.
+        action: What to do where it is not.
+        required: Whether nothing flies without; else it is said, and that is all.
+    """
+
+    name: str
+    passes: Callable[[CheckFacts], bool]
+    action: Callable[[CheckFacts], str]
+    required: bool = True
+
+
+def _wrong_parameters(now: CheckFacts) -> list[str]:
+    values = now.parameters or {}
+    return [rule.action for rule in now.stack.rules if rule.name in values and not rule.right(values[rule.name])]
+
+
+def _inside_fence(now: CheckFacts) -> bool:
+    """Whether the box lies inside the fence of the parameters, which counts from home: here the origin."""
+    values = now.parameters or {}
+    if values.get("FENCE_ENABLE", 1.0) == 0.0:
+        return True
+    radius_m, height_m = (values.get(name, 0.0) for name in now.stack.fence)
+    (west, south, _), (east, north, up) = now.box
+    farthest_m = max(hypot(x, y) for x in (west, east) for y in (south, north))
+    return (radius_m <= 0.0 or farthest_m <= radius_m) and (height_m <= 0.0 or up <= height_m)
+
+
+CHECKS: tuple[Check, ...] = (
+    Check("clock", lambda now: now.clock_known, lambda _: "the vehicle answers no TIMESYNC: look at the link"),
+    Check(
+        "states",
+        lambda now: now.state_rate_hz >= MIN_STATE_RATE_HZ and now.state_age_s <= now.limits.max_state_age_s,
+        lambda now: (
+            f"{now.state_rate_hz:.0f} states a second, {MIN_STATE_RATE_HZ:.0f} are needed: raise the link's rate, or "
+            "end other streams"
+        ),
+    ),
+    Check(
+        "delay",
+        lambda now: now.state_delay_s <= MAX_DELAY_S and now.round_trip_s <= 2.0 * MAX_DELAY_S,
+        lambda now: (
+            f"states are {1e3 * now.state_delay_s:.0f} ms old, a round trip takes {1e3 * now.round_trip_s:.0f} ms: use "
+            "a quicker link, a cable at best"
+        ),
+    ),
+    Check(
+        "modes",
+        lambda now: now.mode_rate_hz >= MIN_MODE_RATE_HZ,
+        lambda now: (
+            f"the mode is reported {now.mode_rate_hz:.0f} times a second: the pilot's choice is obeyed that much later"
+        ),
+        required=False,
+    ),
+    Check("parameters", lambda now: now.parameters is not None, lambda _: "its parameters are not read yet"),
+    Check("settings", lambda now: not _wrong_parameters(now), lambda now: "; ".join(_wrong_parameters(now))),
+    Check(
+        "hover thrust",
+        lambda now: now.thrust is not None and _MIN_HOVER <= now.thrust.hover <= _MAX_HOVER,
+        lambda _: "the hover thrust of its parameters is none: hover it once, by its own autopilot",
+    ),
+    Check(
+        "estimator",
+        lambda now: now.estimator_ok is not False,
+        lambda _: "the vehicle does not know where it is: wait for GPS, or look at its estimator",
+    ),
+    Check(
+        "pre-arm",
+        lambda now: now.armed or not now.may_arm or now.prearm_ok is not False,
+        lambda _: "the vehicle says that it cannot be armed: see its messages",
+    ),
+    Check(
+        "battery",
+        lambda now: not isfinite(now.battery) or now.battery >= START_BATTERY,
+        lambda now: f"{100 * now.battery:.0f} % are left, {100 * START_BATTERY:.0f} are needed: charge it",
+    ),
+    Check(
+        "fence",
+        lambda now: not now.fence_breached and _inside_fence(now),
+        lambda _: "the track, with its margin, leads beyond the vehicle's fence: choose another, or move the fence",
+    ),
+)
+
+
+def failing(now: CheckFacts, *, required: bool = True) -> list[str]:
+    """Return what fails, and what to do about it, a line each."""
+    rows = (check for check in CHECKS if check.required == required)
+    return [f"{check.name}: {check.action(now)}" for check in rows if not check.passes(now)]

@@ -1,0 +1,171 @@
+"""What ends a flight by a companion: one table of limits, each over what is known of the flight now."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import dist, inf
+from typing import NamedTuple
+
+from colibri.common.types import Vector
+
+MAX_STATE_AGE_S = 0.1
+MIN_BATTERY = 0.15
+_CRITICAL = frozenset({5, 6, 7, 8})
+"""MAV_STATE_CRITICAL, EMERGENCY, POWEROFF and FLIGHT_TERMINATION."""
+
+
+class Box(NamedTuple):
+    """Where a vehicle may be, ENU, m."""
+
+    lower: Vector
+    upper: Vector
+
+    def has(self, place: Vector) -> bool:
+        """Whether a place lies in it."""
+        return all(low <= x <= high for low, x, high in zip(self.lower, place, self.upper, strict=True))
+
+    def around(self, place: Vector, margin_m: float) -> "Box":
+        """Return the box that holds a place with its margin, too."""
+        lower = tuple(min(low, x - margin_m) for low, x in zip(self.lower, place, strict=True))
+        upper = tuple(max(high, x + margin_m) for high, x in zip(self.upper, place, strict=True))
+        return Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightLimits:
+    """Limits of a flight; each is an option of the command line.
+
+    Attributes:
+        margin_m: Of the box around track and way.
+        max_tilt_deg: Of the thrust axis.
+        max_error_m: Between vehicle and reference.
+        max_state_age_s: Of the newest state.
+        min_battery: Part of the charge.
+    """
+
+    margin_m: float = 3.0
+    max_tilt_deg: float = 50.0
+    max_error_m: float = 1.5
+    max_state_age_s: float = MAX_STATE_AGE_S
+    min_battery: float = MIN_BATTERY
+
+
+class FlightFacts(NamedTuple):
+    """What is known of a flight now.
+
+    Attributes:
+        state_age_s: Of the newest state.
+        position_enu_m: By it.
+        tilt_deg: By it.
+        reference_enu_m: Where the vehicle is to be; None while nothing is flown.
+        estimator_ok: By its report; None where there is none.
+        jumped_m: How far the estimate has jumped since the last state.
+        battery: nan where it is not known.
+        system_status: MAV_STATE.
+        fence_breached: By its report.
+        law_error: What the control law ended with; empty for nothing.
+    """
+
+    state_age_s: float = 0.0
+    position_enu_m: Vector = (0.0, 0.0, 0.0)
+    tilt_deg: float = 0.0
+    reference_enu_m: Vector | None = None
+    estimator_ok: bool | None = None
+    jumped_m: float = 0.0
+    battery: float = inf
+    system_status: int = 0
+    fence_breached: bool = False
+    law_error: str = ""
+
+
+class Limit(NamedTuple):
+    """A row of the table.
+
+    Attributes:
+        name: Of what is exceeded.
+        exceeded: Whether it is.
+        words: How much of what, for whoever reads why the flight has ended.
+        blind: Whether nothing more may be commanded but the mode.
+    """
+
+    name: str
+    exceeded: Callable[[FlightFacts, FlightLimits, Box], bool]
+    words: Callable[[FlightFacts, FlightLimits], str]
+    blind: bool = False
+
+
+MAX_JUMP_M = 1.0
+
+LIMITS: tuple[Limit, ...] = (
+    Limit(
+        "late states",
+        lambda now, limits, _: now.state_age_s > limits.max_state_age_s,
+        lambda now, limits: (
+            f"the newest state is {1e3 * now.state_age_s:.0f} ms old, more than {1e3 * limits.max_state_age_s:.0f}"
+        ),
+        blind=True,
+    ),
+    Limit(
+        "estimate lost",
+        lambda now, _limits, _box: now.estimator_ok is False,
+        lambda _now, _limits: "the vehicle does not know its attitude, velocity or position any more",
+        blind=True,
+    ),
+    Limit(
+        "estimate jumped",
+        lambda now, _limits, _box: now.jumped_m > MAX_JUMP_M,
+        lambda now, _limits: f"the vehicle's estimate has jumped by {now.jumped_m:.1f} m",
+        blind=True,
+    ),
+    Limit(
+        "control law",
+        lambda now, _limits, _box: bool(now.law_error),
+        lambda now, _limits: now.law_error,
+        blind=True,
+    ),
+    Limit(
+        "box",
+        lambda now, _limits, box: not box.has(now.position_enu_m),
+        lambda now, limits: (
+            "the vehicle has left the box {:.0f} m around its track, at {:.1f}, {:.1f}, {:.1f} m".format(
+                limits.margin_m, *now.position_enu_m
+            )
+        ),
+    ),
+    Limit(
+        "tilt",
+        lambda now, limits, _: now.tilt_deg > limits.max_tilt_deg,
+        lambda now, limits: f"the vehicle leans by {now.tilt_deg:.0f} degrees, more than {limits.max_tilt_deg:.0f}",
+    ),
+    Limit(
+        "error",
+        lambda now, limits, _: (
+            now.reference_enu_m is not None and dist(now.reference_enu_m, now.position_enu_m) > limits.max_error_m
+        ),
+        lambda now, limits: (
+            f"the vehicle is {dist(now.reference_enu_m or now.position_enu_m, now.position_enu_m):.2f} m from where it "
+            f"is to be, more than {limits.max_error_m:g}"
+        ),
+    ),
+    Limit(
+        "battery",
+        lambda now, limits, _: now.battery < limits.min_battery,
+        lambda now, limits: (
+            f"{100 * now.battery:.0f} % of the battery are left, less than {100 * limits.min_battery:.0f}"
+        ),
+    ),
+    Limit(
+        "fence",
+        lambda now, _limits, _box: now.fence_breached,
+        lambda _now, _limits: "the vehicle is beyond its fence",
+    ),
+    Limit(
+        "failsafe",
+        lambda now, _limits, _box: now.system_status in _CRITICAL,
+        lambda now, _limits: f"the vehicle reports an emergency (system status {now.system_status})",
+    ),
+)
+
+
+def exceeded(now: FlightFacts, limits: FlightLimits, box: Box) -> Limit | None:
+    """Return the first limit that is exceeded; None if none is."""
+    return next((limit for limit in LIMITS if limit.exceeded(now, limits, box)), None)

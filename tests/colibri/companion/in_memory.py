@@ -1,0 +1,138 @@
+"""A companion and a vehicle of `colibri sitl`, in memory and in lockstep: no sockets, no clock."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Generic, TypeVar
+
+from colibri.autopilot.control.interface import Clock, Controller
+from colibri.autopilot.control.profile import load_profile
+from colibri.autopilot.control.registry import load_controller
+from colibri.autopilot.guidance.trajectories.loading import load_track
+from colibri.companion.guide import Companion
+from colibri.companion.settings import CompanionSettings
+from colibri.companion.supervision.phases import Phase
+from colibri.plant.vehicle.description import Vehicle, load_vehicle
+from colibri.sitl.backends.link_faults import Pipe, Trouble
+from colibri.sitl.vehicle import Sitl
+from tests.colibri.companion.stand_in import StandIn
+
+AHEAD_US = 7_654_321
+"""The companion's clock is ahead of the vehicle's by this."""
+NO_LAW_CLOCK = 0.0
+
+
+class Mutinous:
+    """The law of profile `flight`, until it raises."""
+
+    def __init__(self) -> None:
+        self.raises = False
+
+    def __call__(self, table: Mapping[str, Any], vehicle: Vehicle, clock: Clock) -> Controller[Any]:
+        law = load_controller(load_profile("flight").controller)(table, vehicle, clock)
+        step = law.step
+
+        def mutinous(*args: Any) -> Any:
+            if self.raises:
+                raise ArithmeticError("no more")
+            return step(*args)
+
+        law.step = mutinous  # type: ignore[method-assign, assignment]
+        return law
+
+
+Flown = TypeVar("Flown", Sitl, StandIn)
+
+
+class Ride(Generic[Flown]):
+    """A companion on a link of its own to a vehicle.
+
+    Attributes:
+        sitl: The vehicle.
+        companion: The companion.
+        trouble: What the link does; may be changed at any time.
+        law: The control law.
+        sent: When and what the companion has sent, before the link.
+    """
+
+    def __init__(
+        self,
+        sitl: Flown,
+        track: str = "spiral",
+        settings: CompanionSettings | None = None,
+        *,
+        trouble: Trouble | None = None,
+        seed: int = 0,
+        profile: str = "flight",
+    ) -> None:
+        self.sitl: Flown = sitl
+        loaded, vehicle = load_profile(profile), load_vehicle("hummingbird")
+        path = load_track(track, vehicle, loaded).track
+        settings = settings or CompanionSettings(may_arm=True)
+        self.law = Mutinous()
+        law = self.law if profile == "flight" else None
+        self.companion = Companion(settings, loaded, vehicle, path, lambda: NO_LAW_CLOCK, law)
+        self.trouble = trouble or Trouble()
+        self._up, self._down = Pipe(self.trouble, f"{seed} up"), Pipe(self.trouble, f"{seed} down")
+        self._port: StandIn | Port = sitl if isinstance(sitl, StandIn) else Port(sitl)
+        self.sent: list[tuple[int, bytes]] = []
+        self.history: list[tuple[float, Phase]] = []
+        self.frozen = False
+
+    @property
+    def now_us(self) -> int:
+        return self.sitl.time_us + AHEAD_US
+
+    def step(self) -> None:
+        """Fly one frame."""
+        now_us = self.now_us
+        for datagram in self._down.due(now_us):
+            self.companion.receive(datagram, now_us)
+        if not self.frozen:
+            for frame in self.companion.poll(now_us):
+                self.sent.append((now_us, frame))
+                self._up.put(frame, now_us)
+        if not self.history or self.history[-1][1] is not self.companion.phase:
+            self.history.append((self.sitl.time_s, self.companion.phase))
+        self._port.carry(self._up.due(now_us))
+        self.sitl.step()
+        for datagram in self._port.take():
+            self._down.put(datagram, self.now_us)
+
+    def until(self, condition: Callable[[], object], within_s: float) -> None:
+        """Fly until something is so."""
+        ends_s = self.sitl.time_s + within_s
+        while not condition():
+            assert self.sitl.time_s < ends_s, (self.companion.phase, self.companion.said, self.companion.failing)
+            self.step()
+
+    def to_the_end(self, within_s: float) -> None:
+        """Fly until the companion has ended."""
+        self.until(lambda: self.companion.ended is not None, within_s)
+
+
+class Port:
+    """The vehicle's end of the link: a station without a voice of its own."""
+
+    def __init__(self, sitl: Sitl) -> None:
+        station = sitl.client(250, 250, beats=False)
+        self._to_vehicle: list[bytes] = []
+        self._from_vehicle: list[bytes] = []
+        station.arriving = self._arriving  # type: ignore[method-assign]
+        station.departing = self._departing  # type: ignore[method-assign]
+
+    def carry(self, datagrams: list[bytes]) -> None:
+        """Hand datagrams to the vehicle."""
+        self._to_vehicle.extend(datagrams)
+
+    def take(self) -> list[bytes]:
+        """Return what the vehicle has sent."""
+        taken, self._from_vehicle = self._from_vehicle, []
+        return taken
+
+    def _arriving(self, datagram: bytes, now_us: int) -> None:
+        del now_us
+        self._from_vehicle.append(datagram)
+
+    def _departing(self, now_us: int) -> list[bytes]:
+        del now_us
+        taken, self._to_vehicle = self._to_vehicle, []
+        return taken

@@ -1,0 +1,168 @@
+"""Clock, states, reports, commands and parameters of a vehicle, message by message."""
+
+from random import Random
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from colibri.companion.conversation.clock import VehicleClock
+from colibri.companion.conversation.commands import AGAIN_US, TRIES, UNANSWERED, CommandQueue
+from colibri.companion.conversation.parameters import ParameterReader
+from colibri.companion.conversation.states import StateAssembler, TimedState
+from colibri.companion.conversation.vehicle_report import VehicleReport
+from colibri.companion.stacks.ardupilot import ARDUPILOT
+from colibri.companion.stacks.colibri import COLIBRI
+from colibri.companion.stacks.px4 import PX4
+from colibri.companion.stacks.recognition import recognised
+from colibri.companion.stacks.thrust_curve import MiddleHovers, ThrustCurve
+from colibri.mavlink.wire.dialect import Bits, Codec, Message, mav
+
+VEHICLE = Codec(1, 1)
+NO_COVARIANCE = (0.0,) * 21
+
+
+def said(name: str, *fields: Any) -> Message:
+    (message,) = Codec(0, 0).decode(VEHICLE.encode(name, *fields))
+    return message
+
+
+def exchanged(clock: VehicleClock, offset_us: int, ways_us: list[tuple[int, int]], from_us: int = 0) -> int:
+    """Exchange TIMESYNC with a vehicle whose clock is ahead; return when the last came back."""
+    now_us = from_us
+    for there_us, back_us in ways_us:
+        asked = clock.request(now_us)
+        assert asked is not None
+        clock.receive((now_us + there_us + offset_us) * 1000, asked[1], now_us + there_us + back_us)
+        now_us += 100_000
+    return now_us
+
+
+@given(seed=st.integers(0, 10_000), offset_us=st.integers(-(10**12), 10**12))
+def test_the_clock_s_offset_is_as_good_as_the_quickest_exchange(seed: int, offset_us: int) -> None:
+    clock, chance = VehicleClock(), Random(seed)
+    ways_us = [(20_000 + chance.randrange(10_000), 20_000 + chance.randrange(10_000)) for _ in range(40)]
+    now_us = exchanged(clock, offset_us, ways_us, 10**9)
+    assert clock.known
+    assert abs(clock.own_us(now_us + offset_us) - now_us) <= 5_000
+    assert 40_000 <= clock.round_trip_us <= 60_000
+
+
+def test_a_vehicle_that_was_started_again_has_another_clock() -> None:
+    clock = VehicleClock()
+    now_us = exchanged(clock, 5_000_000, [(1000, 1000)] * 20)
+    now_us = exchanged(clock, -9_000_000, [(1000, 1000)] * 8, now_us)
+    assert abs(clock.own_us(now_us - 9_000_000) - now_us) <= 1_000
+
+
+def test_what_is_no_answer_says_nothing_of_the_clock() -> None:
+    clock = VehicleClock()
+    clock.receive(0, 1_000_000, 2_000)
+    clock.receive(5, -(10**15), 2_000)
+    clock.receive(5, 10**15, 2_000)
+    assert not clock.known
+    with pytest.raises(ValueError, match="TIMESYNC"):
+        clock.own_us(0)
+
+
+def test_a_state_is_in_enu_and_flu_whichever_messages_it_comes_by() -> None:
+    rate, q = (0.1, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0)
+    odometry = StateAssembler().receive(
+        said("ODOMETRY", 20_000, 1, 12, 1.0, 2.0, -3.0, q, 0.5, 0.0, 0.0, *rate, NO_COVARIANCE, NO_COVARIANCE, 0, 8, 9),
+        0,
+    )
+    apart = StateAssembler()
+    assert apart.receive(said("LOCAL_POSITION_NED", 20, 1.0, 2.0, -3.0, 0.5, 0.0, 0.0), 0) is None
+    quaternion = apart.receive(said("ATTITUDE_QUATERNION", 20, *q, *rate), 0)
+    euler = StateAssembler()
+    euler.receive(said("LOCAL_POSITION_NED", 20, 1.0, 2.0, -3.0, 0.5, 0.0, 0.0), 0)
+    angles = euler.receive(said("ATTITUDE", 20, 0.0, 0.0, 0.0, *rate), 0)
+    for state in (odometry, quaternion, angles):
+        assert isinstance(state, TimedState)
+        assert state.vehicle_us == 20_000
+        assert state.position_enu_m == pytest.approx((2.0, 1.0, 3.0))
+        assert state.velocity_enu_m_s == pytest.approx((0.0, 0.5, 0.0))
+        assert state.rate_flu_rad_s == pytest.approx((0.1, -0.2, -0.3))
+        assert state.attitude == pytest.approx((0.5**0.5, 0.0, 0.0, 0.5**0.5))
+
+
+def test_a_state_is_neither_old_nor_without_number() -> None:
+    states, nan, q = StateAssembler(), float("nan"), (1.0, 0.0, 0.0, 0.0)
+
+    def odometry(time_us: int, x: float, frame: int = 1) -> TimedState | None:
+        rest = (0.0,) * 6
+        fields = (time_us, frame, 12, x, 0.0, 0.0, q, *rest, NO_COVARIANCE, NO_COVARIANCE, 0, 8, 9)
+        return states.receive(said("ODOMETRY", *fields), 0)
+
+    assert odometry(50_000, 1.0)
+    assert odometry(40_000, 1.0) is None
+    assert odometry(60_000, nan) is None
+    assert odometry(70_000, 1.0, frame=20) is None
+    assert states.refused == 1
+
+
+def test_an_old_mode_after_a_new_one_is_none() -> None:
+    report, codec, reads = VehicleReport(), Codec(1, 1), Codec(0, 0)
+    first, second = (codec.encode("CURRENT_MODE", 0, mode, mode) for mode in (7, 9))
+    for frame in (second, first):
+        report.receive(reads.decode(frame)[0], 0)
+    assert report.mode == 9
+
+
+def test_a_command_is_repeated_until_it_is_acknowledged() -> None:
+    queue = CommandQueue()
+    queue.ask("mode", 176, 1.0)
+    queue.ask("mode", 176, 1.0)
+    queue.ask("arm", 400, 1.0)
+    assert queue.poll(0) == [(176, 0, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))]
+    assert queue.poll(AGAIN_US - 1) == []
+    assert queue.poll(AGAIN_US)[0][:2] == (176, 1)
+    queue.receive(400, 0)
+    queue.receive(176, mav.MAV_RESULT_IN_PROGRESS)
+    assert not queue.results
+    queue.receive(176, mav.MAV_RESULT_DENIED)
+    assert queue.results == {"mode": mav.MAV_RESULT_DENIED}
+    for tries in range(TRIES + 1):
+        queue.poll((tries + 2) * AGAIN_US)
+    assert queue.results["arm"] == UNANSWERED
+    assert queue.idle
+
+
+def test_parameters_are_read_in_either_encoding_and_missing_ones_given_up() -> None:
+    for by_bits, wire in ((True, Bits(8)), (False, 8.0)):
+        reader = ParameterReader(["GUID_OPTIONS", "HOVER", "NOWHERE"], integers_by_bits=by_bits)
+        assert set(reader.poll(0)) == {"GUID_OPTIONS", "HOVER", "NOWHERE"}
+        reader.receive(said("PARAM_VALUE", "GUID_OPTIONS", wire, mav.MAV_PARAM_TYPE_INT32, 3, 0))
+        reader.receive(said("PARAM_VALUE", "HOVER", 0.25, mav.MAV_PARAM_TYPE_REAL32, 3, 1))
+        assert reader.values == {"GUID_OPTIONS": 8.0, "HOVER": 0.25}
+        assert not reader.done
+        for tries in range(6):
+            reader.poll((tries + 1) * 500_000)
+        assert reader.done
+
+
+def test_a_stack_is_recognised() -> None:
+    assert recognised(mav.MAV_AUTOPILOT_PX4, b"Colibri\0\0") is COLIBRI
+    assert recognised(mav.MAV_AUTOPILOT_GENERIC, b"Colibri\0\0") is COLIBRI
+    assert recognised(mav.MAV_AUTOPILOT_PX4, bytes(18)) is PX4
+    assert recognised(mav.MAV_AUTOPILOT_ARDUPILOTMEGA, bytes(18)) is ARDUPILOT
+    assert recognised(mav.MAV_AUTOPILOT_GENERIC, bytes(18)) is None
+
+
+@given(
+    hover=st.floats(0.2, 0.6),
+    expo=st.floats(0.0, 0.9),
+    spin_min=st.floats(0.0, 0.2),
+    quadratic=st.booleans(),
+    load=st.floats(0.3, 1.4),
+)
+def test_a_thrust_curve_is_its_own_inverse(
+    hover: float, expo: float, spin_min: float, quadratic: bool, load: float
+) -> None:
+    curve = ThrustCurve(hover=hover, expo=expo, spin_min=spin_min, quadratic=quadratic)
+    assert curve.command(1.0) == pytest.approx(hover)
+    command = curve.command(load)
+    if 0.0 < command < 1.0:
+        assert curve.load(command) == pytest.approx(load)
+    assert MiddleHovers(max_load=2.5).load(MiddleHovers(max_load=2.5).command(load)) == pytest.approx(load)

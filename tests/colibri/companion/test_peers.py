@@ -1,0 +1,122 @@
+"""A companion on real PX4 and real ArduCopter, each with its own physics, in a network of its own where there can be.
+
+Nothing of theirs is in this repository: COLIBRI_ARDUCOPTER names the program, COLIBRI_PX4 a folder of PX4's sources in
+which px4_sitl_default is built. What is started is ended by its number.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytestmark = pytest.mark.peers
+
+ARDUCOPTER, PX4 = "COLIBRI_ARDUCOPTER", "COLIBRI_PX4"
+COPTER_PARAMETERS = {
+    "FRAME_CLASS": 1,
+    "FRAME_TYPE": 0,
+    "GUID_OPTIONS": 8,
+    "GUID_TIMEOUT": 1,
+    "FS_THR_ENABLE": 0,
+    "FS_GCS_ENABLE": 0,
+    **{f"INS_{part}{axis}": value for axis in "XYZ" for part, value in (("ACCOFFS_", 0.001), ("ACCSCAL_", 1.001))},
+    **{f"INS_ACC2{part}{axis}": value for axis in "XYZ" for part, value in (("OFFS_", 0.001), ("SCAL_", 1.001))},
+    **{f"COMPASS_OFS{n}_{axis}": value for n in ("", 2, 3) for axis, value in (("X", 5), ("Y", 13), ("Z", -18))},
+    "MOT_THST_EXPO": 0.65,
+    "MOT_THST_HOVER": 0.39,
+    "ATC_RAT_YAW_P": 0.3,
+    "ATC_RAT_YAW_I": 0.02,
+    "BATT_MONITOR": 4,
+}
+PX4_SETTINGS = {
+    "PX4_SYS_AUTOSTART": "10040",
+    "PX4_SIM_MODEL": "sihsim_quadx",
+    "PX4_PARAM_COM_RC_IN_MODE": "4",
+    "PX4_PARAM_NAV_DLL_ACT": "0",
+    "PX4_PARAM_COM_RCL_EXCEPT": "7",
+    "PX4_PARAM_CBRK_SUPPLY_CHK": "894281",
+}
+PX4_INSTANCE = 9
+SHELL = """
+ip link set lo up 2>/dev/null
+"$@" > vehicle.log 2>&1 &
+vehicle=$!
+{companion} > companion.log 2>&1
+code=$?
+kill $vehicle
+wait $vehicle 2>/dev/null
+exit $code
+"""
+
+
+def found(name: str) -> Path:
+    path = os.environ.get(name)
+    if not path:
+        pytest.skip(f"{name} names no program")
+    return Path(path)
+
+
+def network_of_its_own() -> list[str]:
+    """Return what begins a command in a network with loopback alone; nothing where the system does not let it."""
+    alone = ["unshare", "-rn"]
+    there = shutil.which("unshare") is not None
+    return alone if there and subprocess.run([*alone, "true"], check=False).returncode == 0 else []
+
+
+def fly(folder: Path, vehicle: list[str], options: str, **environment: str) -> dict[str, Any]:
+    """Fly a vehicle that is started here; return the companion's report."""
+    out = folder / "out"
+    companion = f"{sys.executable} -m colibri companion {options} --wait 120 --out {out}"
+    alone = (
+        shutil.which("unshare") is not None and subprocess.run(["unshare", "-rn", "true"], check=False).returncode == 0
+    )
+    command = [*(["unshare", "-rn"] if alone else []), "sh", "-c", SHELL.format(companion=companion), "sh", *vehicle]
+    ended = subprocess.run(command, cwd=folder, env=os.environ | environment, check=False, timeout=400.0)
+    said = (folder / "companion.log").read_text(encoding="utf-8")
+    assert ended.returncode == 0, said
+    report: dict[str, Any] = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    return report
+
+
+def arducopter(folder: Path, options: str) -> dict[str, Any]:
+    """Fly ArduCopter with its own physics, at real time."""
+    program = found(ARDUCOPTER)
+    parameters = folder / "companion.parm"
+    parameters.write_text("".join(f"{name} {value}\n" for name, value in COPTER_PARAMETERS.items()), encoding="utf-8")
+    vehicle = [
+        *(str(program), "--model", "+", "--speedup", "1", "--home", "47.3977,8.5456,488,0", "-w"),
+        *("--defaults", str(parameters), "--serial0", "udpclient:127.0.0.1:14555"),
+    ]
+    return fly(folder, vehicle, f"{options} --vehicle udpin:127.0.0.1:14555")
+
+
+def px4(folder: Path, options: str) -> dict[str, Any]:
+    """Fly PX4 with its own physics, at real time."""
+    build = found(PX4) / "build" / "px4_sitl_default"
+    vehicle = [str(build / "bin" / "px4"), "-i", str(PX4_INSTANCE), "-d", str(build / "etc")]
+    return fly(folder, vehicle, f"{options} --vehicle udpin:127.0.0.1:{14540 + PX4_INSTANCE}", **PX4_SETTINGS)
+
+
+def test_arducopter_flies_the_spiral_twice_as_well_as_by_its_own_position_control(tmp_path: Path) -> None:
+    report = arducopter(tmp_path, "spiral --arm --duration 60")
+    assert report["stack"] == "ardupilot"
+    assert report["in_order"]
+    assert report["control_rmse_m"] <= 0.045 / 2.0
+
+
+def test_arducopter_is_identified(tmp_path: Path) -> None:
+    report = arducopter(tmp_path, "--identify --arm")
+    assert report["in_order"]
+    assert "time_constant_s" in (tmp_path / "out" / "companion.toml").read_text(encoding="utf-8")
+
+
+def test_px4_is_flown_and_left_in_hold(tmp_path: Path) -> None:
+    report = px4(tmp_path, "hover:height=3 --arm --duration 10 --controller lpv-mpc")
+    assert report["stack"] == "px4"
+    assert report["in_order"]
+    assert report["control_rmse_m"] < 0.3

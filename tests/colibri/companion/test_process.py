@@ -1,0 +1,75 @@
+"""`colibri companion` as a command: bad input, and a vehicle over UDP."""
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from colibri.cli.main import main
+from tools.harness.sitl_process import vehicle
+
+LINK = "udpin:127.0.0.1:0"
+BAD_INPUT = {
+    "no track": ((), "name a TRACK to fly, or --identify"),
+    "unknown track": (("spirl",), "unknown track spirl"),
+    "below the floor": (("hover:height=-3",), "below the floor"),
+    "arms in a dry run": (("spiral", "--arm", "--dry-run"), "--dry-run arms nothing"),
+    "identifies on a track": (("spiral", "--identify"), "--identify hovers"),
+    "no response": (("spiral", "--response", "none.toml"), "none.toml: No such file"),
+    "unknown stack": (("spiral", "--stack", "betaflight"), "invalid choice"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_INPUT)
+def test_bad_input_is_one_line(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    options, said = BAD_INPUT[name]
+    with pytest.raises(SystemExit) as end:
+        main(["companion", *options, "--vehicle", LINK])
+    assert end.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+
+
+@pytest.mark.parametrize(
+    ("url", "said"),
+    [("udpout:192.0.2.1:14540", "reaches beyond this computer"), ("14540", "expected"), ("udpin:nowhere", "expected")],
+)
+def test_a_link_that_is_none_is_one_line(url: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["companion", "hover", "--vehicle", url])
+    assert end.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+
+
+def companion(out: Path, port: int, *options: str) -> subprocess.CompletedProcess[str]:
+    link = f"udpout:127.0.0.1:{port}"
+    command = [sys.executable, "-m", "colibri", "companion", *options, "--vehicle", link, "--out", str(out)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_a_dry_run_over_udp_logs_and_moves_nothing(tmp_path: Path) -> None:
+    with vehicle(tmp_path) as flown:
+        ended = companion(tmp_path / "out", flown.port, "hover", "--dry-run", "--duration", "1")
+        assert not any(sight.armed for sight in flown.seen.sights)
+    assert ended.returncode == 0, ended.stderr
+    report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert (report["stack"], report["setpoints"], report["in_order"]) == ("colibri", 0, True)
+    rows = list(csv.DictReader((tmp_path / "out" / "companion.csv").read_text(encoding="utf-8").splitlines()))
+    assert len(rows) > 20
+    assert {row["sent"] for row in rows} == {"0"}
+
+
+@pytest.mark.long
+def test_a_flight_over_udp_is_handed_over_in_order(tmp_path: Path) -> None:
+    with vehicle(tmp_path) as flown:
+        options = ("hover:height=2", "--arm", "--duration", "3", "--max-age", "20000")
+        ended = companion(tmp_path / "out", flown.port, *options)
+        assert ended.returncode == 0, ended.stderr
+        assert "height reached: hold" in flown.said
+    report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert report["control_rmse_m"] < 0.5
+    assert report["lost"] is None

@@ -1,0 +1,91 @@
+"""A companion flies stand-ins for PX4 and ArduPilot, whose response and hover thrust it does not quite know."""
+
+from collections.abc import Callable
+
+import pytest
+
+from colibri.companion.identified import identified
+from colibri.companion.settings import CompanionSettings
+from colibri.companion.supervision.phases import Phase
+from tests.colibri.companion.in_memory import Ride
+from tests.colibri.companion.stand_in import GUIDED, LOITER, PX4_HOLD, PX4_OFFBOARD, STABILIZE, ArduPilot, Px4, StandIn
+
+STACKS: list[Callable[[], StandIn]] = [Px4, ArduPilot]
+
+
+@pytest.mark.parametrize("made", STACKS)
+def test_it_flies_a_track(made: Callable[[], StandIn]) -> None:
+    vehicle = made()
+    ride = Ride(vehicle, "spiral", CompanionSettings(may_arm=True, duration_s=12.0))
+    ride.to_the_end(60.0)
+    ended, errors = ride.companion.ended, ride.companion.errors
+    assert ended
+    assert ended.in_order
+    assert vehicle.mode == vehicle.hold
+    assert errors.flown_s == pytest.approx(12.0, abs=0.1)
+    assert errors.rmse_m() < 0.05
+
+
+@pytest.mark.parametrize("made", STACKS)
+def test_the_hover_thrust_is_refined_in_flight(made: Callable[[], StandIn]) -> None:
+    vehicle = made()
+    ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, duration_s=14.0))
+    ride.to_the_end(60.0)
+    thrust, load = ride.companion.rows[-1].thrust, 1.0
+    assert thrust < 0.9
+    hover = vehicle.numbers.hover_signal
+    made_load = (vehicle._signal(thrust) / hover) ** 2  # noqa: SLF001
+    assert made_load == pytest.approx(load, abs=0.05)
+    assert abs(ride.companion.thrust_scale - 1.0) > 0.03
+    assert abs(ride.companion.rows[-1].push_z) < 0.25
+
+
+@pytest.mark.parametrize(("made", "choice"), [(Px4, 7 << 16), (ArduPilot, STABILIZE)])
+def test_a_pilot_s_mode_is_obeyed_within_a_tenth_of_a_second(made: Callable[[], StandIn], choice: int) -> None:
+    vehicle = made()
+    ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True))
+    ride.until(lambda: ride.companion.phase is Phase.FLYING, 30.0)
+    vehicle.choose(choice)
+    chosen_us, orders = ride.now_us, len(vehicle.modes)
+    ride.to_the_end(1.0)
+    assert ride.now_us - chosen_us <= 100_000
+    for _ in range(300):
+        ride.step()
+    assert len(vehicle.modes) == orders
+
+
+def test_px4_is_streamed_setpoints_before_it_is_asked_for_offboard() -> None:
+    vehicle = Px4()
+    ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, duration_s=1.0))
+    ride.to_the_end(40.0)
+    (offboard_us,) = [at_us for at_us, mode in vehicle.modes if mode == PX4_OFFBOARD]
+    before = [at_us for at_us, _ in vehicle.setpoints if at_us <= offboard_us]
+    assert len(before) >= 100
+    assert vehicle.modes[-1][1] == PX4_HOLD
+
+
+def test_ardupilot_takes_off_in_guided_and_is_left_in_loiter() -> None:
+    vehicle = ArduPilot()
+    ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, duration_s=1.0))
+    ride.to_the_end(40.0)
+    assert [mode for _, mode in vehicle.modes] == [GUIDED, LOITER]
+
+
+def test_an_ardupilot_that_would_take_thrust_for_a_climb_rate_is_not_flown() -> None:
+    vehicle = ArduPilot()
+    vehicle.params["GUID_OPTIONS"] = 0
+    ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, gives_up_s=6.0))
+    ride.to_the_end(20.0)
+    assert not vehicle.armed
+    assert ride.companion.ended
+    assert "add 8 to GUID_OPTIONS" in ride.companion.ended.why
+
+
+@pytest.mark.parametrize("made", [Px4, pytest.param(ArduPilot, marks=pytest.mark.long)])
+def test_an_identification_finds_what_the_stand_in_has(made: Callable[[], StandIn]) -> None:
+    vehicle = made()
+    ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, identifies=True))
+    ride.to_the_end(60.0)
+    response, _, _ = identified(ride.companion)
+    assert response.time_constant_s == pytest.approx(vehicle.numbers.lag_s, rel=0.1)
+    assert response.latency_s == pytest.approx(vehicle.numbers.late_s, abs=0.006)

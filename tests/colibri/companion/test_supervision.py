@@ -1,0 +1,117 @@
+"""The table of phases, of limits and of checks: each row by itself."""
+
+from math import inf, nan
+
+import pytest
+
+from colibri.companion.stacks.ardupilot import ARDUPILOT
+from colibri.companion.stacks.px4 import PX4
+from colibri.companion.stacks.thrust_curve import ThrustCurve
+from colibri.companion.supervision.checks import CHECKS, CheckFacts, failing
+from colibri.companion.supervision.limits import LIMITS, Box, FlightFacts, FlightLimits, exceeded
+from colibri.companion.supervision.phases import TABLE, Condition, Phase, next_phase
+
+BOX = Box((-3.0, -3.0, -1.0), (3.0, 3.0, 5.0))
+GOOD = CheckFacts(
+    stack=PX4,
+    thrust=ThrustCurve(hover=0.4),
+    parameters={},
+    clock_known=True,
+    round_trip_s=0.02,
+    state_age_s=0.01,
+    state_rate_hz=100.0,
+    state_delay_s=0.01,
+    mode_rate_hz=25.0,
+    estimator_ok=True,
+    prearm_ok=True,
+    battery=0.8,
+    fence_breached=False,
+    armed=False,
+    may_arm=True,
+    box=BOX,
+    limits=FlightLimits(),
+)
+FAILS: list[tuple[str, CheckFacts]] = [
+    ("clock", GOOD._replace(clock_known=False)),
+    ("states", GOOD._replace(state_rate_hz=10.0)),
+    ("states", GOOD._replace(state_age_s=inf)),
+    ("delay", GOOD._replace(round_trip_s=0.3)),
+    ("delay", GOOD._replace(state_delay_s=0.09)),
+    ("modes", GOOD._replace(mode_rate_hz=1.0)),
+    ("parameters", GOOD._replace(parameters=None)),
+    ("settings", GOOD._replace(parameters={"COM_OF_LOSS_T": 30.0})),
+    ("settings", GOOD._replace(stack=ARDUPILOT, parameters={"GUID_OPTIONS": 4.0})),
+    ("hover thrust", GOOD._replace(thrust=ThrustCurve(hover=0.95))),
+    ("hover thrust", GOOD._replace(thrust=None)),
+    ("estimator", GOOD._replace(estimator_ok=False)),
+    ("pre-arm", GOOD._replace(prearm_ok=False)),
+    ("battery", GOOD._replace(battery=0.2)),
+    ("fence", GOOD._replace(fence_breached=True)),
+    ("fence", GOOD._replace(parameters={"GF_MAX_VER_DIST": 4.0})),
+    ("fence", GOOD._replace(parameters={"GF_MAX_HOR_DIST": 4.0})),
+]
+
+
+def test_a_vehicle_that_is_ready_passes_every_check() -> None:
+    assert failing(GOOD) == failing(GOOD, required=False) == []
+    assert failing(GOOD._replace(battery=nan, estimator_ok=None, prearm_ok=None)) == []
+    assert failing(GOOD._replace(stack=ARDUPILOT, parameters={"FENCE_ENABLE": 0.0, "FENCE_RADIUS": 1.0})) == []
+
+
+@pytest.mark.parametrize(("name", "facts"), FAILS)
+def test_each_check_fails_alone_and_says_what_to_do(name: str, facts: CheckFacts) -> None:
+    lines = failing(facts) + failing(facts, required=False)
+    assert len(lines) == 1
+    assert lines[0].startswith(f"{name}: ")
+    assert len(lines[0]) > len(name) + 20
+
+
+def test_every_check_was_seen_to_fail() -> None:
+    assert {name for name, _ in FAILS} == {check.name for check in CHECKS}
+
+
+EXCEEDS = {
+    "late states": FlightFacts(state_age_s=0.11),
+    "estimate lost": FlightFacts(estimator_ok=False),
+    "estimate jumped": FlightFacts(jumped_m=2.0),
+    "control law": FlightFacts(law_error="it raised"),
+    "box": FlightFacts(position_enu_m=(0.0, 3.1, 0.0)),
+    "tilt": FlightFacts(tilt_deg=51.0),
+    "error": FlightFacts(reference_enu_m=(1.6, 0.0, 0.0)),
+    "battery": FlightFacts(battery=0.1),
+    "fence": FlightFacts(fence_breached=True),
+    "failsafe": FlightFacts(system_status=5),
+}
+
+
+def test_each_limit_is_exceeded_alone_and_says_by_how_much() -> None:
+    assert {limit.name for limit in LIMITS} == EXCEEDS.keys()
+    assert exceeded(FlightFacts(), FlightLimits(), BOX) is None
+    for name, facts in EXCEEDS.items():
+        limit = exceeded(facts, FlightLimits(), BOX)
+        assert limit is not None
+        assert limit.name == name
+        assert len(limit.words(facts, FlightLimits())) > 5
+
+
+def test_a_position_that_is_no_number_is_outside_the_box() -> None:
+    limit = exceeded(FlightFacts(position_enu_m=(nan, 0.0, 0.0)), FlightLimits(), BOX)
+    assert limit is not None
+    assert limit.name == "box"
+
+
+def test_from_every_phase_in_the_air_a_pilot_and_a_stop_lead_out() -> None:
+    for phase in (Phase.ARMING, Phase.TAKING_OFF, Phase.TAKING_OVER, Phase.FLYING, Phase.HANDING_OVER):
+        everything = frozenset(Condition)
+        assert next_phase(phase, everything) == (Phase.ENDED, Condition.PILOT)
+        if phase is not Phase.HANDING_OVER:
+            stopped = frozenset({Condition.STOPPED, Condition.ARMED, Condition.OFFBOARD, Condition.UP})
+            assert next_phase(phase, stopped)[0] is Phase.HANDING_OVER
+    for phase in Phase:
+        assert next_phase(phase, frozenset()) == (phase, None)
+    assert not any(Phase.ENDED in row.sources for row in TABLE)
+
+
+def test_nothing_leads_to_arming_but_a_check_that_allows_it() -> None:
+    rows = [row for row in TABLE if row.target is Phase.ARMING]
+    assert [(row.sources, row.condition) for row in rows] == [((Phase.CHECKING,), Condition.CHECKED_TO_ARM)]
