@@ -23,8 +23,8 @@ _MAX_BATCH = 500
 class Cluster:
     """A cluster of Dask.
 
-    A job whose worker goes is done by another. One that several workers went with is done alone, and given up if it
-    takes several more with it.
+    A job whose worker goes is done by another. One that several workers went with is done alone when the others are
+    done, and given up if it takes several more with it.
     """
 
     def __init__(self, client_or_address: Any, *, batch: int | None = None) -> None:
@@ -69,21 +69,25 @@ class Cluster:
         given = client.submit(cloudpickle.loads, cloudpickle.dumps((work, common)), pure=False)
         left = iter(jobs)
         waiting: dict[Any, list[Job]] = {}
+        suspects: list[Job] = []
         ended = as_completed(with_results=False)
         size = self._batch or 1
         try:
             while True:
                 self._hand_out(given, self._batches(left, size, len(waiting)), waiting, ended)
-                if not waiting:
-                    return
+                alone = not waiting
+                if alone:  # only now: Dask holds a worker's end against all that waited there
+                    if not suspects:
+                        return
+                    self._hand_out(given, [[suspects.pop()]], waiting, ended)
                 future = next(ended)
                 batch = waiting.pop(future)
                 error = future.exception()
                 if isinstance(error, KilledWorker):
-                    if len(batch) == 1:
+                    if alone:
                         yield batch[0], Killed()
                     else:
-                        self._hand_out(given, [[job] for job in batch], waiting, ended)
+                        suspects += batch
                     continue
                 took_s, results = future.result()
                 if self._batch is None:
