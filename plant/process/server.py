@@ -102,7 +102,8 @@ class Server:
 
     def _advance(self, plant: Plant, pace: Pace) -> bool:
         """Send a frame when it is due, and go on with its answer; return False if a signal came first."""
-        self._wait_until(pace.due_s(plant.world.time_us, perf_counter()))
+        if isfinite(pace.speed):
+            self._wait_until(pace.due_s(plant.world.time_us, perf_counter()))
         command = self._exchange(plant)
         if command is None:
             return False
@@ -112,7 +113,7 @@ class Server:
     def _offer(self, plant: Plant) -> float:
         """Send the plant's frame; return the wall-clock time, s."""
         world = plant.world
-        frame, plant_status = plant.measure()
+        frame, plant_status = plant.measure(with_battery=self._end.sends_battery(world.time_us))
         now_s = perf_counter()
         self._end.offer(frame, now_s, plant_status, state_frame(world) if self._streams_truth else None)
         sent = self._send()

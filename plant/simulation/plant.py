@@ -83,9 +83,10 @@ class Plant:
         self._round_trip_us = 2 * latency_us
         self._results: tuple[FaultResult, ...] = ()
 
-    def measure(self) -> ReceivedFrame:
-        """Return the frame of the world as it is now, and what goes beside it."""
-        status = PlantStatus(self._physics.battery(self.world), self._results, self._actuation.delay_us or None)
+    def measure(self, *, with_battery: bool = True) -> ReceivedFrame:
+        """Return the frame of the world as it is now, and what goes beside it; of the battery only if that is sent."""
+        battery = self._physics.battery(self.world) if with_battery else None
+        status = PlantStatus(battery, self._results, self._actuation.delay_us or None)
         return ReceivedFrame(self._measure(self.world), status)
 
     def prepare(self) -> None:
