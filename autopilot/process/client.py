@@ -69,14 +69,16 @@ class Client:
         due_s = 0.0
         while not self._stop:
             received = self._link.receive(min(max(0.0, due_s - perf_counter()), _MAX_WAIT_S))
-            step = self._answer(autopilot, received[0]) if received else None
+            step = answer(self._end, autopilot, received[0], perf_counter()) if received else None
+            self._send()
             due_s = self._end.poll(perf_counter())
-            for datagram in self._end.take_outbox():
-                self._link.send(datagram)
-            if step and isinstance(autopilot, Autopilot):
-                autopilot.settle()
-            if step:
-                self._keep(partial(AutopilotLog.write, step=step))  # while the plant integrates
+            self._send()
+            if step:  # while the plant integrates
+                if isinstance(autopilot, Autopilot):
+                    autopilot.settle()
+                self._frame_came = True
+                self._report_if_unknown(step)
+                self._keep(partial(AutopilotLog.write, step=step))
             if step and self._ground:
                 autopilot = self._ground.serve(perf_counter())
                 if self._ground.shut_down:
@@ -102,12 +104,9 @@ class Client:
                 raise
             self._status.say("said", f"{error}; flying on")
 
-    def _answer(self, autopilot: "Autopilot | Copter", datagram: bytes) -> Step | None:
-        step = answer(self._end, autopilot, datagram, perf_counter())
-        if step is not None:
-            self._frame_came = True
-            self._report_if_unknown(step)
-        return step
+    def _send(self) -> None:
+        for datagram in self._end.take_outbox():
+            self._link.send(datagram)
 
     def _report_if_unknown(self, step: Step) -> None:
         """Report, once, why a vehicle without an estimate stays disarmed, or falls."""

@@ -141,7 +141,8 @@ class InMemory:
 
     def __call__(self, plant: Plant) -> tuple[Step, ActuatorCommand]:
         """Return the autopilot's step and the command as the plant decoded it."""
-        frame, plant_status = plant.measure()
+        with_battery = self._plant_end.sends_battery(plant.world.time_us)
+        frame, plant_status = plant.measure(with_battery=with_battery)
         self._plant_end.offer(frame, _NEVER_LATE_S, plant_status)
         step = self._to_autopilot(frame.time_us)
         command = self._to_plant(frame.time_us)

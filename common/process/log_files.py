@@ -1,7 +1,7 @@
 """Log files: rows of numbers, lines of JSON, frames; to the disk as they come, or block by block."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from itertools import accumulate
 from math import inf
@@ -86,7 +86,7 @@ _Record = TypeVar("_Record")
 class BlockLog(LogFile, ABC, Generic[_Record]):
     """A file whose records are written `BLOCK` at a time: a process that is killed loses those since the last block.
 
-    So nothing is formatted or written between a frame and its answer, and what is costs half as much.
+    Each is formatted as it comes: of a whole block that would take longer than the other process computes.
     """
 
     BLOCK = 64
@@ -94,7 +94,7 @@ class BlockLog(LogFile, ABC, Generic[_Record]):
     def __init__(self, path: Path) -> None:
         """Open the file, its folder made where it is missing, or end the process with one line."""
         super().__init__(path)
-        self._waiting: list[_Record] = []
+        self._waiting: list[bytes] = []
 
     def add(self, record: _Record) -> None:
         """Append a record, and write all that wait once they are a block.
@@ -102,7 +102,7 @@ class BlockLog(LogFile, ABC, Generic[_Record]):
         Raises:
             LogError: They cannot be written.
         """
-        self._waiting.append(record)
+        self._waiting.append(self.encode(record))
         if len(self._waiting) >= self.BLOCK:
             self.flush()
 
@@ -114,7 +114,7 @@ class BlockLog(LogFile, ABC, Generic[_Record]):
         """
         waiting, self._waiting = self._waiting, []
         if waiting:
-            self.append(*self.encode(waiting))
+            self.append(*waiting)
 
     def close(self) -> None:
         """Write what waits, if that can be done, and close: who must know whether it can flushes before."""
@@ -123,8 +123,8 @@ class BlockLog(LogFile, ABC, Generic[_Record]):
         super().close()
 
     @abstractmethod
-    def encode(self, records: list[_Record]) -> Iterable[bytes]:
-        """Return the bytes of each record."""
+    def encode(self, record: _Record) -> bytes:
+        """Return the bytes of a record."""
 
 
 class CsvLog(BlockLog[Sequence[float]]):
@@ -138,17 +138,11 @@ class CsvLog(BlockLog[Sequence[float]]):
         except LogError as error:
             fail(str(error))
 
-    def encode(self, records: list[Sequence[float]]) -> Iterable[bytes]:
-        """Return the line of each row."""
-        block = _NUMBERS.encode_lines(records)
-        if _NULL[:1] not in block:  # no number has that letter
-            return _parted(block)
-        lines = _parted(block.replace(_NULL, b"nan"))
-        for at in [at for at, row in enumerate(records) if inf in row or -inf in row]:
-            lines[at] = ",".join(map(str, records[at])).encode() + b"\n"
-        return lines
-
-
-def _parted(block: bytes) -> list[bytes]:
-    """Return the lines of a block, without their brackets."""
-    return [line[1:-1] + b"\n" for line in block.split(b"\n")[:-1]]
+    def encode(self, record: Sequence[float]) -> bytes:
+        """Return the line of a row."""
+        line = _NUMBERS.encode(record)[1:-1]
+        if _NULL[:1] not in line:  # no number has that letter
+            return line + b"\n"
+        if inf in record or -inf in record:
+            return ",".join(map(str, record)).encode() + b"\n"
+        return line.replace(_NULL, b"nan") + b"\n"

@@ -101,6 +101,10 @@ class PlantEnd:
         self._resend_at_s = 0.0
         self._outbox: list[Outgoing] = []
 
+    def sends_battery(self, time_us: int) -> bool:
+        """Whether a frame of `time_us` has the battery beside it; who calls later is sent that of the frame before."""
+        return time_us % BATTERY_EVERY_US == 0
+
     def offer(
         self, frame: Frame, now_s: float, plant_status: PlantStatus = NOTHING, truth: StateFrame | None = None
     ) -> None:
@@ -116,9 +120,10 @@ class PlantEnd:
             frames.append(self._heartbeat())
         if plant_status.results:
             frames += encode_results(self._codec, plant_status.results, self._autopilot)
-        self._battery = plant_status.battery
-        if plant_status.battery is not None and frame.time_us % BATTERY_EVERY_US == 0:
-            frames.append(encode_battery(self._codec, plant_status.battery))
+        if plant_status.battery is not None:
+            self._battery = plant_status.battery
+            if self.sends_battery(frame.time_us):
+                frames.append(encode_battery(self._codec, plant_status.battery))
         if plant_status.delay_us is not None:
             frames.append(encode_delay(self._codec, frame.time_us, plant_status.delay_us))
         if truth is not None:

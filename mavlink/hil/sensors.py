@@ -173,7 +173,7 @@ def decode_sensors(sensor: Message, *others: Message) -> SensorFrame:
     return _measured([getattr(sensor.fields, name) for name in _FIELDS.split()], **own)
 
 
-def _measured(numbers: Sequence[Any], **own: Any) -> SensorFrame:
+def _measured(numbers: Sequence[Any], gps: GpsFix | None = None, distance: Distance | None = None) -> SensorFrame:
     """Return the frame of a HIL_SENSOR's fields, and of what sensors with messages of their own measured."""
     time_us, xacc, yacc, zacc, xgyro, ygyro, zgyro, xmag, ymag, zmag, hpa, _, _, temperature_c, updated = numbers
     return SensorFrame(
@@ -184,7 +184,8 @@ def _measured(numbers: Sequence[Any], **own: Any) -> SensorFrame:
         frd_from_flu((xmag, ymag, zmag)),
         hpa * 100.0,
         temperature_c,
-        **own,
+        gps,
+        distance,
     )
 
 

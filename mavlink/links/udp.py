@@ -1,6 +1,7 @@
 """A UDP endpoint that never blocks."""
 
 import socket
+from ipaddress import ip_address
 from select import select
 from time import perf_counter
 
@@ -20,6 +21,7 @@ class UdpLink(Endpoint):
         super().__init__(url, target)
         sock.setblocking(False)
         self._socket = sock
+        self._connected = target is not None and _connect(sock, target)
         self.spin_s = SPIN_S
         self._waited_s = 0.0
         self._opened = [] if target is None else [target]
@@ -33,7 +35,10 @@ class UdpLink(Endpoint):
         destination = address or self.target
         assert destination is not None, "an endpoint that waits needs an address to send to"
         try:
-            self._socket.sendto(datagram, destination)
+            if self._connected and destination == self.target:
+                self._socket.send(datagram)
+            else:
+                self._socket.sendto(datagram, destination)
         except (BlockingIOError, ConnectionRefusedError):
             return
         except OSError as error:
@@ -62,7 +67,7 @@ class UdpLink(Endpoint):
         received = []
         for _ in range(_DATAGRAMS_AT_ONCE):
             try:
-                datagram, sender = self._socket.recvfrom(_MAX_DATAGRAM_BYTES)
+                datagram, sender = self._take()
             except ConnectionRefusedError:
                 continue
             except BlockingIOError:
@@ -81,9 +86,26 @@ class UdpLink(Endpoint):
 
     def _receive_now(self) -> tuple[bytes, Address] | None:
         try:
-            datagram, sender = self._socket.recvfrom(_MAX_DATAGRAM_BYTES)
+            datagram, sender = self._take()
         except (BlockingIOError, ConnectionRefusedError):
             return None
         if self.target is not None and sender != self.target:
             return None
         return datagram, sender
+
+    def _take(self) -> tuple[bytes, Address]:
+        if self._connected:
+            assert self.target is not None, "only with a target is a socket connected"
+            return self._socket.recv(_MAX_DATAGRAM_BYTES), self.target
+        return self._socket.recvfrom(_MAX_DATAGRAM_BYTES)
+
+
+def _connect(sock: socket.socket, target: Address) -> bool:
+    """Connect to a target on this computer, which saves a fifth of an exchange; return whether that was done.
+
+    Not to others: the way to them may change, and that of a connected socket does not.
+    """
+    if not ip_address(target[0]).is_loopback:
+        return False
+    sock.connect(target)
+    return True

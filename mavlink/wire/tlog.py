@@ -1,7 +1,7 @@
 """Telemetry logs as ground stations write them: each frame behind its time, µs, as a big-endian integer."""
 
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from colibri.common.process.log_files import BlockLog
@@ -40,23 +40,20 @@ def decode(log: bytes) -> Iterator[Logged]:
         at = begin + length
 
 
-class TlogWriter(BlockLog[tuple[int, tuple[bytes, ...]]]):
+class TlogWriter(BlockLog[tuple[int, list[bytes]]]):
     """A telemetry log that is written block by block."""
 
-    def write(self, time_us: int, frames: Iterable[bytes]) -> None:
+    def write(self, time_us: int, frames: list[bytes]) -> None:
         """Append frames, all of time `time_us`.
 
         Raises:
             LogError: They cannot be written.
         """
-        at_once = tuple(frames)
-        if at_once:
-            self.add((time_us, at_once))
+        if frames:
+            self.add((time_us, frames))
 
-    def encode(self, records: list[tuple[int, tuple[bytes, ...]]]) -> Iterable[bytes]:
+    def encode(self, record: tuple[int, list[bytes]]) -> bytes:
         """Return each frame behind its time."""
-        dated: list[bytes] = []
-        for time_us, frames in records:
-            stamp = STAMP.pack(time_us)
-            dated += [stamp + frame for frame in frames]
-        return dated
+        time_us, frames = record
+        stamp = STAMP.pack(time_us)
+        return stamp + stamp.join(frames)

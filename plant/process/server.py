@@ -9,7 +9,7 @@ from colibri.common.process.lifecycle import Stop
 from colibri.common.process.log_files import LogError
 from colibri.common.process.status import Progress, Status
 from colibri.mavlink.hil.faults import Fault
-from colibri.mavlink.hil.lockstep_plant import PlantEnd
+from colibri.mavlink.hil.lockstep_plant import Outgoing, PlantEnd
 from colibri.mavlink.hil.state import ActuatorCommand
 from colibri.mavlink.hil.world_changes import WorldChange
 from colibri.mavlink.links.udp import UdpLink
@@ -87,6 +87,7 @@ class Server:
                 break
             frames += 1
             progress.report(plant.world.time_us / 1e6, perf_counter() - began_s)
+        self._log_traffic([])
         self._log(plant.world)
         self._keep(PlantLogs.flush)
         figures: dict[str, Any] = {"frames": frames, "resent": self._end.resent, "dropped": dict(self._end.dropped)}
@@ -101,7 +102,8 @@ class Server:
 
     def _advance(self, plant: Plant, pace: Pace) -> bool:
         """Send a frame when it is due, and go on with its answer; return False if a signal came first."""
-        self._wait_until(pace.due_s(plant.world.time_us, perf_counter()))
+        if isfinite(pace.speed):
+            self._wait_until(pace.due_s(plant.world.time_us, perf_counter()))
         command = self._exchange(plant)
         if command is None:
             return False
@@ -111,12 +113,15 @@ class Server:
     def _offer(self, plant: Plant) -> float:
         """Send the plant's frame; return the wall-clock time, s."""
         world = plant.world
-        self._time_us = world.time_us
-        frame, plant_status = plant.measure()
+        frame, plant_status = plant.measure(with_battery=self._end.sends_battery(world.time_us))
         now_s = perf_counter()
         self._end.offer(frame, now_s, plant_status, state_frame(world) if self._streams_truth else None)
-        self._send()
-        self._log(world)  # while the autopilot computes
+        sent = self._send()
+        self._log_traffic([])  # while the autopilot computes
+        self._time_us = world.time_us
+        self._log_traffic(sent)
+        self._log(world)
+        plant.prepare()
         return now_s
 
     def _exchange(self, plant: Plant) -> ActuatorCommand | None:
@@ -130,7 +135,7 @@ class Server:
                 silence.end(now_s)
                 return command
             due_s = self._end.poll(now_s)
-            self._send()
+            self._send_and_log()
             silence.lasts(now_s, "no answer", plant.world.time_us, ", waiting for the autopilot")
         return None
 
@@ -155,15 +160,27 @@ class Server:
         if received is None:
             return None
         command = self._end.receive(*received, perf_counter())
-        self._send()
+        self._send_and_log()
         return command
 
-    def _send(self) -> None:
+    def _send(self) -> list[Outgoing]:
+        """Send what is to be sent, and return it."""
         sent = self._end.take_outbox()
         for outgoing in sent:
             self._link.send(outgoing.datagram, outgoing.address)
-        self._keep(lambda logs: logs.write_traffic(self._time_us, self._end.received, sent))
-        self._end.received.clear()
+        return sent
+
+    def _send_and_log(self) -> None:
+        """Send what is to be sent, and log it; without that what was received is logged behind the next frame."""
+        sent = self._send()
+        if sent:
+            self._log_traffic(sent)
+
+    def _log_traffic(self, sent: list[Outgoing]) -> None:
+        """Log what was received since last asked, and then what was sent, at the time of the last frame."""
+        received, time_us = self._end.received, self._time_us
+        self._keep(lambda logs: logs.write_traffic(time_us, received, sent))
+        received.clear()
 
     def _wait_until(self, due_s: float) -> None:
         while not self._stop and (early_s := due_s - perf_counter()) > 0.0:

@@ -55,24 +55,27 @@ class Triad:
             chance: Standard normal numbers.
         """
         self._limit = limit
+        self._chance = chance
+        self._walk, self._noise = walk * sqrt(interval_s), density / sqrt(interval_s)
         self.bias: Vector = (turn_on * next(chance), turn_on * next(chance), turn_on * next(chance))
-        self._errors = _errors(self.bias, walk * sqrt(interval_s), density / sqrt(interval_s), chance)
+        self._last = np.array(self.bias)
+        self._drawn: list[list[float]] = []
 
     def measure(self, truth: Vector) -> Vector:
         """Return the sample of `truth`, one interval after the one before."""
         limit = self._limit
-        bx, by, bz, dx, dy, dz = next(self._errors)
+        self.draw()
+        bx, by, bz, dx, dy, dz = self._drawn.pop()
         x, y, z = bx + (truth[0] + dx), by + (truth[1] + dy), bz + (truth[2] + dz)
         if -limit <= x <= limit and -limit <= y <= limit and -limit <= z <= limit:
             return (x, y, z)
         return (min(max(x, -limit), limit), min(max(y, -limit), limit), min(max(z, -limit), limit))
 
-
-def _errors(bias: Vector, walk: float, noise: float, chance: Iterator[float]) -> Iterator[list[float]]:
-    """Yield, for each sample after `bias`, the bias and white noise, of each axis; many samples are drawn at once."""
-    last = np.array(bias)
-    while True:
-        drawn = np.fromiter(chance, np.float64, 6 * _DRAWN).reshape(_DRAWN, 6)
-        biases = np.add.accumulate(np.concatenate([last[None], walk * drawn[:, :3]]))[1:]
-        last = biases[-1]
-        yield from np.concatenate([biases, noise * drawn[:, 3:]], axis=1).tolist()
+    def draw(self) -> None:
+        """Have the bias and white noise of the next sample: those of many are drawn at once."""
+        if self._drawn:
+            return
+        drawn = np.fromiter(self._chance, np.float64, 6 * _DRAWN).reshape(_DRAWN, 6)
+        biases = np.add.accumulate(np.concatenate([self._last[None], self._walk * drawn[:, :3]]))[1:]
+        self._last = biases[-1]
+        self._drawn = np.concatenate([biases, self._noise * drawn[:, 3:]], axis=1)[::-1].tolist()

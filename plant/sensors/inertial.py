@@ -13,6 +13,7 @@ from colibri.plant.vehicle.sensors import Accelerometer, Gyroscope
 def _accelerometer(part: Accelerometer, setting: Setting, chance: Iterator[float]) -> Measure:
     walk, turn_on = part.bias_walk_m_s3_rthz, part.turn_on_bias_m_s2
     errors = Triad(part.noise_density_m_s2_rthz, walk, turn_on, part.range_m_s2, setting.interval_s, chance)
+    setting.ahead.append(errors.draw)
     specific_force = setting.physics.specific_force
     return lambda world: errors.measure(specific_force(world))
 
@@ -20,6 +21,7 @@ def _accelerometer(part: Accelerometer, setting: Setting, chance: Iterator[float
 def _gyroscope(part: Gyroscope, setting: Setting, chance: Iterator[float]) -> Measure:
     walk, turn_on = part.bias_walk_rad_s2_rthz, part.turn_on_bias_rad_s
     errors = Triad(part.noise_density_rad_s_rthz, walk, turn_on, part.range_rad_s, setting.interval_s, chance)
+    setting.ahead.append(errors.draw)
 
     def measure(world: World) -> tuple[float, float, float]:
         p, q, r = world.state[3:6]

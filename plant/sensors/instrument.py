@@ -25,11 +25,16 @@ def vector_sum(value: Vector, error: Vector) -> Vector:
 
 
 class Setting(NamedTuple):
-    """Where the sensors of one vehicle are."""
+    """Where the sensors of one vehicle are.
+
+    Attributes:
+        ahead: Where each puts what it can do before it measures, whatever the world will be; it need not be done.
+    """
 
     physics: Physics
     origin: Geodetic
     interval_s: float
+    ahead: list[Callable[[], None]]
 
 
 class Instrument(NamedTuple):

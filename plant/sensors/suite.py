@@ -4,6 +4,7 @@ What they measure depends on the seed, the simulated time and the truth alone: e
 and the same frame asked for twice is the same frame.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from colibri.common.earth.atmosphere import temperature_c
@@ -43,7 +44,9 @@ class SensorSuite:
         """Switch on `parts`, by the chance of `seed` (not negative); frames go through `faults`, where given."""
         self._faults = faults
         self._origin = origin
-        setting, chances = Setting(physics, origin, interval_us * 1e-6), streams(seed, Source.SENSORS, len(ROWS))
+        self._ahead: list[Callable[[], None]] = []
+        setting = Setting(physics, origin, interval_us * 1e-6, self._ahead)
+        chances = streams(seed, Source.SENSORS, len(ROWS))
         self._instruments = [
             (_PLACE[row.field], row.group, row.switched_on(getattr(parts, row.part), setting, chance))
             for row, chance in zip(ROWS, chances, strict=True)
@@ -59,6 +62,11 @@ class SensorSuite:
             frame = self._measured(world)
             self._frame = frame if self._faults is None else self._faults.through(frame)
         return self._frame
+
+    def prepare(self) -> None:
+        """Do what can be done before the next world is known."""
+        for do in self._ahead:
+            do()
 
     def _measured(self, world: World) -> SensorFrame:
         reported, updated = self._reported, 0

@@ -69,22 +69,30 @@ class Plant:
         self.faults = Faults(vehicle, physics, feedback, seed=seed)
         self.interval_us = interval_us
         self._physics = physics
+        self._suite: SensorSuite | None = None
         self._measure: Callable[[World], Frame] = state_frame
         if feedback is Feedback.SENSORS:
             assert vehicle.sensors is not None, "only what has sensors serves them"
             faults = self.faults.sensors
-            self._measure = SensorSuite(
+            self._suite = SensorSuite(
                 vehicle.sensors, physics, origin, seed=seed, interval_us=interval_us, faults=faults
-            ).measure
+            )
+            self._measure = self._suite.measure
             physics.specific_force(world)  # loads it, before any frame
         self._actuation = Actuation(_held(world, vehicle))
         self._round_trip_us = 2 * latency_us
         self._results: tuple[FaultResult, ...] = ()
 
-    def measure(self) -> ReceivedFrame:
-        """Return the frame of the world as it is now, and what goes beside it."""
-        status = PlantStatus(self._physics.battery(self.world), self._results, self._actuation.delay_us or None)
+    def measure(self, *, with_battery: bool = True) -> ReceivedFrame:
+        """Return the frame of the world as it is now, and what goes beside it; of the battery only if that is sent."""
+        battery = self._physics.battery(self.world) if with_battery else None
+        status = PlantStatus(battery, self._results, self._actuation.delay_us or None)
         return ReceivedFrame(self._measure(self.world), status)
+
+    def prepare(self) -> None:
+        """Do what the next frame needs whatever the answer to this one is, while the autopilot computes it."""
+        if self._suite is not None:
+            self._suite.prepare()
 
     def answer(self, command: ActuatorCommand, faults: Sequence[Fault | WorldChange] = ()) -> None:
         """Go on to the next frame, with the answer to this one and with faults that happen now."""
