@@ -36,6 +36,7 @@ SUBCOMMANDS = {
     "check-controller": "try on a control law of your own what every one must satisfy",
     "certify": "prove what can be proven of a profile's attitude law",
     "bench": "measure how fast it flies",
+    "view": "see flights, or a MAVLink vehicle, fly in a browser",
     "plot": "draw the figures of a flight, however it ended",
     "show": "print the file of a profile or vehicle, to copy and change",
     "vehicle": "write a vehicle as parameters of PX4 or ArduPilot",
@@ -47,6 +48,7 @@ _ROOMS = (
     dict.fromkeys(("campaign", "compare", "study", "figures"), "campaigns")
     | dict.fromkeys(("certify", "check-controller"), "laws")
     | dict.fromkeys(("show", "vehicle"), "descriptions")
+    | {"view": "viewer"}
 )
 _NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 

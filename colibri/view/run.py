@@ -1,0 +1,117 @@
+"""The page from its address on the terminal to its end: flights played, vehicles followed, what was done passed on."""
+
+import webbrowser
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from time import perf_counter, sleep
+
+from colibri.common.process.lifecycle import Stop
+from colibri.view.horizons import HorizonProcess, Horizons
+from colibri.view.page.page import Page
+from colibri.view.playback import Playback, speed_of
+from colibri.view.recorded import RecordedFlight
+from colibri.view.snapshot import Source, ViewError
+
+FRAMES_HZ = 30.0
+WORDS_HZ = 5.0
+"""How often words, time line and plots change: an eye reads no faster."""
+
+
+class Show:
+    """Sources on a page, brought up to date whenever it is time: pure of waiting."""
+
+    def __init__(self, page: Page, sources: Sequence[Source], now_s: float) -> None:
+        """Show sources from their beginning, which is when the first browser comes."""
+        begin_s, end_s = zip(*(source.span_s for source in sources), strict=True)
+        self._page = page
+        self._sources = sources
+        self.playback = Playback((min(begin_s), max(end_s)), now_s, min(begin_s))
+        self._words_at_s = now_s
+        self._shown: object = None
+        self._is_told = self._was_watched = False
+
+    def turn(self, now_s: float) -> None:
+        """Do what was asked for, and show what is now."""
+        if self._page.watched and not self._was_watched:
+            self._was_watched = True
+            self.playback = self.playback.play(now_s)
+        for done in self._page.done():
+            self._shown = None
+            if done.what == "play":
+                moves = self.playback.plays and not self.playback.is_over(now_s)
+                self.playback = self.playback.pause(now_s) if moves else self.playback.play(now_s)
+            elif done.what == "seek":
+                self.playback = self.playback.seek(done.value, now_s)
+            elif done.what == "speed":
+                self.playback = self.playback.at_speed(speed_of(done.value), now_s)
+        live = any(source.is_live for source in self._sources)
+        time_s = now_s if live else self.playback.time_s(now_s)
+        if time_s != self._shown:
+            self._shown = time_s
+            self._page.show([source.at(time_s) for source in self._sources])
+            self._is_told = False
+        if not self._is_told and now_s >= self._words_at_s:
+            self._words_at_s = now_s + 1.0 / WORDS_HZ
+            self._is_told = True
+            plays = self.playback.plays and not self.playback.is_over(now_s)
+            self._page.tell([source.at(time_s) for source in self._sources], time_s, plays)
+            self._page.plot(time_s, anew=live)
+
+
+def show_recorded(folders: Sequence[Path], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
+    """Show flights that were flown, until interrupted.
+
+    Raises:
+        ViewError: One cannot be read, or the port is taken.
+    """
+    with ExitStack() as held:
+        flights = read_flights(folders, held)
+        serve_until_stopped(flights, port, browser=browser, say=say)
+
+
+def read_flights(folders: Sequence[Path], held: ExitStack) -> list[RecordedFlight]:
+    """Return the flights of folders, whose horizons come by and by as long as `held` lasts.
+
+    Raises:
+        ViewError: One cannot be read.
+    """
+    flights = [RecordedFlight(folder, name) for folder, name in zip(folders, _names(folders), strict=True)]
+    for folder, flight in zip(folders, flights, strict=True):
+        horizons = Horizons()
+        flight.use_horizons(horizons)
+        held.callback(HorizonProcess(folder, horizons).close)
+    return flights
+
+
+def serve_until_stopped(sources: Sequence[Source], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
+    """Serve the page of some sources; say its address first.
+
+    Raises:
+        ViewError: The port is taken.
+    """
+    page = Page(sources, port)
+    stop = Stop()
+    try:
+        say(page.url)
+        if browser:
+            webbrowser.open(page.url)
+        show = Show(page, sources, perf_counter())
+        while not stop:
+            began_s = perf_counter()
+            show.turn(began_s)
+            sleep(max(0.0, began_s + 1.0 / FRAMES_HZ - perf_counter()))
+    finally:
+        page.close()
+
+
+def _names(folders: Sequence[Path]) -> list[str]:
+    """Return short names that differ: the last parts of the paths, as many as it takes."""
+    paths = [folder.resolve().parts for folder in folders]
+    if len(set(paths)) < len(paths):
+        raise ViewError(f"{folders[0]} is given twice: name two flights")
+    for count in range(1, max(map(len, paths)) + 1):
+        names = ["/".join(parts[-count:]) for parts in paths]
+        if len(set(names)) == len(names):
+            return names
+    raise AssertionError("paths that differ have parts that differ")
