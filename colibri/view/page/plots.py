@@ -38,18 +38,13 @@ class Plots:
             else:
                 handle, _ = self._shown[title]
                 handle.data = data
-                handle.scales = _scales(data)
                 self._shown[title] = (handle, data)
 
     def mark(self, time_s: float) -> None:
         """Mark a time in each plot."""
         for handle, data in self._shown.values():
-            times_s, *values = data
-            row = int(np.searchsorted(times_s, time_s))
-            row = min(row, len(times_s) - 1)
-            now = np.full(len(times_s), np.nan)
-            now[row] = values[0][row]
-            handle.data = (times_s, *values[:-1], now)
+            times_s, *values, _ = data
+            handle.data = (times_s, *values, _spike(times_s, values, time_s))
 
     def _add(self, title: str, data: tuple[Array, ...], series: tuple[uplot.Series, ...]) -> Any:
         return self._gui.add_uplot(
@@ -57,7 +52,7 @@ class Plots:
             series,
             title=title,
             height=HEIGHT_PX,
-            scales=_scales(data),
+            scales={"x": uplot.Scale(time=False)},
             axes=(uplot.Axis(size=28), uplot.Axis(size=_AXIS_PX)),
             legend=uplot.Legend(show=len(series) > 3, live=False),
             cursor=uplot.Cursor(show=True),
@@ -82,7 +77,7 @@ class Plots:
         for number, chart in enumerate(charts):
             if chart is None or not len(chart.times_s):
                 continue
-            values.append(np.interp(times_s, chart.times_s, chart.headline, left=np.nan, right=np.nan))
+            values.append(np.interp(times_s, chart.times_s, chart.headline))
             stroke = "#{:02x}{:02x}{:02x}".format(*COLOURS[number % len(COLOURS)])
             lines.append(uplot.Series(label=self._names[number], stroke=stroke, width=1.3, points={"show": False}))
         return _framed(times_s, values, tuple(lines))
@@ -92,18 +87,15 @@ def _framed(
     times_s: Array, values: list[Array], lines: tuple[uplot.Series, ...]
 ) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
     """Return data and series with time before them and the mark behind them."""
-    mark = uplot.Series(label="now", stroke=_NOW, width=0, points={"show": True, "size": 9, "fill": _NOW})
-    data = (times_s, *values, np.full(len(times_s), np.nan))
+    mark = uplot.Series(label="now", stroke=_NOW, width=1, points={"show": False})
+    data = (times_s, *values, _spike(times_s, values, -np.inf))
     return data, (uplot.Series(label="s"), *lines, mark)
 
 
-def _scales(data: tuple[Array, ...]) -> dict[str, uplot.Scale]:
-    """Return the ranges of both axes: those that uPlot finds itself it loses to a mark that is not a number."""
-    known = np.concatenate([values[np.isfinite(values)] for values in data[1:-1]])
-    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
-    margin = 0.06 * (high - low) or 0.5
-    span = (float(data[0][0]), max(float(data[0][-1]), float(data[0][0]) + 0.01))
-    return {
-        "x": uplot.Scale(time=False, auto=False, range=span),
-        "y": uplot.Scale(auto=False, range=(low - margin, high + margin)),
-    }
+def _spike(times_s: Array, values: list[Array], time_s: float) -> Array:
+    """Return a line along the lowest value, up to the largest at a time: uPlot finds no range for what is no number."""
+    low, high = (float(pick(values)) for pick in (np.min, np.max))
+    mark = np.full(len(times_s), low)
+    if time_s >= times_s[0]:
+        mark[min(int(np.searchsorted(times_s, time_s)), len(times_s) - 1)] = high
+    return mark
