@@ -3,11 +3,18 @@
 import webbrowser
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from functools import partial
+from math import inf
 from pathlib import Path
 from time import perf_counter, sleep
+from typing import Any
 
 from colibri.common.process.lifecycle import Stop
+from colibri.view.access import Token
 from colibri.view.horizons import HorizonProcess, Horizons
+from colibri.view.live import LiveVehicle
+from colibri.view.modes import CHOICES
+from colibri.view.observer import Observer
 from colibri.view.page.page import Page
 from colibri.view.playback import Playback, speed_of
 from colibri.view.recorded import RecordedFlight
@@ -21,11 +28,18 @@ WORDS_HZ = 5.0
 class Show:
     """Sources on a page, brought up to date whenever it is time: pure of waiting."""
 
-    def __init__(self, page: Page, sources: Sequence[Source], now_s: float) -> None:
-        """Show sources from their beginning, which is when the first browser comes."""
+    def __init__(
+        self,
+        page: Page,
+        sources: Sequence[Source],
+        now_s: float,
+        order: Callable[[str, Any], None] = lambda _what, _value: None,
+    ) -> None:
+        """Show sources from their beginning, which is when the first browser comes; `order` takes what is ordered."""
         begin_s, end_s = zip(*(source.span_s for source in sources), strict=True)
         self._page = page
         self._sources = sources
+        self._order = order
         self.playback = Playback((min(begin_s), max(end_s)), now_s, min(begin_s))
         self._words_at_s = now_s
         self._shown: object = None
@@ -43,6 +57,8 @@ class Show:
                 self.playback = self.playback.pause(now_s) if moves else self.playback.play(now_s)
             elif done.what == "seek":
                 self.playback = self.playback.seek(done.value, now_s)
+            elif done.what == "order":
+                self._order(*done.value)
             elif done.what == "speed":
                 self.playback = self.playback.at_speed(speed_of(done.value), now_s)
         live = any(source.is_live for source in self._sources)
@@ -56,7 +72,7 @@ class Show:
             self._is_told = True
             plays = self.playback.plays and not self.playback.is_over(now_s)
             self._page.tell([source.at(time_s) for source in self._sources], time_s, plays)
-            self._page.plot(time_s, anew=live)
+            self._page.plot(inf if live else time_s, anew=live)
 
 
 def show_recorded(folders: Sequence[Path], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
@@ -84,8 +100,35 @@ def read_flights(folders: Sequence[Path], held: ExitStack) -> list[RecordedFligh
     return flights
 
 
+def show_live(url: str, port: int, *, browser: bool, say: Callable[[str], None]) -> None:
+    """Show the vehicle on a link, until interrupted; say a token that its commands need.
+
+    Raises:
+        ViewError: The link cannot be opened, or the port is taken.
+    """
+    vehicle = LiveVehicle(url)
+    try:
+        serve_until_stopped([vehicle], port, browser=browser, say=say)
+    finally:
+        vehicle.close()
+
+
+def pass_on(vehicle: LiveVehicle, what: str, value: Any) -> None:
+    """Give a vehicle an order of the page."""
+    orders: dict[str, Callable[[Observer], None]] = {
+        "arm": lambda observer: observer.arm(True),
+        "disarm": lambda observer: observer.arm(False),
+        "take off": lambda observer: observer.take_off(value),
+        "land": Observer.land,
+        "return": Observer.return_home,
+        "mode": lambda observer: observer.set_mode(value),
+        "go to": lambda observer: observer.go_to(value),
+    }
+    vehicle.order(orders[what])
+
+
 def serve_until_stopped(sources: Sequence[Source], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
-    """Serve the page of some sources; say its address first.
+    """Serve the page of some sources; say its address first, and for a live vehicle the token of its commands.
 
     Raises:
         ViewError: The port is taken.
@@ -94,9 +137,15 @@ def serve_until_stopped(sources: Sequence[Source], port: int, *, browser: bool, 
     stop = Stop()
     try:
         say(page.url)
+        show = Show(page, sources, perf_counter())
+        live = sources[0]
+        if isinstance(live, LiveVehicle):
+            token = Token.new()
+            say(f"token for commands: {token.text}")
+            page.offer_commands(token, lambda: CHOICES.get(live.autopilot or 0, ()))
+            show = Show(page, sources, perf_counter(), partial(pass_on, live))
         if browser:
             webbrowser.open(page.url)
-        show = Show(page, sources, perf_counter())
         while not stop:
             began_s = perf_counter()
             show.turn(began_s)

@@ -34,13 +34,16 @@ def run(args: Namespace) -> int:
         fail(f"--port: must be from 0 to 65535, not {args.port}")
     try:
         with loading():
-            from colibri.view.run import show_recorded
+            from colibri.view.run import show_live, show_recorded
     except ModuleNotFoundError as error:
         if error.name not in ("viser", "websockets"):
             raise
         fail("the page needs viser: pip install 'colibri-sitl[view]'")
     try:
-        show_recorded([Path(what) for what in args.what], args.port, browser=not args.no_browser, say=_say)
+        if links:
+            show_live(links[0], args.port, browser=not args.no_browser, say=_say)
+        else:
+            show_recorded([Path(what) for what in args.what], args.port, browser=not args.no_browser, say=_say)
     except Error as error:
         fail(str(error))
     return 0

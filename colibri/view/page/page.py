@@ -1,12 +1,14 @@
 """The page as one thing: begun with vehicles, shown what they are like, asked what was done on it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from queue import Empty
 
 import numpy as np
 
-from colibri.view.access import HOST
-from colibri.view.geometry import bounds, vehicle_scale
+from colibri.common.types import Vector
+from colibri.view.access import HOST, Token
+from colibri.view.geometry import bounds, ground_point, vehicle_scale
+from colibri.view.page.commands import Commands
 from colibri.view.page.controls import Controls, Done, words
 from colibri.view.page.plots import Plots
 from colibri.view.page.scene import SurroundingsScene, VehicleScene, add_ground
@@ -14,6 +16,8 @@ from colibri.view.page.server import serve, stop
 from colibri.view.snapshot import Snapshot, Source
 
 _LEFT_PX, _RIGHT_PX = 290.0, 380.0
+_LIVE_EXTENT_M = 8.0
+"""Half of the side of what is looked at of a vehicle whose way is not known yet."""
 
 
 class Page:
@@ -42,7 +46,9 @@ class Page:
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         around = [source.surroundings for source in self._sources]
         middle, extent_m = bounds([path for each in around for path in (each.path, each.reference_path)])
-        self._extent_m, self._ground_m = extent_m, min(each.ground_m for each in around)
+        live = self._sources[0].is_live
+        extent_m = _LIVE_EXTENT_M if live else extent_m
+        self._ground_m = min(each.ground_m for each in around)
         self._world = scene.add_frame("/world", show_axes=False)
         add_ground(scene, self._ground_m, extent_m)
         self._scale = vehicle_scale(extent_m, self._sources[0].airframe)
@@ -50,15 +56,13 @@ class Page:
         self._around = [SurroundingsScene(scene, number) for number in range(len(self._sources))]
         self._follows = False
         self._look(middle, extent_m)
-        live = self._sources[0].is_live
         begin_s, end_s = zip(*(source.span_s for source in self._sources), strict=True)
         self.controls = Controls(gui, None if live else (min(begin_s), max(end_s)), self._scale)
         gui.main_panel.dock_left()
         gui.main_panel.set_width(_LEFT_PX)
         panel = gui.add_panel()
-        with panel.add_tab("Plots"):
-            self._plots = Plots(gui, self._names)
-            self._plots.show([source.charts() for source in self._sources])
+        self._plots = Plots(gui, panel.add_tab("Plots"), self._names)
+        self._plots.show([source.charts() for source in self._sources])
         panel.dock_right()
         panel.set_width(_RIGHT_PX)
 
@@ -106,6 +110,15 @@ class Page:
         if anew:
             self._plots.show([source.charts() for source in self._sources])
         self._plots.mark(time_s)
+
+    def offer_commands(self, token: Token, modes: Callable[[], Sequence[str]]) -> None:
+        """Offer commands to browsers that know a token; they come as `order` among what was done."""
+        Commands(self.server, token, modes, self.controls.done, self._ground_point)
+
+    def _ground_point(self, origin: Vector, direction: Vector) -> Vector | None:
+        """Return where a ray of the camera meets the ground, in the vehicle's frame."""
+        x, y, z = np.subtract(origin, self._world.position).tolist()
+        return ground_point((x, y, z), direction, self._ground_m)
 
     def close(self) -> None:
         """End the server."""

@@ -22,9 +22,10 @@ _AXIS_PX = 44
 class Plots:
     """One plot a title: of one vehicle all series, of several the headline of each."""
 
-    def __init__(self, gui: viser.GuiApi, names: Sequence[str]) -> None:
-        """Plot into the container that is open in `gui`, of vehicles by their names."""
+    def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, names: Sequence[str]) -> None:
+        """Plot into a tab, of vehicles by their names."""
         self._gui = gui
+        self._tab = tab
         self._names = tuple(names)
         self._shown: dict[str, tuple[Any, tuple[Array, ...]]] = {}
 
@@ -34,7 +35,8 @@ class Plots:
             same = [next((chart for chart in of_one if chart.title == title), None) for of_one in charts]
             data, series = self._alone(same[0]) if len(same) == 1 and same[0] else self._overlaid(same)
             if title not in self._shown:
-                self._shown[title] = (self._add(title, data, series), data)
+                with self._tab:
+                    self._shown[title] = (self._add(title, data, series), data)
             else:
                 handle, _ = self._shown[title]
                 handle.data = data

@@ -49,6 +49,7 @@ class VehicleScene:
         self._angles = (0.0, 0.0, 0.0, 0.0)
         self._time_s: float | None = None
         colour = COLOURS[number % len(COLOURS)]
+        self._frame = scene.add_frame(self._root, show_axes=False)
         self._body = scene.add_frame(f"{self._root}/vehicle", show_axes=False)
         self._blades, self._discs = self._build(colour)
         self._thrust = scene.add_arrows(
@@ -96,7 +97,7 @@ class VehicleScene:
 
     def remove(self) -> None:
         """Take it away."""
-        self._scene.remove_by_name(self._root)
+        self._frame.remove()
 
     def _show_reference(self, now: Snapshot, layers: frozenset[str]) -> None:
         known = np.isfinite(now.reference_enu_m).all() and "reference" in layers
@@ -162,6 +163,7 @@ class SurroundingsScene:
         """Draw nothing yet."""
         self._scene = scene
         self._root = f"/world/around{number}"
+        self._frame = scene.add_frame(self._root, show_axes=False)
         self._colour = COLOURS[number % len(COLOURS)]
         self._layers: dict[str, list[Any]] = {}
         self.shown: Surroundings | None = None
@@ -170,8 +172,8 @@ class SurroundingsScene:
         """Draw anew what has changed; show what belongs to `layers`."""
         if around is not self.shown:
             self.shown = around
-            for handle in (each for handles in self._layers.values() for each in handles):
-                handle.remove()
+            self._frame.remove()
+            self._frame = self._scene.add_frame(self._root, show_axes=False)
             self._layers = {"path": [], "reference": [], "mission, fence": []}
             self._draw(around)
         for layer, handles in self._layers.items():

@@ -18,7 +18,7 @@ FLAGS = (
     "--enable-unsafe-swiftshader",
 )
 SIZE = (1280, 800)
-WITHIN_MS = 120_000
+WITHIN_MS = 60_000
 """How long anything may take: without a GPU, on a computer that does other things too, seconds a picture."""
 _KNOWN_WARNINGS = ("THREE.Clock",)
 

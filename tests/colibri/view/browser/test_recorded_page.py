@@ -18,8 +18,10 @@ BLUE_OVER_RED = 60
 
 
 @pytest.fixture(scope="module")
-def recorded() -> RecordedFlight:
-    return RecordedFlight(fly("spiral", duration=6.0, profile="flight", link="memory").plan.out, "spiral flight")
+def recorded() -> Iterator[RecordedFlight]:
+    flight = fly("spiral", duration=6.0, profile="flight", link="memory")
+    yield RecordedFlight(flight.plan.out, "spiral flight")
+    assert flight.plan.out.exists()
 
 
 @pytest.fixture
