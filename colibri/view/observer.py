@@ -103,7 +103,7 @@ class Observer:
             return
         home_up = self.telemetry.home_enu_m[2]
         above_sea = origin.altitude_m + (0.0 if home_up != home_up else home_up) + height_m
-        self._command("take off", mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, nan, nan, nan, above_sea)
+        self._command("take off", mav.MAV_CMD_NAV_TAKEOFF, -1.0, 0.0, 0.0, nan, nan, nan, above_sea)
 
     def land(self) -> None:
         """Land where it is."""
