@@ -16,14 +16,15 @@ class LiveVehicle:
     """The vehicle at the other end of a link.
 
     Attributes:
-        name: The link's URL.
+        url: Of the link, with the port that it has got.
+        name: The same, where it has no other.
         airframe: Of no vehicle in particular: telemetry does not say where rotors are.
     """
 
     airframe = Airframe()
     is_live = True
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, name: str = "") -> None:
         """Open a link and serve it.
 
         Raises:
@@ -33,7 +34,8 @@ class LiveVehicle:
             self._link = open_ground_link(url)
         except LinkError as error:
             raise ViewError(str(error)) from error
-        self.name = self._link.url
+        self.url = self._link.url
+        self.name = name or self.url
         self._observer = Observer()
         self._lock = Lock()
         self._ends = Event()

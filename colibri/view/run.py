@@ -1,11 +1,12 @@
 """The page from its address on the terminal to its end: flights played, vehicles followed, what was done passed on."""
 
 import webbrowser
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from math import inf
 from pathlib import Path
+from threading import Event, Thread
 from time import perf_counter, sleep
 from typing import Any
 
@@ -127,31 +128,65 @@ def pass_on(vehicle: LiveVehicle, what: str, value: Any) -> None:
     vehicle.order(orders[what])
 
 
+@contextmanager
+def page_beside(say: Callable[[str], None]) -> Iterator[str]:
+    """Show in a browser what flies meanwhile; yields the link that the vehicle has to call.
+
+    The page has a thread of its own in this process, which only watches those that fly.
+
+    Raises:
+        ViewError: There is no port for it.
+    """
+    vehicle = LiveVehicle("udpin:127.0.0.1:0", name="vehicle")
+    ends = Event()
+    try:
+        page, show = _begin([vehicle], 0, browser=True, say=say)
+        thread = Thread(target=_keep_showing, args=(show, ends.is_set), daemon=True)
+        thread.start()
+        try:
+            yield vehicle.url.replace("udpin", "udpout")
+        finally:
+            ends.set()
+            thread.join()
+            page.close()
+    finally:
+        vehicle.close()
+
+
 def serve_until_stopped(sources: Sequence[Source], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
     """Serve the page of some sources; say its address first, and for a live vehicle the token of its commands.
 
     Raises:
         ViewError: The port is taken.
     """
-    page = Page(sources, port)
+    page, show = _begin(sources, port, browser=browser, say=say)
     stop = Stop()
     try:
-        say(page.url)
-        show = Show(page, sources, perf_counter())
-        live = sources[0]
-        if isinstance(live, LiveVehicle):
-            token = Token.new()
-            say(f"token for commands: {token.text}")
-            page.offer_commands(token, lambda: CHOICES.get(live.autopilot or 0, ()))
-            show = Show(page, sources, perf_counter(), partial(pass_on, live))
-        if browser:
-            webbrowser.open(page.url)
-        while not stop:
-            began_s = perf_counter()
-            show.turn(began_s)
-            sleep(max(0.0, began_s + 1.0 / FRAMES_HZ - perf_counter()))
+        _keep_showing(show, stop.__bool__)
     finally:
         page.close()
+
+
+def _begin(sources: Sequence[Source], port: int, *, browser: bool, say: Callable[[str], None]) -> tuple[Page, Show]:
+    page = Page(sources, port)
+    say(page.url)
+    show = Show(page, sources, perf_counter())
+    live = sources[0]
+    if isinstance(live, LiveVehicle):
+        token = Token.new()
+        say(f"token for commands: {token.text}")
+        page.offer_commands(token, lambda: CHOICES.get(live.autopilot or 0, ()))
+        show = Show(page, sources, perf_counter(), partial(pass_on, live))
+    if browser:
+        webbrowser.open(page.url)
+    return page, show
+
+
+def _keep_showing(show: Show, ends: Callable[[], bool]) -> None:
+    while not ends():
+        began_s = perf_counter()
+        show.turn(began_s)
+        sleep(max(0.0, began_s + 1.0 / FRAMES_HZ - perf_counter()))
 
 
 def _names(folders: Sequence[Path]) -> list[str]:

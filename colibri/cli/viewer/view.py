@@ -3,6 +3,7 @@
 from argparse import Namespace
 from pathlib import Path
 
+from colibri.cli.shared.beside import NEEDS_VISER
 from colibri.common.process.arguments import ArgumentParser, natural
 from colibri.common.process.lifecycle import fail, loading
 
@@ -38,7 +39,7 @@ def run(args: Namespace) -> int:
     except ModuleNotFoundError as error:
         if error.name not in ("viser", "websockets"):
             raise
-        fail("the page needs viser: pip install 'colibri-sitl[view]'")
+        fail(NEEDS_VISER)
     try:
         if links:
             show_live(links[0], args.port, browser=not args.no_browser, say=_say)
