@@ -10,6 +10,8 @@ from threading import Event, Thread
 from time import perf_counter, sleep
 from typing import Any
 
+import numpy as np
+
 from colibri.common.process.lifecycle import Stop
 from colibri.view.access import Token
 from colibri.view.horizons import HorizonProcess, Horizons
@@ -22,6 +24,8 @@ from colibri.view.recorded import RecordedFlight
 from colibri.view.snapshot import Source, ViewError
 
 FRAMES_HZ = 30.0
+EXPORT_HZ, EXPORT_FRAMES = 15.0, 6000
+"""Of a page that is written to a file; of a long flight fewer a second."""
 WORDS_HZ = 5.0
 """How often words, time line and plots change: an eye reads no faster."""
 
@@ -87,8 +91,28 @@ def show_recorded(folders: Sequence[Path], port: int, *, browser: bool, say: Cal
         serve_until_stopped(flights, port, browser=browser, say=say)
 
 
-def read_flights(folders: Sequence[Path], held: ExitStack) -> list[RecordedFlight]:
-    """Return the flights of folders, whose horizons come by and by as long as `held` lasts.
+def export(folders: Sequence[Path], path: Path) -> None:
+    """Write flights as one HTML file that plays them in any browser, without plots.
+
+    Raises:
+        ViewError: One cannot be read, or the file cannot be written.
+    """
+    with ExitStack() as held:
+        flights = read_flights(folders, held, wait=True)
+        begin_s, end_s = zip(*(flight.span_s for flight in flights), strict=True)
+        first_s, last_s = min(begin_s), max(end_s)
+        count = min(max(2, round(EXPORT_HZ * (last_s - first_s))), EXPORT_FRAMES)
+        page = Page(flights, 0)
+        held.callback(page.close)
+        html = page.recorded_html(np.linspace(first_s, last_s, count).tolist())
+    try:
+        path.write_text(html, encoding="utf-8")
+    except OSError as error:
+        raise ViewError(f"cannot write --export {path}: {error.strerror}") from error
+
+
+def read_flights(folders: Sequence[Path], held: ExitStack, *, wait: bool = False) -> list[RecordedFlight]:
+    """Return the flights of folders, whose horizons come by and by as long as `held` lasts; `wait` for all of them.
 
     Raises:
         ViewError: One cannot be read.
@@ -97,7 +121,10 @@ def read_flights(folders: Sequence[Path], held: ExitStack) -> list[RecordedFligh
     for folder, flight in zip(folders, flights, strict=True):
         horizons = Horizons()
         flight.use_horizons(horizons)
-        held.callback(HorizonProcess(folder, horizons).close)
+        process = HorizonProcess(folder, horizons)
+        held.callback(process.close)
+        if wait:
+            process.wait()
     return flights
 
 

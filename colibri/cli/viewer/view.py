@@ -21,6 +21,7 @@ def add_options(parser: ArgumentParser) -> None:
         "that a MAVLink vehicle is on, udpin:127.0.0.1:14550 say",
     )
     add("--port", type=natural, default=0, metavar="N", help="of the page, on loopback (default: any that is free)")
+    add("--export", type=Path, metavar="FILE.html", help="write flights as one file that plays them, and end")
     add("--no-browser", action="store_true", help="only print the page's address, alone on the first line")
 
 
@@ -31,17 +32,21 @@ def run(args: Namespace) -> int:
     links = [what for what in args.what if what.startswith(_LINKS)]
     if links and len(args.what) > 1:
         fail("one link, or folders of flights: a live vehicle and others are not shown together")
+    if links and args.export:
+        fail("--export writes flights that are over: give their folders")
     if args.port > 65535:
         fail(f"--port: must be from 0 to 65535, not {args.port}")
     try:
         with loading():
-            from colibri.view.run import show_live, show_recorded
+            from colibri.view.run import export, show_live, show_recorded
     except ModuleNotFoundError as error:
         if error.name not in ("viser", "websockets"):
             raise
         fail(NEEDS_VISER)
     try:
-        if links:
+        if args.export:
+            export([Path(what) for what in args.what], args.export)
+        elif links:
             show_live(links[0], args.port, browser=not args.no_browser, say=_say)
         else:
             show_recorded([Path(what) for what in args.what], args.port, browser=not args.no_browser, say=_say)

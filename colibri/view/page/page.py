@@ -120,6 +120,16 @@ class Page:
         x, y, z = np.subtract(origin, self._world.position).tolist()
         return ground_point((x, y, z), direction, self._ground_m)
 
+    def recorded_html(self, times_s: Sequence[float]) -> str:
+        """Return the scene at some times, one after the other at their pace, as a page that needs no server."""
+        serializer = self.server.get_scene_serializer()
+        before_s = times_s[0]
+        for time_s in times_s:
+            serializer.insert_sleep(time_s - before_s)
+            before_s = time_s
+            self.show([source.at(time_s) for source in self._sources])
+        return serializer.as_html()
+
     def close(self) -> None:
         """End the server."""
         stop(self.server)
