@@ -1,5 +1,6 @@
 """A flight's folder as snapshots and charts."""
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from colibri.experiments.flight import Flight, fly
 from colibri.view.horizons import Horizons, predicted
 from colibri.view.recorded import RecordedFlight
-from colibri.view.run import Show
+from colibri.view.run import Show, export, read_flights
 from colibri.view.snapshot import ViewError
 
 
@@ -115,3 +116,22 @@ def test_buttons_play_pause_seek_and_change_the_speed(recorded: RecordedFlight) 
     show.turn(12.0)
     assert page.shown == pytest.approx([0.0, 0.5, 1.0, 1.25, 0.3], abs=0.01)
     assert page.plays == [True, True, True, False, False]
+
+
+def test_an_export_needs_nothing_else(flight: Flight, tmp_path: Path) -> None:
+    path = tmp_path / "flight.html"
+    export([flight.plan.out], path)
+    text = path.read_text(encoding="utf-8")
+    assert "__VISER_EMBED_DATA__" in text
+    assert 'src="http' not in text
+    with pytest.raises(ViewError, match="cannot write"):
+        export([flight.plan.out], tmp_path / "missing" / "flight.html")
+
+
+def test_a_flight_is_not_laid_over_itself(flight: Flight, tmp_path: Path) -> None:
+    with pytest.raises(ViewError, match="given twice"), ExitStack() as held:
+        read_flights([flight.plan.out, flight.plan.out], held)
+    copied = flight.save(tmp_path / flight.plan.out.name)
+    with ExitStack() as held:
+        names = [each.name for each in read_flights([flight.plan.out, copied], held)]
+    assert len(set(names)) == 2
