@@ -5,8 +5,8 @@ OUT ?= out/spiral
 # Every command starts processes, the tests hundreds of them: each would compile all modules anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup fly test test-long lint test-clients test-peers fuzz chaos scenarios scenarios-rough soak soak-clients \
-  kills golden verify-pythons bench lock clean
+.PHONY: setup fly test test-long lint test-clients test-peers test-view fuzz chaos scenarios scenarios-rough soak \
+  soak-clients kills golden verify-pythons bench lock clean
 
 setup: .venv/.ready
 
@@ -35,6 +35,12 @@ test: lint
 # What takes long and shows more of the same: whole commands timed, kills in missions, 500 items over a bad link.
 test-long: setup
 	$(BIN)/python -m pytest -m long -n 2 --dist worksteal
+
+# The page of `colibri view` in Chromium, which draws without a GPU: about a minute.
+test-view: setup
+	@command -v chromium chromium-browser google-chrome >/dev/null || \
+	  { echo "make test-view needs a Chromium: apt-get install chromium" >&2; exit 2; }
+	$(BIN)/python -m pytest -m view tests/colibri/view/browser
 
 # MAVSDK, MAVProxy and DroneKit fly the vehicle: minutes each. MAVSDK_EXAMPLES=FOLDER, a checkout of MAVSDK-Python, has
 # its examples flown too; they need the ports 14540 and 50051. TABLE=FILE keeps what came of them, as Markdown.

@@ -3,9 +3,10 @@
 from argparse import Namespace
 
 from colibri.analysis.limits import limit
+from colibri.cli.shared.beside import add_view, viewed
 from colibri.cli.shared.options import add_out, add_signing
 from colibri.common.process.arguments import ArgumentParser
-from colibri.common.process.lifecycle import loading
+from colibri.common.process.lifecycle import fail, loading
 from colibri.experiments.options import add_plan_options
 
 
@@ -21,6 +22,7 @@ def add_options(parser: ArgumentParser) -> None:
         help="a ground station that may watch and command: udpout:, udpin:, tcp: or tcpin:HOST:PORT, or "
         "serial:DEVICE:BAUD; may be repeated",
     )
+    add_view(add)
     add_signing(add)
     add_out(add, "out", "logs and figures")
     add(
@@ -40,4 +42,7 @@ def run(args: Namespace) -> int:
     with loading():
         from colibri.cli.shared.fly_and_report import fly
 
-    return fly(args)
+    if args.view and args.link != "udp":
+        fail(f"--view needs --link udp: over {args.link} there is no autopilot to connect to")
+    with viewed(args, args.gcs):
+        return fly(args)

@@ -4,9 +4,11 @@ from argparse import Namespace
 from math import inf
 from pathlib import Path
 
+from colibri.cli.shared.beside import add_view, viewed
 from colibri.cli.shared.options import add_signing
 from colibri.common.earth.home import DEFAULT_HOME, home
 from colibri.common.process.arguments import ArgumentParser, natural, not_negative, positive, speed
+from colibri.common.process.lifecycle import fail
 from colibri.experiments.options import add_feedback
 from colibri.plant.process.options import add_world_arguments
 
@@ -42,6 +44,7 @@ def add_options(parser: ArgumentParser) -> None:
         "serial:DEVICE:BAUD; may be repeated "
         "(default: udpout:127.0.0.1:14550, and udpout:127.0.0.1:14540 + N)",
     )
+    add_view(add)
     add_signing(add)
     add(
         "--state",
@@ -72,6 +75,9 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Serve ground stations as the command line says; return the exit code."""
-    from colibri.flights.fleet import sitl
+    from colibri.flights.fleet import ground_links, sitl
 
-    return sitl(args)
+    if args.view and args.count > 1:
+        fail("--view shows one vehicle: leave --count out")
+    with viewed(args, ground_links(args, args.instance)):
+        return sitl(args)

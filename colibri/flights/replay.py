@@ -52,6 +52,24 @@ class Recorded(NamedTuple):
     command: ActuatorCommand | None
 
 
+class Answer(NamedTuple):
+    """What the autopilot made of a frame when it was asked again.
+
+    Attributes:
+        time_us: Of the frame.
+        command: What it had answered; None where nothing of that was recorded.
+        pilot: That answered.
+        step: Its answer.
+        known: Its state estimate; None before the first estimate.
+    """
+
+    time_us: int
+    command: ActuatorCommand | None
+    pilot: Autopilot | Copter
+    step: Step
+    known: StateFrame | None
+
+
 class Difference(NamedTuple):
     """The first command that is not what it was.
 
@@ -127,15 +145,7 @@ def replay_flight(tlog: Path) -> Replayed:
     Raises:
         ReplayError: They cannot be replayed.
     """
-    log = _bytes(tlog)
-    inputs = _inputs(tlog.parent / INPUTS, tlog)
-    setups = [what for what in inputs if isinstance(what, Setup)]
-    try:
-        recorded = list(recorded_frames(decode(log), setups[0]))
-    except TlogError as error:
-        raise ReplayError(f"{tlog}: {error}: expected the flight.tlog of a flight") from error
-    if not any(each.command for each in recorded):
-        raise ReplayError(f"{tlog}: no frame of {setups[0].feedback} feedback is answered in it: nothing to replay")
+    recorded, inputs = _read(tlog)
     try:
         return _compare(recorded, inputs)
     except ReplayError:
@@ -163,17 +173,51 @@ def recorded_frames(log: Iterable[Logged], setup: Setup) -> Iterator[Recorded]:
         yield Recorded(time_us, b"".join(sent[time_us]), commands.get(time_us))
 
 
+def answers_of(tlog: Path) -> Iterator[Answer]:
+    """Yield the answers of the autopilot to the frames of a flight, as `replay_flight` reads it, one after the other.
+
+    Raises:
+        ReplayError: They cannot be replayed.
+    """
+    yield from _answers(*_read(tlog))
+
+
+def _read(tlog: Path) -> tuple[list[Recorded], list[Input]]:
+    log = _bytes(tlog)
+    inputs = _inputs(tlog.parent / INPUTS, tlog)
+    setups = [what for what in inputs if isinstance(what, Setup)]
+    try:
+        recorded = list(recorded_frames(decode(log), setups[0]))
+    except TlogError as error:
+        raise ReplayError(f"{tlog}: {error}: expected the flight.tlog of a flight") from error
+    if not any(each.command for each in recorded):
+        raise ReplayError(f"{tlog}: no frame of {setups[0].feedback} feedback is answered in it: nothing to replay")
+    return recorded, inputs
+
+
 def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
-    """Answer each frame as the autopilot did that was started last before it, until an answer differs."""
+    """Compare answers with what was commanded, until one differs."""
+    codec = Codec(next(what for what in inputs if isinstance(what, Setup)).system_id, dialect.AUTOPILOT_COMPONENT)
+    commands = last_us = 0
+    for answer in _answers(recorded, inputs):
+        if answer.command is not None:
+            replayed = _carried(codec, answer.step.command)
+            if replayed != answer.command:
+                difference = Difference(answer.command, replayed, _mode(answer.pilot), answer.known)
+                return Replayed(commands, last_us, difference)
+            commands, last_us = commands + 1, answer.time_us
+    return Replayed(commands, last_us, None)
+
+
+def _answers(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Iterator[Answer]:
+    """Answer each frame as the autopilot did that was started last before it."""
     setups = {what.first_us: what for what in inputs if isinstance(what, Setup)}
     inbox: dict[int, list[Received]] = {}
     for what in inputs:
         if isinstance(what, ReceivedDatagram):
             inbox.setdefault(what.time_us, []).append(Received(what.datagram, what.link, what.address, what.loopback))
     pilot: Autopilot | Copter | None = None
-    codec = Codec(next(iter(setups.values())).system_id, dialect.AUTOPILOT_COMPONENT)
     known: StateFrame | None = None
-    commands = last_us = 0
     for time_us, datagram, command in recorded:
         if time_us in setups:
             pilot = _begun(setups[time_us])
@@ -189,14 +233,9 @@ def _compare(recorded: Sequence[Recorded], inputs: Sequence[Input]) -> Replayed:
         except DecisionError as error:
             raise ReplayError(f"at t = {frame.time_us * 1e-6:.3f} s: {error}") from error
         known = _known(frame, step, known)
-        if command is not None:
-            replayed = _carried(codec, step.command)
-            if replayed != command:
-                return Replayed(commands, last_us, Difference(command, replayed, _mode(pilot), known))
-            commands, last_us = commands + 1, frame.time_us
+        yield Answer(frame.time_us, command, pilot, step, known)
         if isinstance(pilot, Copter):
             pilot.serve(inbox.get(frame.time_us, ()))
-    return Replayed(commands, last_us, None)
 
 
 def _carried(codec: Codec, command: ActuatorCommand) -> ActuatorCommand:

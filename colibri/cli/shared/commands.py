@@ -37,6 +37,15 @@ GROUPS: dict[str, dict[str, Command]] = {
             colibri sitl --feedback sensors --turbulence light --speed 1
             """,
         ),
+        "view": Command(
+            "see flights, or a MAVLink vehicle, fly in a browser",
+            "viewer",
+            """
+            colibri view out/spiral
+            colibri view out/spiral out/other    # two flights in one picture
+            colibri view udpin:127.0.0.1:14550
+            """,
+        ),
         "plot": Command(
             "draw the figures of a flight, however it ended",
             "",

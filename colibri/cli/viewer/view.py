@@ -1,0 +1,59 @@
+"""`colibri view`: its options, and its call."""
+
+from argparse import Namespace
+from pathlib import Path
+
+from colibri.cli.shared.beside import NEEDS_VISER
+from colibri.common.process.arguments import ArgumentParser, natural
+from colibri.common.process.lifecycle import fail, loading
+
+_LINKS = ("udpin:", "udpout:", "tcp:", "tcpin:")
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add the options of `colibri view`."""
+    add = parser.add_argument
+    add(
+        "what",
+        nargs="+",
+        metavar="FOLDER|LINK",
+        help="flights by their folders, as `colibri fly` leaves them: several are shown over each other; or one link "
+        "that a MAVLink vehicle is on, udpin:127.0.0.1:14550 say",
+    )
+    add("--port", type=natural, default=0, metavar="N", help="of the page, on loopback (default: any that is free)")
+    add("--export", type=Path, metavar="FILE.html", help="write flights as one file that plays them, and end")
+    add("--no-browser", action="store_true", help="only print the page's address, alone on the first line")
+
+
+def run(args: Namespace) -> int:
+    """Show flights or a vehicle in a browser until interrupted; return the exit code."""
+    from colibri.common.errors import Error
+
+    links = [what for what in args.what if what.startswith(_LINKS)]
+    if links and len(args.what) > 1:
+        fail("one link, or folders of flights: a live vehicle and others are not shown together")
+    if links and args.export:
+        fail("--export writes flights that are over: give their folders")
+    if args.port > 65535:
+        fail(f"--port: must be from 0 to 65535, not {args.port}")
+    try:
+        with loading():
+            from colibri.view.run import export, show_live, show_recorded
+    except ModuleNotFoundError as error:
+        if error.name not in ("viser", "websockets"):
+            raise
+        fail(NEEDS_VISER)
+    try:
+        if args.export:
+            export([Path(what) for what in args.what], args.export)
+        elif links:
+            show_live(links[0], args.port, browser=not args.no_browser, say=_say)
+        else:
+            show_recorded([Path(what) for what in args.what], args.port, browser=not args.no_browser, say=_say)
+    except Error as error:
+        fail(str(error))
+    return 0
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)  # noqa: T201

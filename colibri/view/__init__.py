@@ -1,0 +1,14 @@
+"""Flights and vehicles in a browser: scene and plots as plain data, of logs or of telemetry, and the page."""
+
+from typing import TYPE_CHECKING
+
+from colibri.common.lazy import public
+
+if TYPE_CHECKING:
+    from colibri.view.recorded import RecordedFlight as RecordedFlight
+    from colibri.view.snapshot import Chart as Chart
+    from colibri.view.snapshot import Snapshot as Snapshot
+    from colibri.view.snapshot import Source as Source
+    from colibri.view.snapshot import ViewError as ViewError
+else:
+    __getattr__, __dir__ = public(__name__)

@@ -1,0 +1,101 @@
+"""A live vehicle as a source: a thread that serves a link, and hands what it knows to the page."""
+
+from collections.abc import Callable
+from threading import Event, Lock, Thread
+from time import perf_counter
+
+from colibri.mavlink.links.link import LinkError
+from colibri.mavlink.links.open import open_ground_link
+from colibri.view.observer import Observer
+from colibri.view.snapshot import Airframe, Chart, Snapshot, Surroundings, ViewError
+
+_WAIT_S = 0.02
+
+
+class LiveVehicle:
+    """The vehicle at the other end of a link.
+
+    Attributes:
+        url: Of the link, with the port that it has got.
+        name: The same, where it has no other.
+        airframe: Of no vehicle in particular: telemetry does not say where rotors are.
+    """
+
+    airframe = Airframe()
+    is_live = True
+
+    def __init__(self, url: str, name: str = "") -> None:
+        """Open a link and serve it.
+
+        Raises:
+            ViewError: It cannot be opened.
+        """
+        try:
+            self._link = open_ground_link(url)
+        except LinkError as error:
+            raise ViewError(str(error)) from error
+        self.url = self._link.url
+        self.name = name or self.url
+        self._observer = Observer()
+        self._lock = Lock()
+        self._ends = Event()
+        self._peers = [self._link.target] if self._link.target else []
+        self._thread = Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """Nothing is known of before."""
+        return 0.0, 0.0
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """Its plans, home and fence, as they were last asked for."""
+        with self._lock:
+            return self._observer.surroundings
+
+    @property
+    def autopilot(self) -> int | None:
+        """MAV_AUTOPILOT; None before its first heartbeat."""
+        with self._lock:
+            return self._observer.telemetry.autopilot
+
+    def at(self, time_s: float) -> Snapshot:
+        """Return the vehicle now, which is `time_s` by the wall clock."""
+        with self._lock:
+            return self._observer.telemetry.snapshot(time_s)
+
+    def charts(self) -> tuple[Chart, ...]:
+        """Return what is plotted of the last minute."""
+        with self._lock:
+            return self._observer.telemetry.charts()
+
+    def order(self, give: Callable[[Observer], None]) -> None:
+        """Have an order given: `live.order(Observer.land)`."""
+        with self._lock:
+            give(self._observer)
+
+    def close(self) -> None:
+        """Close the link."""
+        self._ends.set()
+        self._thread.join()
+        self._link.close()
+
+    def _serve(self) -> None:
+        while not self._ends.is_set():
+            self._link.wait(_WAIT_S)
+            received = self._link.receive_now()
+            self._peers += [address for address in self._link.take_opened() if address not in self._peers]
+            for gone in self._link.take_closed():
+                self._peers = [address for address in self._peers if address != gone]
+            now_s = perf_counter()
+            with self._lock:
+                for datagram, address in received:
+                    if address not in self._peers:
+                        self._peers.append(address)
+                    self._observer.receive(datagram, now_s)
+                self._observer.poll(now_s)
+                outbox = self._observer.take_outbox()
+            for datagram in outbox:
+                for address in self._peers:
+                    self._link.send(datagram, address)

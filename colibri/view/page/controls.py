@@ -1,0 +1,106 @@
+"""Buttons, sliders and words at the left: what is done with them goes into a queue, in its order."""
+
+from collections.abc import Sequence
+from queue import SimpleQueue
+from typing import Any, NamedTuple
+
+import numpy as np
+import viser
+
+from colibri.view.page.scene import COLOURS, LAYERS
+from colibri.view.playback import SPEEDS
+from colibri.view.snapshot import Snapshot
+
+
+class Done(NamedTuple):
+    """What somebody did: `play`, `seek` to a time, `speed` as its text, `layers`, `scale`, `follow`."""
+
+    what: str
+    value: Any = None
+
+
+class Controls:
+    """The panel at the left."""
+
+    def __init__(self, gui: viser.GuiApi, span_s: tuple[float, float] | None, scale: float) -> None:
+        """Build it; `span_s` is None for what is live and has no time line."""
+        self.done: SimpleQueue[Done] = SimpleQueue()
+        self._words = gui.add_markdown("")
+        self._play: viser.GuiButtonHandle | None = None
+        self._slider: viser.GuiSliderHandle[float] | None = None
+        if span_s is not None:
+            self._add_player(gui, span_s)
+        self._boxes: dict[str, viser.GuiInputHandle[bool]] = {}
+        self._add_layers(gui, scale)
+
+    @property
+    def layers(self) -> frozenset[str]:
+        """What is to be shown."""
+        return frozenset(name for name, box in self._boxes.items() if box.value)
+
+    def show(self, text: str, time_s: float, plays: bool) -> None:
+        """Show words, and where playing is."""
+        if self._words.content != text:
+            self._words.content = text
+        if self._slider is not None and self._play is not None:
+            self._slider.value = round(time_s, 2)  # type: ignore[misc]  # has a setter that types do not know
+            label = "Pause" if plays else "Play"
+            if self._play.label != label:
+                self._play.label = label
+
+    def _add_player(self, gui: viser.GuiApi, span_s: tuple[float, float]) -> None:
+        self._play = gui.add_button("Play")
+        self._slider = slider = gui.add_slider("Time, s", *_widened(span_s), 0.01, round(span_s[0], 2))
+        speed = gui.add_button_group("Speed", SPEEDS)
+        self._play.on_click(lambda _: self.done.put(Done("play")))
+        slider.on_update(lambda event: self._by_hand(event, Done("seek", slider.value)))
+        speed.on_click(lambda _: self.done.put(Done("speed", speed.value)))
+
+    def _add_layers(self, gui: viser.GuiApi, scale: float) -> None:
+        with gui.add_folder("Show", expand_by_default=False):
+            for name in LAYERS:
+                self._boxes[name] = box = gui.add_checkbox(name, initial_value=True)
+                box.on_update(lambda _: self.done.put(Done("layers")))
+            size = gui.add_slider("Vehicle size", 1.0, max(40.0, scale), 0.1, scale)
+            size.on_update(lambda event: self._by_hand(event, Done("scale", size.value)))
+        follow = gui.add_checkbox("Follow the vehicle", initial_value=False)
+        follow.on_update(lambda event: self._by_hand(event, Done("follow", follow.value)))
+
+    def _by_hand(self, event: viser.GuiEvent[Any], done: Done) -> None:
+        """Count what a browser did, not what the page sets itself."""
+        if event.client_id is not None:
+            self.done.put(done)
+
+
+def words(names: Sequence[str], snapshots: Sequence[Snapshot]) -> str:
+    """Return what is said of the vehicles now, as Markdown."""
+    return "\n\n".join(
+        _of_one(name, "#{:02x}{:02x}{:02x}".format(*COLOURS[number % len(COLOURS)]), now)
+        for number, (name, now) in enumerate(zip(names, snapshots, strict=True))
+    )
+
+
+def _of_one(name: str, colour: str, now: Snapshot) -> str:
+    speed = float(np.linalg.norm(now.velocity_enu_m_s))
+    east, north, up = now.position_enu_m
+    armed = {True: "armed", False: "disarmed", None: ""}[now.armed]
+    facts = [
+        f"t {now.time_s:.2f} s",
+        f"E {east:.2f} N {north:.2f} U {up:.2f} m",
+        f"{speed:.1f} m/s" if np.isfinite(speed) else "",
+        now.battery,
+    ]
+    error = float(np.linalg.norm(np.subtract(now.position_enu_m, now.reference_enu_m)))
+    if np.isfinite(error):
+        facts.append(f"error {error:.3f} m")
+    lines = [
+        f"**<span style='color:{colour}'>■</span> {name}** {' · '.join(filter(None, (now.mode, armed)))}",
+        " · ".join(filter(None, facts)),
+        *(f"*{text}*" for text in now.texts),
+    ]
+    return "  \n".join(lines)
+
+
+def _widened(span_s: tuple[float, float]) -> tuple[float, float]:
+    """Return the ends of the time line to the hundredth; a flight of one row gets some length."""
+    return round(span_s[0], 2), max(round(span_s[1], 2), round(span_s[0], 2) + 0.01)

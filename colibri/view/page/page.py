@@ -1,0 +1,146 @@
+"""The page as one thing: begun with vehicles, shown what they are like, asked what was done on it."""
+
+from collections.abc import Callable, Iterator, Sequence
+from queue import Empty
+
+import numpy as np
+
+from colibri.common.types import Vector
+from colibri.view.access import HOST, Token
+from colibri.view.geometry import bounds, ground_point, vehicle_scale
+from colibri.view.page.commands import Commands
+from colibri.view.page.controls import Controls, Done, words
+from colibri.view.page.plots import Plots
+from colibri.view.page.scene import SurroundingsScene, VehicleScene, add_ground
+from colibri.view.page.server import serve, stop
+from colibri.view.snapshot import Snapshot, Source
+
+_LEFT_PX, _RIGHT_PX = 290.0, 380.0
+_LIVE_EXTENT_M = 8.0
+"""Half of the side of what is looked at of a vehicle whose way is not known yet."""
+
+
+class Page:
+    """A page that shows vehicles.
+
+    Attributes:
+        server: viser's.
+        url: Its address.
+        controls: What it was told.
+    """
+
+    def __init__(self, sources: Sequence[Source], port: int) -> None:
+        """Serve it on a port of loopback, 0 for one that is free.
+
+        Raises:
+            ViewError: The port is taken.
+        """
+        self._sources = sources
+        self._names = [source.name for source in sources]
+        self.server = serve(port, "Colibri")
+        self.url = f"http://{HOST}:{self.server.get_port()}"
+        self._set_up()
+
+    def _set_up(self) -> None:
+        gui, scene = self.server.gui, self.server.scene
+        gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
+        around = [source.surroundings for source in self._sources]
+        middle, extent_m = bounds([path for each in around for path in (each.path, each.reference_path)])
+        live = self._sources[0].is_live
+        extent_m = _LIVE_EXTENT_M if live else extent_m
+        self._ground_m = min(each.ground_m for each in around)
+        self._world = scene.add_frame("/world", show_axes=False)
+        add_ground(scene, self._ground_m, extent_m)
+        self._scale = vehicle_scale(extent_m, self._sources[0].airframe)
+        self._vehicles = self._built()
+        self._around = [SurroundingsScene(scene, number) for number in range(len(self._sources))]
+        self._follows = False
+        self._look(middle, extent_m)
+        begin_s, end_s = zip(*(source.span_s for source in self._sources), strict=True)
+        self.controls = Controls(gui, None if live else (min(begin_s), max(end_s)), self._scale)
+        gui.main_panel.dock_left()
+        gui.main_panel.set_width(_LEFT_PX)
+        panel = gui.add_panel()
+        self._plots = Plots(gui, panel.add_tab("Plots"), self._names)
+        self._plots.show([source.charts() for source in self._sources])
+        panel.dock_right()
+        panel.set_width(_RIGHT_PX)
+
+    @property
+    def watched(self) -> bool:
+        """Whether a browser shows it."""
+        return bool(self.server.get_clients())
+
+    def done(self) -> Iterator[Done]:
+        """Yield what was done since last asked; what concerns only the picture is taken care of."""
+        while True:
+            try:
+                done = self.controls.done.get_nowait()
+            except Empty:
+                return
+            if done.what == "scale":
+                self._scale = float(done.value)
+                for vehicle in self._vehicles:
+                    vehicle.remove()
+                self._vehicles = self._built()
+            elif done.what == "follow":
+                self._follows = bool(done.value)
+                self._world.position = (0.0, 0.0, 0.0)
+            yield done
+
+    def show(self, snapshots: Sequence[Snapshot]) -> None:
+        """Show each vehicle as it is now."""
+        layers = self.controls.layers
+        with self.server.atomic():
+            for vehicle, around, source, now in zip(
+                self._vehicles, self._around, self._sources, snapshots, strict=True
+            ):
+                around.show(source.surroundings, layers)
+                vehicle.show(now, self._ground_m, layers)
+            if self._follows:
+                x, y, z = snapshots[0].position_enu_m
+                self._world.position = (-x, -y, -z)
+
+    def tell(self, snapshots: Sequence[Snapshot], time_s: float, plays: bool) -> None:
+        """Say in words what they are doing."""
+        self.controls.show(words(self._names, snapshots), time_s, plays)
+
+    def plot(self, time_s: float, *, anew: bool = False) -> None:
+        """Mark a time in the plots; `anew` plots what has come since, too."""
+        if anew:
+            self._plots.show([source.charts() for source in self._sources])
+        self._plots.mark(time_s)
+
+    def offer_commands(self, token: Token, modes: Callable[[], Sequence[str]]) -> None:
+        """Offer commands to browsers that know a token; they come as `order` among what was done."""
+        Commands(self.server, token, modes, self.controls.done, self._ground_point)
+
+    def _ground_point(self, origin: Vector, direction: Vector) -> Vector | None:
+        """Return where a ray of the camera meets the ground, in the vehicle's frame."""
+        x, y, z = np.subtract(origin, self._world.position).tolist()
+        return ground_point((x, y, z), direction, self._ground_m)
+
+    def recorded_html(self, times_s: Sequence[float]) -> str:
+        """Return the scene at some times, one after the other at their pace, as a page that needs no server."""
+        serializer = self.server.get_scene_serializer()
+        before_s = times_s[0]
+        for time_s in times_s:
+            serializer.insert_sleep(time_s - before_s)
+            before_s = time_s
+            self.show([source.at(time_s) for source in self._sources])
+        return serializer.as_html()
+
+    def close(self) -> None:
+        """End the server."""
+        stop(self.server)
+
+    def _built(self) -> list[VehicleScene]:
+        scene = self.server.scene
+        return [VehicleScene(scene, number, each.airframe, self._scale) for number, each in enumerate(self._sources)]
+
+    def _look(self, middle: tuple[float, float, float], extent_m: float) -> None:
+        """Put the camera of who comes: from the south-west, at all of the flight."""
+        camera = self.server.initial_camera
+        camera.position = tuple(np.add(middle, np.array([-1.2, -1.8, 1.0]) * extent_m).tolist())
+        camera.look_at = middle
+        camera.far = max(1000.0, 100.0 * extent_m)

@@ -1,0 +1,103 @@
+"""The plots beside the scene: series over time, and a mark where the flight is now."""
+
+from collections.abc import Sequence
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+import viser
+from viser import uplot
+
+from colibri.common.types import Array
+from colibri.view.page.scene import COLOURS
+from colibri.view.snapshot import Chart
+
+HEIGHT_PX = 150
+_SERIES = ("#1e6ed2", "#e67814", "#28964a", "#963caa", "#c8282d", "#606060")
+_LIMIT = "#9a9a9a"
+_NOW = "#d01080"
+_AXIS_PX = 44
+
+
+class Plots:
+    """One plot a title: of one vehicle all series, of several the headline of each."""
+
+    def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, names: Sequence[str]) -> None:
+        """Plot into a tab, of vehicles by their names."""
+        self._gui = gui
+        self._tab = tab
+        self._names = tuple(names)
+        self._shown: dict[str, tuple[Any, tuple[Array, ...]]] = {}
+
+    def show(self, charts: Sequence[Sequence[Chart]]) -> None:
+        """Plot charts of each vehicle."""
+        for title in dict.fromkeys(chart.title for of_one in charts for chart in of_one):
+            same = [next((chart for chart in of_one if chart.title == title), None) for of_one in charts]
+            data, series = self._alone(same[0]) if len(same) == 1 and same[0] else self._overlaid(same)
+            if title not in self._shown:
+                with self._tab:
+                    self._shown[title] = (self._add(title, data, series), data)
+            else:
+                handle, _ = self._shown[title]
+                handle.data = data
+                self._shown[title] = (handle, data)
+
+    def mark(self, time_s: float) -> None:
+        """Mark a time in each plot."""
+        for handle, data in self._shown.values():
+            times_s, *values, _ = data
+            handle.data = (times_s, *values, _spike(times_s, values, time_s))
+
+    def _add(self, title: str, data: tuple[Array, ...], series: tuple[uplot.Series, ...]) -> Any:
+        return self._gui.add_uplot(
+            data,
+            series,
+            title=title,
+            height=HEIGHT_PX,
+            scales={"x": uplot.Scale(time=False)},
+            axes=(uplot.Axis(size=28), uplot.Axis(size=_AXIS_PX)),
+            legend=uplot.Legend(show=len(series) > 3, live=False),
+            cursor=uplot.Cursor(show=True),
+            padding=(4, 12, 0, 0),
+        )
+
+    def _alone(self, chart: Chart) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
+        colours = cycle(_SERIES)
+        lines = tuple(
+            uplot.Series(label=name.strip("()"), stroke=_LIMIT, width=1, dash=(4.0, 4.0), points={"show": False})
+            if name.startswith("(")
+            else uplot.Series(label=name, stroke=next(colours), width=1.3, points={"show": False})
+            for name in chart.names
+        )
+        return _framed(chart.times_s, list(chart.values), lines)
+
+    def _overlaid(self, charts: Sequence[Chart | None]) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
+        """Return the headlines of several vehicles over the times of all."""
+        known = [chart for chart in charts if chart is not None]
+        times_s = np.unique(np.concatenate([chart.times_s for chart in known]))
+        values, lines = [], []
+        for number, chart in enumerate(charts):
+            if chart is None or not len(chart.times_s):
+                continue
+            values.append(np.interp(times_s, chart.times_s, chart.headline))
+            stroke = "#{:02x}{:02x}{:02x}".format(*COLOURS[number % len(COLOURS)])
+            lines.append(uplot.Series(label=self._names[number], stroke=stroke, width=1.3, points={"show": False}))
+        return _framed(times_s, values, tuple(lines))
+
+
+def _framed(
+    times_s: Array, values: list[Array], lines: tuple[uplot.Series, ...]
+) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
+    """Return data and series with time before them and the mark behind them."""
+    mark = uplot.Series(label="now", stroke=_NOW, width=1, points={"show": False})
+    data = (times_s, *values, _spike(times_s, values, -np.inf))
+    return data, (uplot.Series(label="s"), *lines, mark)
+
+
+def _spike(times_s: Array, values: list[Array], time_s: float) -> Array:
+    """Return a line along the lowest value, up to the largest at a time: uPlot finds no range for what is no number."""
+    low, high = (float(pick(values)) for pick in (np.min, np.max))
+    mark = np.full(len(times_s), low)
+    if time_s >= times_s[0]:
+        mark[min(int(np.searchsorted(times_s, time_s)), len(times_s) - 1)] = high
+    return mark

@@ -1,0 +1,75 @@
+"""The server of the page: viser's, on loopback, refusing whoever comes from elsewhere."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from http import HTTPStatus
+from io import StringIO
+from typing import Any
+
+import viser
+import websockets.asyncio.server
+from websockets.asyncio.server import ServerConnection
+from websockets.http11 import Request, Response
+
+from colibri.view.access import HOST, refusal
+from colibri.view.snapshot import ViewError
+
+_Answer = Callable[[ServerConnection, Request], Response | None]
+
+
+class PageServer(viser.ViserServer):
+    """viser's server without its tunnel, which would lead from everywhere to this computer."""
+
+    def request_share_url(self, verbose: bool = True) -> str | None:  # noqa: ARG002
+        """Open none, whoever asks."""
+        return None
+
+
+def serve(port: int, label: str) -> PageServer:
+    """Return a server on a port of loopback; 0 takes one that is free.
+
+    Raises:
+        ViewError: The port is taken.
+    """
+    with _guarded() as guards, redirect_stdout(StringIO()):
+        server = PageServer(host=HOST, port=port, label=label, verbose=False)
+    if not guards:
+        server.stop()
+        raise ViewError("this version of viser serves in a way that cannot be guarded: install the one of the lock")
+    if port not in (0, server.get_port()):
+        stop(server)
+        raise ViewError(f"--port {port} is taken: name another, or 0 for one that is free")
+    return server
+
+
+def stop(server: PageServer) -> None:
+    """End a server; it would say so where the page's address stands."""
+    with redirect_stdout(StringIO()):
+        server.stop()
+
+
+@contextmanager
+def _guarded() -> Iterator[list[str]]:
+    """Have what is served meanwhile look at each request first; yields as many words as servers were begun."""
+    begun: list[str] = []
+    unguarded = websockets.asyncio.server.serve
+
+    def begin(*args: Any, process_request: _Answer, **options: Any) -> Any:
+        begun.append("guarded")
+        return unguarded(*args, process_request=_looks_first(process_request), **options)
+
+    websockets.asyncio.server.serve = begin  # type: ignore[assignment,misc]
+    try:
+        yield begun
+    finally:
+        websockets.asyncio.server.serve = unguarded  # type: ignore[misc]
+
+
+def _looks_first(answer: _Answer) -> _Answer:
+    def look(connection: ServerConnection, request: Request) -> Response | None:
+        port = connection.local_address[1]
+        if why := refusal(request.headers, port):
+            return connection.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
+        return answer(connection, request)
+
+    return look

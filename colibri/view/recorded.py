@@ -1,0 +1,265 @@
+"""A flight that was flown, from its folder: what `colibri fly` left there, however the flight ended."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.analysis.logs import read_blocks, read_columns, read_series
+from colibri.analysis.recording import Lags, RecordingError, path_times
+from colibri.analysis.series.reduction import Extremes
+from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES
+from colibri.autopilot.guidance.trajectories.tracks import position
+from colibri.common.errors import Error
+from colibri.common.rotations import earth_from_body
+from colibri.common.types import Array
+from colibri.flights.plan import FlightPlan
+from colibri.flights.provenance import plan_of
+from colibri.plant.vehicle.description import Vehicle
+from colibri.view.geometry import thinned
+from colibri.view.horizons import Horizons
+from colibri.view.snapshot import NO_POINTS, NOWHERE, Airframe, Chart, Snapshot, Surroundings, ViewError
+
+MAX_ROWS = 30_000
+"""Of a flight in memory: ten minutes at 50 Hz; of a longer one fewer a second."""
+CHART_POINTS = 512
+_ROW_S = 0.02
+_TRAIL_S = 8.0
+_TRAIL_POINTS = 200
+_PATH_POINTS = 4000
+_EVENTS = 3
+"""How many of the controller's latest events are shown."""
+
+
+class Columns(NamedTuple):
+    """Some columns of a log by their names, at its times."""
+
+    times_s: Array
+    named: dict[str, Array]
+
+    def columns(self, *names: str) -> Array:
+        """Return some columns, (n, len(names))."""
+        return np.stack([self.named[name] for name in names], axis=1)
+
+
+class RecordedFlight:
+    """A flight's logs, thinned to what a page can show.
+
+    Attributes:
+        plan: Of the flight.
+        name, airframe, span_s, surroundings: As of a `Source`.
+    """
+
+    def __init__(self, folder: Path, name: str = "") -> None:
+        """Read a folder.
+
+        Raises:
+            ViewError: It holds no flight, or one that ended before it began.
+        """
+        try:
+            self.plan = plan_of(folder)
+            self._truth = _read(folder / "plant.csv", _ROW_S)
+            self._decisions = _read(folder / "autopilot.csv", 0.0)
+            estimate = folder / "estimate.csv"
+            self._estimate = _read(estimate, _ROW_S) if estimate.exists() else None
+        except OSError as error:
+            raise ViewError(f"{error.filename or folder}: {error.strerror}") from error
+        except Error as error:
+            raise ViewError(str(error) if str(folder) in str(error) else f"{folder}: {error}") from error
+        self.name = name or folder.name or str(folder)
+        self.airframe = airframe_of(self.plan.plant_vehicle)
+        self.span_s = (float(self._truth.times_s[0]), float(self._truth.times_s[-1]))
+        self._place = self._truth.columns("x", "y", "z")
+        self._speeds = self._truth.columns("u", "v", "w")
+        self._reference = _reference(self.plan, self._truth.times_s, self._decisions)
+        self._full_speed = self.plan.plant_vehicle.rotors.max_speed
+        self._horizons: Horizons | None = None
+        self._events = _events(self._decisions)
+        self.surroundings = Surroundings(
+            ground_m=_ground_m(self.plan.plant_vehicle, self._place),
+            path=thinned(self._place, _PATH_POINTS),
+            reference_path=thinned(self._reference, _PATH_POINTS),
+            home_enu_m=(0.0, 0.0, _ground_m(self.plan.plant_vehicle, self._place)),
+        )
+
+    @property
+    def is_live(self) -> bool:
+        """It is over."""
+        return False
+
+    def use_horizons(self, horizons: Horizons) -> None:
+        """Show predicted horizons, as far as they are there."""
+        self._horizons = horizons
+
+    def at(self, time_s: float) -> Snapshot:
+        """Return the vehicle at a time: between two rows of the logs what lies between them."""
+        times_s = self._truth.times_s
+        row = int(np.searchsorted(times_s, time_s + 1e-9))
+        at_s = min(max(time_s, self.span_s[0]), self.span_s[1])
+        place = _between(times_s, self._place, at_s)
+        attitude = _between(times_s, self._truth.columns("qw", "qx", "qy", "qz"), at_s)
+        qw, qx, qy, qz = (attitude / np.linalg.norm(attitude)).tolist()
+        w1, w2, w3, w4 = (self._rotor_speeds(at_s) / self._full_speed).tolist()
+        first = int(np.searchsorted(times_s, at_s - _TRAIL_S))
+        trail = np.vstack([thinned(self._place[first:row], _TRAIL_POINTS), place])
+        estimate, sigma = self._estimated(at_s)
+        return Snapshot(
+            time_s=at_s,
+            position_enu_m=_vector(place),
+            attitude=(qw, qx, qy, qz),
+            velocity_enu_m_s=earth_from_body((qw, qx, qy, qz), _vector(_between(times_s, self._speeds, at_s))),
+            rotors=(w1, w2, w3, w4),
+            reference_enu_m=_vector(_between(times_s, self._reference, at_s)),
+            trail=trail,
+            horizon=NO_POINTS if self._horizons is None else self._horizons.at(at_s),
+            wind_enu_m_s=_vector(_between(times_s, self._truth.columns("wind_east", "wind_north", "wind_up"), at_s)),
+            estimate_enu_m=estimate,
+            sigma_m=sigma,
+            mode=f"track {self.plan.track_name}, {self.plan.profile.controller}",
+            armed=True,
+            battery=_battery(float(_between(times_s, self._truth.columns("voltage_v"), at_s)[0])),
+            texts=self._said(at_s),
+        )
+
+    def charts(self) -> tuple[Chart, ...]:
+        """Return what is plotted, of some hundred points each."""
+        rotors = self.plan.plant_vehicle.rotors
+        times_s = self._truth.times_s
+        error = np.linalg.norm(self._place - self._reference, axis=1)
+        tilt = _tilt_deg(self._truth.columns("qw", "qx", "qy", "qz"))
+        speeds = self._truth.columns("omega1", "omega2", "omega3", "omega4")
+        limits = np.broadcast_to([rotors.idle_speed, rotors.max_speed], (len(times_s), 2))
+        charts = [
+            _chart("position error, m", ("error",), times_s, error[:, None]),
+            _chart("tilt, deg", ("tilt",), times_s, tilt[:, None]),
+            _chart(
+                f"rotor speeds, {rotors.speed_unit}",
+                ("1", "2", "3", "4", "(idle)", "(largest)"),
+                times_s,
+                np.hstack([speeds, limits]),
+                speeds.max(axis=1),
+            ),
+        ]
+        decided = self._decisions
+        if len(decided.times_s) > 1:
+            kinds = ("rotors", "increments", "angles", "rates")
+            active = decided.columns(*(f"active_{kind}" for kind in kinds))
+            charts += [
+                _chart("active constraints", kinds, decided.times_s, active, active.sum(axis=1)),
+                _chart("QP time, ms", ("QP",), decided.times_s, decided.columns("solve_time_us") / 1e3),
+            ]
+        if self._estimate is not None and len(self._estimate.times_s) > 1:
+            charts.append(self._estimation_chart(self._estimate))
+        known = np.isfinite(self._truth.named["voltage_v"])
+        if known.any():
+            charts.append(_chart("battery, V", ("voltage",), times_s[known], self._truth.columns("voltage_v")[known]))
+        return tuple(charts)
+
+    def _estimation_chart(self, estimate: Columns) -> Chart:
+        truth = _interpolated(estimate.times_s, self._truth.times_s, self._place)
+        wrong = estimate.columns("x", "y", "z") - truth
+        bound = 3.0 * estimate.columns("sd_x", "sd_y", "sd_z").max(axis=1)[:, None]
+        names = ("east", "north", "up", "(3σ)", "(-3σ)")
+        values = np.hstack([wrong, bound, -bound])
+        return _chart("estimate - truth, m", names, estimate.times_s, values, np.linalg.norm(wrong, axis=1))
+
+    def _rotor_speeds(self, time_s: float) -> Array:
+        return _between(self._truth.times_s, self._truth.columns("omega1", "omega2", "omega3", "omega4"), time_s)
+
+    def _estimated(self, time_s: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        if self._estimate is None or not len(self._estimate.times_s):
+            return NOWHERE, NOWHERE
+        times_s = self._estimate.times_s
+        place = _between(times_s, self._estimate.columns("x", "y", "z"), time_s)
+        return _vector(place), _vector(_between(times_s, self._estimate.columns("sd_x", "sd_y", "sd_z"), time_s))
+
+    def _said(self, time_s: float) -> tuple[str, ...]:
+        until = [text for at_s, text in self._events if at_s <= time_s]
+        return tuple(until[-_EVENTS:][::-1])
+
+
+def airframe_of(vehicle: Vehicle) -> Airframe:
+    """Return what is drawn of a vehicle that is described."""
+    a, b, c, d = (1.0 if direction == "ccw" else -1.0 for direction in vehicle.rotors.direction)
+    foot_m = vehicle.ground.foot_depth_m if vehicle.ground else 0.0
+    return Airframe(rotors_m=vehicle.rotors.position_m, spins=(a, b, c, d), foot_m=foot_m)
+
+
+def _read(path: Path, apart_s: float) -> Columns:
+    """Return a log's columns, of rows at least `apart_s` apart, and no more of them than `MAX_ROWS`."""
+    (times_s,) = read_series(path, 0)
+    if not len(times_s):
+        raise RecordingError(f"{path} is empty: the flight ended before it began")
+    interval_s = float(times_s[-1] - times_s[0]) / max(len(times_s) - 1, 1)
+    step = max(1, round(apart_s / interval_s) if interval_s else 1, -(-len(times_s) // MAX_ROWS))
+    wanted = np.zeros(len(times_s), dtype=np.bool_)
+    wanted[::step] = wanted[-1] = True
+    rows = np.vstack(list(read_blocks(path, wanted)))
+    return Columns(rows[:, 0], dict(zip(read_columns(path), rows.T, strict=True)))
+
+
+def _reference(plan: FlightPlan, times_s: Array, decisions: Columns) -> Array:
+    """Return where the vehicle was to be at some times, (n, 3)."""
+    lags = Lags(decisions.times_s, decisions.named["path_lag_s"])
+    return position(plan.track, path_times(times_s, lags))
+
+
+def _ground_m(vehicle: Vehicle, place: Array) -> float:
+    """Return the height of the ground; below the flight where the vehicle has none to stand on."""
+    return vehicle.ground_height_m if vehicle.ground else min(0.0, float(place[:, 2].min()))
+
+
+def _chart(title: str, names: tuple[str, ...], times_s: Array, values: Array, headline: Array | None = None) -> Chart:
+    """Return a chart of series (n, k), of each span of time the extremes."""
+    extremes = Extremes(values.shape[1] + 2, CHART_POINTS)
+    shown = values[:, 0] if headline is None else headline
+    extremes.add(np.column_stack([times_s, shown, values]))
+    rows = np.vstack(extremes.points())
+    return Chart(title, names, rows[:, 0], rows[:, 2:].T, rows[:, 1])
+
+
+def _events(decisions: Columns) -> list[tuple[float, str]]:
+    """Return when the controller's QP was not solved, or something else decided, and what; once each time it begins."""
+    statuses = {code: status for status, code in STATUS_CODES.items()}
+    fallbacks = {code: fallback for fallback, code in FALLBACK_CODES.items()}
+    events = []
+    for names, column, said in ((statuses, "qp_status", "QP"), (fallbacks, "fallback", "decided by")):
+        codes = decisions.named[column].astype(int)
+        for row in np.flatnonzero(np.diff(codes, prepend=codes[:1])).tolist():
+            time_s = float(decisions.times_s[row])
+            events.append((time_s, f"{time_s:.2f} s: {said} {_word(names[int(codes[row])])}"))
+    return sorted(events)
+
+
+def _word(what: object) -> str:
+    return str(getattr(what, "value", what)).replace("_", " ")
+
+
+def _between(times_s: Array, rows: Array, time_s: float) -> Array:
+    """Return what lies between the two rows around a time, (columns,)."""
+    after = min(max(int(np.searchsorted(times_s, time_s)), 1), max(len(times_s) - 1, 0))
+    before = max(after - 1, 0)
+    span_s = times_s[after] - times_s[before]
+    part = min(max((time_s - times_s[before]) / span_s, 0.0), 1.0) if span_s > 0.0 else 1.0
+    between: Array = rows[before] + part * (rows[after] - rows[before])
+    return between
+
+
+def _interpolated(at_s: Array, times_s: Array, rows: Array) -> Array:
+    return np.stack([np.interp(at_s, times_s, column) for column in rows.T], axis=1)
+
+
+def _tilt_deg(quaternions: Array) -> Array:
+    """Return the angle between the body's z axis and the vertical, (n,)."""
+    _, x, y, _ = quaternions.T
+    tilt: Array = np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x**2 + y**2), -1.0, 1.0)))
+    return tilt
+
+
+def _vector(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def _battery(voltage_v: float) -> str:
+    return "" if np.isnan(voltage_v) else f"{voltage_v:.2f} V"

@@ -1,0 +1,228 @@
+"""The page from its address on the terminal to its end: flights played, vehicles followed, what was done passed on."""
+
+import webbrowser
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from math import inf
+from pathlib import Path
+from threading import Event, Thread
+from time import perf_counter, sleep
+from typing import Any
+
+import numpy as np
+
+from colibri.common.process.lifecycle import Stop
+from colibri.view.access import Token
+from colibri.view.horizons import HorizonProcess, Horizons
+from colibri.view.live import LiveVehicle
+from colibri.view.modes import CHOICES
+from colibri.view.observer import Observer
+from colibri.view.page.page import Page
+from colibri.view.playback import Playback, speed_of
+from colibri.view.recorded import RecordedFlight
+from colibri.view.snapshot import Source, ViewError
+
+FRAMES_HZ = 30.0
+EXPORT_HZ, EXPORT_FRAMES = 15.0, 6000
+"""Of a page that is written to a file; of a long flight fewer a second."""
+WORDS_HZ = 5.0
+"""How often words, time line and plots change: an eye reads no faster."""
+
+
+class Show:
+    """Sources on a page, brought up to date whenever it is time: pure of waiting."""
+
+    def __init__(
+        self,
+        page: Page,
+        sources: Sequence[Source],
+        now_s: float,
+        order: Callable[[str, Any], None] = lambda _what, _value: None,
+    ) -> None:
+        """Show sources from their beginning, which is when the first browser comes; `order` takes what is ordered."""
+        begin_s, end_s = zip(*(source.span_s for source in sources), strict=True)
+        self._page = page
+        self._sources = sources
+        self._order = order
+        self.playback = Playback((min(begin_s), max(end_s)), now_s, min(begin_s))
+        self._words_at_s = now_s
+        self._shown: object = None
+        self._is_told = self._was_watched = False
+
+    def turn(self, now_s: float) -> None:
+        """Do what was asked for, and show what is now."""
+        if self._page.watched and not self._was_watched:
+            self._was_watched = True
+            self.playback = self.playback.play(now_s)
+        for done in self._page.done():
+            self._shown = None
+            if done.what == "play":
+                moves = self.playback.plays and not self.playback.is_over(now_s)
+                self.playback = self.playback.pause(now_s) if moves else self.playback.play(now_s)
+            elif done.what == "seek":
+                self.playback = self.playback.seek(done.value, now_s)
+            elif done.what == "order":
+                self._order(*done.value)
+            elif done.what == "speed":
+                self.playback = self.playback.at_speed(speed_of(done.value), now_s)
+        live = any(source.is_live for source in self._sources)
+        time_s = now_s if live else self.playback.time_s(now_s)
+        if time_s != self._shown:
+            self._shown = time_s
+            self._page.show([source.at(time_s) for source in self._sources])
+            self._is_told = False
+        if not self._is_told and now_s >= self._words_at_s:
+            self._words_at_s = now_s + 1.0 / WORDS_HZ
+            self._is_told = True
+            plays = self.playback.plays and not self.playback.is_over(now_s)
+            self._page.tell([source.at(time_s) for source in self._sources], time_s, plays)
+            self._page.plot(inf if live else time_s, anew=live)
+
+
+def show_recorded(folders: Sequence[Path], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
+    """Show flights that were flown, until interrupted.
+
+    Raises:
+        ViewError: One cannot be read, or the port is taken.
+    """
+    with ExitStack() as held:
+        flights = read_flights(folders, held)
+        serve_until_stopped(flights, port, browser=browser, say=say)
+
+
+def export(folders: Sequence[Path], path: Path) -> None:
+    """Write flights as one HTML file that plays them in any browser, without plots.
+
+    Raises:
+        ViewError: One cannot be read, or the file cannot be written.
+    """
+    with ExitStack() as held:
+        flights = read_flights(folders, held, wait=True)
+        begin_s, end_s = zip(*(flight.span_s for flight in flights), strict=True)
+        first_s, last_s = min(begin_s), max(end_s)
+        count = min(max(2, round(EXPORT_HZ * (last_s - first_s))), EXPORT_FRAMES)
+        page = Page(flights, 0)
+        held.callback(page.close)
+        html = page.recorded_html(np.linspace(first_s, last_s, count).tolist())
+    try:
+        path.write_text(html, encoding="utf-8")
+    except OSError as error:
+        raise ViewError(f"cannot write --export {path}: {error.strerror}") from error
+
+
+def read_flights(folders: Sequence[Path], held: ExitStack, *, wait: bool = False) -> list[RecordedFlight]:
+    """Return the flights of folders, whose horizons come by and by as long as `held` lasts; `wait` for all of them.
+
+    Raises:
+        ViewError: One cannot be read.
+    """
+    flights = [RecordedFlight(folder, name) for folder, name in zip(folders, _names(folders), strict=True)]
+    for folder, flight in zip(folders, flights, strict=True):
+        horizons = Horizons()
+        flight.use_horizons(horizons)
+        process = HorizonProcess(folder, horizons)
+        held.callback(process.close)
+        if wait:
+            process.wait()
+    return flights
+
+
+def show_live(url: str, port: int, *, browser: bool, say: Callable[[str], None]) -> None:
+    """Show the vehicle on a link, until interrupted; say a token that its commands need.
+
+    Raises:
+        ViewError: The link cannot be opened, or the port is taken.
+    """
+    vehicle = LiveVehicle(url)
+    try:
+        serve_until_stopped([vehicle], port, browser=browser, say=say)
+    finally:
+        vehicle.close()
+
+
+def pass_on(vehicle: LiveVehicle, what: str, value: Any) -> None:
+    """Give a vehicle an order of the page."""
+    orders: dict[str, Callable[[Observer], None]] = {
+        "arm": lambda observer: observer.arm(True),
+        "disarm": lambda observer: observer.arm(False),
+        "take off": lambda observer: observer.take_off(value),
+        "land": Observer.land,
+        "return": Observer.return_home,
+        "mode": lambda observer: observer.set_mode(value),
+        "go to": lambda observer: observer.go_to(value),
+    }
+    vehicle.order(orders[what])
+
+
+@contextmanager
+def page_beside(say: Callable[[str], None]) -> Iterator[str]:
+    """Show in a browser what flies meanwhile; yields the link that the vehicle has to call.
+
+    The page has a thread of its own in this process, which only watches those that fly.
+
+    Raises:
+        ViewError: There is no port for it.
+    """
+    vehicle = LiveVehicle("udpin:127.0.0.1:0", name="vehicle")
+    ends = Event()
+    try:
+        page, show = _begin([vehicle], 0, browser=True, say=say)
+        thread = Thread(target=_keep_showing, args=(show, ends.is_set), daemon=True)
+        thread.start()
+        try:
+            yield vehicle.url.replace("udpin", "udpout")
+        finally:
+            ends.set()
+            thread.join()
+            page.close()
+    finally:
+        vehicle.close()
+
+
+def serve_until_stopped(sources: Sequence[Source], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
+    """Serve the page of some sources; say its address first, and for a live vehicle the token of its commands.
+
+    Raises:
+        ViewError: The port is taken.
+    """
+    page, show = _begin(sources, port, browser=browser, say=say)
+    stop = Stop()
+    try:
+        _keep_showing(show, stop.__bool__)
+    finally:
+        page.close()
+
+
+def _begin(sources: Sequence[Source], port: int, *, browser: bool, say: Callable[[str], None]) -> tuple[Page, Show]:
+    page = Page(sources, port)
+    say(page.url)
+    show = Show(page, sources, perf_counter())
+    live = sources[0]
+    if isinstance(live, LiveVehicle):
+        token = Token.new()
+        say(f"token for commands: {token.text}")
+        page.offer_commands(token, lambda: CHOICES.get(live.autopilot or 0, ()))
+        show = Show(page, sources, perf_counter(), partial(pass_on, live))
+    if browser:
+        webbrowser.open(page.url)
+    return page, show
+
+
+def _keep_showing(show: Show, ends: Callable[[], bool]) -> None:
+    while not ends():
+        began_s = perf_counter()
+        show.turn(began_s)
+        sleep(max(0.0, began_s + 1.0 / FRAMES_HZ - perf_counter()))
+
+
+def _names(folders: Sequence[Path]) -> list[str]:
+    """Return short names that differ: the last parts of the paths, as many as it takes."""
+    paths = [folder.resolve().parts for folder in folders]
+    if len(set(paths)) < len(paths):
+        raise ViewError(f"{folders[0]} is given twice: name two flights")
+    for count in range(1, max(map(len, paths)) + 1):
+        names = ["/".join(parts[-count:]) for parts in paths]
+        if len(set(names)) == len(names):
+            return names
+    raise AssertionError("paths that differ have parts that differ")

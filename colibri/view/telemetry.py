@@ -1,0 +1,250 @@
+"""What a live vehicle is like, from the messages that it sends: any vehicle's common ones, and Colibri's own."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from math import isfinite, isnan, nan, pi
+from typing import Any
+
+import numpy as np
+
+from colibri.common.earth.geodesy import Geodetic, enu_of, geodetic_of
+from colibri.common.rotations import quaternion_from_euler
+from colibri.common.types import FourRotors, Quaternion, Vector
+from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.ned import ned_frd_from_enu_flu, ned_from_enu
+from colibri.view.modes import mode_name
+from colibri.view.snapshot import NO_POINTS, NOWHERE, UNKNOWN_ROTORS, Chart, Snapshot
+
+CHART_S = 60.0
+TRAIL_POINTS = 600
+TEXTS = 4
+_ROW_S = 0.1
+_STALE_S = 3.0
+"""What has not been said for that long is no longer shown: a predicted horizon, a reference."""
+_PULSE_US = (1000.0, 2000.0)
+_E7 = 1e7
+_CHARTS = (
+    ("position error, m", ("error",)),
+    ("tilt, deg", ("tilt",)),
+    ("rotors, % of the largest", ("1", "2", "3", "4")),
+    ("active constraints", ("rotors", "increments", "angles", "rates")),
+    ("QP time, ms", ("QP",)),
+    ("estimated accuracy, m", ("horizontal", "vertical")),
+    ("battery, V", ("voltage",)),
+)
+
+
+class Telemetry:
+    """The latest of everything, by messages as they come.
+
+    Attributes:
+        autopilot: MAV_AUTOPILOT; None before the first heartbeat.
+        system: Its system id; 0 before.
+        origin: Where its local frame begins; None while nothing says.
+        home_enu_m: As it says.
+    """
+
+    def __init__(self) -> None:
+        """Know nothing."""
+        self.autopilot: int | None = None
+        self.system = 0
+        self.origin: Geodetic | None = None
+        self.home_enu_m: Vector = NOWHERE
+        self._has_local = False
+        self._now = Snapshot(time_s=0.0, position_enu_m=NOWHERE, attitude=(1.0, 0.0, 0.0, 0.0))
+        self._trail: deque[Vector] = deque(maxlen=TRAIL_POINTS)
+        self._texts: deque[str] = deque(maxlen=TEXTS)
+        self._values: dict[str, tuple[float, Any]] = {}
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=round(CHART_S / _ROW_S))
+        self._began_s = nan
+        self._handlers: dict[str, Callable[[Any, float], None]] = {
+            "HEARTBEAT": self._heartbeat,
+            "LOCAL_POSITION_NED": self._local_position,
+            "GLOBAL_POSITION_INT": self._global_position,
+            "GPS_GLOBAL_ORIGIN": self._origin,
+            "HOME_POSITION": self._home,
+            "ATTITUDE_QUATERNION": self._attitude_quaternion,
+            "ATTITUDE": self._attitude,
+            "POSITION_TARGET_LOCAL_NED": self._target,
+            "SERVO_OUTPUT_RAW": self._servos,
+            "ACTUATOR_OUTPUT_STATUS": self._outputs,
+            "TRAJECTORY_REPRESENTATION_WAYPOINTS": self._horizon,
+            "DEBUG_FLOAT_ARRAY": self._solver,
+            "ESTIMATOR_STATUS": self._accuracy,
+            "BATTERY_STATUS": self._battery_status,
+            "WIND_COV": self._wind,
+            "STATUSTEXT": self._text,
+        }
+
+    def receive(self, message: Message, now_s: float) -> None:
+        """Take in a message of the vehicle's autopilot, come at `now_s` by the wall clock."""
+        if isnan(self._began_s):
+            self._began_s = now_s
+        handler = self._handlers.get(message.name)
+        if handler is not None:
+            handler(message.fields, now_s)
+
+    def say(self, text: str) -> None:
+        """Add a line to what is said."""
+        self._texts.appendleft(text)
+
+    def snapshot(self, now_s: float) -> Snapshot:
+        """Return the vehicle as far as it is known; where no position has come, at the origin."""
+        now = self._now
+        place = now.position_enu_m if all(map(isfinite, now.position_enu_m)) else (0.0, 0.0, 0.0)
+        return Snapshot(
+            time_s=0.0 if isnan(self._began_s) else now_s - self._began_s,
+            position_enu_m=place,
+            attitude=now.attitude,
+            velocity_enu_m_s=now.velocity_enu_m_s,
+            rotors=self._fresh("rotors", now_s, UNKNOWN_ROTORS),
+            reference_enu_m=self._fresh("reference", now_s, NOWHERE),
+            trail=np.array([*self._trail]) if self._trail else NO_POINTS,
+            horizon=self._fresh("horizon", now_s, NO_POINTS),
+            wind_enu_m_s=self._fresh("wind", now_s, NOWHERE),
+            mode=self._fresh("mode", now_s, "no heartbeat"),
+            armed=self._fresh("armed", now_s, None),
+            battery=self._battery(now_s),
+            texts=tuple(self._texts),
+        )
+
+    def charts(self) -> tuple[Chart, ...]:
+        """Return what is plotted of the last minute; nothing of what the vehicle never sends."""
+        if len(self._rows) < 2:
+            return ()
+        rows = np.array(self._rows)
+        charts, at = [], 1
+        for title, names in _CHARTS:
+            values = rows[:, at : at + len(names)]
+            at += len(names)
+            known = np.isfinite(values).all(axis=1)
+            if known.sum() > 1:
+                shown = values[known]
+                charts.append(Chart(title, names, rows[known, 0] - self._began_s, shown.T, shown.max(axis=1)))
+        return tuple(charts)
+
+    def place_of(self, latitude_deg: float, longitude_deg: float, up_m: float, *, above_sea: bool) -> Vector:
+        """Return a place on earth in the local frame, ENU; nan where nobody has said where that begins."""
+        if self.origin is None:
+            return NOWHERE
+        east, north, _ = enu_of(Geodetic(latitude_deg, longitude_deg, self.origin.altitude_m), self.origin)
+        home_up = 0.0 if isnan(self.home_enu_m[2]) else self.home_enu_m[2]
+        return east, north, up_m - self.origin.altitude_m if above_sea else up_m + home_up
+
+    def _fresh(self, name: str, now_s: float, otherwise: Any) -> Any:
+        said_s, value = self._values.get(name, (-_STALE_S, otherwise))
+        return value if now_s - said_s < _STALE_S else otherwise
+
+    def _set(self, name: str, now_s: float, value: Any) -> None:
+        self._values[name] = (now_s, value)
+
+    def _battery(self, now_s: float) -> str:
+        volts = self._fresh("volts", now_s, nan)
+        return "" if isnan(volts) else f"{volts:.2f} V"
+
+    def _moved(self, place: Vector, velocity: Vector, now_s: float) -> None:
+        self._now = replace(self._now, position_enu_m=place, velocity_enu_m_s=velocity)
+        self._trail.append(place)
+        if not self._rows or now_s - self._rows[-1][0] >= _ROW_S:
+            self._rows.append(self._row(place, now_s))
+
+    def _row(self, place: Vector, now_s: float) -> tuple[float, ...]:
+        error = float(np.linalg.norm(np.subtract(place, self._fresh("reference", now_s, NOWHERE))))
+        _, x, y, _ = self._now.attitude
+        tilt = float(np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))))
+        rotors = (100.0 * part for part in self._fresh("rotors", now_s, UNKNOWN_ROTORS))
+        solver = self._fresh("solver", now_s, (nan,) * 5)
+        accuracy = self._fresh("accuracy", now_s, (nan, nan))
+        return (now_s, error, tilt, *rotors, *solver[1:], solver[0], *accuracy, self._fresh("volts", now_s, nan))
+
+    # What each message says.
+
+    def _heartbeat(self, fields: Any, now_s: float) -> None:
+        self.autopilot = int(fields.autopilot)
+        armed = bool(fields.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED)
+        self._set("armed", now_s, armed)
+        self._set("mode", now_s, mode_name(self.autopilot, fields.custom_mode))
+
+    def _local_position(self, fields: Any, now_s: float) -> None:
+        self._has_local = True
+        place = ned_from_enu((fields.x, fields.y, fields.z))
+        self._moved(place, ned_from_enu((fields.vx, fields.vy, fields.vz)), now_s)
+
+    def _global_position(self, fields: Any, now_s: float) -> None:
+        place = Geodetic(fields.lat / _E7, fields.lon / _E7, fields.alt / 1e3)
+        if self.origin is None and (fields.lat or fields.lon):
+            here = self._now.position_enu_m
+            back = (0.0, 0.0, 0.0) if any(map(isnan, here)) else (-here[0], -here[1], -here[2])
+            self.origin = geodetic_of(back, place)
+        if not self._has_local and self.origin is not None:
+            velocity = (fields.vy / 100.0, fields.vx / 100.0, -fields.vz / 100.0)
+            self._moved(enu_of(place, self.origin), velocity, now_s)
+
+    def _origin(self, fields: Any, _now_s: float) -> None:
+        self.origin = Geodetic(fields.latitude / _E7, fields.longitude / _E7, fields.altitude / 1e3)
+
+    def _home(self, fields: Any, _now_s: float) -> None:
+        if self.origin is not None:
+            home = Geodetic(fields.latitude / _E7, fields.longitude / _E7, fields.altitude / 1e3)
+            self.home_enu_m = enu_of(home, self.origin)
+
+    def _attitude_quaternion(self, fields: Any, _now_s: float) -> None:
+        attitude: Quaternion = ned_frd_from_enu_flu((fields.q1, fields.q2, fields.q3, fields.q4))
+        self._now = replace(self._now, attitude=attitude)
+
+    def _attitude(self, fields: Any, _now_s: float) -> None:
+        attitude = quaternion_from_euler(fields.roll, -fields.pitch, pi / 2.0 - fields.yaw)
+        self._now = replace(self._now, attitude=attitude)
+
+    def _target(self, fields: Any, now_s: float) -> None:
+        if all(map(isfinite, (fields.x, fields.y, fields.z))) and not fields.type_mask & 0b111:
+            self._set("reference", now_s, ned_from_enu((fields.x, fields.y, fields.z)))
+
+    def _servos(self, fields: Any, now_s: float) -> None:
+        pulses = (fields.servo1_raw, fields.servo2_raw, fields.servo3_raw, fields.servo4_raw)
+        self._pulses(pulses, now_s)
+
+    def _outputs(self, fields: Any, now_s: float) -> None:
+        self._pulses(tuple(fields.actuator[:4]), now_s)
+
+    def _pulses(self, pulses: FourRotors, now_s: float) -> None:
+        low, high = _PULSE_US
+        if any(pulses):
+            parts = tuple(min(max((pulse - low) / (high - low), 0.0), 1.0) for pulse in pulses)
+            self._set("rotors", now_s, parts)
+
+    def _horizon(self, fields: Any, now_s: float) -> None:
+        points = [
+            ned_from_enu((fields.pos_x[k], fields.pos_y[k], fields.pos_z[k]))
+            for k in range(min(fields.valid_points, 5))
+        ]
+        self._set("horizon", now_s, np.array([self._now.position_enu_m, *points]))
+
+    def _solver(self, fields: Any, now_s: float) -> None:
+        if fields.name == "lpv_mpc":
+            self._set("solver", now_s, (fields.data[3] / 1e3, *fields.data[7:11]))
+
+    def _accuracy(self, fields: Any, now_s: float) -> None:
+        self._set("accuracy", now_s, (fields.pos_horiz_accuracy, fields.pos_vert_accuracy))
+
+    def _battery_status(self, fields: Any, now_s: float) -> None:
+        cells = [cell for cell in fields.voltages if cell not in (0, 0xFFFF)]
+        if cells:
+            self._set("volts", now_s, sum(cells) / 1e3)
+
+    def _wind(self, fields: Any, now_s: float) -> None:
+        self._set("wind", now_s, (fields.wind_y, fields.wind_x, -fields.wind_z))
+
+    def _text(self, fields: Any, _now_s: float) -> None:
+        self.say(fields.text)
+
+
+INTERVALS_US: dict[str, int] = {
+    **dict.fromkeys(("ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"), 40_000),
+    **dict.fromkeys(("POSITION_TARGET_LOCAL_NED", "SERVO_OUTPUT_RAW"), 100_000),
+    **dict.fromkeys(("TRAJECTORY_REPRESENTATION_WAYPOINTS", "DEBUG_FLOAT_ARRAY"), 100_000),
+    **dict.fromkeys(("GLOBAL_POSITION_INT", "ESTIMATOR_STATUS", "BATTERY_STATUS", "WIND_COV"), 500_000),
+    **dict.fromkeys(("GPS_GLOBAL_ORIGIN", "HOME_POSITION"), 2_000_000),
+}
+"""What the page asks for, and how often."""

@@ -1,0 +1,62 @@
+"""A headless Chromium of the system, driven by Playwright: it draws WebGL without a GPU, slowly."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from playwright.sync_api import Page, sync_playwright
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+FLAGS = (
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+)
+SIZE = (1280, 800)
+WITHIN_MS = 60_000
+"""How long anything may take: without a GPU, on a computer that does other things too, seconds a picture."""
+_KNOWN_WARNINGS = ("THREE.Clock",)
+
+
+class Tab:
+    """A tab of the browser.
+
+    Attributes:
+        page: Playwright's.
+        complaints: What the console, a script or a request to another computer brought.
+    """
+
+    def __init__(self, page: Page, url: str) -> None:
+        """Open a page, and keep what goes wrong."""
+        self.page = page
+        self.complaints: list[str] = []
+        page.set_default_timeout(WITHIN_MS)
+        page.on("console", lambda message: self._console(message.type, message.text))
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("request", lambda request: self._request(request.url))
+        page.goto(url)
+
+    def _console(self, kind: str, text: str) -> None:
+        if kind in ("error", "warning") and not any(known in text for known in _KNOWN_WARNINGS):
+            self.complaints.append(text)
+
+    def _request(self, url: str) -> None:
+        if not url.startswith(("http://127.0.0.1:", "data:", "blob:")):
+            self.complaints.append(f"asks {url}")
+
+
+@contextmanager
+def chromium() -> Iterator[Page]:
+    """Yield an empty tab of a new browser."""
+    path = next(filter(None, map(shutil.which, NAMES)), None)
+    assert path is not None, "no Chromium: apt-get install chromium"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
+        width, height = SIZE
+        yield browser.new_page(viewport={"width": width, "height": height})
+        browser.close()

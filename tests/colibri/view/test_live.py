@@ -1,0 +1,174 @@
+"""The page's end of a link: at our own vehicle in simulated time, and at what PX4 and ArduPilot send."""
+
+from functools import partial
+from math import pi, radians
+from typing import Any
+
+import numpy as np
+import pytest
+
+from colibri.common.earth.geodesy import Geodetic, geodetic_of
+from colibri.mavlink.mission.items import FENCE
+from colibri.mavlink.wire.dialect import Codec, Message, mav
+from colibri.sitl.ground_station import Station
+from colibri.sitl.mission_items import land, takeoff, waypoint
+from colibri.sitl.vehicle import Sitl
+from colibri.view.modes import ARDUPILOT, PX4, mode_name, set_mode
+from colibri.view.observer import COMPONENT, SYSTEM, Observer
+from colibri.view.snapshot import Snapshot
+
+HOME = Geodetic(47.0, 8.0, 400.0)
+
+
+class Viewer(Station):
+    """A station of a flight in simulated time that is an `Observer`."""
+
+    observer: Observer
+
+    def add(self, message: Message) -> None:
+        now_s = self._flight.time_us / 1e6
+        self.observer.receive(message.frame, now_s)
+
+    def departing(self, now_us: int) -> list[bytes]:
+        self.observer.poll(now_us / 1e6)
+        for datagram in self.observer.take_outbox():
+            self.send_raw(datagram)
+        return super().departing(now_us)
+
+
+def watched(sitl: Sitl) -> Observer:
+    """Return an observer of a flight."""
+    viewer = sitl.client(SYSTEM, COMPONENT, beats=False)
+    viewer.__class__ = Viewer
+    assert isinstance(viewer, Viewer)
+    viewer.observer = Observer()
+    return viewer.observer
+
+
+def test_orders_fly_the_vehicle_and_the_page_sees_it(sitl: Sitl) -> None:
+    observer = watched(sitl)
+
+    def now() -> Snapshot:
+        return observer.telemetry.snapshot(sitl.time_us / 1e6)
+
+    seen_there = lambda: observer.telemetry.system and observer.telemetry.origin  # noqa: E731
+    sitl.wait_until(seen_there, within=10.0, what="a heartbeat and an origin")
+    observer.arm(True)
+    sitl.wait_until(lambda: sitl.armed, within=3.0, what="arming")
+    observer.take_off(4.0)
+    sitl.wait_until(lambda: sitl.is_at((0.0, 0.0, 4.0)), within=20.0, what="the climb")
+    observer.go_to((3.0, 2.0, 5.0))
+    sitl.wait_until(lambda: sitl.is_at((3.0, 2.0, 5.0)), within=20.0, what="the way")
+    seen = now()
+    assert seen.position_enu_m == pytest.approx(sitl.position, abs=0.1)
+    assert seen.armed
+    assert seen.mode == "Hold"
+    assert all(0.2 < part < 1.0 for part in seen.rotors)
+    assert seen.reference_enu_m == pytest.approx((3.0, 2.0, 5.0), abs=0.3)
+    assert len(seen.horizon) == 6
+    assert len(seen.trail) > 10
+    assert any("accepted" in text for text in seen.texts)
+    titles = [chart.title for chart in observer.telemetry.charts()]
+    assert {"position error, m", "active constraints", "QP time, ms"} <= set(titles)
+    observer.set_mode("Land")
+    sitl.wait_until(lambda: now().mode == "Land", within=5.0, what="the mode")
+
+
+def test_plans_are_drawn_where_they_lie(sitl: Sitl) -> None:
+    sitl.upload_mission([takeoff(3.0), waypoint(5.0, 0.0, 3.0), land(0.0, 0.0)])
+    observer = watched(sitl)
+    sitl.wait_until(lambda: len(observer.surroundings.mission) > 1, within=15.0, what="the mission")
+    marks = {mark.text: mark.place_enu_m for mark in observer.surroundings.mission}
+    assert marks["2"] == pytest.approx((5.0, 0.0, 3.0), abs=0.05)
+
+
+@pytest.fixture
+def others() -> tuple[Observer, Any]:
+    """Return an observer, and what hands it a message of an ArduPilot copter."""
+    observer, codec = Observer(), Codec(1, 1)
+
+    def send(name: str, *fields: Any) -> None:
+        observer.receive(codec.encode(name, *fields), 1.0)
+
+    send("HEARTBEAT", mav.MAV_TYPE_QUADROTOR, ARDUPILOT, 0x81, 4, mav.MAV_STATE_ACTIVE, 3)
+    return observer, send
+
+
+def test_a_foreign_vehicle_is_seen_by_its_common_messages(others: tuple[Observer, Any]) -> None:
+    observer, send = others
+    east_of_home = geodetic_of((10.0, 0.0, 7.0), HOME)
+    send("GPS_GLOBAL_ORIGIN", round(HOME[0] * 1e7), round(HOME[1] * 1e7), round(HOME[2] * 1e3))
+    place = (round(east_of_home[0] * 1e7), round(east_of_home[1] * 1e7), round(east_of_home[2] * 1e3))
+    send("GLOBAL_POSITION_INT", 1000, *place, 7000, 300, 0, 0, 9000)
+    send("ATTITUDE", 1000, radians(10.0), 0.0, pi / 2.0, 0.0, 0.0, 0.0)
+    send("SERVO_OUTPUT_RAW", 1000, 0, 1500, 1600, 1000, 2000, 0, 0, 0, 0)
+    send("STATUSTEXT", 6, "hello")
+    now = observer.telemetry.snapshot(1.1)
+    assert (now.mode, now.armed) == ("Guided", True)
+    assert now.position_enu_m == pytest.approx((10.0, 0.0, 7.0), abs=0.05)
+    assert now.velocity_enu_m_s == pytest.approx((0.0, 3.0, 0.0))
+    assert now.rotors == pytest.approx((0.5, 0.6, 0.0, 1.0))
+    assert now.attitude == pytest.approx((np.cos(radians(5.0)), np.sin(radians(5.0)), 0.0, 0.0), abs=1e-6)
+    assert now.texts == ("hello",)
+    assert not len(now.horizon)
+    assert observer.telemetry.snapshot(60.0).mode == "no heartbeat"
+
+
+def test_a_fence_comes_item_by_item(others: tuple[Observer, Any]) -> None:
+    observer, send = others
+    send("GPS_GLOBAL_ORIGIN", round(HOME[0] * 1e7), round(HOME[1] * 1e7), round(HOME[2] * 1e3))
+    corners = [geodetic_of((east, north, 0.0), HOME) for east, north in ((9.0, 9.0), (-9.0, 9.0), (0.0, -9.0))]
+    send("MISSION_COUNT", SYSTEM, COMPONENT, 4, FENCE)
+    vertex, ring = mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
+    item = partial(send, "MISSION_ITEM_INT", SYSTEM, COMPONENT)
+    for seq, there in enumerate(corners):
+        item(seq, 5, vertex, 0, 1, 3.0, 0.0, 0.0, 0.0, round(there[0] * 1e7), round(there[1] * 1e7), 0.0, FENCE)
+    observer.poll(2.0)
+    assert not list(observer.surroundings.fence)
+    item(3, 5, ring, 0, 1, 2.5, 0.0, 0.0, 0.0, round(HOME[0] * 1e7), round(HOME[1] * 1e7), 0.0, FENCE)
+    observer.poll(2.0)
+    inside, outside = observer.surroundings.fence
+    assert inside.keeps_in
+    assert not outside.keeps_in
+    assert inside.corners_m == pytest.approx(np.array([[9.0, 9.0], [-9.0, 9.0], [0.0, -9.0]]), abs=0.05)
+    assert np.linalg.norm(outside.corners_m, axis=1) == pytest.approx(2.5, abs=0.05)
+
+
+def test_an_order_is_said_again_until_it_is_answered(others: tuple[Observer, Any]) -> None:
+    observer, send = others
+    observer.take_outbox()
+    observer.land()
+    sent = [names(observer, at_s).count("COMMAND_LONG") for at_s in (10.0, 10.5, 11.1)]
+    assert sent == [1, 0, 1]
+    send("COMMAND_ACK", mav.MAV_CMD_NAV_LAND, mav.MAV_RESULT_DENIED, 0, 0, SYSTEM, COMPONENT)
+    assert observer.telemetry.snapshot(11.1).texts[0] == "land: denied"
+    assert "COMMAND_LONG" not in names(observer, 13.0)
+
+
+def test_nobody_answers() -> None:
+    observer = Observer()
+    observer.land()
+    assert observer.telemetry.snapshot(0.0).texts == ("land: no vehicle is there",)
+
+
+def test_it_does_not_pass_for_a_ground_station() -> None:
+    observer = Observer()
+    observer.poll(0.0)
+    (beat,) = Codec(1, 1).decode(observer.take_outbox()[0])
+    assert beat.fields.type != mav.MAV_TYPE_GCS
+
+
+@pytest.mark.parametrize(("autopilot", "name"), [(PX4, "Hold"), (PX4, "Return"), (ARDUPILOT, "RTL")])
+def test_modes_are_set_as_they_are_read(autopilot: int, name: str) -> None:
+    params = set_mode(autopilot, name)
+    assert params is not None
+    _, main, sub = map(int, params)
+    custom = main << 16 | sub << 24 if autopilot == PX4 else main
+    assert mode_name(autopilot, custom) == name
+    assert set_mode(mav.MAV_AUTOPILOT_GENERIC, name) is None
+
+
+def names(observer: Observer, at_s: float) -> list[str]:
+    """Return what is sent at a time, by the messages' names."""
+    observer.poll(at_s)
+    return [message.name for each in observer.take_outbox() for message in Codec(1, 1).decode(each)]
