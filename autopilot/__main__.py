@@ -58,7 +58,7 @@ def command_line() -> ArgumentParser:
     add("--signing-key", type=Path, metavar="FILE", help="sign what is sent, refuse what is not signed with this key")
     add("--insecure", action="store_true", help="let links leave this computer without a key")
     add("--strict", action="store_true", help="end by what a part raises in flight; default: it is replaced, flown on")
-    add_common_arguments(parser, "autopilot.csv (references, solver, times)")
+    add_common_arguments(parser, "autopilot.csv (references, solver, times) and flight.ulg")
     return parser
 
 

@@ -67,7 +67,7 @@ def command_line() -> ArgumentParser:
     add(
         "--truth", action="store_true", help="append the true state to each frame, for a program in between (for tests)"
     )
-    add_common_arguments(parser, "plant.csv (truth at every frame) and flight.tlog")
+    add_common_arguments(parser, "plant.csv (truth at every frame), flight.tlog and flight.ulg")
     return parser
 
 

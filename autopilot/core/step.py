@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, Protocol
 
-from colibri.autopilot.control.interface import Decision
+from colibri.autopilot.control.interface import Decision, Horizon
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.mavlink.hil.faults import Fault
 from colibri.mavlink.hil.lockstep_autopilot import AutopilotEnd
@@ -29,7 +29,8 @@ class Step(NamedTuple):
 
     Between two control samples the last command is sent again, and there is no decision. Where frames are
     states there is no estimate. Faults are requested of the plant with the command. Unless the vehicle is `known`, its
-    rotors stand. The delay is the one that is compensated.
+    rotors stand. The delay is the one that is compensated. Of an autopilot without ground
+    stations, a decision has beside it the frame and the references that it was made from.
     """
 
     command: ActuatorCommand
@@ -39,6 +40,8 @@ class Step(NamedTuple):
     faults: tuple[Fault, ...] = ()
     known: bool = True
     delay_us: int = 0
+    frame: Frame | None = None
+    references: Horizon | None = None
 
 
 def nothing_known(time_us: int, duration_s: float) -> Step:

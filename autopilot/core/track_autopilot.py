@@ -81,7 +81,7 @@ class Autopilot:
         if not follows(frame.time_us, self._time_us, self.frame_interval_us):
             self._begin(known)
         self._time_us = frame.time_us
-        decision = None
+        decision = references = None
         if due:
             state = self._loop.state(self._delay.ahead(known, self._loop.charge_ah))
             acts_us = frame.time_us + self._delay.delay_us
@@ -93,7 +93,13 @@ class Autopilot:
         command = ActuatorCommand(frame.time_us, self._loop.controls, armed=True)
         self._delay.sent(command)
         estimate = self._state_source.estimate if due else None
-        return Step(command, decision, self._clock() - started_s, estimate, delay_us=self._delay.delay_us)
+        duration_s = self._clock() - started_s
+        return Step(
+            *(command, decision, duration_s, estimate),
+            delay_us=self._delay.delay_us,
+            frame=frame if due else None,
+            references=references,
+        )
 
     def settle(self) -> None:
         """Do what need not be done before an answer, while the plant integrates; else the next step does it."""

@@ -1,6 +1,6 @@
 """Snapshots for telemetry: what the flight is like at a control sample."""
 
-from math import nan
+from math import isnan, nan
 
 from colibri.autopilot.commander.flight.reference_generator import Guidance
 from colibri.autopilot.commander.pilot import Pilot
@@ -146,6 +146,7 @@ class SnapshotBuilder:
         self._solver = SolverState(
             status=STATUS_CODES[how.qp_status],
             fallback=FALLBACK_CODES[how.fallback],
+            iterations=-1 if isnan(how.qp_iterations) else int(how.qp_iterations),
             solve_time_s=how.solve_time_s,
             step_time_s=duration_s,
             cost=how.cost,

@@ -10,6 +10,7 @@ from colibri.autopilot.control.interface import FALLBACK_CODES, STATUS_CODES, Ac
 from colibri.autopilot.core.step import Step
 from colibri.autopilot.estimation.estimate import Estimate
 from colibri.autopilot.estimation.measurements.table import kinds_of
+from colibri.autopilot.process.flight_topics import FlightTopics
 from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup, line
 from colibri.common.process.log_files import CsvLog, LogError, LogFile
 from colibri.mavlink.hil.feedback import Feedback
@@ -47,9 +48,13 @@ def check_columns(kinds: Sequence[str]) -> tuple[str, ...]:
 
 
 class AutopilotLog:
-    """What the autopilot writes: its start, what it received, one row a control sample, and what it estimates then."""
+    """What the autopilot writes: its start, what it received, one row a control sample, and what it estimates then.
 
-    def __init__(self, folder: Path, setup: Setup) -> None:
+    Attributes:
+        topics: What it writes to `flight.ulg`; None where it writes none.
+    """
+
+    def __init__(self, folder: Path, setup: Setup, *, ulog: bool = True) -> None:
         """Create `autopilot.csv` and `inputs.jsonl` in `folder`; on sensors also `estimate.csv` and `filter.csv`.
 
         What is received is appended to what the process before received: it may have died in mid-flight.
@@ -65,10 +70,13 @@ class AutopilotLog:
             vehicle = setup.vehicle_tables
             kinds = kinds_of(vehicle.sensors) if vehicle and vehicle.sensors else []
             self._checks = CsvLog(folder / "filter.csv", check_columns(kinds))
+        self.topics = FlightTopics(folder, setup) if ulog else None
         self._rows = [log for log in (self._decisions, self._estimates, self._checks) if log is not None]
 
     def write(self, step: Step) -> None:
         """Append a control sample; of a frame between two of them, only the check of the filter."""
+        if step.command.time_us < self._time_us and self.topics:
+            self.topics.begin_again()
         self._time_us = step.command.time_us
         if self._begins:
             self._begins = False
@@ -83,9 +91,11 @@ class AutopilotLog:
         how = step.decision.diagnostics
         codes = (STATUS_CODES[how.qp_status], FALLBACK_CODES[how.fallback])
         times_us = (how.solve_time_s * 1e6, step.duration_s * 1e6)
-        time_s = step.command.time_us / 1e6
         counts = (how.cost, how.slack, *how.active, step.delay_us, how.mass_kg, how.path_lag_s, how.qp_iterations)
-        self._decisions.add((time_s, *step.decision.attitude_reference, *codes, *times_us, *counts))
+        decided = (*step.decision.attitude_reference, *codes, *times_us, *counts)
+        self._decisions.add((step.command.time_us / 1e6, *decided))
+        if self.topics and not self._setup.ground:
+            self.topics.write(step, decided)
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
         """Record that the next frame is answered by a vehicle that begins with these parameters and this history."""
@@ -120,11 +130,15 @@ class AutopilotLog:
         """
         for log in self._rows:
             log.flush()
+        if self.topics:
+            self.topics.flush()
 
     def close(self) -> None:
         """Close the files."""
         for log in (self._inputs, *self._rows):
             log.close()
+        if self.topics:
+            self.topics.close()
 
     def _write_estimate(self, log: CsvLog, estimate: Estimate) -> None:
         frame = estimate.frame

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace, link: UdpLink | BlockingReceiver, status: Stat
         end = _flier(args, vehicle) if args.simulator else _end(args, autopilot.frame_interval_us)
     except Error as error:
         fail(keep_failure(error, args.out))
-    log = AutopilotLog(args.out, _setup(args, profile, vehicle)) if args.out else None
+    log = AutopilotLog(args.out, _setup(args, profile, vehicle), ulog=not args.no_ulog) if args.out else None
     if ground and log:
         ground.record(log)
     if args.stepped and isinstance(link, UdpLink):  # several flights share the cores: who waits gives way at once

@@ -187,7 +187,7 @@ def plan_point(common: Common, point: Point, out: Path) -> FlightPlan:
         file.write_text(common.track_files[track], encoding="utf-8")
         track = with_file(track, file)
     names: dict[str, Any] = {f"{option}_name": name for option, name in called.items() if isinstance(name, str)}
-    return replace(plan_of(track, options, out), **names)
+    return replace(plan_of(track, options, out), **names, ulog=common.logs != "none")
 
 
 def _killed(point: Point, common: Common) -> Flown:

@@ -35,6 +35,7 @@ def add_options(parser: ArgumentParser) -> None:
         "ground_contact_s=0 say; may be repeated",
     )
     add("--no-figures", action="store_true", help="draw no PNG figures")
+    add("--no-ulog", action="store_true", help="write no flight.ulg")
 
 
 def run(args: Namespace) -> int:

@@ -11,8 +11,8 @@ from colibri.common.process.lifecycle import fail
 
 PROVENANCE = "provenance.json"
 LOGS = (
-    *("flight.csv", "flight.tlog", "plant.csv", "autopilot.csv", "inputs.jsonl", "estimate.csv", "filter.csv"),
-    *("report.json", FAILURE, PROVENANCE),
+    *("flight.csv", "flight.tlog", "flight.ulg", "plant.csv", "autopilot.csv", "inputs.jsonl"),
+    *("estimate.csv", "filter.csv", "report.json", FAILURE, PROVENANCE),
 )
 FIGURES = ("trajectory.png", "position.png", "attitude.png", "inputs.png", "rotors.png", "error.png")
 

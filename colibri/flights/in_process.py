@@ -52,7 +52,10 @@ def fly_locally(plan: FlightPlan, progress: Callable[[float], None] = unseen) ->
     with loading():
         autopilot, plant = put_together(plan, perf_counter)
     interval_us = plant.interval_us
-    plant_logs, log = PlantLogs(plan.out), AutopilotLog(plan.out, _setup(plan))
+    plant_logs, log = (
+        PlantLogs(plan.out, plan.plant_vehicle, ulog=plan.ulog),
+        AutopilotLog(plan.out, _setup(plan), ulog=plan.ulog),
+    )
     exchange: Exchange = Direct(autopilot)
     if plan.link == "memory":
         exchange = InMemory(autopilot, interval_us, plan.feedback, plant_logs)

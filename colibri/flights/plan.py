@@ -86,6 +86,7 @@ class FlightPlan(WorldSetting):
         vehicle: The vehicle that the autopilot controls.
         plant_vehicle: The vehicle that the plant flies, its parts left out.
         law: Makes the control law; None: as it is registered.
+        ulog: Whether `flight.ulg` is written.
     """
 
     track_name: str
@@ -110,6 +111,7 @@ class FlightPlan(WorldSetting):
     vehicle: Vehicle
     plant_vehicle: Vehicle
     law: Factory | None = None
+    ulog: bool = True
 
     @classmethod
     def from_arguments(cls, args: argparse.Namespace) -> "FlightPlan":

@@ -73,6 +73,7 @@ def _plant_options(plan: FlightPlan) -> list[str]:
         duration=plan.duration_s,
         speed=plan.speed,
         out=plan.out,
+        no_ulog=not plan.ulog,
     )
 
 
@@ -92,6 +93,7 @@ def _autopilot_options(plan: FlightPlan, plant_url: str) -> list[str]:
         signing_key=plan.ground.signing_key,
         insecure=plan.ground.insecure,
         out=plan.out,
+        no_ulog=not plan.ulog,
     )
 
 

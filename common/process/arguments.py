@@ -87,6 +87,7 @@ def add_common_arguments(parser: ArgumentParser, log: str) -> None:
     add = parser.add_argument
     add("--system-id", type=system_id, default=1, metavar="ID", help="MAVLink system (default 1)")
     add("--out", type=Path, metavar="DIR", help=f"write {log} there")
+    add("--no-ulog", action="store_true", help="write no flight.ulg there")
     add(
         "--boot-unix-us",
         type=natural,

@@ -1,25 +1,30 @@
 """NED and FRD, MAVLink's axes: the only place where they are."""
 
 from math import sqrt
+from typing import TypeVar
 
-from colibri.common.types import Quaternion, Vector
+from colibri.common.types import Array
 
+_Number = TypeVar("_Number", float, Array)
+"""One vector, or many at once: a column a component."""
 _HALF_SQRT2 = sqrt(0.5)
 
 
-def ned_from_enu(vector: Vector) -> Vector:
+def ned_from_enu(vector: tuple[_Number, _Number, _Number]) -> tuple[_Number, _Number, _Number]:
     """Convert an earth vector from ENU to NED, or from NED to ENU: the map is its own inverse."""
     x, y, z = vector
     return (y, x, -z)
 
 
-def frd_from_flu(vector: Vector) -> Vector:
+def frd_from_flu(vector: tuple[_Number, _Number, _Number]) -> tuple[_Number, _Number, _Number]:
     """Convert a body vector from FLU to FRD, or from FRD to FLU: the map is its own inverse."""
     x, y, z = vector
     return (x, -y, -z)
 
 
-def ned_frd_from_enu_flu(q: Quaternion) -> Quaternion:
+def ned_frd_from_enu_flu(
+    q: tuple[_Number, _Number, _Number, _Number],
+) -> tuple[_Number, _Number, _Number, _Number]:
     """Convert an attitude from ENU/FLU to NED/FRD, or back: the map is its own inverse.
 
     In Euler angles: roll stays, pitch changes its sign, yaw becomes pi/2 - yaw.

@@ -36,7 +36,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
     text = f"{text}; {all_parameters_by(args.vehicle, 'ardupilot')}"
     status.say("frame", text, frame_class=1, frame_type=frame_type, thrust_expo=expo)
     end = ArduPilotEnd(Physics(vehicle, args.integrator, weather), start, motors, vehicle.rotors)
-    logs = PlantLogs(args.out, speaks_mavlink=False) if args.out else None
+    logs = PlantLogs(args.out, vehicle, speaks_mavlink=False, ulog=not args.no_ulog) if args.out else None
     with closing(link, logs):
         ArduPilotServer(end, link, status, stop, logs).serve(duration_s=args.duration)
     return EXIT_INTERRUPTED if stop else 0

@@ -73,7 +73,7 @@ class Simulator:
         self._seed, self._speed, self._duration_us = args.seed, args.speed, args.duration * 1e6
         self._link, self._status, self._stop = link, status, stop
         self._end = SimulatorEnd(system_id=args.system_id)
-        self._logs = PlantLogs(args.out, args.boot_unix_us) if args.out else None
+        self._logs = PlantLogs(args.out, vehicle, args.boot_unix_us, ulog=not args.no_ulog) if args.out else None
         self._logged_calls = 1
         self._time_us = 0
 

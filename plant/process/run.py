@@ -38,7 +38,7 @@ def run(args: argparse.Namespace, link: UdpLink, status: Status, stop: Stop) -> 
         fail(str(error))
     if args.truth:  # several flights share the cores: whoever waits gives way at once
         link.spin_s = 0.0
-    logs = PlantLogs(args.out, args.boot_unix_us) if args.out else None
+    logs = PlantLogs(args.out, builder.vehicle, args.boot_unix_us, ulog=not args.no_ulog) if args.out else None
     interval_us = round(1e3 / args.rate) * 1000
     end = PlantEnd(
         system_id=args.system_id, frame_interval_us=interval_us, serves=tuple(builder.starts), waits=not args.realtime

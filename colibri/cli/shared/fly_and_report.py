@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from colibri.analysis.limits import exceeded
@@ -24,7 +25,7 @@ _UPDATES = 500
 def fly(args: argparse.Namespace) -> int:
     """Fly as the command line says; return the exit code."""
     try:
-        plan = FlightPlan.from_arguments(args)
+        plan = replace(FlightPlan.from_arguments(args), ulog=not args.no_ulog)
     except Error as error:
         fail(str(error))
     with occupied(plan.out):

@@ -71,7 +71,11 @@ def served(
     end = ArduPilotEnd(
         Physics(VEHICLE, "rk4"), starting_world(Start(), VEHICLE), VEHICLE.rotors.numbering(), VEHICLE.rotors
     )
-    link, stop, logs = cast(UdpLink, script), cast(Stop, script), PlantLogs(out, speaks_mavlink=False)
+    link, stop, logs = (
+        cast(UdpLink, script),
+        cast(Stop, script),
+        PlantLogs(out, load_vehicle("hummingbird"), speaks_mavlink=False),
+    )
     ArduPilotServer(end, link, Status("plant", as_json=True), stop, logs).serve(duration_s=100.0)
     logs.close()
     assert len(script.sent) == number
@@ -106,6 +110,7 @@ def test_each_ardupilot_has_a_file_of_its_own(
 ) -> None:
     requests = flight(110.0, 20, 0.0025) + flight(120.0, 30, 0.0025) + flight(130.0, 40, 0.0025)
     served(requests, out, monkeypatch, capsys)
-    assert sorted(path.name for path in out.iterdir()) == ["plant-1.csv", "plant-2.csv", "plant.csv"]
+    topics = ["flight-1.ulg", "flight-2.ulg", "flight.ulg"]
+    assert sorted(path.name for path in out.iterdir()) == [*topics, "plant-1.csv", "plant-2.csv", "plant.csv"]
     for name, steps in {"plant-1.csv": 20, "plant-2.csv": 30, "plant.csv": 40}.items():
         assert rows(out / name)["t"] == pytest.approx(0.0025 * np.arange(1, steps + 1))

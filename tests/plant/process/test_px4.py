@@ -251,7 +251,7 @@ def test_a_px4_takes_off_and_hovers_over_tcp_and_so_does_the_next(tmp_path: Path
         names = [message.name for each in logged for message in Codec(1, 1).decode(each.frame)]
         assert {"COMMAND_LONG", "HEARTBEAT"} <= set(names[: len(Px4().hello())])
         assert names.count("HIL_SENSOR") == pytest.approx(15 * 250, abs=25)
-    assert len(list((tmp_path / "out").iterdir())) == 4
+    assert len(list((tmp_path / "out").iterdir())) == 6
 
 
 def test_a_px4_that_waits_to_be_called_is_called_over_udp(tmp_path: Path) -> None:

@@ -1,0 +1,74 @@
+"""The messages of a ULog file, as bytes.
+
+Specification: https://docs.px4.io/main/en/dev_log/ulog_file_format. A file is a header, the definitions (flag bits,
+formats, information, parameters), and from the first subscription on the data. A message is its size, type and content.
+"""
+
+from collections.abc import Mapping
+from struct import Struct
+
+_MAGIC = b"ULog\x01\x12\x35"
+_VERSION = 1
+_HEAD = Struct("<HB")
+_SUBSCRIPTION = Struct("<BH")
+_LOGGED = Struct("<BQ")
+_TYPES = {int: ("int32_t", Struct("<i")), float: ("float", Struct("<f"))}
+_MAX_TEXT_BYTES = 1000
+
+DATA = ord("D")
+HEAD_BYTES = _HEAD.size
+
+
+def message(kind: str, content: bytes) -> bytes:
+    """Return a message of a type, a letter."""
+    return _HEAD.pack(len(content), ord(kind)) + content
+
+
+SYNC = message("S", bytes([0x2F, 0x73, 0x13, 0x20, 0x25, 0x0C, 0xBB, 0x12]))
+"""What a reader looks for behind bytes that it cannot read."""
+
+
+def header(start_us: int = 0) -> bytes:
+    """Return the beginning of a file whose log starts at a time, µs, with no flag set."""
+    return _MAGIC + bytes([_VERSION]) + start_us.to_bytes(8, "little") + message("B", bytes(8 + 8 + 3 * 8))
+
+
+def format_of(name: str, fields: str) -> bytes:
+    """Return the definition of a type: `fields` are "type name;" each."""
+    return message("F", f"{name}:{fields}".encode())
+
+
+def information(facts: Mapping[str, str | int]) -> bytes:
+    """Return texts and numbers (uint32_t) by name."""
+    return b"".join(_information(name, fact) for name, fact in facts.items())
+
+
+def _information(name: str, fact: str | int) -> bytes:
+    if isinstance(fact, int):
+        return _keyed("I", f"uint32_t {name}", fact.to_bytes(4, "little"))
+    text = fact.encode()
+    return _keyed("I", f"char[{len(text)}] {name}", text)
+
+
+def parameters(values: Mapping[str, int | float]) -> bytes:
+    """Return parameters by name: among the definitions those at the start, later what has changed."""
+    return b"".join(_parameter(name, value) for name, value in values.items())
+
+
+def _parameter(name: str, value: int | float) -> bytes:
+    kind, layout = _TYPES[type(value)]
+    return _keyed("P", f"{kind} {name}", layout.pack(value))
+
+
+def _keyed(kind: str, key: str, value: bytes) -> bytes:
+    return message(kind, bytes([len(key)]) + key.encode() + value)
+
+
+def subscription(topic: str, number: int) -> bytes:
+    """Return that messages of a number are of a topic."""
+    return message("A", _SUBSCRIPTION.pack(0, number) + topic.encode())
+
+
+def logged_string(time_us: int, severity: int, text: str) -> bytes:
+    """Return a line that was said; `severity` as of STATUSTEXT, 0 (emergency) to 7 (debug)."""
+    return message("L", _LOGGED.pack(ord("0") + severity, time_us) + text.encode()[:_MAX_TEXT_BYTES])

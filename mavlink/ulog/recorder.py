@@ -1,0 +1,113 @@
+"""A vehicle that ground stations fly, as a ULog: its snapshots, what it says, its parameters."""
+
+from collections.abc import Mapping
+from math import nan
+
+from colibri.common.rotations import euler_from_quaternion
+from colibri.mavlink.parameters.store import Parameters, Value
+from colibri.mavlink.telemetry.snapshot import CHARGE_OK, BatteryState, Snapshot
+from colibri.mavlink.ulog import messages, topics
+from colibri.mavlink.ulog.beginning import beginning
+from colibri.mavlink.ulog.samples import SampleBlocks
+from colibri.mavlink.ulog.sensing import SensingBlocks, sensing_numbers
+from colibri.mavlink.ulog.status import Status, status_message
+from colibri.mavlink.ulog.topics import record
+
+STATUS_EVERY_US = 1_000_000
+_STILL = (nan,) * 4
+_NO_REFERENCE = (nan,) * 3
+
+
+class Recorder:
+    """Turns snapshots into messages of a ULog: what each call returns is to be appended to the file."""
+
+    def __init__(self, vehicle: str, system_id: int, parameters: Parameters, *, with_battery: bool) -> None:
+        """Record `vehicle`.
+
+        Args:
+            vehicle: Its name.
+            system_id: Its system id.
+            parameters: Its parameters.
+            with_battery: Whether its battery is recorded; not where the plant writes of it to the same file.
+        """
+        self._vehicle, self._system_id, self._parameters = vehicle, system_id, parameters
+        self._with_battery = with_battery
+        self._samples, self._sensings = SampleBlocks(), SensingBlocks()
+        self._revision, self._values = parameters.revision, dict(parameters.values)
+        self._status: Status | None = None
+        self._status_us = 0
+
+    def begin(self) -> bytes:
+        """Return the beginning of a file."""
+        self._status = None
+        self._revision, self._values = self._parameters.revision, dict(self._parameters.values)
+        return beginning(self._vehicle, self._values)
+
+    def update(self, snapshot: Snapshot) -> bytes:
+        """Record a snapshot."""
+        recorded = self._changed_parameters() + self._changed_status(snapshot)
+        recorded += self._samples.add(sample_row(snapshot))
+        row = sensing_row(snapshot)
+        return recorded if row is None else recorded + self._sensings.add(row)
+
+    def say(self, time_us: int, severity: int, text: str) -> bytes:
+        """Record a line that the vehicle says."""
+        return messages.SYNC + messages.logged_string(time_us, severity, text)
+
+    def take(self) -> bytes:
+        """Return what waits."""
+        return self._samples.take() + self._sensings.take()
+
+    def _changed_parameters(self) -> bytes:
+        if self._parameters.revision == self._revision:
+            return b""
+        known, values = self._values, self._parameters.values
+        self._revision, self._values = self._parameters.revision, dict(values)
+        changed: Mapping[str, Value] = {name: value for name, value in values.items() if known.get(name) != value}
+        return messages.SYNC + messages.parameters(changed)
+
+    def _changed_status(self, snapshot: Snapshot) -> bytes:
+        """Return the status where it has changed, and every second; with it the battery."""
+        now_us, status = snapshot.time_us, status_of(snapshot)
+        if status == self._status and 0 <= now_us - self._status_us < STATUS_EVERY_US:
+            return b""
+        self._status, self._status_us = status, now_us
+        recorded = status_message(now_us, status, self._system_id)
+        if snapshot.battery is not None and self._with_battery:
+            recorded += battery_message(now_us, snapshot.battery)
+        return recorded
+
+
+def sample_row(s: Snapshot) -> tuple[float, ...]:
+    """Return the row of `samples.COLUMNS`."""
+    steered, solver = s.setpoint, s.solver
+    attitude = _NO_REFERENCE if s.solver.step_time_s == 0.0 else euler_from_quaternion(steered.attitude)
+    return (
+        s.time_us,
+        *(*s.position_enu_m, *s.velocity_enu_m_s, *s.attitude, *s.rate_flu_rad_s),
+        *(s.controls if s.armed else _STILL),
+        *(*steered.position_enu_m, *steered.velocity_enu_m_s, *steered.acceleration_enu_m_s2),
+        *(steered.yaw_rad, steered.yaw_rate_rad_s, *attitude),
+        *(solver.status, solver.fallback, 1e6 * solver.solve_time_s, 1e6 * solver.step_time_s, solver.cost),
+        *(solver.slack, *solver.active, s.delay_us, solver.mass_kg, solver.path_lag_s),
+        nan if solver.iterations < 0 else solver.iterations,
+    )
+
+
+def sensing_row(s: Snapshot) -> tuple[float, ...] | None:
+    """Return the row of `sensing.COLUMNS`; None where the state is not estimated."""
+    if s.sensed is None or s.estimator is None:
+        return None
+    return sensing_numbers(s.time_us, s.sensed, s.estimator)
+
+
+def status_of(s: Snapshot) -> Status:
+    """Return the status."""
+    return Status(s.armed, s.custom_mode, s.failsafe, s.armable, s.flight_started_us, s.takeoff_us)
+
+
+def battery_message(time_us: int, battery: BatteryState) -> bytes:
+    """Return the battery at a time."""
+    taken = (battery.voltage_v, battery.current_a, 1e3 * battery.used_ah, battery.remaining, battery.remaining_s)
+    warning = max(battery.charge_state - CHARGE_OK, 0)
+    return messages.SYNC + record(topics.BATTERY, time_us, *taken, True, battery.cells, warning)

@@ -1,0 +1,77 @@
+"""Control samples as topics: the state that a control law is given, what it steers to, commands, how it decided."""
+
+import numpy as np
+
+from colibri.common.compiled_rotations import quaternion_from_euler
+from colibri.common.types import Array
+from colibri.mavlink.ulog import topics
+from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Blocks, Turned, attitude_ned, heading_from_yaw, put_valid
+from colibri.mavlink.ulog.topics import Records
+from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
+
+COLUMNS = (
+    "time_us",
+    *("x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz", "p", "q", "r"),
+    *("control1", "control2", "control3", "control4"),
+    *("x_ref", "y_ref", "z_ref", "vx_ref", "vy_ref", "vz_ref", "ax_ref", "ay_ref", "az_ref", "yaw_ref", "yaw_rate_ref"),
+    *("phi_ref", "theta_ref", "psi_ref"),
+    *("qp_status", "fallback", "solve_time_us", "control_step_us", "cost", "slack"),
+    *("active_rotors", "active_increments", "active_angles", "active_rates"),
+    *("delay_us", "mass_kg", "path_lag_s", "iterations"),
+)
+"""What a row of a control sample has, in SI, ENU and FLU; nan for what there is not.
+
+Time (µs); position, velocity, attitude (wxyz, FLU to ENU), rates; commanded rotor speeds in parts of the largest, nan
+unless armed; references of position, velocity, acceleration, yaw (counter-clockwise from east) and its rate; attitude
+steered to; and how it was decided, from the attitude on as in `autopilot.csv`.
+"""
+
+_TOPICS = (
+    *(topics.ATTITUDE, topics.RATES, topics.POSITION, topics.MOTORS, topics.TRAJECTORY, topics.POSITION_SETPOINT),
+    *(topics.ATTITUDE_SETPOINT, topics.MPC),
+)
+_ATTITUDE, _CONTROLS, _YAW = slice(7, 11), slice(14, 18), slice(27, 29)
+_ATTITUDE_REFERENCE, _CODES, _ACTIVE = slice(29, 32), slice(32, 34), slice(38, 42)
+_MPC = [COLUMNS.index(name) for name in (*COLUMNS[34:38], *COLUMNS[42:])]
+
+_turned = Turned(
+    COLUMNS,
+    RATES=(frd_from_flu, "p q r"),
+    PLACE=(ned_from_enu, "x y z vx vy vz"),
+    REFERENCE=(ned_from_enu, "x_ref y_ref z_ref vx_ref vy_ref vz_ref ax_ref ay_ref az_ref"),
+)
+_RATES, _PLACE, _REFERENCE = _turned.places.values()
+
+
+class SampleBlocks(Blocks):
+    """Encodes rows of `COLUMNS`."""
+
+    def __init__(self) -> None:
+        """Have room for a block."""
+        super().__init__(len(COLUMNS))
+        self._records = Records(BLOCK_ROWS, *_TOPICS)
+        put_valid(self._records, topics.POSITION)
+        self._records[topics.MOTORS, "control"][:] = np.nan
+
+    def encode(self, table: Array) -> bytes:
+        """Return the messages of rows."""
+        count, records, turned = len(table), self._records, _turned(table)
+        for topic in _TOPICS:
+            records[topic, "timestamp"][:count] = table[:, :1]
+        records[topics.ATTITUDE, "q"][:count] = attitude_ned(table[:, _ATTITUDE])
+        records[topics.RATES, "xyz"][:count] = turned[:, _RATES]
+        records[topics.POSITION, "x"][:count] = turned[:, _PLACE]
+        records[topics.MOTORS, "control"][:count, :4] = table[:, _CONTROLS]
+        yaw_rad, yaw_rate_rad_s = table[:, _YAW].T
+        trajectory = records[topics.TRAJECTORY, "position"]
+        trajectory[:count, :9] = turned[:, _REFERENCE]
+        trajectory[:count, 9], trajectory[:count, 10] = heading_from_yaw(yaw_rad), -yaw_rate_rad_s
+        records[topics.POSITION_SETPOINT, "x"][:count] = trajectory[:count]
+        steered = records[topics.ATTITUDE_SETPOINT, "q_d"]
+        angles = table[:, _ATTITUDE_REFERENCE].tolist()
+        steered[:count, :4] = attitude_ned(np.array([quaternion_from_euler(*each) for each in angles]))
+        steered[:count, 6] = -0.25 * np.square(table[:, _CONTROLS]).sum(axis=1)
+        records[topics.MPC, "solve_time_us"][:count] = table[:, _MPC]
+        records[topics.MPC, "active_rotors"][:count] = table[:, _ACTIVE]
+        records[topics.MPC, "qp_status"][:count] = table[:, _CODES]
+        return records.first(count)

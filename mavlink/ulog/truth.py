@@ -1,0 +1,104 @@
+"""The truth as topics: what `plant.csv` has, at most 125 times a second."""
+
+from collections.abc import Sequence
+from math import isnan, nan, pi
+from typing import NamedTuple
+
+import numpy as np
+
+from colibri.common.types import Array
+from colibri.mavlink.ulog import topics
+from colibri.mavlink.ulog.blocks import BLOCK_ROWS, Blocks, Turned, attitude_ned, put_valid
+from colibri.mavlink.ulog.topics import Records, record
+from colibri.mavlink.wire.ned import frd_from_flu, ned_from_enu
+
+COLUMNS = (
+    *("t", "u", "v", "w", "p", "q", "r", "x", "y", "z", "qw", "qx", "qy", "qz"),
+    *("omega1", "omega2", "omega3", "omega4", "voltage_v", "charge_ah", "wind_east", "wind_north", "wind_up"),
+)
+"""Of `plant.csv`: time (s), velocity and rates (m/s, rad/s, FLU body), position (m, ENU), attitude (wxyz, FLU to ENU),
+rotor speeds (vehicle's unit), voltage (V), charge used (Ah), wind (m/s)."""
+INTERVAL_S = 0.008
+
+_SAME_S = 1e-7
+_ROTORS, _ALL_OF_THEM = 4, 0b1111
+_UNKNOWN, _NO_WARNING = -1.0, 0
+_S_PER_H = 3600.0
+
+_turned = Turned(COLUMNS, RATES=(frd_from_flu, "p q r"), POSITION=(ned_from_enu, "x y z"))
+_RATES, _POSITION = _turned.places.values()
+
+
+class TruthVehicle(NamedTuple):
+    """What of a vehicle gives numbers of the truth their units.
+
+    Attributes:
+        rad_s_per_speed_unit: The unit of its rotor speeds.
+        capacity_ah: Of its battery; 0 without one.
+    """
+
+    rad_s_per_speed_unit: float
+    capacity_ah: float
+
+
+class TruthBlocks(Blocks):
+    """Encodes rows of `COLUMNS`."""
+
+    def __init__(self, vehicle: TruthVehicle) -> None:
+        """Encode for a vehicle."""
+        super().__init__(len(COLUMNS))
+        self._capacity_ah = vehicle.capacity_ah
+        self._rpm_per_unit = vehicle.rad_s_per_speed_unit * 30.0 / pi
+        self._last_s = self._charge_s = self._charge_ah = nan
+        self._records = Records(
+            BLOCK_ROWS, topics.ATTITUDE_TRUTH, topics.RATES_TRUTH, topics.POSITION_TRUTH, topics.ESCS
+        )
+        put_valid(self._records, topics.POSITION_TRUTH)
+        self._records[topics.ESCS, "esc_count"][:] = (_ROTORS, _ALL_OF_THEM, _ALL_OF_THEM)
+
+    def add(self, row: Sequence[float]) -> bytes:
+        """Take a row as `Blocks` does, unless it comes too soon behind the last one."""
+        if 0.0 <= row[0] - self._last_s < INTERVAL_S - _SAME_S:
+            return b""
+        self._last_s = row[0]
+        return super().add(row)
+
+    def encode(self, table: Array) -> bytes:
+        """Return the messages of rows."""
+        count, records, turned = len(table), self._records, _turned(table)
+        time_us = np.rint(1e6 * table[:, :1])
+        for topic in (topics.ATTITUDE_TRUTH, topics.RATES_TRUTH, topics.POSITION_TRUTH, topics.ESCS):
+            records[topic, "timestamp"][:count] = time_us
+        records[topics.ATTITUDE_TRUTH, "q"][:count] = attitude_ned(table[:, 10:14])
+        records[topics.RATES_TRUTH, "xyz"][:count] = turned[:, _RATES]
+        position = records[topics.POSITION_TRUTH, "x"]
+        position[:count, :3] = turned[:, _POSITION]
+        for place, velocity in enumerate(ned_from_enu(_rotated(table[:, 10:14].T, table[:, 1:4].T)), start=3):
+            position[:count, place] = velocity
+        escs = records[topics.ESCS, "esc"][:count]
+        escs["timestamp"] = time_us[:, None]
+        escs["esc_rpm"][:, :, 0] = np.rint(self._rpm_per_unit * table[:, 14:18])
+        return records.first(count) + self._battery(*table[-1, [0, 18, 19]].tolist())
+
+    def _battery(self, time_s: float, voltage_v: float, charge_ah: float) -> bytes:
+        """Return a message of the battery, whose current is the mean since the one before."""
+        if not self._capacity_ah:
+            return b""
+        elapsed_s, used_ah = time_s - self._charge_s, charge_ah - self._charge_ah
+        self._charge_s, self._charge_ah = time_s, charge_ah
+        current_a = _S_PER_H * used_ah / elapsed_s if elapsed_s > 0.0 else _UNKNOWN
+        remaining = min(max(1.0 - charge_ah / self._capacity_ah, 0.0), 1.0)
+        known = (0.0 if isnan(voltage_v) else voltage_v, current_a, 1e3 * charge_ah, remaining, nan)
+        return record(topics.BATTERY, round(1e6 * time_s), *known, True, 0, _NO_WARNING)
+
+
+def _rotated(attitude: Array, vector: Array) -> tuple[Array, Array, Array]:
+    """Return vectors of the body, (3, n), in the earth's frame, by attitudes (4, n): v + w t + q x t, t = 2 q x v."""
+    w, x, y, z = attitude
+    u, v, s = vector
+    tx, ty, tz = 2.0 * (y * s - z * v), 2.0 * (z * u - x * s), 2.0 * (x * v - y * u)
+    return (
+        u + w * tx + y * tz - z * ty,
+        v + w * ty + z * tx - x * tz,
+        s + w * tz + x * ty - y * tx,
+    )

@@ -1,0 +1,237 @@
+"""ULog files as PX4's own reader has them: every topic, every field, and whatever is left of one that was cut off."""
+
+from io import BytesIO
+from math import isnan, nan, pi
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pyulog import ULog
+
+from colibri.common.rotations import quaternion_from_euler
+from colibri.mavlink.hil.sensors import SensorFrame
+from colibri.mavlink.parameters.store import Kind, Parameter, Parameters
+from colibri.mavlink.telemetry.snapshot import BatteryState, EstimatorState, Setpoint, Snapshot, SolverState
+from colibri.mavlink.ulog import messages, samples, sensing, topics, truth
+from colibri.mavlink.ulog.beginning import beginning
+from colibri.mavlink.ulog.blocks import BLOCK_ROWS
+from colibri.mavlink.ulog.recorder import Recorder
+from colibri.mavlink.ulog.status import Status, nav_state, status_message
+
+BEGINNING = beginning("Test", {"AN_INT": 3, "A_FLOAT": 0.5})
+NUMBERS = np.random.default_rng(1)
+
+
+def read(content: bytes) -> ULog:
+    log = ULog(BytesIO(BEGINNING + content))
+    assert not log.file_corruption
+    return log
+
+
+def data(log: ULog, topic: str) -> dict[str, Any]:
+    found: dict[str, Any] = log.get_dataset(topic).data
+    return found
+
+
+def sample(time_us: int) -> dict[str, float]:
+    return {
+        **dict(zip(samples.COLUMNS, NUMBERS.uniform(0.0, 1.0, len(samples.COLUMNS)), strict=True)),
+        "time_us": time_us,
+    }
+
+
+def single(*numbers: float) -> list[float]:
+    return np.array(numbers, dtype=np.float32).tolist()  # type: ignore[no-any-return]
+
+
+def fields(found: dict[str, Any], names: str, row: int = 0) -> list[float]:
+    return [found[name][row].item() for name in names.split()]
+
+
+def test_a_file_begins_with_facts_parameters_and_all_formats() -> None:
+    log = read(b"")
+    assert {"sys_name": "Colibri", "ver_hw": "Test"}.items() <= log.msg_info_dict.items()
+    assert log.initial_parameters == {"AN_INT": 3, "A_FLOAT": 0.5}
+    assert log.message_formats.keys() == {*topics.TOPICS, *topics.PARTS}
+    assert log.data_list == []
+
+
+def test_a_control_sample_is_in_ned_and_frd() -> None:
+    blocks = samples.SampleBlocks()
+    rows = [sample(8000 * number) for number in range(BLOCK_ROWS + 2)]
+    content = b"".join(blocks.add(list(row.values())) for row in rows) + blocks.take()
+    log = read(content)
+    for number in (0, 1, BLOCK_ROWS - 1, BLOCK_ROWS + 1):
+        r = rows[number]
+        for topic in samples._TOPICS:  # noqa: SLF001
+            assert data(log, topic)["timestamp"][number] == r["time_us"]
+        position = fields(data(log, topics.POSITION), "x y z vx vy vz", number)
+        assert position == single(r["y"], r["x"], -r["z"], r["vy"], r["vx"], -r["vz"])
+        assert fields(data(log, topics.RATES), "xyz[0] xyz[1] xyz[2]", number) == single(r["p"], -r["q"], -r["r"])
+        assert fields(data(log, topics.MOTORS), "control[0] control[3]", number) == single(r["control1"], r["control4"])
+        assert isnan(data(log, topics.MOTORS)["control[4]"][number])
+        steered = data(log, topics.TRAJECTORY)
+        place = fields(steered, "position[0] position[1] position[2]", number)
+        assert place == single(r["y_ref"], r["x_ref"], -r["z_ref"])
+        assert fields(steered, "velocity[0] acceleration[1]", number) == single(r["vy_ref"], r["ax_ref"])
+        assert fields(steered, "yaw yawspeed", number) == pytest.approx([pi / 2 - r["yaw_ref"], -r["yaw_rate_ref"]])
+        same = fields(data(log, topics.POSITION_SETPOINT), "x y z vx yaw acceleration[2]", number)
+        assert same[:3] == place
+        assert same[5] == single(-r["az_ref"])[0]
+        decided = fields(data(log, topics.MPC), "solve_time_us control_step_us cost slack delay_us mass_kg", number)
+        named = ("solve_time_us", "control_step_us", "cost", "slack", "delay_us", "mass_kg")
+        assert decided == single(*(r[name] for name in named))
+        assert fields(data(log, topics.MPC), "path_lag_s iterations", number) == single(
+            r["path_lag_s"], r["iterations"]
+        )
+
+
+@given(phi=st.floats(-3.0, 3.0), theta=st.floats(-1.5, 1.5), psi=st.floats(-3.0, 3.0))
+def test_attitudes_keep_their_angles(phi: float, theta: float, psi: float) -> None:
+    """Roll stays, pitch changes its sign, yaw is counted from north."""
+    row = dict.fromkeys(samples.COLUMNS, 0.0) | {"phi_ref": phi, "theta_ref": theta, "psi_ref": psi}
+    row |= dict(zip(("qw", "qx", "qy", "qz"), quaternion_from_euler(phi, theta, psi), strict=True))
+    blocks = samples.SampleBlocks()
+    blocks.add(list(row.values()))
+    log = read(blocks.take())
+    expected = quaternion_from_euler(phi, -theta, pi / 2 - psi)
+    held, wanted = data(log, topics.ATTITUDE), data(log, topics.ATTITUDE_SETPOINT)
+    for found in ([held[f"q[{i}]"][0] for i in range(4)], [wanted[f"q_d[{i}]"][0] for i in range(4)]):
+        assert abs(np.dot(found, expected)) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_truth_is_at_most_125_times_a_second_with_rotors_and_battery() -> None:
+    blocks = truth.TruthBlocks(truth.TruthVehicle(rad_s_per_speed_unit=2.0 * pi / 60.0, capacity_ah=2.0))
+    east = dict.fromkeys(truth.COLUMNS, 0.0) | {"qw": 0.5**0.5, "qz": 0.5**0.5, "u": 3.0, "w": -1.0, "q": 0.25}
+    east |= {"x": 1.0, "y": 2.0, "z": 3.0, "omega2": 5000.0, "voltage_v": 12.0}
+    rows = [east | {"t": 0.004 * number, "charge_ah": 0.001 * number} for number in range(2 * BLOCK_ROWS + 3)]
+    log = read(b"".join(blocks.add(list(row.values())) for row in rows) + blocks.take())
+    position = data(log, topics.POSITION_TRUTH)
+    assert position["timestamp"].tolist() == [8000 * number for number in range(BLOCK_ROWS + 2)]
+    assert fields(position, "x y z vx vy vz") == pytest.approx([2.0, 1.0, -3.0, 3.0, 0.0, 1.0], abs=1e-6)
+    assert fields(data(log, topics.RATES_TRUTH), "xyz[1]") == [-0.25]
+    escs = data(log, topics.ESCS)
+    assert fields(escs, "esc_count esc_online_flags esc[0].esc_rpm esc[1].esc_rpm", -1) == [4, 15, 0, 5000]
+    battery = data(log, topics.BATTERY)
+    assert battery["current_a"].tolist() == pytest.approx([-1.0, 0.001 / 0.004 * 3600.0])
+    assert fields(battery, "voltage_v discharged_mah remaining", 1) == pytest.approx([12.0, 130.0, 0.935])
+
+
+def test_without_a_battery_there_is_none_and_numbers_beyond_all_bounds_are_written() -> None:
+    blocks = truth.TruthBlocks(truth.TruthVehicle(rad_s_per_speed_unit=1.0, capacity_ah=0.0))
+    blocks.add([0.0, *[1e300] * (len(truth.COLUMNS) - 1)])
+    log = read(blocks.take())
+    assert [found.name for found in log.data_list if found.name == topics.BATTERY] == []
+    assert data(log, topics.POSITION_TRUTH)["z"].tolist() == [-np.inf]
+
+
+def test_sensors_and_their_estimate() -> None:
+    blocks = sensing.SensingBlocks()
+    frame = SensorFrame(0, 0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (0.0, 0.0, 0.0), 1e5, 20.0)
+    state = EstimatorState(831, (0.1, 0.2, 0.3, 0.4, 0.5, 0.6), 0.75, 1.5, 0, 0)
+    blocks.add(sensing.sensing_numbers(7000, frame, state))
+    log = read(blocks.take())
+    measured = data(log, topics.SENSORS)
+    axes = "accelerometer_m_s2[0] accelerometer_m_s2[1] accelerometer_m_s2[2] gyro_rad[0] gyro_rad[1] gyro_rad[2]"
+    assert fields(measured, axes) == [1.0, -2.0, -3.0, 4.0, -5.0, -6.0]
+    known = data(log, topics.ESTIMATOR)
+    assert fields(known, "timestamp solution_status_flags pos_horiz_accuracy pos_vert_accuracy") == [
+        7000,
+        831,
+        0.75,
+        1.5,
+    ]
+    ratios = fields(known, "vel_test_ratio pos_test_ratio hgt_test_ratio hdg_test_ratio hagl_test_ratio")
+    assert ratios == single(0.1, 0.2, 0.3, 0.4, 0.5)
+
+
+def test_modes_have_px4s_numbers() -> None:
+    assert [nav_state(main << 16 | sub << 24) for main, sub in ((3, 0), (4, 3), (4, 4), (6, 0), (9, 9))] == [
+        2,
+        4,
+        3,
+        14,
+        31,
+    ]
+    status = Status(armed=True, custom_mode=4 << 16 | 5 << 24, failsafe=True, armable=False, armed_us=5, takeoff_us=6)
+    found = data(read(status_message(9, status, system_id=7)), topics.STATUS)
+    names = "timestamp armed_time takeoff_time arming_state nav_state system_id failsafe pre_flight_checks_pass"
+    assert fields(found, names) == [9, 5, 6, 2, 5, 7, 1, 0]
+
+
+def snapshot(time_us: int, **changes: Any) -> Snapshot:
+    seen: dict[str, Any] = {"armed": True, "controls": (0.1, 0.2, 0.3, 0.4), "position_enu_m": (1.0, 2.0, 3.0)}
+    battery = BatteryState(3, 11.5, 2.0, 0.5, 0.75, 600.0, 5.0, charge_state=2)
+    return Snapshot(time_us=time_us, battery=battery, **(seen | changes))
+
+
+def test_a_vehicle_of_ground_stations_is_recorded_with_what_changes() -> None:
+    parameters = Parameters([Parameter(name="A", kind=Kind.REAL, default=1.0, description="")])
+    recorder = Recorder("Test", 1, parameters, with_battery=True)
+    content = recorder.begin()
+    for number in range(300):
+        solver = SolverState(status=0, iterations=7, step_time_s=1e-4, active=(1, 2, 3, 4))
+        content += recorder.update(snapshot(8000 * number, failsafe=number >= 200, solver=solver, setpoint=Setpoint()))
+        if number == 99:
+            assert parameters.set("A", 2.0) is None
+            content += recorder.say(8000 * number, 4, "low battery")
+    log = ULog(BytesIO(content + recorder.take()))
+    assert not log.file_corruption
+    assert (log.initial_parameters, [change[1:] for change in log.changed_parameters]) == ({"A": 1.0}, [("A", 2.0)])
+    assert [(said.timestamp, said.log_level_str(), said.message) for said in log.logged_messages] == [
+        (792_000, "WARNING", "low battery")
+    ]
+    assert data(log, topics.STATUS)["timestamp"].tolist() == [0, 1_000_000, 1_600_000]
+    assert fields(data(log, topics.BATTERY), "voltage_v current_a discharged_mah remaining warning") == [
+        11.5,
+        2,
+        500,
+        0.75,
+        1,
+    ]
+    assert len(data(log, topics.POSITION)["x"]) == 300
+    assert fields(data(log, topics.MPC), "iterations active_rates qp_status fallback", 299) == [7, 4, 0, -1]
+
+
+def whole_messages(content: bytes) -> int:
+    """Return how many messages of data are whole in the content behind the beginning."""
+    at = whole = 0
+    while at + 3 <= len(content):
+        at += 3 + int.from_bytes(content[at : at + 2], "little")
+        whole += at <= len(content)
+    return whole
+
+
+def test_a_file_that_was_cut_off_anywhere_has_all_messages_before() -> None:
+    blocks = samples.SampleBlocks()
+    for number in range(2):
+        blocks.add(list(sample(8000 * number).values()))
+    content = blocks.take() + messages.logged_string(5, 6, "end")
+    for end in range(len(content) + 1):
+        log = ULog(BytesIO(BEGINNING + content[:end]))
+        rows = sum(len(found.data["timestamp"]) for found in log.data_list)
+        assert rows + len(log.logged_messages) + (end >= len(messages.SYNC)) == whole_messages(content[:end])
+    for end in range(16, len(BEGINNING), 97):
+        assert ULog(BytesIO(BEGINNING[:end])).data_list == []
+
+
+def test_a_reader_that_has_lost_its_place_finds_it_at_the_next_block() -> None:
+    blocks = samples.SampleBlocks()
+    content = b"".join(blocks.add(list(sample(8000 * number).values())) for number in range(3 * BLOCK_ROWS))
+    block = len(content) // 3
+    log = ULog(BytesIO(BEGINNING + content[: block - 20] + content[block:]))
+    assert log.file_corruption
+    assert data(log, topics.MPC)["timestamp"][-1] == 8000 * (3 * BLOCK_ROWS - 1)
+
+
+def test_what_is_no_number_stays_none() -> None:
+    row = dict.fromkeys(samples.COLUMNS, nan) | {"time_us": 8000}
+    row |= dict.fromkeys(("qp_status", "fallback"), -1) | {
+        f"active_{kind}": 0 for kind in ("rotors", "increments", "angles", "rates")
+    }
+    blocks = samples.SampleBlocks()
+    blocks.add(list(row.values()))
+    found = data(read(blocks.take()), topics.TRAJECTORY)
+    assert all(isnan(found[name][0]) for name in ("position[0]", "yaw", "yawspeed"))
