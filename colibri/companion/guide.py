@@ -30,6 +30,7 @@ from colibri.companion.steering.smooth_start import smoothly_started
 from colibri.companion.supervision.checks import CheckFacts, failing
 from colibri.companion.supervision.conditions import Situation, conditions
 from colibri.companion.supervision.limits import Box, FlightFacts, Limit, exceeded
+from colibri.companion.supervision.pace import Pace
 from colibri.companion.supervision.phases import Condition, Phase, next_phase
 from colibri.plant.vehicle.description import Vehicle
 
@@ -108,6 +109,7 @@ class Companion:
         self._asked: Asked | None = None
         self._jumped_m = 0.0
         self._law_error = ""
+        self._pace = Pace()
         self._stopped = self._brakes = self._on_way = self._has_flown = False
         self._failing: list[str] = ["clock"]
         self.ended: Ended | None = None
@@ -280,6 +282,7 @@ class Companion:
                 self._box = self._box.around(place, margin_m)
         self._orders.enter(phase, before)
         if phase is Phase.FLYING:
+            self._pace.begin(now_us)
             self._predictor.begin()
             self._predictor.observe(self._newest.at_us, self._newest.state) if self._newest else None
             self._pilot.begin(self._predictor.at(self._acts_us(now_us)))
@@ -335,6 +338,7 @@ class Companion:
         except DecisionError as error:
             self._law_error = str(error)
             return []
+        self._pace.count(now_us)
         if asked.reference is not None:
             self._asked = asked
             place = _first(asked.reference.position_enu_m)
@@ -414,6 +418,8 @@ class Companion:
             system_status=report.system_status,
             fence_breached=report.fence_breached,
             law_error=self._law_error,
+            pace=self._pace.kept(now_us, self.interval_us) if flies else 1.0,
+            gap_s=self._pace.gap_s(now_us) if flies else 0.0,
         )
 
     def _note(self, now_us: int, y: Array, asked: Asked, thrust: float, *, sent: bool) -> None:

@@ -68,6 +68,8 @@ def plan_of(args: Namespace) -> Plan:
             max_tilt_deg=args.max_tilt,
             max_error_m=args.max_error,
             max_state_age_s=1e-3 * args.max_age,
+            min_pace=0.01 * args.min_pace,
+            max_gap_s=1e-3 * args.max_gap,
         ),
         setpoints=SetpointKind(args.setpoints),
         stack=STACKS[args.stack] if args.stack else None,

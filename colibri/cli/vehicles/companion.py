@@ -50,6 +50,20 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="MS",
         help="of the newest state; ends the flight (default %(default)g)",
     )
+    add(
+        "--min-pace",
+        type=positive,
+        default=80.0,
+        metavar="PERCENT",
+        help="of the setpoints over a second, by a computer that keeps up; fewer end the flight (default %(default)g)",
+    )
+    add(
+        "--max-gap",
+        type=positive,
+        default=200.0,
+        metavar="MS",
+        help="between two setpoints; ends the flight (default %(default)g)",
+    )
     add_signing(add)
     add_out(add, "out/companion", "logs and report")
 

@@ -9,6 +9,8 @@ from colibri.common.types import Vector
 
 MAX_STATE_AGE_S = 0.1
 MIN_BATTERY = 0.15
+MIN_PACE = 0.8
+MAX_GAP_S = 0.2
 _CRITICAL = frozenset({5, 6, 7, 8})
 """MAV_STATE_CRITICAL, EMERGENCY, POWEROFF and FLIGHT_TERMINATION."""
 
@@ -40,6 +42,8 @@ class FlightLimits:
         max_error_m: Between vehicle and reference.
         max_state_age_s: Of the newest state.
         min_battery: Part of the charge.
+        min_pace: Part of the setpoints that are due, over a second.
+        max_gap_s: Between two setpoints.
     """
 
     margin_m: float = 3.0
@@ -47,6 +51,8 @@ class FlightLimits:
     max_error_m: float = 1.5
     max_state_age_s: float = MAX_STATE_AGE_S
     min_battery: float = MIN_BATTERY
+    min_pace: float = MIN_PACE
+    max_gap_s: float = MAX_GAP_S
 
 
 class FlightFacts(NamedTuple):
@@ -63,6 +69,8 @@ class FlightFacts(NamedTuple):
         system_status: MAV_STATE.
         fence_breached: By its report.
         law_error: What the control law ended with; empty for nothing.
+        pace: Part of the setpoints of the last second that there was.
+        gap_s: Since the last setpoint.
     """
 
     state_age_s: float = 0.0
@@ -75,6 +83,8 @@ class FlightFacts(NamedTuple):
     system_status: int = 0
     fence_breached: bool = False
     law_error: str = ""
+    pace: float = 1.0
+    gap_s: float = 0.0
 
 
 class Limit(NamedTuple):
@@ -121,6 +131,15 @@ LIMITS: tuple[Limit, ...] = (
         lambda now, _limits, _box: bool(now.law_error),
         lambda now, _limits: now.law_error,
         blind=True,
+    ),
+    Limit(
+        "overloaded",
+        lambda now, limits, _: now.pace < limits.min_pace or now.gap_s > limits.max_gap_s,
+        lambda now, limits: (
+            f"this computer is too slow: {100 * now.pace:.0f} % of the setpoints in the last second, of at least "
+            f"{100 * limits.min_pace:.0f}, and the last {1e3 * now.gap_s:.0f} ms ago, of at most "
+            f"{1e3 * limits.max_gap_s:.0f}"
+        ),
     ),
     Limit(
         "box",

@@ -51,6 +51,7 @@ class Ride(Generic[Flown]):
         trouble: What the link does; may be changed at any time.
         law: The control law.
         sent: When and what the companion has sent, before the link.
+        polls_every_us: How seldom the computer gets round to the companion.
     """
 
     def __init__(
@@ -75,7 +76,8 @@ class Ride(Generic[Flown]):
         self._port: StandIn | Port = sitl if isinstance(sitl, StandIn) else Port(sitl)
         self.sent: list[tuple[int, bytes]] = []
         self.history: list[tuple[float, Phase]] = []
-        self.frozen = False
+        self.polls_every_us = 0
+        self._polled_us = -1
 
     @property
     def now_us(self) -> int:
@@ -86,7 +88,8 @@ class Ride(Generic[Flown]):
         now_us = self.now_us
         for datagram in self._down.due(now_us):
             self.companion.receive(datagram, now_us)
-        if not self.frozen:
+        if now_us - self._polled_us >= self.polls_every_us:
+            self._polled_us = now_us
             for frame in self.companion.poll(now_us):
                 self.sent.append((now_us, frame))
                 self._up.put(frame, now_us)

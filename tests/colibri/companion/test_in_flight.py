@@ -231,6 +231,16 @@ def _raise(ride: Ride[Sitl]) -> Callable[[], None]:
     return lambda: None
 
 
+def _slow(ride: Ride[Sitl]) -> Callable[[], None]:
+    ride.polls_every_us = 12_000
+    return lambda: None
+
+
+def _stall(ride: Ride[Sitl]) -> Callable[[], None]:
+    ride.polls_every_us = 212_000
+    return lambda: None
+
+
 def _jump(ride: Ride[Sitl]) -> Callable[[], None]:
     codec, report = Codec(1, 1), ride.companion.peer
     q, nothing = (1.0, 0.0, 0.0, 0.0), (nan,) + (0.0,) * 20
@@ -257,6 +267,8 @@ AS_IT_IS = FlightLimits()
         ("estimate lost", _estimator_lost, AS_IT_IS),
         ("estimate jumped", _jump, AS_IT_IS),
         ("control law", _raise, AS_IT_IS),
+        ("overloaded", _slow, AS_IT_IS),
+        ("overloaded", _stall, AS_IT_IS),
         ("box", _blow, TIGHT_BOX),
         ("tilt", _blow, TIGHT_TILT),
         ("error", _blow, TIGHT_ERROR),
@@ -278,7 +290,7 @@ def test_each_limit_ends_it_and_leaves_the_vehicle_in_hold(
         goes_on()
         ride.step()
     ended_us = ride.now_us
-    ride.trouble.down = False
+    ride.trouble.down, ride.polls_every_us = False, 0
     ride.to_the_end(5.0)
     limit, ended = ride.companion.limit, ride.companion.ended
     assert limit

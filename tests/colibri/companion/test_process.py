@@ -66,7 +66,18 @@ def test_a_dry_run_over_udp_logs_and_moves_nothing(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_a_flight_over_udp_is_handed_over_in_order(tmp_path: Path) -> None:
     with vehicle(tmp_path) as flown:
-        options = ("hover:height=2", "--arm", "--duration", "3", "--max-age", "20000")
+        options = (
+            "hover:height=2",
+            "--arm",
+            "--duration",
+            "3",
+            "--max-age",
+            "20000",
+            "--max-gap",
+            "20000",
+            "--min-pace",
+            "1",
+        )
         ended = companion(tmp_path / "out", flown.port, *options)
         assert ended.returncode == 0, ended.stderr
         assert "height reached: hold" in flown.said

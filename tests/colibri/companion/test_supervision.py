@@ -9,6 +9,7 @@ from colibri.companion.stacks.px4 import PX4
 from colibri.companion.stacks.thrust_curve import ThrustCurve
 from colibri.companion.supervision.checks import CHECKS, CheckFacts, failing
 from colibri.companion.supervision.limits import LIMITS, Box, FlightFacts, FlightLimits, exceeded
+from colibri.companion.supervision.pace import Pace
 from colibri.companion.supervision.phases import TABLE, Condition, Phase, next_phase
 
 BOX = Box((-3.0, -3.0, -1.0), (3.0, 3.0, 5.0))
@@ -75,6 +76,7 @@ EXCEEDS = {
     "estimate lost": FlightFacts(estimator_ok=False),
     "estimate jumped": FlightFacts(jumped_m=2.0),
     "control law": FlightFacts(law_error="it raised"),
+    "overloaded": FlightFacts(pace=0.79),
     "box": FlightFacts(position_enu_m=(0.0, 3.1, 0.0)),
     "tilt": FlightFacts(tilt_deg=51.0),
     "error": FlightFacts(reference_enu_m=(1.6, 0.0, 0.0)),
@@ -92,6 +94,27 @@ def test_each_limit_is_exceeded_alone_and_says_by_how_much() -> None:
         assert limit is not None
         assert limit.name == name
         assert len(limit.words(facts, FlightLimits())) > 5
+
+
+def test_a_gap_in_the_setpoints_is_an_overload_too() -> None:
+    limit = exceeded(FlightFacts(gap_s=0.21), FlightLimits(), BOX)
+    assert limit is not None
+    assert limit.name == "overloaded"
+    assert "210 ms ago" in limit.words(FlightFacts(gap_s=0.21), FlightLimits())
+
+
+def test_the_pace_is_the_part_of_the_setpoints_of_the_last_second() -> None:
+    pace = Pace()
+    pace.begin(5_000_000)
+    assert pace.kept(5_900_000, 8_000) == 1.0
+    for n in range(1, 126):
+        pace.count(5_000_000 + 8_000 * n)
+    assert pace.kept(6_000_000, 8_000) == pytest.approx(1.0)
+    for n in range(1, 63):
+        pace.count(6_000_000 + 16_000 * n)
+    assert pace.kept(7_000_000, 8_000) == pytest.approx(0.5, abs=0.01)
+    assert pace.gap_s(7_000_000) == pytest.approx(0.008)
+    assert pace.kept(8_100_000, 8_000) == 0.0
 
 
 def test_a_position_that_is_no_number_is_outside_the_box() -> None:
