@@ -32,6 +32,11 @@ docs` from the tables and services themselves; a test holds that they agree.
 At rates that a client changes by SET_MESSAGE_INTERVAL or REQUEST_DATA_STREAM; REQUEST_MESSAGE asks for one. *SDK*
 and *GCS*: messages a second on links to SDKs (ports 14540 to 14549) and to ground stations; `-`: when asked for.
 """
+_OBEYED = """
+## Commands obeyed
+
+As COMMAND_LONG or COMMAND_INT; any other, and a request for what the vehicle has not, is answered by UNSUPPORTED.
+"""
 _TELEMETRY = (attitude, controller, position, power, sensors, status)
 _HANDLERS = (commands, motion_commands, stations, streaming_service, standard_modes, system_commands)
 
@@ -46,7 +51,7 @@ def page() -> str:
             *_streamed(),
             "\n## Taken\n\n| messages | what takes them |\n|---|---|",
             *_taken(),
-            "\n## Commands obeyed\n\nAs COMMAND_LONG or COMMAND_INT; any other, and a request for what the vehicle has not, is answered by UNSUPPORTED.\n",
+            _OBEYED,
             "| command | number |\n|---|---:|",
             *(f"| `{command}` | {getattr(mav, command)} |" for command in sorted(obeyed())),
             "",

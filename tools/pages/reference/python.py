@@ -40,7 +40,7 @@ def _thing(name: str, thing: Any) -> Iterator[str]:
         return
     yield f"### {name}\n"
     if inspect.isfunction(thing):
-        yield f"```python\n{_signature(name, thing)}\n```\n"
+        yield f"```\n{_signature(name, thing)}\n```\n"
     yield _text(inspect.getdoc(thing) or "")
     if inspect.isclass(thing):
         yield from _members(thing)
@@ -84,7 +84,7 @@ def _signature(name: str, function: Any) -> str:
 
 def _default(value: object) -> str:
     plain = value is None or isinstance(value, bool | int | float | str | tuple)
-    return repr(value) if plain and not re.search(" at 0x", repr(value)) else "…"
+    return repr(value) if plain and not re.search(" at 0x", repr(value)) else "..."
 
 
 def _sentence(doc: str) -> str:
