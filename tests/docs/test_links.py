@@ -1,5 +1,6 @@
 """Links and pictures of README and docs/ lead somewhere; every page is in the site's navigation; README is short."""
 
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.docs.pages import DOCS, PAGES, ROOT, anchors, links
+from tests.docs.pages import DOCS, PAGES, ROOT, anchors, links, prose
 
 README_LINES = 150
 _OPEN = ("https://", "http://127.0.0.1", "http://localhost")
@@ -52,3 +53,9 @@ def test_readme_is_short_and_shows_three_pictures_of_which_one_moves() -> None:
     assert len(shown) == 3
     (moving,) = [link for link in shown if link.endswith(".gif")]
     assert (ROOT / moving).stat().st_size <= 1_500_000
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_no_bar_in_code_is_shown_with_its_backslash(page: Path) -> None:
+    r"""Of `a\|b` in a table the site shows the backslash, GitHub does not; `<code>a&#124;b</code>` both show alike."""
+    assert not re.findall(r"`[^`\n]*\\\|[^`\n]*`", prose(page))

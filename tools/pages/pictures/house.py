@@ -14,7 +14,7 @@ PACKAGES = {
     "colibri": ("#f3e9f7", "what a user imports or runs"),
     "colibri.autopilot": ("#e6f0fa", "frames in, commands out"),
     "colibri.plant": ("#e9f6ec", "the vehicle and its world"),
-    "colibri.mavlink": ("#fdf3e1", "knows neither of the two"),
+    "colibri.mavlink": ("#fdf3e1", "knows no plant, no autopilot"),
     "colibri.common": ("#eef1f4", "knows no vehicle"),
 }
 _INK, _FRAME = "#223344", "#8899aa"

@@ -10,6 +10,7 @@ from colibri.cli.shared.commands import COMMANDS, GROUPS
 from colibri.cli.shared.parser import parser_of
 from colibri.cli.shared.processes import PROCESSES
 from colibri.plant.__main__ import command_line as plant_command_line
+from tools.pages.tables import code
 
 _HEAD = """# Commands and options
 
@@ -87,14 +88,11 @@ def _section(name: str, parser: ArgumentParser) -> Iterator[str]:
 def _names(action: Action) -> str:
     values = action.metavar
     if values is None and action.choices is not None:
-        values = "\\|".join(map(str, action.choices))
+        values = "|".join(map(str, action.choices))
     if values is None and action.nargs != 0:
         values = action.dest.upper()
-    shown = " ".join(values) if isinstance(values, tuple) else str(values or "").replace("\\|", "|")
-    shown = shown.replace("|", "\\|")
-    if not action.option_strings:
-        return f"`{shown}`"
-    return f"`{', '.join(action.option_strings)}{' ' + shown if shown else ''}`"
+    shown = " ".join(values) if isinstance(values, tuple) else str(values or "")
+    return code(" ".join(filter(None, [", ".join(action.option_strings), shown])))
 
 
 def _help(action: Action, parser: ArgumentParser) -> str:
