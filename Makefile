@@ -6,7 +6,7 @@ OUT ?= out/spiral
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: setup fly test test-long lint test-clients test-peers fuzz chaos scenarios scenarios-rough soak soak-clients \
-  kills golden verify-pythons bench docs lock clean
+  kills golden verify-pythons bench docs pages lock clean
 
 setup: .venv/.ready
 
@@ -99,6 +99,11 @@ verify-pythons: setup
 # `colibri bench`, with RotorPy's flights beside its own where that is installed.
 bench: setup
 	$(BIN)/python -m tools.bench
+
+# What of docs/ the code writes in no time; the pages with flights in them: python -m tools.pages PAGE docs.
+PAGES := failsafes faults modes parameters pictures.house $(addprefix reference.,command_line files keys messages python)
+pages: setup
+	for page in $(PAGES); do $(BIN)/python -m tools.pages $$page docs || exit 1; done
 
 # The pages of docs/ as a site, in site/: a link or an anchor that leads nowhere fails. Nothing is fetched, then or by readers.
 docs: setup

@@ -19,6 +19,7 @@ PACKAGES = {
 }
 _INK, _FRAME = "#223344", "#8899aa"
 _WIDTH, _ROW, _GAP, _SPACE = 3.0, 0.36, 0.5, 0.3
+_COLUMNS = (("colibri",), ("colibri.autopilot",), ("colibri.plant", "colibri.common"), ("colibri.mavlink",))
 _FILES = {"__main__", "pytest_plugin", "errors"}
 _ALONE = ("autopilot", "plant", "mavlink", "common")
 
@@ -42,32 +43,33 @@ def _is_room(package: str, room: str, leave: set[str]) -> bool:
     return room not in leave and folder.is_dir()
 
 
+def description() -> str:
+    """Return what is drawn as text, which the picture keeps: so it is seen when it is no longer current."""
+    return "; ".join(f"{package}: {' > '.join(' '.join(row) for row in rows)}" for package, rows in layers().items())
+
+
 def draw(path: Path) -> None:
     """Draw the house."""
     figure = Figure(figsize=(12.0, 6.4), dpi=100)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.axis("off")
     rooms = layers()
-    columns = [["colibri"], ["colibri.autopilot"], ["colibri.plant", "colibri.common"], ["colibri.mavlink"]]
-    for column, packages in enumerate(columns):
+    bottom = -max(sum(_height(rooms[package]) + _SPACE for package in packages) for packages in _COLUMNS) + _SPACE
+    for column, packages in enumerate(_COLUMNS):
         top = 0.0
         for package in packages:
             top = _package(axes, column * (_WIDTH + _GAP), top, package, rooms[package]) - _SPACE
     style: dict[str, Any] = {"arrowstyle": "-|>", "color": _INK, "linewidth": 1.4}
-    for column in range(len(columns) - 1):
+    for column in range(len(_COLUMNS) - 1):
         left = column * (_WIDTH + _GAP) + _WIDTH
         axes.annotate("", xy=(left + _GAP, -0.35), xytext=(left, -0.35), arrowprops=style)
     common = _height(rooms["colibri.plant"]) + _SPACE + 0.35
     axes.annotate("", xy=(left, -common), xytext=(left + _GAP, -common), arrowprops=style)
-    axes.set_xlim(-0.2, len(columns) * (_WIDTH + _GAP) - 0.3)
-    axes.set_ylim(_bottom(rooms) - 0.55, 0.25)
+    axes.set_xlim(-0.2, len(_COLUMNS) * (_WIDTH + _GAP) - 0.3)
+    axes.set_ylim(bottom - 0.55, 0.25)
     note = "imports follow the arrows, and within a package go down; of the plant, autopilot/ reads vehicle/ alone"
-    axes.text(0.0, _bottom(rooms) - 0.3, note, fontsize=9.5, color=_INK, va="center")
-    figure.savefig(path)
-
-
-def _bottom(rooms: dict[str, list[list[str]]]) -> float:
-    return min(-_height(rows) for rows in rooms.values())
+    axes.text(0.0, bottom - 0.3, note, fontsize=9.5, color=_INK, va="center")
+    figure.savefig(path, metadata={"Description": description()})
 
 
 def _height(rows: list[list[str]]) -> float:
