@@ -6,7 +6,7 @@ OUT ?= out/spiral
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: setup fly test test-long lint test-clients test-peers test-view fuzz chaos scenarios scenarios-rough soak \
-  soak-clients kills golden verify-pythons bench lock clean
+  soak-clients kills golden verify-pythons bench docs pages lock clean
 
 setup: .venv/.ready
 
@@ -106,6 +106,17 @@ verify-pythons: setup
 bench: setup
 	$(BIN)/python -m tools.bench
 
+# What of docs/ the code writes in no time; the pages with flights in them: python -m tools.pages PAGE docs.
+PAGES := failsafes faults modes parameters pictures.house $(addprefix reference.,command_line files keys messages python)
+pages: setup
+	for page in $(PAGES); do $(BIN)/python -m tools.pages $$page docs || exit 1; done
+
+# The pages of docs/ as a site, in site/: a link or an anchor that leads nowhere fails. Nothing is fetched, then or by readers.
+docs: setup
+	$(BIN)/python -m pytest -q -p no:cacheprovider tests/docs/test_links.py
+	$(BIN)/zensical build --strict
+	@echo "read it at site/index.html; with search: $(BIN)/python -m http.server --bind 127.0.0.1 --directory site"
+
 # The lock names versions and hashes, no registry. Needs uv.
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
@@ -114,4 +125,4 @@ lock:
 	  --extra clients pyproject.toml -o requirements-clients.lock
 
 clean:
-	rm -rf .venv .venv-clients .venv-3.* out dist
+	rm -rf .venv .venv-clients .venv-3.* out dist site .cache

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Sequence
+from html import escape
 from pathlib import Path
 
 _TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
@@ -25,3 +26,8 @@ def with_tables(page: str, tables: Iterable[str]) -> str:
     page = _TABLE.sub(newest, page)
     assert not ahead, f"the page has no table {ahead[0].partition(chr(10))[0]}"
     return page
+
+
+def code(text: str) -> str:
+    """Return what shows a text as code in a cell of a table: by GitHub and by the site, also where it has bars."""
+    return f"<code>{escape(text, quote=False).replace('|', '&#124;')}</code>" if "|" in text else f"`{text}`"

@@ -1,4 +1,4 @@
-"""README's snippets for ground stations, as they stand there; only their ports are other ones."""
+"""The snippets of docs/connect.md for ground stations, as they stand there; only their ports are other ones."""
 
 import re
 import socket
@@ -16,16 +16,16 @@ from colibri.flights.fleet import GROUND_PORT, SDK_PORT
 from tests.clients.support.mavproxy import MavProxy
 from tools.harness.sitl_process import Vehicle, vehicle
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "connect.md"
 GIVE_UP_AFTER_S = 120.0
 SPEED = 4.0
 
 
 def snippets(beginning: str) -> list[str]:
-    """Return the fenced blocks behind the line that begins so, in the section of ground stations."""
-    _, _, behind = README.read_text(encoding="utf-8").partition("\n## Connect QGroundControl / MAVSDK / MAVProxy")
-    _, _, behind = behind.partition("\n## ")[0].partition(beginning)
-    assert behind, f"README has no line that begins with {beginning}"
+    """Return the fenced blocks behind the heading that begins so, before the next one."""
+    _, _, behind = f"\n{PAGE.read_text(encoding='utf-8')}".partition(f"\n{beginning}")
+    assert behind, f"the page has no line that begins with {beginning}"
+    behind = behind.partition("\n## ")[0]
     return re.findall(r"```\w*\n(.*?)```", behind, re.DOTALL)
 
 
@@ -61,14 +61,14 @@ def went_to(flown: Vehicle, latitude_deg: float, longitude_deg: float, height_m:
 
 def test_the_command_is_all_that_qgroundcontrol_needs() -> None:
     """What QGroundControl does then is in test_qgroundcontrol.py."""
-    assert snippets(" / DroneKit")[0] == ".venv/bin/colibri sitl\n"
+    assert snippets("# Connect")[0] == ".venv/bin/colibri sitl\n"
 
 
 @pytest.mark.long
 def test_mavsdk(tmp_path: Path) -> None:
     port = free_port()
     with vehicle(tmp_path, links=(f"udpout:127.0.0.1:{port}",), speed=SPEED) as flown:
-        run(snippets("**MAVSDK**")[0], SDK_PORT, port, tmp_path)
+        run(snippets("## MAVSDK")[0], SDK_PORT, port, tmp_path)
         assert_landed(flown)
         assert 4.8 < max(sight.height_m for sight in flown.seen.sights) < 5.1
 
@@ -76,7 +76,7 @@ def test_mavsdk(tmp_path: Path) -> None:
 def test_dronekit(tmp_path: Path) -> None:
     port = free_port()
     with vehicle(tmp_path, links=(f"udpout:127.0.0.1:{port}",), speed=SPEED) as flown:
-        run(snippets("**DroneKit**")[0], GROUND_PORT, port, tmp_path)
+        run(snippets("## DroneKit")[0], GROUND_PORT, port, tmp_path)
         assert_landed(flown)
         assert flown.seen.modes()[-1] is Mode.LAND
 
@@ -84,11 +84,11 @@ def test_dronekit(tmp_path: Path) -> None:
 @pytest.mark.clients
 def test_mavproxy(tmp_path: Path) -> None:
     port = free_port()
-    command = snippets("**MAVProxy**")[0].split()
+    command = snippets("## MAVProxy")[0].split()
     assert command[:1] == ["mavproxy.py"]
     (option,) = command[1:]
     connection = option.removeprefix("--master=").replace(str(GROUND_PORT), str(port))
-    arm, take_off, go, return_home = snippets("**MAVProxy**")[1].splitlines()
+    arm, take_off, go, return_home = snippets("## MAVProxy")[1].splitlines()
     with (
         vehicle(tmp_path, links=(f"udpout:127.0.0.1:{port}",), speed=SPEED) as flown,
         MavProxy(tmp_path, connection) as proxy,

@@ -1,0 +1,57 @@
+"""README and the pages of docs/, and what is in them: fenced blocks, prose, links, headings."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = (ROOT / "README.md", *sorted(DOCS.rglob("*.md")))
+
+_FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_LINK = re.compile(r"\]\(([^)\s]+)\)")
+_HEADING = re.compile(r"^#{1,6} (.+)$", re.MULTILINE)
+
+
+class Block(NamedTuple):
+    """A fenced block.
+
+    Attributes:
+        page: Its page, relative to the repository.
+        language: As the fence says; may be empty.
+        text: What is in it.
+    """
+
+    page: str
+    language: str
+    text: str
+
+
+def blocks(*languages: str) -> Iterator[Block]:
+    """Yield the fenced blocks of all pages in one of these languages."""
+    for path in PAGES:
+        for language, text in _FENCE.findall(path.read_text(encoding="utf-8")):
+            if language in languages:
+                yield Block(str(path.relative_to(ROOT)), language, text)
+
+
+def prose(path: Path) -> str:
+    """Return a page without its fenced blocks."""
+    return _FENCE.sub("", path.read_text(encoding="utf-8"))
+
+
+def links(path: Path) -> list[str]:
+    """Return where the links and pictures of a page lead."""
+    return _LINK.findall(re.sub(r"`[^`\n]*`", "", prose(path)))
+
+
+def anchors(path: Path) -> set[str]:
+    """Return the anchors of a page's headings, as GitHub and the site make them."""
+    found: set[str] = set()
+    for heading in _HEADING.findall(prose(path)):
+        plain = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading).replace("`", "")
+        anchor = re.sub(r"[^\w\- ]", "", plain.strip().lower()).replace(" ", "-")
+        number = next(n for n in range(len(found) + 1) if (f"{anchor}-{n}" if n else anchor) not in found)
+        found.add(f"{anchor}-{number}" if number else anchor)
+    return found

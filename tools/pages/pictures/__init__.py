@@ -1,0 +1,1 @@
+"""Pictures of docs/ that stand alone: a flight that moves, and the house."""

@@ -1,0 +1,106 @@
+"""`cli.md`: every command and option, from the parsers themselves."""
+
+from argparse import SUPPRESS, Action, ArgumentParser, HelpFormatter
+from collections.abc import Iterator
+from pathlib import Path
+from textwrap import dedent
+
+from colibri.autopilot.__main__ import command_line as autopilot_command_line
+from colibri.cli.shared.commands import COMMANDS, GROUPS
+from colibri.cli.shared.parser import parser_of
+from colibri.cli.shared.processes import PROCESSES
+from colibri.plant.__main__ import command_line as plant_command_line
+from tools.pages.tables import code
+
+_HEAD = """# Commands and options
+
+`colibri COMMAND --help` says the same on a terminal. Written by `python -m tools.pages reference.command_line docs`
+from the parsers themselves; a test holds that they agree.
+"""
+_TAIL = """## Environment and exit codes
+
+| variable | what it does |
+|---|---|
+| `NO_COLOR` | set to anything: no colours on the terminal |
+| `NUMBA_CACHE_DIR` | a folder for machine code, where no usual one can be written to ([install.md](install.md)) |
+
+Exit codes: 0 it went well; 1 something failed, and one line says what; 2 bad input, and one line says what to do;
+130 interrupted.
+"""
+
+
+class _Listener(HelpFormatter):
+    """Takes down the arguments that a parser has, in place of formatting them."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog)
+        self.heard: list[Action] = []
+
+    def add_argument(self, action: Action) -> None:
+        """Take it down."""
+        self.heard.append(action)
+
+
+def arguments_of(parser: ArgumentParser) -> list[Action]:
+    """Return the arguments of a parser in the order of its help."""
+    listener = _Listener(parser.prog)
+    parser.formatter_class = lambda prog: listener  # noqa: ARG005
+    parser.format_help()
+    return [action for action in listener.heard if action.help != SUPPRESS]
+
+
+def parsers() -> dict[str, ArgumentParser]:
+    """Return the parser of each command by its name, the two processes last."""
+    whole = parser_of(*COMMANDS)
+    (commands,) = [action.choices for action in arguments_of(whole) if isinstance(action.choices, dict)]
+    found = {name: commands[name] for name in COMMANDS}
+    return {**found, "plant": plant_command_line(), "autopilot": autopilot_command_line()}
+
+
+def page() -> str:
+    """Return the page."""
+    known = parsers()
+    lines = [_HEAD]
+    for group, commands in GROUPS.items():
+        lines += [f"- **{group}**: " + ", ".join(f"[`{name}`](#colibri-{name})" for name in commands)]
+    lines += [
+        "- **the two processes of a flight**: " + ", ".join(f"[`{name}`](#colibri-{name})" for name in PROCESSES),
+        "",
+    ]
+    for name, parser in known.items():
+        lines += _section(name, parser)
+    return "\n".join([*lines, _TAIL])
+
+
+def _section(name: str, parser: ArgumentParser) -> Iterator[str]:
+    does = COMMANDS[name].does if name in COMMANDS else PROCESSES[name]
+    yield f"## colibri {name}\n"
+    yield f"{does[0].upper()}{does[1:]}.\n"
+    if name in COMMANDS:
+        yield f"```sh\n{dedent(COMMANDS[name].examples).strip()}\n```\n"
+    yield "| | |\n|---|---|"
+    for action in arguments_of(parser):
+        if action.dest != "help":
+            yield f"| {_names(action)} | {_help(action, parser)} |"
+    yield ""
+
+
+def _names(action: Action) -> str:
+    values = action.metavar
+    if values is None and action.choices is not None:
+        values = "|".join(map(str, action.choices))
+    if values is None and action.nargs != 0:
+        values = action.dest.upper()
+    shown = " ".join(values) if isinstance(values, tuple) else str(values or "")
+    return code(" ".join(filter(None, [", ".join(action.option_strings), shown])))
+
+
+def _help(action: Action, parser: ArgumentParser) -> str:
+    values = {**vars(action), "prog": parser.prog}
+    said = (action.help or "") % values
+    return " ".join(said.split()).replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
+
+
+def write(folder: Path) -> None:
+    """Write the page."""
+    (folder / "cli.md").write_text(page(), encoding="utf-8")

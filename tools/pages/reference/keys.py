@@ -1,0 +1,194 @@
+"""`profile-keys.md` and `vehicle-keys.md`: every key of the two kinds of files, from the structures that read them."""
+
+import ast
+import re
+from collections.abc import Callable, Iterator
+from inspect import cleandoc, getsource
+from pathlib import Path
+from textwrap import dedent
+from typing import Any
+
+import msgspec
+from msgspec.inspect import (
+    CustomType,
+    DictType,
+    Field,
+    FloatType,
+    IntType,
+    LiteralType,
+    Metadata,
+    NoneType,
+    StructType,
+    TupleType,
+    Type,
+    UnionType,
+    VarTupleType,
+)
+
+from colibri.autopilot.control.geometric import GeometricSettings
+from colibri.autopilot.control.lpv_mpc.law import LpvMpcSettings
+from colibri.autopilot.control.profile import ProfileTables, profile_names, profile_text
+from colibri.autopilot.control.thesis.cascade import CascadeSettings
+from colibri.autopilot.control.thesis.global_mpc import GlobalSettings
+from colibri.autopilot.control.whole_lpv_mpc.law import WholeLpvMpcSettings
+from colibri.plant.vehicle.description import Vehicle, vehicle_names, vehicle_text
+
+LAWS: dict[str, Any] = {
+    "whole-lpv-mpc": WholeLpvMpcSettings,
+    "lpv-mpc": LpvMpcSettings,
+    "geometric-se3": GeometricSettings,
+    "cascade": CascadeSettings,
+    "global-lpv-mpc": GlobalSettings,
+}
+_PROFILES = """# Keys of a profile
+
+A profile is a TOML file: `colibri show profile flight > mine.toml`, changed, is flown by `--profile mine.toml`
+([vehicles.md](vehicles.md)). Keys that are not listed here, and what is out of range, are refused by file and key.
+Those without "may be left out" must be there. The example is of the first of Colibri's profiles that has the key.
+Written by `python -m tools.pages reference.keys docs` from the structures that read the files; a test holds that
+they agree.
+"""
+_VEHICLES = """# Keys of a vehicle
+
+A vehicle is a TOML file: `colibri show vehicle hummingbird > mine.toml`, changed, is flown by `--vehicle
+mine.toml`, or with `--plant-vehicle mine.toml` by an autopilot that is not told ([vehicles.md](vehicles.md)). Keys
+that are not listed here, and what is out of range, are refused by file and key. What may be left out is not
+modelled then. The example is of the first of Colibri's vehicles that has the key. Written by `python -m tools.pages
+reference.keys docs` from the structures that read the files; a test holds that they agree.
+"""
+_HEADINGS = "| key | what may be there | for example | what it is |\n|---|---|---|---|"
+_SOURCE = re.compile(r"^\s*([\w-]+)\s*=\s*(.+?)\s*(?:#\s*(.*))?$")
+_MORE = re.compile(r"^\s{12,}#\s*(.*)$")
+_BOUNDS = {"gt": "above", "ge": "from", "lt": "below", "le": "to"}
+
+
+def pages() -> dict[str, str]:
+    """Return the pages by their names."""
+    profiles = _said("flight", profile_names(), profile_text)
+    vehicles = _said("hummingbird", vehicle_names(), vehicle_text)
+    sections = [_PROFILES, *_sections(ProfileTables, "", profiles)]
+    for law, settings in LAWS.items():
+        sections += _sections(settings, f"controllers.{law}", profiles)
+    return {
+        "profile-keys.md": "\n".join(sections),
+        "vehicle-keys.md": "\n".join([_VEHICLES, *_sections(Vehicle, "", vehicles)]),
+    }
+
+
+def _said(first: str, names: list[str], text_of: Callable[[str], str]) -> dict[str, tuple[str, str, str]]:
+    """Return of each dotted key its value, its comment, and the name of its file: `first`, or the first that has it."""
+    found: dict[str, tuple[str, str, str]] = {}
+    for name in sorted(names, key=lambda name: name != first):
+        table = key = ""
+        for line in text_of(name).splitlines():
+            if heading := re.match(r"\s*\[([\w.-]+)\]", line):
+                table, key = heading[1], ""
+            elif entry := _SOURCE.match(line):
+                key = f"{table}.{entry[1]}".lstrip(".")
+                if key in found:
+                    key = ""
+                else:
+                    found[key] = (entry[2], entry[3] or "", name)
+            elif key and (more := _MORE.match(line)):
+                value, comment, where = found[key]
+                found[key] = (value, f"{comment} {more[1]}", where)
+    return found
+
+
+def _sections(kind: Any, above: str, said: dict[str, tuple[str, str, str]]) -> Iterator[str]:
+    """Yield the section of a table, then those of the tables in it."""
+    info = msgspec.inspect.type_info(kind)
+    assert isinstance(info, StructType)
+    yield f"## {_heading(above)}\n"
+    yield f"{_first_line(kind)}\n"
+    notes, inner = _notes(kind), []
+    rows = [_HEADINGS]
+    for field in info.fields:
+        key = f"{above}.{field.encode_name}".lstrip(".")
+        table = _table_of(field.type)
+        if table is not None:
+            inner.append((table, key))
+        what = "a table, below" if table is not None else _what(field.type)
+        value, comment, where = said.get(key, ("", "", ""))
+        note = notes.get(field.name) or comment or (_first_line(table) if table is not None else "")
+        shown = f"`{value}` ({where})" if value else ""
+        rows.append(f"| `{field.encode_name}` | {what}{_optional(field)} | {_cell(shown)} | {_cell(note)} |")
+    yield "\n".join(rows) + "\n"
+    for table, key in inner:
+        yield from _sections(table, key, said)
+
+
+def _heading(above: str) -> str:
+    return f"`[{above}]`" if above else "Top of the file"
+
+
+def _optional(field: Field) -> str:
+    if field.required:
+        return ""
+    default = field.default
+    shown = "" if default in (None, "") else f": {list(default) if isinstance(default, tuple) else default}"
+    return f"; may be left out{shown}"
+
+
+def _first_line(kind: Any) -> str:
+    return cleandoc(kind.__doc__).partition("\n\n")[0].replace("\n", " ")
+
+
+def _table_of(kind: Type) -> Any:
+    """Return the structure that a key holds; None where it holds none."""
+    parts = kind.types if isinstance(kind, UnionType) else (kind,)
+    return next((part.cls for part in parts if isinstance(part, StructType)), None)
+
+
+def _what(kind: Type) -> str:
+    """Return in words which values are right."""
+    match kind:
+        case Metadata():
+            return _what(kind.type)
+        case FloatType() | IntType():
+            limits = [(word, getattr(kind, name)) for name, word in _BOUNDS.items()]
+            bounds = [f"{word} {limit:g}" for word, limit in limits if limit is not None]
+            return " ".join(["whole number" if isinstance(kind, IntType) else "number", *bounds])
+        case LiteralType():
+            return " or ".join(f"`{value}`" for value in kind.values)
+        case TupleType():
+            each = {_what(item): None for item in kind.item_types}
+            return f"{len(kind.item_types)} of: {', '.join(each)}"
+        case VarTupleType():
+            return f"list of: {_what(kind.item_type)}"
+        case UnionType():
+            return " or ".join(_what(part) for part in kind.types if not isinstance(part, NoneType))
+        case DictType():
+            return "tables"
+        case CustomType():
+            return kind.cls.__name__
+    return "yes or no: `true`, `false`" if type(kind).__name__ == "BoolType" else "text"
+
+
+def _notes(kind: Any) -> dict[str, str]:
+    """Return the docstring below each field of a structure and of those it derives from."""
+    notes: dict[str, str] = {}
+    for part in reversed(kind.__mro__):
+        if not part.__module__.startswith("colibri."):
+            continue
+        (tree,) = ast.parse(dedent(getsource(part))).body
+        assert isinstance(tree, ast.ClassDef)
+        for field, below in zip(tree.body, tree.body[1:], strict=False):
+            if (
+                isinstance(field, ast.AnnAssign)
+                and isinstance(below, ast.Expr)
+                and isinstance(below.value, ast.Constant)
+            ):
+                assert isinstance(field.target, ast.Name)
+                notes[field.target.id] = " ".join(str(below.value.value).split())
+    return notes
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def write(folder: Path) -> None:
+    """Write the pages."""
+    for name, page in pages().items():
+        (folder / name).write_text(page, encoding="utf-8")

@@ -1,0 +1,126 @@
+"""`messages.md`: what the vehicle streams, takes and obeys, from its tables and from the classes of its services."""
+
+import ast
+import pkgutil
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from inspect import getdoc, getmembers, getsource, isclass
+from pathlib import Path
+from types import ModuleType
+
+import colibri.mavlink as mavlink_package
+from colibri.autopilot.commander import commands, motion_commands
+from colibri.autopilot.ground import stations, system_commands
+from colibri.mavlink.mission.service import MissionService, Vehicle
+from colibri.mavlink.services import standard_modes
+from colibri.mavlink.services.statustext import StatusText
+from colibri.mavlink.streaming import service as streaming_service
+from colibri.mavlink.streaming.rates import DEFAULTS, GCS, HZ, SDK
+from colibri.mavlink.telemetry import attitude, controller, position, power, sensors, status
+from colibri.mavlink.wire.dialect import mav
+
+_HEAD = """# Messages
+
+What a vehicle of `colibri sitl` streams, takes and obeys. How clients use it:
+[ground-stations.md](ground-stations.md); setpoints, sticks and targets are those of PX4. Between plant and
+autopilot it is the messages of [lockstep.md](lockstep.md). Written by `python -m tools.pages reference.messages
+docs` from the tables and services themselves; a test holds that they agree.
+
+## Streamed
+
+At rates that a client changes by SET_MESSAGE_INTERVAL or REQUEST_DATA_STREAM; REQUEST_MESSAGE asks for one. *SDK*
+and *GCS*: messages a second on links to SDKs (ports 14540 to 14549) and to ground stations; `-`: when asked for.
+"""
+_OBEYED = """
+## Commands obeyed
+
+As COMMAND_LONG or COMMAND_INT; any other, and a request for what the vehicle has not, is answered by UNSUPPORTED.
+"""
+_TELEMETRY = (attitude, controller, position, power, sensors, status)
+_HANDLERS = (commands, motion_commands, stations, streaming_service, standard_modes, system_commands)
+
+
+def page() -> str:
+    """Return the page."""
+    return "\n".join(
+        [
+            _HEAD,
+            "| message | SDK | GCS | what is in it |",
+            "|---|---:|---:|---|",
+            *_streamed(),
+            "\n## Taken\n\n| messages | what takes them |\n|---|---|",
+            *_taken(),
+            _OBEYED,
+            "| command | number |\n|---|---:|",
+            *(f"| `{command}` | {getattr(mav, command)} |" for command in sorted(obeyed())),
+            "",
+        ]
+    )
+
+
+def _streamed() -> Iterator[str]:
+    for name in sorted(DEFAULTS[SDK].keys() | DEFAULTS[GCS].keys()):
+        encoder = next(getattr(module, name.lower()) for module in _TELEMETRY if hasattr(module, name.lower()))
+        meaning = " ".join((getdoc(encoder) or "").split()).removeprefix(name).lstrip()
+        yield f"| `{name}` | {_rate(SDK, name)} | {_rate(GCS, name)} | {_cell(meaning)} |"
+
+
+def _rate(kind: str, name: str) -> str:
+    interval_us = DEFAULTS[kind].get(name)
+    return f"{HZ / interval_us:g}" if interval_us else "-"
+
+
+def _taken() -> Iterator[str]:
+    by_service: dict[str, list[str]] = {}
+    for message, service in sorted(taken().items()):
+        by_service.setdefault(service, []).append(f"`{message}`")
+    for service, messages in by_service.items():
+        yield f"| {', '.join(messages)} | {_cell(service)} |"
+
+
+def taken() -> dict[str, str]:
+    """Return who takes each message that a vehicle takes: the first sentence of the service."""
+    found: dict[str, str] = {}
+    for module in _modules(mavlink_package):
+        for _, kind in getmembers(module, isclass):
+            handles = getattr(kind, "handles", None)
+            if kind.__module__ == module.__name__ and isinstance(handles, frozenset):
+                found |= dict.fromkeys(handles, (getdoc(kind) or "").partition("\n\n")[0].replace("\n", " "))
+    nowhere = Vehicle(*([lambda *_: None] * len(Vehicle._fields)))  # type: ignore[arg-type]
+    plans = MissionService({}, nowhere, StatusText())
+    doc = (getdoc(MissionService) or "").partition(":")[0] + "."
+    return found | dict.fromkeys(plans.handles, doc)
+
+
+def _modules(package: ModuleType) -> Iterator[ModuleType]:
+    for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        yield import_module(info.name)
+
+
+def obeyed() -> set[str]:
+    """Return the names of the commands for which there is a handler."""
+    found: set[str] = set()
+    for module in _HANDLERS:
+        tree = ast.parse(getsource(module))
+        handlers = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+        for node in (part for of in handlers if of.name.strip("_") == "handlers" for part in ast.walk(of)):
+            if isinstance(node, ast.Attribute) and node.attr.startswith("MAV_CMD_"):
+                found.add(node.attr)
+        found |= {
+            str(node.value) for node in ast.walk(tree) if isinstance(node, ast.Constant) and _is_command(node.value)
+        }
+    return found
+
+
+def _is_command(value: object) -> bool:
+    return isinstance(value, str) and re.fullmatch("MAV_CMD_[A-Z0-9_]+", value) is not None
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def write(folder: Path) -> None:
+    """Write the page."""
+    (folder / "messages.md").write_text(page(), encoding="utf-8")

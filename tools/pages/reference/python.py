@@ -1,0 +1,119 @@
+"""`python-api.md`: the public names of the packages, from their signatures and docstrings."""
+
+import inspect
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+FACES = ("colibri", "colibri.sitl")
+_HEAD = """# Python
+
+What `colibri` and `colibri.sitl` make public, from their docstrings: how to use it is in [python.md](python.md),
+[campaigns.md](campaigns.md), [controllers.md](controllers.md) and [scenarios.md](scenarios.md). The other packages
+name what is public in their `__init__` ([design.md](design.md)). Written by `python -m tools.pages reference.python
+docs`; a test holds that it agrees.
+"""
+_SECTION = re.compile(r"^(Args|Returns|Raises|Yields|Attributes):$")
+_ENTRY = re.compile(r"^    (\*{0,2}\w+)(?: \(.*?\))?: (.*)$")
+
+
+def page() -> str:
+    """Return the page."""
+    lines = [_HEAD]
+    shown: set[int] = set()
+    for face in FACES:
+        package = import_module(face)
+        lines += [f"## {face}\n", f"{inspect.getdoc(package)}\n"]
+        for name in sorted(package.__all__, key=str.lower):
+            thing = getattr(package, name)
+            if id(thing) not in shown:
+                shown.add(id(thing))
+                lines += _thing(name, thing)
+    return "\n".join(lines)
+
+
+def _thing(name: str, thing: Any) -> Iterator[str]:
+    if not (inspect.isclass(thing) or inspect.isfunction(thing)):
+        yield f"### {name}\n\nA type: `{thing}`.\n"
+        return
+    yield f"### {name}\n"
+    if inspect.isfunction(thing):
+        yield f"```\n{_signature(name, thing)}\n```\n"
+    yield _text(inspect.getdoc(thing) or "")
+    if inspect.isclass(thing):
+        yield from _members(thing)
+
+
+def _members(kind: type) -> Iterator[str]:
+    """Yield what of a class of ours is public and says what it is: methods and properties, its own and inherited."""
+    rows = []
+    for name, member in inspect.getmembers(kind):
+        owner = next((base for base in kind.__mro__ if name in vars(base)), kind)
+        if name.startswith("_") or not owner.__module__.startswith("colibri."):
+            continue
+        if inspect.isfunction(member) or inspect.ismethod(member):
+            shown = _signature(name, member)
+        elif isinstance(member, property) or type(member).__name__ == "cached_property":
+            shown = name
+        else:
+            continue
+        said = _sentence(inspect.getdoc(member) or "")
+        if said:
+            rows.append(f"| `{_cell(shown)}` | {_cell(said)} |")
+    if rows:
+        yield "| | |\n|---|---|\n" + "\n".join(rows) + "\n"
+
+
+def _signature(name: str, function: Any) -> str:
+    """Return how it is called: names and defaults; types are in the docstrings where they matter."""
+    parts, star = [], False
+    for parameter in inspect.signature(function).parameters.values():
+        if parameter.name == "self":
+            continue
+        if parameter.kind is parameter.KEYWORD_ONLY and not star:
+            parts.append("*")
+            star = True
+        star = star or parameter.kind is parameter.VAR_POSITIONAL
+        prefix = {"VAR_POSITIONAL": "*", "VAR_KEYWORD": "**"}.get(parameter.kind.name, "")
+        default = "" if parameter.default is parameter.empty else f"={_default(parameter.default)}"
+        parts.append(f"{prefix}{parameter.name}{default}")
+    return f"{name}({', '.join(parts)})"
+
+
+def _default(value: object) -> str:
+    plain = value is None or isinstance(value, bool | int | float | str | tuple)
+    return repr(value) if plain and not re.search(" at 0x", repr(value)) else "..."
+
+
+def _sentence(doc: str) -> str:
+    return " ".join(doc.partition("\n\n")[0].split())
+
+
+def _text(doc: str) -> str:
+    """Return a docstring as Markdown: its sections as lists."""
+    lines: list[str] = []
+    in_section = False
+    for line in doc.splitlines():
+        section, entry = _SECTION.match(line), _ENTRY.match(line)
+        if section:
+            in_section = True
+            lines += [f"*{section[1]}*", ""]
+        elif in_section and entry:
+            lines.append(f"- `{entry[1]}`: {entry[2]}")
+        elif in_section and line.startswith("        "):
+            lines[-1] += f" {line.strip()}"
+        else:
+            in_section = in_section and (not line or line.startswith(" "))
+            lines.append(line.strip() if in_section else line)
+    return "\n".join(lines) + "\n"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def write(folder: Path) -> None:
+    """Write the page."""
+    (folder / "python-api.md").write_text(page(), encoding="utf-8")
