@@ -119,7 +119,7 @@ def test_a_file_that_is_no_mission_is_refused(text: str, tmp_path: Path) -> None
 
 def test_a_vehicle_says_where_its_home_is_and_a_mission_is_flown_from_there(tmp_path: Path) -> None:
     with Flights(Setting(), None) as flights:
-        sitl = flights.begin()
+        sitl = flights.begin(airborne=2.5)
         port, seeker = Port(sitl), HomeSeeker(VehiclePeer())
         while seeker.home is None:
             assert sitl.time_s < 10.0
@@ -131,7 +131,7 @@ def test_a_vehicle_says_where_its_home_is_and_a_mission_is_flown_from_there(tmp_
         given = mission.waypoints(seeker.home)
         assert given.points_enu_m == pytest.approx(np.array(PLACES), abs=0.03)
         flown = track_through(given, load_vehicle("hummingbird"), load_profile("flight"), seeker.home.up_m).track
-        ride = Ride(sitl, flown, CompanionSettings(may_arm=True, takeoff_height_m=mission.takeoff_m))
+        ride = Ride(sitl, flown, CompanionSettings())
         ride.to_the_end(40.0)
         ended = ride.companion.ended
         assert ended
