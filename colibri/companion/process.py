@@ -9,15 +9,18 @@ from typing import Any, NamedTuple, TextIO
 
 from colibri.analysis.report import length, write_report
 from colibri.autopilot.control.profile import Profile, load_profile
-from colibri.autopilot.guidance.trajectories.loading import load_track
+from colibri.autopilot.guidance.trajectories.loading import load_track, track_through
 from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.errors import Error
 from colibri.common.process.lifecycle import EXIT_FAILED, Stop, fail, gc_frozen
 from colibri.common.process.status import Status
 from colibri.common.types import Address
+from colibri.companion.conversation.home import Home, HomeSeeker
+from colibri.companion.conversation.vehicle_peer import VehiclePeer
 from colibri.companion.errors import CompanionError
 from colibri.companion.guide import Companion
 from colibri.companion.log import FlightSummary, LogRow
+from colibri.companion.plan_file import SUFFIX, MissionPlan, read_plan
 from colibri.companion.report import report
 from colibri.companion.response_file import read_response
 from colibri.companion.settings import CompanionSettings, SetpointKind
@@ -43,6 +46,18 @@ class Plan(NamedTuple):
     vehicle: Vehicle
     track: Track
     note: str
+    mission: MissionPlan | None = None
+
+    def from_home(self, home: Home) -> "Plan":
+        """Return the same plan with its mission flown from a vehicle's home.
+
+        Raises:
+            Error: It cannot be flown from there.
+        """
+        if self.mission is None:
+            return self
+        loaded = track_through(self.mission.waypoints(home), self.vehicle, self.profile, home.up_m)
+        return self._replace(track=loaded.track, note=loaded.note or self.mission.note)
 
 
 def plan_of(args: Namespace) -> Plan:
@@ -53,7 +68,12 @@ def plan_of(args: Namespace) -> Plan:
     """
     profile = load_profile(args.profile).with_choices(args.controller, None)
     vehicle = load_vehicle(args.model or profile.simulation.vehicle)
-    track, note = load_track(_track_name(args), vehicle, profile)
+    name = _track_name(args)
+    mission = read_plan(Path(name)) if name.endswith(SUFFIX) else None
+    if mission is not None:
+        track, note = track_through(mission.waypoints(mission.planned_home), vehicle, profile, 0.0)
+    else:
+        track, note = load_track(name, vehicle, profile)
     response, thrust_scale = read_response(Path(args.response)) if args.response else (None, 1.0)
     if args.arm and args.dry_run:
         raise CompanionError("--dry-run arms nothing: leave --arm out")
@@ -61,7 +81,7 @@ def plan_of(args: Namespace) -> Plan:
         may_arm=args.arm,
         dry_run=args.dry_run,
         duration_s=args.duration,
-        takeoff_height_m=args.height,
+        takeoff_height_m=args.height or (mission.takeoff_m if mission else None),
         gives_up_s=args.wait,
         limits=FlightLimits(
             margin_m=args.margin,
@@ -77,7 +97,7 @@ def plan_of(args: Namespace) -> Plan:
         identifies=args.identify,
         thrust_scale=thrust_scale,
     )
-    return Plan(settings, profile, vehicle, track, note)
+    return Plan(settings, profile, vehicle, track, note, mission)
 
 
 def _track_name(args: Namespace) -> str:
@@ -101,23 +121,30 @@ def fly(args: Namespace) -> int:
         plan = plan_of(args)
         signing = _signing(args.signing_key)
         check_reach([args.vehicle], signed=signing is not None, insecure=args.insecure)
-        companion = Companion(plan.settings, plan.profile, plan.vehicle, plan.track, perf_counter)
-        link = open_ground_link(args.vehicle)
+        wire = _Wire(open_ground_link(args.vehicle))
     except Error as error:
+        fail(str(error))
+    stop = Stop()
+    try:
+        if plan.mission is not None:
+            plan = plan.from_home(_seek_home(wire, signing, args.wait, stop))
+        companion = Companion(plan.settings, plan.profile, plan.vehicle, plan.track, perf_counter)
+    except Error as error:
+        wire.link.close()
         fail(str(error))
     companion.peer.sign_with(signing)
     status = _Quiet() if args.quiet else Status("companion", as_json=False)
     if plan.note:
         status.say("note", plan.note)
     with occupied(args.out):
-        stop, summary = Stop(), FlightSummary()
+        summary = FlightSummary()
         try:
             with (args.out / LOG).open("w", newline="", encoding="utf-8") as file, gc_frozen():
-                serve(companion, link, status, stop, _Log(file, summary))
+                serve(companion, wire, status, stop, _Log(file, summary))
         except Error as error:
             fail(str(error), EXIT_FAILED)
         finally:
-            link.close()
+            wire.link.close()
         given = _given(args, plan)
         figures = report(companion, summary, given)
         write_report(figures, args.out / REPORT)
@@ -126,29 +153,68 @@ def fly(args: Namespace) -> int:
     return _end(companion, figures, status, args.out)
 
 
-def serve(companion: Companion, link: GroundLink, status: Status, stop: Stop, log: "_Log") -> None:
+class _Wire:
+    """The link to one vehicle, which is wherever it was last heard from."""
+
+    def __init__(self, link: GroundLink) -> None:
+        self.link = link
+        self._address: Address | None = link.target
+
+    def receive(self) -> list[bytes]:
+        """Return what has come."""
+        received = []
+        for datagram, sender in self.link.receive_now():
+            received.append(datagram)
+            self._address = sender
+        for opened in self.link.take_opened():
+            self._address = self._address or opened
+        if self._address in self.link.take_closed():
+            self._address = None
+        return received
+
+    def send(self, frames: list[bytes]) -> None:
+        """Send frames, if it is known where to."""
+        for frame in frames:
+            if self._address is not None:
+                self.link.send(frame, None if self.link.target == self._address else self._address)
+
+
+def _seek_home(wire: _Wire, signing: Signing | None, wait_s: float, stop: Stop) -> Home:
+    """Return the vehicle's home, once it has said where that is.
+
+    Raises:
+        CompanionError: It has not, for so long.
+        LinkError: The vehicle can never be reached.
+    """
+    peer = VehiclePeer()
+    peer.sign_with(signing)
+    seeker, began_s = HomeSeeker(peer), perf_counter()
+    while seeker.home is None:
+        now_s = perf_counter() - began_s
+        if stop or now_s > wait_s:
+            raise CompanionError("a mission is flown from the vehicle's home, and it has not said where that is")
+        for datagram in wire.receive():
+            seeker.receive(datagram, round(now_s * 1e6))
+        wire.send(seeker.poll(round(now_s * 1e6)))
+        wire.link.wait(_POLL_S)
+    return seeker.home
+
+
+def serve(companion: Companion, wire: _Wire, status: Status, stop: Stop, log: "_Log") -> None:
     """Fly until the companion has ended.
 
     Raises:
         LinkError: The vehicle can never be reached.
     """
     began_s = perf_counter()
-    address: Address | None = link.target
     tell_s, told = _SAY_FAILING_EVERY_S, list[str]()
     while companion.ended is None:
         now_us = round((perf_counter() - began_s) * 1e6)
         if stop:
             companion.stop("interrupted: the vehicle is handed over")
-        for datagram, sender in link.receive_now():
+        for datagram in wire.receive():
             companion.receive(datagram, now_us)
-            address = sender
-        for opened in link.take_opened():
-            address = address or opened
-        if address in link.take_closed():
-            address = None
-        for frame in companion.poll(now_us):
-            if address is not None:
-                link.send(frame, None if link.target == address else address)
+        wire.send(companion.poll(now_us))
         log.write(companion)
         for line in companion.said:
             status.say("phase", line)
@@ -159,7 +225,7 @@ def serve(companion: Companion, link: GroundLink, status: Status, stop: Stop, lo
             tell_s, told = now_us * 1e-6 + _SAY_FAILING_EVERY_S, companion.waits_for
             for line in told:
                 status.say("waits", line)
-        link.wait(_POLL_S)
+        wire.link.wait(_POLL_S)
 
 
 class _Log:

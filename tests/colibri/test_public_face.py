@@ -16,7 +16,7 @@ FACES = (
     *("colibri.analysis", "colibri.autopilot", "colibri.campaigns", "colibri.common", "colibri.companion"),
     "colibri.conformance",
     *("colibri.experiments", "colibri.flights", "colibri.mavlink"),
-    *("colibri.plant", "colibri.sitl", "colibri.tuning"),
+    *("colibri.plant", "colibri.sitl", "colibri.tuning", "colibri.view"),
 )
 PACKAGES = (
     *FACES,

@@ -11,6 +11,7 @@ from colibri.autopilot.guidance.trajectories.reach import Reach, exact_motion
 from colibri.autopilot.guidance.trajectories.registry import TrackError, read_options, track
 from colibri.autopilot.guidance.trajectories.time_optimal.fastest import fastest
 from colibri.autopilot.guidance.trajectories.tracks import DURATION_S, OPTIONS, SamplesFile, Track, WaypointFile
+from colibri.autopilot.guidance.trajectories.waypoint_file import Waypoints
 from colibri.plant.vehicle.description import Vehicle
 
 
@@ -42,20 +43,34 @@ def load_track(name: str, vehicle: Vehicle, profile: Profile, floor_m: float | N
         TrackError: There is no such track, its file cannot be flown, or it leads below the floor.
     """
     found = track(name)
-    as_fast_as_can_be = found.waypoints is not None and found.waypoints.fastest
-    reach = Reach(vehicle, profile, exact_drag=as_fast_as_can_be)
-    floor = (-inf if vehicle.ground is None else 0.0) if floor_m is None else floor_m
     if found.waypoints is not None:
-        try:
-            fitted, changed = (fastest if as_fast_as_can_be else fit)(found.waypoints, reach, floor)
-        except TrackFileError as error:
-            raise TrackError(str(error)) from error
-        return LoadedTrack(fitted, f"{found.waypoints.path}: {changed}" if changed else "")
+        return track_through(found.waypoints, vehicle, profile, floor_m)
+    reach, floor = Reach(vehicle, profile, exact_drag=False), _floor(vehicle, floor_m)
     for time_s, height_m in dips_of(found, floor):
         raise TrackError(f"track {name} is at {height_m:.2f} m after {time_s:.2f} s, below the floor of {floor:g} m")
     demands = reach.demands(exact_motion(found), reach.charge_of_hover(min(found.duration_s, DURATION_S)))
     beyond = [str(demand) for demand in demands if demand.excess(0.0).max() > 1.0]
     return LoadedTrack(found, f"track {name} asks for more than there is: {'; '.join(beyond)}" if beyond else "")
+
+
+def track_through(
+    waypoints: Waypoints, vehicle: Vehicle, profile: Profile, floor_m: float | None = None
+) -> LoadedTrack:
+    """Return the track through waypoints as `vehicle` will fly it under `profile`; as `load_track` does.
+
+    Raises:
+        TrackError: They cannot be flown.
+    """
+    reach = Reach(vehicle, profile, exact_drag=waypoints.fastest)
+    try:
+        fitted, changed = (fastest if waypoints.fastest else fit)(waypoints, reach, _floor(vehicle, floor_m))
+    except TrackFileError as error:
+        raise TrackError(str(error)) from error
+    return LoadedTrack(fitted, f"{waypoints.path}: {changed}" if changed else "")
+
+
+def _floor(vehicle: Vehicle, floor_m: float | None) -> float:
+    return (-inf if vehicle.ground is None else 0.0) if floor_m is None else floor_m
 
 
 def file_text(name: str) -> str | None:

@@ -81,12 +81,22 @@ def read_waypoints(
     return Waypoints(path, times_s, points, looks, timed, fastest, MARGIN if margin is None else margin)
 
 
-def _times(table: CsvTable, points: Array, speed_m_s: float) -> Array:
-    steps = np.diff(points, axis=0)
-    legs_s = np.sqrt((steps * steps).sum(axis=1)) / speed_m_s
-    for row in np.flatnonzero(legs_s < MIN_LEG_S)[:1] + 1:
-        raise table.error(row, "x", f"less than {MIN_LEG_S:g} s from the line before at {speed_m_s:g} m/s")
+def leg_times(points_enu_m: Array, speed_m_s: float) -> Array:
+    """Return when to be at points, s, (n,), at a speed on average, and half of it on the first and the last leg."""
+    legs_s = _legs(points_enu_m, speed_m_s)
     legs_s[[0, -1]] *= 2.0
-    times_s = np.concatenate([[0.0], np.cumsum(legs_s)])
+    return np.concatenate([[0.0], np.cumsum(legs_s)])
+
+
+def _legs(points: Array, speed_m_s: float) -> Array:
+    steps = np.diff(points, axis=0)
+    legs_s: Array = np.sqrt((steps * steps).sum(axis=1)) / speed_m_s
+    return legs_s
+
+
+def _times(table: CsvTable, points: Array, speed_m_s: float) -> Array:
+    for row in np.flatnonzero(_legs(points, speed_m_s) < MIN_LEG_S)[:1] + 1:
+        raise table.error(row, "x", f"less than {MIN_LEG_S:g} s from the line before at {speed_m_s:g} m/s")
+    times_s = leg_times(points, speed_m_s)
     table.check_duration("x", times_s)
     return times_s

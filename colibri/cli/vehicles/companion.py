@@ -12,7 +12,8 @@ from colibri.experiments.options import TRACK_HELP
 def add_options(parser: ArgumentParser) -> None:
     """Add the options of `colibri companion`."""
     add = parser.add_argument
-    add("track", metavar="TRACK", nargs="?", help=TRACK_HELP)
+    mission = "or FILE.plan, a mission of QGroundControl: its waypoints, from the vehicle's home"
+    add("track", metavar="TRACK", nargs="?", help=f"{TRACK_HELP}; {mission}")
     add(
         "--vehicle",
         required=True,

@@ -3,6 +3,7 @@
 from math import nan
 from typing import Any
 
+from colibri.common.earth.geodesy import Geodetic
 from colibri.mavlink.wire.dialect import MODE_ARMED, Message, bits, mav, sequence_of
 
 _OLDER_FROM = 128
@@ -18,6 +19,7 @@ _AHRS: int = mav.MAV_SYS_STATUS_AHRS
 _FENCE: int = mav.MAV_SYS_STATUS_GEOFENCE
 _PERCENT = 100.0
 _MM = 1e-3
+_DEGREES = 1e-7
 _UNKNOWN_LANDED: int = mav.MAV_LANDED_STATE_UNDEFINED
 
 
@@ -37,6 +39,8 @@ class VehicleReport:
         prearm_ok: Whether it could be armed; None where it does not say.
         fence_breached: Whether it is beyond its fence.
         altitude_amsl_m: Height above the sea; nan where it is not known.
+        home: Where its home is; None before it says so.
+        origin: Where the origin of its local frame is; None before it says so.
         texts: STATUSTEXT lines.
     """
 
@@ -55,6 +59,8 @@ class VehicleReport:
         self.prearm_ok: bool | None = None
         self.fence_breached = False
         self.altitude_amsl_m = nan
+        self.home: Geodetic | None = None
+        self.origin: Geodetic | None = None
         self.texts: list[str] = []
         self._told = 0
         self._sequence: int | None = None
@@ -100,6 +106,10 @@ class VehicleReport:
                 )
             case "GLOBAL_POSITION_INT":
                 self.altitude_amsl_m = fields.alt * _MM
+            case "HOME_POSITION":
+                self.home = _geodetic(fields)
+            case "GPS_GLOBAL_ORIGIN":
+                self.origin = _geodetic(fields)
             case "STATUSTEXT":
                 self.texts.append(fields.text)
 
@@ -124,3 +134,7 @@ class VehicleReport:
         self.fence_breached = bool(watched) and not fields.onboard_control_sensors_health & _FENCE
         if fields.battery_remaining >= 0:
             self.battery = fields.battery_remaining / _PERCENT
+
+
+def _geodetic(fields: Any) -> Geodetic:
+    return Geodetic(fields.latitude * _DEGREES, fields.longitude * _DEGREES, fields.altitude * _MM)

@@ -7,6 +7,7 @@ from colibri.autopilot.control.interface import Clock, Controller
 from colibri.autopilot.control.profile import load_profile
 from colibri.autopilot.control.registry import load_controller
 from colibri.autopilot.guidance.trajectories.loading import load_track
+from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.companion.guide import Companion
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.supervision.phases import Phase
@@ -57,7 +58,7 @@ class Ride(Generic[Flown]):
     def __init__(
         self,
         sitl: Flown,
-        track: str = "spiral",
+        track: str | Track = "spiral",
         settings: CompanionSettings | None = None,
         *,
         trouble: Trouble | None = None,
@@ -66,7 +67,7 @@ class Ride(Generic[Flown]):
     ) -> None:
         self.sitl: Flown = sitl
         loaded, vehicle = load_profile(profile), load_vehicle("hummingbird")
-        path = load_track(track, vehicle, loaded).track
+        path = load_track(track, vehicle, loaded).track if isinstance(track, str) else track
         settings = settings or CompanionSettings(may_arm=True)
         self.law = Mutinous()
         law = self.law if profile == "flight" else None

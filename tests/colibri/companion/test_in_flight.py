@@ -77,7 +77,7 @@ def test_it_arms_takes_off_flies_a_track_and_hands_over(flights: Flights) -> Non
 
 def test_it_flies_a_fast_track_over_a_bad_link(flights: Flights) -> None:
     sitl = flights.begin(feedback="sensors", turbulence="light", seed=2)
-    settings = CompanionSettings(may_arm=True, duration_s=7.0)
+    settings = CompanionSettings(may_arm=True, duration_s=4.0)
     ride = Ride(sitl, "lemniscate:lap=8", settings, trouble=BAD_LINK, seed=2)
     ride.to_the_end(60.0)
     assert ride.companion.ended
@@ -158,17 +158,11 @@ def test_a_vehicle_that_refuses_to_arm_ends_it(flights: Flights) -> None:
     assert "take-off was refused" in ride.companion.ended.why
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        SetpointKind.POSITION,
-        pytest.param(SetpointKind.VELOCITY, marks=pytest.mark.long),
-        pytest.param(SetpointKind.ATTITUDE, marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("kind", [SetpointKind.POSITION, SetpointKind.VELOCITY, SetpointKind.ATTITUDE])
 def test_it_flies_by_other_setpoints_too(flights: Flights, kind: SetpointKind) -> None:
     sitl = flights.begin(airborne=2.0)
-    ride = Ride(sitl, "circle:speed=1", CompanionSettings(setpoints=kind, duration_s=4.0))
+    ride = Ride(sitl, "circle:speed=1", CompanionSettings(setpoints=kind, duration_s=2.0))
     ride.to_the_end(30.0)
     assert ride.companion.ended
     assert ride.companion.ended.in_order

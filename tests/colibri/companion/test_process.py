@@ -12,6 +12,9 @@ from colibri.cli.main import main
 from tools.harness.sitl_process import vehicle
 
 LINK = "udpin:127.0.0.1:0"
+MISSION = """{"mission": {"plannedHomePosition": [47.0, 8.0, 400.0], "items": [
+{"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, 47.397742, 8.545594, 2]},
+{"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, null, 47.397752, 8.545594, 3]}]}}"""
 BAD_INPUT = {
     "no track": ((), "name a TRACK to fly, or --identify"),
     "unknown track": (("spirl",), "unknown track spirl"),
@@ -19,6 +22,7 @@ BAD_INPUT = {
     "arms in a dry run": (("spiral", "--arm", "--dry-run"), "--dry-run arms nothing"),
     "identifies on a track": (("spiral", "--identify"), "--identify hovers"),
     "no response": (("spiral", "--response", "none.toml"), "none.toml: No such file"),
+    "no mission": (("none.plan",), "none.plan: No such file"),
     "unknown stack": (("spiral", "--stack", "betaflight"), "invalid choice"),
 }
 
@@ -45,6 +49,18 @@ def test_a_link_that_is_none_is_one_line(url: str, said: str, capsys: pytest.Cap
     assert said in line
 
 
+def test_a_mission_without_a_vehicle_that_says_where_home_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mission = tmp_path / "there.plan"
+    mission.write_text(MISSION, encoding="utf-8")
+    with pytest.raises(SystemExit) as end:
+        main(["companion", str(mission), "--vehicle", LINK, "--wait", "0.01", "--out", str(tmp_path / "out")])
+    assert end.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "it has not said where that is" in line
+
+
 def companion(out: Path, port: int, *options: str) -> subprocess.CompletedProcess[str]:
     link = f"udpout:127.0.0.1:{port}"
     command = [sys.executable, "-m", "colibri", "companion", *options, "--vehicle", link, "--out", str(out)]
@@ -52,8 +68,10 @@ def companion(out: Path, port: int, *options: str) -> subprocess.CompletedProces
 
 
 def test_a_dry_run_over_udp_logs_and_moves_nothing(tmp_path: Path) -> None:
+    mission = tmp_path / "there.plan"
+    mission.write_text(MISSION, encoding="utf-8")
     with vehicle(tmp_path) as flown:
-        ended = companion(tmp_path / "out", flown.port, "hover", "--dry-run", "--duration", "1")
+        ended = companion(tmp_path / "out", flown.port, str(mission), "--dry-run", "--duration", "1")
         assert not any(sight.armed for sight in flown.seen.sights)
     assert ended.returncode == 0, ended.stderr
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))

@@ -16,17 +16,17 @@ STACKS: list[Callable[[], StandIn]] = [Px4, ArduPilot]
 @pytest.mark.parametrize("made", STACKS)
 def test_it_flies_a_track(made: Callable[[], StandIn]) -> None:
     vehicle = made()
-    ride = Ride(vehicle, "spiral", CompanionSettings(may_arm=True, duration_s=12.0))
+    ride = Ride(vehicle, "spiral", CompanionSettings(may_arm=True, duration_s=8.0))
     ride.to_the_end(60.0)
     ended, errors = ride.companion.ended, ride.companion.errors
     assert ended
     assert ended.in_order
     assert vehicle.mode == vehicle.hold
-    assert errors.flown_s == pytest.approx(12.0, abs=0.1)
+    assert errors.flown_s == pytest.approx(8.0, abs=0.1)
     assert errors.rmse_m() < 0.05
 
 
-@pytest.mark.parametrize("made", STACKS)
+@pytest.mark.parametrize("made", [Px4, pytest.param(ArduPilot, marks=pytest.mark.long)])
 def test_the_hover_thrust_is_refined_in_flight(made: Callable[[], StandIn]) -> None:
     vehicle = made()
     ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, duration_s=14.0))
@@ -81,7 +81,8 @@ def test_an_ardupilot_that_would_take_thrust_for_a_climb_rate_is_not_flown() -> 
     assert "add 8 to GUID_OPTIONS" in ride.companion.ended.why
 
 
-@pytest.mark.parametrize("made", [Px4, pytest.param(ArduPilot, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("made", STACKS)
 def test_an_identification_finds_what_the_stand_in_has(made: Callable[[], StandIn]) -> None:
     vehicle = made()
     ride = Ride(vehicle, "hover:height=2", CompanionSettings(may_arm=True, identifies=True))
