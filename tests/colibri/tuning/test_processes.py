@@ -8,8 +8,10 @@ from time import monotonic, sleep
 
 import pytest
 
+from colibri.tuning.run import Watcher, fly_tuning
 from colibri.tuning.trials import JOURNAL
-from tests.colibri.tuning.support import WEIGHTS, files_in, tuned
+from tests.colibri.campaigns.support import Here
+from tests.colibri.tuning.support import WEIGHTS, files_in, planned, tuned
 
 PATIENCE_S = 120.0
 TRIALS = 12
@@ -61,11 +63,25 @@ def test_it_is_killed_and_goes_on_as_if_it_had_not_been(tmp_path: Path) -> None:
     assert files_in(tmp_path / "out") == files_in(tmp_path / "expected")
 
 
+class Joined(Watcher):
+    """Has a second process join after the first trial, and goes on when that process has begun one."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self.second: subprocess.Popen[str] | None = None
+
+    def ended(self, trials: int, first: float, best: float) -> None:
+        if self.second is None:
+            self.second = begin(self._folder, "--resume")
+            wait_for(self._folder, '"process":1', 1)
+
+
 def test_a_second_process_joins(tmp_path: Path) -> None:
-    with begin(tmp_path) as first:
-        wait_for(tmp_path, '"pruned"', 1)
-        with begin(tmp_path, "--resume") as second:
-            assert (first.wait(PATIENCE_S), second.wait(PATIENCE_S)) == (0, 0)
+    watcher = Joined(tmp_path)
+    fly_tuning(planned(trials=TRIALS), Here, tmp_path / "out", watcher=watcher)
+    assert watcher.second is not None
+    _, said = watcher.second.communicate(timeout=PATIENCE_S)
+    assert (watcher.second.returncode, said) == (0, "")
     logs = [json.loads(line) for line in (tmp_path / "out" / JOURNAL).read_text(encoding="utf-8").splitlines()]
     by = [each["user_attr"]["process"] for each in logs if "process" in each.get("user_attr", {})]
     assert len(by) == TRIALS
