@@ -70,8 +70,8 @@ class Joined(Watcher):
         self._folder = folder
         self.second: subprocess.Popen[str] | None = None
 
-    def ended(self, trials: int, first: float, best: float) -> None:
-        if self.second is None:
+    def ended(self, trials: int, _first: float, _best: float) -> None:
+        if trials == 1:
             self.second = begin(self._folder, "--resume")
             wait_for(self._folder, '"process":1', 1)
 
