@@ -4,7 +4,6 @@ import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
-from math import inf
 from pathlib import Path
 from threading import Event, Thread
 from time import perf_counter, sleep
@@ -77,7 +76,7 @@ class Show:
             self._is_told = True
             plays = self.playback.plays and not self.playback.is_over(now_s)
             self._page.tell([source.at(time_s) for source in self._sources], time_s, plays)
-            self._page.plot(inf if live else time_s, anew=live)
+            self._page.plot(time_s, anew=live)
 
 
 def show_recorded(folders: Sequence[Path], port: int, *, browser: bool, say: Callable[[str], None]) -> None:

@@ -57,7 +57,7 @@ class Telemetry:
         self._texts: deque[str] = deque(maxlen=TEXTS)
         self._values: dict[str, tuple[float, Any]] = {}
         self._rows: deque[tuple[float, ...]] = deque(maxlen=round(CHART_S / _ROW_S))
-        self._began_s = nan
+        self._began_s = self._moved_s = nan
         self._handlers: dict[str, Callable[[Any, float], None]] = {
             "HEARTBEAT": self._heartbeat,
             "LOCAL_POSITION_NED": self._local_position,
@@ -99,7 +99,7 @@ class Telemetry:
             attitude=now.attitude,
             velocity_enu_m_s=now.velocity_enu_m_s,
             rotors=self._fresh("rotors", now_s, UNKNOWN_ROTORS),
-            reference_enu_m=self._fresh("reference", now_s, NOWHERE),
+            reference_enu_m=self._reference() if now_s - self._moved_s < _STALE_S else NOWHERE,
             trail=np.array([*self._trail]) if self._trail else NO_POINTS,
             horizon=self._fresh("horizon", now_s, NO_POINTS),
             wind_enu_m_s=self._fresh("wind", now_s, NOWHERE),
@@ -139,6 +139,13 @@ class Telemetry:
     def _set(self, name: str, now_s: float, value: Any) -> None:
         self._values[name] = (now_s, value)
 
+    def _reference(self) -> Vector:
+        """Return where it was to be when its position came last: the last reference, carried on by its velocity."""
+        said_s, (place, velocity) = self._values.get("reference", (-_STALE_S, (NOWHERE, NOWHERE)))
+        age_s = self._moved_s - said_s
+        x, y, z = np.add(place, np.multiply(age_s, velocity)).tolist()
+        return (x, y, z) if age_s < _STALE_S else NOWHERE
+
     def _battery(self, now_s: float) -> str:
         volts = self._fresh("volts", now_s, nan)
         return "" if isnan(volts) else f"{volts:.2f} V"
@@ -146,11 +153,12 @@ class Telemetry:
     def _moved(self, place: Vector, velocity: Vector, now_s: float) -> None:
         self._now = replace(self._now, position_enu_m=place, velocity_enu_m_s=velocity)
         self._trail.append(place)
+        self._moved_s = now_s
         if not self._rows or now_s - self._rows[-1][0] >= _ROW_S:
             self._rows.append(self._row(place, now_s))
 
     def _row(self, place: Vector, now_s: float) -> tuple[float, ...]:
-        error = float(np.linalg.norm(np.subtract(place, self._fresh("reference", now_s, NOWHERE))))
+        error = float(np.linalg.norm(np.subtract(place, self._reference())))
         _, x, y, _ = self._now.attitude
         tilt = float(np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))))
         rotors = (100.0 * part for part in self._fresh("rotors", now_s, UNKNOWN_ROTORS))
@@ -199,7 +207,9 @@ class Telemetry:
 
     def _target(self, fields: Any, now_s: float) -> None:
         if all(map(isfinite, (fields.x, fields.y, fields.z))) and not fields.type_mask & 0b111:
-            self._set("reference", now_s, ned_from_enu((fields.x, fields.y, fields.z)))
+            moves = not fields.type_mask & 0b111000 and all(map(isfinite, (fields.vx, fields.vy, fields.vz)))
+            velocity = ned_from_enu((fields.vx, fields.vy, fields.vz)) if moves else (0.0, 0.0, 0.0)
+            self._set("reference", now_s, (ned_from_enu((fields.x, fields.y, fields.z)), velocity))
 
     def _servos(self, fields: Any, now_s: float) -> None:
         pulses = (fields.servo1_raw, fields.servo2_raw, fields.servo3_raw, fields.servo4_raw)

@@ -106,10 +106,11 @@ class Page:
         self.controls.show(words(self._names, snapshots), time_s, plays)
 
     def plot(self, time_s: float, *, anew: bool = False) -> None:
-        """Mark a time in the plots; `anew` plots what has come since, too."""
+        """Mark a time in the plots; `anew` plots what has come since instead, whose end is now."""
         if anew:
             self._plots.show([source.charts() for source in self._sources])
-        self._plots.mark(time_s)
+        else:
+            self._plots.mark(time_s)
 
     def offer_commands(self, token: Token, modes: Callable[[], Sequence[str]]) -> None:
         """Offer commands to browsers that know a token; they come as `order` among what was done."""

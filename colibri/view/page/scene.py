@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from colibri.common.types import Array, Vector
+from colibri.common.types import Array
 from colibri.view.geometry import (
     Colour,
     about_up,
@@ -33,7 +33,7 @@ _FRONT: Colour = (220, 50, 40)
 _DARK: Colour = (60, 60, 65)
 _WIND_S = 0.4
 """The arrow of the wind is what it blows in that time, at a vehicle of true size."""
-_ABOVE: Vector = (0.0, 0.0, 0.2)
+_ABOVE, _BELOW = (0.0, 0.0, 0.2), (0.0, 0.0, -0.2)
 _NO_SEGMENTS: Any = np.zeros((1, 2, 3), dtype=np.float32)
 
 
@@ -189,7 +189,7 @@ class SurroundingsScene:
         self._marks("mission", around.mission, MISSION)
         self._marks("rally", around.rally, RALLY)
         if np.isfinite(around.home_enu_m).all():
-            self._marks("home", (Mark(around.home_enu_m, "home"),), HOME)
+            self._marks("home", (Mark(around.home_enu_m, "home"),), HOME, below=True)
         for number, zone in enumerate(around.fence):
             lines = zone_segments(zone, around.ground_m, around.ceiling_m)
             colour = KEEPS_IN if zone.keeps_in else KEEPS_OUT
@@ -204,12 +204,17 @@ class SurroundingsScene:
         at = f"{self._root}/{name}"
         return self._scene.add_line_segments(at, lines, colors=colour, thickness=width, thickness_units="screen")
 
-    def _marks(self, name: str, marks: tuple[Mark, ...], colour: Colour) -> None:
+    def _marks(self, name: str, marks: tuple[Mark, ...], colour: Colour, *, below: bool = False) -> None:
+        """Draw balls with words above them, or below, where those of a landing at home leave room."""
         for number, mark in enumerate(marks):
             at = f"{self._root}/{name}{number}"
             self._add("mission, fence", self._scene.add_icosphere(at, 0.12, colour, position=mark.place_enu_m))
             label = self._scene.add_label(
-                f"{at}/label", mark.text, anchor="bottom-center", position=_ABOVE, font_screen_scale=0.8
+                f"{at}/label",
+                mark.text,
+                anchor="top-center" if below else "bottom-center",
+                position=_BELOW if below else _ABOVE,
+                font_screen_scale=0.8,
             )
             self._add("mission, fence", label)
 

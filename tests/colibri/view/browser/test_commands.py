@@ -31,7 +31,7 @@ def page(vehicle: LiveVehicle) -> Iterator[Page]:
 
 
 def test_a_browser_commands_once_it_has_said_the_token(page: Page, vehicle: LiveVehicle) -> None:
-    from tests.colibri.view.browser.chromium import Tab, chromium
+    from tools.pages.pictures.chromium import Tab, chromium
 
     orders: list[tuple[str, object]] = []
     show = Show(page, [vehicle], 0.0, lambda what, value: orders.append((what, value)))

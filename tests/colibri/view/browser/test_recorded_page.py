@@ -32,7 +32,7 @@ def page(recorded: RecordedFlight) -> Iterator[Page]:
 
 
 def test_it_shows_the_flight_and_obeys_its_buttons(page: Page, recorded: RecordedFlight) -> None:
-    from tests.colibri.view.browser.chromium import Tab, chromium
+    from tools.pages.pictures.chromium import Tab, chromium
 
     show = Show(page, [recorded], 0.0)
     show.turn(0.0)

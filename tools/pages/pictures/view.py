@@ -1,0 +1,169 @@
+"""`view-*.png`: the page of `colibri view` as Chromium shows it, of flights in memory, live and recorded."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from io import BytesIO
+from pathlib import Path
+
+from PIL import Image
+
+from colibri.experiments.flight import fly
+from colibri.mavlink.wire.dialect import Message, mav
+from colibri.sitl.backends.setting import setting_of
+from colibri.sitl.ground_station import Station
+from colibri.sitl.mission_items import Item, circle, land, polygon, takeoff, waypoint
+from colibri.sitl.session import Flights
+from colibri.sitl.vehicle import Sitl
+from colibri.view.access import Token
+from colibri.view.modes import CHOICES, PX4
+from colibri.view.observer import COMPONENT, SYSTEM, Observer
+from colibri.view.page.page import Page
+from colibri.view.run import Show, read_flights
+from colibri.view.snapshot import Airframe, Chart, Snapshot, Source, Surroundings
+from tools.pages.pictures.chromium import Tab, chromium
+
+FRAME_S = 0.1
+DRAWN_AFTER_MS = 15000
+"""Without a GPU a picture takes a second, and what is sent last has to be in it."""
+COLOURS = 160
+TOKEN = Token("docs")
+
+
+class Watching(Station):
+    """A station of a flight in simulated time that is an `Observer`."""
+
+    observer: Observer
+
+    def add(self, message: Message) -> None:
+        """Hand it to the observer."""
+        self.observer.receive(message.frame, self._flight.time_us / 1e6)
+
+    def departing(self, now_us: int) -> list[bytes]:
+        """Send what the observer has to say."""
+        self.observer.poll(now_us / 1e6)
+        for datagram in self.observer.take_outbox():
+            self.send_raw(datagram)
+        return super().departing(now_us)
+
+
+class Watched:
+    """A flight in simulated time as a live vehicle of the page."""
+
+    airframe = Airframe()
+    is_live = True
+
+    def __init__(self, sitl: Sitl, name: str) -> None:
+        """Watch it from now on."""
+        self.name = name
+        self.sitl = sitl
+        station = sitl.client(SYSTEM, COMPONENT, beats=False)
+        station.__class__ = Watching
+        assert isinstance(station, Watching)
+        self._observer = station.observer = Observer()
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """See `Source`."""
+        return 0.0, 0.0
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """See `Source`."""
+        return self._observer.surroundings
+
+    def at(self, time_s: float) -> Snapshot:
+        """See `Source`."""
+        return self._observer.telemetry.snapshot(time_s)
+
+    def charts(self) -> tuple[Chart, ...]:
+        """See `Source`."""
+        return self._observer.telemetry.charts()
+
+
+def write(folder: Path) -> None:
+    """Fly, and write the pictures."""
+    recorded(folder / "view-recorded.png")
+    compared(folder / "view-two.png")
+    live(folder / "view-live.png")
+    mission(folder / "view-mission.png")
+
+
+def recorded(path: Path) -> None:
+    """Show a flight on sensors in wind, with its horizon."""
+    flight = fly("lemniscate:lap=5", duration=15.0, feedback="sensors", wind="5@270", turbulence="light", link="memory")
+    with ExitStack() as held:
+        flights = read_flights([flight.plan.out], held, wait=True)
+        flights[0].name = "lemniscate"
+        keep(path, flights, 12.5)
+
+
+def compared(path: Path) -> None:
+    """Show two control laws on one track."""
+    begun = partial(fly, "lemniscate:lap=6", duration=12.0, wind="8@270", turbulence="moderate", link="memory")
+    both = [begun(), begun(controller="geometric-se3")]
+    with ExitStack() as held:
+        flights = read_flights([flight.plan.out for flight in both], held, wait=True)
+        for flight, name in zip(flights, ("whole-lpv-mpc", "geometric-se3"), strict=True):
+            flight.name = name
+        keep(path, flights, 9.3)
+
+
+def live(path: Path) -> None:
+    """Show a vehicle on sensors that goes where it was told to, with its commands unlocked."""
+    with begun(feedback="sensors", wind="4@300") as sitl:
+        vehicle = Watched(sitl, "udpin:127.0.0.1:14550")
+        sitl.run(3.0)
+        sitl.arm()
+        sitl.takeoff(3.0)
+        sitl.goto(6.0, 3.0, 4.0, wait=False)
+        sitl.run(2.2)
+        keep(path, [vehicle], sitl.time_s, commands=True)
+
+
+def mission(path: Path) -> None:
+    """Show a mission inside a fence, with a zone to keep out of and a rally point."""
+    with begun(wind="3@200") as sitl:
+        vehicle = Watched(sitl, "udpin:127.0.0.1:14550")
+        corners = [(-6.0, -6.0), (12.0, -6.0), (12.0, 10.0), (-6.0, 10.0)]
+        sitl.upload_fence([*polygon(corners), *circle(2.0, (4.0, 3.0), keep_out=True)])
+        sitl.upload_rally([Item(mav.MAV_CMD_NAV_RALLY_POINT, place=(-4.0, 7.0, 3.0))])
+        places = ((8.0, 0.0, 3.0), (8.0, 7.0, 4.0), (0.0, 7.0, 4.0), (0.0, 3.0, 3.0))
+        sitl.upload_mission([takeoff(3.0), *(waypoint(*place) for place in places), land(0.0, 0.0)])
+        sitl.arm()
+        sitl.start_mission()
+        sitl.run(11.0)
+        keep(path, [vehicle], sitl.time_s)
+
+
+@contextmanager
+def begun(**setting: str) -> Iterator[Sitl]:
+    """Yield a vehicle that stands at home."""
+    with Flights(setting_of([setting]), None) as flights:
+        yield flights.begin()
+
+
+def keep(path: Path, sources: Sequence[Source], time_s: float, *, commands: bool = False) -> None:
+    """Write what the page shows at a time."""
+    page = Page(sources, 0)
+    if commands:
+        page.offer_commands(TOKEN, lambda: CHOICES[PX4])
+    begin_s = time_s if sources[0].is_live else 0.0
+    show = Show(page, sources, begin_s)
+    try:
+        with chromium() as tab:
+            Tab(tab, page.url)
+            tab.get_by_text("position error, m").wait_for()
+            tab.locator(".mantine-Notification-closeButton").click()
+            if commands:
+                tab.locator("input.mantine-TextInput-input").last.fill(TOKEN.text)
+                tab.get_by_role("button", name="Unlock").click()
+            show.turn(begin_s)
+            show.playback = show.playback.seek(time_s, begin_s).pause(begin_s)
+            for frame in range(5):
+                show.turn(begin_s + frame * FRAME_S)
+            tab.wait_for_timeout(DRAWN_AFTER_MS)
+            png = tab.screenshot()
+    finally:
+        page.close()
+    Image.open(BytesIO(png)).convert("RGB").quantize(COLOURS).save(path, optimize=True)
