@@ -54,7 +54,7 @@ PX4 = Stack(
     ),
     fence=("GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"),
     thrust=_thrust,
-    response=Response((0.055, 0.055, 0.15), 0.012, 0.03, (3.8, 3.8, 2.0), (40.0, 40.0, 6.0)),
+    response=Response((0.055, 0.055, 0.3), 0.04, 0.04, (3.8, 3.8, 2.0), (12.0, 12.0, 6.0)),
     take_off=TakeOff.COMMAND_THEN_ARM,
     integers_by_bits=True,
 )

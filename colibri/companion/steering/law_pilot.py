@@ -33,6 +33,7 @@ from colibri.common.rotations import euler_from_quaternion, nearest_turn
 from colibri.common.types import Array, Vector
 from colibri.companion.stacks.stack import Response
 from colibri.companion.steering import response as model
+from colibri.companion.steering.slowness import slowed
 from colibri.mavlink.hil.state import StateFrame
 from colibri.plant.vehicle.description import Vehicle
 
@@ -142,7 +143,7 @@ class LawPilot:
         """Build the law for the vehicle as its stack lets it turn."""
         self._response = response
         self._vehicle = turning_no_faster(self._airframe, response)
-        self._loop = ControlLoop(self._profile, self._vehicle, self._clock, self._law)
+        self._loop = ControlLoop(slowed(self._profile, response), self._vehicle, self._clock, self._law)
         self._motion = packed(motion.motion_model(self._vehicle))
 
     def begin(self, y: Array) -> None:
@@ -268,7 +269,8 @@ def turning_no_faster(vehicle: Vehicle, response: Response) -> Vehicle:
         max(inertia, moment / limit)
         for inertia, moment, limit in zip(vehicle.body.inertia_kg_m2[:2], moments_n_m[:2], most[:2], strict=True)
     )
-    return vehicle.replace("body.inertia_kg_m2", (ix, iy, vehicle.body.inertia_kg_m2[2]))
+    iz = max(vehicle.body.inertia_kg_m2[2], abs(ix - iy))
+    return vehicle.replace("body.inertia_kg_m2", (ix, iy, iz))
 
 
 def _yaw_rate_of(euler: Vector, rate: Vector) -> float:

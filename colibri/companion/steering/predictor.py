@@ -16,6 +16,7 @@ from colibri.common.types import Array, Vector
 from colibri.companion.conversation.states import TimedState
 from colibri.companion.stacks.stack import Response
 from colibri.companion.steering import response as model
+from colibri.companion.steering.slowness import lateness_s, slowness
 from colibri.plant.vehicle.description import Vehicle
 
 _FOLLOWS_US = 150_000
@@ -25,6 +26,11 @@ _DISTURBANCE_1_S = 6.0
 _MAX_DISTURBANCE = np.array([6.0, 6.0, 6.0, 20.0, 20.0, 20.0])
 _TURN_PART = 0.5
 """Of the disturbance of rates: their model is the less certain one."""
+_TURN_POWER = 8.0
+"""The later the rates follow, the less of what they miss is a disturbance: it is the model's."""
+_CORRECTED_IN_LATENESSES = 8.0
+"""So many times what the rates follow too late, an error of the predicted rates is corrected in. Of what is not rates
+the vehicle knows more than the model."""
 _SCALE_1_S = 0.25
 MIN_SCALE, MAX_SCALE = 0.5, 1.8
 
@@ -42,7 +48,8 @@ class Predictor:
     Attributes:
         corrected_in_s: In which an error of the prediction is corrected, as a time constant. The longer a state and a
             command are on their way, the longer it must be: corrections at once, of what jitter and loss make of a
-            prediction, would be taken for motion, and answered too late.
+            prediction, would be taken for motion, and answered too late. What the rates follow later than laws are
+            tuned for is added to it.
         thrust_scale: Thrust that is made, in parts of the one that was meant.
         disturbance: Acceleration, ENU, m/s², and angular acceleration, FLU, rad/s², (6,).
     """
@@ -59,6 +66,8 @@ class Predictor:
     def adopt(self, vehicle: Vehicle, response: Response) -> None:
         """Predict with another response."""
         self._model = packed(model.response_model(vehicle, response))
+        self._late_s = _CORRECTED_IN_LATENESSES * lateness_s(response)
+        self._turn_part = _TURN_PART * slowness(response) ** -_TURN_POWER
 
     def begin(self) -> None:
         """Begin with level hover commanded, and no disturbance."""
@@ -109,14 +118,19 @@ class Predictor:
 
     def _corrected(self, expected: Array, measured: Array, passed_s: float) -> Array:
         """Return the expected state corrected by a part of what was missed, of which the disturbance learns, too."""
-        part = 1.0 - exp(-passed_s / self.corrected_in_s) if self.corrected_in_s > 0.0 else 1.0
+        part = np.full(model.STATES, self._part(passed_s, 0.0))
+        part[model.RATE] = self._part(passed_s, self._late_s)
         if float(expected[model.ATTITUDE] @ measured[model.ATTITUDE]) < 0.0:
             measured[model.ATTITUDE] *= -1.0
         missed = part * (measured - expected)
         y: Array = expected + missed
         y[model.ATTITUDE] /= np.linalg.norm(y[model.ATTITUDE])
-        self._learn(y, np.concatenate((missed[model.VELOCITY], _TURN_PART * missed[model.RATE])), passed_s)
+        self._learn(y, np.concatenate((missed[model.VELOCITY], self._turn_part * missed[model.RATE])), passed_s)
         return y
+
+    def _part(self, passed_s: float, late_s: float) -> float:
+        corrected_in_s = self.corrected_in_s + late_s
+        return 1.0 - exp(-passed_s / corrected_in_s) if corrected_in_s > 0.0 else 1.0
 
     def _learn(self, y: Array, missed: Array, passed_s: float) -> None:
         part = 1.0 - exp(-_DISTURBANCE_1_S * passed_s)

@@ -21,6 +21,7 @@ STEP_US = 4_000
 BOOTED_US = 3_000_000
 """The clock of a vehicle began before anybody listened."""
 GRAVITY = 9.81
+_PARTS = 4
 PX4_HOLD, PX4_TAKEOFF, PX4_LAND, PX4_OFFBOARD = (
     main << 16 | sub << 24 for main, sub in ((4, 3), (4, 2), (4, 6), (6, 0))
 )
@@ -39,6 +40,8 @@ class Numbers:
         late_s: Before a command has any effect.
         thrust_lag_s: Of the motors.
         push_m_s2: Of the wind, ENU.
+        natural_rad_s: Of roll and pitch rates that overshoot, a second order; 0 for the lag alone.
+        damping: Of that.
     """
 
     hover_signal: float = 0.6
@@ -46,6 +49,8 @@ class Numbers:
     late_s: float = 0.008
     thrust_lag_s: float = 0.025
     push_m_s2: tuple[float, float, float] = (0.4, -0.2, 0.0)
+    natural_rad_s: float = 0.0
+    damping: float = 0.5
 
 
 @dataclass(kw_only=True)
@@ -66,6 +71,7 @@ class StandIn:
         self.velocity = np.zeros(3)
         self.attitude = (sqrt(0.5), 0.0, 0.0, sqrt(0.5))
         self.rate = np.zeros(3)
+        self.turning = np.zeros(3)
         self.lift = 0.0
         self.climb_to: float | None = None
         self.setpoints: list[tuple[int, tuple[float, ...]]] = []
@@ -180,8 +186,8 @@ class StandIn:
         late_us = self.time_us - round(self.numbers.late_s * 1e6)
         acting = [values for at_us, values in self.setpoints[-20:] if at_us <= late_us]
         *wanted, thrust = acting[-1] if acting else (0.0, 0.0, 0.0, 0.0)
-        stays = np.array([exp(-h / lag_s) for lag_s in self.numbers.lag_s])
-        before, self.rate = self.rate, np.array(wanted) + (self.rate - np.array(wanted)) * stays
+        before = self.rate
+        self._follow(np.array(wanted), h)
         lift = GRAVITY * (self._signal(thrust) / self.numbers.hover_signal) ** 2
         self.lift = lift + (self.lift - lift) * exp(-h / self.numbers.thrust_lag_s)
         self._turn(0.5 * (before + self.rate), h)
@@ -189,6 +195,21 @@ class StandIn:
         acceleration = self.lift * up - [0.0, 0.0, GRAVITY] + np.array(self.numbers.push_m_s2) - 0.1 * self.velocity
         self.position = self.position + h * (self.velocity + 0.5 * h * acceleration)
         self.velocity = self.velocity + h * acceleration
+
+    def _follow(self, wanted: Array, h: float) -> None:
+        numbers = self.numbers
+        stays = np.array([exp(-h / lag_s) for lag_s in numbers.lag_s])
+        lagged = wanted + (self.rate - wanted) * stays
+        if numbers.natural_rad_s > 0.0:
+            rate = self.rate
+            for _ in range(_PARTS):
+                off = numbers.natural_rad_s**2 * (wanted - rate)
+                self.turning = self.turning + h / _PARTS * (
+                    off - 2.0 * numbers.damping * numbers.natural_rad_s * self.turning
+                )
+                rate = rate + h / _PARTS * self.turning
+            lagged[:2] = rate[:2]
+        self.rate = lagged
 
     def _turn(self, rate: Array, h: float) -> None:
         w, x, y, z = self.attitude
@@ -206,7 +227,7 @@ class StandIn:
                 self._arrived()
         self.velocity += (np.array([0.0, 0.0, climb]) - self.velocity) * min(1.0, 4.0 * h)
         self.position = self.position + h * self.velocity
-        self.rate = np.zeros(3)
+        self.rate, self.turning = np.zeros(3), np.zeros(3)
         w, _, _, z = self.attitude
         self.attitude = normalized((w, 0.0, 0.0, z))
         self.lift = GRAVITY

@@ -2,13 +2,24 @@
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from colibri.companion.identified import identified
 from colibri.companion.settings import CompanionSettings
 from colibri.companion.supervision.phases import Phase
 from tests.colibri.companion.in_memory import Ride
-from tests.colibri.companion.stand_in import GUIDED, LOITER, PX4_HOLD, PX4_OFFBOARD, STABILIZE, ArduPilot, Px4, StandIn
+from tests.colibri.companion.stand_in import (
+    GUIDED,
+    LOITER,
+    PX4_HOLD,
+    PX4_OFFBOARD,
+    STABILIZE,
+    ArduPilot,
+    Numbers,
+    Px4,
+    StandIn,
+)
 
 STACKS: list[Callable[[], StandIn]] = [Px4, ArduPilot]
 
@@ -24,6 +35,29 @@ def test_it_flies_a_track(made: Callable[[], StandIn]) -> None:
     assert vehicle.mode == vehicle.hold
     assert errors.flown_s == pytest.approx(8.0, abs=0.1)
     assert errors.rmse_m() < 0.05
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.02),
+        Numbers(natural_rad_s=20.0, damping=0.5, late_s=0.06),
+        Numbers(natural_rad_s=18.0, damping=0.6, late_s=0.04),
+        Numbers(lag_s=(0.11, 0.11, 0.3), late_s=0.04),
+        Numbers(lag_s=(0.028, 0.028, 0.3), late_s=0.055),
+    ],
+)
+def test_px4_s_rates_may_follow_late_and_overshoot(numbers: Numbers) -> None:
+    vehicle = Px4(numbers=numbers)
+    ride = Ride(vehicle, "spiral", CompanionSettings(may_arm=True, duration_s=6.0))
+    ride.until(lambda: ride.companion.phase is Phase.FLYING, 30.0)
+    turning = []
+    while ride.companion.ended is None:
+        ride.step()
+        turning.append(float(np.abs(vehicle.rate[:2]).max()))
+    assert ride.companion.ended.in_order, ride.companion.ended.why
+    assert ride.companion.errors.rmse_m() <= 0.033
+    assert max(turning[-500:]) < max(turning[:2000])
 
 
 @pytest.mark.parametrize("made", [Px4, pytest.param(ArduPilot, marks=pytest.mark.long)])
