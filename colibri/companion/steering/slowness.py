@@ -12,7 +12,7 @@ from colibri.companion.stacks.stack import Response
 _AS_TUNED_S = 0.06
 """Up to this delay, dead time and lag together, a law flies as it is tuned."""
 _MOST = 1.6
-_WEIGHTS = {"position": -4.0, "velocity": 4.0, "rate": 6.0, "first_correction": 6.0, "next_correction": 6.0}
+_WEIGHTS = {"position": -2.0, "velocity": 4.0, "rate": 6.0, "first_correction": 6.0, "next_correction": 6.0}
 """With which power of the slowness each weight goes: less is asked of the place, and each change costs more."""
 
 
