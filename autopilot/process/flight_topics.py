@@ -33,7 +33,7 @@ _NO_REFERENCES = (nan,) * 11
 class FlightTopics:
     """Writes control samples as topics: those of a track from its steps, those of ground stations from snapshots.
 
-    The file is opened with the first of them.
+    The file is opened with the first frame that is answered.
     """
 
     def __init__(self, folder: Path, setup: Setup) -> None:
@@ -56,6 +56,14 @@ class FlightTopics:
         """Write the snapshots of a vehicle with these parameters from now on."""
         self._recorder = Recorder(self._vehicle, self._setup.system_id, parameters, with_battery=False)
         self._beginning = self._beginning or self._recorder.begin()
+
+    def begin(self) -> None:
+        """Have the file begun, with parameters, before the plant's first block comes, which knows none.
+
+        Raises:
+            LogError: It cannot be written.
+        """
+        self._begun()
 
     def begin_again(self) -> None:
         """Begin anew, as time begins again: another plant flies another flight."""
@@ -84,7 +92,7 @@ class FlightTopics:
     def _note(self, time_us: int, fallback: Fallback | None) -> None:
         """Write status and texts that are due."""
         setup = self._setup
-        if self._file is None:
+        if self._status_us == 0:
             self.say(time_us, INFO, f"{setup.track or 'no track'}, profile {setup.profile}, {setup.controller}")
         if time_us >= self._status_us:
             self._status_us = time_us + STATUS_EVERY_US
@@ -130,9 +138,12 @@ class FlightTopics:
     def _append(self, recorded: bytes) -> None:
         if not recorded:
             return
+        self._begun().append(recorded)
+
+    def _begun(self) -> SharedLog:
         if self._file is None:
             self._file = SharedLog(self._path, self._beginning)
-        self._file.append(recorded)
+        return self._file
 
 
 def _first(references: Horizon) -> tuple[float, ...]:

@@ -78,6 +78,8 @@ class AutopilotLog:
         if step.command.time_us < self._time_us and self.topics:
             self.topics.begin_again()
         self._time_us = step.command.time_us
+        if self.topics:
+            self.topics.begin()
         if self._begins:
             self._begins = False
             self._inputs.append(line(msgspec.structs.replace(self._setup, first_us=self._time_us)))

@@ -61,7 +61,7 @@ class Page:
         gui.main_panel.dock_left()
         gui.main_panel.set_width(_LEFT_PX)
         panel = gui.add_panel()
-        self._plots = Plots(gui, panel.add_tab("Plots"), self._names)
+        self._plots = Plots(gui, panel.add_tab("Plots"), self._names, marked=not live)
         self._plots.show([source.charts() for source in self._sources])
         panel.dock_right()
         panel.set_width(_RIGHT_PX)
@@ -106,11 +106,10 @@ class Page:
         self.controls.show(words(self._names, snapshots), time_s, plays)
 
     def plot(self, time_s: float, *, anew: bool = False) -> None:
-        """Mark a time in the plots; `anew` plots what has come since instead, whose end is now."""
+        """Mark a time in the plots; `anew` plots what has come since, too."""
         if anew:
             self._plots.show([source.charts() for source in self._sources])
-        else:
-            self._plots.mark(time_s)
+        self._plots.mark(time_s)
 
     def offer_commands(self, token: Token, modes: Callable[[], Sequence[str]]) -> None:
         """Offer commands to browsers that know a token; they come as `order` among what was done."""

@@ -22,8 +22,9 @@ _AXIS_PX = 44
 class Plots:
     """One plot a title: of one vehicle all series, of several the headline of each."""
 
-    def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, names: Sequence[str]) -> None:
-        """Plot into a tab, of vehicles by their names."""
+    def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, names: Sequence[str], *, marked: bool) -> None:
+        """Plot into a tab, of vehicles by their names; `marked` where a time of theirs can be marked."""
+        self._marked = marked
         self._gui = gui
         self._tab = tab
         self._names = tuple(names)
@@ -43,7 +44,9 @@ class Plots:
                 self._shown[title] = (handle, data)
 
     def mark(self, time_s: float) -> None:
-        """Mark a time in each plot."""
+        """Mark a time in each plot, where that can be done."""
+        if not self._marked:
+            return
         for handle, data in self._shown.values():
             times_s, *values, _ = data
             handle.data = (times_s, *values, _spike(times_s, values, time_s))
@@ -56,7 +59,7 @@ class Plots:
             height=HEIGHT_PX,
             scales={"x": uplot.Scale(time=False)},
             axes=(uplot.Axis(size=28), uplot.Axis(size=_AXIS_PX)),
-            legend=uplot.Legend(show=len(series) > 3, live=False),
+            legend=uplot.Legend(show=len(series) > 2 + self._marked, live=False),
             cursor=uplot.Cursor(show=True),
             padding=(4, 12, 0, 0),
         )
@@ -69,7 +72,7 @@ class Plots:
             else uplot.Series(label=name, stroke=next(colours), width=1.3, points={"show": False})
             for name in chart.names
         )
-        return _framed(chart.times_s, list(chart.values), lines)
+        return self._framed(chart.times_s, list(chart.values), lines)
 
     def _overlaid(self, charts: Sequence[Chart | None]) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
         """Return the headlines of several vehicles over the times of all."""
@@ -82,16 +85,17 @@ class Plots:
             values.append(np.interp(times_s, chart.times_s, chart.headline))
             stroke = "#{:02x}{:02x}{:02x}".format(*COLOURS[number % len(COLOURS)])
             lines.append(uplot.Series(label=self._names[number], stroke=stroke, width=1.3, points={"show": False}))
-        return _framed(times_s, values, tuple(lines))
+        return self._framed(times_s, values, tuple(lines))
 
-
-def _framed(
-    times_s: Array, values: list[Array], lines: tuple[uplot.Series, ...]
-) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
-    """Return data and series with time before them and the mark behind them."""
-    mark = uplot.Series(label="now", stroke=_NOW, width=1, points={"show": False})
-    data = (times_s, *values, _spike(times_s, values, -np.inf))
-    return data, (uplot.Series(label="s"), *lines, mark)
+    def _framed(
+        self, times_s: Array, values: list[Array], lines: tuple[uplot.Series, ...]
+    ) -> tuple[tuple[Array, ...], tuple[uplot.Series, ...]]:
+        """Return data and series with time before them and the mark, if there is one, behind them."""
+        seconds = uplot.Series(label="s")
+        if not self._marked:
+            return (times_s, *values), (seconds, *lines)
+        mark = uplot.Series(label="now", stroke=_NOW, width=1, points={"show": False})
+        return (times_s, *values, _spike(times_s, values, -np.inf)), (seconds, *lines, mark)
 
 
 def _spike(times_s: Array, values: list[Array], time_s: float) -> Array:

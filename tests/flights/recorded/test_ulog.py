@@ -1,9 +1,13 @@
 """`flight.ulg` of flights: each number of it as in the tables, by PX4's reader; and its commands."""
 
 import csv
+import os
+import signal
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
@@ -18,6 +22,10 @@ from colibri.plant.vehicle.description import load_vehicle
 from tools.harness.processes import rows
 
 SPIRAL = ("fly", "spiral", "--quiet", "--no-figures", "--duration", "2")
+
+
+PATIENCE_S = 60.0
+KILLED_AT_BYTES = 400_000
 
 
 class Flown:
@@ -46,6 +54,12 @@ def on_sensors(tmp_path_factory: pytest.TempPathFactory) -> Flown:
     folder = tmp_path_factory.mktemp("sensors")
     assert main([*SPIRAL, "--link", "memory", "--feedback", "sensors", "--out", str(folder)]) == 0
     return Flown(folder)
+
+
+@pytest.fixture(params=["on_state", "on_sensors"])
+def either(request: pytest.FixtureRequest) -> Flown:
+    flown: Flown = request.getfixturevalue(request.param)
+    return flown
 
 
 def single(column: Any) -> Any:
@@ -157,11 +171,11 @@ def test_px4s_commands_read_it(
     command: Callable[[], None],
     options: list[str],
     said: str,
-    on_state: Flown,
+    either: Flown,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(sys, "argv", ["ulog", str(on_state.folder / "flight.ulg"), *options])
+    monkeypatch.setattr(sys, "argv", ["ulog", str(either.folder / "flight.ulg"), *options])
     command()
     shown = capsys.readouterr()
     assert said in shown.out
@@ -170,12 +184,29 @@ def test_px4s_commands_read_it(
 
 
 def test_px4s_tables_have_each_row(
-    on_state: Flown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    either: Flown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(sys, "argv", ["ulog2csv", str(on_state.folder / "flight.ulg"), "-o", str(tmp_path)])
+    monkeypatch.setattr(sys, "argv", ["ulog2csv", str(either.folder / "flight.ulg"), "-o", str(tmp_path)])
     ulog2csv.main()
     assert capsys.readouterr().err == ""
     tables = {path.name for path in tmp_path.iterdir()}
-    assert len(tables) == len(on_state.log.data_list) == 14
+    assert len(tables) == len(either.log.data_list) >= 14
     with (tmp_path / "flight_trajectory_setpoint_0.csv").open(encoding="utf-8") as table:
-        assert len(list(csv.DictReader(table))) == len(on_state.decided["t"])
+        assert len(list(csv.DictReader(table))) == len(either.decided["t"])
+
+
+def test_what_was_written_before_both_processes_are_killed_is_whole(tmp_path: Path) -> None:
+    log = tmp_path / "flight.ulg"
+    flight = [sys.executable, "-m", "colibri", "fly", "spiral", "--quiet", "--speed", "4", "--out", str(tmp_path)]
+    with subprocess.Popen(flight, start_new_session=True) as process:
+        until_s = monotonic() + PATIENCE_S
+        while not log.exists() or log.stat().st_size < KILLED_AT_BYTES:
+            assert monotonic() < until_s
+            sleep(0.01)
+        os.killpg(process.pid, signal.SIGKILL)
+    left = ULog(str(log))
+    assert not left.file_corruption
+    for topic in ("vehicle_local_position", "vehicle_local_position_groundtruth"):
+        times_us = left.get_dataset(topic).data["timestamp"]
+        assert len(times_us) >= 64
+        assert np.all(np.diff(times_us) == 8000)
