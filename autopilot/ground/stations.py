@@ -176,6 +176,7 @@ class Stations:
             observers=(self._streams,),
             caught=caught,
         )
+        self.snapshot: Snapshot | None = None
         self.log = LogLink(self.hub, self._streams, files, settings.boot_unix_us)
 
     def use(self, channel: int, kind: str) -> None:
@@ -193,6 +194,7 @@ class Stations:
 
     def update(self, snapshot: Snapshot) -> None:
         """Take in the vehicle's state. Called once a control sample."""
+        self.snapshot = snapshot
         self._heartbeat.update(snapshot)
         self._streams.update(snapshot)
         self.setpoints.update(snapshot, self._pilot.context().state.euler[2])

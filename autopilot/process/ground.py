@@ -23,6 +23,7 @@ from colibri.common.process.log_files import LogError
 from colibri.common.process.status import Status
 from colibri.common.serialization import to_bytes
 from colibri.mavlink.links.link import LinkError
+from colibri.mavlink.telemetry.snapshot import Snapshot
 from colibri.mavlink.wire.signing import tick_at
 from colibri.plant.vehicle.description import Vehicle
 
@@ -81,6 +82,7 @@ class Ground:
                 status.say("track", note)
         self.errors = ErrorLog(args.out or args.state, status)
         self._log: AutopilotLog | None = None
+        self._recorded_snapshot: Snapshot | None = None
         self.copter = self._new_copter(self._state.history())
         self._kept_samples = self._kept_plans = 0
         self._kept_armed = False
@@ -104,6 +106,8 @@ class Ground:
         """Record in `log` what the vehicle begins with, and what it receives."""
         self._log = log
         log.begin_again(self._values, self._past_bytes)
+        if log.topics:
+            log.topics.follow(self.copter.parameters)
 
     def serve(self, now_s: float) -> Copter:
         """Receive from ground stations and answer them; return the vehicle that flies on.
@@ -115,6 +119,8 @@ class Ground:
         if self._log:
             received = self._recorded(self._log, received)
         outbox = self.copter.serve(received)
+        if self._log:
+            self._record_snapshot(self._log)
         if stations.system.restart:
             self._restart(stations.system.restart)
         try:
@@ -126,6 +132,17 @@ class Ground:
         if records:
             self.errors.write(records)
         return self.copter
+
+    def _record_snapshot(self, log: "AutopilotLog") -> None:
+        """Record what ground stations are told, where it is new."""
+        snapshot = self.copter.stations.snapshot
+        if snapshot is None or snapshot is self._recorded_snapshot:
+            return
+        self._recorded_snapshot = snapshot
+        try:
+            log.write_snapshot(snapshot)
+        except LogError as error:
+            self._status.say("said", f"{error}; flying on")
 
     def _recorded(self, log: "AutopilotLog", received: Iterable[Received]) -> Iterator[Received]:
         """Yield what was received; the flight goes on where it cannot be recorded."""

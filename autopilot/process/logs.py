@@ -15,6 +15,7 @@ from colibri.autopilot.process.recorded_inputs import ReceivedDatagram, Setup, l
 from colibri.common.process.log_files import CsvLog, LogError, LogFile
 from colibri.mavlink.hil.feedback import Feedback
 from colibri.mavlink.parameters.store import Value
+from colibri.mavlink.telemetry.snapshot import Snapshot
 
 if TYPE_CHECKING:
     from colibri.autopilot.core.step import Received
@@ -98,6 +99,15 @@ class AutopilotLog:
         self._decisions.add((step.command.time_us / 1e6, *decided))
         if self.topics and not self._setup.ground:
             self.topics.write(step, decided)
+
+    def write_snapshot(self, snapshot: Snapshot) -> None:
+        """Append what ground stations are told.
+
+        Raises:
+            LogError: It cannot be written.
+        """
+        if self.topics:
+            self.topics.write_snapshot(snapshot)
 
     def begin_again(self, values: Mapping[str, Value], history: bytes) -> None:
         """Record that the next frame is answered by a vehicle that begins with these parameters and this history."""
