@@ -1,8 +1,6 @@
 """`flight.ulg` of flights: each number of it as in the tables, by PX4's reader; and its commands."""
 
 import csv
-import os
-import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -11,6 +9,7 @@ from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 from pyulog import ULog, info, messages, params, ulog2csv
 
@@ -22,8 +21,7 @@ from colibri.plant.vehicle.description import load_vehicle
 from tools.harness.processes import rows
 
 SPIRAL = ("fly", "spiral", "--quiet", "--no-figures", "--duration", "2")
-
-
+TOPICS = {"on_state": 14, "on_sensors": 16}
 PATIENCE_S = 60.0
 KILLED_AT_BYTES = 400_000
 
@@ -56,7 +54,7 @@ def on_sensors(tmp_path_factory: pytest.TempPathFactory) -> Flown:
     return Flown(folder)
 
 
-@pytest.fixture(params=["on_state", "on_sensors"])
+@pytest.fixture(params=TOPICS)
 def either(request: pytest.FixtureRequest) -> Flown:
     flown: Flown = request.getfixturevalue(request.param)
     return flown
@@ -183,14 +181,15 @@ def test_px4s_commands_read_it(
     assert shown.err == ""
 
 
+@pytest.mark.parametrize(("either", "topics"), TOPICS.items(), indirect=["either"])
 def test_px4s_tables_have_each_row(
-    either: Flown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    either: Flown, topics: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["ulog2csv", str(either.folder / "flight.ulg"), "-o", str(tmp_path)])
     ulog2csv.main()
     assert capsys.readouterr().err == ""
     tables = {path.name for path in tmp_path.iterdir()}
-    assert len(tables) == len(either.log.data_list) >= 14
+    assert len(tables) == len(either.log.data_list) == topics
     with (tmp_path / "flight_trajectory_setpoint_0.csv").open(encoding="utf-8") as table:
         assert len(list(csv.DictReader(table))) == len(either.decided["t"])
 
@@ -198,12 +197,16 @@ def test_px4s_tables_have_each_row(
 def test_what_was_written_before_both_processes_are_killed_is_whole(tmp_path: Path) -> None:
     log = tmp_path / "flight.ulg"
     flight = [sys.executable, "-m", "colibri", "fly", "spiral", "--quiet", "--speed", "4", "--out", str(tmp_path)]
-    with subprocess.Popen(flight, start_new_session=True) as process:
+    with subprocess.Popen(flight) as process:
         until_s = monotonic() + PATIENCE_S
         while not log.exists() or log.stat().st_size < KILLED_AT_BYTES:
             assert monotonic() < until_s
             sleep(0.01)
-        os.killpg(process.pid, signal.SIGKILL)
+        launcher = psutil.Process(process.pid)
+        started = launcher.children(recursive=True)
+        assert len(started) >= 2
+        for each in (*started, launcher):
+            each.kill()
     left = ULog(str(log))
     assert not left.file_corruption
     for topic in ("vehicle_local_position", "vehicle_local_position_groundtruth"):
