@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.peers.test_on_the_plant import ALONE, PROGRAMS, can_be_alone
+from tests.peers.programs import ALONE, program_of
 
 pytestmark = pytest.mark.peers
 
@@ -53,16 +53,6 @@ kill -KILL $vehicle
 wait $vehicle 2>/dev/null
 exit $code
 """
-
-
-def program_of(whom: str) -> Path:
-    """Return the program that an environment variable names, if it can be run alone; else skip the test."""
-    path = os.environ.get(PROGRAMS[whom])
-    if not path:
-        pytest.skip(f"{PROGRAMS[whom]} does not say where {whom} is")
-    if not can_be_alone():
-        pytest.skip("no network namespace to be had: unshare --map-root-user --net")
-    return Path(path)
 
 
 def fly(folder: Path, vehicle: list[str], options: str, **environment: str) -> dict[str, Any]:

@@ -4,41 +4,26 @@ COLIBRI_PX4 is a build folder of PX4's SITL (`build/px4_sitl_default`), COLIBRI_
 Both bind to all addresses: they run in a network namespace with loopback alone.
 """
 
-import os
 import sys
 from pathlib import Path
-from subprocess import DEVNULL, run
+from subprocess import run
 
 import numpy as np
 import pytest
 
 from tests.peers.on_the_plant import HOVER_S, TAKE_OFF_M
+from tests.peers.programs import ALONE, PROGRAMS, program_of
 from tools.harness.processes import rows
 
 pytestmark = pytest.mark.peers
 
-PROGRAMS = {"px4": "COLIBRI_PX4", "ardupilot": "COLIBRI_ARDUCOPTER"}
 HEIGHT_M = {"px4": 2.5, "ardupilot": TAKE_OFF_M}
-ALONE = ("unshare", "--map-root-user", "--net", "sh", "-c", 'ip link set lo up && exec "$0" "$@"')
 MINUTES = 6.0
-
-
-def can_be_alone() -> bool:
-    """Whether this system lets a user have a network namespace."""
-    try:
-        return run([*ALONE, "true"], stdout=DEVNULL, stderr=DEVNULL, check=False).returncode == 0
-    except OSError:
-        return False
 
 
 @pytest.mark.parametrize("whom", PROGRAMS)
 def test_it_takes_off_and_hovers_and_so_does_the_next(whom: str, tmp_path: Path) -> None:
-    program = os.environ.get(PROGRAMS[whom])
-    if not program:
-        pytest.skip(f"{PROGRAMS[whom]} does not say where {whom} is")
-    if not can_be_alone():
-        pytest.skip("no network namespace to be had: unshare --map-root-user --net")
-    command = [*ALONE, sys.executable, "-m", "tests.peers.on_the_plant", whom, program, str(tmp_path)]
+    command = [*ALONE, sys.executable, "-m", "tests.peers.on_the_plant", whom, str(program_of(whom)), str(tmp_path)]
     run(command, check=True, timeout=60.0 * MINUTES)
     for name in ("plant-1.csv", "plant.csv"):
         flown = rows(tmp_path / "plant" / name)

@@ -13,8 +13,10 @@ from colibri.companion.errors import CompanionError
 from colibri.companion.identification.fit import RateLog, fit
 from colibri.companion.identification.steps import duration_s, step_at
 from colibri.companion.response_file import read_response, response_text
+from colibri.companion.stacks.px4 import PX4
 from colibri.companion.stacks.stack import Response
 from colibri.companion.steering import response as model
+from colibri.companion.steering.law_pilot import turning_no_faster
 from colibri.companion.steering.smooth_start import OVER_S, smoothly_started
 from colibri.plant.vehicle.description import load_vehicle
 
@@ -116,3 +118,11 @@ def test_a_track_begins_at_rest_and_goes_on_as_it_is(name: str) -> None:
         shifted = position(as_it_is, later - 0.5 * OVER_S, derivative)
         assert position(started, later, derivative) == pytest.approx(shifted, abs=1e-6)
     assert position(started, np.array([0.0])) == pytest.approx(position(as_it_is, np.array([0.0])))
+
+
+def test_a_vehicle_that_its_stack_turns_more_slowly_has_moments_of_a_body() -> None:
+    slow = PX4.response._replace(max_acceleration_rad_s2=(10.0, 12.0, 6.0))
+    ix, iy, iz = turning_no_faster(load_vehicle("iris"), slow).body.inertia_kg_m2
+    before = load_vehicle("iris").body.inertia_kg_m2
+    assert min(ix / before[0], iy / before[1]) > 1.0
+    assert 2.0 * max(ix, iy, iz) <= ix + iy + iz

@@ -9,40 +9,15 @@ import pytest
 
 from colibri.common.earth.geodesy import Geodetic, geodetic_of
 from colibri.mavlink.mission.items import FENCE
-from colibri.mavlink.wire.dialect import Codec, Message, mav
-from colibri.sitl.ground_station import Station
+from colibri.mavlink.wire.dialect import Codec, mav
 from colibri.sitl.mission_items import land, takeoff, waypoint
 from colibri.sitl.vehicle import Sitl
 from colibri.view.modes import ARDUPILOT, PX4, mode_name, set_mode
 from colibri.view.observer import COMPONENT, SYSTEM, Observer
 from colibri.view.snapshot import Snapshot
+from tools.pages.pictures.watched import watched
 
 HOME = Geodetic(47.0, 8.0, 400.0)
-
-
-class Viewer(Station):
-    """A station of a flight in simulated time that is an `Observer`."""
-
-    observer: Observer
-
-    def add(self, message: Message) -> None:
-        now_s = self._flight.time_us / 1e6
-        self.observer.receive(message.frame, now_s)
-
-    def departing(self, now_us: int) -> list[bytes]:
-        self.observer.poll(now_us / 1e6)
-        for datagram in self.observer.take_outbox():
-            self.send_raw(datagram)
-        return super().departing(now_us)
-
-
-def watched(sitl: Sitl) -> Observer:
-    """Return an observer of a flight."""
-    viewer = sitl.client(SYSTEM, COMPONENT, beats=False)
-    viewer.__class__ = Viewer
-    assert isinstance(viewer, Viewer)
-    viewer.observer = Observer()
-    return viewer.observer
 
 
 def test_orders_fly_the_vehicle_and_the_page_sees_it(sitl: Sitl) -> None:

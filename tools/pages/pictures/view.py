@@ -9,76 +9,24 @@ from pathlib import Path
 from PIL import Image
 
 from colibri.experiments.flight import fly
-from colibri.mavlink.wire.dialect import Message, mav
+from colibri.mavlink.wire.dialect import mav
 from colibri.sitl.backends.setting import setting_of
-from colibri.sitl.ground_station import Station
 from colibri.sitl.mission_items import Item, circle, land, polygon, takeoff, waypoint
 from colibri.sitl.session import Flights
 from colibri.sitl.vehicle import Sitl
 from colibri.view.access import Token
 from colibri.view.modes import CHOICES, PX4
-from colibri.view.observer import COMPONENT, SYSTEM, Observer
 from colibri.view.page.page import Page
 from colibri.view.run import Show, read_flights
-from colibri.view.snapshot import Airframe, Chart, Snapshot, Source, Surroundings
+from colibri.view.snapshot import Source
 from tools.pages.pictures.chromium import Tab, chromium
+from tools.pages.pictures.watched import Watched
 
 FRAME_S = 0.1
 DRAWN_AFTER_MS = 15000
 """Without a GPU a picture takes a second, and what is sent last has to be in it."""
 COLOURS = 160
 TOKEN = Token("docs")
-
-
-class Watching(Station):
-    """A station of a flight in simulated time that is an `Observer`."""
-
-    observer: Observer
-
-    def add(self, message: Message) -> None:
-        """Hand it to the observer."""
-        self.observer.receive(message.frame, self._flight.time_us / 1e6)
-
-    def departing(self, now_us: int) -> list[bytes]:
-        """Send what the observer has to say."""
-        self.observer.poll(now_us / 1e6)
-        for datagram in self.observer.take_outbox():
-            self.send_raw(datagram)
-        return super().departing(now_us)
-
-
-class Watched:
-    """A flight in simulated time as a live vehicle of the page."""
-
-    airframe = Airframe()
-    is_live = True
-
-    def __init__(self, sitl: Sitl, name: str) -> None:
-        """Watch it from now on."""
-        self.name = name
-        self.sitl = sitl
-        station = sitl.client(SYSTEM, COMPONENT, beats=False)
-        station.__class__ = Watching
-        assert isinstance(station, Watching)
-        self._observer = station.observer = Observer()
-
-    @property
-    def span_s(self) -> tuple[float, float]:
-        """See `Source`."""
-        return 0.0, 0.0
-
-    @property
-    def surroundings(self) -> Surroundings:
-        """See `Source`."""
-        return self._observer.surroundings
-
-    def at(self, time_s: float) -> Snapshot:
-        """See `Source`."""
-        return self._observer.telemetry.snapshot(time_s)
-
-    def charts(self) -> tuple[Chart, ...]:
-        """See `Source`."""
-        return self._observer.telemetry.charts()
 
 
 def write(folder: Path) -> None:

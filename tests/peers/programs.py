@@ -1,0 +1,28 @@
+"""Where the real stacks are, and how they run alone: both bind to all addresses."""
+
+import os
+from pathlib import Path
+from subprocess import DEVNULL, run
+
+import pytest
+
+PROGRAMS = {"px4": "COLIBRI_PX4", "ardupilot": "COLIBRI_ARDUCOPTER"}
+ALONE = ("unshare", "--map-root-user", "--net", "sh", "-c", 'ip link set lo up && exec "$0" "$@"')
+
+
+def can_be_alone() -> bool:
+    """Whether this system lets a user have a network namespace."""
+    try:
+        return run([*ALONE, "true"], stdout=DEVNULL, stderr=DEVNULL, check=False).returncode == 0
+    except OSError:
+        return False
+
+
+def program_of(whom: str) -> Path:
+    """Return the program that an environment variable names, if it can be run alone; else skip the test."""
+    path = os.environ.get(PROGRAMS[whom])
+    if not path:
+        pytest.skip(f"{PROGRAMS[whom]} does not say where {whom} is")
+    if not can_be_alone():
+        pytest.skip("no network namespace to be had: unshare --map-root-user --net")
+    return Path(path)
