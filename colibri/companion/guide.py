@@ -4,14 +4,12 @@ What is done in each phase is here; which follows which, and why, is in `supervi
 """
 
 from math import dist, inf, nan
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from colibri.autopilot.control.interface import FALLBACK_CODES, Clock
 from colibri.autopilot.control.profile import Profile
 from colibri.autopilot.control.registry import DecisionError, Factory
-from colibri.autopilot.guidance.trajectories.tracks import Track, position
+from colibri.autopilot.guidance.trajectories.tracks import Track
 from colibri.common.rotations import euler_from_quaternion, tilt_deg
 from colibri.common.types import Array, Vector
 from colibri.companion.conversation.vehicle_peer import ReceivedState, VehiclePeer
@@ -29,7 +27,8 @@ from colibri.companion.steering.reference_history import PastReference, Referenc
 from colibri.companion.steering.smooth_start import smoothly_started
 from colibri.companion.supervision.checks import CheckFacts, failing
 from colibri.companion.supervision.conditions import Situation, conditions
-from colibri.companion.supervision.limits import Box, FlightFacts, Limit, exceeded
+from colibri.companion.supervision.ending import Ended, how_it_ended
+from colibri.companion.supervision.limits import FlightFacts, Limit, box_of, exceeded
 from colibri.companion.supervision.pace import Pace
 from colibri.companion.supervision.phases import Condition, Phase, next_phase
 from colibri.plant.vehicle.description import Vehicle
@@ -42,22 +41,8 @@ _BRAKES_US = 3_000_000
 """How long it may brake at the end of a track before the vehicle is handed over."""
 _SLOW_M_S = 0.3
 _UP_M, _UP_M_S = 0.5, 0.3
-_TRACK_POINTS = 400
 _CORRECTED_IN = 0.5
 """Round trips in which an error of the prediction is corrected."""
-_ENDLESS_S = 100.0
-
-
-class Ended(NamedTuple):
-    """How it ended.
-
-    Attributes:
-        in_order: Whether all was flown that was asked for, or whoever may end it did.
-        why: In words.
-    """
-
-    in_order: bool
-    why: str
 
 
 class Companion:
@@ -99,7 +84,7 @@ class Companion:
         self._predictor.thrust_scale = settings.thrust_scale
         self._history = ReferenceHistory()
         self._orders = Orders(self.peer, settings, self._pilot.start_enu_m[2])
-        self._box = _box_of(track, settings)
+        self._box = box_of(track, settings.duration_s, settings.limits.margin_m)
         self._weight_n = vehicle.body.mass_kg * vehicle.gravity_m_s2
         self._thrust: Thrust | None = None
         self.phase, self._since_us = Phase.CONNECTING, 0
@@ -291,21 +276,7 @@ class Companion:
             self._pilot.hold()
             self._brakes = why is Condition.FINISHED
         elif phase is Phase.ENDED:
-            self.ended = self._how_it_ended(before, why)
-
-    def _how_it_ended(self, before: Phase, why: Condition) -> Ended:
-        if why is Condition.PILOT:
-            return Ended(True, "the pilot, or the vehicle itself, has chosen another mode: it is theirs")
-        if self.limit is not None:
-            return Ended(False, f"ended by its limit: {self.limit.name}")
-        if self._orders.refused:
-            return Ended(False, self._orders.refused)
-        if why is Condition.TOO_LATE:
-            what = "; ".join(self._failing) if before is Phase.CHECKING else f"nothing came of {before} in time"
-            return Ended(False, what)
-        if why is Condition.DISARMED and before is not Phase.HANDING_OVER:
-            return Ended(False, why.value)
-        return Ended(True, why.value)
+            self.ended = how_it_ended(before, why, self.limit, self._orders.refused, self._failing)
 
     def _may_hand_over(self, now_us: int) -> bool:
         """Whether it is time to order the vehicle to hold: once it is slow at the end of a track, else at once."""
@@ -439,15 +410,6 @@ class Companion:
             *(*self._predictor.disturbance[:3].tolist(), FALLBACK_CODES[fallback], int(sent)),
         )
         self.rows.append(LogRow(*numbers))
-
-
-def _box_of(track: Track, settings: CompanionSettings) -> Box:
-    """Return the box around the part of a track that is flown, with the margin; it ends at the ground."""
-    ends_s = min(track.duration_s, settings.duration_s, _ENDLESS_S)
-    points = position(track, np.linspace(0.0, ends_s, _TRACK_POINTS))
-    margin_m = settings.limits.margin_m
-    lower, upper = (points.min(axis=0) - margin_m).tolist(), (points.max(axis=0) + margin_m).tolist()
-    return Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
 
 
 def _first(rows: Any) -> Vector:

@@ -5,12 +5,18 @@ from dataclasses import dataclass
 from math import dist, inf
 from typing import NamedTuple
 
+import numpy as np
+
+from colibri.autopilot.guidance.trajectories.tracks import Track, position
 from colibri.common.types import Vector
 
 MAX_STATE_AGE_S = 0.1
 MIN_BATTERY = 0.15
 MIN_PACE = 0.8
 MAX_GAP_S = 0.2
+_TRACK_POINTS = 400
+_ENDLESS_S = 100.0
+"""Of a track without an end so much is looked at."""
 _CRITICAL = frozenset({5, 6, 7, 8})
 """MAV_STATE_CRITICAL, EMERGENCY, POWEROFF and FLIGHT_TERMINATION."""
 
@@ -30,6 +36,13 @@ class Box(NamedTuple):
         lower = tuple(min(low, x - margin_m) for low, x in zip(self.lower, place, strict=True))
         upper = tuple(max(high, x + margin_m) for high, x in zip(self.upper, place, strict=True))
         return Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
+
+
+def box_of(track: Track, duration_s: float, margin_m: float) -> Box:
+    """Return the box around the part of a track that is flown, with a margin."""
+    points = position(track, np.linspace(0.0, min(track.duration_s, duration_s, _ENDLESS_S), _TRACK_POINTS))
+    lower, upper = (points.min(axis=0) - margin_m).tolist(), (points.max(axis=0) + margin_m).tolist()
+    return Box((lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
