@@ -6,7 +6,8 @@ import numpy as np
 
 from colibri.autopilot.control.interface import Diagnostics, Horizon, PlanColumns, VehicleState
 from colibri.common.elementary import square
-from colibri.common.elementwise import cos, sin
+from colibri.common.jit import compiled
+from colibri.common.kernels import cos, sin
 from colibri.common.matrices import matvec
 from colibri.common.types import Array
 from colibri.mavlink.telemetry.snapshot import Forecast
@@ -42,16 +43,11 @@ class Forecaster:
         self, state: VehicleState, plan: Array, squared: Array, columns: PlanColumns, mass_kg: float
     ) -> tuple[Forecast, ...]:
         """Integrate thrust along the body's z axis and gravity; drag does not matter in so short a time."""
-        ahead = plan[1:]
-        phi, theta, psi, yaw_rate = (ahead[:, column] for column in columns)
-        x = cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi)
-        y = cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi)
-        up = np.stack([x, y, cos(phi) * cos(theta)], axis=1)
-        acceleration = up * (matvec(squared, self._full_thrust_n) / mass_kg)[:, None]
-        acceleration[:, 2] -= self._gravity_m_s2
-        velocity = np.array(state.velocity_enu_m_s) + self._interval_s * np.cumsum(acceleration, axis=0)
-        position = np.array(state.position_enu_m) + self._interval_s * np.cumsum(velocity, axis=0)
-        return self._points(position, velocity, acceleration, psi, yaw_rate)
+        begin = np.array((*state.position_enu_m, *state.velocity_enu_m_s))
+        thrusts_n = matvec(squared, self._full_thrust_n)
+        motion = _motion(begin, plan, columns, thrusts_n, mass_kg, self._gravity_m_s2, self._interval_s)
+        psi, yaw_rate = plan[1:, columns.psi], plan[1:, columns.yaw_rate]
+        return self._points(motion[:, 0:3], motion[:, 3:6], motion[:, 6:9], psi, yaw_rate)
 
     def _points(self, p: Array, v: Array, a: Array, yaw: Array, rate: Array) -> tuple[Forecast, ...]:
         last = len(p) - 1
@@ -67,3 +63,36 @@ class Forecaster:
             )
             for k in chosen
         )
+
+
+@compiled
+def _motion(
+    begin: Array,
+    plan: Array,
+    columns: PlanColumns,
+    thrusts_n: Array,
+    mass_kg: float,
+    gravity_m_s2: float,
+    interval_s: float,
+) -> Array:
+    """Return position, velocity and acceleration, ENU, after each step of a plan, (n, 9).
+
+    `begin` is position and velocity before it, (6,); `plan` has a row more than there are `thrusts_n`, that of now.
+    """
+    motion = np.zeros((thrusts_n.shape[0], 9))
+    speeds, places = np.zeros(3), np.zeros(3)  # their sums; what they are multiplied by comes after
+    for k in range(thrusts_n.shape[0]):
+        phi, theta, psi = plan[k + 1, columns.phi], plan[k + 1, columns.theta], plan[k + 1, columns.psi]
+        position, velocity, acceleration = motion[k, 0:3], motion[k, 3:6], motion[k, 6:9]
+        acceleration[0] = cos(phi) * sin(theta) * cos(psi) + sin(phi) * sin(psi)
+        acceleration[1] = cos(phi) * sin(theta) * sin(psi) - sin(phi) * cos(psi)
+        acceleration[2] = cos(phi) * cos(theta)
+        for i in range(3):
+            acceleration[i] *= thrusts_n[k] / mass_kg
+        acceleration[2] -= gravity_m_s2
+        for i in range(3):
+            speeds[i] += acceleration[i]
+            velocity[i] = begin[3 + i] + interval_s * speeds[i]
+            places[i] += velocity[i]
+            position[i] = begin[i] + interval_s * places[i]
+    return motion

@@ -106,7 +106,7 @@ class Sitl(View, Stepped, Steered):
             Raises:
                 AttributeError: There is no such attribute.
             """
-            if "rotors" in self.__dict__ and not hasattr(self, name):
+            if name[0] != "_" and "rotors" in self.__dict__ and not hasattr(self, name):
                 raise AttributeError(f"a vehicle has no {name} to set: choose {', '.join(_SETTABLE)}")
             super().__setattr__(name, value)
 

@@ -2,7 +2,7 @@
 
 from math import nan
 
-from colibri.common.rotations import euler_from_quaternion
+from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry.encoder import (
     MILLI_G,

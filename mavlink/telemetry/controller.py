@@ -2,9 +2,9 @@
 
 from math import degrees, hypot, isnan
 
+from colibri.common.compiled_rotations import euler_from_quaternion
 from colibri.common.earth.geodesy import geodetic_of
 from colibri.common.kernels import atan2
-from colibri.common.rotations import euler_from_quaternion
 from colibri.mavlink.node.service import Fields
 from colibri.mavlink.telemetry.encoder import UNKNOWN_U16, boot_ms, minus, yaw_ned
 from colibri.mavlink.telemetry.snapshot import Forecast, Setpoint, Snapshot

@@ -48,15 +48,21 @@ def refusals(inputs: ArmingInputs) -> list[str]:
     state, stick = inputs.state, inputs.thrust_stick
     if state is None:
         return ["no telemetry from the plant"]
-    tilted_deg, fastest_m_s = tilt_deg(state.attitude), max(map(abs, state.velocity_enu_m_s))
-    checks = (
-        (tilted_deg > MAX_TILT_DEG, f"tilted by {tilted_deg:.0f} degrees, more than {MAX_TILT_DEG:.0f}"),
-        (fastest_m_s > MAX_SPEED_M_S, f"moving at {fastest_m_s:.1f} m/s"),
-        (not inputs.standing, "not standing on the ground"),
-        (inputs.charge < MIN_CHARGE, f"battery at {inputs.charge:.0%}"),
-        (bool(inputs.battery), inputs.battery),
-        (stick is not None and stick > MAX_THRUST_STICK, "thrust stick is up"),
-        (inputs.outside_fence is not None, inputs.outside_fence.reason if inputs.outside_fence else ""),
-        (bool(inputs.not_known), inputs.not_known),
-    )
-    return [reason for fails, reason in checks if fails]
+    reasons = []
+    if (tilted_deg := tilt_deg(state.attitude)) > MAX_TILT_DEG:
+        reasons.append(f"tilted by {tilted_deg:.0f} degrees, more than {MAX_TILT_DEG:.0f}")
+    if (fastest_m_s := max(map(abs, state.velocity_enu_m_s))) > MAX_SPEED_M_S:
+        reasons.append(f"moving at {fastest_m_s:.1f} m/s")
+    if not inputs.standing:
+        reasons.append("not standing on the ground")
+    if inputs.charge < MIN_CHARGE:
+        reasons.append(f"battery at {inputs.charge:.0%}")
+    if inputs.battery:
+        reasons.append(inputs.battery)
+    if stick is not None and stick > MAX_THRUST_STICK:
+        reasons.append("thrust stick is up")
+    if inputs.outside_fence is not None:
+        reasons.append(inputs.outside_fence.reason)
+    if inputs.not_known:
+        reasons.append(inputs.not_known)
+    return reasons

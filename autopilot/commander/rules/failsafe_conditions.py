@@ -74,18 +74,15 @@ class Conditions:
         self._pose_us = 0
 
     def look(self, inputs: FailsafeInputs, limits: Limits, held: Container[Condition]) -> Mapping[Condition, int]:
-        """Return since when each condition holds; those that do not are not in it. `held` are lost already.
-
-        Every condition has a rule in one of the two tables: this fails at the first sample where one has none.
-        """
+        """Return since when each condition holds; those that do not are not in it. `held` are lost already."""
         before, self._since_us = self._since_us, {}
         found: dict[Condition, int] = {}
-        for condition in Condition:
-            if condition in SILENT_SINCE:
-                since_us = SILENT_SINCE[condition](inputs, condition in held)
-                if since_us is not None:
-                    found[condition] = since_us
-            elif HOLDS[condition](inputs, limits):
+        for condition, silent_since in SILENT_SINCE.items():
+            since_us = silent_since(inputs, condition in held)
+            if since_us is not None:
+                found[condition] = since_us
+        for condition, holds in HOLDS.items():
+            if holds(inputs, limits):
                 found[condition] = self._since_us[condition] = before.get(condition, inputs.now_us)
         frozen_us = self._frozen_since(inputs)
         if frozen_us is not None:

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from colibri.autopilot.control.interface import VehicleState
-from colibri.autopilot.control.vehicle_model.battery import BatteryModel
+from colibri.autopilot.control.vehicle_model.battery import BatteryModel, terminal
 from colibri.autopilot.control.vehicle_model.rotor_lag import RotorLag, follow, rotor_lag
 from colibri.common.elementary import square
-from colibri.common.jit import compiled
+from colibri.common.jit import Packed, compiled, packed
 from colibri.common.rotations import rotation_matrix
 from colibri.common.types import Array
 from colibri.plant.vehicle.description import Vehicle
@@ -98,13 +98,14 @@ class RotorWatch:
         self._before: Array | None = None
         self._residual, self._noise = np.zeros(4), np.zeros(4)
         self.adopt(vehicle)
-        still = np.zeros(9)
-        _evidence(still, still, self.speeds, self.speeds, interval_s, self._signature, self._residual, self._noise)
-        self.begin((0.0, 0.0, 0.0, 0.0))
+        controls = (0.0, 0.0, 0.0, 0.0)
+        self.speeds = _followed(self.speeds, controls, 1.0, self._lag, self._battery.numbers)
+        self._add(np.zeros(9), np.zeros(9), self.speeds)
+        self.begin(controls)
 
     def adopt(self, vehicle: Vehicle) -> None:
         """Go on with other numbers of the vehicle."""
-        self._signature = signature_of(vehicle)
+        self._signature = packed(signature_of(vehicle))
         self._lag: RotorLag = rotor_lag(vehicle, self._interval_s)
         self._battery = BatteryModel(vehicle)
 
@@ -125,24 +126,68 @@ class RotorWatch:
             charge_ah: Charge taken from the battery.
             airborne: Whether nothing but air touches it.
         """
-        max_speed = self._battery.max_speed_now(charge_ah, self.speeds)
-        commands = np.minimum(np.maximum(np.array(controls), self._lag.min_speed), max_speed)
-        before, self.speeds = self.speeds, follow(self.speeds, commands, self._lag)
-        last = self._before
+        open_v = self._battery.open_voltage_v(charge_ah)
+        before, last = self.speeds, self._before
+        self.speeds = _followed(before, controls, open_v, self._lag, self._battery.numbers)
         R = rotation_matrix(state.attitude)
         self._before = now = np.array((*state.velocity_enu_m_s, *state.rate_flu_rad_s, R[0][2], R[1][2], R[2][2]))
         if last is None or not airborne:
             self.evidence[:] = 0.0
             return self.lost
-        self.evidence += _evidence(
-            last, now, before, self.speeds, self._interval_s, self._signature, self._residual, self._noise
-        )
-        np.maximum(self.evidence, 0.0, out=self.evidence)
-        likeliest = int(np.argmax(self.evidence))
-        self.max_evidence = max(self.max_evidence, float(self.evidence[likeliest]))
-        if self.lost is None and self.evidence[likeliest] >= ALARM:
+        likeliest, most = self._add(last, now, before)
+        self.max_evidence = max(self.max_evidence, most)
+        if self.lost is None and most >= ALARM:
             self.lost = likeliest
         return self.lost
+
+    def _add(self, last: Array, now: Array, speeds_before: Array) -> tuple[int, float]:
+        """Add a sample's evidence; return which rotor is likeliest to be lost, and its evidence."""
+        found: tuple[int, float] = _add_evidence(
+            self.evidence,
+            last,
+            now,
+            speeds_before,
+            self.speeds,
+            self._interval_s,
+            self._signature,
+            self._residual,
+            self._noise,
+        )
+        return found
+
+
+@compiled
+def _followed(
+    speeds: Array, controls: tuple[float, float, float, float], open_v: float, lag: RotorLag, battery: Packed
+) -> Array:
+    """Return the rotor speeds (4,) one control sample after `controls`, on a battery with an open voltage."""
+    max_speed = terminal(open_v, speeds, battery)[0] / battery[0].full_voltage_v
+    commands = np.empty_like(speeds)
+    for i in range(speeds.shape[0]):
+        commands[i] = min(max(controls[i], lag.min_speed), max_speed)
+    return follow(speeds, commands, lag)
+
+
+@compiled
+def _add_evidence(
+    evidence: Array,
+    before: Array,
+    now: Array,
+    speeds_before: Array,
+    speeds: Array,
+    interval_s: float,
+    signature: Packed,
+    last: Array,
+    noise: Array,
+) -> tuple[int, float]:
+    """Add a sample to the CUSUMs, (4,); return the largest one's rotor, and what that has come to: see `_evidence`."""
+    sample = _evidence(before, now, speeds_before, speeds, interval_s, signature, last, noise)
+    likeliest = 0
+    for i in range(evidence.shape[0]):
+        evidence[i] = max(evidence[i] + sample[i], 0.0)
+        if evidence[i] > evidence[likeliest]:
+            likeliest = i
+    return likeliest, evidence[likeliest]
 
 
 @compiled
@@ -152,7 +197,7 @@ def _evidence(
     speeds_before: Array,
     speeds: Array,
     interval_s: float,
-    signature: Signature,
+    signature: Packed,
     last: Array,
     noise: Array,
 ) -> Array:
@@ -162,25 +207,26 @@ def _evidence(
     parts of the largest, (4,). `last` is the residual of the sample before, (4,), and `noise` the variances of what
     changes in it from sample to sample, (4,); both are carried on in place.
     """
+    of = signature[0]
     thrust_n = np.empty(4)
     h, h_rate = 0.0, 0.0
     for i in range(4):
         squared = 0.5 * (speeds_before[i] * speeds_before[i] + speeds[i] * speeds[i])
-        thrust_n[i] = signature.full_thrust_n[i] * squared
-        h += signature.momentum[i] * 0.5 * (speeds_before[i] + speeds[i])
-        h_rate += signature.momentum[i] * (speeds[i] - speeds_before[i]) / interval_s
-    ix, iy, iz = signature.inertia
+        thrust_n[i] = of.full_thrust_n[i] * squared
+        h += of.momentum[i] * 0.5 * (speeds_before[i] + speeds[i])
+        h_rate += of.momentum[i] * (speeds[i] - speeds_before[i]) / interval_s
+    ix, iy, iz = of.inertia[0], of.inertia[1], of.inertia[2]
     p, q, r = 0.5 * (before[3] + now[3]), 0.5 * (before[4] + now[4]), 0.5 * (before[5] + now[5])
     residual, expected = np.zeros(4), np.zeros(4)
     for i in range(3):
-        acceleration = (now[i] - before[i]) / interval_s + (signature.gravity_m_s2 if i == 2 else 0.0)
-        residual[0] += signature.mass_kg * acceleration * 0.5 * (before[6 + i] + now[6 + i])
+        acceleration = (now[i] - before[i]) / interval_s + (of.gravity_m_s2 if i == 2 else 0.0)
+        residual[0] += of.mass_kg * acceleration * 0.5 * (before[6 + i] + now[6 + i])
     residual[1] = ix * (now[3] - before[3]) / interval_s - (iy - iz) * q * r + q * h
     residual[2] = iy * (now[4] - before[4]) / interval_s - (iz - ix) * p * r - p * h
     residual[3] = iz * (now[5] - before[5]) / interval_s - (ix - iy) * p * q + h_rate
     for row in range(4):
         for i in range(4):
-            expected[row] += signature.effect[row, i] * thrust_n[i]
+            expected[row] += of.effect[row, i] * thrust_n[i]
         residual[row] -= expected[row]
         change = residual[row] - last[row]
         noise[row] += _NOISE_PART * (0.5 * change * change - noise[row])
@@ -188,13 +234,13 @@ def _evidence(
     evidence = np.zeros(4)
     for i in range(4):
         for row in range(4):
-            missing = signature.effect[row, i] * thrust_n[i]
+            missing = of.effect[row, i] * thrust_n[i]
             weak, none = residual[row] + _WEAK * missing, residual[row] + missing
             if row > 0:
                 minimum, maximum = _INERT * expected[row], _AGILE * expected[row]
                 if minimum > maximum:
                     minimum, maximum = maximum, minimum
                 weak -= min(max(weak, minimum), maximum)
-            evidence[i] += 0.5 * (weak * weak - none * none) / (signature.variances[row] + noise[row])
+            evidence[i] += 0.5 * (weak * weak - none * none) / (of.variances[row] + noise[row])
         evidence[i] = min(evidence[i], MAX_EVIDENCE)
     return evidence

@@ -7,7 +7,14 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple, Protocol
 
 from colibri.mavlink.hil.conductor import Parcel, StepMessage
-from colibri.mavlink.hil.state import ActuatorCommand, StateFrame, decode_actuators, decode_state
+from colibri.mavlink.hil.state import (
+    ActuatorCommand,
+    StateFrame,
+    decode_actuators,
+    decode_state,
+    read_actuators,
+    read_state,
+)
 from colibri.mavlink.hil.world_changes import WorldChange, encode_change
 from colibri.mavlink.wire.dialect import (
     AUTOPILOT_COMPONENT,
@@ -125,6 +132,8 @@ class LockstepSession:
         self._plant = plant
         self._autopilot = autopilot
         self._codec = Codec(system, AUTOPILOT_COMPONENT)
+        self._autopilot_source = bytes(self._codec.source)
+        self._truth_source = bytes((system, TRUTH_COMPONENT))
         self.acks: list[tuple[int, int]] = []
         self.trouble = Trouble()
         self._up, self._down = (Pipe(self.trouble, f"{seed} plant {way}") for way in ("up", "down"))
@@ -214,11 +223,14 @@ class LockstepSession:
         for other in others:
             self._read_acks(other)
         frame, true_state = parted(datagram)
-        messages = {message.name: message for message in self._codec.decode(true_state)}
-        truth = decode_state(messages["ATTITUDE_QUATERNION"], messages["LOCAL_POSITION_NED"])
+        truth = read_state(true_state, self._truth_source) or self._decoded_state(true_state)
         if truth is None:
             raise SessionError("the vehicle has no finite state any more")
         return frame, truth
+
+    def _decoded_state(self, true_state: bytes) -> StateFrame | None:
+        messages = {message.name: message for message in self._codec.decode(true_state)}
+        return decode_state(messages["ATTITUDE_QUATERNION"], messages["LOCAL_POSITION_NED"])
 
     def _read_acks(self, datagram: bytes) -> None:
         for message in self._codec.decode(datagram):
@@ -230,6 +242,9 @@ class LockstepSession:
             self.acks.append((number, result))
 
     def _command(self, answer: bytes) -> ActuatorCommand:
+        alone = read_actuators(answer, self._autopilot_source)
+        if alone is not None:
+            return alone
         for message in self._codec.decode(answer):
             command = decode_actuators(message) if message.name == "HIL_ACTUATOR_CONTROLS" else None
             if command is not None:

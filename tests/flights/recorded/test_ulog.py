@@ -217,9 +217,9 @@ def test_what_was_written_before_both_processes_are_killed_is_whole(tmp_path: Pa
 
 @pytest.mark.parametrize("feedback", ["state", "sensors"])
 def test_a_vehicle_of_ground_stations_leaves_its_parameters_and_state(tmp_path: Path, feedback: str) -> None:
-    stands = ["sitl", "--quiet", "--speed", "max", "--duration", "3", "--feedback", feedback, "--out", str(tmp_path)]
-    station = ["--gcs", "udpin:127.0.0.1:0"]
-    subprocess.run([sys.executable, "-m", "colibri", *stands, *station], check=True, timeout=PATIENCE_S)
+    ports = ["--plant-port", "0", "--gcs", "udpin:127.0.0.1:0"]
+    flies = ["--quiet", "--speed", "max", "--duration", "3", "--feedback", feedback, "--out", str(tmp_path)]
+    subprocess.run([sys.executable, "-m", "colibri", "sitl", *ports, *flies], check=True, timeout=PATIENCE_S)
     log = ULog(str(tmp_path / "0" / "flight.ulg"))
     assert not log.file_corruption
     assert "MPC_XY_CRUISE" in log.initial_parameters
