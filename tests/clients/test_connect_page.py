@@ -73,6 +73,7 @@ def test_mavsdk(tmp_path: Path) -> None:
         assert 4.8 < max(sight.height_m for sight in flown.seen.sights) < 5.1
 
 
+@pytest.mark.long
 def test_dronekit(tmp_path: Path) -> None:
     port = free_port()
     with vehicle(tmp_path, links=(f"udpout:127.0.0.1:{port}",), speed=SPEED) as flown:

@@ -96,6 +96,7 @@ def test_takeoff_and_land(tmp_path: Path) -> None:
         assert max_height_m == pytest.approx(takeoff_and_land.HEIGHT_M, abs=ACCEPTANCE_M)
 
 
+@pytest.mark.long
 def test_offboard_position(tmp_path: Path) -> None:
     with after("offboard_position", tmp_path) as flown:
         flown.seen.wait(lambda sight: sight.mode is Mode.HOLD, "hold")

@@ -91,6 +91,7 @@ def test_unsigned_badly_signed_and_replayed_frames_are_refused(tmp_path: Path, k
             assert change_speed(station) == ACCEPTED
 
 
+@pytest.mark.long
 def test_a_key_is_set_over_loopback_and_outlives_a_restart(tmp_path: Path) -> None:
     with GroundStation() as station:
         with vehicle(tmp_path, links=(station.url,), speed=4.0) as flown:

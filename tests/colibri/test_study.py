@@ -150,7 +150,9 @@ def test_a_table_has_a_row_for_each_name_and_columns_for_each_group(short: Flown
     assert rows == [("a", "1", "ag", "1", "ah"), ("b", "1", "bg", "1", "bh")]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in ("recovery", "limits") else pytest.mark.long) for name in NAMES]
+)
 def test_figures_and_tables_are_written(name: str, short: Flown, tmp_path: Path) -> None:
     study = of_name(name)
     flown = [moved(short, to_t_s=30.0, by_m=0.1)] * len(study.cases)
@@ -188,6 +190,7 @@ _LEVEL: Settings = {
 """Its height changes by a hundredth of a millimetre."""
 
 
+@pytest.mark.long
 def test_a_study_from_the_command_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -25,6 +25,7 @@ def test_output_that_nobody_reads_is_no_traceback() -> None:
     assert (done.returncode, done.stderr) == (1, "")
 
 
+@pytest.mark.long
 def test_a_home_that_cannot_be_written_to_is_not_spoken_of(tmp_path: Path) -> None:
     """By matplotlib, which would; what it makes is kept for the next time."""
     home, temporary = tmp_path / "home", tmp_path / "temporary"

@@ -153,6 +153,7 @@ def _write(folder: Path, factor: float, argument: str = "Number") -> None:
     (folder / "caller.py").write_text(CALLER.format(argument=argument))
 
 
+@pytest.mark.long
 def test_machine_code_is_renewed_with_a_kernel_that_it_calls_and_with_the_types_of_its_arguments(
     tmp_path: Path,
 ) -> None:
@@ -163,6 +164,7 @@ def test_machine_code_is_renewed_with_a_kernel_that_it_calls_and_with_the_types_
     assert said == ["4.0 0", "4.0 1", "9.0 0", "9.0 0"]
 
 
+@pytest.mark.long
 def test_machine_code_of_one_version_is_not_run_by_the_index_of_another(tmp_path: Path) -> None:
     """As two processes leave it that write at once."""
     _write(tmp_path, 2.0)
@@ -176,6 +178,7 @@ def test_machine_code_of_one_version_is_not_run_by_the_index_of_another(tmp_path
     assert [_run(tmp_path).stdout for _ in range(2)] == ["9.0 0\n", "9.0 1\n"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("trusted", [True, False], ids=["private", "open to others"])
 def test_where_neither_package_nor_home_can_be_written_to_machine_code_is_kept_privately_or_not_at_all(
     tmp_path: Path, *, trusted: bool

@@ -18,7 +18,6 @@ FEW = ("at-its-limits-in-gusts", "lemniscate-on-sensors", "wave-by-global-lpv-mp
 """Those that showed a difference of kernels first, and others of other parts."""
 FEWER = ("at-its-limits-in-gusts", "wave-by-global-lpv-mpc")
 ALL = {variation.name: variation for variation in variations()}
-FEW_VARIATIONS = ("openblas-nehalem", "glibc-without-avx2-and-fma")
 
 
 def check(variation: Variation, flown: Flown) -> None:
@@ -43,7 +42,9 @@ def test_a_few_golden_flights_are_what_they_were(tmp_path: Path) -> None:
 
 
 @begins_as_recorded
-@pytest.mark.parametrize("name", FEW_VARIATIONS)
+@pytest.mark.parametrize(
+    "name", ["openblas-nehalem", pytest.param("glibc-without-avx2-and-fma", marks=pytest.mark.long)]
+)
 def test_fewer_are_the_same_under_a_few_variations(tmp_path: Path, name: str) -> None:
     check(ALL[name], fly_here(ALL[name], tmp_path, only=FEWER))
 

@@ -186,6 +186,7 @@ def peak_bytes(plan: FlightPlan) -> int:
         tracemalloc.stop()
 
 
+@pytest.mark.long
 def test_memory_hardly_grows_with_the_flight(plan: FlightPlan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     in_blocks(monkeypatch, 1 << 14)
     monkeypatch.setattr(figure_series, "MAX_POINTS", 1 << 10)

@@ -48,6 +48,7 @@ def rows(out: Path, least: int) -> int:
     return count
 
 
+@pytest.mark.long
 def test_it_is_interrupted_and_goes_on_though_a_worker_is_killed(tmp_path: Path, expected: tuple[str, str]) -> None:
     out = tmp_path / "out"
     with begin(out, "--workers", "1") as first:

@@ -47,7 +47,13 @@ def tried(law: type[laws.Good], area: str) -> Conformance:
     return colibri.check_controller(law, only=[area], duration=SHORT_S)
 
 
-@pytest.mark.parametrize("name", controller_names())
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name == colibri.load_profile("flight").controller else pytest.mark.long)
+        for name in controller_names()
+    ],
+)
 def test_laws_that_come_along_satisfy_it(name: str) -> None:
     found = colibri.check_controller(name, duration=SHORT_S, only=WITHOUT_FLIGHTS if name == FAILS else ())
     assert found.failures == ""

@@ -266,7 +266,8 @@ def test_who_does_not_fly_does_not_load_what_flies(pytester: pytest.Pytester) ->
     assert not [line for line in result.outlines if line.startswith("sitl:")]
 
 
-@pytest.mark.parametrize("link", ["memory", pytest.param("udp", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("link", ["memory", "udp"])
 def test_the_docs_first_test_in_a_strangers_folder(tmp_path: Path, link: str) -> None:
     """The wheel alone, in a folder that knows nothing of this repository; only what is compiled is compiled already."""
     site, stranger = tmp_path / "site", tmp_path / "stranger"
@@ -282,13 +283,8 @@ def test_the_docs_first_test_in_a_strangers_folder(tmp_path: Path, link: str) ->
     assert "sitl: 3 flights" in result.stdout
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        (str(Path(sys.executable).parent / "pytest"),),
-        pytest.param((sys.executable, "-m", "pytest"), marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("command", [(str(Path(sys.executable).parent / "pytest"),), (sys.executable, "-m", "pytest")])
 def test_a_stranger_who_has_packages_of_the_same_names_flies(tmp_path: Path, command: tuple[str, ...]) -> None:
     """Nothing of what a stranger may call `tools`, `plant`, `mavlink` or `autopilot` is in the way."""
     for package in ("tools", "mavlink", "autopilot"):

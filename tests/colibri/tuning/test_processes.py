@@ -76,6 +76,7 @@ class Joined(Watcher):
             wait_for(self._folder, '"process":1', 1)
 
 
+@pytest.mark.long
 def test_a_second_process_joins(tmp_path: Path) -> None:
     watcher = Joined(tmp_path)
     fly_tuning(planned(trials=TRIALS), Here, tmp_path / "out", watcher=watcher)

@@ -130,6 +130,7 @@ def test_a_trial_that_is_clearly_worse_ends_early(tmp_path: Path) -> None:
         assert trial.values[0] == pytest.approx(values.mean(), rel=0.05)
 
 
+@pytest.mark.long
 def test_several_objectives_have_a_pareto_front(tmp_path: Path) -> None:
     results = tuned(tmp_path, trials=8, objectives={"rmse_m": "mean", "effort_n_m": {"quantile": 0.9}})
     assert len(results.front) > 1

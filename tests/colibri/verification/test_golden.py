@@ -160,6 +160,7 @@ def test_what_does_not_go_together_is_refused_in_one_line(
     assert error.count("\n") == 1
 
 
+@pytest.mark.long
 def test_both_kinds_of_flight_are_the_same_over_udp(tmp_path: Path) -> None:
     for flight in (SHORT, HOP):
         flown = [golden.fly_golden(flight, tmp_path / flight.name / link, link) for link in ("memory", "udp")]

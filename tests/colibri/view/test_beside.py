@@ -30,7 +30,7 @@ def unwatched() -> str:
     return fly("lemniscate", duration=DURATION_S, link="memory").sha256
 
 
-@pytest.mark.parametrize("behave", [hangs, leaves])
+@pytest.mark.parametrize("behave", [hangs, pytest.param(leaves, marks=pytest.mark.long)])
 def test_a_flight_beside_its_page_is_the_same(
     unwatched: str, behave: Callable[[ClientConnection], None], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

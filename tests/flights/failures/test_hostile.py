@@ -6,6 +6,7 @@ The long version is `python -m tools.fuzz`.
 import random
 from typing import Any
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
@@ -94,6 +95,7 @@ UnderFire.TestCase.settings = settings(max_examples=6, stateful_step_count=18)
 TestUnderFire = UnderFire.TestCase
 
 
+@pytest.mark.long
 def test_messages_by_the_thousand_in_every_mode() -> None:
     outcome = ground_campaign(10_000, seed=1)
     assert outcome.failures == []

@@ -120,6 +120,7 @@ def waiting_ports(autopilot: Process) -> list[int]:
     return [int(url.rpartition(":")[2]) for url in urls if url.partition(":")[0] in ("udpin", "tcpin")]
 
 
+@pytest.mark.long
 def test_a_flood_ends_no_flight(logs: Path) -> None:
     with hovering(logs, "udpin:127.0.0.1:0") as (_, autopilot, seen, _):
         (port,) = waiting_ports(autopilot)

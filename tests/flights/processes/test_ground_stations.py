@@ -72,6 +72,7 @@ def test_a_flight_is_paced_to_the_wall_clock_once_somebody_may_watch(tmp_path: P
     assert report["wall_time_s"] > 1.4
 
 
+@pytest.mark.long
 def test_a_ground_station_may_take_over(tmp_path: Path) -> None:
     """A track is a mode like any other: another one can be chosen."""
     station = Station(255, orders=[HOLD])

@@ -31,6 +31,7 @@ def test_what_was_changed_is_said_before_the_flight(tmp_path: Path, capsys: pyte
     assert f"{tmp_path / 'points.csv'}: {said}\n" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_floor_reaches_the_autopilot_and_its_replay(tmp_path: Path) -> None:
     name, options = written(tmp_path, DIPS), ("--floor", "1", "--duration", "8", "--quiet", "--no-figures")
     for link in ("udp", "memory"):

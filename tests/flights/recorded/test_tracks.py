@@ -142,6 +142,7 @@ def test_what_has_no_end_goes_on_beyond_100_s(tmp_path: Path) -> None:
     assert flown["t"][-1] == pytest.approx(105.0)
 
 
+@pytest.mark.long
 def test_options_and_a_file_reach_the_autopilot_over_udp(tmp_path: Path) -> None:
     """With every figure drawn: a name may hold what matplotlib and rich would take for markup."""
     path = tmp_path / "points $x$ [red].csv"

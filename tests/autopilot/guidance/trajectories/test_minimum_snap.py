@@ -67,7 +67,7 @@ def test_every_derivative_up_to_twice_its_order_less_two_is_continuous(order: in
     assert np.abs(before - after).max() > 1.0, "the next one jumps"
 
 
-@pytest.mark.parametrize("order", [SNAP, ACCELERATION])
+@pytest.mark.parametrize("order", [pytest.param(SNAP, marks=pytest.mark.long), ACCELERATION])
 def test_no_other_way_through_the_points_costs_less(order: int) -> None:
     """What is added is zero, with its derivatives below `order`, at both ends, and passes zero at every point."""
     best = minimise(order, TIMES_S, POINTS)

@@ -55,6 +55,7 @@ def cluster(tmp_path: Path) -> Iterator[Processes]:
         yield Processes(stack, tmp_path / "dask")
 
 
+@pytest.mark.long
 def test_it_is_the_same_table_though_a_worker_is_killed(tmp_path: Path, cluster: Processes) -> None:
     campaign = planned(fly={"duration": 0.6}, seeds=SEEDS, draw={MASS: {"uniform": [0.68, 0.74]}})
     fly_campaign(campaign, Here(), tmp_path / "here")
