@@ -27,6 +27,9 @@ class Forecaster:
         self._mass_kg = vehicle.body.mass_kg
         self._gravity_m_s2 = vehicle.gravity_m_s2
         self._interval_s = interval_s
+        if columns is not None:  # compiled before it flies
+            plan = np.zeros((2, 1 + max(columns)))
+            _motion(np.zeros(6), plan, columns, np.zeros(1), self._mass_kg, self._gravity_m_s2, interval_s)
 
     def forecast(self, state: VehicleState, references: Horizon | None, how: Diagnostics) -> tuple[Forecast, ...]:
         """Return points of the plan, the last at its end; of the references where the law predicts no attitude."""
