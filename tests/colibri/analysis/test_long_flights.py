@@ -78,6 +78,7 @@ def test_instants_are_the_same_to_the_microsecond() -> None:
     assert not at_times(instants_s, np.empty(0)).any()
 
 
+@pytest.mark.long
 def test_parts_joined_are_the_flight_to_the_bit(plan: FlightPlan, monkeypatch: pytest.MonkeyPatch) -> None:
     in_blocks(monkeypatch, ALL_ROWS)
     whole, (as_one,) = read_recording(plan), FlightReader(plan)

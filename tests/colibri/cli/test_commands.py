@@ -165,6 +165,7 @@ def test_figures_are_drawn_of_what_a_flight_left(tmp_path: Path, capsys: pytest.
     assert "provenance.json is missing" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_figures_that_find_no_room_are_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

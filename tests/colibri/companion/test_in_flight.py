@@ -75,6 +75,7 @@ def test_it_arms_takes_off_flies_a_track_and_hands_over(flights: Flights) -> Non
     assert gaps_us == {8_000}
 
 
+@pytest.mark.long
 def test_it_flies_a_fast_track_over_a_bad_link(flights: Flights) -> None:
     sitl = flights.begin(feedback="sensors", turbulence="light", seed=2)
     settings = CompanionSettings(may_arm=True, duration_s=4.0)

@@ -91,6 +91,7 @@ def test_a_second_process_joins(tmp_path: Path) -> None:
     assert [int(row.split(",")[0]) for row in rows] == list(range(TRIALS))
 
 
+@pytest.mark.long
 def test_it_is_interrupted_and_says_how_to_go_on(tmp_path: Path) -> None:
     with begin(tmp_path) as first:
         wait_for(tmp_path, '"pruned"', 1)

@@ -46,6 +46,7 @@ def test_a_sudden_bias_is_learned_and_its_end_too(bias: Vector, seed: int) -> No
     assert not flight.client.said("lost")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "bias",
     [(0.02, 0.0, 0.0), *(pytest.param(more, marks=pytest.mark.long) for more in ((0.0, -0.1, 0.0), (0.2, 0.2, 0.1)))],

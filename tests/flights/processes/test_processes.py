@@ -47,6 +47,7 @@ def test_a_bad_link_does_not_change_the_flight(tmp_path: Path, logs: Path) -> No
     assert plant.errors() + autopilot.errors() == ""
 
 
+@pytest.mark.long
 def test_the_autopilot_may_start_first(tmp_path: Path, logs: Path) -> None:
     free, url = start_plant(logs, tmp_path / "unused")
     free.kill()
@@ -105,6 +106,7 @@ def test_a_killed_plant_is_missed_and_replaced(tmp_path: Path, logs: Path) -> No
     assert (states(tmp_path / "second") == states(tmp_path / "alone")).all()
 
 
+@pytest.mark.long
 def test_an_autopilot_at_another_rate_is_told(tmp_path: Path, logs: Path) -> None:
     profile = tmp_path / "slow.toml"
     text = (Path(__file__).parents[3] / "autopilot" / "profiles" / "thesis.toml").read_text(encoding="utf-8")
