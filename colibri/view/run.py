@@ -4,6 +4,7 @@ import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
+from math import inf
 from pathlib import Path
 from threading import Event, Thread
 from time import perf_counter, sleep
@@ -26,7 +27,11 @@ FRAMES_HZ = 30.0
 EXPORT_HZ, EXPORT_FRAMES = 15.0, 6000
 """Of a page that is written to a file; of a long flight fewer a second."""
 WORDS_HZ = 5.0
-"""How often words, time line and plots change: an eye reads no faster."""
+"""How often words and time line change: an eye reads no faster."""
+PLOTS_HZ = 2.0
+"""How often plots change, which are sent whole, and drawn anew: their mark moves by a pixel or two."""
+DRAWN_AFTER_S = 1.0
+"""A browser that has come draws words and plots first: a scene that moves meanwhile would hold it up."""
 
 
 class Show:
@@ -45,14 +50,18 @@ class Show:
         self._sources = sources
         self._order = order
         self.playback = Playback((min(begin_s), max(end_s)), now_s, min(begin_s))
-        self._words_at_s = now_s
+        self._words_at_s = self._plots_at_s = now_s
+        self._plays_at_s: float | None = None
         self._shown: object = None
-        self._is_told = self._was_watched = False
+        self._is_told = self._is_plotted = False
 
     def turn(self, now_s: float) -> None:
         """Do what was asked for, and show what is now."""
-        if self._page.watched and not self._was_watched:
-            self._was_watched = True
+        if self._plays_at_s is None and self._page.watched:
+            self._plays_at_s = now_s + DRAWN_AFTER_S
+        if self._plays_at_s is not None and now_s >= self._plays_at_s:
+            self._plays_at_s = inf
+            self._page.reveal()
             self.playback = self.playback.play(now_s)
         for done in self._page.done():
             self._shown = None
@@ -70,12 +79,15 @@ class Show:
         if time_s != self._shown:
             self._shown = time_s
             self._page.show([source.at(time_s) for source in self._sources])
-            self._is_told = False
+            self._is_told = self._is_plotted = False
         if not self._is_told and now_s >= self._words_at_s:
             self._words_at_s = now_s + 1.0 / WORDS_HZ
             self._is_told = True
             plays = self.playback.plays and not self.playback.is_over(now_s)
             self._page.tell([source.at(time_s) for source in self._sources], time_s, plays)
+        if not self._is_plotted and now_s >= self._plots_at_s:
+            self._plots_at_s = now_s + 1.0 / PLOTS_HZ
+            self._is_plotted = True
             self._page.plot(time_s, anew=live)
 
 

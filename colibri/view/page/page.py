@@ -49,7 +49,7 @@ class Page:
         live = self._sources[0].is_live
         extent_m = _LIVE_EXTENT_M if live else extent_m
         self._ground_m = min(each.ground_m for each in around)
-        self._world = scene.add_frame("/world", show_axes=False)
+        self._world = scene.add_frame("/world", show_axes=False, visible=False)
         add_ground(scene, self._ground_m, extent_m)
         self._scale = vehicle_scale(extent_m, self._sources[0].airframe)
         self._vehicles = self._built()
@@ -70,6 +70,10 @@ class Page:
     def watched(self) -> bool:
         """Whether a browser shows it."""
         return bool(self.server.get_clients())
+
+    def reveal(self) -> None:
+        """Show the scene, of which a browser draws nothing before."""
+        self._world.visible = True
 
     def done(self) -> Iterator[Done]:
         """Yield what was done since last asked; what concerns only the picture is taken care of."""
@@ -122,6 +126,7 @@ class Page:
 
     def recorded_html(self, times_s: Sequence[float]) -> str:
         """Return the scene at some times, one after the other at their pace, as a page that needs no server."""
+        self.reveal()
         serializer = self.server.get_scene_serializer()
         before_s = times_s[0]
         for time_s in times_s:

@@ -17,12 +17,12 @@ from colibri.sitl.vehicle import Sitl
 from colibri.view.access import Token
 from colibri.view.modes import CHOICES, PX4
 from colibri.view.page.page import Page
-from colibri.view.run import Show, read_flights
+from colibri.view.run import DRAWN_AFTER_S, Show, read_flights
 from colibri.view.snapshot import Source
 from tools.pages.pictures.chromium import Tab, chromium
 from tools.pages.pictures.watched import Watched
 
-FRAME_S = 0.1
+FRAME_S, PLOTTED_AGAIN = 0.1, 8
 DRAWN_AFTER_MS = 15000
 """Without a GPU a picture takes a second, and what is sent last has to be in it."""
 COLOURS = 160
@@ -97,7 +97,7 @@ def keep(path: Path, sources: Sequence[Source], time_s: float, *, commands: bool
     if commands:
         page.offer_commands(TOKEN, lambda: CHOICES[PX4])
     begin_s = time_s if sources[0].is_live else 0.0
-    show = Show(page, sources, begin_s)
+    show = Show(page, sources, begin_s - DRAWN_AFTER_S)
     try:
         with chromium() as tab:
             Tab(tab, page.url)
@@ -106,9 +106,10 @@ def keep(path: Path, sources: Sequence[Source], time_s: float, *, commands: bool
             if commands:
                 tab.locator("input.mantine-TextInput-input").last.fill(TOKEN.text)
                 tab.get_by_role("button", name="Unlock").click()
+            show.turn(begin_s - DRAWN_AFTER_S)
             show.turn(begin_s)
             show.playback = show.playback.seek(time_s, begin_s).pause(begin_s)
-            for frame in range(5):
+            for frame in range(PLOTTED_AGAIN):
                 show.turn(begin_s + frame * FRAME_S)
             tab.wait_for_timeout(DRAWN_AFTER_MS)
             png = tab.screenshot()
