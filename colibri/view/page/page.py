@@ -7,7 +7,7 @@ import numpy as np
 
 from colibri.common.types import Vector
 from colibri.view.access import HOST, Token
-from colibri.view.geometry import bounds, ground_point, vehicle_scale
+from colibri.view.geometry import bounds, ground_point, outline, vehicle_scale
 from colibri.view.page.commands import Commands
 from colibri.view.page.controls import Controls, Done, words
 from colibri.view.page.plots import Plots
@@ -16,8 +16,8 @@ from colibri.view.page.server import serve, stop
 from colibri.view.snapshot import Snapshot, Source
 
 _LEFT_PX, _RIGHT_PX = 290.0, 380.0
-_LIVE_EXTENT_M = 8.0
-"""Half of the side of what is looked at of a vehicle whose way is not known yet."""
+_LIVE_EXTENT_M, _LIVE_MARGIN = 8.0, 1.2
+"""Half of the side of what is looked at of a vehicle whose way is not known yet; how much more than its plans is."""
 
 
 class Page:
@@ -45,9 +45,9 @@ class Page:
         gui, scene = self.server.gui, self.server.scene
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         around = [source.surroundings for source in self._sources]
-        middle, extent_m = bounds([path for each in around for path in (each.path, each.reference_path)])
+        middle, extent_m = bounds([points for each in around for points in outline(each)])
         live = self._sources[0].is_live
-        extent_m = _LIVE_EXTENT_M if live else extent_m
+        extent_m = max(extent_m, _LIVE_EXTENT_M if live else 0.0)
         self._ground_m = min(each.ground_m for each in around)
         self._world = scene.add_frame("/world", show_axes=False, visible=False)
         add_ground(scene, self._ground_m, extent_m)
@@ -71,8 +71,15 @@ class Page:
         """Whether a browser shows it."""
         return bool(self.server.get_clients())
 
-    def reveal(self) -> None:
-        """Show the scene, of which a browser draws nothing before."""
+    def reveal(self, snapshots: Sequence[Snapshot] = ()) -> None:
+        """Show the scene, of which browsers draw nothing before; whatever is known of a live vehicle is in sight."""
+        if snapshots and self._sources[0].is_live:
+            known = [points for source in self._sources for points in outline(source.surroundings)]
+            middle, extent_m = bounds([*known, *(now.trail for now in snapshots)])
+            self._look(middle, max(_LIVE_MARGIN * extent_m, _LIVE_EXTENT_M))
+            for client in self.server.get_clients().values():
+                client.camera.position = self.server.initial_camera.position
+                client.camera.look_at = self.server.initial_camera.look_at
         self._world.visible = True
 
     def done(self) -> Iterator[Done]:

@@ -89,7 +89,7 @@ class Recorder:
         self.waiting: list[object] = []
         self.plotted: list[float] = []
 
-    def reveal(self) -> None:
+    def reveal(self, _snapshots: object) -> None:
         self.revealed = True
 
     def done(self) -> list[object]:
