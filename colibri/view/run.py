@@ -62,6 +62,7 @@ class Show:
         if self._plays_at_s is not None and now_s >= self._plays_at_s:
             self._plays_at_s = inf
             self._page.reveal([source.at(now_s) for source in self._sources])
+            self._shown = None
             self.playback = self.playback.play(now_s)
         for done in self._page.done():
             self._shown = None

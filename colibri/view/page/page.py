@@ -47,15 +47,14 @@ class Page:
         around = [source.surroundings for source in self._sources]
         middle, extent_m = bounds([points for each in around for points in outline(each)])
         live = self._sources[0].is_live
-        extent_m = max(extent_m, _LIVE_EXTENT_M if live else 0.0)
+        self._extent_m = max(extent_m, _LIVE_EXTENT_M if live else 0.0)
         self._ground_m = min(each.ground_m for each in around)
-        self._world = scene.add_frame("/world", show_axes=False, visible=False)
-        add_ground(scene, self._ground_m, extent_m)
-        self._scale = vehicle_scale(extent_m, self._sources[0].airframe)
-        self._vehicles = self._built()
-        self._around = [SurroundingsScene(scene, number) for number in range(len(self._sources))]
+        self._world = scene.add_frame("/world", show_axes=False)
+        self._scale = vehicle_scale(self._extent_m, self._sources[0].airframe)
+        self._vehicles: list[VehicleScene] = []
+        self._around: list[SurroundingsScene] = []
         self._follows = False
-        self._look(middle, extent_m)
+        self._look(middle, self._extent_m)
         begin_s, end_s = zip(*(source.span_s for source in self._sources), strict=True)
         self.controls = Controls(gui, None if live else (min(begin_s), max(end_s)), self._scale)
         gui.main_panel.dock_left()
@@ -72,7 +71,9 @@ class Page:
         return bool(self.server.get_clients())
 
     def reveal(self, snapshots: Sequence[Snapshot] = ()) -> None:
-        """Show the scene, of which browsers draw nothing before; whatever is known of a live vehicle is in sight."""
+        """Begin the scene, of which browsers have nothing before; whatever is known of a live vehicle is in sight."""
+        if self._vehicles:
+            return
         if snapshots and self._sources[0].is_live:
             known = [points for source in self._sources for points in outline(source.surroundings)]
             middle, extent_m = bounds([*known, *(now.trail for now in snapshots)])
@@ -80,7 +81,9 @@ class Page:
             for client in self.server.get_clients().values():
                 client.camera.position = self.server.initial_camera.position
                 client.camera.look_at = self.server.initial_camera.look_at
-        self._world.visible = True
+        add_ground(self.server.scene, self._ground_m, self._extent_m)
+        self._around = [SurroundingsScene(self.server.scene, number) for number in range(len(self._sources))]
+        self._vehicles = self._built()
 
     def done(self) -> Iterator[Done]:
         """Yield what was done since last asked; what concerns only the picture is taken care of."""
@@ -93,14 +96,16 @@ class Page:
                 self._scale = float(done.value)
                 for vehicle in self._vehicles:
                     vehicle.remove()
-                self._vehicles = self._built()
+                self._vehicles = self._built() if self._vehicles else []
             elif done.what == "follow":
                 self._follows = bool(done.value)
                 self._world.position = (0.0, 0.0, 0.0)
             yield done
 
     def show(self, snapshots: Sequence[Snapshot]) -> None:
-        """Show each vehicle as it is now."""
+        """Show each vehicle as it is now, once the scene has begun."""
+        if not self._vehicles:
+            return
         layers = self.controls.layers
         with self.server.atomic():
             for vehicle, around, source, now in zip(

@@ -124,9 +124,9 @@ def test_buttons_play_pause_seek_and_change_the_speed(recorded: RecordedFlight) 
     show.turn(11.6)
     page.waiting = [Done("seek", 0.3)]
     show.turn(12.0)
-    assert page.shown == pytest.approx([0.0, 0.5, 1.0, 1.25, 0.3], abs=0.01)
-    assert page.plays == [False, True, True, False, False]
-    assert page.plotted == pytest.approx([0.0, 0.5, 1.0, 1.25, 0.3], abs=0.01)
+    assert page.shown == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.25, 0.3], abs=0.01)
+    assert page.plays == [False, True, True, True, False, False]
+    assert page.plotted == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.25, 0.3], abs=0.01)
 
 
 def test_an_export_needs_nothing_else(flight: Flight, tmp_path: Path) -> None:
