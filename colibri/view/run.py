@@ -19,6 +19,7 @@ from colibri.view.live import LiveVehicle
 from colibri.view.modes import CHOICES
 from colibri.view.observer import Observer
 from colibri.view.page.page import Page
+from colibri.view.page.server import PageServer, serve
 from colibri.view.playback import Playback, speed_of
 from colibri.view.recorded import RecordedFlight
 from colibri.view.snapshot import Source, ViewError
@@ -92,15 +93,16 @@ class Show:
             self._page.plot(time_s, anew=live)
 
 
-def show_recorded(folders: Sequence[Path], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
+def play(folders: Sequence[Path], server: PageServer) -> None:
     """Show flights that were flown, until interrupted.
 
     Raises:
-        ViewError: One cannot be read, or the port is taken.
+        ViewError: One cannot be read.
     """
     with ExitStack() as held:
         flights = read_flights(folders, held)
-        serve_until_stopped(flights, port, browser=browser, say=say)
+        page = Page(flights, server)
+        _keep_showing(Show(page, flights, perf_counter()), Stop().__bool__)
 
 
 def export(folders: Sequence[Path], path: Path) -> None:
@@ -114,7 +116,7 @@ def export(folders: Sequence[Path], path: Path) -> None:
         begin_s, end_s = zip(*(flight.span_s for flight in flights), strict=True)
         first_s, last_s = min(begin_s), max(end_s)
         count = min(max(2, round(EXPORT_HZ * (last_s - first_s))), EXPORT_FRAMES)
-        page = Page(flights, 0)
+        page = Page(flights, serve(0, "Colibri"))
         held.callback(page.close)
         html = page.recorded_html(np.linspace(first_s, last_s, count).tolist())
     try:
@@ -148,7 +150,11 @@ def show_live(url: str, port: int, *, browser: bool, say: Callable[[str], None])
     """
     vehicle = LiveVehicle(url)
     try:
-        serve_until_stopped([vehicle], port, browser=browser, say=say)
+        page, show = _begin(vehicle, port, browser=browser, say=say)
+        try:
+            _keep_showing(show, Stop().__bool__)
+        finally:
+            page.close()
     finally:
         vehicle.close()
 
@@ -179,7 +185,7 @@ def page_beside(say: Callable[[str], None]) -> Iterator[str]:
     vehicle = LiveVehicle("udpin:127.0.0.1:0", name="vehicle")
     ends = Event()
     try:
-        page, show = _begin([vehicle], 0, browser=True, say=say)
+        page, show = _begin(vehicle, 0, browser=True, say=say)
         thread = Thread(target=_keep_showing, args=(show, ends.is_set), daemon=True)
         thread.start()
         try:
@@ -192,30 +198,13 @@ def page_beside(say: Callable[[str], None]) -> Iterator[str]:
         vehicle.close()
 
 
-def serve_until_stopped(sources: Sequence[Source], port: int, *, browser: bool, say: Callable[[str], None]) -> None:
-    """Serve the page of some sources; say its address first, and for a live vehicle the token of its commands.
-
-    Raises:
-        ViewError: The port is taken.
-    """
-    page, show = _begin(sources, port, browser=browser, say=say)
-    stop = Stop()
-    try:
-        _keep_showing(show, stop.__bool__)
-    finally:
-        page.close()
-
-
-def _begin(sources: Sequence[Source], port: int, *, browser: bool, say: Callable[[str], None]) -> tuple[Page, Show]:
-    page = Page(sources, port)
+def _begin(live: LiveVehicle, port: int, *, browser: bool, say: Callable[[str], None]) -> tuple[Page, Show]:
+    page = Page([live], serve(port, "Colibri"))
     say(page.url)
-    show = Show(page, sources, perf_counter())
-    live = sources[0]
-    if isinstance(live, LiveVehicle):
-        token = Token.new()
-        say(f"token for commands: {token.text}")
-        page.offer_commands(token, lambda: CHOICES.get(live.autopilot or 0, ()))
-        show = Show(page, sources, perf_counter(), partial(pass_on, live))
+    token = Token.new()
+    say(f"token for commands: {token.text}")
+    page.offer_commands(token, lambda: CHOICES.get(live.autopilot or 0, ()))
+    show = Show(page, [live], perf_counter(), partial(pass_on, live))
     if browser:
         webbrowser.open(page.url)
     return page, show

@@ -6,13 +6,13 @@ from queue import Empty
 import numpy as np
 
 from colibri.common.types import Vector
-from colibri.view.access import HOST, Token
+from colibri.view.access import Token
 from colibri.view.geometry import bounds, ground_point, outline, vehicle_scale
 from colibri.view.page.commands import Commands
 from colibri.view.page.controls import Controls, Done, words
 from colibri.view.page.plots import Plots
 from colibri.view.page.scene import SurroundingsScene, VehicleScene, add_ground
-from colibri.view.page.server import serve, stop
+from colibri.view.page.server import PageServer, address, stop
 from colibri.view.snapshot import Snapshot, Source
 
 _LEFT_PX, _RIGHT_PX = 290.0, 380.0
@@ -29,16 +29,12 @@ class Page:
         controls: What it was told.
     """
 
-    def __init__(self, sources: Sequence[Source], port: int) -> None:
-        """Serve it on a port of loopback, 0 for one that is free.
-
-        Raises:
-            ViewError: The port is taken.
-        """
+    def __init__(self, sources: Sequence[Source], server: PageServer) -> None:
+        """Put it on a server."""
         self._sources = sources
         self._names = [source.name for source in sources]
-        self.server = serve(port, "Colibri")
-        self.url = f"http://{HOST}:{self.server.get_port()}"
+        self.server = server
+        self.url = address(server)
         self._set_up()
 
     def _set_up(self) -> None:
@@ -78,9 +74,9 @@ class Page:
             known = [points for source in self._sources for points in outline(source.surroundings)]
             middle, extent_m = bounds([*known, *(now.trail for now in snapshots)])
             self._look(middle, max(_LIVE_MARGIN * extent_m, _LIVE_EXTENT_M))
-            for client in self.server.get_clients().values():
-                client.camera.position = self.server.initial_camera.position
-                client.camera.look_at = self.server.initial_camera.look_at
+        for client in self.server.get_clients().values():  # they may have come before it was known where to look
+            client.camera.position = self.server.initial_camera.position
+            client.camera.look_at = self.server.initial_camera.look_at
         add_ground(self.server.scene, self._ground_m, self._extent_m)
         self._around = [SurroundingsScene(self.server.scene, number) for number in range(len(self._sources))]
         self._vehicles = self._built()

@@ -25,6 +25,7 @@ from colibri.view.live import LiveVehicle
 from colibri.view.modes import CHOICES, PX4
 from colibri.view.observer import Observer
 from colibri.view.page.page import Page
+from colibri.view.page.server import serve
 from colibri.view.run import DRAWN_AFTER_S, Show, read_flights
 from colibri.view.snapshot import Source
 from tools.pages.pictures.chromium import Tab, chromium
@@ -152,7 +153,7 @@ def wait(until: Callable[[], object]) -> None:
 
 def keep(path: Path, sources: Sequence[Source], time_s: float | Callable[[], float], *, commands: bool = False) -> None:
     """Write what the page shows at a time, which may be asked for once a browser is there."""
-    page = Page(sources, 0)
+    page = Page(sources, serve(0, "Colibri"))
     if commands:
         page.offer_commands(TOKEN, lambda: CHOICES[PX4])
     try:

@@ -9,6 +9,7 @@ from PIL import Image
 
 from colibri.experiments.flight import fly
 from colibri.view.page.page import Page
+from colibri.view.page.server import serve
 from colibri.view.recorded import RecordedFlight
 from colibri.view.run import Show
 
@@ -26,7 +27,7 @@ def recorded() -> Iterator[RecordedFlight]:
 
 @pytest.fixture
 def page(recorded: RecordedFlight) -> Iterator[Page]:
-    begun = Page([recorded], 0)
+    begun = Page([recorded], serve(0, "Colibri"))
     yield begun
     begun.close()
 
